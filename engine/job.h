@@ -1,0 +1,145 @@
+// What the user decides: material, slabs, machine, tools, tolerances, strategy. Every default plans a 0.75 in MDF
+// pattern on the 1160 mm machine of the RPM paper. Millimetres, newtons, seconds and millimetres a minute, unless a
+// name says otherwise. The TOML spelling of every key is io/job_toml.
+#pragma once
+
+#include <cstdint>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "kernels/features/features.h"
+
+namespace slabwright {
+
+enum class LengthUnit : std::uint8_t { mm, inch };
+enum class LayerStrategy : std::uint8_t { printed, optimal };
+enum class Frame : std::uint8_t { pattern_base, layer_top };
+enum class ToolKind : std::uint8_t { flat, ball, face, drill };
+
+inline constexpr double kInch = 25.4;
+
+/// A cutter as the machine's magazine holds it.
+struct Tool {
+    int number = 0;  ///< T number, 1…
+    ToolKind kind = ToolKind::flat;
+    std::string name;
+    double diameter = 0;
+    double flute_length = 0;
+    double shank_diameter = 0;
+    double stickout = 0;         ///< from the holder's nose to the tip
+    double holder_diameter = 0;  ///< of the holder's nose
+    int flutes = 2;
+    double helix_rad = std::numbers::pi / 6;
+    double max_rpm = 18000;
+    double max_feed = 9000;                     ///< mm/min, along the path
+    double plunge_feed = 1500;                  ///< mm/min, straight down
+    double stepdown_min = 0, stepdown_max = 0;  ///< LUO table 5.4
+    double stepover = 0.5;                      ///< share of the diameter, for clearing
+};
+
+struct Material {
+    std::string name = "MDF";
+    double strength_mpa = 27;            ///< LUO 6.5.2
+    double min_thickness = 0.2 * kInch;  ///< MTmin, thinnest material above a boundary
+    double shallow_limit_deg = 15;       ///< Type III
+    double density_kg_m3 = 750;
+    double ktc = 8.8575, kte = 1.1268, kfc = 0.6188, kfe = 2.4948;  ///< LUO 6.5.1: N/mm², N/mm
+};
+
+struct Slabs {
+    std::vector<double> thicknesses{19.0};  ///< in stock, ascending
+    double length = 1160, width = 1160;     ///< the largest slab, x and y
+    double margin = 25.4;                   ///< the stock reaches this far past the pattern, where the slab allows
+    double facing_allowance = 0.5;          ///< the face mill takes at least this off, to find the whole slab
+};
+
+struct Machine {
+    std::string name = "RPM 1160";
+    double travel_x = 1220, travel_y = 1220, travel_z = 150;  ///< of the spindle
+    double build_height = 1200;                               ///< build chamber
+    double build_mass_kg = 1440;
+    double max_feed = 9000, rapid_feed = 12000;  ///< mm/min
+    double acceleration = 1000;                  ///< mm/s²
+    double max_rpm = 18000;
+    double spindle_dwell_s = 3;
+    double tool_change_s = 15;
+    double clearance = 10;  ///< mm of air between a rapid and the highest stock
+    Frame frame = Frame::pattern_base;
+    double base_board_thickness = 19;  ///< the sacrificial board under the first layer
+    double base_board_cut = -1;        ///< how deep it may be cut; negative: the finish tool's overrun
+};
+
+struct Bonding {
+    std::string glue = "cyanoacrylate";
+    double press_force = 17000;  ///< N, at most
+    double press_time_s = 30;
+    double max_pressure_mpa = 0.5;  ///< on the glued area, so that a rib is not crushed
+    double edge_setback = 3.0;      ///< glue keeps this far from finished edges
+    double handling_s = 60;         ///< fetch, clamp, place
+    double glue_s_per_m2 = 60;
+};
+
+struct Tolerances {
+    double gouge = 0.01;                ///< along the normal
+    double cusp = 0.04;                 ///< left by finish passes (scallop height)
+    double rough_cusp = 0.01 * kInch;   ///< L of the roughing stepdown (LUO 5.5.3.3)
+    double chordal_deviation = 0.0254;  ///< of the STL
+    double undercut = 0.25;             ///< an undercut that leaves less than this is a remark, not a refusal
+    double gap = 0;                     ///< open chains this near are closed, and reported
+    double weld = 0;                    ///< vertices this near are merged, and reported; 0: bit-exact only
+};
+
+struct LayerPlanning {
+    LayerStrategy strategy = LayerStrategy::optimal;
+    Finder finder = Finder::exact;
+    double min_layer = 3.0;          ///< thinnest layer that is not reported
+    double alpha = 0.7, beta = 0.3;  ///< Q = α·DT + β·A in inch units, as printed
+    bool saddles_constrain = false;
+    double flat_merge = 1.0;
+    double halving_coarse = 2.54, halving_resolution = 0.254;
+};
+
+struct Cutting {
+    double wall_allowance = 0.3, floor_allowance = 0.3;  ///< left by roughing
+    double steep_limit_deg = 45;                         ///< level contours from here up, projected raster below
+    double overlap_deg = 2;                              ///< both cut this far past the limit
+    double vertical_deg = 89.5;                          ///< walls from here up go to the flat end mill
+    double min_stepdown = 0.2, min_stepover = 0.2;       ///< floors of the finish steps; reported where they bite
+    double face_depth = 4.0;                             ///< deepest face-milling step
+    double ramp_deg = 5;                                 ///< entry into stock
+    double holder_clearance = 2.0;
+    double finish_feed = 5000;
+};
+
+struct Job {
+    LengthUnit units = LengthUnit::mm;  ///< of the STL
+    bool allow_undercut = false;
+    Material material;
+    Slabs slabs;
+    Machine machine;
+    Bonding bonding;
+    Tolerances tolerances;
+    LayerPlanning layers;
+    Cutting cutting;
+    /// The fixed set: face mill, 1/2 in flat end mill, 1/4 in ball end mill (LUO's comparison set).
+    std::vector<Tool> tools{
+        {1, ToolKind::face, "face mill 50 mm", 50, 20, 20, 60, 60, 4, 0.0, 12000, 9000, 1000, 0.1, 4.0, 0.6},
+        {2, ToolKind::flat, "flat end mill 1/2 in", 0.5 * kInch, 32, 0.5 * kInch, 50, 40, 2, std::numbers::pi / 6, 18000, 9000, 1500, 0.1 * kInch,
+         0.15 * kInch, 0.5},
+        {3, ToolKind::ball, "ball end mill 1/4 in", 0.25 * kInch, 30, 0.25 * kInch, 45, 32, 2, std::numbers::pi / 6, 18000, 9000, 1500,
+         0.0625 * kInch, 0.125 * kInch, 0.5},
+    };
+};
+
+/// The tallest layer this job can cut (LTmax, method.md section 4): the thickest slab less the facing allowance, and for
+/// every tool its flutes less overrun and holder clearance.
+[[nodiscard]] double max_layer_thickness(const Job& job);
+
+/// The first tool of a kind. @throws Error(usage, "job.tool") when the library has none
+[[nodiscard]] const Tool& tool_of_kind(const Job& job, ToolKind kind);
+
+/// Checks ranges and combinations. @throws Error(usage) that names the key
+void validate(const Job& job);
+
+}  // namespace slabwright

@@ -1,0 +1,28 @@
+// The tool paths of one layer (SHAPING, FINISH; method.md sections 5 and 11), with the fixed tool set.
+#pragma once
+
+#include "engine/plan.h"
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// A layer's work is a value in and a value out.
+struct LayerJob {
+    MeshView mesh;  ///< the whole pattern, pattern-base
+    const Job* job = nullptr;
+    double z_bottom = 0, z_top = 0, slab_thickness = 0;
+    double floor_below = 0;                          ///< the lowest z that a tip may reach: z_bottom less what may be cut under it
+    std::array<double, 2> stock_min{}, stock_max{};  ///< mm
+    int index = 0;
+};
+
+struct LayerResult {
+    std::vector<Operation> operations;  ///< in the order of execution
+    std::vector<Diagnostic> diagnostics;
+};
+
+/// Face, rough, floors, walls, levels and raster of one layer. Operations that would remove nothing are left out.
+[[nodiscard]] LayerResult plan_layer_paths(Context& context, const LayerJob& layer);
+
+}  // namespace slabwright

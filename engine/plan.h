@@ -1,0 +1,100 @@
+// The plan: what the engine decided, ready to be written. Frame `pattern-base`, millimetres; paths in 0.1 µm.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/job.h"
+#include "kernels/features/features.h"
+#include "kernels/polygons/loops.h"
+
+namespace slabwright {
+
+enum class Severity : std::uint8_t { note, warning, error };
+[[nodiscard]] std::string_view name(Severity severity);
+
+/// Something the user should know, with a place (mm) when it has one.
+struct Diagnostic {
+    Severity severity = Severity::note;
+    std::string code;     ///< stable, e.g. "undercut.unmade"
+    std::string message;  ///< one line, sizes with units
+    std::optional<std::array<double, 3>> where;
+    friend bool operator==(const Diagnostic&, const Diagnostic&) = default;
+};
+
+/// One straight move to (x, y, z) in 0.1 µm, frame pattern-base; feed in mm/min, 0 for a rapid.
+struct Move {
+    std::int32_t x = 0, y = 0, z = 0;
+    std::uint32_t feed = 0;
+    friend bool operator==(const Move&, const Move&) = default;
+};
+
+enum class OperationKind : std::uint8_t { face, rough, semi_rough, finish, corner, drill, edge };
+[[nodiscard]] std::string_view name(OperationKind kind);  ///< as plan.json spells it
+
+/// One program: one tool, one purpose. Moves begin and end with a Z-only rapid at `clearance_z`.
+struct Operation {
+    OperationKind kind{};
+    std::string purpose;  ///< in words: "level contours", "projected raster", "walls", "floors"…
+    int tool = 0;         ///< Tool::number
+    double stepdown = 0;  ///< mm, the largest; 0 where it has none
+    double stepover = 0;  ///< mm, the largest; 0 where it has none
+    double spindle_rpm = 0;
+    double clearance_z = 0;  ///< mm
+    std::vector<Move> moves;
+    std::string file;  ///< name under nc/, "" until named
+    double cutting_mm = 0, rapid_mm = 0, minutes = 0;
+    double peak_force_n = 0, deflection_mm = 0;
+};
+
+struct Layer {
+    int index = 0;
+    double z_bottom = 0, z_top = 0, slab_thickness = 0;
+    std::string reason;  ///< why z_top lies where it lies, in words
+    std::vector<Operation> operations;
+    double glue_area_mm2 = 0;  ///< under this layer's slab
+    std::array<double, 2> glue_centroid{0, 0};
+    double press_force_n = 0;
+    Loops glue;  ///< where glue goes
+};
+
+/// A step of the machine's sequence (method.md section 12); `needs` are ids of the steps that must be done before.
+struct SequenceStep {
+    int id = 0;
+    int layer = 0;
+    std::string action;  ///< "take_slab", "clamp", "glue", "place", "press", "table", "touch_off", "face", "mill", "inspect"…
+    std::vector<int> needs;
+    std::vector<std::pair<std::string, double>> numbers;     ///< named quantities, names end in their unit
+    std::vector<std::pair<std::string, std::string>> words;  ///< programs, materials
+    double seconds = 0;
+};
+
+struct Totals {
+    int layers = 0, operations = 0, tool_changes = 0;
+    double cutting_mm = 0, rapid_mm = 0;
+    double cutting_minutes = 0, bonding_minutes = 0, tool_change_minutes = 0, build_minutes = 0;
+    double stock_volume_mm3 = 0, part_volume_mm3 = 0, stack_mass_kg = 0;
+};
+
+struct InputInfo {
+    std::string file, sha256;
+    std::uint64_t triangles = 0;
+    std::array<double, 3> min{}, max{};  ///< mm, as in the STL (before the pattern is set on z = 0)
+};
+
+struct Plan {
+    InputInfo input;
+    Job job;
+    std::array<double, 2> stock_min{}, stock_max{};
+    std::vector<Feature> features;
+    std::vector<Layer> layers;
+    std::vector<SequenceStep> sequence;
+    Totals totals;
+    std::vector<Diagnostic> diagnostics;
+};
+
+}  // namespace slabwright

@@ -1,0 +1,46 @@
+// The front door of the library: the one header that an embedder includes.
+//
+//     slabwright::Context context({.threads = 2});
+//     slabwright::Job job;                                   // or read_job("job.toml")
+//     slabwright::Plan plan = slabwright::plan(context, "pattern.stl", job);
+//     slabwright::write(context, plan, "out");
+//
+// Everything throws slabwright::Error and nothing else; context.cancel() from any thread stops it. The library writes
+// nothing to stderr, sets no signal handler and never exits; several plans may run at once, each on its own Context.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "engine/job.h"
+#include "engine/plan.h"
+#include "kernels/errors.h"
+#include "kernels/export.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// "major.minor.patch"
+[[nodiscard]] SLABWRIGHT_API std::string version();
+
+/// Reads a job file (TOML). @throws Error(usage) with file, line and the nearest known key
+[[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path);
+
+/// All keys with their defaults and comments, as a job file.
+[[nodiscard]] SLABWRIGHT_API std::string default_job_toml();
+
+/// Reads the STL and plans the build. @throws Error(input | no_plan | cancelled | usage)
+[[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const std::string& stl_path, const Job& job);
+
+/// Writes plan.json, nc/, tool.tbl and sequence.json into `directory`, all or nothing: a fresh folder beside it is
+/// filled and then takes its place; an existing folder is replaced only if it holds a plan.json of ours or is empty.
+/// @throws Error(input) when the place cannot be written
+SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string& directory);
+
+/// Mesh report, features and undercuts of a file as JSON (schema slabwright.inspect/1).
+[[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const std::string& stl_path, const Job& job);
+
+/// Sections every `every_mm` (at its multiples above the bottom) written by the ending of `out`: .svg, .dxf or .json.
+SLABWRIGHT_API void slice_to_file(Context& context, const std::string& stl_path, const Job& job, double every_mm, const std::string& out);
+
+}  // namespace slabwright

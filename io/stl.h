@@ -1,0 +1,39 @@
+// STL in: binary and ASCII, memory-mapped, decoded and welded in parallel.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "engine/plan.h"
+#include "kernels/mesh/report.h"
+#include "kernels/mesh/weld.h"
+
+namespace slabwright {
+
+struct StlOptions {
+    LengthUnit units = LengthUnit::mm;
+    double weld_mm = 0;  ///< 0: bit-exact only
+};
+
+struct StlMesh {
+    Mesh mesh;  ///< millimetres, set on z = 0 (the lowest vertex); x and y as in the file
+    MeshReport report;
+    InputInfo input;
+    std::vector<Diagnostic> diagnostics;  ///< every finding of the report, welds, suspicious units
+};
+
+/// Reads a file. A "solid" prefix is no proof of ASCII, the facet count of the header no proof of anything: both are
+/// checked against the length. Decimal points do not depend on the locale.
+/// @throws Error(input) with the file, and the facet, offset or line: missing, empty, truncated, wrong count, unparsable,
+///         non-finite or absurd (over 1e6 mm) coordinates, no facets
+[[nodiscard]] StlMesh read_stl(Context& context, const std::string& path, const StlOptions& options = {});
+
+/// Whether a planner may use this mesh: closed (but for open edges in the base plane), consistently oriented, not inside
+/// out. @throws Error(input) with the count, the first facet and its place, and the remedy (for open edges: the
+/// --weld tolerance that closes them all, found by trying, when there is one)
+void require_solid(Context& context, const StlMesh& stl, const std::string& path);
+
+/// Binary STL, for models that the project makes.
+void write_stl(const std::string& path, const Mesh& mesh);
+
+}  // namespace slabwright

@@ -1,0 +1,49 @@
+// The triangle mesh: float32 vertices welded bit-exactly, uint32 indices, adjacency across edges.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace slabwright {
+
+/// A point in millimetres, frame `pattern-base` (z = 0 at the pattern's bottom).
+struct Vec3f {
+    float x = 0, y = 0, z = 0;
+    friend bool operator==(const Vec3f&, const Vec3f&) = default;
+};
+
+/// Three vertex (or facet) indices.
+using Index3 = std::array<std::uint32_t, 3>;
+
+/// No facet lies across this edge: the mesh is open there.
+inline constexpr std::uint32_t kNoFacet = 0xFFFFFFFFu;
+
+/// Borrowed arrays of a mesh. Facets are counter-clockwise seen from outside.
+struct MeshView {
+    std::span<const Vec3f> vertices;
+    std::span<const Index3> facets;
+    /// neighbours[f][k] is the facet across the edge (facets[f][k], facets[f][(k + 1) % 3]), or kNoFacet.
+    std::span<const Index3> neighbours;
+
+    [[nodiscard]] std::size_t size() const noexcept { return facets.size(); }
+};
+
+struct Box3 {
+    Vec3f min, max;
+};
+
+struct Mesh {
+    std::vector<Vec3f> vertices;
+    std::vector<Index3> facets;
+    std::vector<Index3> neighbours;
+
+    [[nodiscard]] MeshView view() const noexcept { return {vertices, facets, neighbours}; }
+};
+
+/// Bounding box of the vertices that facets use; all zeros for an empty mesh.
+[[nodiscard]] Box3 bounds(MeshView mesh);
+
+}  // namespace slabwright

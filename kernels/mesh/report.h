@@ -1,0 +1,37 @@
+// What is wrong with a mesh, counted and placed (method.md section 1). Nothing is repaired here.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// A count, and the lowest facet (index in the file's order) that shows it; kNoFacet when the count is 0.
+struct Finding {
+    std::uint64_t count = 0;
+    std::uint32_t first_facet = kNoFacet;
+};
+
+struct MeshReport {
+    std::uint64_t facets = 0, vertices = 0, components = 0;
+    Finding open_edges;           ///< edges with one facet
+    Finding open_edges_off_base;  ///< those of them that do not lie wholly in the lowest plane
+    Finding non_manifold_edges;   ///< edges with more than two facets
+    Finding misoriented_edges;    ///< edges whose facets do not run along them in opposite directions, one for one
+    Finding degenerate_facets;    ///< two equal corners, or no area
+    Finding duplicate_facets;     ///< same three vertices as an earlier facet
+    Finding inverted_components;  ///< closed components of negative volume that lie in no other component
+    double volume_mm3 = 0;        ///< signed, of the whole
+    double area_mm2 = 0;
+    Box3 box;
+    /// Component of every facet, numbered by lowest facet.
+    std::vector<std::uint32_t> component_of;
+};
+
+/// Reports on a mesh whose adjacency is filled. Deterministic.
+[[nodiscard]] MeshReport report_mesh(Context& context, MeshView mesh);
+
+}  // namespace slabwright

@@ -1,0 +1,57 @@
+// Closed polygons in the plane, in integers of 0.1 µm.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace slabwright {
+
+/// Coordinates and paths are integers in units of 0.1 µm: int32 reaches ±214 m, products go to int64.
+inline constexpr double kUnitsPerMm = 10000.0;
+
+/// Nearest unit of a length in millimetres (halves away from zero, on every machine).
+[[nodiscard]] inline std::int32_t to_units(double mm) { return static_cast<std::int32_t>(std::llround(mm * kUnitsPerMm)); }
+[[nodiscard]] inline double to_mm(std::int64_t units) { return static_cast<double>(units) / kUnitsPerMm; }
+
+struct Point2 {
+    std::int32_t x = 0, y = 0;
+    friend bool operator==(const Point2&, const Point2&) = default;
+    friend auto operator<=>(const Point2&, const Point2&) = default;
+};
+
+/// A set of closed loops: outer loops counter-clockwise, holes clockwise. Loop i has the points
+/// points[starts[i]] … points[starts[i + 1] − 1], the last joined to the first (which is not repeated).
+struct Loops {
+    std::vector<Point2> points;
+    std::vector<std::uint32_t> starts{0};  ///< one more than there are loops
+    std::vector<std::int32_t> parents;     ///< the loop directly around loop i, or −1; empty when not nested yet
+
+    [[nodiscard]] std::size_t size() const noexcept { return starts.size() - 1; }
+    [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+    [[nodiscard]] std::span<const Point2> loop(std::size_t i) const { return std::span(points).subspan(starts[i], starts[i + 1] - starts[i]); }
+    /// Closes the points appended since the last call into a loop.
+    void close_loop() { starts.push_back(static_cast<std::uint32_t>(points.size())); }
+};
+
+/// Signed area of one loop in mm², positive counter-clockwise.
+[[nodiscard]] double signed_area(std::span<const Point2> loop);
+/// Sum of the signed areas in mm²: the area of the region when outer loops and holes are oriented as above.
+[[nodiscard]] double area(const Loops& loops);
+/// Winding number of the region's loops around p; points on the boundary count as either side.
+[[nodiscard]] int winding(const Loops& loops, Point2 p);
+
+/// Fills `parents` by containment of properly nested loops; loops may touch but not cross. O(n log n) in points.
+void nest(Loops& loops);
+
+/// Boolean operations and offsets on regions (non-zero winding), by polyclipping. Results are nested.
+[[nodiscard]] Loops unite(const Loops& a, const Loops& b);
+[[nodiscard]] Loops intersect(const Loops& a, const Loops& b);
+[[nodiscard]] Loops subtract(const Loops& a, const Loops& b);
+/// Grows (delta > 0) or shrinks a region by `delta_mm`, round joins; arcs deviate by at most `tolerance_mm`, always
+/// to the side of the *larger* region, so that what is kept clear is never understated.
+[[nodiscard]] Loops offset(const Loops& region, double delta_mm, double tolerance_mm);
+
+}  // namespace slabwright

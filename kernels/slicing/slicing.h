@@ -1,0 +1,41 @@
+// Sections of a mesh by horizontal planes.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+#include "kernels/polygons/loops.h"
+
+namespace slabwright {
+
+/// A plane at z is met from one side only, so that a facet lying in it belongs to exactly one side:
+/// `above` is the limit z + 0 (vertices at z count as below), `below` the limit z − 0 (vertices at z count as above).
+enum class Side : std::uint8_t { below, above };
+
+struct Plane {
+    double z = 0;  ///< mm
+    Side side = Side::above;
+};
+
+/// The polygons of solid ∩ plane. Points lie where mesh edges cross the plane, rounded to 0.1 µm; outer loops run
+/// counter-clockwise, holes clockwise, each starts at the crossing of its lowest facet index.
+struct Section {
+    Plane plane;
+    Loops loops;  ///< nested
+    /// Chains that an open mesh leaves unclosed, as point lists in the manner of Loops (not closed).
+    Loops open_chains;
+};
+
+struct SliceOptions {
+    double close_gap_mm = 0;  ///< open chains whose ends are this near are closed, and counted in `closed_gaps`
+};
+
+/// Cuts the mesh by all planes at once, in parallel; results come in the order of the request, and are bit-identical on
+/// any number of threads. A mesh whose adjacency is closed gives closed loops at every height, those of vertices,
+/// edges and flats included. Loops of fewer than three distinct points or no area are dropped.
+/// @param planes any order, any number; non-finite z is an Error(usage)
+[[nodiscard]] std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plane> planes, const SliceOptions& options = {});
+
+}  // namespace slabwright
