@@ -1,0 +1,526 @@
+#include "kernels/access/standing_part.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kernels/access/triangle.h"
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr std::size_t kFan = 4;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct P2 {
+    double x, y;
+};
+
+Point3 to_point(const Vec3f& v) { return {v.x, v.y, v.z}; }
+Point3 sub(const Point3& a, const Point3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Point3 between(const Point3& a, const Point3& b, double t) { return {a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t}; }
+
+/// A convex polygon of at most five corners: a triangle cut by two horizontal planes.
+struct Polygon {
+    std::array<Point3, 8> p;
+    int n = 0;
+};
+
+Polygon clip_z(const Polygon& in, double z, bool keep_above) {
+    Polygon out;
+    for (int i = 0; i < in.n; ++i) {
+        const Point3 &a = in.p[i], &b = in.p[(i + 1) % in.n];
+        const double da = keep_above ? a[2] - z : z - a[2], db = keep_above ? b[2] - z : z - b[2];
+        if (da >= 0) out.p[out.n++] = a;
+        if ((da < 0) != (db < 0)) {
+            Point3 c = between(a, b, da / (da - db));
+            c[2] = z;
+            out.p[out.n++] = c;
+        }
+    }
+    return out;
+}
+
+Point3 closest_on_segment(const Point3& c, const Point3& a, const Point3& b) {
+    const Point3 d = sub(b, a);
+    const double l = dot(d, d);
+    return l > 0 ? between(a, b, std::clamp(dot(sub(c, a), d) / l, 0.0, 1.0)) : a;
+}
+
+double distance_2d(P2 p, P2 a, P2 b) {
+    const double dx = b.x - a.x, dy = b.y - a.y, l = dx * dx + dy * dy;
+    const double t = l > 0 ? std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / l, 0.0, 1.0) : 0.0;
+    return std::hypot(p.x - a.x - t * dx, p.y - a.y - t * dy);
+}
+
+double cross_2d(P2 a, P2 b, P2 c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
+
+bool segments_cross(P2 a, P2 b, P2 c, P2 d) {
+    const double s1 = cross_2d(a, b, c), s2 = cross_2d(a, b, d), s3 = cross_2d(c, d, a), s4 = cross_2d(c, d, b);
+    return ((s1 > 0) != (s2 > 0)) && ((s3 > 0) != (s4 > 0));
+}
+
+bool contains_2d(const Polygon& poly, P2 q) {
+    // The box first: on a polygon seen edge-on all signs below are rounding, and could agree far along its line.
+    double x0 = kInfinity, x1 = -kInfinity, y0 = kInfinity, y1 = -kInfinity;
+    for (int i = 0; i < poly.n; ++i) {
+        x0 = std::min(x0, poly.p[i][0]), x1 = std::max(x1, poly.p[i][0]);
+        y0 = std::min(y0, poly.p[i][1]), y1 = std::max(y1, poly.p[i][1]);
+    }
+    if (q.x < x0 || q.x > x1 || q.y < y0 || q.y > y1) return false;
+    int turn = 0;
+    for (int i = 0; i < poly.n; ++i) {
+        const Point3 &a = poly.p[i], &b = poly.p[(i + 1) % poly.n];
+        const double s = cross_2d({a[0], a[1]}, {b[0], b[1]}, q);
+        if (s == 0) continue;
+        if (turn != 0 && (s > 0) != (turn > 0)) return false;
+        turn = s > 0 ? 1 : -1;
+    }
+    return turn != 0;  // a polygon seen edge-on has no inside; its edges are measured
+}
+
+/// Horizontal distance between a segment (or a point) and a convex polygon; infinite for an empty one.
+double distance_2d(const Polygon& poly, P2 a, P2 b) {
+    if (poly.n == 0) return kInfinity;
+    // Points exactly on an edge line give s == 0 for one edge only, which contains_2d tolerates: their distance is 0 or
+    // is measured against the edges anyway.
+    if (poly.n >= 3 && contains_2d(poly, a)) {
+        double area = 0;
+        for (int i = 1; i + 1 < poly.n; ++i)
+            area += cross_2d({poly.p[0][0], poly.p[0][1]}, {poly.p[i][0], poly.p[i][1]}, {poly.p[i + 1][0], poly.p[i + 1][1]});
+        if (area != 0) return 0;
+    }
+    const bool moving = a.x != b.x || a.y != b.y;
+    double best = kInfinity;
+    for (int i = 0; i < poly.n; ++i) {
+        const P2 c{poly.p[i][0], poly.p[i][1]}, d{poly.p[(i + 1) % poly.n][0], poly.p[(i + 1) % poly.n][1]};
+        best = std::min(best, distance_2d(a, c, d));
+        if (moving) {
+            if (segments_cross(a, b, c, d)) return 0;
+            best = std::min({best, distance_2d(b, c, d), distance_2d(c, a, b)});
+        }
+    }
+    return best;
+}
+
+/// Distance between a point's upward ray and a triangle, and its vector (from triangle to ray), whose z is never negative.
+/// Over the triangle both the distance from the point and that from the ray are convex, and they have one gradient where the
+/// triangle is not above the point: if the nearest point to the point lies there, it is the nearest to the ray too.
+/// Otherwise the nearest to the ray is as high as the point or higher, and is measured horizontally.
+struct RayDistance {
+    double d;
+    Point3 vector;
+};
+RayDistance ray_distance(const Point3& c, const Triangle& t) {
+    const Point3 q = closest_on_triangle(c, t);
+    if (q[2] <= c[2]) {
+        const Point3 v = sub(c, q);
+        return {std::sqrt(dot(v, v)), v};
+    }
+    Polygon poly;
+    poly.n = 3;
+    for (int i = 0; i < 3; ++i) poly.p[i] = t[i];
+    poly = clip_z(poly, c[2], true);
+    if (poly.n == 0) {  // q is above by rounding only
+        const Point3 v{c[0] - q[0], c[1] - q[1], 0};
+        return {std::sqrt(dot(v, v)), v};
+    }
+    const P2 a{c[0], c[1]};
+    if (distance_2d(poly, a, a) == 0) return {0, {0, 0, 0}};
+    double best = kInfinity;
+    Point3 v{};
+    for (int i = 0; i < poly.n; ++i) {
+        Point3 s = poly.p[i], e = poly.p[(i + 1) % poly.n], from = c;
+        s[2] = e[2] = from[2] = 0;
+        const Point3 w = sub(from, closest_on_segment(from, s, e));
+        const double d = dot(w, w);
+        if (d < best) best = d, v = w;
+    }
+    return {std::sqrt(best), v};
+}
+
+/// Calls fn(triangle) for the parts of a facet below z (one or two triangles), none when no corner lies below.
+template <class Fn>
+void below(const std::array<Vec3f, 3>& facet, double z, Fn&& fn) {
+    int under = 0;
+    for (const Vec3f& v : facet) under += v.z < z;
+    if (under == 0) return;
+    if (under == 3 || (facet[0].z <= z && facet[1].z <= z && facet[2].z <= z)) {
+        fn(Triangle{to_point(facet[0]), to_point(facet[1]), to_point(facet[2])});
+        return;
+    }
+    Polygon poly;
+    poly.n = 3;
+    for (int i = 0; i < 3; ++i) poly.p[i] = to_point(facet[i]);
+    poly = clip_z(poly, z, false);
+    for (int i = 1; i + 1 < poly.n; ++i) fn(Triangle{poly.p[0], poly.p[i], poly.p[i + 1]});
+}
+
+/// Least distance over the piece from a to b (ray starts) to a triangle, and where; looks only for less than `limit`.
+/// The distance to a convex set is convex along a line: tangents at both ends of a bracket bound it from below, their
+/// crossing is the next place to try (Kelley's cutting planes in one dimension).
+struct Closest {
+    double d;
+    double t;
+};
+Closest piece_distance(const Point3& a, const Point3& b, const Triangle& tri, double limit) {
+    const Point3 along = sub(b, a);
+    const double length = std::sqrt(dot(along, along));
+    struct Sample {
+        double t, d, g;
+    };
+    auto at = [&](double t) {
+        const RayDistance r = ray_distance(between(a, b, t), tri);
+        return Sample{t, r.d, r.d > 0 ? dot(r.vector, along) / r.d : 0};
+    };
+    const Sample mid = at(0.5);
+    if (mid.d - length / 2 >= limit || mid.g == 0 || length == 0) return {mid.d, 0.5};
+    if (mid.d - std::abs(mid.g) / 2 >= limit) return {mid.d, 0.5};
+    Sample l = mid, r = mid;
+    if (mid.g > 0) {
+        l = at(0);
+        if (l.g >= 0) return {l.d, 0};
+    } else {
+        r = at(1);
+        if (r.g <= 0) return {r.d, 1};
+    }
+    for (int i = 0; i < 60; ++i) {
+        const Sample& best = l.d <= r.d ? l : r;
+        double t = (r.d - l.d + l.g * l.t - r.g * r.t) / (l.g - r.g);
+        const double bound = l.d + l.g * (t - l.t);
+        if (!(bound < limit) || best.d - bound <= StandingPart::kNumericalError) break;
+        // A crossing at an end would not shorten the bracket.
+        const double margin = 1e-3 * (r.t - l.t);
+        t = std::clamp(t, l.t + margin, r.t - margin);
+        const Sample m = at(t);
+        if (m.g == 0) return {m.d, m.t};
+        (m.g > 0 ? r : l) = m;
+    }
+    return l.d <= r.d ? Closest{l.d, l.t} : Closest{r.d, r.t};
+}
+
+/// Largest min(radius − r, z − tip) over a triangle and a piece of the tip's way, if above `best`.
+struct Deepest {
+    double depth;
+    double t;
+};
+Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& tri, double radius, double best) {
+    double top = -kInfinity;
+    for (int i = 0; i < tri.n; ++i) top = std::max(top, tri.p[i][2]);
+    auto reaches = [&](const Point3& s, const Point3& e, double tip, double depth) {
+        return distance_2d(clip_z(tri, tip + depth, true), {s[0], s[1]}, {e[0], e[1]}) <= radius - depth;
+    };
+    // The largest depth reached with the tip at one height, while its axis is anywhere between s and e.
+    auto deepest_at = [&](const Point3& s, const Point3& e, double tip, double floor) {
+        double low = floor, high = std::min(radius, top - tip);
+        if (high <= low) return floor;
+        if (reaches(s, e, tip, high)) return high;
+        while (high - low > StandingPart::kNumericalError / 4) {
+            const double m = (low + high) / 2;
+            (reaches(s, e, tip, m) ? low : high) = m;
+        }
+        return low;
+    };
+    const double lowest = std::min(a[2], b[2]);
+    const double enough = best + StandingPart::kNumericalError;
+    if (std::min(radius, top - lowest) <= enough || !reaches(a, b, lowest, enough)) return {best, 0};
+    if (a[2] == b[2]) {
+        const double depth = deepest_at(a, b, lowest, best);
+        if (depth <= best) return {best, 0};
+        // The place along the piece: the axis there is nearest to what stands above the cylinder's shrunken floor.
+        const Polygon above = clip_z(tri, lowest + depth, true);
+        double low = 0, high = 1;
+        for (int i = 0; i < 40; ++i) {
+            const double m1 = low + (high - low) / 3, m2 = high - (high - low) / 3;
+            const Point3 p = between(a, b, m1), q = between(a, b, m2);
+            if (distance_2d(above, {p[0], p[1]}, {p[0], p[1]}) <= distance_2d(above, {q[0], q[1]}, {q[0], q[1]})) high = m2;
+            else low = m1;
+        }
+        return {depth, (low + high) / 2};
+    }
+    // A ramp or plunge: the depth is concave along the way, so a search by thirds finds its maximum.
+    auto depth_at = [&](double t) {
+        const Point3 p = between(a, b, t);
+        return deepest_at(p, p, p[2], std::min(0.0, best) - 2 * (StandingPart::kPiece + 1));
+    };
+    double low = 0, high = 1;
+    for (int i = 0; i < 50; ++i) {
+        const double m1 = low + (high - low) / 3, m2 = high - (high - low) / 3;
+        if (depth_at(m1) >= depth_at(m2)) high = m2;
+        else low = m1;
+    }
+    Deepest result{best, 0};
+    for (const double t : {0.0, (low + high) / 2, 1.0}) {
+        const double d = depth_at(t);
+        if (d > result.depth) result = {d, t};
+    }
+    return result;
+}
+
+}  // namespace
+
+StandingPart::StandingPart(Context& context, MeshView mesh) {
+    const std::size_t n = mesh.size();
+    box_ = bounds(mesh);
+    const double ex = std::max(1e-6, static_cast<double>(box_.max.x) - box_.min.x), ey = std::max(1e-6, static_cast<double>(box_.max.y) - box_.min.y),
+                 ez = std::max(1e-6, static_cast<double>(box_.max.z) - box_.min.z);
+    const double extent = std::max({ex, ey, ez});
+    struct Key {
+        std::uint64_t code;
+        std::uint32_t facet;
+    };
+    std::vector<Key> keys(n);
+    parallel_for(context, n, 1 << 14, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const Index3& f = mesh.facets[i];
+            const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
+            auto cell = [&](double sum, double low) {
+                return static_cast<std::uint32_t>(std::clamp((sum / 3 - low) / extent, 0.0, 1.0) * static_cast<double>((1 << 21) - 1));
+            };
+            keys[i] = {morton(cell(static_cast<double>(a.x) + b.x + c.x, box_.min.x), cell(static_cast<double>(a.y) + b.y + c.y, box_.min.y),
+                              cell(static_cast<double>(a.z) + b.z + c.z, box_.min.z)),
+                       static_cast<std::uint32_t>(i)};
+        }
+    });
+    parallel_sort(context, keys.begin(), keys.end(),
+                  [](const Key& a, const Key& b) { return a.code != b.code ? a.code < b.code : a.facet < b.facet; });
+    facets_.resize(n);
+    parallel_for(context, n, 1 << 14, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const Index3& f = mesh.facets[keys[i].facet];
+            for (int k = 0; k < 3; ++k) facets_[i].v[k] = mesh.vertices[f[k]];
+        }
+    });
+    auto join = [](Node& a, const Node& b) {
+        a.x0 = std::min(a.x0, b.x0), a.y0 = std::min(a.y0, b.y0), a.z0 = std::min(a.z0, b.z0);
+        a.x1 = std::max(a.x1, b.x1), a.y1 = std::max(a.y1, b.y1), a.z1 = std::max(a.z1, b.z1);
+    };
+    std::size_t below_count = n;
+    do {
+        const std::size_t count = (below_count + kFan - 1) / kFan, level = levels_.size();
+        levels_.emplace_back(count);
+        parallel_for(context, count, 1 << 12, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                constexpr float inf = std::numeric_limits<float>::infinity();
+                Node node{inf, inf, inf, -inf, -inf, -inf};
+                for (std::size_t k = i * kFan; k < std::min(below_count, (i + 1) * kFan); ++k) {
+                    if (level == 0)
+                        for (const Vec3f& v : facets_[k].v) join(node, {v.x, v.y, v.z, v.x, v.y, v.z});
+                    else join(node, levels_[level - 1][k]);
+                }
+                levels_[level][i] = node;
+            }
+        });
+        below_count = count;
+    } while (below_count > 1);
+}
+
+/// Visits, in one fixed order, every facet of whose nodes enter(box) holds.
+template <class Enter, class Visit>
+void StandingPart::walk(Enter&& enter, Visit&& visit) const {
+    struct Item {
+        std::uint32_t level;
+        std::size_t index;
+    };
+    std::array<Item, 96> stack;
+    std::size_t size = 0;
+    if (facets_.empty()) return;
+    stack[size++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0};
+    while (size > 0) {
+        const Item item = stack[--size];
+        if (!enter(levels_[item.level][item.index])) continue;
+        if (item.level == 0) {
+            for (std::size_t k = item.index * kFan; k < std::min(facets_.size(), (item.index + 1) * kFan); ++k) visit(facets_[k]);
+        } else {
+            const std::size_t end = std::min(levels_[item.level - 1].size(), (item.index + 1) * kFan);
+            for (std::size_t k = end; k-- > item.index * kFan;) stack[size++] = {item.level - 1, k};
+        }
+    }
+}
+
+namespace {
+template <class NodeT>
+double xy_distance(const NodeT& n, double x, double y) {
+    const double dx = std::max({0.0, n.x0 - x, x - n.x1}), dy = std::max({0.0, n.y0 - y, y - n.y1});
+    return std::sqrt(dx * dx + dy * dy);
+}
+}  // namespace
+
+Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+    const double top = z_top - kSheet;
+    Penetration result{at_least, from, false};
+    auto found = [&](double depth, const Point3& tip) {
+        if (depth > result.depth) result = {depth, tip, true};
+    };
+    if (std::min(from[2], to[2]) >= top - at_least) return {0, from, false};
+    const Point3 span = sub(to, from);
+    const double length = std::sqrt(dot(span, span));
+    const int pieces = std::max(1, static_cast<int>(std::ceil(length / kPiece)));
+    // Under the cap, the section of the part by the layer's top, the depth is that of the ball's centre below it. On a piece it is greatest
+    // at an end or where the axis crosses the cap's outline, and the outline is an edge of facets cut at the top.
+    auto under_cap = [&](const Point3& tip) {
+        const double depth = radius - std::max(0.0, tip[2] + radius - top);
+        if (depth > result.depth && covered(tip[0], tip[1], top)) found(depth, tip);
+    };
+    under_cap(from);
+    Point3 a = from;
+    for (int i = 0; i < pieces && result.depth < radius; ++i) {
+        const Point3 b = i + 1 == pieces ? to : between(from, to, static_cast<double>(i + 1) / pieces);
+        under_cap(b);
+        if (std::min(a[2], b[2]) < top - result.depth) {
+            const Point3 ca{a[0], a[1], a[2] + radius}, cb{b[0], b[1], b[2] + radius}, mid = between(ca, cb, 0.5);
+            const double half = length / pieces / 2 + 1e-9;
+            walk(
+                [&](const Node& n) {
+                    const double z = std::min<double>(n.z1, top), reach = radius - result.depth + half;
+                    if (n.z0 >= top) return false;
+                    const double dxy = xy_distance(n, mid[0], mid[1]), dz = std::max(0.0, mid[2] - z);
+                    return dxy * dxy + dz * dz < reach * reach;
+                },
+                [&](const Facet& f) {
+                    {  // The facet's own box, before the exact distance.
+                        const double x0 = std::min({f.v[0].x, f.v[1].x, f.v[2].x}), x1 = std::max({f.v[0].x, f.v[1].x, f.v[2].x});
+                        const double y0 = std::min({f.v[0].y, f.v[1].y, f.v[2].y}), y1 = std::max({f.v[0].y, f.v[1].y, f.v[2].y});
+                        const double z1 = std::min<double>(top, std::max({f.v[0].z, f.v[1].z, f.v[2].z}));
+                        const double dx = std::max({0.0, x0 - mid[0], mid[0] - x1}), dy = std::max({0.0, y0 - mid[1], mid[1] - y1});
+                        const double dz = std::max(0.0, mid[2] - z1), reach = radius - result.depth + half;
+                        if (dx * dx + dy * dy + dz * dz >= reach * reach) return;
+                    }
+                    below(f.v, top, [&](const Triangle& t) {
+                        const Closest c = piece_distance(ca, cb, t, radius - result.depth);
+                        if (radius - c.d > result.depth) found(radius - c.d, between(a, b, c.t));
+                    });
+                });
+        }
+        a = b;
+    }
+    if (!result.found) result.depth = 0;
+    return result;
+}
+
+Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+    const double top = z_top - kSheet;
+    Penetration result{at_least, from, false};
+    auto found = [&](double depth, const Point3& tip) {
+        if (depth > result.depth) result = {depth, tip, true};
+    };
+    if (radius <= at_least || std::min(from[2], to[2]) >= top - at_least) return {0, from, false};
+    const Point3 span = sub(to, from);
+    const double length = std::sqrt(dot(span, span));
+    const int pieces = std::max(1, static_cast<int>(std::ceil(length / kPiece)));
+    auto under_cap = [&](const Point3& tip) {
+        const double depth = std::min(radius, top - tip[2]);
+        if (depth > result.depth && covered(tip[0], tip[1], top)) found(depth, tip);
+    };
+    under_cap(from);
+    Point3 a = from;
+    for (int i = 0; i < pieces && result.depth < radius; ++i) {
+        const Point3 b = i + 1 == pieces ? to : between(from, to, static_cast<double>(i + 1) / pieces);
+        under_cap(b);
+        const double lowest = std::min(a[2], b[2]);
+        if (lowest < top - result.depth) {
+            const Point3 mid = between(a, b, 0.5);
+            const double half = std::hypot(b[0] - a[0], b[1] - a[1]) / 2 + 1e-9;
+            walk(
+                [&](const Node& n) {
+                    if (n.z0 >= top || std::min<double>(n.z1, top) - lowest <= result.depth) return false;
+                    return xy_distance(n, mid[0], mid[1]) < radius - result.depth + half;
+                },
+                [&](const Facet& f) {
+                    Polygon poly;
+                    poly.n = 3;
+                    int under = 0;
+                    for (int k = 0; k < 3; ++k) {
+                        poly.p[k] = to_point(f.v[k]);
+                        under += f.v[k].z < top;
+                    }
+                    if (under == 0) return;
+                    if (under < 3) poly = clip_z(poly, top, false);
+                    const Deepest d = piece_depth(a, b, poly, radius, result.depth);
+                    if (d.depth > result.depth) found(d.depth, between(a, b, d.t));
+                });
+        }
+        a = b;
+    }
+    if (!result.found) result.depth = 0;
+    return result;
+}
+
+bool StandingPart::covered(double x, double y, double z) const {
+    int winding = 0;
+    walk([&](const Node& n) { return n.z1 >= z && n.x0 <= x && x <= n.x1 && n.y0 <= y && y <= n.y1; },
+         [&](const Facet& f) {
+             if (f.v[0].z < z && f.v[1].z < z && f.v[2].z < z) return;
+             const int w = facet_winding(f.v, x, y);
+             if (w != 0 && facet_height(f.v, x, y) >= z) winding += w;
+         });
+    return winding > 0;
+}
+
+double StandingPart::envelope(double x, double y, double z_top, double none) const {
+    const double top = z_top - kSheet;
+    int winding = 0;
+    double height = -kInfinity;
+    walk([&](const Node& n) { return n.x0 <= x && x <= n.x1 && n.y0 <= y && y <= n.y1; },
+         [&](const Facet& f) {
+             const int w = facet_winding(f.v, x, y);
+             if (w == 0) return;
+             const double z = facet_height(f.v, x, y);
+             if (z >= top) winding += w;
+             else height = std::max(height, z);
+         });
+    if (winding > 0) return z_top;
+    return height > -kInfinity ? height : none;
+}
+
+void StandingPart::envelope_grid(double x0, double y0, double cell, int nx, int ny, double z_top, float none, float* out) const {
+    const double top = z_top - kSheet, x1 = x0 + cell * (nx - 1), y1 = y0 + cell * (ny - 1);
+    const std::size_t count = static_cast<std::size_t>(nx) * ny;
+    std::vector<int> winding(count, 0);
+    constexpr float nothing = -std::numeric_limits<float>::infinity();
+    std::fill(out, out + count, nothing);
+    walk([&](const Node& n) { return n.x0 <= x1 && x0 <= n.x1 && n.y0 <= y1 && y0 <= n.y1; },
+         [&](const Facet& f) {
+             const double fx0 = std::min({f.v[0].x, f.v[1].x, f.v[2].x}), fx1 = std::max({f.v[0].x, f.v[1].x, f.v[2].x});
+             const double fy0 = std::min({f.v[0].y, f.v[1].y, f.v[2].y}), fy1 = std::max({f.v[0].y, f.v[1].y, f.v[2].y});
+             const int j0 = static_cast<int>(std::max(0.0, std::ceil((fy0 - y0) / cell) - 1)),
+                       j1 = static_cast<int>(std::min<double>(ny - 1, std::floor((fy1 - y0) / cell) + 1));
+             const int i0 = static_cast<int>(std::max(0.0, std::ceil((fx0 - x0) / cell) - 1)),
+                       i1 = static_cast<int>(std::min<double>(nx - 1, std::floor((fx1 - x0) / cell) + 1));
+             for (int j = j0; j <= j1; ++j) {
+                 const double y = y0 + j * cell;
+                 if (y < fy0 || y > fy1) continue;
+                 for (int i = i0; i <= i1; ++i) {
+                     const double x = x0 + i * cell;
+                     const int w = facet_winding(f.v, x, y);
+                     if (w == 0) continue;
+                     const double z = facet_height(f.v, x, y);
+                     const std::size_t k = static_cast<std::size_t>(j) * nx + i;
+                     if (z >= top) winding[k] += w;
+                     else out[k] = std::max(out[k], static_cast<float>(z));
+                 }
+             }
+         });
+    for (std::size_t k = 0; k < count; ++k)
+        if (winding[k] > 0) out[k] = static_cast<float>(z_top);
+        else if (out[k] == nothing) out[k] = none;
+}
+
+double StandingPart::distance_from_shadow(const Point3& point, double z_top, double limit) const {
+    const double top = z_top - kSheet;
+    double best = limit;
+    if (point[2] - top < best && covered(point[0], point[1], top)) best = std::max(0.0, point[2] - top);
+    walk(
+        [&](const Node& n) {
+            if (n.z0 >= top) return false;
+            const double dxy = xy_distance(n, point[0], point[1]), dz = std::max(0.0, point[2] - std::min<double>(n.z1, top));
+            return dxy * dxy + dz * dz < best * best;
+        },
+        [&](const Facet& f) { below(f.v, top, [&](const Triangle& t) { best = std::min(best, ray_distance(point, t).d); }); });
+    return best;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,77 @@
+// The part as a cutter meets it in one layer: solid ∩ {z ≤ z_top}, all that stands below the layer's top (higher layers
+// are not there yet, lower ones are). Every cutter here reaches from its lower end upwards without end, so what matters of
+// the part is its shadow, the set of points that have part at or above them: a cutter touches the one exactly if it
+// touches the other, and just as deep. Nothing here is sampled: a straight motion is one convex problem per facet.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+using Point3 = std::array<double, 3>;  ///< mm
+
+/// Where a cutter is deepest in the part during a motion.
+struct Penetration {
+    double depth = 0;  ///< mm; 0 when nothing deeper than asked was found
+    Point3 tip{};      ///< the tip's place then
+    bool found = false;
+};
+
+/// A tree over the facets of a mesh, built once and used for every layer. Borrows nothing: it copies the facets.
+/// Const functions may be called from many threads at once. Deterministic.
+class StandingPart {
+public:
+    StandingPart(Context& context, MeshView mesh);
+
+    /// Material thinner than this under a layer's top is not counted: a facet that lies in the top plane to within
+    /// rounding of float32 and of the plan's text belongs to the next layer. All depths may be short by this, mm.
+    static constexpr double kSheet = 0.001;
+    /// Longest piece of a motion that is treated at once, mm; the result does not depend on it.
+    static constexpr double kPiece = 0.5;
+    /// Error of a depth by numerical minimisation, mm.
+    static constexpr double kNumericalError = 1e-7;
+
+    /// Largest depth, over a straight motion of the tip, of part in a ball end mill: a ball of `radius` whose lowest point
+    /// is the tip, and the shank of the same radius above its centre. Depth of a point in the cutter is its distance
+    /// from the cutter's surface, so a wall that is cut too deep by d counts d, whatever its slope.
+    /// @param at_least only depths above this are looked for (0 or more), mm
+    [[nodiscard]] Penetration ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
+
+    /// The same for an upright cylinder that begins at the tip and has no upper end (flat end mill, face mill, shank,
+    /// holder): depth of a point is the lesser of its distances from the wall and from the floor of the cylinder.
+    [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
+
+    /// Whether there is part just under the plane z at (x, y).
+    [[nodiscard]] bool covered(double x, double y, double z) const;
+
+    /// The largest z ≤ z_top of the part over (x, y); `none` where there is no part.
+    [[nodiscard]] double envelope(double x, double y, double z_top, double none) const;
+    /// The same for a grid of nx × ny points (x0 + i·cell, y0 + j·cell), row j after row j − 1, by scan conversion.
+    void envelope_grid(double x0, double y0, double cell, int nx, int ny, double z_top, float none, float* out) const;
+
+    /// Distance of a point from the shadow of the part below z_top, at most `limit` (returned when nothing is nearer); 0 within.
+    [[nodiscard]] double distance_from_shadow(const Point3& point, double z_top, double limit) const;
+
+    /// Lowest and highest z, and the extent in x and y, of the facets.
+    [[nodiscard]] Box3 box() const { return box_; }
+
+private:
+    struct Facet {
+        std::array<Vec3f, 3> v;
+    };
+    struct Node {
+        float x0, y0, z0, x1, y1, z1;
+    };
+    template <class Enter, class Visit>
+    void walk(Enter&& enter, Visit&& visit) const;
+    std::vector<Facet> facets_;              ///< in Morton order
+    std::vector<std::vector<Node>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
+    Box3 box_{};
+};
+
+}  // namespace slabwright

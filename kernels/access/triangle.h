@@ -1,0 +1,26 @@
+// The two questions about a facet that the trees of this folder ask: its nearest point, and its crossing with a vertical line.
+#pragma once
+
+#include <array>
+
+#include "kernels/access/standing_part.h"
+#include "kernels/mesh/mesh.h"
+
+namespace slabwright {
+
+using Triangle = std::array<Point3, 3>;
+
+/// The nearest point of a triangle; of a degenerate one, the nearest of its edges.
+[[nodiscard]] Point3 closest_on_triangle(const Point3& point, const Triangle& triangle);
+
+/// Winding number of a facet's outline around (x, y), seen from above: +1 facing up, −1 facing down, 0 beside it. Half-open,
+/// so over a closed mesh the sum is 0 everywhere, on edges and vertices too.
+[[nodiscard]] int facet_winding(const std::array<Vec3f, 3>& facet, double x, double y);
+
+/// Height of a facet's plane over (x, y), kept within the facet's own range; its top when it is vertical.
+[[nodiscard]] double facet_height(const std::array<Vec3f, 3>& facet, double x, double y);
+
+/// Bits of three cell numbers (21 bits each) interleaved: near in space is mostly near in this order.
+[[nodiscard]] std::uint64_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t z);
+
+}  // namespace slabwright

@@ -1,0 +1,301 @@
+// StandingPart and ClosestPoint against closed forms and against brute force over every facet.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <random>
+
+#include "kernels/access/closest_point.h"
+#include "kernels/access/standing_part.h"
+
+using namespace slabwright;
+
+namespace {
+
+void facet(Mesh& m, Point3 a, Point3 b, Point3 c) {
+    for (const Point3& p : {a, b, c}) {
+        m.vertices.push_back({static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])});
+    }
+    const auto n = static_cast<std::uint32_t>(m.vertices.size());
+    m.facets.push_back({n - 3, n - 2, n - 1});
+}
+void quad(Mesh& m, Point3 a, Point3 b, Point3 c, Point3 d) {
+    facet(m, a, b, c);
+    facet(m, a, c, d);
+}
+void box(Mesh& m, Point3 l, Point3 h) {
+    quad(m, {l[0], l[1], l[2]}, {l[0], h[1], l[2]}, {h[0], h[1], l[2]}, {h[0], l[1], l[2]});
+    quad(m, {l[0], l[1], h[2]}, {h[0], l[1], h[2]}, {h[0], h[1], h[2]}, {l[0], h[1], h[2]});
+    quad(m, {l[0], l[1], l[2]}, {h[0], l[1], l[2]}, {h[0], l[1], h[2]}, {l[0], l[1], h[2]});
+    quad(m, {h[0], h[1], l[2]}, {l[0], h[1], l[2]}, {l[0], h[1], h[2]}, {h[0], h[1], h[2]});
+    quad(m, {l[0], h[1], l[2]}, {l[0], l[1], l[2]}, {l[0], l[1], h[2]}, {l[0], h[1], h[2]});
+    quad(m, {h[0], l[1], l[2]}, {h[0], h[1], l[2]}, {h[0], h[1], h[2]}, {h[0], l[1], h[2]});
+}
+
+/// A closed block whose top is height(x, y) over [0, n]², on a grid of 1 mm, with its bottom at 0.
+Mesh relief(int n, const std::function<double(double, double)>& height) {
+    Mesh m;
+    auto p = [&](int i, int j) { return Point3{static_cast<double>(i), static_cast<double>(j), height(i, j)}; };
+    auto o = [&](int i, int j) { return Point3{static_cast<double>(i), static_cast<double>(j), 0}; };
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+            quad(m, p(i, j), p(i + 1, j), p(i + 1, j + 1), p(i, j + 1));
+            quad(m, o(i, j), o(i, j + 1), o(i + 1, j + 1), o(i + 1, j));
+        }
+    for (int i = 0; i < n; ++i) {
+        quad(m, o(i, 0), o(i + 1, 0), p(i + 1, 0), p(i, 0));
+        quad(m, o(i + 1, n), o(i, n), p(i, n), p(i + 1, n));
+        quad(m, o(0, i + 1), o(0, i), p(0, i), p(0, i + 1));
+        quad(m, o(n, i), o(n, i + 1), p(n, i + 1), p(n, i));
+    }
+    return m;
+}
+
+/// Points of the part's surface below z_top, as dense as `step`, its cap included (from covered()).
+std::vector<Point3> surface_points(const Mesh& m, double z_top, double step) {
+    std::vector<Point3> points;
+    for (const Index3& f : m.facets) {
+        auto v = [&](int k) { return Point3{m.vertices[f[k]].x, m.vertices[f[k]].y, m.vertices[f[k]].z}; };
+        const Point3 a = v(0), b = v(1), c = v(2);
+        auto length = [](Point3 p, Point3 q) { return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]); };
+        const int n = static_cast<int>(std::ceil(std::max({length(a, b), length(b, c), length(c, a)}) / step));
+        for (int i = 0; i <= n; ++i)
+            for (int j = 0; i + j <= n; ++j) {
+                const double s = static_cast<double>(i) / n, t = static_cast<double>(j) / n;
+                const Point3 q{a[0] + s * (b[0] - a[0]) + t * (c[0] - a[0]), a[1] + s * (b[1] - a[1]) + t * (c[1] - a[1]),
+                               a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2])};
+                if (q[2] <= z_top) points.push_back(q);
+            }
+    }
+    return points;
+}
+
+double bumpy(double x, double y) { return 6 + 2.5 * std::sin(x * 0.9) * std::cos(y * 0.7) + std::sin(2.1 * x + y); }
+
+}  // namespace
+
+TEST(StandingPart, BallOnBoxInClosedForm) {
+    Context context;
+    Mesh m;
+    box(m, {0, 0, 0}, {20, 20, 10});
+    const StandingPart part(context, m.view());
+    const double R = 3, e = 2e-6;
+    // Beside the wall x = 20, well below the top: only the shank and the ball's equator count.
+    EXPECT_EQ(part.ball(10, {23.0, 5, 2}, {23.0, 15, 2}, R, 1e-5).depth, 0);
+    EXPECT_NEAR(part.ball(10, {22.95, 5, 2}, {22.95, 15, 2}, R, 0).depth, 0.05, e);
+    EXPECT_NEAR(part.ball(10, {22.95, 5, -8}, {22.95, 15, -8}, R, 0).depth, 0.05, e);
+    // Above the top edge, along it and across it.
+    const double h = 10 - StandingPart::kSheet;
+    EXPECT_NEAR(part.ball(10, {22, 5, 7.5}, {22, 15, 7.5}, R, 0).depth, R - std::hypot(2, 7.5 + R - h), e);
+    // On the top: the cap counts, from any side, and a motion that dips in the middle is caught between its ends.
+    EXPECT_NEAR(part.ball(10, {5, 5, 9.9}, {15, 5, 9.9}, R, 0).depth, 0.1 - StandingPart::kSheet, e);
+    EXPECT_EQ(part.ball(10, {5, 5, 10}, {15, 5, 10}, R, 1e-5).depth, 0);
+    // Across the corner: deepest where the way is nearest to it.
+    const Penetration p = part.ball(10, {20, 22.9, 1}, {22.9, 20, 1}, R, 0);
+    EXPECT_NEAR(p.depth, R - 2.9 / std::sqrt(2.0), e);
+    EXPECT_NEAR(p.tip[0], 21.45, 1e-3);
+    EXPECT_NEAR(p.tip[1], 21.45, 1e-3);
+    // A lower layer's view of the same box: nothing above 4 stands.
+    EXPECT_EQ(part.ball(4, {-5, 10, 4}, {25, 10, 4}, R, 1e-5).depth, 0);
+    EXPECT_NEAR(part.ball(4, {-5, 10, 3.5}, {25, 10, 3.5}, R, 0).depth, 0.5 - StandingPart::kSheet, 2e-3);
+    // From above through the top: the axis itself inside the part.
+    EXPECT_NEAR(part.ball(10, {10, 10, 12}, {10, 10, 2}, R, 0).depth, R, e);
+}
+
+TEST(StandingPart, CylinderOnBoxInClosedForm) {
+    Context context;
+    Mesh m;
+    box(m, {0, 0, 0}, {20, 20, 10});
+    const StandingPart part(context, m.view());
+    const double R = 5, e = 2e-6, s = StandingPart::kSheet;
+    EXPECT_EQ(part.cylinder(10, {25, 0, 3}, {25, 20, 3}, R, 1e-5).depth, 0);
+    EXPECT_NEAR(part.cylinder(10, {24.98, 0, 3}, {24.98, 20, 3}, R, 0).depth, 0.02, e);
+    EXPECT_NEAR(part.cylinder(10, {22, 0, 9.7}, {22, 20, 9.7}, R, 0).depth, 0.3 - s, e);   // the floor is nearer than the wall
+    EXPECT_NEAR(part.cylinder(10, {10, 10, 9.7}, {11, 10, 9.7}, R, 0).depth, 0.3 - s, e);  // all over the cap
+    EXPECT_NEAR(part.cylinder(10, {24, 10, 12}, {24, 10, 2}, R, 0).depth, 1, e);           // plunge beside: the wall is nearer
+    EXPECT_NEAR(part.cylinder(10, {24, 10, 12}, {24, 10, 9.5}, R, 0).depth, 0.5 - s, e);
+    // Down a ramp past the top edge: depth grows until the wall limits it; the end is the deepest.
+    EXPECT_NEAR(part.cylinder(10, {24.9, 0, 12}, {24.9, 20, 9.95}, R, 0).depth, 0.05 - s, e);
+    EXPECT_EQ(part.cylinder(10, {-20, -20, 10}, {40, 40, 10}, 25, 1e-5).depth, 0);  // a face mill over the top
+}
+
+TEST(StandingPart, OverhangCountsLikeItsShadowAndOnlyUpToTheTop) {
+    Context context;
+    Mesh m;
+    box(m, {0, 0, 0}, {10, 10, 5});
+    box(m, {0, 0, 5}, {30, 10, 10});  // overhangs the first, from z = 5
+    const StandingPart part(context, m.view());
+    // In the lower layer the space beside the first box is free, although the overhang begins exactly at its top.
+    EXPECT_EQ(part.ball(5, {20, -5, 1}, {20, 15, 1}, 3, 1e-5).depth, 0);
+    EXPECT_EQ(part.cylinder(5, {20, -5, 1}, {20, 15, 1}, 3, 1e-5).depth, 0);
+    EXPECT_FALSE(part.covered(20, 5, 4.999));
+    EXPECT_TRUE(part.covered(5, 5, 4.999));
+    // In the upper layer the cutter's shank would meet it.
+    EXPECT_NEAR(part.ball(10, {20, -5, 1}, {20, 15, 1}, 3, 0).depth, 3, 1e-6);
+    EXPECT_NEAR(part.envelope(20, 5, 10, -1), 10, 0);
+    EXPECT_NEAR(part.envelope(20, 5, 5, -1), -1, 0);
+    EXPECT_NEAR(part.envelope(20, 5, 7, -1), 7, 0);
+}
+
+TEST(StandingPart, AgreesWithBruteForceOnARelief) {
+    Context context;
+    const Mesh m = relief(12, bumpy);
+    const StandingPart part(context, m.view());
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-2, 14), uz(1, 9), d(-0.7, 0.7), ur(0.3, 3);
+    const double step = 0.025;
+    for (const double z_top : {100.0, 6.5}) {
+        const auto points = surface_points(m, z_top - StandingPart::kSheet, step);
+        for (int trial = 0; trial < 40; ++trial) {
+            const Point3 a{u(random), u(random), uz(random)};
+            const Point3 b{a[0] + d(random), a[1] + d(random), trial % 3 == 0 ? a[2] : a[2] + d(random)};
+            const double R = ur(random);
+            double ball = 0, cylinder = 0;
+            const int samples = 24;
+            std::vector<Point3> near;
+            for (const Point3& q : points)
+                if (std::hypot(q[0] - a[0], q[1] - a[1]) < R + 1) near.push_back(q);
+            for (int i = 0; i <= samples; ++i) {
+                const double t = static_cast<double>(i) / samples;
+                const Point3 p{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
+                double near2 = R * R;
+                for (const Point3& q : near) {
+                    const double x = q[0] - p[0], y = q[1] - p[1], r2 = x * x + y * y;
+                    if (r2 >= R * R) continue;
+                    const double z = std::max(0.0, p[2] + R - q[2]);
+                    near2 = std::min(near2, r2 + z * z);
+                    if (q[2] > p[2]) cylinder = std::max(cylinder, std::min(R - std::sqrt(r2), q[2] - p[2]));
+                }
+                ball = std::max(ball, R - std::sqrt(near2));
+                if (part.covered(p[0], p[1], z_top - StandingPart::kSheet)) {
+                    ball = std::max(ball, R - std::max(0.0, p[2] + R - z_top));
+                    cylinder = std::max(cylinder, std::min(R, z_top - p[2]));
+                }
+            }
+            // Brute force samples, so it can only miss: by half a step of the way and of the surface.
+            const double miss = step * 0.6 + std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]) / samples / 2 + 2 * StandingPart::kSheet;
+            const double gb = part.ball(z_top, a, b, R, 0).depth, gc = part.cylinder(z_top, a, b, R, 0).depth;
+            EXPECT_GE(gb, ball - 2 * StandingPart::kSheet) << "trial " << trial << " R " << R;
+            EXPECT_LE(gb, ball + miss) << "trial " << trial << " R " << R;
+            EXPECT_GE(gc, cylinder - 2 * StandingPart::kSheet) << "trial " << trial << " R " << R;
+            EXPECT_LE(gc, cylinder + miss) << "trial " << trial << " R " << R;
+            // A floor that is asked for changes nothing above it.
+            if (gb > 0.1) {
+                EXPECT_NEAR(part.ball(z_top, a, b, R, 0.1).depth, gb, 1e-6);
+            }
+            if (gc > 0.1) {
+                EXPECT_NEAR(part.cylinder(z_top, a, b, R, 0.1).depth, gc, 1e-6);
+            }
+        }
+    }
+}
+
+TEST(StandingPart, EnvelopeByPointsAndByGrid) {
+    Context context;
+    const Mesh m = relief(12, bumpy);
+    const StandingPart part(context, m.view());
+    const int nx = 37, ny = 29;
+    std::vector<float> grid(static_cast<std::size_t>(nx) * ny);
+    for (const double z_top : {100.0, 6.5}) {
+        part.envelope_grid(-1, -0.5, 0.5, nx, ny, z_top, -1, grid.data());
+        int capped = 0, open = 0;
+        for (int j = 0; j < ny; ++j)
+            for (int i = 0; i < nx; ++i) {
+                const double x = -1 + 0.5 * i, y = -0.5 + 0.5 * j;
+                const float g = grid[static_cast<std::size_t>(j) * nx + i];
+                EXPECT_NEAR(g, part.envelope(x, y, z_top, -1), 1e-6);
+                if (x < 0 || y < 0 || x > 12 || y > 12) {
+                    EXPECT_EQ(g, -1);
+                    ++open;
+                }
+                if (x == std::floor(x) && y == std::floor(y) && x > 0 && y > 0 && x < 12 && y < 12) {
+                    EXPECT_NEAR(g, std::min(z_top, bumpy(x, y)), 2e-3);
+                    capped += g == static_cast<float>(z_top);
+                }
+            }
+        EXPECT_GT(open, 0);
+        if (z_top < 10) {
+            EXPECT_GT(capped, 0);
+        }
+    }
+}
+
+TEST(StandingPart, DistanceFromShadow) {
+    Context context;
+    Mesh m;
+    box(m, {0, 0, 0}, {10, 10, 5});
+    box(m, {0, 0, 5}, {30, 10, 10});
+    const StandingPart part(context, m.view());
+    EXPECT_NEAR(part.distance_from_shadow({5, 5, 12}, 10, 50), 2 + StandingPart::kSheet, 1e-6);
+    EXPECT_NEAR(part.distance_from_shadow({33, 5, 14}, 10, 50), 5, 2e-3);
+    EXPECT_NEAR(part.distance_from_shadow({20, 5, 2}, 10, 50), 0, 0);  // under the overhang is shadow
+    EXPECT_NEAR(part.distance_from_shadow({20, 5, 2}, 5, 50), 10, 1e-6);
+    EXPECT_NEAR(part.distance_from_shadow({20, 5, 2}, 5, 4), 4, 0);
+}
+
+TEST(ClosestPoint, AgreesWithBruteForce) {
+    Context context;
+    const Mesh m = relief(12, bumpy);
+    const ClosestPoint closest(context, m.view());
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-3, 15), uz(-2, 12);
+    const auto points = surface_points(m, 1e9, 0.05);
+    std::vector<Point3> queries;
+    for (int i = 0; i < 300; ++i) queries.push_back({u(random), u(random), uz(random)});
+    const auto hits = closest.query(context, queries, 100);
+    ASSERT_EQ(hits.size(), queries.size());
+    for (std::size_t i = 0; i < queries.size(); ++i) {
+        const Point3& q = queries[i];
+        double best = 1e9;
+        for (const Point3& p : points) best = std::min(best, std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]));
+        ASSERT_NE(hits[i].facet, kNoFacet);
+        EXPECT_LE(std::abs(hits[i].distance), best + 1e-6);
+        EXPECT_GE(std::abs(hits[i].distance), best - 0.05);
+        const Point3& c = hits[i].point;
+        EXPECT_NEAR(std::hypot(c[0] - q[0], c[1] - q[1], c[2] - q[2]), std::abs(hits[i].distance), 1e-9);
+        const bool column = q[0] > 0 && q[1] > 0 && q[0] < 12 && q[1] < 12;
+        if (!column || q[2] < 0 || q[2] > 10) {
+            EXPECT_GE(hits[i].distance, 0);
+        }
+        if (column && q[2] > 0.01 && q[2] < 2.4) {
+            EXPECT_LT(hits[i].distance, 0);
+        }
+        // One at a time gives the same, and so does one thread.
+        const auto one = closest.query(q, 100);
+        EXPECT_EQ(one.distance, hits[i].distance);
+        EXPECT_EQ(one.facet, hits[i].facet);
+    }
+    Context serial({.threads = 1});
+    const auto again = closest.query(serial, queries, 100);
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+        EXPECT_EQ(hits[i].distance, again[i].distance);
+        EXPECT_EQ(hits[i].facet, again[i].facet);
+    }
+}
+
+TEST(ClosestPoint, RadiusSignAndTies) {
+    Context context;
+    Mesh m;
+    box(m, {1000, 1000, 0}, {1020, 1020, 10});
+    const ClosestPoint closest(context, m.view());
+    EXPECT_EQ(closest.query({1010, 1010, 15}, 4.9).facet, kNoFacet);
+    EXPECT_NEAR(closest.query({1010, 1010, 15}, 5.1).distance, 5, 1e-9);
+    EXPECT_NEAR(closest.query({1010, 1010, 15}, 5).distance, 5, 1e-9);
+    EXPECT_NEAR(closest.query({1010, 1003, 5}, 50).distance, -3, 1e-9);
+    EXPECT_NEAR(closest.query({1010, 1010, 5}, 50).distance, -5, 1e-9);
+    // The diagonal of a face belongs to two facets: the lower index answers. The column above an edge or a corner is
+    // either inside or outside, never half.
+    EXPECT_EQ(closest.query({1010, 1010, 12}, 50).facet, 2u);
+    EXPECT_EQ(closest.winding({1010, 1010, 5}), 1);
+    EXPECT_EQ(closest.winding({1010, 1010, 11}), 0);
+    EXPECT_EQ(closest.winding({1010, 1010, -1}), 0);
+    EXPECT_EQ(closest.winding({999, 1010, 5}), 0);
+    const int edge = closest.winding({1020, 1010, 5});
+    EXPECT_TRUE(edge == 0 || edge == 1);
+}
