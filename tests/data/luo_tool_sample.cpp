@@ -1,0 +1,77 @@
+// The sample of LUO 5.6. Its drawing (figure 5.15) is lost in the scan, so this part is built from what the text says of it, so that
+// LUO's finish tools follow from the geometry (inches; diameters):
+//
+//   layer 1, 0 to .75      a plate with vertical walls and no concave corner: every tool reaches everything, the 1 in is chosen.
+//   layer 2, .75 to 1.50   an H drafted by 3°, an island drafted by 2°, a vertical boss. The H has four concave corners of radius .15
+//                          to .19: the .25 in tool fits them, the .50 in does not, and the notches are .60 to .68 wide: the .50 in
+//                          tool can rough them, the .75 in cannot.
+//   layer 3, 1.50 to 2.00  a C drafted by 3°, with two such corners, and a blind slot from 1.70 up, .18 to .21 wide: only the .125 in
+//                          tool enters. Where the slot begins, LUO table 6.3 changes from .25 to .125.
+//
+// LUO 5.6 also finds that only the .125 in flat end mill roughs layer 3 with AS = 0, which no slot of one width can give together with
+// that table: what lies outside a swath of .125 from either wall is wide enough for a .25 in tool.
+#include <array>
+
+#include "tests/data/sweep.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kInch = 25.4;
+constexpr double kChord = 0.01;  // mm
+
+Outline inches(std::vector<Corner> corners) {
+    for (Corner& c : corners) c = {c.x * kInch, c.y * kInch, c.radius * kInch};
+    return rounded_polygon(corners, kChord);
+}
+
+}  // namespace
+
+std::vector<Facet> luo_tool_sample() {
+    const double z1 = 0.75 * kInch, z2 = 1.5 * kInch, z3 = 2.0 * kInch, slot_floor = 1.7 * kInch;
+    const Outline plate = inches({{0, 0, 0.5}, {8.75, 0, 0.5}, {8.75, 6.5, 0.5}, {0, 6.5, 0.5}});
+    const Outline letter_h = inches({{0.5, 0.5, 0.5},
+                                     {5.5, 0.5, 0.5},
+                                     {5.5, 2.95, 0.5},
+                                     {3.9, 2.95, 0.15},
+                                     {3.9, 3.55, 0.15},
+                                     {5.5, 3.55, 0.5},
+                                     {5.5, 6, 0.5},
+                                     {0.5, 6, 0.5},
+                                     {0.5, 3.55, 0.5},
+                                     {2.1, 3.55, 0.15},
+                                     {2.1, 2.95, 0.15},
+                                     {0.5, 2.95, 0.5}});
+    const Outline letter_c = inches({{2.3, 0.9, 0.3},
+                                     {5.1, 0.9, 0.3},
+                                     {5.1, 2.89, 0.3},
+                                     {3.4, 2.89, 0.15},
+                                     {3.4, 3.61, 0.15},
+                                     {5.1, 3.61, 0.3},
+                                     {5.1, 5.6, 0.3},
+                                     {2.3, 5.6, 0.3}});
+    const Outline island = stadium(7.4 * kInch, 1.4 * kInch, 7.4 * kInch, 2.8 * kInch, 0.8 * kInch, kChord);
+    const Outline boss = circle(7.4 * kInch, 5.0 * kInch, 0.8 * kInch, kChord);
+    const double slot_rim = 0.09 * kInch + (drafted_pocket(z3, slot_floor, 3, 0, kChord).back().offset) * -1;
+    const Outline slot = stadium(3.2 * kInch, 4.6 * kInch, 4.2 * kInch, 4.6 * kInch, slot_rim, kChord);
+
+    std::vector<Facet> facets;
+    const Profile plate_wall{{0, 0}, {0, z1}};
+    flat(facets, ring(plate, plate_wall.front()), {}, false);
+    const Ring plate_top = sweep(facets, plate, plate_wall);
+
+    const Profile h_wall = drafted_wall(z1, z2, 3, 0, 0, kChord), island_wall = drafted_wall(z1, z3, 2, 0, 0, kChord);
+    const Profile boss_wall{{0, z1}, {0, z2}};
+    flat(facets, plate_top, {ring(letter_h, h_wall.front()), ring(island, island_wall.front()), ring(boss, boss_wall.front())}, true);
+    flat(facets, sweep(facets, island, island_wall), {}, true);
+    flat(facets, sweep(facets, boss, boss_wall), {}, true);
+
+    const Profile c_wall = drafted_wall(z2, z3, 3, 0, 0, kChord), slot_wall = drafted_pocket(z3, slot_floor, 3, 0, kChord);
+    flat(facets, sweep(facets, letter_h, h_wall), {ring(letter_c, c_wall.front())}, true);
+    flat(facets, sweep(facets, letter_c, c_wall), {ring(slot, slot_wall.front())}, true);
+    flat(facets, sweep(facets, slot, slot_wall), {}, true);
+    return facets;
+}
+
+}  // namespace slabwright
