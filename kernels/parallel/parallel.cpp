@@ -17,12 +17,16 @@
 
 namespace slabwright {
 
+namespace {
+int machine_threads() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
+}  // namespace
+
 struct Context::Impl {
     explicit Impl(int n)
         : threads(n)
 #if !defined(SLABWRIGHT_STD_THREADS)
           ,
-          arena(n)
+          arena(std::min(n, machine_threads()))  // oneTBB warns on stderr about more, and would not run them anyway
 #endif
     {
     }
@@ -37,10 +41,6 @@ struct Context::Impl {
     std::uint64_t steps = 1;
     std::atomic<std::uint64_t> done{0};
 };
-
-namespace {
-int machine_threads() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
-}  // namespace
 
 Context::Context() : Context(Options{}) {}
 
@@ -137,7 +137,8 @@ void run_chunks(Context& context, std::size_t chunks, void (*fn)(void*, std::siz
     worker();
     for (std::thread& thread : threads) thread.join();
 #else
-    context.impl_->arena.execute([&] { tbb::parallel_for(std::size_t{0}, chunks, body); });
+    // Isolated: a thread that waits for this loop takes no chunk of an outer one, which would hold two layers' memory at once.
+    context.impl_->arena.execute([&] { tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, chunks, body); }); });
 #endif
     if (error) std::rethrow_exception(error);
 }

@@ -1,0 +1,59 @@
+// Face milling: from the bonded slab down to the layer's top, in rectangles from outside in, clockwise, so that the
+// cutter always climbs and never lifts an edge that hangs over.
+#include <algorithm>
+#include <cmath>
+
+#include "engine/paths/layer_cut.h"
+
+namespace slabwright {
+
+Operation face_layer(const LayerCut& cut) {
+    const Tool& tool = tool_of_kind(cut.job, ToolKind::face);
+    Operation op = cut.operation(OperationKind::face, "face to the layer's top", tool);
+    const double depth = cut.stock_top - cut.layer.z_top;
+    if (depth <= 0) return op;
+    const double limit = std::min(cut.job.cutting.face_depth, tool.stepdown_max > 0 ? tool.stepdown_max : cut.job.cutting.face_depth);
+    const int steps = std::max(1, static_cast<int>(std::ceil(depth / limit - 1e-9)));
+    const double r = tool.diameter / 2, stepover = tool.stepover * tool.diameter;
+    op.stepdown = depth / steps;
+    op.stepover = stepover;
+    const double clearance = cut.stock_top + cut.job.machine.clearance;
+    PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance, cut.stock_top + 2);
+    const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
+    for (int step = 1; step <= steps; ++step) {
+        const std::int32_t z = to_units(step == steps ? cut.layer.z_top : cut.stock_top - op.stepdown * step);
+        double inset = stepover - r;  // of the cutter's centre from the stock's edge
+        const double x0 = std::max(lo[0] + inset, cut.low(0, r)), y_out = cut.low(1, r + 2);
+        path.go_above({to_units(std::min(x0, hi[0])), to_units(y_out)});
+        path.sink(z);
+        for (;; inset += stepover) {
+            const double w = hi[0] - lo[0] - 2 * inset, d = hi[1] - lo[1] - 2 * inset;
+            const double left = std::max(lo[0] + inset, cut.low(0, r)), right = std::min(hi[0] - inset, cut.high(0, r));
+            const double south = std::max(lo[1] + inset, cut.low(1, r)), north = std::min(hi[1] - inset, cut.high(1, r));
+            if (w <= 0 || d <= 0) {  // what is left is a strip narrower than two step-overs: along its middle
+                if (std::max(w, d) > 0 || inset == stepover - r) {
+                    const double cx = 0.5 * (lo[0] + hi[0]), cy = 0.5 * (lo[1] + hi[1]);
+                    if (w > d) {
+                        path.cut({to_units(left), to_units(cy)}, z);
+                        path.cut({to_units(right), to_units(cy)}, z);
+                    } else {
+                        path.cut({to_units(cx), to_units(south)}, z);
+                        path.cut({to_units(cx), to_units(north)}, z);
+                    }
+                }
+                break;
+            }
+            path.cut({to_units(left), to_units(south)}, z);
+            path.cut({to_units(left), to_units(north)}, z);
+            path.cut({to_units(right), to_units(north)}, z);
+            path.cut({to_units(right), to_units(south)}, z);
+            path.cut({to_units(left), to_units(south)}, z);
+            if (std::min(w, d) <= 2 * r) break;  // the ring has reached the middle
+        }
+        path.retract();
+    }
+    path.finish();
+    return op;
+}
+
+}  // namespace slabwright

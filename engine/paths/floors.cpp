@@ -1,0 +1,54 @@
+// Finishing of up-facing flats by the flat end mill: roughing left its allowance on them.
+#include <algorithm>
+#include <cmath>
+
+#include "engine/paths/layer_cut.h"
+
+namespace slabwright {
+
+Operation finish_floors(const LayerCut& cut) {
+    const Tool& tool = tool_of_kind(cut.job, ToolKind::flat);
+    Operation op = cut.operation(OperationKind::finish, "floors", tool);
+    const double r = tool.diameter / 2;
+    const Cutter cutter{Cutter::Profile::flat, r};
+    std::vector<double> heights;
+    for (const Feature* flat : cut.layer.flats)
+        if (flat->area >= cut.job.cutting.min_flat_area) heights.push_back(flat->z_low);
+    std::sort(heights.begin(), heights.end(), std::greater<>());
+    heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
+    if (heights.empty()) return op;
+    const std::vector<Section> inside = cut.insides(cutter, heights);
+    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
+                     cut.layer.z_top + 2);
+    op.stepover = tool.stepover * tool.diameter;
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+        std::vector<SolidFacet> facets;
+        double y_low = 1e300, y_high = -1e300;
+        for (const SolidFacet& f : cut.solid.facets) {
+            if (f.z_min != f.z_max || f.z_max != heights[i] || f.normal[2] <= 0) continue;
+            facets.push_back(f);
+            for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
+        }
+        if (facets.empty()) continue;
+        y_low = std::max(y_low - 0.4 * r, cut.low(1, r));
+        y_high = std::min(y_high + 0.4 * r, cut.high(1, r));
+        const int gaps = std::max(1, static_cast<int>(std::ceil((y_high - y_low) / op.stepover - 1e-9)));
+        std::vector<std::int32_t> lines;
+        for (int k = 0; k <= gaps; ++k) lines.push_back(to_units(y_low + (y_high - y_low) * k / gaps));
+        lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
+        const Fibres forbidden = fibres(cut.context, cut.solid, inside[i].loops, cutter, heights[i], Axis::x, lines);
+        const Fibres reach = covering(cut.context, facets, r, Axis::x, lines);
+        std::vector<std::vector<Stretch>> free(lines.size());
+        for (std::size_t l = 0; l < lines.size(); ++l)
+            for (const Forbidden& near : reach.line(l))
+                for (const Stretch& s :
+                     free_stretches(forbidden.line(l), std::max(near.low, cut.low(0, r + 2)), std::min(near.high, cut.high(0, r + 2)), 0.01))
+                    free[l].push_back(s);
+        zigzag(path, cut, tool, lines, free, heights[i], std::min(cut.layer.z_top, heights[i] + cut.job.cutting.floor_allowance),
+               [&](std::span<const std::int32_t> at) { return fibres(cut.context, cut.solid, inside[i].loops, cutter, heights[i], Axis::y, at); });
+    }
+    path.finish();
+    return op;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,65 @@
+// What all operations of one layer share, and the operations themselves, one file each.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "engine/paths/path_builder.h"
+#include "engine/paths/paths.h"
+#include "kernels/cutting/drop.h"
+#include "kernels/cutting/level_contours.h"
+
+namespace slabwright {
+
+struct LayerCut {
+    Context& context;
+    const LayerJob& layer;
+    const Job& job;
+    LayerSolid solid;
+    double stock_top = 0;  ///< of the slab as bonded, mm
+
+    /// The place of x or y stretched past the stock's edge by `beyond`, kept within the travel of the machine.
+    [[nodiscard]] double low(int axis, double beyond) const;
+    [[nodiscard]] double high(int axis, double beyond) const;
+    /// Smallest slope (radians from level) of the facets to be machined between z0 and z1 that are at least `steepest_flat`
+    /// steep; π/2 where there are none.
+    [[nodiscard]] double least_slope(double z0, double z1, double at_least) const;
+    /// Sections of the mesh for the tip heights of a cutter, in their order.
+    [[nodiscard]] std::vector<Section> insides(const Cutter& cutter, std::span<const double> tip_z) const;
+    /// The contour of every level, levels in parallel.
+    [[nodiscard]] std::vector<Contours> contours(const Cutter& cutter, std::span<const double> tip_z, std::int32_t pitch) const;
+    [[nodiscard]] Operation operation(OperationKind kind, const char* purpose, const Tool& tool) const;
+
+    struct SlopeBin {
+        double least = 0;
+    };
+    std::vector<std::vector<double>> slopes;  ///< by z bin: the slopes of its facets, ascending, thinned
+    double slope_bin = 0.1;                   ///< mm
+};
+
+/// Longest chord between exact cutter locations that stays within 0.65 of the gouge tolerance (see level_contours), in
+/// 0.1 µm for a grid's pitch (chord/√2), and what simplifying may add.
+[[nodiscard]] double safe_chord_mm(double radius, double gouge);
+[[nodiscard]] std::int32_t safe_pitch(double radius, double gouge);
+[[nodiscard]] double simplify_tolerance_units(double gouge);
+
+/// Clears a region given as free stretches on parallel lines along x, chained into zigzags; each chain is entered from
+/// outside the stock where it begins there, else by a ramp.
+/// @param line_y     0.1 µm, ascending
+/// @param free       per line
+/// @param tip_z      mm
+/// @param above_z    mm: where standing stock ends, so that a ramp starts there
+/// @param link_free  whether the tool may go straight along y at x (0.1 µm) between two neighbouring lines
+void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<const std::int32_t> line_y,
+            const std::vector<std::vector<Stretch>>& free, double tip_z, double above_z,
+            const std::function<Fibres(std::span<const std::int32_t>)>& links);
+
+[[nodiscard]] Operation face_layer(const LayerCut& cut);
+[[nodiscard]] Operation rough_layer(const LayerCut& cut);
+[[nodiscard]] Operation finish_floors(const LayerCut& cut);
+[[nodiscard]] Operation finish_walls(const LayerCut& cut);
+[[nodiscard]] Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics);
+[[nodiscard]] Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics);
+
+}  // namespace slabwright

@@ -1,0 +1,216 @@
+// Finishing by level contours: the ball end mill on slopes of 45° and more, the flat end mill on vertical walls. Of every
+// contour only the stretches are cut whose contact lies on such a surface, within the layer.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "engine/paths/layer_cut.h"
+#include "kernels/cutting/cusp.h"
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+// An open or closed stretch of a contour; closed ones repeat their first point at the end.
+struct Run {
+    std::vector<PathPoint> points;
+    bool closed = false;
+};
+
+// Cuts one contour into the stretches of its wanted points.
+void append_runs(const Contours& contours, std::size_t c, std::int32_t z, const std::vector<char>& wanted, double tolerance, std::vector<Run>& out) {
+    const std::size_t first = contours.starts[c], n = contours.starts[c + 1] - first;
+    if (n < 2) return;
+    std::size_t start = n;
+    for (std::size_t k = 0; k < n && start == n; ++k)
+        if (!wanted[k]) start = k;
+    auto point = [&](std::size_t k) {
+        const Point2 p = contours.points[first + k % n];
+        return PathPoint{p.x, p.y, z};
+    };
+    if (start == n) {
+        Run run;
+        for (std::size_t k = 0; k <= n; ++k) run.points.push_back(point(k));
+        run.points = simplify(run.points, tolerance);
+        run.closed = true;
+        if (run.points.size() > 2) out.push_back(std::move(run));
+        return;
+    }
+    for (std::size_t k = 0; k < n;) {
+        if (!wanted[(start + k) % n]) {
+            ++k;
+            continue;
+        }
+        Run run;
+        for (; k < n && wanted[(start + k) % n]; ++k) run.points.push_back(point(start + k));
+        if (run.points.size() < 2) continue;
+        run.points = simplify(run.points, tolerance);
+        out.push_back(std::move(run));
+    }
+}
+
+// Nearest run first; ties by index. Closed runs are begun at their point nearest to the tool.
+void cut_level(PathBuilder& path, std::vector<Run>& runs, Point2& at) {
+    auto distance2 = [&](const PathPoint& p) {
+        const std::int64_t dx = std::int64_t{p.x} - at.x, dy = std::int64_t{p.y} - at.y;
+        return dx * dx + dy * dy;
+    };
+    std::vector<char> done(runs.size(), 0);
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+        std::size_t best = runs.size(), best_point = 0;
+        std::int64_t best_way = INT64_MAX;
+        for (std::size_t i = 0; i < runs.size(); ++i) {
+            if (done[i]) continue;
+            const std::size_t candidates = runs[i].closed ? runs[i].points.size() - 1 : 1;
+            for (std::size_t p = 0; p < candidates; ++p) {
+                const std::int64_t way = distance2(runs[i].points[p]);
+                if (way < best_way) best_way = way, best = i, best_point = p;
+            }
+        }
+        Run& run = runs[best];
+        done[best] = 1;
+        if (run.closed) {
+            run.points.pop_back();
+            std::rotate(run.points.begin(), run.points.begin() + static_cast<std::ptrdiff_t>(best_point), run.points.end());
+            run.points.push_back(run.points.front());
+        }
+        path.go_above({run.points[0].x, run.points[0].y});
+        path.plunge(run.points[0].z);
+        for (std::size_t p = 1; p < run.points.size(); ++p) path.cut({run.points[p].x, run.points[p].y}, run.points[p].z);
+        path.retract();
+        at = path.at();
+    }
+}
+
+double vertical_nz(const LayerCut& cut) { return std::cos(cut.job.cutting.vertical_deg * std::numbers::pi / 180); }
+
+}  // namespace
+
+Operation finish_walls(const LayerCut& cut) {
+    const Tool& tool = tool_of_kind(cut.job, ToolKind::flat);
+    Operation op = cut.operation(OperationKind::finish, "vertical walls", tool);
+    const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut);
+    double low = 1e300, high = -1e300;  // of the vertical facets
+    for (const SolidFacet& f : cut.solid.facets) {
+        if (std::abs(f.nz) > vertical || f.z_max <= cut.layer.z_bottom || (f.normal[0] == 0 && f.normal[1] == 0)) continue;
+        low = std::min(low, std::max(f.z_min, cut.layer.z_bottom));
+        high = std::max(high, f.z_max);
+    }
+    if (low >= high) return op;
+    // One level on every floor and on the layer's bottom, so that a wall is cut down to where it stands.
+    std::vector<double> fixed{cut.layer.z_bottom};
+    for (const Feature* flat : cut.layer.flats)
+        if (flat->area >= cut.job.cutting.min_flat_area) fixed.push_back(flat->z_low);
+    std::sort(fixed.begin(), fixed.end(), std::greater<>());
+    fixed.erase(std::unique(fixed.begin(), fixed.end()), fixed.end());
+    std::vector<double> tips;
+    double z = high;
+    for (const double f : fixed) {
+        if (f >= high) continue;
+        const int steps = std::max(1, static_cast<int>(std::ceil((z - f) / tool.stepdown_max - 1e-9)));
+        for (int k = 1; k <= steps; ++k) {
+            const double tip = k == steps ? f : z - (z - f) * k / steps;
+            op.stepdown = std::max(op.stepdown, (z - f) / steps);
+            tips.push_back(tip);
+            if (tip < low) break;
+        }
+        z = f;
+        if (tips.back() < low) break;
+    }
+    const Cutter cutter{Cutter::Profile::flat, r};
+    const std::vector<Contours> contours = cut.contours(cutter, tips, safe_pitch(r, gouge));
+    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
+                     cut.layer.z_top + 2);
+    Point2 at{};
+    for (std::size_t i = 0; i < tips.size(); ++i) {
+        std::vector<Run> runs;
+        for (std::size_t c = 0; c < contours[i].size(); ++c) {
+            std::vector<char> wanted;
+            for (std::size_t k = contours[i].starts[c]; k < contours[i].starts[c + 1]; ++k) wanted.push_back(std::abs(contours[i].nz[k]) <= vertical);
+            append_runs(contours[i], c, to_units(tips[i]), wanted, simplify_tolerance_units(gouge), runs);
+        }
+        cut_level(path, runs, at);
+    }
+    path.finish();
+    return op;
+}
+
+Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
+    const Tool& tool = tool_of_kind(cut.job, ToolKind::ball);
+    Operation op = cut.operation(OperationKind::finish, "level contours", tool);
+    const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut), degree = std::numbers::pi / 180;
+    const double split = (cut.job.cutting.steep_limit_deg - cut.job.cutting.overlap_deg) * degree;
+    double low = 1e300, high = -1e300;
+    bool any_vertical = false;
+    for (const SolidFacet& f : cut.solid.facets) {
+        if (f.nz > std::cos(split) || f.nz < -vertical || f.z_max <= cut.layer.z_bottom || (f.normal[0] == 0 && f.normal[1] == 0)) continue;
+        any_vertical |= std::abs(f.nz) <= vertical;
+        low = std::min(low, std::max(f.z_min, cut.layer.z_bottom));
+        high = std::max(high, f.z_max);
+    }
+    if (low >= high) return op;
+
+    // From the highest tip that may touch, down to the lowest whose contact is still in the layer.
+    std::vector<double> tips;
+    const double lowest = std::max(cut.layer.floor_below, low - r);
+    double bite = 0;
+    for (double z = high; z > lowest;) {
+        const double alpha = cut.least_slope(z - tool.stepdown_max, std::min(high, z + r), split);
+        double step = std::min(ball_level_stepdown(r, alpha, cut.job.tolerances.cusp), tool.stepdown_max);
+        if (step < cut.job.cutting.min_stepdown) {
+            bite = std::max(bite, ball_level_cusp(r, alpha, cut.job.cutting.min_stepdown));
+            step = cut.job.cutting.min_stepdown;
+        }
+        z = std::max(z - step, lowest);
+        op.stepdown = std::max(op.stepdown, step);
+        tips.push_back(z);
+    }
+    if (bite > 0)
+        diagnostics.push_back({Severity::warning,
+                               "finish.stepdown_floor",
+                               fmt::format("layer {}: the smallest stepdown {:.2f} mm leaves a cusp of up to {:.3f} mm", cut.layer.index,
+                                           cut.job.cutting.min_stepdown, bite),
+                               {}});
+
+    const Cutter cutter{Cutter::Profile::ball, r};
+    const std::vector<Contours> contours = cut.contours(cutter, tips, safe_pitch(r, gouge));
+    // A vertical wall belongs to the flat end mill wherever that can stand against the place of contact.
+    std::unique_ptr<DropIndex> flat;
+    double flat_r = 0;
+    if (any_vertical) {
+        flat_r = tool_of_kind(cut.job, ToolKind::flat).diameter / 2;
+        flat = std::make_unique<DropIndex>(cut.context, cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
+    }
+    std::vector<std::vector<Run>> runs(tips.size());
+    parallel_each(cut.context, tips.size(), [&](std::size_t i) {
+        const Contours& level = contours[i];
+        for (std::size_t c = 0; c < level.size(); ++c) {
+            const std::size_t first = level.starts[c], n = level.starts[c + 1] - first;
+            std::vector<char> wanted(n, 0);
+            for (std::size_t k = 0; k < n; ++k) {
+                const double nz = level.nz[first + k], contact = tips[i] + r * (1 - nz);
+                if (nz > std::cos(split) || nz < -vertical || contact < cut.layer.z_bottom - 0.05 || contact > cut.layer.z_top + 1e-6) continue;
+                wanted[k] = 1;
+                if (!flat || nz > vertical) continue;
+                const Point2 a = level.points[first + (k + n - 1) % n], p = level.points[first + k], b = level.points[first + (k + 1) % n];
+                const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y, l = std::hypot(dx, dy);
+                if (l == 0) continue;
+                // The solid is on the right, so the free side is on the left.
+                const Rest rest = flat->drop(to_mm(p.x) - dy / l * (flat_r - r), to_mm(p.y) + dx / l * (flat_r - r));
+                if (rest.tip_z <= contact) wanted[k] = 0;
+            }
+            append_runs(level, c, to_units(tips[i]), wanted, simplify_tolerance_units(gouge), runs[i]);
+        }
+    });
+    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
+                     cut.layer.z_top + 2);
+    Point2 at{};
+    for (std::vector<Run>& level : runs) cut_level(path, level, at);
+    path.finish();
+    return op;
+}
+
+}  // namespace slabwright

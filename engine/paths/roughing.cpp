@@ -1,0 +1,141 @@
+// Roughing: level by level from the top, zigzag inside what the shadow leaves free, then once along its border. A level
+// lies on every up-facing flat (plus allowance) and on the layer's bottom; between them the stepdowns of section 5.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "engine/paths/layer_cut.h"
+#include "kernels/cutting/cusp.h"
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+struct RoughLevel {
+    double tip = 0;    // where the tip runs
+    double spare = 0;  // what must be spared lies above this height
+};
+
+std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool) {
+    const double floor = cut.job.cutting.floor_allowance, bottom = cut.layer.z_bottom, top = cut.layer.z_top;
+    std::vector<RoughLevel> fixed;
+    for (const Feature* flat : cut.layer.flats)
+        if (flat->area >= cut.job.cutting.min_flat_area && flat->z_low + floor < top && flat->z_low > bottom)
+            fixed.push_back({flat->z_low + floor, flat->z_low});
+    fixed.push_back({bottom, bottom});
+    std::sort(fixed.begin(), fixed.end(), [](const RoughLevel& a, const RoughLevel& b) { return a.tip > b.tip; });
+    std::vector<RoughLevel> levels;
+    double z = top;
+    for (const RoughLevel& f : fixed) {
+        if (!levels.empty() && levels.back().tip - f.tip < 1e-3) continue;
+        while (z - f.tip > 1e-9) {
+            // The flattest slope decides, within what the tool may take; the last steps before a fixed level are even.
+            const double alpha = cut.least_slope(z - tool.stepdown_max, z, cut.job.cutting.steep_limit_deg * std::numbers::pi / 180);
+            const double step = std::clamp(flat_level_stepdown(alpha, cut.job.tolerances.rough_cusp), tool.stepdown_min, tool.stepdown_max);
+            const double count = std::ceil((z - f.tip) / step - 1e-9);
+            if (count <= 1) break;
+            z -= (z - f.tip) / count;
+            levels.push_back({z, std::max(bottom, z - floor)});
+        }
+        levels.push_back(f);
+        z = f.tip;
+    }
+    return levels;
+}
+
+// Down along a closed ring, as often around as the slope asks for; ends at the ring's start.
+void ramp_along(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_t above, std::int32_t z, double ramp_deg) {
+    path.sink(above);
+    double length = 0;
+    for (std::size_t k = 1; k < ring.size(); ++k) length += std::hypot(ring[k].x - ring[k - 1].x, ring[k].y - ring[k - 1].y);
+    const double drop = static_cast<double>(above) - z;
+    if (length < 1 || drop <= 0) return path.plunge(z);
+    const double turns = std::max(1.0, std::ceil(drop / (length * std::tan(ramp_deg * std::numbers::pi / 180))));
+    double done = 0;
+    for (int turn = 0; turn < static_cast<int>(turns); ++turn)
+        for (std::size_t k = 1; k < ring.size(); ++k) {
+            done += std::hypot(ring[k].x - ring[k - 1].x, ring[k].y - ring[k - 1].y);
+            path.cut({ring[k].x, ring[k].y}, std::max(z, above - static_cast<std::int32_t>(drop * done / (length * turns))));
+        }
+}
+
+}  // namespace
+
+Operation rough_layer(const LayerCut& cut) {
+    const Tool& tool = tool_of_kind(cut.job, ToolKind::flat);
+    Operation op = cut.operation(OperationKind::rough, "zigzag levels", tool);
+    const double r = tool.diameter / 2, clearance = cut.layer.z_top + cut.job.machine.clearance;
+    const Cutter cutter{Cutter::Profile::flat, r + cut.job.cutting.wall_allowance};
+    const std::vector<RoughLevel> levels = rough_levels(cut, tool);
+    std::vector<double> spare;
+    for (const RoughLevel& l : levels) spare.push_back(l.spare);
+    const std::vector<Section> inside = cut.insides(cutter, spare);
+
+    // Lines from edge to edge of the stock, evenly spaced.
+    const double depth = cut.layer.stock_max[1] - cut.layer.stock_min[1];
+    const int gaps = std::max(1, static_cast<int>(std::ceil(depth / (tool.stepover * tool.diameter) - 1e-9)));
+    op.stepover = depth / gaps;
+    std::vector<std::int32_t> lines;
+    for (int k = 0; k <= gaps; ++k) lines.push_back(to_units(cut.layer.stock_min[1] + depth * k / gaps));
+    // Contours of the border may be coarser than a finish pass: what their chords miss must stay well inside the allowance.
+    const std::int32_t pitch = safe_pitch(r, std::max(0.01, 0.2 * cut.job.cutting.wall_allowance));
+    const FibreGrid grid = fibre_grid(cut.solid, cutter, pitch);
+    const double from = cut.low(0, r + 2), to = cut.high(0, r + 2);
+
+    struct Level {
+        std::vector<std::vector<Stretch>> free;
+        Contours border;
+    };
+    std::vector<Level> cuts(levels.size());
+    parallel_each(cut.context, levels.size(), [&](std::size_t i) {
+        const Fibres forbidden = fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::x, lines);
+        for (std::size_t l = 0; l < lines.size(); ++l) cuts[i].free.push_back(free_stretches(forbidden.line(l), from, to, 0.2));
+        cuts[i].border = level_contours(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, grid);
+    });
+
+    PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance, cut.layer.z_top + 2);
+    double above = cut.layer.z_top;
+    for (std::size_t i = 0; i < levels.size(); ++i) {
+        op.stepdown = std::max(op.stepdown, above - levels[i].tip);
+        zigzag(path, cut, tool, lines, cuts[i].free, levels[i].tip, above, [&](std::span<const std::int32_t> at) {
+            return fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::y, at);
+        });
+        // Along the border, begun where a zigzag line ends and the cutter has been already.
+        const Contours& border = cuts[i].border;
+        const std::int32_t z = to_units(levels[i].tip);
+        for (std::size_t c = 0; c < border.size(); ++c) {
+            const auto points = std::span(border.points).subspan(border.starts[c], border.starts[c + 1] - border.starts[c]);
+            if (points.size() < 3) continue;
+            std::size_t start = 0;
+            std::int64_t nearest = INT64_MAX;
+            bool in_stock = false;
+            for (std::size_t k = 0; k < points.size(); ++k) {
+                const auto it = std::lower_bound(lines.begin(), lines.end(), points[k].y);
+                for (const auto l : {it, it == lines.begin() ? it : std::prev(it)}) {
+                    if (l == lines.end()) continue;
+                    const std::int64_t d = std::abs(std::int64_t{*l} - points[k].y);
+                    if (d < nearest) nearest = d, start = k;
+                }
+                in_stock |= to_mm(points[k].x) > cut.layer.stock_min[0] - r && to_mm(points[k].x) < cut.layer.stock_max[0] + r &&
+                            to_mm(points[k].y) > cut.layer.stock_min[1] - r && to_mm(points[k].y) < cut.layer.stock_max[1] + r;
+            }
+            if (!in_stock) continue;
+            std::vector<PathPoint> line;
+            for (std::size_t k = 0; k <= points.size(); ++k) {
+                const Point2 p = points[(start + k) % points.size()];
+                line.push_back({p.x, p.y, z});
+            }
+            const std::vector<PathPoint> ring = simplify(line, 0.02 * kUnitsPerMm);
+            path.go_above({ring[0].x, ring[0].y});
+            if (nearest <= 2 * std::int64_t{pitch}) path.sink(z);
+            else ramp_along(path, ring, to_units(above), z, cut.job.cutting.ramp_deg);  // a pocket that no line met
+            for (const PathPoint& p : ring) path.cut({p.x, p.y}, z);
+        }
+        above = levels[i].tip;
+    }
+    path.finish();
+    return op;
+}
+
+}  // namespace slabwright

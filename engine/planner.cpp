@@ -1,0 +1,215 @@
+#include "engine/planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "engine/layers/layers.h"
+#include "engine/paths/paths.h"
+#include "engine/schedule/motion_time.h"
+#include "engine/schedule/schedule.h"
+#include "kernels/errors.h"
+#include "kernels/parallel/parallel.h"
+#include "kernels/slicing/slicing.h"
+
+namespace slabwright {
+
+namespace {
+
+Error refuse(const char* code, std::string message, std::string place, std::string remedy) {
+    return Error(ErrorKind::no_plan, code, std::move(message), std::move(place), std::move(remedy));
+}
+
+// The stock: the pattern's outline and the job's margin around it, no larger than a slab, and such that the machine
+// reaches all of it.
+void place_stock(Plan& plan, const Box3& box) {
+    const Job& job = plan.job;
+    const std::array<double, 2> lo{box.min.x, box.min.y}, hi{box.max.x, box.max.y}, slab{job.slabs.length, job.slabs.width};
+    const std::array<double, 2> travel{job.machine.travel_x, job.machine.travel_y};
+    constexpr const char* axis[] = {"x", "y"};
+    for (int k = 0; k < 2; ++k) {
+        const double size = hi[k] - lo[k];
+        if (size > slab[k])
+            throw refuse(
+                "fit.slab",
+                fmt::format("the pattern is {:.1f} mm in {}, {:.1f} mm more than the slab's {:.1f} mm", size, axis[k], size - slab[k], slab[k]),
+                axis[k], "use larger slabs, turn or split the pattern");
+        if (size > travel[k])
+            throw refuse("fit.travel",
+                         fmt::format("the pattern is {:.1f} mm in {}, {:.1f} mm more than the machine's travel of {:.1f} mm", size, axis[k],
+                                     size - travel[k], travel[k]),
+                         axis[k], "use a larger machine, turn or split the pattern");
+        const double margin = std::min({job.slabs.margin, (slab[k] - size) / 2, (travel[k] - size) / 2});
+        plan.stock_min[k] = lo[k] - margin;
+        plan.stock_max[k] = hi[k] + margin;
+    }
+    if (box.max.z > job.machine.build_height)
+        throw refuse("fit.chamber",
+                     fmt::format("the pattern is {:.1f} mm high, {:.1f} mm more than the build chamber's {:.1f} mm", box.max.z,
+                                 box.max.z - job.machine.build_height, job.machine.build_height),
+                     "z", "split the pattern");
+}
+
+void check_travel(const Plan& plan) {
+    const Machine& machine = plan.job.machine;
+    const double cx = 0.5 * (plan.stock_min[0] + plan.stock_max[0]), cy = 0.5 * (plan.stock_min[1] + plan.stock_max[1]);
+    for (const Layer& layer : plan.layers)
+        for (const Operation& op : layer.operations) {
+            double over_x = 0, over_y = 0, low = 1e300, high = -1e300;
+            for (const Move& m : op.moves) {
+                over_x = std::max(over_x, std::abs(to_mm(m.x) - cx) - machine.travel_x / 2);
+                over_y = std::max(over_y, std::abs(to_mm(m.y) - cy) - machine.travel_y / 2);
+                low = std::min(low, to_mm(m.z));
+                high = std::max(high, to_mm(m.z));
+            }
+            const double over_z = high - low - machine.travel_z;
+            for (const auto& [over, axis] : {std::pair{over_x, "x"}, {over_y, "y"}, {over_z, "z"}})
+                if (over > 1e-4)
+                    throw refuse(
+                        "fit.travel",
+                        fmt::format("the {} program of layer {} leaves the machine's travel in {} by {:.1f} mm", op.purpose, layer.index, axis, over),
+                        fmt::format("layer {}", layer.index), "use a smaller margin, a larger machine, or turn the pattern");
+        }
+}
+
+}  // namespace
+
+Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const Job& job) {
+    validate(job);
+    Plan plan;
+    plan.input = input;
+    plan.job = job;
+    if (mesh.facets.empty()) throw refuse("input.empty", "there is nothing to make: the mesh has no facets", input.file, "export the pattern again");
+    const MeshView view = mesh.view();
+    const Box3 box = bounds(view);
+    const double height = box.max.z;
+    place_stock(plan, box);
+
+    context.begin_phase("features", 0.10, 0.20);
+    FeatureOptions options;
+    options.finder = job.layers.finder;
+    options.chordal_deviation_mm = job.tolerances.chordal_deviation;
+    options.flat_merge_mm = job.layers.flat_merge;
+    options.shallow_limit_rad = job.material.shallow_limit_deg * std::numbers::pi / 180;
+    options.halving_coarse_mm = job.layers.halving_coarse;
+    options.halving_resolution_mm = job.layers.halving_resolution;
+    FeatureSet found = find_features(context, view, options);
+    plan.features = std::move(found.features);
+    for (const FinderDisagreement& d : found.disagreements)
+        plan.diagnostics.push_back({Severity::note, "features.finders_disagree",
+                                    fmt::format("only the {} finder sees a {} at {:.3f} mm", name(d.found_by), name(d.type), d.z),
+                                    std::array{d.x, d.y, d.z}});
+
+    context.begin_phase("layers", 0.20, 0.25);
+    LayerRequest request;
+    request.height = height;
+    request.max_layer = max_layer_thickness(job);
+    request.min_layer = job.layers.min_layer;
+    request.min_material = job.material.min_thickness;
+    request.alpha = job.layers.alpha;
+    request.beta = job.layers.beta;
+    request.slab_thicknesses = job.slabs.thicknesses;
+    request.facing_allowance = job.slabs.facing_allowance;
+    request.saddles_constrain = job.layers.saddles_constrain;
+    request.features = plan.features;
+    request.section_area = [&](double z) {
+        const Plane plane{z, Side::above};
+        return std::abs(area(slice(context, view, {&plane, 1})[0].loops));
+    };
+    LayerPlacement placement = job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request);
+    plan.diagnostics.insert(plan.diagnostics.end(), placement.diagnostics.begin(), placement.diagnostics.end());
+    std::vector<double> tops;
+    for (const Boundary& b : placement.boundaries) {
+        Layer layer;
+        layer.index = static_cast<int>(plan.layers.size()) + 1;
+        layer.z_bottom = tops.empty() ? 0 : tops.back();
+        layer.z_top = b.z;
+        layer.slab_thickness = b.slab_thickness;
+        layer.reason = b.reason;
+        tops.push_back(b.z);
+        plan.layers.push_back(std::move(layer));
+    }
+
+    const std::vector<UnmadeUndercut> unmade = measure_undercuts(context, view, tops, options);
+    double worst = 0;
+    const UnmadeUndercut* deepest = nullptr;
+    for (const UnmadeUndercut& u : unmade) {
+        if (u.depth_mm > worst) worst = u.depth_mm, deepest = &u;
+        if (u.depth_mm > job.tolerances.undercut)
+            plan.diagnostics.push_back({job.allow_undercut ? Severity::warning : Severity::error, "undercut.unmade",
+                                        fmt::format("an undercut of {:.1f} mm² stays filled up to {:.2f} mm deep", u.area_mm2, u.depth_mm),
+                                        std::array{u.x, u.y, u.z}});
+    }
+    if (worst > job.tolerances.undercut && !job.allow_undercut) {
+        const auto count = std::count_if(unmade.begin(), unmade.end(), [&](const UnmadeUndercut& u) { return u.depth_mm > job.tolerances.undercut; });
+        throw refuse("undercut.unmade",
+                     fmt::format("{} undercut{} cannot be milled from above; the deepest, of {:.1f} mm², would stay filled {:.2f} mm deep", count,
+                                 count == 1 ? "" : "s", deepest->area_mm2, deepest->depth_mm),
+                     fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", deepest->x, deepest->y, deepest->z),
+                     "turn or split the pattern, or accept it with --allow-undercut");
+    }
+    if (!unmade.empty() && worst <= job.tolerances.undercut) {
+        double total = 0;
+        for (const UnmadeUndercut& u : unmade) total += u.area_mm2;
+        plan.diagnostics.push_back({Severity::note, "undercut.shallow",
+                                    fmt::format("{} undercut patches ({:.1f} mm²) stay filled, at most {:.3f} mm deep", unmade.size(), total, worst),
+                                    std::array{deepest->x, deepest->y, deepest->z}});
+    }
+
+    // A gap in the mesh shows as an open chain; sections at every boundary and feature would miss one in between, so the
+    // loader has refused all open edges but those in the base plane already. What is left here is proof by section.
+    context.begin_phase("paths", 0.25, 0.92, plan.layers.size());
+    const Tool& finish = tool_of_kind(job, ToolKind::ball);
+    const double overrun = finish.diameter / 2;
+    const double board = job.machine.base_board_cut >= 0 ? std::min(job.machine.base_board_cut, job.machine.base_board_thickness)
+                                                         : std::min(overrun, job.machine.base_board_thickness);
+    std::vector<LayerResult> results(plan.layers.size());
+    parallel_each(context, plan.layers.size(), [&](std::size_t i) {
+        const Layer& layer = plan.layers[i];
+        LayerJob work;
+        work.mesh = view;
+        work.job = &plan.job;
+        work.z_bottom = layer.z_bottom;
+        work.z_top = layer.z_top;
+        work.slab_thickness = layer.slab_thickness;
+        work.floor_below = layer.z_bottom - (i == 0 ? board : overrun);
+        work.stock_min = plan.stock_min;
+        work.stock_max = plan.stock_max;
+        work.index = layer.index;
+        for (const Feature& f : plan.features)
+            if (f.type == FeatureType::up_flat && f.z_low > layer.z_bottom && f.z_low < layer.z_top) work.flats.push_back(&f);
+        results[i] = plan_layer_paths(context, work);
+        context.advance();
+    });
+    std::size_t operations = 0;
+    for (std::size_t i = 0; i < results.size(); ++i) {
+        plan.layers[i].operations = std::move(results[i].operations);
+        operations += plan.layers[i].operations.size();
+        plan.diagnostics.insert(plan.diagnostics.end(), results[i].diagnostics.begin(), results[i].diagnostics.end());
+        for (Operation& op : plan.layers[i].operations) {
+            const MotionTime time = motion_time(op.moves, job.machine);
+            op.cutting_mm = time.cutting_mm;
+            op.rapid_mm = time.rapid_mm;
+            op.minutes = time.minutes + job.machine.spindle_dwell_s / 60;
+        }
+    }
+    if (operations == 0) throw refuse("plan.empty", "nothing would be cut", input.file, "check the units and the slabs");
+    check_travel(plan);
+
+    context.begin_phase("schedule", 0.92, 0.95);
+    std::vector<Plane> joints;
+    for (const Layer& layer : plan.layers) joints.push_back({layer.z_bottom, layer.index == 1 ? Side::above : Side::below});
+    const std::vector<Section> sections = slice(context, view, joints, {job.tolerances.gap});
+    for (std::size_t i = 0; i < plan.layers.size(); ++i) bond_layer(plan.layers[i], sections[i].loops, plan, plan.diagnostics);
+    schedule(plan);
+    if (plan.totals.stack_mass_kg > job.machine.build_mass_kg)
+        throw refuse("fit.mass",
+                     fmt::format("the stack weighs {:.0f} kg, {:.0f} kg more than the build platform carries", plan.totals.stack_mass_kg,
+                                 plan.totals.stack_mass_kg - job.machine.build_mass_kg),
+                     {}, "split the pattern or use a smaller margin");
+    return plan;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,364 @@
+#include "kernels/cutting/fibres.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t kBlock = 64;  // lines that share one pass over their facets
+constexpr double kMergeGap = 1e-6;  // mm; gaps this small are rounding between neighbouring elements
+
+// The hull of an element's pieces. Facet ⊕ ball is convex, so all its pieces together are one interval.
+struct Hull {
+    double low = kInfinity, high = -kInfinity;
+    float nz_low = 0, nz_high = 0;
+    void add(double a, double b, double nz_a, double nz_b) {
+        if (!(a < b)) return;
+        if (a < low) {
+            low = a;
+            nz_low = static_cast<float>(nz_a);
+        }
+        if (b > high) {
+            high = b;
+            nz_high = static_cast<float>(nz_b);
+        }
+    }
+};
+
+// A segment and the ball around each of its points, met by a line in direction U at heights that do not change: all that
+// does not depend on the line's other coordinate is computed once.
+template <int U, int V>
+class Capsule {
+public:
+    Capsule(const Vec3d& a, const Vec3d& b, double radius, double zc)
+        : a_(a), b_(b), du_(b[U] - a[U]), dv_(b[V] - a[V]), dz_(b[2] - a[2]), wza_(zc - a[2]), wzb_(zc - b[2]), r2_(radius * radius), r_(radius) {
+        length2_ = du_ * du_ + dv_ * dv_ + dz_ * dz_;
+    }
+
+    /// nz < −1 in `fixed_nz` asks for the contact's own.
+    void meet(double v, Hull& hull, double fixed_nz = -2) const {
+        ball(a_[U], v - a_[V], wza_, hull, fixed_nz);
+        ball(b_[U], v - b_[V], wzb_, hull, fixed_nz);
+        if (length2_ <= 0) return;
+        // With w = c − a and u = c_U − a_U: |w|² − (w·d)²/|d|² < r² and 0 ≤ w·d ≤ |d|².
+        const double wv = v - a_[V], s = dv_ * wv + dz_ * wza_;
+        const double qa = 1 - du_ * du_ / length2_, qb = du_ * s / length2_, qc = wv * wv + wza_ * wza_ - s * s / length2_ - r2_;
+        double low, high;
+        if (qa < 1e-12) {
+            if (qc >= 0) return;
+            low = -kInfinity;
+            high = kInfinity;
+        } else {
+            const double discriminant = qb * qb - qa * qc;
+            if (discriminant <= 0) return;
+            const double root = std::sqrt(discriminant);
+            low = (qb - root) / qa;
+            high = (qb + root) / qa;
+        }
+        if (du_ != 0) {
+            double t0 = -s / du_, t1 = (length2_ - s) / du_;
+            if (t0 > t1) std::swap(t0, t1);
+            low = std::max(low, t0);
+            high = std::min(high, t1);
+        } else if (s < 0 || s > length2_) return;
+        if (!(low < high)) return;
+        auto nz = [&](double u) { return fixed_nz > -1.5 ? fixed_nz : (wza_ - dz_ * (du_ * u + s) / length2_) / r_; };
+        hull.add(a_[U] + low, a_[U] + high, nz(low), nz(high));
+    }
+
+private:
+    void ball(double centre, double wv, double wz, Hull& hull, double fixed_nz) const {
+        const double h2 = r2_ - wv * wv - wz * wz;
+        if (h2 <= 0) return;
+        const double h = std::sqrt(h2), nz = fixed_nz > -1.5 ? fixed_nz : wz / r_;
+        hull.add(centre - h, centre + h, nz, nz);
+    }
+    const Vec3d &a_, &b_;
+    double du_, dv_, dz_, wza_, wzb_, r2_, r_, length2_;
+};
+
+// The points within `radius` of a facet's plane that project into the facet.
+template <int U, int V>
+class Prism {
+public:
+    Prism(const SolidFacet& f, double radius, double zc) : f_(f), r_(radius) {
+        const Vec3d& n = f.normal;
+        flat_ = n[0] == 0 && n[1] == 0 && n[2] == 0;
+        if (flat_) return;
+        for (int k = 0; k < 3; ++k) {
+            const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
+            const Vec3d e{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+            const Vec3d m{n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0]};  // inward
+            u_[k] = m[U];
+            v_[k] = m[V];
+            c_[k] = m[2] * (zc - a[2]) - m[U] * a[U] - m[V] * a[V];
+        }
+        c_[3] = n[2] * (zc - f.p[0][2]) - n[U] * f.p[0][U] - n[V] * f.p[0][V];
+    }
+
+    void meet(double v, Hull& hull) const {
+        if (flat_) return;
+        const Vec3d& n = f_.normal;
+        const double k = n[V] * v + c_[3];  // signed distance is n_U·u + k
+        double low = -kInfinity, high = kInfinity;
+        if (std::abs(n[U]) < 1e-12) {
+            if (std::abs(k) >= r_) return;
+        } else {
+            low = (-r_ - k) / n[U];
+            high = (r_ - k) / n[U];
+            if (low > high) std::swap(low, high);
+        }
+        for (int i = 0; i < 3; ++i) {
+            const double c = v_[i] * v + c_[i];  // inside where u_·u + c ≥ 0
+            if (u_[i] > 0) low = std::max(low, -c / u_[i]);
+            else if (u_[i] < 0) high = std::min(high, -c / u_[i]);
+            else if (c < 0) return;
+        }
+        if (!(low < high)) return;
+        hull.add(low, high, (n[U] * low + k) / r_ * n[2], (n[U] * high + k) / r_ * n[2]);
+    }
+
+private:
+    const SolidFacet& f_;
+    double r_;
+    bool flat_ = false;
+    std::array<double, 3> u_{}, v_{};
+    std::array<double, 4> c_{};
+};
+
+// The part of a facet above z, seen from above, as a convex polygon at height z.
+int part_above(const SolidFacet& f, double z, std::array<Vec3d, 4>& out) {
+    int n = 0;
+    for (int k = 0; k < 3; ++k) {
+        const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
+        const bool a_in = a[2] > z, b_in = b[2] > z;
+        if (a_in) out[n++] = {a[0], a[1], z};
+        if (a_in != b_in) {
+            const Vec3d &low = a_in ? b : a, &high = a_in ? a : b;
+            const double t = (z - low[2]) / (high[2] - low[2]);
+            out[n++] = {low[0] + t * (high[0] - low[0]), low[1] + t * (high[1] - low[1]), z};
+        }
+    }
+    return n;
+}
+
+// The segment in which the plane just above z cuts a facet.
+bool cut_segment(const SolidFacet& f, double z, std::array<Vec3d, 2>& out) {
+    int n = 0;
+    for (int k = 0; k < 3 && n < 2; ++k) {
+        const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
+        const bool a_in = a[2] > z, b_in = b[2] > z;
+        if (a_in == b_in) continue;
+        const Vec3d &low = a_in ? b : a, &high = a_in ? a : b;
+        const double t = (z - low[2]) / (high[2] - low[2]);
+        out[n++] = {low[0] + t * (high[0] - low[0]), low[1] + t * (high[1] - low[1]), z};
+    }
+    return n == 2;
+}
+
+struct Crossing {
+    double u;
+    int turn;
+};
+
+template <int U, int V>
+Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z,
+                    std::span<const std::int32_t> lines) {
+    const bool ball = cutter.profile == Cutter::Profile::ball;
+    const double r = cutter.radius, zc = ball ? tip_z + r : tip_z;  // the ball's centre, or the disc
+    Fibres result;
+    if (lines.empty()) return result;
+    const std::size_t blocks = (lines.size() + kBlock - 1) / kBlock;
+
+    // Which facets can matter, by block of lines.
+    auto first_line = [&](double v) {
+        return static_cast<std::size_t>(
+            std::lower_bound(lines.begin(), lines.end(), v * kUnitsPerMm, [](std::int32_t l, double x) { return l < x; }) - lines.begin());
+    };
+    auto range = [&](const SolidFacet& f) {
+        const double low = std::min({f.p[0][V], f.p[1][V], f.p[2][V]}) - r, high = std::max({f.p[0][V], f.p[1][V], f.p[2][V]}) + r;
+        return std::pair{first_line(low), first_line(high)};
+    };
+    auto active = [&](const SolidFacet& f) {
+        if (ball && f.z_max > zc - r && f.z_min <= zc) return true;     // within the ball's lower half
+        return f.z_max > zc && (f.nz < 0 || (!ball && f.z_min <= zc));  // cut by the disc's plane, or overhanging
+    };
+    std::vector<std::uint32_t> counts(blocks + 1, 0), members;
+    for (int pass = 0; pass < 2; ++pass) {
+        if (pass == 1) {
+            std::uint32_t sum = 0;
+            for (std::uint32_t& c : counts) sum += std::exchange(c, sum);
+            members.resize(sum);
+        }
+        for (std::size_t i = 0; i < solid.facets.size(); ++i) {
+            const SolidFacet& f = solid.facets[i];
+            if (!active(f)) continue;
+            const auto [first, last] = range(f);
+            if (first >= last) continue;
+            for (std::size_t b = first / kBlock; b <= (last - 1) / kBlock; ++b) {
+                if (pass == 1) members[counts[b]] = static_cast<std::uint32_t>(i);
+                ++counts[b];
+            }
+        }
+        if (pass == 1) {  // counts[b] is now the end of block b
+            for (std::size_t b = blocks; b > 0; --b) counts[b] = counts[b - 1];
+            counts[0] = 0;
+        }
+    }
+
+    // The inside: which segments cross the lines of a block.
+    struct Segment {
+        Point2 a, b;
+    };
+    std::vector<std::vector<Segment>> segments(blocks);
+    auto coordinate = [](Point2 p, int axis) { return axis == 0 ? p.x : p.y; };
+    for (std::size_t l = 0; l < inside.size(); ++l) {
+        const auto loop = inside.loop(l);
+        for (std::size_t i = 0; i < loop.size(); ++i) {
+            const Point2 a = loop[i], b = loop[i + 1 == loop.size() ? 0 : i + 1];
+            const std::int32_t va = coordinate(a, V), vb = coordinate(b, V);
+            if (va == vb) continue;
+            const std::size_t first = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::min(va, vb)) - lines.begin());
+            const std::size_t last = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::max(va, vb)) - lines.begin());
+            if (first >= last) continue;
+            for (std::size_t k = first / kBlock; k <= (last - 1) / kBlock; ++k) segments[k].push_back({a, b});
+        }
+    }
+
+    std::vector<Fibres> parts(blocks);
+    parallel_each(context, blocks, [&](std::size_t block) {
+        const std::size_t begin = block * kBlock, end = std::min(lines.size(), begin + kBlock);
+        std::array<std::vector<Forbidden>, kBlock> found;
+        for (std::uint32_t m = counts[block]; m < counts[block + 1]; ++m) {
+            const SolidFacet& f = solid.facets[members[m]];
+            auto [first, last] = range(f);
+            first = std::max(first, begin);
+            last = std::min(last, end);
+            std::array<Hull, kBlock> hulls;
+            auto each_line = [&](auto&& element, auto... fixed) {
+                for (std::size_t l = first; l < last; ++l) element.meet(to_mm(lines[l]), hulls[l - begin], fixed...);
+            };
+            if (ball && f.z_max > zc - r && f.z_min <= zc) {
+                each_line(Prism<U, V>(f, r, zc));
+                for (int k = 0; k < 3; ++k)
+                    if (f.edges >> k & 1) each_line(Capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r, zc));
+            }
+            if (f.z_max > zc) {
+                if (f.nz < 0) {
+                    std::array<Vec3d, 4> polygon;
+                    const int n = part_above(f, zc, polygon);
+                    for (int k = 0; k < n; ++k) each_line(Capsule<U, V>(polygon[k], polygon[(k + 1) % n], r, zc), static_cast<double>(f.nz));
+                } else if (!ball) {
+                    std::array<Vec3d, 2> cut;
+                    if (cut_segment(f, zc, cut)) each_line(Capsule<U, V>(cut[0], cut[1], r, zc), static_cast<double>(f.nz));
+                }
+            }
+            for (std::size_t l = first; l < last; ++l) {
+                const Hull& h = hulls[l - begin];
+                if (h.low < h.high) found[l - begin].push_back({h.low, h.high, h.nz_low, h.nz_high});
+            }
+        }
+        Fibres& part = parts[block];
+        std::vector<Crossing> crossings;
+        for (std::size_t l = begin; l < end; ++l) {
+            std::vector<Forbidden>& on_line = found[l - begin];
+            crossings.clear();
+            for (const Segment& s : segments[block]) {
+                const std::int64_t va = coordinate(s.a, V), vb = coordinate(s.b, V), v = lines[l];
+                if ((va <= v) == (vb <= v)) continue;
+                const double t = static_cast<double>(v - va) / static_cast<double>(vb - va);
+                const double u = (coordinate(s.a, U) + t * (static_cast<double>(coordinate(s.b, U)) - coordinate(s.a, U))) / kUnitsPerMm;
+                // Solid lies left of a segment, so along +x a falling one enters; along +y the handedness is mirrored.
+                crossings.push_back({u, ((va > vb) == (U == 0)) ? 1 : -1});
+            }
+            std::sort(crossings.begin(), crossings.end(),
+                      [](const Crossing& a, const Crossing& b) { return a.u != b.u ? a.u < b.u : a.turn > b.turn; });
+            int depth = 0;
+            double entered = 0;
+            for (const Crossing& c : crossings) {
+                if (depth <= 0 && depth + c.turn > 0) entered = c.u;
+                if (depth > 0 && depth + c.turn <= 0 && c.u > entered) on_line.push_back({entered, c.u, 0, 0});
+                depth += c.turn;
+            }
+            std::sort(on_line.begin(), on_line.end(),
+                      [](const Forbidden& a, const Forbidden& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
+            for (const Forbidden& f : on_line) {
+                if (part.intervals.size() > part.starts.back() && f.low <= part.intervals.back().high + kMergeGap) {
+                    Forbidden& last = part.intervals.back();
+                    if (f.high > last.high) {
+                        last.high = f.high;
+                        last.nz_high = f.nz_high;
+                    }
+                } else part.intervals.push_back(f);
+            }
+            part.starts.push_back(static_cast<std::uint32_t>(part.intervals.size()));
+        }
+    });
+    std::size_t total = 0;
+    for (const Fibres& part : parts) total += part.intervals.size();
+    result.intervals.reserve(total);
+    result.starts.reserve(lines.size() + 1);
+    for (const Fibres& part : parts) {
+        const std::uint32_t base = static_cast<std::uint32_t>(result.intervals.size());
+        for (std::size_t i = 1; i < part.starts.size(); ++i) result.starts.push_back(base + part.starts[i]);
+        result.intervals.insert(result.intervals.end(), part.intervals.begin(), part.intervals.end());
+    }
+    return result;
+}
+
+}  // namespace
+
+Plane inside_plane(const LayerSolid& solid, const Cutter& cutter, double tip_z) {
+    const double z = cutter.profile == Cutter::Profile::ball ? tip_z + cutter.radius : tip_z;
+    // Above the layer's top only a ball's cap still matters: over the top's inside it is forbidden as long as it dips below.
+    if (z < solid.z_top) return {z, Side::above};
+    return {solid.z_top, Side::below};
+}
+
+Fibres fibres(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z, Axis axis,
+              std::span<const std::int32_t> lines) {
+    const Loops none;
+    const Loops& region = tip_z < solid.z_top ? inside : none;  // a tip above the top stands clear of everything
+    return axis == Axis::x ? fibres_along<0, 1>(context, solid, region, cutter, tip_z, lines)
+                           : fibres_along<1, 0>(context, solid, region, cutter, tip_z, lines);
+}
+
+Fibres covering(Context& context, std::span<const SolidFacet> facets, double radius, Axis axis, std::span<const std::int32_t> lines) {
+    // A facet that overhangs a flat cutter's tip forbids exactly the places from which the disc reaches it.
+    LayerSolid overhang;
+    double low = kInfinity;
+    overhang.z_top = -kInfinity;
+    for (const SolidFacet& f : facets) {
+        low = std::min(low, f.z_min);
+        overhang.z_top = std::max(overhang.z_top, f.z_max);
+        overhang.facets.push_back(f);
+        overhang.facets.back().nz = -1;
+    }
+    if (facets.empty()) low = overhang.z_top = 0;
+    return fibres(context, overhang, {}, {Cutter::Profile::flat, radius}, low - 1, axis, lines);
+}
+
+std::vector<Stretch> free_stretches(std::span<const Forbidden> forbidden, double low, double high, double shortest) {
+    std::vector<Stretch> free;
+    double from = low;
+    auto close = [&](double to) {
+        if (to - from >= shortest) free.push_back({from, to});
+    };
+    for (const Forbidden& f : forbidden) {
+        if (f.high <= from) continue;
+        if (f.low >= high) break;
+        close(std::min(f.low, high));
+        from = std::max(from, f.high);
+    }
+    close(high);
+    return free;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,129 @@
+#include "kernels/cutting/layer_solid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/parallel/parallel.h"
+#include "kernels/slicing/slicing.h"
+
+namespace slabwright {
+
+namespace {
+
+Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
+Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3d cross(const Vec3d& a, const Vec3d& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+
+Vec3d unit_normal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+    const Vec3d u = minus(b, a), v = minus(c, a), n = cross(u, v);
+    const double length = std::sqrt(dot(n, n)), scale = dot(u, u) + dot(v, v);
+    if (!(length > 1e-12 * scale) || length == 0) return {0, 0, 0};
+    return {n[0] / length, n[1] / length, n[2] / length};
+}
+
+// The crossing is computed from the lower end to the upper one, so that both facets of an edge get the same point.
+Vec3d cross_plane(const Vec3d& a, const Vec3d& b, double z) {
+    const Vec3d& low = a[2] <= b[2] ? a : b;
+    const Vec3d& high = a[2] <= b[2] ? b : a;
+    const double t = (z - low[2]) / (high[2] - low[2]);
+    return {low[0] + t * (high[0] - low[0]), low[1] + t * (high[1] - low[1]), z};
+}
+
+// An edge is tested by its lower facet unless it is concave: there the facets' own prisms overlap and hide it.
+bool edge_matters(MeshView mesh, std::uint32_t f, int k, const Vec3d& a, const Vec3d& n) {
+    const std::uint32_t g = mesh.neighbours[f][k];
+    if (g == kNoFacet) return true;
+    if (g < f) return false;
+    if (dot(n, n) == 0) return true;
+    const std::uint32_t e0 = mesh.facets[f][k], e1 = mesh.facets[f][(k + 1) % 3];
+    for (const std::uint32_t v : mesh.facets[g]) {
+        if (v == e0 || v == e1) continue;
+        const Vec3d w = minus(to_double(mesh.vertices[v]), a);
+        return dot(n, w) <= 1e-7 * std::sqrt(dot(w, w));
+    }
+    return true;
+}
+
+void append_facet(MeshView mesh, std::uint32_t f, double z_top, std::vector<SolidFacet>& out) {
+    std::array<Vec3d, 3> p;
+    for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
+    const Vec3d n = unit_normal(p[0], p[1], p[2]);
+    std::array<bool, 3> matters;
+    for (int k = 0; k < 3; ++k) matters[k] = edge_matters(mesh, f, k, p[k], n);
+
+    // Clip at z_top; corner[i] is followed by an edge that matters[i] (the new edge along the top always does).
+    std::array<Vec3d, 4> corner;
+    std::array<bool, 4> edge{};
+    int corners = 0;
+    for (int k = 0; k < 3; ++k) {
+        const Vec3d &a = p[k], &b = p[(k + 1) % 3];
+        const bool a_in = a[2] <= z_top, b_in = b[2] <= z_top;
+        if (a_in) {
+            corner[corners] = a;
+            edge[corners++] = matters[k] || (a[2] == z_top && b[2] == z_top);  // what lies beyond the top is not there
+        }
+        if (a_in != b_in && a[2] != z_top && b[2] != z_top) {
+            corner[corners] = cross_plane(a, b, z_top);
+            edge[corners++] = a_in ? true : matters[k];
+        } else if (a_in && !b_in) {
+            edge[corners - 1] = true;  // a lies on the top itself: what follows it is the top edge
+        }
+    }
+    if (corners < 3) return;
+    auto emit = [&](int i, int j, int k, bool ij, bool jk, bool ki) {
+        SolidFacet s;
+        s.p = {corner[i], corner[j], corner[k]};
+        s.normal = n;
+        s.nz = static_cast<float>(n[2]);
+        s.edges = static_cast<std::uint8_t>((ij ? 1 : 0) | (jk ? 2 : 0) | (ki ? 4 : 0));
+        s.z_min = std::min({s.p[0][2], s.p[1][2], s.p[2][2]});
+        s.z_max = std::max({s.p[0][2], s.p[1][2], s.p[2][2]});
+        out.push_back(s);
+    };
+    if (corners == 3) emit(0, 1, 2, edge[0], edge[1], edge[2]);
+    else {
+        emit(0, 1, 2, edge[0], edge[1], false);
+        emit(0, 2, 3, false, edge[2], edge[3]);
+    }
+}
+
+}  // namespace
+
+LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_top) {
+    LayerSolid solid;
+    solid.z_low = z_low;
+    solid.z_top = z_top;
+    constexpr std::size_t grain = std::size_t{1} << 14;
+    std::vector<std::vector<SolidFacet>> parts((mesh.size() + grain - 1) / grain);
+    parallel_for(context, mesh.size(), grain, [&](std::size_t begin, std::size_t end) {
+        std::vector<SolidFacet>& part = parts[begin / grain];
+        for (std::size_t f = begin; f < end; ++f) {
+            const Index3& facet = mesh.facets[f];
+            const double z0 = mesh.vertices[facet[0]].z, z1 = mesh.vertices[facet[1]].z, z2 = mesh.vertices[facet[2]].z;
+            const double low = std::min({z0, z1, z2}), high = std::max({z0, z1, z2});
+            if (low >= z_top || high < z_low) continue;  // a flat at the top itself belongs to the cap
+            append_facet(mesh, static_cast<std::uint32_t>(f), z_top, part);
+        }
+    });
+    std::size_t total = 0;
+    for (const auto& part : parts) total += part.size();
+    solid.facets.reserve(total);
+    for (auto& part : parts) {
+        solid.facets.insert(solid.facets.end(), part.begin(), part.end());
+        std::vector<SolidFacet>().swap(part);
+    }
+    const Plane top{z_top, Side::below};
+    solid.cap = std::move(slice(context, mesh, {&top, 1})[0].loops);
+    solid.min = {1e300, 1e300};
+    solid.max = {-1e300, -1e300};
+    for (const SolidFacet& f : solid.facets)
+        for (const Vec3d& p : f.p)
+            for (int k = 0; k < 2; ++k) {
+                solid.min[k] = std::min(solid.min[k], p[k]);
+                solid.max[k] = std::max(solid.max[k], p[k]);
+            }
+    return solid;
+}
+
+}  // namespace slabwright

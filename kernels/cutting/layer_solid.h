@@ -1,0 +1,36 @@
+// The solid that a cutter must spare while one layer is machined: the pattern up to the layer's top. What the layers
+// above will add is not there yet; what the layers below have finished is.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+#include "kernels/polygons/loops.h"
+
+namespace slabwright {
+
+using Vec3d = std::array<double, 3>;
+
+/// A facet of the layer's solid, cut off at the layer's top.
+struct SolidFacet {
+    std::array<Vec3d, 3> p;
+    Vec3d normal{};  ///< unit, outward; zero for a facet without area
+    double z_min = 0, z_max = 0;
+    std::uint8_t edges = 0;  ///< bit k: the edge (p[k], p[k + 1]) is not concave, and this facet is the one to test it
+    float nz = 0;            ///< of the facet before cutting
+};
+
+struct LayerSolid {
+    double z_low = 0, z_top = 0;         ///< facets wholly below z_low are left out
+    std::vector<SolidFacet> facets;      ///< in the order of the mesh
+    Loops cap;                           ///< the section just below z_top: the solid's flat upper end
+    std::array<double, 2> min{}, max{};  ///< of the facets, in x and y
+};
+
+/// @param z_low how far down a cutter of this layer can touch anything
+[[nodiscard]] LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_top);
+
+}  // namespace slabwright

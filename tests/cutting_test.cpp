@@ -1,0 +1,180 @@
+// Fibres, level contours and drops against brute force over all facets.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "kernels/cutting/drop.h"
+#include "kernels/cutting/level_contours.h"
+#include "tests/support/height_field.h"
+
+namespace slabwright {
+namespace {
+
+double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+// Distance from a point to a triangle (Ericson, Real-Time Collision Detection 5.1.5).
+double distance_to(const Vec3d& p, const std::array<Vec3d, 3>& t) {
+    const Vec3d ab = minus(t[1], t[0]), ac = minus(t[2], t[0]), ap = minus(p, t[0]);
+    auto at = [&](double v, double w) {
+        const Vec3d q{t[0][0] + v * ab[0] + w * ac[0], t[0][1] + v * ab[1] + w * ac[1], t[0][2] + v * ab[2] + w * ac[2]}, d = minus(p, q);
+        return std::sqrt(dot(d, d));
+    };
+    const double d1 = dot(ab, ap), d2 = dot(ac, ap);
+    if (d1 <= 0 && d2 <= 0) return at(0, 0);
+    const Vec3d bp = minus(p, t[1]);
+    const double d3 = dot(ab, bp), d4 = dot(ac, bp);
+    if (d3 >= 0 && d4 <= d3) return at(1, 0);
+    const double vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(d1 / (d1 - d3), 0);
+    const Vec3d cp = minus(p, t[2]);
+    const double d5 = dot(ab, cp), d6 = dot(ac, cp);
+    if (d6 >= 0 && d5 <= d6) return at(0, 1);
+    const double vb = d5 * d2 - d1 * d6;
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return at(0, d2 / (d2 - d6));
+    const double va = d3 * d6 - d5 * d4;
+    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+        const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return at(1 - w, w);
+    }
+    return at(vb / (va + vb + vc), vc / (va + vb + vc));
+}
+
+// How much room the cutter has: distance of its axis (ball centre and up, disc and up) from the mesh cut off at z_top,
+// less its radius; negative where it touches. Facets are lifted flat to the cutter's level where they stand above it.
+double room(const Mesh& mesh, double z_top, const Cutter& cutter, double x, double y, double tip) {
+    const bool ball = cutter.profile == Cutter::Profile::ball;
+    const double zc = ball ? tip + cutter.radius : tip;
+    if (tip >= z_top) return 1e9;
+    double nearest = 1e9;
+    auto visit = [&](std::array<Vec3d, 3> t) { nearest = std::min(nearest, distance_to({x, y, zc}, t)); };
+    int turns = 0;  // of the section at zc (or the cap) around the axis, by a ray upward from the axis point: crossings
+    for (const Index3& f : mesh.facets) {
+        std::vector<Vec3d> p;
+        for (const std::uint32_t v : f) p.push_back({mesh.vertices[v].x, mesh.vertices[v].y, mesh.vertices[v].z});
+        auto clip = [](const std::vector<Vec3d>& in, double z, bool below) {
+            std::vector<Vec3d> out;
+            for (std::size_t k = 0; k < in.size(); ++k) {
+                const Vec3d &a = in[k], &b = in[(k + 1) % in.size()];
+                const bool ai = below ? a[2] <= z : a[2] > z, bi = below ? b[2] <= z : b[2] > z;
+                if (ai) out.push_back(a);
+                if (ai != bi && a[2] != b[2]) {
+                    const double s = (z - a[2]) / (b[2] - a[2]);
+                    out.push_back({a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), z});
+                }
+            }
+            return out;
+        };
+        const std::vector<Vec3d> kept = clip(p, z_top, true);
+        // A ray straight up from (x, y) just under the cap, or from zc: an odd number of facets above means inside.
+        const double area2 = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (p[1][1] - p[0][1]);
+        if (area2 != 0) {
+            bool in = true;
+            double z = 0;
+            for (int k = 0; k < 3; ++k) {
+                const Vec3d &a = p[static_cast<std::size_t>(k)], &b = p[static_cast<std::size_t>((k + 1) % 3)],
+                            &c = p[static_cast<std::size_t>((k + 2) % 3)];
+                const double s = (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
+                in &= area2 > 0 ? s > 0 : s < 0;
+                z += s / area2 * c[2];
+            }
+            if (in && z > std::min(zc, z_top)) ++turns;
+        }
+        if (kept.size() < 3) continue;
+        std::vector<Vec3d> above = clip(kept, zc, false);
+        for (Vec3d& v : above) v[2] = zc;
+        for (std::size_t k = 1; k + 1 < above.size(); ++k) visit({above[0], above[k], above[k + 1]});
+        if (ball)
+            for (std::size_t k = 1; k + 1 < kept.size(); ++k) visit({kept[0], kept[k], kept[k + 1]});
+    }
+    if (turns % 2 == 1) return -cutter.radius;  // on the axis, or above the cap and nearer than the ball's lower half
+    return nearest - cutter.radius;
+}
+
+class Cutting : public testing::TestWithParam<std::tuple<int, Cutter::Profile>> {};
+
+TEST_P(Cutting, ContoursTouchAndSpareThePart) {
+    const auto [seed, profile] = GetParam();
+    std::printf("seed %d\n", seed);
+    Context context;
+    const Mesh mesh = test::random_height_field(context, 6, 3.0, 12, seed % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(seed));
+    const double z_top = seed % 3 == 0 ? 8.0 : 12.5;
+    const LayerSolid solid = layer_solid(context, mesh.view(), -5, z_top);
+    const Cutter cutter{profile, 2.0};
+    const std::int32_t pitch = 2000;  // 0.2 mm
+    const double miss = 0.2 * 0.2 / (4 * cutter.radius) + 1e-4;
+    std::mt19937 random(static_cast<std::uint32_t>(seed));
+    for (const double tip : {-1.5, 1.0, 2.0, 3.25, 5.0, 7.0, 7.9}) {
+        const Plane plane = inside_plane(solid, cutter, tip);
+        const std::vector<Section> inside = slice(context, mesh.view(), {&plane, 1});
+        const Contours contours = level_contours(context, solid, inside[0].loops, cutter, tip, fibre_grid(solid, cutter, pitch));
+        Loops loops;
+        for (std::size_t c = 0; c < contours.size(); ++c) {
+            const auto points = std::span(contours.points).subspan(contours.starts[c], contours.starts[c + 1] - contours.starts[c]);
+            for (std::size_t k = 0; k < points.size(); ++k) {
+                const Point2 a = points[k], b = points[(k + 1) % points.size()];
+                loops.points.push_back(a);
+                ASSERT_LE(std::hypot(a.x - b.x, a.y - b.y), 1.4143 * pitch) << "a chord leaves its cell";
+                if (random() % 8) continue;
+                EXPECT_NEAR(room(mesh, z_top, cutter, to_mm(a.x), to_mm(a.y), tip), 0, 2e-4) << to_mm(a.x) << ' ' << to_mm(a.y) << " tip " << tip;
+                EXPECT_GE(room(mesh, z_top, cutter, 0.5 * to_mm(std::int64_t{a.x} + b.x), 0.5 * to_mm(std::int64_t{a.y} + b.y), tip), -miss);
+            }
+            loops.close_loop();
+        }
+        // Nothing is missing: wherever there is clearly room, or clearly none, the contours say the same.
+        for (int k = 0; k < 200; ++k) {
+            const double x = static_cast<double>(random() % 2600) / 100 - 13, y = static_cast<double>(random() % 2600) / 100 - 13;
+            const double r = room(mesh, z_top, cutter, x, y, tip);
+            if (std::abs(r) < 0.05) continue;
+            EXPECT_EQ(winding(loops, {to_units(x), to_units(y)}) != 0, r < 0) << x << ' ' << y << " tip " << tip << " room " << r;
+        }
+    }
+}
+
+TEST_P(Cutting, DropRestsOnThePart) {
+    const auto [seed, profile] = GetParam();
+    std::printf("seed %d\n", seed);
+    Context context;
+    const Mesh mesh = test::random_height_field(context, 6, 3.0, 12, seed % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(seed));
+    const double z_top = seed % 3 == 0 ? 8.0 : 12.5;
+    const LayerSolid solid = layer_solid(context, mesh.view(), -5, z_top);
+    const Cutter cutter{profile, 2.0};
+    const DropIndex index(context, solid, cutter);
+    std::mt19937 random(static_cast<std::uint32_t>(seed));
+    for (int k = 0; k < 150; ++k) {
+        const double x = static_cast<double>(random() % 26000) / 1000 - 13, y = static_cast<double>(random() % 26000) / 1000 - 13;
+        const Rest rest = index.drop(x, y);
+        if (rest.tip_z < -2.5) {
+            EXPECT_GE(room(mesh, z_top, cutter, x, y, -2.4), 0);
+            continue;
+        }
+        EXPECT_GE(room(mesh, z_top, cutter, x, y, rest.tip_z + 1e-6), -1e-6) << x << ' ' << y;
+        EXPECT_LT(room(mesh, z_top, cutter, x, y, rest.tip_z - 1e-3), 0) << x << ' ' << y << " could go lower than " << rest.tip_z;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, Cutting, testing::Combine(testing::Range(1, 7), testing::Values(Cutter::Profile::ball, Cutter::Profile::flat)));
+
+TEST(Fibres, SameBytesOnAnyNumberOfThreads) {
+    std::vector<Contours> results;
+    for (const int threads : {1, 2, 4}) {
+        Context context({.threads = threads});
+        const Mesh mesh = test::random_height_field(context, 20, 2.0, 12, 0.5, 7);
+        const LayerSolid solid = layer_solid(context, mesh.view(), -5, 9);
+        const Cutter cutter{Cutter::Profile::ball, 3.0};
+        const Plane plane = inside_plane(solid, cutter, 4);
+        const auto inside = slice(context, mesh.view(), {&plane, 1});
+        results.push_back(level_contours(context, solid, inside[0].loops, cutter, 4, fibre_grid(solid, cutter, 2500)));
+    }
+    for (const Contours& c : results) {
+        EXPECT_EQ(c.points, results[0].points);
+        EXPECT_EQ(c.starts, results[0].starts);
+        EXPECT_EQ(c.nz, results[0].nz);
+    }
+    EXPECT_GT(results[0].size(), 0U);
+}
+
+}  // namespace
+}  // namespace slabwright
