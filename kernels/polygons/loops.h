@@ -43,15 +43,21 @@ struct Loops {
 /// Winding number of the region's loops around p; points on the boundary count as either side.
 [[nodiscard]] int winding(const Loops& loops, Point2 p);
 
-/// Fills `parents` by containment of properly nested loops; loops may touch but not cross. O(n log n) in points.
+/// Fills `parents` by containment: the smallest larger loop around each. Loops may touch in points and along edges; where
+/// they cross (self-intersecting meshes) the answer is by one point inside each loop, and never cyclic. O(n) in points, plus
+/// for every loop the edge chains that one horizontal line meets.
 void nest(Loops& loops);
 
-/// Boolean operations and offsets on regions (non-zero winding), by polyclipping. Results are nested.
+/// Boolean operations and offsets on regions (non-zero winding), by polyclipping. Results are nested, outer loops
+/// counter-clockwise and holes clockwise. @throws Error when a result would pass 214 m, or polyclipping fails
 [[nodiscard]] Loops unite(const Loops& a, const Loops& b);
 [[nodiscard]] Loops intersect(const Loops& a, const Loops& b);
 [[nodiscard]] Loops subtract(const Loops& a, const Loops& b);
-/// Grows (delta > 0) or shrinks a region by `delta_mm`, round joins; arcs deviate by at most `tolerance_mm`, always
-/// to the side of the *larger* region, so that what is kept clear is never understated.
+/// The outline of what the loops cover: overlaps and crossings are gone.
+[[nodiscard]] Loops simplify(const Loops& loops);
+/// Grows (delta > 0) or shrinks a region by `delta_mm`, round joins; straight edges are exact to 0.1 µm, arcs deviate by at
+/// most `tolerance_mm` (0.0001 or more), always to the side of the *larger* region, so that what is kept clear is never
+/// understated.
 [[nodiscard]] Loops offset(const Loops& region, double delta_mm, double tolerance_mm);
 
 }  // namespace slabwright

@@ -1,0 +1,181 @@
+// Booleans and offsets, by polyclipping. Its units are ours (0.1 µm), which keeps it in its fast range up to 107 m.
+#include <polyclipping/clipper.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "kernels/errors.h"
+#include "kernels/polygons/loops.h"
+
+namespace slabwright {
+
+namespace {
+
+using ClipperLib::cInt;
+using ClipperLib::IntPoint;
+using ClipperLib::Path;
+using ClipperLib::Paths;
+
+/// Loops without repeated points; what has fewer than three left encloses nothing.
+Paths to_paths(const Loops& loops) {
+    Paths paths;
+    paths.reserve(loops.size());
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+        Path path;
+        path.reserve(loops.loop(i).size());
+        for (const Point2 p : loops.loop(i))
+            if (path.empty() || path.back() != IntPoint(p.x, p.y)) path.emplace_back(p.x, p.y);
+        while (path.size() > 1 && path.back() == path.front()) path.pop_back();
+        if (path.size() >= 3) paths.push_back(std::move(path));
+    }
+    return paths;
+}
+
+std::int32_t checked(cInt value) {
+    if (value < std::numeric_limits<std::int32_t>::min() || value > std::numeric_limits<std::int32_t>::max()) {
+        throw Error(ErrorKind::usage, "polygons.range", "a polygon reaches past 214 m from the origin", {},
+                    "check the units, or use a smaller offset");
+    }
+    return static_cast<std::int32_t>(value);
+}
+
+Loops to_loops(const Paths& paths) {
+    Loops loops;
+    for (const Path& path : paths) {
+        if (path.size() < 3) continue;
+        for (const IntPoint& p : path) loops.points.push_back({checked(p.X), checked(p.Y)});
+        loops.close_loop();
+    }
+    nest(loops);
+    return loops;
+}
+
+Paths execute(ClipperLib::ClipType type, const Paths& subject, const Paths& clip, ClipperLib::PolyFillType fill) {
+    Paths result;
+    try {
+        ClipperLib::Clipper clipper;
+        // It skips paths that enclose nothing, and takes it for a failure when none is left.
+        const bool subjects = clipper.AddPaths(subject, ClipperLib::ptSubject, true), clips = clipper.AddPaths(clip, ClipperLib::ptClip, true);
+        if (!subjects && !clips) return result;
+        if (!clipper.Execute(type, result, fill, fill)) {
+            throw Error(ErrorKind::no_plan, "polygons.failed", "polyclipping could not combine these polygons", {},
+                        "report the model; a slightly different height or tolerance avoids it");
+        }
+    } catch (const ClipperLib::clipperException& error) {
+        throw Error(ErrorKind::no_plan, "polygons.failed", std::string("polyclipping refused these polygons: ") + error.what(), {},
+                    "check the units of the model");
+    }
+    return result;
+}
+
+Loops combine(ClipperLib::ClipType type, const Loops& a, const Loops& b) {
+    return to_loops(execute(type, to_paths(a), to_paths(b), ClipperLib::pftNonZero));
+}
+
+/// Drops points on the straight line between their neighbours, spikes included, until there is none.
+void drop_straight(Path& path) {
+    auto straight = [](const IntPoint& a, const IntPoint& b, const IntPoint& c) {
+        return static_cast<__int128>(b.X - a.X) * (c.Y - b.Y) == static_cast<__int128>(b.Y - a.Y) * (c.X - b.X);
+    };
+    Path kept;
+    kept.reserve(path.size());
+    for (const IntPoint& p : path) {
+        while (kept.size() >= 2 && straight(kept[kept.size() - 2], kept.back(), p)) kept.pop_back();
+        if (kept.empty() || kept.back() != p) kept.push_back(p);
+    }
+    // The seam: the first points have not seen the last ones yet.
+    std::size_t first = 0;
+    for (bool again = true; again && kept.size() - first >= 3;) {
+        again = false;
+        if (straight(kept[kept.size() - 2], kept.back(), kept[first])) {
+            kept.pop_back();
+            again = true;
+        } else if (straight(kept.back(), kept[first], kept[first + 1])) {
+            ++first;
+            again = true;
+        }
+    }
+    path.assign(kept.begin() + static_cast<std::ptrdiff_t>(first), kept.end());
+    if (path.size() < 3) path.clear();
+}
+
+/// The loop moved by `delta` units to its outside, not yet freed of its crossings: an edge keeps its length, and moves
+/// along its normal; where the moved edges part, an arc joins them; where they cross, the path goes through the vertex,
+/// so that all that is swept too far winds the other way and the positive filling drops it.
+///
+/// polyclipping's own arcs are chords whose number is rounded down, on the inner side. Here the number is rounded up, and
+/// the side chosen: the region must not come out too small. Growing, tangents around the arc stand outside of it;
+/// shrinking, the arcs belong to what is taken away, and chords inside of them take too little.
+Path moved(const Path& loop, double delta, double tolerance) {
+    const std::size_t n = loop.size();
+    const double radius = std::abs(delta);
+    const double largest = delta > 0 ? 2 * std::acos(radius / (radius + tolerance)) : 2 * std::acos(std::max(0.0, 1 - tolerance / radius));
+    const double largest_step = std::min(largest, std::numbers::pi / 2);
+    auto rounded = [](double x, double y) { return IntPoint(static_cast<cInt>(std::llround(x)), static_cast<cInt>(std::llround(y))); };
+
+    Path path;
+    path.reserve(2 * n);
+    for (std::size_t i = 0; i < n; ++i) {
+        const IntPoint &a = loop[i == 0 ? n - 1 : i - 1], &b = loop[i], &c = loop[i + 1 == n ? 0 : i + 1];
+        const double x = static_cast<double>(b.X), y = static_cast<double>(b.Y);
+        double ux = x - static_cast<double>(a.X), uy = y - static_cast<double>(a.Y);
+        double vx = static_cast<double>(c.X) - x, vy = static_cast<double>(c.Y) - y;
+        const double u = std::hypot(ux, uy), v = std::hypot(vx, vy);
+        ux /= u, uy /= u, vx /= v, vy /= v;
+        const double turn = std::atan2(ux * vy - uy * vx, ux * vx + uy * vy);
+        // Outward normals are (uy, −ux) and (vy, −vx); delta < 0 turns them inward.
+        if (turn * delta <= 0) {
+            path.push_back(rounded(x + delta * uy, y - delta * ux));
+            path.push_back(b);
+            path.push_back(rounded(x + delta * vy, y - delta * vx));
+            continue;
+        }
+        const auto steps = static_cast<std::size_t>(std::max(1.0, std::ceil(std::abs(turn) / largest_step)));
+        const double step = turn / static_cast<double>(steps);
+        if (delta > 0) {
+            const double reach = delta / std::cos(step / 2);
+            for (std::size_t k = 0; k < steps; ++k) {
+                const double angle = (static_cast<double>(k) + 0.5) * step, cosine = std::cos(angle), sine = std::sin(angle);
+                path.push_back(rounded(x + reach * (uy * cosine + ux * sine), y + reach * (uy * sine - ux * cosine)));
+            }
+        } else {
+            for (std::size_t k = 0; k <= steps; ++k) {
+                const double angle = static_cast<double>(k) * step, cosine = std::cos(angle), sine = std::sin(angle);
+                path.push_back(rounded(x + delta * (uy * cosine + ux * sine), y + delta * (uy * sine - ux * cosine)));
+            }
+        }
+    }
+    return path;
+}
+
+}  // namespace
+
+Loops unite(const Loops& a, const Loops& b) { return combine(ClipperLib::ctUnion, a, b); }
+Loops intersect(const Loops& a, const Loops& b) { return combine(ClipperLib::ctIntersection, a, b); }
+Loops subtract(const Loops& a, const Loops& b) { return combine(ClipperLib::ctDifference, a, b); }
+Loops simplify(const Loops& loops) { return combine(ClipperLib::ctUnion, loops, {}); }
+
+Loops offset(const Loops& region, double delta_mm, double tolerance_mm) {
+    if (!std::isfinite(delta_mm) || std::abs(delta_mm) * kUnitsPerMm > std::numeric_limits<std::int32_t>::max()) {
+        throw Error(ErrorKind::usage, "polygons.offset", "an offset must be finite and under 214 m", {}, "check the tool's diameter");
+    }
+    if (!(tolerance_mm * kUnitsPerMm >= 1) || !std::isfinite(tolerance_mm)) {
+        throw Error(ErrorKind::usage, "polygons.tolerance", "the tolerance of an offset must be 0.0001 mm or more");
+    }
+    // Regions may overlap themselves; only the outline of what they cover may be moved.
+    Paths outline = execute(ClipperLib::ctUnion, to_paths(region), {}, ClipperLib::pftNonZero);
+    const double delta = delta_mm * kUnitsPerMm;
+    if (delta == 0) return to_loops(outline);
+    Paths raw;
+    raw.reserve(outline.size());
+    for (Path& loop : outline) {
+        drop_straight(loop);
+        if (!loop.empty()) raw.push_back(moved(loop, delta, tolerance_mm * kUnitsPerMm));
+    }
+    return to_loops(execute(ClipperLib::ctUnion, raw, {}, ClipperLib::pftPositive));
+}
+
+}  // namespace slabwright

@@ -1,0 +1,240 @@
+#include "kernels/polygons/loops.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace slabwright {
+
+namespace {
+
+// Coordinates are int32, so differences need 33 bits and their products 66: sums and orientations are exact in 128.
+using Wide = __int128;
+
+/// Twice the signed area, exact.
+Wide twice_area(std::span<const Point2> loop) {
+    Wide sum = 0;
+    if (loop.size() < 3) return sum;
+    const std::int64_t ox = loop[0].x, oy = loop[0].y;
+    std::int64_t px = loop[1].x - ox, py = loop[1].y - oy;
+    for (std::size_t i = 2; i < loop.size(); ++i) {
+        const std::int64_t x = loop[i].x - ox, y = loop[i].y - oy;
+        sum += static_cast<Wide>(px) * y - static_cast<Wide>(py) * x;
+        px = x;
+        py = y;
+    }
+    return sum;
+}
+
+constexpr double kHalfSquareUnit = 0.5 / (kUnitsPerMm * kUnitsPerMm);  // mm² per unit of twice_area
+
+/// A run of edges of one loop along which y never turns back; horizontal edges ride along.
+struct Chain {
+    std::int32_t y_low = 0, y_high = 0, x_low = 0, x_high = 0;
+    std::uint32_t loop = 0;
+    std::uint32_t first = 0, edges = 0;  // offset of its first point within the loop, number of edges
+    std::int32_t direction = 0;          // +1 rises, −1 falls
+};
+
+/// An abscissa num / den, den > 0, exact.
+struct Ratio {
+    Wide num = 0, den = 1;
+};
+bool less_or_equal(const Ratio& a, const Ratio& b) { return a.num * b.den <= b.num * a.den; }
+bool less(const Ratio& a, const Ratio& b) { return a.num * b.den < b.num * a.den; }
+std::int64_t floor_of(const Ratio& r) {
+    Wide q = r.num / r.den;
+    if (q * r.den > r.num) --q;
+    return static_cast<std::int64_t>(q);
+}
+
+Point2 cyclic(std::span<const Point2> loop, std::size_t i) { return loop[i < loop.size() ? i : i - loop.size()]; }
+
+/// Where the chain crosses the line at y + 1/2. Needs y_low <= y < y_high.
+Ratio crossing(const Chain& chain, std::span<const Point2> loop, std::int32_t y) {
+    // The last point of the chain on its starting side; the next one lies across the line.
+    std::size_t low = 0, high = chain.edges;
+    while (high - low > 1) {
+        const std::size_t middle = (low + high) / 2;
+        const bool upper = cyclic(loop, chain.first + middle).y > y;
+        if (upper == (chain.direction > 0)) high = middle;
+        else low = middle;
+    }
+    Point2 a = cyclic(loop, chain.first + low), b = cyclic(loop, chain.first + high);
+    if (chain.direction < 0) std::swap(a, b);
+    const Wide rise = static_cast<Wide>(b.y) - a.y, run = static_cast<Wide>(b.x) - a.x;
+    return {2 * rise * a.x + run * (2 * (static_cast<Wide>(y) - a.y) + 1), 2 * rise};
+}
+
+void append_chains(std::span<const Point2> loop, std::uint32_t index, std::vector<Chain>& chains) {
+    const std::size_t n = loop.size();
+    if (n < 3) return;
+    std::size_t lowest = 0;
+    for (std::size_t i = 1; i < n; ++i)
+        if (loop[i].y < loop[lowest].y) lowest = i;
+    Chain chain;
+    auto open = [&](std::size_t k, std::int32_t direction) {
+        const Point2 p = cyclic(loop, lowest + k);
+        chain = {p.y, p.y, p.x, p.x, index, static_cast<std::uint32_t>((lowest + k) % n), 0, direction};
+    };
+    auto extend = [&](Point2 p) {
+        ++chain.edges;
+        chain.y_low = std::min(chain.y_low, p.y);
+        chain.y_high = std::max(chain.y_high, p.y);
+        chain.x_low = std::min(chain.x_low, p.x);
+        chain.x_high = std::max(chain.x_high, p.x);
+    };
+    // Starting at a lowest point, the first chain rises and the last one ends where it began.
+    open(0, +1);
+    for (std::size_t k = 0; k < n; ++k) {
+        const Point2 p = cyclic(loop, lowest + k), q = cyclic(loop, k + 1 == n ? lowest : lowest + k + 1);
+        const std::int32_t direction = q.y > p.y ? 1 : q.y < p.y ? -1 : chain.direction;
+        if (direction != chain.direction) {
+            if (chain.y_high > chain.y_low) chains.push_back(chain);
+            open(k, direction);
+        }
+        extend(q);
+    }
+    if (chain.y_high > chain.y_low) chains.push_back(chain);
+}
+
+/// A point just right of `x` on the line at y + 1/2.
+struct Probe {
+    std::uint32_t loop = 0;
+    std::int32_t y = 0;
+    Ratio x;
+};
+
+/// The leftmost crossing at y + 1/2 behind which the loop's own winding is not zero. Whiskers (edges there and back) have
+/// none; then false.
+bool leftmost_inside(std::span<const Chain> chains, std::span<const Point2> loop, std::int32_t y, Ratio& x, bool& any) {
+    struct Crossing {
+        Ratio x;
+        std::int32_t direction;
+    };
+    std::vector<Crossing> row;
+    for (const Chain& chain : chains)
+        if (chain.y_low <= y && y < chain.y_high) row.push_back({crossing(chain, loop, y), chain.direction});
+    any = !row.empty();
+    if (!any) return false;
+    std::sort(row.begin(), row.end(), [](const Crossing& a, const Crossing& b) { return less(a.x, b.x); });
+    int sum = 0;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+        sum += row[i].direction;
+        const bool last_here = i + 1 == row.size() || less(row[i].x, row[i + 1].x);
+        if (last_here && sum != 0) {
+            x = row[i].x;
+            return true;
+        }
+    }
+    x = row.front().x;
+    return false;
+}
+
+}  // namespace
+
+double signed_area(std::span<const Point2> loop) { return static_cast<double>(twice_area(loop)) * kHalfSquareUnit; }
+
+double area(const Loops& loops) {
+    Wide sum = 0;
+    for (std::size_t i = 0; i < loops.size(); ++i) sum += twice_area(loops.loop(i));
+    return static_cast<double>(sum) * kHalfSquareUnit;
+}
+
+int winding(const Loops& loops, Point2 p) {
+    int turns = 0;
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+        const auto loop = loops.loop(i);
+        if (loop.empty()) continue;
+        Point2 a = loop.back();
+        for (const Point2 b : loop) {
+            // An edge counts when it crosses the ray from p to the right; half-open in y, so that a vertex counts once.
+            const bool a_upper = a.y > p.y, b_upper = b.y > p.y;
+            if (a_upper != b_upper) {
+                const Wide side = (static_cast<Wide>(b.x) - a.x) * (static_cast<std::int64_t>(p.y) - a.y) -
+                                  (static_cast<Wide>(b.y) - a.y) * (static_cast<std::int64_t>(p.x) - a.x);
+                if (b_upper && side > 0) ++turns;
+                if (a_upper && side < 0) --turns;
+            }
+            a = b;
+        }
+    }
+    return turns;
+}
+
+// Every loop is asked for at one point: on a line half a unit above an integer height, just right of the loop's leftmost
+// crossing. No point of any loop lies on such a line, so loops that touch in points cannot confuse the count, and where
+// they share an edge "just right" decides. All arithmetic is exact. The loops around that point are found by counting
+// signed crossings to its left, over chains of edges that rise or fall: a chain that lies wholly on one side costs one
+// comparison, the others a binary search. The chains that a line meets are kept up by a sweep in y.
+//
+// Only a larger loop (of two equal ones the earlier) may be a parent, so that there is no cycle even where loops cross.
+void nest(Loops& loops) {
+    const std::size_t n = loops.size();
+    loops.parents.assign(n, -1);
+    if (n < 2) return;
+
+    std::vector<Wide> size(n);
+    std::vector<Chain> chains;
+    std::vector<Probe> probes;
+    for (std::size_t i = 0; i < n; ++i) {
+        const auto loop = loops.loop(i);
+        size[i] = twice_area(loop);
+        if (size[i] < 0) size[i] = -size[i];
+        const std::size_t first = chains.size();
+        append_chains(loop, static_cast<std::uint32_t>(i), chains);
+        const std::span<const Chain> own = std::span(chains).subspan(first);
+        if (own.empty()) continue;  // flat: no inside, no place in the order
+        std::int32_t low = std::numeric_limits<std::int32_t>::max(), high = std::numeric_limits<std::int32_t>::min();
+        for (const Chain& chain : own) {
+            low = std::min(low, chain.y_low);
+            high = std::max(high, chain.y_high);
+        }
+        Probe probe{static_cast<std::uint32_t>(i), low, {}};
+        bool any = false;
+        if (!leftmost_inside(own, loop, low, probe.x, any)) {
+            // A whisker hangs from the loop's bottom: the middle is a better place, if it is not one of whiskers too.
+            Probe middle{probe.loop, static_cast<std::int32_t>((static_cast<std::int64_t>(low) + high - 1) / 2), {}};
+            if (leftmost_inside(own, loop, middle.y, middle.x, any)) probe = middle;
+        }
+        probes.push_back(probe);
+    }
+
+    std::sort(chains.begin(), chains.end(), [](const Chain& a, const Chain& b) { return a.y_low < b.y_low; });
+    std::sort(probes.begin(), probes.end(), [](const Probe& a, const Probe& b) { return a.y < b.y; });
+    auto larger = [&](std::size_t a, std::size_t b) { return size[a] != size[b] ? size[a] > size[b] : a < b; };
+
+    std::vector<Chain> active;
+    std::vector<std::int32_t> turns(n, 0);
+    std::vector<std::uint32_t> met;
+    std::size_t next = 0;
+    for (const Probe& probe : probes) {
+        while (next < chains.size() && chains[next].y_low <= probe.y) active.push_back(chains[next++]);
+        const std::int64_t x = floor_of(probe.x);
+        for (std::size_t c = 0; c < active.size();) {
+            const Chain& chain = active[c];
+            if (chain.y_high <= probe.y) {
+                active[c] = active.back();
+                active.pop_back();
+                continue;
+            }
+            ++c;
+            if (chain.x_low > x || chain.loop == probe.loop) continue;  // wholly right of the probe, or its own
+            if (chain.x_high <= x || less_or_equal(crossing(chain, loops.loop(chain.loop), probe.y), probe.x)) {
+                turns[chain.loop] += chain.direction;
+                met.push_back(chain.loop);
+            }
+        }
+        std::int32_t parent = -1;
+        for (const std::uint32_t j : met) {
+            if (turns[j] != 0 && larger(j, probe.loop) && (parent < 0 || larger(static_cast<std::size_t>(parent), j))) {
+                parent = static_cast<std::int32_t>(j);
+            }
+        }
+        for (const std::uint32_t j : met) turns[j] = 0;
+        met.clear();
+        loops.parents[probe.loop] = parent;
+    }
+}
+
+}  // namespace slabwright

@@ -1,0 +1,431 @@
+// How it works. The two sides of a plane are told apart by one float threshold: a vertex lies above exactly if its z is
+// greater. So a facet in the plane is all below or all above and yields nothing, and every other facet that meets the plane
+// has exactly one edge that goes up through it and one that goes down. The section's segment on a facet, solid on its left,
+// runs from the down edge to the up edge, and the facet across the up edge continues it: no search, no comparing of
+// coordinates. On closed adjacency this is a permutation of the crossed facets, and its cycles are the loops.
+//
+// Each vertex is ranked among the sorted thresholds, each facet is thereby crossed by one run of planes, and two passes (count,
+// scatter) give every plane the ascending list of its facets. Planes are then walked independently.
+#include "kernels/slicing/slicing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <numeric>
+#include <queue>
+#include <string>
+#include <utility>
+
+#include "kernels/errors.h"
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr std::size_t kVertexGrain = std::size_t{1} << 15;
+constexpr std::size_t kFacetGrain = std::size_t{1} << 16;
+/// Facet chunks of the scatter; more would only make the counters (chunks × planes) larger.
+constexpr std::size_t kMaxChunks = 64;
+/// Crossed facets listed at a time (64 MB of indices), unless one plane alone has more.
+constexpr std::size_t kBatchCrossings = std::size_t{1} << 24;
+/// Planes that are counted at a time, so that the counters stay small on any request.
+constexpr std::size_t kBatchPlanes = 4096;
+/// Neighbouring planes cross mostly the same facets, so a thread does a few in a row.
+constexpr std::size_t kPlaneGrain = 4;
+/// Past this |x| or |y| in mm a point does not fit 32 bits.
+constexpr float kReach = 214000.0f;
+
+/// The largest float t such that "vertex above the plane on this side" is the same as "vertex z > t".
+float threshold(const Plane& plane) {
+    constexpr float lowest = -std::numeric_limits<float>::infinity();
+    if (plane.z > static_cast<double>(std::numeric_limits<float>::max())) return std::numeric_limits<float>::max();
+    if (plane.z < -static_cast<double>(std::numeric_limits<float>::max())) return lowest;
+    const auto nearest = static_cast<float>(plane.z);
+    const bool too_high = plane.side == Side::above ? static_cast<double>(nearest) > plane.z : static_cast<double>(nearest) >= plane.z;
+    return too_high ? std::nextafterf(nearest, lowest) : nearest;
+}
+
+/// Counts the thresholds under a height. Buckets of equal height narrow the search; as the bucket is a monotonic function of
+/// the height, only the thresholds of the height's own bucket are in doubt.
+class Ranking {
+public:
+    explicit Ranking(const std::vector<float>& thresholds) : thresholds_(thresholds) {
+        low_ = thresholds.front();
+        const double span = static_cast<double>(thresholds.back()) - low_;
+        const std::size_t buckets = 4 * thresholds.size() + 1;
+        last_ = static_cast<double>(buckets - 1);
+        per_mm_ = std::isfinite(span) && span > 0 ? last_ / span : 0;
+        starts_.assign(buckets + 1, 0);
+        for (const float t : thresholds) ++starts_[bucket(t) + 1];
+        std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
+    }
+    [[nodiscard]] std::uint32_t operator()(float z) const {
+        const std::size_t b = bucket(z);
+        const float* base = thresholds_.data();
+        return static_cast<std::uint32_t>(std::lower_bound(base + starts_[b], base + starts_[b + 1], z) - base);
+    }
+
+private:
+    [[nodiscard]] std::size_t bucket(float z) const {
+        const double b = per_mm_ == 0 ? 0 : (static_cast<double>(z) - low_) * per_mm_;
+        return b <= 0 ? 0 : b >= last_ ? static_cast<std::size_t>(last_) : static_cast<std::size_t>(b);
+    }
+    const std::vector<float>& thresholds_;
+    std::vector<std::uint32_t> starts_;
+    double low_ = 0, per_mm_ = 0, last_ = 0;
+};
+
+/// Planes [first, last) of the sorted request that cross a facet.
+struct Run {
+    std::uint32_t first = 0, last = 0;
+};
+
+/// By the corners above the plane (bit i for corner i): the edge along which the facet rises through it, and the edge along
+/// which it falls; edge k goes from corner k to corner k + 1, and 3 is none.
+constexpr std::uint8_t kUpEdge[8] = {3, 2, 0, 2, 1, 1, 0, 3};
+constexpr std::uint8_t kDownEdge[8] = {3, 0, 1, 1, 2, 0, 2, 3};
+constexpr std::uint8_t kNextCorner[3] = {1, 2, 0};
+
+unsigned corners_above(MeshView mesh, const Index3& facet, float limit) {
+    return static_cast<unsigned>(mesh.vertices[facet[0]].z > limit) | static_cast<unsigned>(mesh.vertices[facet[1]].z > limit) << 1 |
+           static_cast<unsigned>(mesh.vertices[facet[2]].z > limit) << 2;
+}
+
+/// Nearest unit, halves away from zero; the same as to_units() on every coordinate a float can hold, and inlined.
+std::int32_t nearest_unit(double mm) {
+    const double units = mm * kUnitsPerMm;
+    return static_cast<std::int32_t>(units + (units < 0 ? -0.5 : 0.5));
+}
+
+/// Where an edge meets the plane. Both facets of an edge must find the same point, so it is computed from the end of lower
+/// index. The ends lie on different sides, so the share t is in [0, 1], and a plane exactly at an end gives that end.
+Point2 crossing(MeshView mesh, std::uint32_t a, std::uint32_t b, double z) {
+    if (b < a) std::swap(a, b);
+    const Vec3f &p = mesh.vertices[a], &q = mesh.vertices[b];
+    const double rise = static_cast<double>(q.z) - p.z;
+    const double t = (z - p.z) / rise;
+    return {nearest_unit(p.x + t * (static_cast<double>(q.x) - p.x)), nearest_unit(p.y + t * (static_cast<double>(q.y) - p.y))};
+}
+
+/// What walking one plane needs; kept from plane to plane, and clean between them.
+struct Scratch {
+    std::vector<std::uint64_t> pending;  // one bit per facet: crossed, not walked yet
+    std::vector<Point2> points, backward;
+    Loops loops, chains;
+};
+
+bool is_pending(const Scratch& scratch, std::uint32_t facet) { return (scratch.pending[facet >> 6] >> (facet & 63) & 1) != 0; }
+void set_pending(Scratch& scratch, std::uint32_t facet) { scratch.pending[facet >> 6] |= std::uint64_t{1} << (facet & 63); }
+void clear_pending(Scratch& scratch, std::uint32_t facet) { scratch.pending[facet >> 6] &= ~(std::uint64_t{1} << (facet & 63)); }
+
+void drop_repeats(std::vector<Point2>& points) { points.erase(std::unique(points.begin(), points.end()), points.end()); }
+
+/// Adds a loop unless it encloses nothing. Exact, as twice the area may not fit 64 bits.
+void add_loop(std::vector<Point2>& points, Loops& loops) {
+    drop_repeats(points);
+    while (points.size() > 1 && points.back() == points.front()) points.pop_back();
+    if (points.size() < 3 || signed_area(points) == 0) return;
+    loops.points.insert(loops.points.end(), points.begin(), points.end());
+    loops.close_loop();
+}
+
+/// Follows the section through one facet after the other from `start`, along up edges (`kUpEdge`) or against its direction
+/// (`kDownEdge`), and appends the crossing on every edge it goes through.
+/// @return true when it came back to `start`, false when it ended at an open edge
+bool walk(MeshView mesh, double z, float limit, std::uint32_t start, const std::uint8_t (&edge_of)[8], Scratch& scratch,
+          std::vector<Point2>& points) {
+    const std::size_t facets = mesh.facets.size();
+    for (std::uint32_t f = start;;) {
+        const Index3& facet = mesh.facets[f];
+        const unsigned edge = edge_of[corners_above(mesh, facet, limit)];
+        points.push_back(crossing(mesh, facet[edge], facet[kNextCorner[edge]], z));
+        const std::uint32_t next = mesh.neighbours[f][edge];
+        if (next == start) return true;
+        // Beside an open edge this ends a walk only where adjacency is not mutual.
+        if (next >= facets || !is_pending(scratch, next)) return false;
+        clear_pending(scratch, next);
+        f = next;
+    }
+}
+
+/// Joins chains whose ends are within the gap, the nearest pair of ends first, ties to the lower index. Only an end and a
+/// beginning are joined, so that the solid stays on the left.
+std::uint32_t join_chains(const Loops& chains, double gap_mm, Loops& loops, Loops& open, std::vector<Point2>& points) {
+    const std::size_t n = chains.size();
+    const double gap = gap_mm * kUnitsPerMm;
+    const double gap2 = gap * gap;
+    struct Pair {
+        double distance2 = 0;
+        std::uint32_t tail = 0, head = 0;
+    };
+    auto after = [](const Pair& a, const Pair& b) {
+        if (a.distance2 != b.distance2) return a.distance2 > b.distance2;
+        return a.tail != b.tail ? a.tail > b.tail : a.head > b.head;
+    };
+    auto head_of = [&](std::uint32_t c) { return chains.loop(c).front(); };
+    auto tail_of = [&](std::uint32_t c) { return chains.loop(c).back(); };
+    std::vector<std::uint32_t> by_x(n);
+    std::iota(by_x.begin(), by_x.end(), 0u);
+    std::sort(by_x.begin(), by_x.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return head_of(a).x != head_of(b).x ? head_of(a).x < head_of(b).x : a < b; });
+    std::vector<std::uint32_t> next(n, kNoFacet), previous(n, kNoFacet);
+
+    // The nearest free beginning to an end: outwards in x from the end, until x alone is too far.
+    auto nearest = [&](std::uint32_t tail, Pair& best) {
+        const Point2 p = tail_of(tail);
+        best = {std::nextafter(gap2, std::numeric_limits<double>::infinity()), tail, kNoFacet};
+        auto consider = [&](std::uint32_t head) {
+            const double dx = static_cast<double>(head_of(head).x) - p.x, dy = static_cast<double>(head_of(head).y) - p.y;
+            if (dx * dx > best.distance2) return false;
+            const bool itself = head == tail && chains.loop(head).size() < 3;
+            const double distance2 = dx * dx + dy * dy;
+            if (previous[head] == kNoFacet && !itself && distance2 <= gap2 &&
+                (distance2 < best.distance2 || (distance2 == best.distance2 && head < best.head))) {
+                best = {distance2, tail, head};
+            }
+            return true;
+        };
+        const auto from = std::lower_bound(by_x.begin(), by_x.end(), p.x, [&](std::uint32_t c, std::int32_t x) { return head_of(c).x < x; });
+        for (auto it = from; it != by_x.end() && consider(*it);) ++it;
+        for (auto it = from; it != by_x.begin() && consider(*std::prev(it));) --it;
+        return best.head != kNoFacet;
+    };
+    std::priority_queue<Pair, std::vector<Pair>, decltype(after)> queue(after);
+    Pair pair;
+    for (std::uint32_t c = 0; c < n; ++c)
+        if (nearest(c, pair)) queue.push(pair);
+    std::uint32_t joined = 0;
+    while (!queue.empty()) {
+        const Pair top = queue.top();
+        queue.pop();
+        if (previous[top.head] != kNoFacet) {
+            if (nearest(top.tail, pair)) queue.push(pair);
+            continue;
+        }
+        next[top.tail] = top.head;
+        previous[top.head] = top.tail;
+        ++joined;
+    }
+
+    std::vector<bool> done(n, false);
+    auto gather = [&](std::uint32_t first) {
+        points.clear();
+        for (std::uint32_t c = first; c != kNoFacet && !done[c]; c = next[c]) {
+            done[c] = true;
+            points.insert(points.end(), chains.loop(c).begin(), chains.loop(c).end());
+        }
+    };
+    for (std::uint32_t c = 0; c < n; ++c) {
+        if (previous[c] != kNoFacet) continue;
+        gather(c);
+        drop_repeats(points);
+        if (points.size() < 2) continue;
+        open.points.insert(open.points.end(), points.begin(), points.end());
+        open.close_loop();
+    }
+    for (std::uint32_t c = 0; c < n; ++c) {
+        if (done[c]) continue;
+        gather(c);
+        add_loop(points, loops);
+    }
+    return joined;
+}
+
+/// An exact copy: the scratch keeps its room, the result takes no more than it needs.
+Loops taken(const Loops& from) {
+    Loops to;
+    to.points = std::vector<Point2>(from.points.begin(), from.points.end());
+    to.starts = std::vector<std::uint32_t>(from.starts.begin(), from.starts.end());
+    return to;
+}
+
+void clear(Loops& loops) {
+    loops.points.clear();
+    loops.starts.assign(1, 0);
+    loops.parents.clear();
+}
+
+void cut(MeshView mesh, float limit, std::span<const std::uint32_t> crossed, const SliceOptions& options, Scratch& scratch, Section& section) {
+    const double z = section.plane.z;
+    for (const std::uint32_t f : crossed) set_pending(scratch, f);
+    clear(scratch.loops);
+    clear(scratch.chains);
+    for (const std::uint32_t f : crossed) {
+        if (!is_pending(scratch, f)) continue;
+        clear_pending(scratch, f);
+        scratch.points.clear();
+        if (walk(mesh, z, limit, f, kUpEdge, scratch, scratch.points)) {
+            add_loop(scratch.points, scratch.loops);
+            continue;
+        }
+        // The walk fell off an open edge: the same chain may also reach back from where it began.
+        scratch.backward.clear();
+        walk(mesh, z, limit, f, kDownEdge, scratch, scratch.backward);
+        std::reverse(scratch.backward.begin(), scratch.backward.end());
+        scratch.backward.insert(scratch.backward.end(), scratch.points.begin(), scratch.points.end());
+        drop_repeats(scratch.backward);
+        scratch.chains.points.insert(scratch.chains.points.end(), scratch.backward.begin(), scratch.backward.end());
+        scratch.chains.close_loop();
+    }
+    if (options.close_gap_mm > 0 && !scratch.chains.empty()) {
+        section.closed_gaps = join_chains(scratch.chains, options.close_gap_mm, scratch.loops, section.open_chains, scratch.points);
+    } else {
+        for (std::size_t c = 0; c < scratch.chains.size(); ++c) {
+            const auto chain = scratch.chains.loop(c);
+            if (chain.size() < 2) continue;
+            section.open_chains.points.insert(section.open_chains.points.end(), chain.begin(), chain.end());
+            section.open_chains.close_loop();
+        }
+    }
+    section.loops = taken(scratch.loops);
+    nest(section.loops);
+}
+
+/// Lends each running task a scratch; which one it gets does not matter, as all are clean.
+class ScratchPool {
+public:
+    explicit ScratchPool(std::size_t facets) : facets_(facets) {}
+    [[nodiscard]] std::unique_ptr<Scratch> take() {
+        {
+            const std::lock_guard lock(mutex_);
+            if (!free_.empty()) {
+                auto scratch = std::move(free_.back());
+                free_.pop_back();
+                return scratch;
+            }
+        }
+        auto scratch = std::make_unique<Scratch>();
+        scratch->pending.assign((facets_ + 63) / 64, 0);
+        return scratch;
+    }
+    void give(std::unique_ptr<Scratch> scratch) {
+        const std::lock_guard lock(mutex_);
+        free_.push_back(std::move(scratch));
+    }
+
+private:
+    std::size_t facets_;
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<Scratch>> free_;
+};
+
+void check(MeshView mesh, std::span<const Plane> planes, const SliceOptions& options) {
+    for (std::size_t i = 0; i < planes.size(); ++i) {
+        if (std::isfinite(planes[i].z)) continue;
+        throw Error(ErrorKind::usage, "slice.plane", "a plane's height is not a finite number", "plane " + std::to_string(i));
+    }
+    if (!std::isfinite(options.close_gap_mm) || options.close_gap_mm < 0) {
+        throw Error(ErrorKind::usage, "slice.gap", "the gap to close must be 0 mm or more");
+    }
+    if (mesh.neighbours.size() != mesh.facets.size()) {
+        throw Error(ErrorKind::input, "slice.adjacency", "the mesh has no adjacency", {}, "weld it first");
+    }
+    if (mesh.facets.size() >= kNoFacet) throw Error(ErrorKind::input, "slice.facets", "the mesh has more than 4294967294 facets");
+}
+
+}  // namespace
+
+std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plane> planes, const SliceOptions& options) {
+    check(mesh, planes, options);
+    std::vector<Section> sections(planes.size());
+    for (std::size_t i = 0; i < planes.size(); ++i) sections[i].plane = planes[i];
+    if (planes.empty() || mesh.facets.empty()) return sections;
+    const std::size_t facets = mesh.facets.size(), vertices = mesh.vertices.size();
+    const std::uint64_t listed = std::min<std::uint64_t>(std::max(kBatchCrossings, facets), std::uint64_t{facets} * planes.size());
+    const MemoryCharge charge(context, vertices * sizeof(std::uint32_t) + facets * sizeof(Run) + listed * sizeof(std::uint32_t), "slicing");
+
+    std::vector<std::uint32_t> order(planes.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+        if (planes[a].z != planes[b].z) return planes[a].z < planes[b].z;
+        return planes[a].side != planes[b].side ? planes[a].side < planes[b].side : a < b;
+    });
+    std::vector<float> limits(planes.size());
+    for (std::size_t p = 0; p < order.size(); ++p) limits[p] = threshold(planes[order[p]]);
+
+    // A vertex is above the first rank[v] planes of the order, and below the others.
+    const Ranking ranking(limits);
+    std::vector<std::uint32_t> rank(vertices);
+    parallel_for(context, vertices, kVertexGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) {
+            const Vec3f& p = mesh.vertices[v];
+            if (!(std::abs(p.x) <= kReach && std::abs(p.y) <= kReach && std::isfinite(p.z))) {
+                throw Error(ErrorKind::input, "slice.range", "a vertex is not finite, or reaches past 214 m from the origin",
+                            "vertex " + std::to_string(v), "check the units of the model");
+            }
+            rank[v] = ranking(p.z);
+        }
+    });
+    std::vector<Run> runs(facets);
+    parallel_for(context, facets, kFacetGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t f = begin; f < end; ++f) {
+            const Index3& facet = mesh.facets[f];
+            if (facet[0] >= vertices || facet[1] >= vertices || facet[2] >= vertices) {
+                throw Error(ErrorKind::input, "slice.index", "a facet names a vertex that does not exist", "facet " + std::to_string(f));
+            }
+            const auto [low, high] = std::minmax({rank[facet[0]], rank[facet[1]], rank[facet[2]]});
+            runs[f] = {low, high};
+        }
+    });
+
+    const std::size_t grain = std::max(kFacetGrain, (facets + kMaxChunks - 1) / kMaxChunks), chunks = (facets + grain - 1) / grain;
+    ScratchPool pool(facets);
+    std::vector<std::uint32_t> crossed;
+    for (std::size_t window = 0; window < order.size(); window += kBatchPlanes) {
+        const std::size_t window_planes = std::min(kBatchPlanes, order.size() - window);
+        // slots[chunk * stride + p]: first how many facets of the chunk plane window + p crosses, then where they go.
+        const std::size_t stride = window_planes + 1;
+        std::vector<std::uint64_t> slots(chunks * stride, 0);
+        auto clip = [&](const Run& run, std::size_t first, std::size_t last) {
+            return std::pair(std::max<std::size_t>(run.first, first), std::min<std::size_t>(run.last, last));
+        };
+        parallel_for(context, facets, grain, [&](std::size_t begin, std::size_t end) {
+            std::uint64_t* count = slots.data() + begin / grain * stride;
+            for (std::size_t f = begin; f < end; ++f) {
+                const auto [first, last] = clip(runs[f], window, window + window_planes);
+                if (first >= last) continue;
+                ++count[first - window];
+                --count[last - window];  // wraps below zero, and back when summed
+            }
+            for (std::size_t p = 1; p < stride; ++p) count[p] += count[p - 1];
+        });
+        std::vector<std::uint64_t> totals(window_planes, 0);
+        for (std::size_t c = 0; c < chunks; ++c)
+            for (std::size_t p = 0; p < window_planes; ++p) totals[p] += slots[c * stride + p];
+
+        for (std::size_t first = 0, last = 0; first < window_planes; first = last) {
+            std::uint64_t room = 0;
+            while (last < window_planes && (last == first || room + totals[last] <= kBatchCrossings)) room += totals[last++];
+            std::vector<std::uint64_t> starts(last - first + 1, 0);
+            for (std::size_t p = first; p < last; ++p) {
+                starts[p - first + 1] = starts[p - first] + totals[p];
+                std::uint64_t at = starts[p - first];
+                for (std::size_t c = 0; c < chunks; ++c) at += std::exchange(slots[c * stride + p], at);
+            }
+            crossed.resize(room);
+            parallel_for(context, facets, grain, [&](std::size_t begin, std::size_t end) {
+                std::uint64_t* slot = slots.data() + begin / grain * stride;
+                for (std::size_t f = begin; f < end; ++f) {
+                    const auto [low, high] = clip(runs[f], window + first, window + last);
+                    for (std::size_t p = low; p < high; ++p) crossed[slot[p - window]++] = static_cast<std::uint32_t>(f);
+                }
+            });
+            parallel_for(context, last - first, kPlaneGrain, [&](std::size_t begin, std::size_t end) {
+                auto scratch = pool.take();
+                for (std::size_t i = begin; i < end; ++i) {
+                    context.throw_if_cancelled();
+                    const std::size_t p = window + first + i;
+                    cut(mesh, limits[p], std::span(crossed).subspan(starts[i], starts[i + 1] - starts[i]), options, *scratch, sections[order[p]]);
+                }
+                pool.give(std::move(scratch));
+            });
+        }
+    }
+    return sections;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,393 @@
+// Areas, winding, nesting, booleans and offsets against brute force.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <random>
+
+#include "kernels/errors.h"
+#include "kernels/polygons/loops.h"
+
+namespace {
+
+using namespace slabwright;
+
+std::uint64_t seed_of(const char* test) {
+    std::uint64_t seed = 20240607;
+    for (const char* c = test; *c; ++c) seed = seed * 131 + static_cast<unsigned char>(*c);
+    std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
+    return seed;
+}
+
+void add(Loops& loops, const std::vector<Point2>& points) {
+    loops.points.insert(loops.points.end(), points.begin(), points.end());
+    loops.close_loop();
+}
+
+std::vector<Point2> rectangle(int x0, int y0, int x1, int y1) { return {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}; }
+std::vector<Point2> reversed(std::vector<Point2> points) { return {points.rbegin(), points.rend()}; }
+
+/// One loop by itself.
+Loops alone(const Loops& loops, std::size_t i) {
+    Loops one;
+    add(one, {loops.loop(i).begin(), loops.loop(i).end()});
+    return one;
+}
+
+double distance_to_segment(double px, double py, Point2 a, Point2 b) {
+    const double dx = b.x - static_cast<double>(a.x), dy = b.y - static_cast<double>(a.y);
+    const double length2 = dx * dx + dy * dy;
+    const double t = length2 > 0 ? std::clamp(((px - a.x) * dx + (py - a.y) * dy) / length2, 0.0, 1.0) : 0.0;
+    return std::hypot(px - (a.x + t * dx), py - (a.y + t * dy));
+}
+
+double distance_to_boundary(const Loops& loops, Point2 p) {
+    double best = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+        const auto loop = loops.loop(i);
+        for (std::size_t k = 0; k < loop.size(); ++k) best = std::min(best, distance_to_segment(p.x, p.y, loop[k], loop[(k + 1) % loop.size()]));
+    }
+    return best;
+}
+
+TEST(Polygons, AreaAndWindingOfKnownShapes) {
+    Loops loops;
+    EXPECT_EQ(area(loops), 0);
+    EXPECT_EQ(winding(loops, {0, 0}), 0);
+    add(loops, rectangle(0, 0, 100000, 200000));                   // 10 × 20 mm
+    add(loops, reversed(rectangle(20000, 20000, 40000, 120000)));  // hole, 2 × 10 mm
+    add(loops, {{25000, 30000}, {35000, 30000}, {35000, 50000}});  // island, half of 1 × 2 mm
+    EXPECT_DOUBLE_EQ(signed_area(loops.loop(0)), 200);
+    EXPECT_DOUBLE_EQ(signed_area(loops.loop(1)), -20);
+    EXPECT_DOUBLE_EQ(area(loops), 181);
+    EXPECT_EQ(winding(loops, {10000, 10000}), 1);
+    EXPECT_EQ(winding(loops, {30000, 100000}), 0);
+    EXPECT_EQ(winding(loops, {34000, 35000}), 1);
+    EXPECT_EQ(winding(loops, {26000, 45000}), 0);
+    EXPECT_EQ(winding(loops, {-1, 5}), 0);
+    nest(loops);
+    EXPECT_EQ(loops.parents, (std::vector<std::int32_t>{-1, 0, 1}));
+}
+
+TEST(Polygons, ExactAtTheEndsOfTheRange) {
+    constexpr std::int32_t low = std::numeric_limits<std::int32_t>::min(), high = std::numeric_limits<std::int32_t>::max();
+    Loops loops;
+    add(loops, rectangle(low, low, high, high));
+    const double side = 4294967295.0 / kUnitsPerMm;
+    EXPECT_NEAR(area(loops), side * side, side * side * 1e-15);
+    EXPECT_EQ(winding(loops, {0, 0}), 1);
+    add(loops, {{low, low}, {high, low}, {high, high}});
+    // One unit on either side of the diagonal.
+    EXPECT_EQ(winding(loops, {5, 3}), 2);
+    EXPECT_EQ(winding(loops, {3, 5}), 1);
+    EXPECT_EQ(winding(loops, {high - 1, high - 3}), 2);
+    nest(loops);
+    EXPECT_EQ(loops.parents, (std::vector<std::int32_t>{-1, 0}));
+}
+
+/// A polygon that is star-shaped about (x, y), with radii in [inner, outer].
+std::vector<Point2> star(std::mt19937_64& random, double x, double y, double inner, double outer) {
+    const int corners = 3 + static_cast<int>(random() % 20);
+    std::uniform_real_distribution<double> radius(inner, outer);
+    std::vector<Point2> points;
+    for (int k = 0; k < corners; ++k) {
+        const double angle = 2 * std::numbers::pi * k / corners, r = radius(random);
+        points.push_back(
+            {static_cast<std::int32_t>(std::lround(x + r * std::cos(angle))), static_cast<std::int32_t>(std::lround(y + r * std::sin(angle)))});
+    }
+    return points;
+}
+
+TEST(Polygons, NestAgreesWithBruteForceOnRandomTrees) {
+    std::mt19937_64 random(seed_of("nest trees"));
+    for (int round = 0; round < 300; ++round) {
+        struct Made {
+            std::vector<Point2> points;
+            int parent;
+        };
+        std::vector<Made> made;
+        // Stars within discs; children keep within discs that fit their parent's inner disc (corners >= 3: cos 60° = 1/2).
+        std::function<void(double, double, double, int, int)> grow = [&](double x, double y, double r, int parent, int depth) {
+            if (r < 40 || depth > 6 || made.size() > 200) return;
+            const int self = static_cast<int>(made.size());
+            auto points = star(random, x, y, 0.8 * r, r);
+            made.push_back({depth % 2 ? reversed(points) : points, parent});
+            const double room = 0.8 * r * 0.5 - 3;  // a circle that lies inside of every such star
+            const int children = static_cast<int>(random() % 5);
+            if (children == 1) {
+                grow(x, y, room, self, depth + 1);
+            } else {
+                for (int c = 0; c < children; ++c) {
+                    const double angle = 2 * std::numbers::pi * c / children, away = room / 2;
+                    const double most = std::min(room - away, away * std::sin(std::numbers::pi / children)) - 2;
+                    grow(x + away * std::cos(angle), y + away * std::sin(angle), most, self, depth + 1);
+                }
+            }
+        };
+        for (int root = 0; root < 4; ++root) grow(root * 50000, static_cast<double>(random() % 40000), 20000, -1, 0);
+        std::vector<std::size_t> order(made.size());
+        for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+        std::shuffle(order.begin(), order.end(), random);
+        Loops loops;
+        std::vector<std::int32_t> place(made.size()), expected(made.size());
+        for (std::size_t i = 0; i < order.size(); ++i) {
+            auto points = made[order[i]].points;
+            std::rotate(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(random() % points.size()), points.end());
+            add(loops, points);
+            place[order[i]] = static_cast<std::int32_t>(i);
+        }
+        for (std::size_t i = 0; i < made.size(); ++i)
+            expected[static_cast<std::size_t>(place[i])] = made[i].parent < 0 ? -1 : place[static_cast<std::size_t>(made[i].parent)];
+        nest(loops);
+        ASSERT_EQ(loops.parents, expected) << "round " << round;
+    }
+}
+
+/// The outlines of the filled cells of a grid, solid on the left; where cells touch in corners loops touch in points.
+Loops trace(const std::vector<std::vector<int>>& cell, int pitch) {
+    const int rows = static_cast<int>(cell.size()), columns = static_cast<int>(cell[0].size());
+    auto filled = [&](int i, int j) {
+        return i >= 0 && j >= 0 && i < columns && j < rows && cell[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)] != 0;
+    };
+    std::multimap<Point2, Point2> edges;  // from, to, in grid corners
+    for (int j = 0; j < rows; ++j) {
+        for (int i = 0; i < columns; ++i) {
+            if (!filled(i, j)) continue;
+            if (!filled(i, j - 1)) edges.insert({{i, j}, {i + 1, j}});
+            if (!filled(i + 1, j)) edges.insert({{i + 1, j}, {i + 1, j + 1}});
+            if (!filled(i, j + 1)) edges.insert({{i + 1, j + 1}, {i, j + 1}});
+            if (!filled(i - 1, j)) edges.insert({{i, j + 1}, {i, j}});
+        }
+    }
+    Loops loops;
+    while (!edges.empty()) {
+        const Point2 start = edges.begin()->first;
+        Point2 from = start, to = edges.begin()->second;
+        edges.erase(edges.begin());
+        std::vector<Point2> points{{from.x * pitch, from.y * pitch}};
+        while (to != start) {
+            points.push_back({to.x * pitch, to.y * pitch});
+            // At a corner of two loops turn left, so that each loop bounds one filled cell group on its own.
+            const auto [first, last] = edges.equal_range(to);
+            auto best = first;
+            for (auto it = first; it != last; ++it) {
+                const int cross = (to.x - from.x) * (it->second.y - to.y) - (to.y - from.y) * (it->second.x - to.x);
+                if (cross > 0) best = it;
+            }
+            from = to;
+            to = best->second;
+            edges.erase(best);
+        }
+        add(loops, points);
+    }
+    return loops;
+}
+
+/// The smallest larger loop around a point of loop i that is on no loop: a quarter pitch inside of its first edge.
+std::vector<std::int32_t> brute_parents(const Loops& loops, int pitch) {
+    std::vector<std::int32_t> parents(loops.size(), -1);
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+        const auto loop = loops.loop(i);
+        const Point2 a = loop[0], b = loop[1];
+        const int sign = signed_area(loop) > 0 ? 1 : -1;  // the loop's own inside lies left of a counter-clockwise one
+        const double length = std::hypot(b.x - a.x, b.y - a.y);
+        const Point2 inside{static_cast<std::int32_t>((a.x + b.x) / 2 - sign * (b.y - a.y) / length * pitch / 4),
+                            static_cast<std::int32_t>((a.y + b.y) / 2 + sign * (b.x - a.x) / length * pitch / 4)};
+        EXPECT_NE(winding(alone(loops, i), inside), 0);
+        for (std::size_t j = 0; j < loops.size(); ++j) {
+            if (j == i || winding(alone(loops, j), inside) == 0) continue;
+            const double size = std::abs(signed_area(loops.loop(j)));
+            if (size <= std::abs(signed_area(loop))) continue;
+            if (parents[i] < 0 || size < std::abs(signed_area(loops.loop(static_cast<std::size_t>(parents[i])))))
+                parents[i] = static_cast<std::int32_t>(j);
+        }
+    }
+    return parents;
+}
+
+TEST(Polygons, NestAgreesWithBruteForceWhereLoopsTouchInPoints) {
+    std::mt19937_64 random(seed_of("nest touching"));
+    for (int round = 0; round < 200; ++round) {
+        const int size = 3 + static_cast<int>(random() % 22), share = 20 + static_cast<int>(random() % 70);
+        std::vector<std::vector<int>> cell(static_cast<std::size_t>(size), std::vector<int>(static_cast<std::size_t>(size)));
+        for (auto& row : cell)
+            for (int& c : row) c = static_cast<int>(random() % 100) < share;
+        Loops loops = trace(cell, 8);
+        nest(loops);
+        ASSERT_EQ(loops.parents, brute_parents(loops, 8)) << "round " << round;
+    }
+}
+
+TEST(Polygons, NestWhereLoopsShareEdges) {
+    Loops loops;
+    add(loops, rectangle(0, 0, 100, 100));
+    add(loops, rectangle(100, 0, 200, 100));         // beside it, one whole edge in common
+    add(loops, reversed(rectangle(0, 0, 50, 100)));  // a hole along the left wall
+    add(loops, rectangle(0, 20, 50, 40));            // across the hole, touching both its walls
+    add(loops, {{100, 0}, {200, 50}, {100, 100}});   // a triangle on an edge of its parent, its tip on another
+    add(loops, rectangle(300, 0, 400, 100));
+    add(loops, {{300, 0}, {400, 100}, {300, 100}});  // all its corners are corners of the one before
+    nest(loops);
+    EXPECT_EQ(loops.parents[0], -1);
+    EXPECT_EQ(loops.parents[1], -1);
+    EXPECT_EQ(loops.parents[2], 0);
+    EXPECT_EQ(loops.parents[3], 2);
+    EXPECT_EQ(loops.parents[4], 1);
+    EXPECT_EQ(loops.parents[5], -1);
+    EXPECT_EQ(loops.parents[6], 5);
+}
+
+TEST(Polygons, NestSurvivesCrossingFlatAndEqualLoops) {
+    std::mt19937_64 random(seed_of("nest crossing"));
+    for (int round = 0; round < 100; ++round) {
+        Loops loops;
+        for (int i = 0; i < 40; ++i) {
+            std::vector<Point2> points;
+            const int corners = static_cast<int>(random() % 12);
+            for (int k = 0; k < corners; ++k)
+                points.push_back({static_cast<std::int32_t>(random() % 40) - 20, static_cast<std::int32_t>(random() % 40) - 20});
+            add(loops, points);
+            if (i % 7 == 0) add(loops, points);
+        }
+        nest(loops);
+        for (std::size_t i = 0; i < loops.size(); ++i) {
+            std::size_t steps = 0;
+            for (std::int32_t p = static_cast<std::int32_t>(i); p >= 0; p = loops.parents[static_cast<std::size_t>(p)])
+                ASSERT_LE(++steps, loops.size());
+        }
+    }
+}
+
+TEST(Polygons, BooleansAgreeWithGridCells) {
+    std::mt19937_64 random(seed_of("booleans"));
+    for (int round = 0; round < 60; ++round) {
+        constexpr int size = 16, pitch = 10000;  // 1 mm cells
+        std::vector<std::vector<int>> in_a(size, std::vector<int>(size)), in_b = in_a;
+        Loops a, b;
+        for (int k = 0; k < 8; ++k) {
+            const int x0 = static_cast<int>(random() % (size - 1)), y0 = static_cast<int>(random() % (size - 1));
+            const int x1 = x0 + 1 + static_cast<int>(random() % static_cast<unsigned>(size - x0 - 1));
+            const int y1 = y0 + 1 + static_cast<int>(random() % static_cast<unsigned>(size - y0 - 1));
+            add(k % 2 ? a : b, rectangle(x0 * pitch, y0 * pitch, x1 * pitch, y1 * pitch));
+            for (int y = y0; y < y1; ++y)
+                for (int x = x0; x < x1; ++x) (k % 2 ? in_a : in_b)[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] = 1;
+        }
+        const Loops results[] = {unite(a, b), intersect(a, b), subtract(a, b), simplify(a)};
+        double expected[4] = {};
+        for (std::size_t y = 0; y < size; ++y) {
+            for (std::size_t x = 0; x < size; ++x) {
+                const bool p = in_a[y][x] != 0, q = in_b[y][x] != 0;
+                const bool inside[4] = {p || q, p && q, p && !q, p};
+                const Point2 middle{static_cast<std::int32_t>(x * pitch + pitch / 2), static_cast<std::int32_t>(y * pitch + pitch / 2)};
+                for (int r = 0; r < 4; ++r) {
+                    expected[r] += inside[r];
+                    ASSERT_EQ(winding(results[r], middle), inside[r] ? 1 : 0) << "round " << round << " operation " << r;
+                }
+            }
+        }
+        for (int r = 0; r < 4; ++r) {
+            ASSERT_EQ(area(results[r]), expected[r]);
+            ASSERT_EQ(results[r].parents.size(), results[r].size());
+            for (std::size_t i = 0; i < results[r].size(); ++i) {  // outer loops and holes alternate from the outside in
+                const std::int32_t parent = results[r].parents[i];
+                const bool hole = signed_area(results[r].loop(i)) < 0;
+                if (parent < 0) ASSERT_FALSE(hole);
+                else ASSERT_NE(hole, signed_area(results[r].loop(static_cast<std::size_t>(parent))) < 0);
+            }
+        }
+    }
+}
+
+TEST(Polygons, OffsetOfStraightEdgesIsExact) {
+    Loops square;
+    add(square, rectangle(0, 0, 100000, 100000));
+    EXPECT_DOUBLE_EQ(area(offset(square, -1, 0.01)), 64);
+    EXPECT_DOUBLE_EQ(area(offset(square, 0, 0.01)), 100);
+    EXPECT_TRUE(offset(square, -5.1, 0.01).empty());
+    const double grown = area(offset(square, 2, 0.001)), exact = 100 + 4 * 10 * 2 + std::numbers::pi * 4;
+    EXPECT_GE(grown, exact);
+    EXPECT_LE(grown, exact + 0.001 * 2 * std::numbers::pi * 2);
+    Loops ring = square;
+    add(ring, reversed(rectangle(40000, 40000, 60000, 60000)));
+    EXPECT_TRUE(offset(ring, -2.9, 0.01).empty());
+    const Loops closed = offset(ring, 1.0001, 0.01);
+    EXPECT_EQ(closed.size(), 1u);  // the hole is gone
+    // An L, shrunk: the arc of its inner corner must leave too much rather than too little.
+    Loops angle;
+    add(angle, {{0, 0}, {100000, 0}, {100000, 50000}, {50000, 50000}, {50000, 100000}, {0, 100000}});
+    const double rest = area(offset(angle, -1, 0.001));
+    // Outer square 8 × 8 less the corner square 5 × 5, whose inner corner (1 mm) is rounded away from the region.
+    const double expected = 64 - 25 + (1 - std::numbers::pi / 4);
+    EXPECT_GE(rest, expected - 1e-9);
+    EXPECT_LE(rest, expected + 0.001 * std::numbers::pi / 2);
+}
+
+TEST(Polygons, OffsetErrsToTheLargerRegionOnly) {
+    std::mt19937_64 random(seed_of("offset"));
+    for (int round = 0; round < 120; ++round) {
+        Loops region;
+        const int bodies = 1 + static_cast<int>(random() % 4);
+        for (int k = 0; k < bodies; ++k) {
+            const auto x = static_cast<double>(random() % 100000), y = static_cast<double>(random() % 100000);
+            add(region, star(random, x, y, 15000, 40000));
+        }
+        if (round % 2)
+            region = subtract(region, [&] {
+                Loops hole;
+                add(hole, star(random, 50000, 50000, 5000, 30000));
+                return hole;
+            }());
+        const double tolerance = round % 3 == 0 ? 0.05 : 0.002;  // mm
+        const double delta = (round % 4 < 2 ? 1 : -1) * (0.05 + static_cast<double>(random() % 1000) / 300);
+        const Loops outline = simplify(region), moved = offset(region, delta, tolerance);
+        std::uniform_int_distribution<std::int32_t> coordinate(-80000, 180000);
+        const double slack = 2.5;  // units: rounding of the region's crossings and of the result's points
+        int tested = 0;
+        for (int k = 0; k < 1500; ++k) {
+            Point2 p{coordinate(random), coordinate(random)};
+            if (k % 3 != 0 && !moved.empty()) {  // most points near the result's boundary, within 1.5 tolerances
+                const Point2 near = moved.points[random() % moved.points.size()];
+                const int reach = static_cast<int>(tolerance * kUnitsPerMm * 1.5) + 4;
+                p = {near.x + static_cast<std::int32_t>(random() % static_cast<unsigned>(2 * reach)) - reach,
+                     near.y + static_cast<std::int32_t>(random() % static_cast<unsigned>(2 * reach)) - reach};
+            }
+            const double boundary = distance_to_boundary(outline, p);
+            const double depth = winding(outline, p) != 0 ? -boundary : boundary;  // signed distance to the region
+            const double past = depth - delta * kUnitsPerMm;
+            const bool inside = winding(moved, p) != 0;
+            if (past < -slack) {
+                ASSERT_TRUE(inside) << "round " << round << ": too small by " << -past << " units at " << p.x << ", " << p.y;
+                ++tested;
+            } else if (past > tolerance * kUnitsPerMm + slack) {
+                ASSERT_FALSE(inside) << "round " << round << ": too large by " << past << " units at " << p.x << ", " << p.y;
+                ++tested;
+            }
+        }
+        EXPECT_GT(tested, 300);
+    }
+}
+
+TEST(Polygons, RefusesWhatDoesNotFit) {
+    Loops square;
+    add(square, rectangle(2000000000, 0, 2100000000, 1000000));
+    EXPECT_THROW((void)offset(square, 10000, 0.1), Error);
+    EXPECT_THROW((void)offset(square, std::nan(""), 0.1), Error);
+    EXPECT_THROW((void)offset(square, std::numeric_limits<double>::infinity(), 0.1), Error);
+    EXPECT_THROW((void)offset(square, 1, 0), Error);
+    EXPECT_THROW((void)offset(square, 1, std::nan("")), Error);
+    EXPECT_NO_THROW((void)offset(square, 1, 0.1));
+    // Loops that enclose nothing vanish.
+    Loops flat;
+    add(flat, {{0, 0}, {10, 10}});
+    add(flat, {{0, 0}, {10, 0}, {5, 0}});
+    add(flat, {{3, 3}, {3, 3}, {3, 3}});
+    EXPECT_TRUE(simplify(flat).empty());
+    EXPECT_TRUE(offset(flat, 1, 0.01).empty());
+    EXPECT_TRUE(offset(Loops{}, 1, 0.01).empty());
+}
+
+}  // namespace
