@@ -230,11 +230,20 @@ TEST(StandingPart, DistanceFromShadow) {
     box(m, {0, 0, 0}, {10, 10, 5});
     box(m, {0, 0, 5}, {30, 10, 10});
     const StandingPart part(context, m.view());
-    EXPECT_NEAR(part.distance_from_shadow({5, 5, 12}, 10, 50), 2 + StandingPart::kSheet, 1e-6);
-    EXPECT_NEAR(part.distance_from_shadow({33, 5, 14}, 10, 50), 5, 2e-3);
-    EXPECT_NEAR(part.distance_from_shadow({20, 5, 2}, 10, 50), 0, 0);  // under the overhang is shadow
-    EXPECT_NEAR(part.distance_from_shadow({20, 5, 2}, 5, 50), 10, 1e-6);
-    EXPECT_NEAR(part.distance_from_shadow({20, 5, 2}, 5, 4), 4, 0);
+    EXPECT_NEAR(part.from_shadow({5, 5, 12}, 10, 50).distance, 2 + StandingPart::kSheet, 1e-6);
+    EXPECT_NEAR(part.from_shadow({33, 5, 14}, 10, 50).distance, 5, 2e-3);
+    EXPECT_NEAR(part.from_shadow({20, 5, 2}, 10, 50).distance, 0, 0);  // under the overhang is shadow
+    EXPECT_NEAR(part.from_shadow({20, 5, 2}, 5, 50).distance, 10, 1e-6);
+    EXPECT_NEAR(part.from_shadow({20, 5, 2}, 5, 4).distance, 4, 0);
+    const auto away = part.from_shadow({33, 5, 14}, 10, 50).away;
+    EXPECT_NEAR(away[0], 3, 1e-6);
+    EXPECT_NEAR(away[2], 4, 2e-3);
+    // Beside: only what stands higher than the point counts.
+    EXPECT_NEAR(part.beside({20, 5, 2}, 5, 50).distance, 10, 1e-6);
+    EXPECT_NEAR(part.beside({20, 5, 6}, 10, 50).distance, 0, 0);
+    EXPECT_NEAR(part.beside({34, 5, 6}, 10, 50).distance, 4, 1e-6);
+    EXPECT_NEAR(part.beside({34, 5, 10}, 10, 50).distance, 50, 0);
+    EXPECT_NEAR(part.beside({34, 5, 2}, 5, 50).distance, 24, 1e-6);
 }
 
 TEST(ClosestPoint, AgreesWithBruteForce) {

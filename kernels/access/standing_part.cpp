@@ -488,11 +488,19 @@ void StandingPart::envelope_grid(double x0, double y0, double cell, int nx, int 
              const double fy0 = std::min({f.v[0].y, f.v[1].y, f.v[2].y}), fy1 = std::max({f.v[0].y, f.v[1].y, f.v[2].y});
              const int j0 = static_cast<int>(std::max(0.0, std::ceil((fy0 - y0) / cell) - 1)),
                        j1 = static_cast<int>(std::min<double>(ny - 1, std::floor((fy1 - y0) / cell) + 1));
-             const int i0 = static_cast<int>(std::max(0.0, std::ceil((fx0 - x0) / cell) - 1)),
-                       i1 = static_cast<int>(std::min<double>(nx - 1, std::floor((fx1 - x0) / cell) + 1));
              for (int j = j0; j <= j1; ++j) {
                  const double y = y0 + j * cell;
                  if (y < fy0 || y > fy1) continue;
+                 // Where the row crosses the outline, a cell wider: facet_winding() decides, this only saves asking it.
+                 double low = fx1, high = fx0;
+                 for (int k = 0; k < 3; ++k) {
+                     const Vec3f &a = f.v[k], &b = f.v[(k + 1) % 3];
+                     if ((a.y <= y) == (b.y <= y)) continue;
+                     const double x = a.x + (y - a.y) / (static_cast<double>(b.y) - a.y) * (static_cast<double>(b.x) - a.x);
+                     low = std::min(low, x), high = std::max(high, x);
+                 }
+                 const int i0 = static_cast<int>(std::clamp(std::floor((low - x0) / cell), 0.0, static_cast<double>(nx)));
+                 const int i1 = static_cast<int>(std::clamp(std::ceil((high - x0) / cell), -1.0, nx - 1.0));
                  for (int i = i0; i <= i1; ++i) {
                      const double x = x0 + i * cell;
                      const int w = facet_winding(f.v, x, y);
@@ -509,17 +517,54 @@ void StandingPart::envelope_grid(double x0, double y0, double cell, int nx, int 
         else if (out[k] == nothing) out[k] = none;
 }
 
-double StandingPart::distance_from_shadow(const Point3& point, double z_top, double limit) const {
+StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_top, double limit) const {
     const double top = z_top - kSheet;
-    double best = limit;
-    if (point[2] - top < best && covered(point[0], point[1], top)) best = std::max(0.0, point[2] - top);
+    Clearance best{limit, {0, 0, 0}};
+    if (point[2] - top < best.distance && covered(point[0], point[1], top)) {
+        const double over = std::max(0.0, point[2] - top);
+        best = {over, {0, 0, over}};
+    }
     walk(
         [&](const Node& n) {
             if (n.z0 >= top) return false;
             const double dxy = xy_distance(n, point[0], point[1]), dz = std::max(0.0, point[2] - std::min<double>(n.z1, top));
-            return dxy * dxy + dz * dz < best * best;
+            return dxy * dxy + dz * dz < best.distance * best.distance;
         },
-        [&](const Facet& f) { below(f.v, top, [&](const Triangle& t) { best = std::min(best, ray_distance(point, t).d); }); });
+        [&](const Facet& f) {
+            below(f.v, top, [&](const Triangle& t) {
+                const RayDistance r = ray_distance(point, t);
+                if (r.d < best.distance) best = {r.d, r.vector};
+            });
+        });
+    return best;
+}
+
+StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, double limit) const {
+    const double top = z_top - kSheet;
+    Clearance best{limit, {0, 0, 0}};
+    if (point[2] >= top) return best;
+    if (covered(point[0], point[1], top)) return {0, {0, 0, 0}};
+    const P2 axis{point[0], point[1]};
+    walk([&](const Node& n) { return n.z0 < top && n.z1 > point[2] && xy_distance(n, axis.x, axis.y) < best.distance; },
+         [&](const Facet& f) {
+             if (f.v[0].z >= top && f.v[1].z >= top && f.v[2].z >= top) return;
+             Polygon poly;
+             poly.n = 3;
+             for (int k = 0; k < 3; ++k) poly.p[k] = to_point(f.v[k]);
+             poly = clip_z(clip_z(poly, top, false), point[2], true);
+             if (poly.n == 0) return;
+             if (distance_2d(poly, axis, axis) == 0) {
+                 best = {0, {0, 0, 0}};
+                 return;
+             }
+             for (int i = 0; i < poly.n; ++i) {
+                 Point3 s = poly.p[i], e = poly.p[(i + 1) % poly.n], from = point;
+                 s[2] = e[2] = from[2] = 0;
+                 const Point3 w = sub(from, closest_on_segment(from, s, e));
+                 const double d = std::sqrt(dot(w, w));
+                 if (d < best.distance) best = {d, w};
+             }
+         });
     return best;
 }
 

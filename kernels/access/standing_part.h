@@ -54,8 +54,15 @@ public:
     /// The same for a grid of nx × ny points (x0 + i·cell, y0 + j·cell), row j after row j − 1, by scan conversion.
     void envelope_grid(double x0, double y0, double cell, int nx, int ny, double z_top, float none, float* out) const;
 
-    /// Distance of a point from the shadow of the part below z_top, at most `limit` (returned when nothing is nearer); 0 within.
-    [[nodiscard]] double distance_from_shadow(const Point3& point, double z_top, double limit) const;
+    /// How far something stands away, and which way: `away` leads from its nearest point to the point asked for.
+    struct Clearance {
+        double distance = 0;  ///< mm; the limit when nothing is nearer
+        Point3 away{};
+    };
+    /// From a point to the shadow of the part below z_top; 0 within it.
+    [[nodiscard]] Clearance from_shadow(const Point3& point, double z_top, double limit) const;
+    /// Horizontally from an upright line through (x, y) to what of the part stands higher than z (and below z_top); 0 within it.
+    [[nodiscard]] Clearance beside(const Point3& point, double z_top, double limit) const;
 
     /// Lowest and highest z, and the extent in x and y, of the facets.
     [[nodiscard]] Box3 box() const { return box_; }

@@ -1,0 +1,65 @@
+#include "kernels/stock/stock.h"
+
+namespace slabwright {
+
+void Stock::add_slab(double z_bottom, double thickness) {
+    slabs_.push_back({z_bottom, thickness, std::vector<float>(grid_.count(), static_cast<float>(thickness))});
+}
+
+CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to) {
+    CutEffect effect;
+    auto taken = [&](std::size_t cell, double before, double after, double& lost) {
+        lost += before - after;
+        effect.highest = std::max(effect.highest, before);
+        effect.lowest = std::min(effect.lowest, after);
+        effect.removed += before - after;
+        if (lost > effect.deepest) {
+            effect.deepest = lost;
+            const auto nx = static_cast<std::size_t>(grid_.nx);
+            effect.where = {grid_.x(static_cast<int>(cell % nx)), grid_.y(static_cast<int>(cell / nx))};
+        }
+    };
+    sweep(grid_, end, from, to, [&](std::size_t cell, double z) {
+        double lost = 0;
+        for (std::size_t k = slabs_.size(); k-- > 0;) {
+            Slab& slab = slabs_[k];
+            float& height = slab.height[cell];
+            if (height > 0) {
+                const auto left = static_cast<float>(std::max(0.0, z - slab.bottom));
+                if (left < height) {
+                    taken(cell, slab.bottom + height, slab.bottom + left, lost);
+                    height = left;
+                }
+            }
+            if (z >= slab.bottom) return;
+        }
+        if (-z > board_[cell]) {
+            effect.lowest = std::min(effect.lowest, z);
+            board_[cell] = static_cast<float>(-z);
+        }
+    });
+    return effect;
+}
+
+double Stock::top(std::size_t cell) const {
+    for (std::size_t k = slabs_.size(); k-- > 0;)
+        if (slabs_[k].height[cell] > 0) return slabs_[k].bottom + slabs_[k].height[cell];
+    return -static_cast<double>(board_[cell]);
+}
+
+double Stock::reach(double radius, const std::array<double, 3>& from, const std::array<double, 3>& to, std::array<double, 2>& where) const {
+    double most = 0;
+    const double lowest = std::min(from[2], to[2]);
+    if (!slabs_.empty() && lowest >= slabs_.back().bottom + slabs_.back().thickness) return 0;
+    sweep(grid_, {CutterEnd::Form::flat, radius, 0}, from, to, [&](std::size_t cell, double z) {
+        const double over = top(cell) - z;
+        if (over > most) {
+            most = over;
+            const auto nx = static_cast<std::size_t>(grid_.nx);
+            where = {grid_.x(static_cast<int>(cell % nx)), grid_.y(static_cast<int>(cell / nx))};
+        }
+    });
+    return most;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,57 @@
+// What is left standing: slabs bonded one on another, each a height field over its own bottom.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "kernels/stock/sweep.h"
+
+namespace slabwright {
+
+/// What one motion did to the stock, over the cells of one piece of it.
+struct CutEffect {
+    double removed = 0;             ///< mm of height summed over cells: times cell² it is a volume
+    double deepest = 0;             ///< mm that one cell lost, at most
+    double highest = -1e300;        ///< z of the highest stock that the motion took, before it was taken
+    double lowest = 1e300;          ///< z of the lowest point cut
+    std::array<double, 2> where{};  ///< the cell that lost most
+};
+
+/// The stock over a rectangle of cells. Slabs are added from below; a column that is cut through a slab's bottom shows what
+/// stands below it, and is cut there too. Under the first slab lies the base board, whose cuts are kept as well.
+class Stock {
+public:
+    explicit Stock(const CellGrid& grid) : grid_(grid), board_(grid.count(), 0.0f) {}
+
+    /// Bonds a slab of `thickness` mm with its bottom at z_bottom, at or above what was added before.
+    void add_slab(double z_bottom, double thickness);
+
+    /// Takes away what the cutter meets on its way.
+    CutEffect cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to);
+
+    /// Largest height by which stock stands above the lower face of an upright cylinder (shank or holder) anywhere on its way;
+    /// 0 when it is free. `where` gets the place.
+    [[nodiscard]] double reach(double radius, const std::array<double, 3>& from, const std::array<double, 3>& to, std::array<double, 2>& where) const;
+
+    /// z of the slab's surface in a cell; its bottom when it is cut through.
+    [[nodiscard]] double surface(std::size_t slab, std::size_t cell) const { return slabs_[slab].bottom + slabs_[slab].height[cell]; }
+    /// z of the highest stock in a column, 0 or less on the bare board.
+    [[nodiscard]] double top(std::size_t cell) const;
+    /// mm cut into the base board.
+    [[nodiscard]] double board_cut(std::size_t cell) const { return board_[cell]; }
+    [[nodiscard]] std::size_t slabs() const { return slabs_.size(); }
+    [[nodiscard]] const CellGrid& grid() const { return grid_; }
+    [[nodiscard]] std::uint64_t bytes() const { return grid_.count() * 4 * (slabs_.size() + 1); }
+
+private:
+    struct Slab {
+        double bottom, thickness;
+        std::vector<float> height;  ///< above the slab's bottom: a float holds 50 mm to 4e-6
+    };
+    CellGrid grid_;
+    std::vector<Slab> slabs_;
+    std::vector<float> board_;
+};
+
+}  // namespace slabwright

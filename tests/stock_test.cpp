@@ -1,0 +1,184 @@
+// The swept envelope against brute force, and the cusps that a ball leaves against their closed forms.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "kernels/stock/stock.h"
+
+using namespace slabwright;
+
+namespace {
+
+double end_height(const CutterEnd& end, double r) {
+    if (end.form == CutterEnd::Form::ball) return end.radius - std::sqrt(std::max(0.0, end.radius * end.radius - r * r));
+    return end.form == CutterEnd::Form::cone ? r * end.slope : 0;
+}
+
+}  // namespace
+
+TEST(Sweep, AgreesWithBruteForce) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-1, 11), uz(-3, 3), ur(0.4, 4);
+    const CellGrid grid{0.1, 0.2, 0.31, 30, 28};
+    for (int trial = 0; trial < 150; ++trial) {
+        CutterEnd end{static_cast<CutterEnd::Form>(trial % 3), ur(random), 0.6};
+        std::array<double, 3> a{u(random), u(random), uz(random)}, b{u(random), u(random), uz(random)};
+        if (trial % 5 == 0) b[2] = a[2];
+        if (trial % 7 == 0) b[0] = a[0], b[1] = a[1];
+        if (trial % 11 == 0) b[1] = a[1];
+        std::vector<double> exact(grid.count(), 1e9), brute(grid.count(), 1e9);
+        sweep(grid, end, a, b, [&](std::size_t c, double z) {
+            EXPECT_EQ(exact[c], 1e9) << "a cell came twice";
+            exact[c] = z;
+        });
+        const int samples = 4000;
+        for (int k = 0; k <= samples; ++k) {
+            const double t = static_cast<double>(k) / samples, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]),
+                         z = a[2] + t * (b[2] - a[2]);
+            for (int j = 0; j < grid.ny; ++j)
+                for (int i = 0; i < grid.nx; ++i) {
+                    const double r = std::hypot(grid.x(i) - x, grid.y(j) - y);
+                    if (r <= end.radius) brute[grid.index(i, j)] = std::min(brute[grid.index(i, j)], z + end_height(end, r));
+                }
+        }
+        const double step = std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]) / samples;
+        const double run = std::hypot(b[0] - a[0], b[1] - a[1]), slope = run > 0 ? std::abs(b[2] - a[2]) / run : 0;
+        for (std::size_t c = 0; c < grid.count(); ++c) {
+            // Brute force can miss a cell that the way only grazes, and is never lower. How much higher it may be at the ball's steep rim
+            // is bounded by the sagitta that one step makes there, elsewhere by the way's slope.
+            if (brute[c] < 1e8) {
+                ASSERT_LT(exact[c], 1e8) << "trial " << trial;
+                EXPECT_LE(exact[c], brute[c] + 1e-9) << "trial " << trial;
+                EXPECT_GE(exact[c], brute[c] - (step * (1 + slope) + std::sqrt(2 * end.radius * step) + 1e-9)) << "trial " << trial;
+            }
+        }
+    }
+}
+
+// Level passes of a ball on a plane at α leave L = R − √(R² − (SD / (2 sin α))²) (method.md section 5).
+TEST(Stock, CuspOfLevelPassesOnAPlane) {
+    const double R = 3.175, alpha = 50 * std::numbers::pi / 180, cusp = 0.1;
+    const double sd = 2 * std::sqrt(2 * R * cusp - cusp * cusp) * std::sin(alpha);
+    ASSERT_LE(sd, 2 * (R - cusp) * std::cos(alpha));
+    const double cell = cusp / 20;
+    // The plane z = x·tan α. The ball touches it from above: centre at distance R along the normal (−sin α, 0, cos α).
+    Stock stock({1, 0, cell, 1200, 1});
+    stock.add_slab(-20, 60);
+    for (double tip = -8; tip < 20; tip += sd) {
+        const double zc = tip + R, xc = (zc - R / std::cos(alpha)) / std::tan(alpha);
+        stock.cut({CutterEnd::Form::ball, R, 0}, {xc, -5, tip}, {xc, 5, tip});
+    }
+    double most = 0, least = 1e9;
+    for (std::size_t i = 0; i < 1200; ++i) {
+        const double x = 1 + static_cast<double>(i) * cell, over = (stock.surface(0, i) - x * std::tan(alpha)) * std::cos(alpha);
+        most = std::max(most, over);
+        least = std::min(least, over);
+    }
+    EXPECT_GE(least, -1e-5);
+    EXPECT_NEAR(most, cusp, 0.01 * cusp);
+}
+
+// Where the shank of the lower pass cuts too: L = R(1 − sin α) + (SD − √(2Ru − u²))·cos α with u = SD·cot α.
+TEST(Stock, CuspWhereTheShankCutsToo) {
+    const double R = 3.175, alpha = 87 * std::numbers::pi / 180, sd = 0.0639 * 25.4;
+    const double u = sd / std::tan(alpha), expected = R * (1 - std::sin(alpha)) + (sd - std::sqrt(2 * R * u - u * u)) * std::cos(alpha);
+    const double cell = 0.0002;
+    Stock stock({0.5, 0, cell, 3000, 1});
+    stock.add_slab(-20, 80);
+    for (double tip = -10; tip < 40; tip += sd) {
+        const double xc = (tip + R - R / std::cos(alpha)) / std::tan(alpha);
+        stock.cut({CutterEnd::Form::ball, R, 0}, {xc, -5, tip}, {xc, 5, tip});
+    }
+    double most = 0;
+    for (std::size_t i = 300; i < 2700; ++i)
+        most = std::max(most, (stock.surface(0, i) - (0.5 + static_cast<double>(i) * cell) * std::tan(alpha)) * std::cos(alpha));
+    EXPECT_NEAR(expected, 0.002 * 25.4, 0.02 * expected);  // LUO's example
+    EXPECT_NEAR(most, expected, 0.01 * expected);
+}
+
+// On a cone of the same slope the passes are circles, and the cusp along a meridian is the plane's (the ball's section through the
+// axis is the same circle, but for the cone's curvature across, which does not reach the meridian plane).
+TEST(Stock, CuspOnAConeByChords) {
+    const double R = 3.175, alpha = 40 * std::numbers::pi / 180, cusp = 0.1, height = 30;
+    const double sd = 2 * std::sqrt(2 * R * cusp - cusp * cusp) * std::sin(alpha), cell = cusp / 20;
+    Stock stock({8, 0, cell, 1000, 1});
+    stock.add_slab(-30, 80);
+    for (double tip = 10; tip < 24; tip += sd) {
+        const double zc = tip + R, r = (height - zc) / std::tan(alpha) + R / std::sin(alpha);  // the centre's circle
+        const int n = 4000;                                                                    // chords miss the circle by r(π/n)²/2 < 1e-5
+        for (int k = -n / 4; k < n / 4; ++k) {
+            const double a = 2 * std::numbers::pi * k / n, b = 2 * std::numbers::pi * (k + 1) / n;
+            stock.cut({CutterEnd::Form::ball, R, 0}, {r * std::cos(a), r * std::sin(a), tip}, {r * std::cos(b), r * std::sin(b), tip});
+        }
+    }
+    double most = 0, least = 1e9;
+    for (std::size_t i = 0; i < 1000; ++i) {
+        const double x = 8 + static_cast<double>(i) * cell, over = (stock.surface(0, i) - (height - x * std::tan(alpha))) * std::cos(alpha);
+        most = std::max(most, over);
+        least = std::min(least, over);
+    }
+    EXPECT_GE(least, -1e-4);
+    EXPECT_NEAR(most, cusp, 0.01 * cusp);
+}
+
+// A ball of radius r over a sphere of radius S in level circles: neighbours' centres lie on the sphere S + r an angle δ apart, and
+// between them the ball leaves (S + r)·cos(δ/2) − √(r² − (S + r)²·sin²(δ/2)) − S.
+TEST(Stock, CuspOnASphere) {
+    const double S = 30, r = 3, delta = 0.03, cell = 0.002;
+    const double expected = (S + r) * std::cos(delta / 2) - std::sqrt(r * r - std::pow((S + r) * std::sin(delta / 2), 2)) - S;
+    Stock stock({12, 0, cell, 5000, 1});
+    stock.add_slab(0, 40);
+    for (double polar = 0.3; polar < 1.0; polar += delta) {
+        const double radius = (S + r) * std::sin(polar), tip = (S + r) * std::cos(polar) - r;
+        const int n = 6000;
+        for (int k = -n / 8; k < n / 8; ++k) {
+            const double a = 2 * std::numbers::pi * k / n, b = 2 * std::numbers::pi * (k + 1) / n;
+            stock.cut({CutterEnd::Form::ball, r, 0}, {radius * std::cos(a), radius * std::sin(a), tip},
+                      {radius * std::cos(b), radius * std::sin(b), tip});
+        }
+    }
+    double most = 0, least = 1e9;
+    for (std::size_t i = 0; i < 5000; ++i) {
+        const double x = 12 + static_cast<double>(i) * cell, over = std::hypot(x, stock.surface(0, i)) - S;
+        most = std::max(most, over);
+        least = std::min(least, over);
+    }
+    EXPECT_GE(least, -1e-4);
+    EXPECT_NEAR(most, expected, 0.01 * expected);
+}
+
+TEST(Stock, CutThroughShowsTheSlabBelowAndTheBoard) {
+    Stock stock({0, 0, 1, 21, 21});
+    stock.add_slab(0, 10);
+    stock.cut({CutterEnd::Form::flat, 100, 0}, {0, 0, 8}, {20, 20, 8});  // faced
+    stock.cut({CutterEnd::Form::flat, 5, 0}, {10, 10, 3}, {10, 10, 3});  // a pocket
+    stock.add_slab(8, 10);
+    const std::size_t middle = stock.grid().index(10, 10), edge = stock.grid().index(0, 0);
+    EXPECT_NEAR(stock.top(middle), 18, 1e-6);
+    // The slab spans the pocket. Cut through it: what shows is the pocket's floor.
+    CutEffect e = stock.cut({CutterEnd::Form::flat, 2, 0}, {10, 10, 7}, {10, 10, 7});
+    EXPECT_NEAR(e.deepest, 10, 1e-6);
+    EXPECT_NEAR(e.highest, 18, 1e-6);
+    EXPECT_NEAR(stock.top(middle), 3, 1e-6);
+    EXPECT_NEAR(stock.surface(1, middle), 8, 1e-6);
+    // Again at the same place: nothing there.
+    e = stock.cut({CutterEnd::Form::flat, 2, 0}, {10, 10, 4}, {10, 10, 4});
+    EXPECT_EQ(e.removed, 0);
+    // Past the slab's bottom where the lower one stands: both are cut.
+    e = stock.cut({CutterEnd::Form::ball, 2, 0}, {0, 0, 6}, {0, 0, 6});
+    EXPECT_NEAR(stock.surface(1, edge), 8, 1e-6);
+    EXPECT_NEAR(stock.surface(0, edge), 6, 1e-6);
+    EXPECT_NEAR(e.deepest, 12, 1e-6);
+    e = stock.cut({CutterEnd::Form::flat, 1, 0}, {20, 20, -1.5}, {20, 20, -1.5});
+    EXPECT_NEAR(stock.board_cut(stock.grid().index(20, 20)), 1.5, 1e-6);
+    EXPECT_NEAR(e.lowest, -1.5, 1e-6);
+    std::array<double, 2> where{};
+    EXPECT_NEAR(stock.reach(3, {10, 2, 15}, {10, 18, 15}, where), 3, 1e-6);
+    EXPECT_EQ(stock.reach(3, {10, 2, 18}, {10, 18, 18}, where), 0);
+}
