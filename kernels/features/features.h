@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -51,6 +52,28 @@ struct FeatureSet {
 
 /// Finds every feature of the mesh. Down-facing flats at the base (the lowest z) are no features.
 /// Undercuts are connected patches of down-facing facets that are not horizontal.
+/// @throws Error(usage, "features.options") for lengths or angles out of range
 [[nodiscard]] FeatureSet find_features(Context& context, MeshView mesh, const FeatureOptions& options = {});
+
+/// Material that stays under down-facing facets when the layers are milled from above: within a layer (zb, zt] the milled
+/// shape at z is the union of the sections in [z, zt], so what lies under a facet of the same layer stays.
+struct UnmadeUndercut {
+    FeatureType type{};                 ///< down_flat when all its facets are horizontal (a flat that no boundary meets), else undercut
+    double z_low = 0, z_high = 0;       ///< mm, range of what stays unmade's facets
+    double area_mm2 = 0;                ///< of the facets, cut to the layers, under which something stays
+    double depth_mm = 0;                ///< the thickest that stays, along the facet's outward normal
+    double x = 0, y = 0, z = 0;         ///< the point of the facet where it is thickest
+    std::vector<std::uint32_t> facets;  ///< connected, ascending
+};
+
+/// Measures what given boundaries leave unmade, in connected patches, the deepest first (ties: lowest facet first).
+/// The depth is found in closed form at corners, edge middles and centroid of every facet as the layers cut it: how far
+/// its outward normal runs before no down-facing facet of the layer lies straight above, or solid or the layer's bottom
+/// is met. A wall that leans out by rounding is as deep as it leans, however tall. Depths under 1 µm are left out, and
+/// so are facets inside the solid (of another shell).
+/// @param layer_tops mm, ascending, in the mesh's own z; the first layer begins at the mesh's lowest z
+/// @throws Error(usage, "features.layer_tops") when the tops do not ascend or are not finite
+[[nodiscard]] std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh, std::span<const double> layer_tops,
+                                                            const FeatureOptions& options = {});
 
 }  // namespace slabwright

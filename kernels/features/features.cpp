@@ -1,0 +1,137 @@
+#include "kernels/features/features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+
+#include "kernels/errors.h"
+#include "kernels/features/finders.h"
+
+namespace slabwright {
+
+std::string_view name(FeatureType type) {
+    switch (type) {
+        case FeatureType::peak:
+            return "peak";
+        case FeatureType::valley:
+            return "valley";
+        case FeatureType::up_flat:
+            return "up_flat";
+        case FeatureType::down_flat:
+            return "down_flat";
+        case FeatureType::shallow:
+            return "shallow";
+        case FeatureType::saddle:
+            return "saddle";
+        case FeatureType::undercut:
+            return "undercut";
+    }
+    return "unknown";
+}
+
+std::string_view name(FoundBy found_by) {
+    switch (found_by) {
+        case FoundBy::exact:
+            return "exact";
+        case FoundBy::halving:
+            return "halving";
+        case FoundBy::facets:
+            return "facets";
+    }
+    return "unknown";
+}
+
+namespace {
+
+void check(const FeatureOptions& o) {
+    auto fail = [](const char* key) {
+        throw Error(ErrorKind::usage, "features.options", std::string("feature option ") + key + " is out of range", {},
+                    "lengths are positive (coarse from 0.001, resolution from 0.0001 mm), angles between 0 and 90 degrees");
+    };
+    auto positive = [](double v) { return v > 0 && std::isfinite(v); };
+    if (!(o.chordal_deviation_mm >= 0)) fail("chordal_deviation_mm");
+    if (!(o.flat_merge_mm >= 0)) fail("flat_merge_mm");
+    // Halving ends because brackets stay wider than the path unit, 0.1 µm.
+    if (!positive(o.halving_coarse_mm) || o.halving_coarse_mm < 1e-3) fail("halving_coarse_mm");
+    if (!positive(o.halving_resolution_mm) || o.halving_resolution_mm < 1e-4) fail("halving_resolution_mm");
+    if (!positive(o.horizontal_rad) || o.horizontal_rad >= std::numbers::pi / 4) fail("horizontal_rad");
+    if (!positive(o.shallow_limit_rad) || o.shallow_limit_rad >= std::numbers::pi / 2) fail("shallow_limit_rad");
+}
+
+auto sort_key(const Feature& f) { return std::tuple(f.type, f.z_low, f.z_high, f.x, f.y, f.facets.empty() ? kNoFacet : f.facets.front()); }
+
+void sort_features(std::vector<Feature>& features) {
+    std::stable_sort(features.begin(), features.end(), [](const Feature& a, const Feature& b) { return sort_key(a) < sort_key(b); });
+}
+
+// Pairs what both finders saw: same type, heights within the bracket that halving ends with, the nearest in height and
+// then in plan first. What stays alone is a disagreement. Both lists are sorted.
+std::vector<FinderDisagreement> compare(const std::vector<Feature>& exact, const std::vector<Feature>& halving, double resolution) {
+    struct Pair {
+        double dz, dxy;
+        std::size_t e, h;
+    };
+    std::vector<Pair> pairs;
+    for (std::size_t h = 0; h < halving.size(); ++h) {
+        const auto first = std::lower_bound(exact.begin(), exact.end(), std::pair(halving[h].type, halving[h].z_low - resolution),
+                                            [](const Feature& f, const auto& key) { return std::pair(f.type, f.z_low) < key; });
+        for (auto it = first; it != exact.end() && it->type == halving[h].type && it->z_low <= halving[h].z_low + resolution; ++it)
+            pairs.push_back({std::abs(it->z_low - halving[h].z_low), std::hypot(it->x - halving[h].x, it->y - halving[h].y),
+                             static_cast<std::size_t>(it - exact.begin()), h});
+    }
+    std::sort(pairs.begin(), pairs.end(),
+              [](const Pair& a, const Pair& b) { return std::tie(a.dxy, a.dz, a.e, a.h) < std::tie(b.dxy, b.dz, b.e, b.h); });
+    std::vector<std::uint8_t> seen_e(exact.size(), 0), seen_h(halving.size(), 0);
+    for (const Pair& p : pairs)
+        if (!seen_e[p.e] && !seen_h[p.h]) seen_e[p.e] = seen_h[p.h] = 1;
+    std::vector<FinderDisagreement> alone;
+    for (std::size_t e = 0; e < exact.size(); ++e)
+        if (!seen_e[e]) alone.push_back({exact[e].type, exact[e].z_low, exact[e].x, exact[e].y, FoundBy::exact});
+    for (std::size_t h = 0; h < halving.size(); ++h)
+        if (!seen_h[h]) alone.push_back({halving[h].type, halving[h].z_low, halving[h].x, halving[h].y, FoundBy::halving});
+    std::sort(alone.begin(), alone.end(), [](const FinderDisagreement& a, const FinderDisagreement& b) {
+        return std::tie(a.type, a.z, a.x, a.y, a.found_by) < std::tie(b.type, b.z, b.x, b.y, b.found_by);
+    });
+    return alone;
+}
+
+}  // namespace
+
+FeatureSet find_features(Context& context, MeshView mesh, const FeatureOptions& options) {
+    check(options);
+    FeatureSet set;
+    std::vector<Patch> patches = connected_patches(context, mesh, classify_facets(context, mesh, options));
+    const std::vector<Feature> flats = find_flats(mesh, patches, options);
+    set.features = flats;
+    for (auto find : {find_shallow, find_undercuts}) {
+        std::vector<Feature> found = find(mesh, patches);
+        set.features.insert(set.features.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));
+    }
+    std::vector<Feature> exact, halving;
+    if (options.finder != Finder::halving) {
+        exact = find_exact(context, mesh, flats);
+        drop_near_flats(context, mesh, flats, options.flat_merge_mm, options.flat_merge_mm, exact);
+        sort_features(exact);
+    }
+    if (options.finder != Finder::exact) {
+        halving = find_halving(context, mesh, options);
+        // Halving knows heights to its resolution only, and its places are those of the section, not of the flat.
+        drop_near_flats(context, mesh, flats, options.flat_merge_mm + options.halving_resolution_mm / 2,
+                        options.flat_merge_mm + options.halving_resolution_mm, halving);
+        // Where a flat parts or joins loops the count test fires too, at a place the sections do not tell.
+        std::erase_if(halving, [&](const Feature& f) {
+            return f.type == FeatureType::saddle && std::any_of(flats.begin(), flats.end(), [&](const Feature& flat) {
+                       return std::abs(flat.z_low - f.z_low) <= options.flat_merge_mm + options.halving_resolution_mm / 2;
+                   });
+        });
+        sort_features(halving);
+    }
+    if (options.finder == Finder::both) set.disagreements = compare(exact, halving, options.halving_resolution_mm);
+    const std::vector<Feature>& points = options.finder == Finder::halving ? halving : exact;
+    set.features.insert(set.features.end(), points.begin(), points.end());
+    sort_features(set.features);
+    return set;
+}
+
+}  // namespace slabwright

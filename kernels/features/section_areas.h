@@ -1,0 +1,29 @@
+// The area of a mesh's section as a function of height, without slicing.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// Answers "how large is the section at z" in microseconds once it is made, from any thread. The part of a closed surface
+/// above a plane and the section close one another, so the section's area is the sum of what the facets above cover in
+/// plan, signed: Σ N_z·A over the parts of facets above z. Exact up to rounding where the mesh is closed above z; facets that
+/// overlap count twice. Keeps a view of the mesh.
+class SectionAreas {
+public:
+    SectionAreas(Context& context, MeshView mesh);
+    [[nodiscard]] double operator()(double z) const;  ///< mm², just above z
+
+private:
+    [[nodiscard]] std::size_t slab(double z) const;
+    MeshView mesh_;
+    double bottom_ = 0, pitch_ = 1;
+    std::vector<double> whole_;                   // per slab: area in plan of the facets that lie wholly above it
+    std::vector<std::uint32_t> starts_, facets_;  // per slab: facets that reach into it and cover something in plan
+};
+
+}  // namespace slabwright
