@@ -1,0 +1,186 @@
+#include "engine/job.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+namespace {
+
+/// Throws with the key as the place; io/job_toml puts file and line there when the job came from a file.
+[[noreturn]] void refuse(const std::string& key, const std::string& message, const std::string& remedy) {
+    throw Error(ErrorKind::usage, "job.range", message, key, remedy);
+}
+
+enum class Ends { closed, open_low, open_both };
+
+/// One number must lie between low and high; `ends` says which of them it may equal.
+void require(const std::string& key, double value, double low, double high, Ends ends = Ends::closed) {
+    const bool low_ok = ends == Ends::closed ? value >= low : value > low;
+    const bool high_ok = ends == Ends::open_both ? value < high : value <= high;
+    if (low_ok && high_ok) return;  // a NaN fails both
+    refuse(
+        key, fmt::format("{} is {}, out of range", key, value),
+        fmt::format("give a number {} {} and {} {}", ends == Ends::closed ? "from" : "over", low, ends == Ends::open_both ? "under" : "up to", high));
+}
+
+void validate_tool(const Tool& tool, std::size_t position) {
+    const auto key = [&](const char* name) { return fmt::format("tool[{}].{}", position + 1, name); };
+    require(key("number"), tool.number, 1, 99999);
+    require(key("diameter"), tool.diameter, 0, 1000, Ends::open_low);
+    require(key("flute_length"), tool.flute_length, 0, 1000, Ends::open_low);
+    require(key("shank_diameter"), tool.shank_diameter, 0, 1000, Ends::open_low);
+    require(key("stickout"), tool.stickout, 0, 2000, Ends::open_low);
+    if (tool.stickout < tool.flute_length)
+        refuse(key("stickout"), fmt::format("{} is {}, less than the flute length {}", key("stickout"), tool.stickout, tool.flute_length),
+               "give the length from the holder's nose to the tip");
+    require(key("holder_diameter"), tool.holder_diameter, 0, 1000, Ends::open_low);
+    require(key("flutes"), tool.flutes, 1, 100);
+    require(key("helix_deg"), tool.helix_rad * 180 / std::numbers::pi, 0, 80);
+    require(key("max_rpm"), tool.max_rpm, 0, 1e6, Ends::open_low);
+    require(key("max_feed"), tool.max_feed, 1, 1e6);
+    require(key("plunge_feed"), tool.plunge_feed, 1, 1e6);
+    require(key("stepdown_min"), tool.stepdown_min, 0, 1000);
+    require(key("stepdown_max"), tool.stepdown_max, 0, 1000, Ends::open_low);
+    if (tool.stepdown_max < tool.stepdown_min)
+        refuse(key("stepdown_max"), fmt::format("{} is {}, less than stepdown_min {}", key("stepdown_max"), tool.stepdown_max, tool.stepdown_min),
+               "swap the two");
+    require(key("stepover"), tool.stepover, 0, 1, Ends::open_low);
+}
+
+}  // namespace
+
+double max_layer_thickness(const Job& job) {
+    double thickness = job.slabs.thicknesses.empty() ? 0 : *std::max_element(job.slabs.thicknesses.begin(), job.slabs.thicknesses.end());
+    thickness -= job.slabs.facing_allowance;
+    for (const Tool& tool : job.tools) {
+        // A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the bottom.
+        if (tool.kind != ToolKind::flat && tool.kind != ToolKind::ball) continue;
+        // To touch a wall of slope a at the layer's bottom, a ball's tip passes it by R(1 - cos a); walls steeper than
+        // the vertical limit go to the flat end mill, which stops at the bottom.
+        const double steepest = job.cutting.vertical_deg * std::numbers::pi / 180;
+        const double overrun = tool.kind == ToolKind::ball ? tool.diameter / 2 * (1 - std::cos(steepest)) : 0.0;
+        thickness = std::min(thickness, tool.flute_length - overrun - job.cutting.holder_clearance);
+    }
+    return thickness;
+}
+
+const Tool& tool_of_kind(const Job& job, ToolKind kind) {
+    static constexpr const char* words[] = {"flat end mill", "ball end mill", "face mill", "drill"};
+    static constexpr const char* keys[] = {"flat", "ball", "face", "drill"};
+    const auto found = std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& tool) { return tool.kind == kind; });
+    if (found != job.tools.end()) return *found;
+    throw Error(ErrorKind::usage, "job.tool", fmt::format("the tool library has no {}", words[static_cast<int>(kind)]), "tool",
+                fmt::format("add a [[tool]] with kind = \"{}\" to the job file", keys[static_cast<int>(kind)]));
+}
+
+void validate(const Job& job) {
+    const Material& m = job.material;
+    require("material.strength_mpa", m.strength_mpa, 0, 10000, Ends::open_low);
+    require("material.min_thickness", m.min_thickness, 0, 1000);
+    require("material.shallow_limit_deg", m.shallow_limit_deg, 0, 90, Ends::open_both);
+    require("material.density_kg_m3", m.density_kg_m3, 0, 30000, Ends::open_low);
+    require("material.ktc", m.ktc, 0, 100000);
+    require("material.kte", m.kte, 0, 100000);
+    require("material.kfc", m.kfc, 0, 100000);
+    require("material.kfe", m.kfe, 0, 100000);
+
+    const Slabs& s = job.slabs;
+    if (s.thicknesses.empty()) refuse("slabs.thicknesses", "slabs.thicknesses is empty", "list the thicknesses in stock, e.g. [19.0]");
+    for (std::size_t i = 0; i < s.thicknesses.size(); ++i) {
+        require("slabs.thicknesses", s.thicknesses[i], 0, 1000, Ends::open_low);
+        if (i > 0 && !(s.thicknesses[i] > s.thicknesses[i - 1]))
+            refuse("slabs.thicknesses", fmt::format("slabs.thicknesses has {} after {}", s.thicknesses[i], s.thicknesses[i - 1]),
+                   "list them in ascending order, each once");
+    }
+    require("slabs.length", s.length, 0, 100000, Ends::open_low);
+    require("slabs.width", s.width, 0, 100000, Ends::open_low);
+    require("slabs.margin", s.margin, 0, 10000);
+    require("slabs.facing_allowance", s.facing_allowance, 0, 1000);
+    if (s.facing_allowance >= s.thicknesses.front())
+        refuse("slabs.facing_allowance",
+               fmt::format("slabs.facing_allowance is {}: nothing is left of the {} mm slab", s.facing_allowance, s.thicknesses.front()),
+               "face off less, or take that slab out of the list");
+
+    const Machine& c = job.machine;
+    require("machine.travel_x", c.travel_x, 0, 100000, Ends::open_low);
+    require("machine.travel_y", c.travel_y, 0, 100000, Ends::open_low);
+    require("machine.travel_z", c.travel_z, 0, 100000, Ends::open_low);
+    require("machine.build_height", c.build_height, 0, 100000, Ends::open_low);
+    require("machine.build_mass_kg", c.build_mass_kg, 0, 1e6, Ends::open_low);
+    require("machine.max_feed", c.max_feed, 1, 1e6);
+    require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
+    require("machine.acceleration", c.acceleration, 0, 1e6, Ends::open_low);
+    require("machine.max_rpm", c.max_rpm, 0, 1e6, Ends::open_low);
+    require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
+    require("machine.tool_change_s", c.tool_change_s, 0, 36000);
+    require("machine.clearance", c.clearance, 0, 1000, Ends::open_low);
+    require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
+    require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
+
+    const Bonding& b = job.bonding;
+    require("bonding.press_force", b.press_force, 0, 1e7);
+    require("bonding.press_time_s", b.press_time_s, 0, 1e6);
+    require("bonding.max_pressure_mpa", b.max_pressure_mpa, 0, 1000, Ends::open_low);
+    require("bonding.edge_setback", b.edge_setback, 0, 1000);
+    require("bonding.handling_s", b.handling_s, 0, 1e6);
+    require("bonding.glue_s_per_m2", b.glue_s_per_m2, 0, 1e6);
+
+    const Tolerances& t = job.tolerances;
+    require("tolerances.gouge", t.gouge, 0, 10, Ends::open_low);
+    require("tolerances.cusp", t.cusp, 0, 10, Ends::open_low);
+    require("tolerances.rough_cusp", t.rough_cusp, 0, 100, Ends::open_low);
+    require("tolerances.chordal_deviation", t.chordal_deviation, 0, 10);
+    require("tolerances.undercut", t.undercut, 0, 10000);
+    require("tolerances.gap", t.gap, 0, 1000);
+    require("tolerances.weld", t.weld, 0, 100);
+
+    const LayerPlanning& l = job.layers;
+    require("layers.min_layer", l.min_layer, 0, 1000);
+    require("layers.alpha", l.alpha, 0, 1e6);
+    require("layers.beta", l.beta, 0, 1e6);
+    require("layers.flat_merge", l.flat_merge, 0, 1000);
+    require("layers.halving_coarse", l.halving_coarse, 0, 1000, Ends::open_low);
+    require("layers.halving_resolution", l.halving_resolution, 0, 1000, Ends::open_low);
+    if (l.halving_resolution > l.halving_coarse)
+        refuse("layers.halving_resolution",
+               fmt::format("layers.halving_resolution is {}, over halving_coarse {}", l.halving_resolution, l.halving_coarse),
+               "halving starts at the coarse spacing and ends at the resolution");
+
+    const Cutting& k = job.cutting;
+    require("cutting.wall_allowance", k.wall_allowance, 0, 100);
+    require("cutting.floor_allowance", k.floor_allowance, 0, 100);
+    require("cutting.steep_limit_deg", k.steep_limit_deg, 1, 89);
+    require("cutting.overlap_deg", k.overlap_deg, 0, 45);
+    require("cutting.vertical_deg", k.vertical_deg, 45, 90);
+    if (k.vertical_deg <= k.steep_limit_deg)
+        refuse("cutting.vertical_deg", fmt::format("cutting.vertical_deg is {}, not over steep_limit_deg {}", k.vertical_deg, k.steep_limit_deg),
+               "vertical walls are steeper than steep ones");
+    require("cutting.min_stepdown", k.min_stepdown, 0, 100, Ends::open_low);
+    require("cutting.min_stepover", k.min_stepover, 0, 100, Ends::open_low);
+    require("cutting.min_flat_area", k.min_flat_area, 0, 1e6);
+    require("cutting.face_depth", k.face_depth, 0, 1000, Ends::open_low);
+    require("cutting.ramp_deg", k.ramp_deg, 0, 90, Ends::open_low);
+    require("cutting.holder_clearance", k.holder_clearance, 0, 1000);
+    require("cutting.finish_feed", k.finish_feed, 1, 1e6);
+
+    if (job.tools.empty()) throw Error(ErrorKind::usage, "job.tool", "the tool library is empty", "tool", "add a [[tool]] to the job file");
+    for (std::size_t i = 0; i < job.tools.size(); ++i) {
+        validate_tool(job.tools[i], i);
+        for (std::size_t j = 0; j < i; ++j)
+            if (job.tools[j].number == job.tools[i].number)
+                refuse(fmt::format("tool[{}].number", i + 1), fmt::format("tool number {} appears twice", job.tools[i].number),
+                       "number each tool once");
+    }
+    const double tallest = max_layer_thickness(job);
+    if (!(tallest > 0) || tallest < l.min_layer)
+        throw Error(ErrorKind::usage, "job.no_layer",
+                    fmt::format("the tallest layer that these slabs and tools can cut is {:.3f} mm, under layers.min_layer {}", tallest, l.min_layer),
+                    "", "take thicker slabs or tools with longer flutes, or lower the minimum");
+}
+
+}  // namespace slabwright

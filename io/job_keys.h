@@ -1,0 +1,145 @@
+// The one table of a job's keys: their names, comments and places in engine/job.h. Reading, printing the defaults,
+// naming unknown keys and writing the job into plan.json all walk it, so they cannot disagree.
+#pragma once
+
+#include "engine/job.h"
+
+namespace slabwright {
+
+/// A word of a job file that stands for an enumerator.
+template <class Enum>
+struct Word {
+    const char* text;
+    Enum value;
+};
+
+inline constexpr Word<LengthUnit> kUnitWords[] = {{"mm", LengthUnit::mm}, {"in", LengthUnit::inch}};
+inline constexpr Word<LayerStrategy> kStrategyWords[] = {{"printed", LayerStrategy::printed}, {"optimal", LayerStrategy::optimal}};
+inline constexpr Word<Finder> kFinderWords[] = {{"halving", Finder::halving}, {"exact", Finder::exact}, {"both", Finder::both}};
+inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}};
+inline constexpr Word<ToolKind> kToolWords[] = {
+    {"flat", ToolKind::flat}, {"ball", ToolKind::ball}, {"face", ToolKind::face}, {"drill", ToolKind::drill}};
+
+template <class Enum, std::size_t N>
+[[nodiscard]] const char* word_of(const Word<Enum> (&words)[N], Enum value) {
+    for (const Word<Enum>& word : words)
+        if (word.value == value) return word.text;
+    return "";
+}
+
+/// Walks the keys of one tool. `visit.required(…)` announces that the next key has no default.
+template <class ToolLike, class Visit>
+void visit_tool_keys(ToolLike& tool, Visit& visit) {
+    visit.required();
+    visit.key("number", tool.number, "T number in the machine's magazine");
+    visit.required();
+    visit.word("kind", tool.kind, kToolWords, "flat, ball, face or drill");
+    visit.key("name", tool.name, "for the operator");
+    visit.required();
+    visit.key("diameter", tool.diameter, "mm");
+    visit.required();
+    visit.key("flute_length", tool.flute_length, "mm");
+    visit.required();
+    visit.key("stickout", tool.stickout, "mm, from the holder's nose to the tip");
+    visit.required();
+    visit.key("shank_diameter", tool.shank_diameter, "mm");
+    visit.required();
+    visit.key("holder_diameter", tool.holder_diameter, "mm, of the holder's nose");
+    visit.key("flutes", tool.flutes, "cutting edges");
+    visit.degrees("helix_deg", tool.helix_rad, "degrees");
+    visit.key("max_rpm", tool.max_rpm, "turns a minute");
+    visit.key("max_feed", tool.max_feed, "mm/min along the path");
+    visit.key("plunge_feed", tool.plunge_feed, "mm/min straight down");
+    visit.key("stepdown_min", tool.stepdown_min, "mm");
+    visit.required();
+    visit.key("stepdown_max", tool.stepdown_max, "mm (LUO table 5.4)");
+    visit.key("stepover", tool.stepover, "share of the diameter, for clearing");
+}
+
+/// Walks every key of the job but the tools: first those of the top, then table by table.
+template <class JobLike, class Visit>
+void visit_job_keys(JobLike& job, Visit& visit) {
+    visit.word("units", job.units, kUnitWords, "of the STL: mm or in; every length in this file is in mm");
+    visit.key("allow_undercut", job.allow_undercut, "plan although undercuts stay unmade");
+
+    visit.table("material", "what the slabs are made of");
+    visit.key("name", job.material.name, "");
+    visit.key("strength_mpa", job.material.strength_mpa, "MPa");
+    visit.key("min_thickness", job.material.min_thickness, "mm, MTmin: thinnest material above a layer boundary");
+    visit.key("shallow_limit_deg", job.material.shallow_limit_deg, "degrees from horizontal: shallower slopes are features (Type III)");
+    visit.key("density_kg_m3", job.material.density_kg_m3, "kg/m^3");
+    visit.key("ktc", job.material.ktc, "N/mm^2, cutting coefficient along the cut (LUO 6.5.1)");
+    visit.key("kte", job.material.kte, "N/mm, edge coefficient along the cut");
+    visit.key("kfc", job.material.kfc, "N/mm^2, cutting coefficient across the cut");
+    visit.key("kfe", job.material.kfe, "N/mm, edge coefficient across the cut");
+
+    visit.table("slabs", "what lies in stock");
+    visit.key("thicknesses", job.slabs.thicknesses, "mm, ascending");
+    visit.key("length", job.slabs.length, "mm in x, the largest slab");
+    visit.key("width", job.slabs.width, "mm in y");
+    visit.key("margin", job.slabs.margin, "mm of stock past the pattern, where the slab allows");
+    visit.key("facing_allowance", job.slabs.facing_allowance, "mm that the face mill takes off at least, to find the whole slab");
+
+    visit.table("machine", "the router");
+    visit.key("name", job.machine.name, "");
+    visit.key("travel_x", job.machine.travel_x, "mm");
+    visit.key("travel_y", job.machine.travel_y, "mm");
+    visit.key("travel_z", job.machine.travel_z, "mm, of the spindle");
+    visit.key("build_height", job.machine.build_height, "mm, of the build chamber");
+    visit.key("build_mass_kg", job.machine.build_mass_kg, "kg that the build table carries");
+    visit.key("max_feed", job.machine.max_feed, "mm/min");
+    visit.key("rapid_feed", job.machine.rapid_feed, "mm/min");
+    visit.key("acceleration", job.machine.acceleration, "mm/s^2");
+    visit.key("max_rpm", job.machine.max_rpm, "turns a minute");
+    visit.key("spindle_dwell_s", job.machine.spindle_dwell_s, "s, from spindle start to the first motion");
+    visit.key("tool_change_s", job.machine.tool_change_s, "s");
+    visit.key("clearance", job.machine.clearance, "mm of air between a rapid and the highest stock");
+    visit.word("frame", job.machine.frame, kFrameWords, "pattern-base (z = 0 at the pattern's bottom) or layer-top (z = 0 at the layer's top)");
+    visit.key("base_board_thickness", job.machine.base_board_thickness, "mm, the sacrificial board under the first layer");
+    visit.key("base_board_cut", job.machine.base_board_cut, "mm that may be cut into it; negative: as deep as the finish tool overruns");
+
+    visit.table("bonding", "glue and press");
+    visit.key("glue", job.bonding.glue, "");
+    visit.key("press_force", job.bonding.press_force, "N, at most");
+    visit.key("press_time_s", job.bonding.press_time_s, "s");
+    visit.key("max_pressure_mpa", job.bonding.max_pressure_mpa, "MPa on the glued area, so that no rib is crushed");
+    visit.key("edge_setback", job.bonding.edge_setback, "mm that glue keeps from finished edges");
+    visit.key("handling_s", job.bonding.handling_s, "s, to fetch, clamp and place a slab");
+    visit.key("glue_s_per_m2", job.bonding.glue_s_per_m2, "s for each square metre of glue");
+
+    visit.table("tolerances", "");
+    visit.key("gouge", job.tolerances.gouge, "mm along the normal: no move cuts deeper into the part");
+    visit.key("cusp", job.tolerances.cusp, "mm, scallop height of the finish passes");
+    visit.key("rough_cusp", job.tolerances.rough_cusp, "mm, L of the roughing stepdown (LUO 5.5.3.3)");
+    visit.key("chordal_deviation", job.tolerances.chordal_deviation, "mm, of the STL");
+    visit.key("undercut", job.tolerances.undercut, "mm: an undercut that leaves less is a remark, not a refusal");
+    visit.key("gap", job.tolerances.gap, "mm: open chains this near are closed, and reported");
+    visit.key("weld", job.tolerances.weld, "mm: vertices this near are merged, and reported; 0: only equal ones");
+
+    visit.table("layers", "where layers end");
+    visit.word("strategy", job.layers.strategy, kStrategyWords, "optimal or printed (LUO 4.2.5)");
+    visit.word("finder", job.layers.finder, kFinderWords, "of features: exact, halving or both");
+    visit.key("min_layer", job.layers.min_layer, "mm: thinner layers are reported");
+    visit.key("alpha", job.layers.alpha, "per inch, in Q = alpha DT + beta A (LUO 4.2.4)");
+    visit.key("beta", job.layers.beta, "per square inch");
+    visit.key("saddles_constrain", job.layers.saddles_constrain, "saddles keep boundaries away as peaks do");
+    visit.key("flat_merge", job.layers.flat_merge, "mm: a peak or valley this near an up-facing flat is no feature of its own");
+    visit.key("halving_coarse", job.layers.halving_coarse, "mm between the first sections of the halving search");
+    visit.key("halving_resolution", job.layers.halving_resolution, "mm at which it ends");
+
+    visit.table("cutting", "tool paths");
+    visit.key("wall_allowance", job.cutting.wall_allowance, "mm that roughing leaves on walls");
+    visit.key("floor_allowance", job.cutting.floor_allowance, "mm that roughing leaves on floors");
+    visit.key("steep_limit_deg", job.cutting.steep_limit_deg, "degrees from horizontal: level contours from here up, projected raster below");
+    visit.key("overlap_deg", job.cutting.overlap_deg, "degrees that both cut past the limit");
+    visit.key("vertical_deg", job.cutting.vertical_deg, "degrees: walls from here up go to the flat end mill");
+    visit.key("min_stepdown", job.cutting.min_stepdown, "mm, floor of the finish stepdown; reported where it bites");
+    visit.key("min_stepover", job.cutting.min_stepover, "mm, floor of the finish stepover; reported where it bites");
+    visit.key("min_flat_area", job.cutting.min_flat_area, "mm^2: smaller up-facing flats get no level of their own");
+    visit.key("face_depth", job.cutting.face_depth, "mm, deepest step of the face mill");
+    visit.key("ramp_deg", job.cutting.ramp_deg, "degrees, entry into stock");
+    visit.key("holder_clearance", job.cutting.holder_clearance, "mm between the holder and anything that stands");
+    visit.key("finish_feed", job.cutting.finish_feed, "mm/min");
+}
+
+}  // namespace slabwright

@@ -1,0 +1,205 @@
+#include "io/plan_json.h"
+
+#include <numbers>
+
+#include "io/job_keys.h"
+
+namespace slabwright {
+
+namespace {
+
+using Shape = JsonText::Shape;
+
+// Decimals of derived quantities. What the job or the engine decided is written exactly.
+constexpr int kLength = 4, kMinutes = 4, kForce = 3, kArea = 3, kDeflection = 6;
+
+void put_xy(JsonText& json, const std::array<double, 2>& xy) { json.begin_array(Shape::line).exact(xy[0]).exact(xy[1]).end(); }
+
+/// Writes the keys of a job as they are spelled in the job file.
+struct JobPrinter {
+    JsonText& json;
+    bool in_table = false;
+    void table(const char* name, const char*) {
+        close();
+        json.key(name).begin_object();
+        in_table = true;
+    }
+    void close() {
+        if (in_table) json.end();
+        in_table = false;
+    }
+    void required() {}
+    void key(const char* name, double value, const char*) { json.key(name).exact(value); }
+    void key(const char* name, int value, const char*) { json.key(name).integer(value); }
+    void key(const char* name, bool value, const char*) { json.key(name).boolean(value); }
+    void key(const char* name, const std::string& value, const char*) { json.key(name).string(value); }
+    void key(const char* name, const std::vector<double>& values, const char*) {
+        json.key(name).begin_array(Shape::line);
+        for (const double value : values) json.exact(value);
+        json.end();
+    }
+    void degrees(const char* name, double radians, const char*) { json.key(name).rounded(radians * 180 / std::numbers::pi, 9); }
+    template <class Enum, std::size_t N>
+    void word(const char* name, Enum value, const Word<Enum> (&words)[N], const char*) {
+        json.key(name).string(word_of(words, value));
+    }
+};
+
+void put_tool(JsonText& json, const Tool& tool) {
+    json.begin_object(Shape::line);
+    json.key("number").integer(tool.number);
+    json.key("kind").string(word_of(kToolWords, tool.kind));
+    json.key("name").string(tool.name);
+    json.key("diameter").exact(tool.diameter);
+    json.key("flute_length").exact(tool.flute_length);
+    json.key("shank_diameter").exact(tool.shank_diameter);
+    json.key("holder").begin_object().key("diameter").exact(tool.holder_diameter).key("stickout").exact(tool.stickout).end();
+    json.key("flutes").integer(tool.flutes);
+    json.key("helix_deg").rounded(tool.helix_rad * 180 / std::numbers::pi, 9);
+    json.key("max_rpm").exact(tool.max_rpm);
+    json.key("max_feed").exact(tool.max_feed);
+    json.key("plunge_feed").exact(tool.plunge_feed);
+    json.key("stepdown").begin_array().exact(tool.stepdown_min).exact(tool.stepdown_max).end();
+    json.key("stepover").exact(tool.stepover);
+    json.end();
+}
+
+void put_operation(JsonText& json, const Operation& operation) {
+    json.begin_object(Shape::line);
+    json.key("kind").string(name(operation.kind));
+    json.key("purpose").string(operation.purpose);
+    json.key("tool").integer(operation.tool);
+    json.key("stepdown").rounded(operation.stepdown, kLength);
+    json.key("stepover").rounded(operation.stepover, kLength);
+    json.key("file").string("nc/" + operation.file);
+    json.key("cutting_mm").rounded(operation.cutting_mm, kLength);
+    json.key("rapid_mm").rounded(operation.rapid_mm, kLength);
+    json.key("minutes").rounded(operation.minutes, kMinutes);
+    json.key("spindle_rpm").rounded(operation.spindle_rpm, 0);
+    json.key("peak_force_n").rounded(operation.peak_force_n, kForce);
+    json.key("deflection_mm").rounded(operation.deflection_mm, kDeflection);
+    json.end();
+}
+
+void put_layer(JsonText& json, const Layer& layer) {
+    json.begin_object();
+    json.key("index").integer(layer.index);
+    json.key("z_bottom").exact(layer.z_bottom);
+    json.key("z_top").exact(layer.z_top);
+    json.key("slab_thickness").exact(layer.slab_thickness);
+    json.key("reason").string(layer.reason);
+    json.key("glue_area_mm2").rounded(layer.glue_area_mm2, kArea);
+    json.key("glue_centroid").begin_array(Shape::line).rounded(layer.glue_centroid[0], kLength).rounded(layer.glue_centroid[1], kLength).end();
+    json.key("press_force_n").rounded(layer.press_force_n, kForce);
+    json.key("operations").begin_array();
+    for (const Operation& operation : layer.operations) put_operation(json, operation);
+    json.end().end();
+}
+
+void put_totals(JsonText& json, const Totals& totals) {
+    json.begin_object();
+    json.key("layers").integer(totals.layers);
+    json.key("operations").integer(totals.operations);
+    json.key("tool_changes").integer(totals.tool_changes);
+    json.key("cutting_mm").rounded(totals.cutting_mm, kLength);
+    json.key("rapid_mm").rounded(totals.rapid_mm, kLength);
+    json.key("cutting_minutes").rounded(totals.cutting_minutes, kMinutes);
+    json.key("bonding_minutes").rounded(totals.bonding_minutes, kMinutes);
+    json.key("tool_change_minutes").rounded(totals.tool_change_minutes, kMinutes);
+    json.key("build_minutes").rounded(totals.build_minutes, kMinutes);
+    json.key("stock_volume_mm3").rounded(totals.stock_volume_mm3, kArea);
+    json.key("part_volume_mm3").rounded(totals.part_volume_mm3, kArea);
+    json.key("stack_mass_kg").rounded(totals.stack_mass_kg, kForce);
+    json.end();
+}
+
+}  // namespace
+
+void put_input(JsonText& json, const InputInfo& input) {
+    json.begin_object();
+    json.key("file").string(input.file);
+    json.key("sha256").string(input.sha256);
+    json.key("triangles").count(input.triangles);
+    json.key("bbox").begin_object(Shape::line);
+    json.key("min").begin_array();
+    for (const double v : input.min) json.rounded(v, 6);
+    json.end().key("max").begin_array();
+    for (const double v : input.max) json.rounded(v, 6);
+    json.end().end().end();
+}
+
+void put_features(JsonText& json, const std::vector<Feature>& features) {
+    json.begin_array();
+    for (const Feature& feature : features) {
+        json.begin_object(Shape::line);
+        json.key("type").string(name(feature.type));
+        // A patch has a range of heights, whatever its extent; everything else has one height.
+        if (feature.type == FeatureType::shallow || feature.type == FeatureType::undercut)
+            json.key("z").begin_array().rounded(feature.z_low, 6).rounded(feature.z_high, 6).end();
+        else json.key("z").rounded(feature.z_low, 6);
+        json.key("xy").begin_array().rounded(feature.x, 6).rounded(feature.y, 6).end();
+        json.key("area").rounded(feature.area, kArea);
+        json.key("found_by").string(name(feature.found_by));
+        json.end();
+    }
+    json.end();
+}
+
+void put_diagnostics(JsonText& json, const std::vector<Diagnostic>& diagnostics) {
+    json.begin_array();
+    for (const Diagnostic& diagnostic : diagnostics) {
+        json.begin_object(Shape::line);
+        json.key("severity").string(name(diagnostic.severity));
+        json.key("code").string(diagnostic.code);
+        json.key("message").string(diagnostic.message);
+        json.key("where");
+        if (diagnostic.where) {
+            json.begin_array();
+            for (const double v : *diagnostic.where) json.rounded(v, kLength);
+            json.end();
+        } else {
+            json.null();
+        }
+        json.end();
+    }
+    json.end();
+}
+
+std::string plan_json(const Plan& plan) {
+    JsonText json;
+    json.begin_object();
+    json.key("schema").string("slabwright.plan/1");
+    json.key("version").string(SLABWRIGHT_VERSION);
+    json.key("units").string("mm");
+    json.key("frame").string(word_of(kFrameWords, plan.job.machine.frame));
+    json.key("input");
+    put_input(json, plan.input);
+    json.key("job").begin_object();
+    JobPrinter job{json};
+    visit_job_keys(plan.job, job);
+    job.close();
+    json.end();
+    json.key("stock").begin_object(Shape::line);
+    json.key("min");
+    put_xy(json, plan.stock_min);
+    json.key("max");
+    put_xy(json, plan.stock_max);
+    json.end();
+    json.key("flask").null();
+    json.key("tools").begin_array();
+    for (const Tool& tool : plan.job.tools) put_tool(json, tool);
+    json.end();
+    json.key("features");
+    put_features(json, plan.features);
+    json.key("layers").begin_array();
+    for (const Layer& layer : plan.layers) put_layer(json, layer);
+    json.end();
+    json.key("totals");
+    put_totals(json, plan.totals);
+    json.key("diagnostics");
+    put_diagnostics(json, plan.diagnostics);
+    json.end();
+    return json.take();
+}
+
+}  // namespace slabwright

@@ -1,0 +1,169 @@
+#include "io/slabwright.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <new>
+
+#include "engine/planner.h"
+#include "io/gcode_writer.h"
+#include "io/inspect_json.h"
+#include "io/job_toml.h"
+#include "io/output_folder.h"
+#include "io/plan_json.h"
+#include "io/sections_dxf.h"
+#include "io/sections_json.h"
+#include "io/sections_svg.h"
+#include "io/sequence_json.h"
+#include "io/stl.h"
+#include "io/tool_table.h"
+#include "kernels/parallel/parallel.h"
+#include "kernels/slicing/slicing.h"
+
+namespace slabwright {
+
+namespace {
+
+/// The front door lets nothing out but Error.
+template <class Body>
+auto guarded(Body&& body) -> decltype(body()) {
+    try {
+        return body();
+    } catch (const Error&) {
+        throw;
+    } catch (const std::bad_alloc&) {
+        throw Error(ErrorKind::no_plan, "memory.exhausted", "the machine has no more memory", "", "give fewer facets, or a machine with more memory");
+    } catch (const std::filesystem::filesystem_error& error) {
+        throw Error(ErrorKind::input, "file.system", error.code().message(), error.path1().string(), "check the path and its rights");
+    } catch (const std::exception& error) {
+        throw Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the pattern and the job");
+    }
+}
+
+std::string read_text(const std::string& path) {
+    const auto refuse = [&] {
+        const std::string reason = std::strerror(errno);
+        throw Error(ErrorKind::usage, "job.unreadable", fmt::format("cannot read the job file: {}", reason), path, "check the path after --job");
+    };
+    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (file < 0) refuse();
+    std::string text;
+    char buffer[1 << 16];
+    ssize_t got = 0;
+    while ((got = ::read(file, buffer, sizeof buffer)) > 0) text.append(buffer, static_cast<std::size_t>(got));
+    if (got < 0) {
+        const int reason = errno;
+        ::close(file);
+        errno = reason;
+        refuse();
+    }
+    ::close(file);
+    return text;
+}
+
+}  // namespace
+
+std::string version() { return SLABWRIGHT_VERSION; }
+
+Job read_job(const std::string& path) {
+    return guarded([&] { return parse_job(read_text(path), path); });
+}
+
+std::string default_job_toml() {
+    return guarded([] { return job_toml(Job{}); });
+}
+
+Plan plan(Context& context, const std::string& stl_path, const Job& job) {
+    return guarded([&] {
+        validate(job);
+        StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld});
+        require_solid(context, stl, stl_path);
+        Plan result = make_plan(context, stl.mesh, stl.input, job);
+        result.diagnostics.insert(result.diagnostics.begin(), stl.diagnostics.begin(), stl.diagnostics.end());
+        return result;
+    });
+}
+
+void write(Context& context, const Plan& plan, const std::string& directory) {
+    guarded([&] {
+        struct Program {
+            const Layer* layer;
+            const Operation* operation;
+        };
+        std::vector<Program> programs;
+        for (const Layer& layer : plan.layers)
+            for (const Operation& operation : layer.operations) programs.push_back({&layer, &operation});
+        context.begin_phase("writing", 0.95, 1.0, programs.size() + 1);
+        OutputFolder out(directory);
+        std::filesystem::create_directory(out.path("nc"));
+        const auto write_whole = [&](const char* name, const std::string& text) {
+            OutputFile file(out.path(name));
+            file.write(text);
+            file.close();
+        };
+        // Each program is a file of its own, so threads cannot mix their texts.
+        parallel_each(context, programs.size(), [&](std::size_t i) {
+            OutputFile file(out.path("nc/" + programs[i].operation->file));
+            write_program(plan, *programs[i].layer, *programs[i].operation, [&](std::string_view piece) {
+                context.throw_if_cancelled();
+                file.write(piece);
+            });
+            file.close();
+            context.advance();
+        });
+        write_whole("tool.tbl", tool_table(plan.job));
+        write_whole("sequence.json", sequence_json(plan));
+        write_whole("plan.json", plan_json(plan));
+        context.throw_if_cancelled();
+        out.commit();
+        context.advance();
+    });
+}
+
+std::string inspect(Context& context, const std::string& stl_path, const Job& job) {
+    return guarded([&] {
+        validate(job);
+        return inspection_json(inspect_stl(context, stl_path, job));
+    });
+}
+
+void slice_to_file(Context& context, const std::string& stl_path, const Job& job, double every_mm, const std::string& out) {
+    guarded([&] {
+        validate(job);
+        if (!(every_mm > 0) || !std::isfinite(every_mm))
+            throw Error(ErrorKind::usage, "slice.every", fmt::format("sections every {} mm are none", every_mm), "--every", "give a distance over 0");
+        const std::size_t dot = out.rfind('.');
+        const std::string ending = dot == std::string::npos ? "" : out.substr(dot);
+        if (ending != ".svg" && ending != ".dxf" && ending != ".json")
+            throw Error(ErrorKind::usage, "slice.format", fmt::format("no format has the ending \"{}\"", ending), out,
+                        "end the name in .svg, .dxf or .json");
+        const StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld});
+        const double height = bounds(stl.mesh.view()).max.z;
+        const double number = std::ceil(height / every_mm) - 1;  // multiples of every_mm inside (0, height)
+        constexpr double most = 1e6;
+        if (number > most)
+            throw Error(ErrorKind::usage, "slice.every",
+                        fmt::format("sections every {} mm of {} mm are {:.0f}, over {:.0f}", every_mm, height, number, most), "--every",
+                        "give a larger distance");
+        if (number < 1)
+            throw Error(ErrorKind::usage, "slice.every", fmt::format("the pattern is {} mm high: no multiple of {} mm lies inside", height, every_mm),
+                        "--every", "give a smaller distance");
+        std::vector<Plane> planes;
+        for (int i = 1; i <= static_cast<int>(number); ++i)
+            if (i * every_mm < height) planes.push_back({i * every_mm, Side::above});
+        context.begin_phase("slicing", 0.5, 0.9);
+        const std::vector<Section> sections = slice(context, stl.mesh.view(), planes, {job.tolerances.gap});
+        context.begin_phase("writing", 0.9, 1.0);
+        const std::string text = ending == ".svg" ? sections_svg(sections) : ending == ".dxf" ? sections_dxf(sections) : sections_json(sections);
+        context.throw_if_cancelled();
+        write_file_whole(out, text);
+    });
+}
+
+}  // namespace slabwright

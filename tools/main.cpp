@@ -1,0 +1,314 @@
+// The `slabwright` command: plan, inspect, slice, job. Errors are one line on stderr, their kind is the exit code.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "io/inspect_json.h"
+#include "io/job_keys.h"
+#include "io/json_text.h"
+#include "io/output_folder.h"
+#include "io/plan_json.h"
+#include "io/slabwright.h"
+
+namespace {
+
+using namespace slabwright;
+
+/// The one plan that a signal can cancel. Only lock-free atomics may be touched in a handler.
+std::atomic<Context*> running{nullptr};
+
+extern "C" void on_signal(int signal) {
+    if (Context* context = running.load()) context->cancel();
+    std::signal(signal, SIG_DFL);  // a second Ctrl-C ends the process at once
+}
+
+struct Options {
+    std::string stl, out, job_file, units, strategy, finder;
+    int threads = 0;
+    double memory_gib = 0, weld = 0, every = 0;
+    bool allow_undercut = false, json = false, quiet = false, defaults = false, weld_given = false;
+};
+
+/// A bar with phase and time left, redrawn at most ten times a second on a terminal's last line.
+class ProgressBar {
+public:
+    void show(const Progress& progress) {
+        const auto now = Clock::now();
+        if (drawn_ && now - last_ < std::chrono::milliseconds(100)) return;
+        last_ = now;
+        drawn_ = true;
+        constexpr int width = 30;
+        const int full = std::clamp(static_cast<int>(progress.fraction * width), 0, width);
+        std::string left;
+        const double elapsed = std::chrono::duration<double>(now - start_).count();
+        if (progress.fraction > 0.02 && elapsed > 1) {
+            const long seconds = static_cast<long>(elapsed * (1 - progress.fraction) / progress.fraction + 0.5);
+            left = fmt::format("{}:{:02} left", seconds / 60, seconds % 60);
+        }
+        const std::string line =
+            fmt::format("\r\x1b[K[{:#<{}}{:.<{}}] {:3.0f} %  {}  {}", "", full, "", width - full, 100 * progress.fraction, progress.phase, left);
+        std::fwrite(line.data(), 1, line.size(), stderr);
+    }
+    void clear() {
+        if (drawn_) std::fputs("\r\x1b[K", stderr);
+        drawn_ = false;
+    }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point start_ = Clock::now(), last_{};
+    bool drawn_ = false;
+};
+
+const char* kind_name(ErrorKind kind) {
+    switch (kind) {
+        case ErrorKind::usage:
+            return "usage";
+        case ErrorKind::input:
+            return "input";
+        case ErrorKind::no_plan:
+            return "no_plan";
+        case ErrorKind::verification:
+            return "verification";
+        case ErrorKind::cancelled:
+            return "cancelled";
+    }
+    return "";
+}
+
+int report(const Error& error, bool as_json) {
+    std::string line;
+    if (as_json) {
+        JsonText json;
+        json.begin_object(JsonText::Shape::line).key("error").begin_object();
+        json.key("kind").string(kind_name(error.kind())).key("exit").integer(static_cast<int>(error.kind()));
+        json.key("code").string(error.code()).key("message").string(error.message());
+        json.key("place").string(error.place()).key("remedy").string(error.remedy()).end().end();
+        line = json.take();
+    } else {
+        line = fmt::format("slabwright: {}", error.what());
+        // One error, one line, whatever a file name or a parser's message holds.
+        std::replace_if(
+            line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }, ' ');
+        line += '\n';
+    }
+    std::fwrite(line.data(), 1, line.size(), stderr);
+    return static_cast<int>(error.kind());
+}
+
+void print(std::string_view text) {
+    std::fwrite(text.data(), 1, text.size(), stdout);
+    std::fflush(stdout);
+}
+
+std::string number(double value, int decimals) {
+    std::string text;
+    append_rounded(text, value, decimals);
+    return text;
+}
+
+std::string duration(double minutes) {
+    const long total = static_cast<long>(minutes + 0.5);
+    return total < 60 ? fmt::format("{} min", total) : fmt::format("{} h {:02} min", total / 60, total % 60);
+}
+
+/// What the person at the router needs to know before the build: how long, what to load, what to mind.
+std::string summary(const Plan& plan, const std::string& out) {
+    const Totals& t = plan.totals;
+    std::string text = fmt::format("{}: {} {}, {} programs, {} in all (cutting {}, bonding {}, tool changes {})\n", out, t.layers,
+                                   t.layers == 1 ? "layer" : "layers", t.operations, duration(t.build_minutes), duration(t.cutting_minutes),
+                                   duration(t.bonding_minutes), duration(t.tool_change_minutes));
+    text += fmt::format("stock   {} x {} mm, {} kg with the base board\n", number(plan.stock_max[0] - plan.stock_min[0], 1),
+                        number(plan.stock_max[1] - plan.stock_min[1], 1), number(t.stack_mass_kg, 1));
+    std::map<double, int> slabs;
+    for (const Layer& layer : plan.layers) ++slabs[layer.slab_thickness];
+    for (const auto& [thickness, count] : slabs) text += fmt::format("slabs   {} of {} mm {}\n", count, number(thickness, 3), plan.job.material.name);
+    for (const Tool& tool : plan.job.tools) {
+        double minutes = 0;
+        int programs = 0;
+        for (const Layer& layer : plan.layers)
+            for (const Operation& operation : layer.operations)
+                if (operation.tool == tool.number) minutes += operation.minutes, ++programs;
+        if (programs > 0)
+            text += fmt::format("tool    T{} {}, {} in {} {}\n", tool.number, tool.name, duration(minutes), programs,
+                                programs == 1 ? "program" : "programs");
+    }
+    for (const Layer& layer : plan.layers)
+        text += fmt::format("layer   {}: {} to {} mm, {}\n", layer.index, number(layer.z_bottom, 3), number(layer.z_top, 3), layer.reason);
+    for (const Severity severity : {Severity::error, Severity::warning}) {
+        // The same finding can come a hundred times; the first few of each code are told, plan.json holds all.
+        std::map<std::string, int> seen;
+        for (const Diagnostic& d : plan.diagnostics) {
+            if (d.severity != severity || ++seen[d.code] > 5) continue;
+            text += fmt::format("{}: {}", name(severity), d.message);
+            if (d.where) text += fmt::format(" (x {} y {} z {})", number((*d.where)[0], 1), number((*d.where)[1], 1), number((*d.where)[2], 1));
+            text += '\n';
+        }
+        for (const auto& [code, count] : seen)
+            if (count > 5) text += fmt::format("{}: {} more of {} in plan.json\n", name(severity), count - 5, code);
+    }
+    return text;
+}
+
+std::string summary_json(const Plan& plan, const std::string& out) {
+    JsonText json;
+    json.begin_object();
+    json.key("plan").string(out + "/plan.json");
+    json.key("layers").integer(plan.totals.layers).key("operations").integer(plan.totals.operations);
+    json.key("build_minutes").rounded(plan.totals.build_minutes, 4);
+    json.key("diagnostics");
+    put_diagnostics(json, plan.diagnostics);
+    json.end();
+    return json.take();
+}
+
+Job job_of(const Options& options) {
+    Job job = options.job_file.empty() ? Job{} : read_job(options.job_file);
+    const auto take = [](const std::string& given, const auto& words, auto& value) {
+        for (const auto& word : words)
+            if (given == word.text) value = word.value;
+    };
+    take(options.units, kUnitWords, job.units);
+    take(options.strategy, kStrategyWords, job.layers.strategy);
+    take(options.finder, kFinderWords, job.layers.finder);
+    if (options.allow_undercut) job.allow_undercut = true;
+    if (options.weld_given) job.tolerances.weld = options.weld;
+    return job;
+}
+
+/// Runs a body with a context that Ctrl-C cancels and whose progress a terminal sees.
+template <class Body>
+void with_context(const Options& options, Body&& body) {
+    ProgressBar bar;
+    Context::Options settings;
+    settings.threads = options.threads;
+    settings.memory_bytes = static_cast<std::uint64_t>(options.memory_gib * (1u << 30));
+    if (!options.quiet && !options.json && isatty(STDERR_FILENO) != 0) settings.progress = [&](const Progress& progress) { bar.show(progress); };
+    Context context(std::move(settings));
+    running = &context;
+    std::signal(SIGINT, on_signal);
+    std::signal(SIGTERM, on_signal);
+    struct Done {
+        ProgressBar& bar;
+        ~Done() {
+            running = nullptr;
+            bar.clear();
+        }
+    };
+    std::string output;
+    {
+        const Done done{bar};
+        output = body(context);
+    }
+    if (!options.quiet) print(output);
+}
+
+void run_plan(const Options& options) {
+    const Job job = job_of(options);
+    require_replaceable(options.out);  // before an hour of planning, not after it
+    with_context(options, [&](Context& context) {
+        const Plan result = plan(context, options.stl, job);
+        write(context, result, options.out);
+        return options.json ? summary_json(result, options.out) : summary(result, options.out);
+    });
+}
+
+void run_inspect(const Options& options) {
+    const Job job = job_of(options);
+    validate(job);
+    with_context(options, [&](Context& context) {
+        if (options.json) return inspect(context, options.stl, job);
+        return inspection_text(inspect_stl(context, options.stl, job));
+    });
+}
+
+void run_slice(const Options& options) {
+    const Job job = job_of(options);
+    with_context(options, [&](Context& context) {
+        slice_to_file(context, options.stl, job, options.every, options.out);
+        return std::string();
+    });
+}
+
+void add_common(CLI::App& command, Options& options) {
+    command.add_option("--threads", options.threads, "threads to use; all that the machine has if not given")->check(CLI::Range(1, 1024));
+    command.add_option("--memory", options.memory_gib, "GiB of memory that may be used; 60 % of the machine's if not given")
+        ->check(CLI::Range(0.001, 1e6));
+    command.add_option("--job", options.job_file, "job file; `slabwright job --defaults` prints one");
+    command.add_option("--units", options.units, "of the STL: mm or in")->check(CLI::IsMember({"mm", "in"}));
+    command
+        .add_option_function<double>(
+            "--weld",
+            [&options](const double& weld) {
+                options.weld = weld;
+                options.weld_given = true;
+            },
+            "mm: vertices this near are merged, and reported")
+        ->check(CLI::Range(0.0, 100.0));
+    command.add_flag("--json", options.json, "errors as JSON on stderr, results as JSON on stdout");
+    command.add_flag("--quiet", options.quiet, "no progress bar, nothing on stdout");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    Options options;
+    CLI::App app("Plans Rapid Pattern Manufacturing: from the STL of a foundry pattern to layers, tool paths, G-code and the build sequence.",
+                 "slabwright");
+    app.set_version_flag("--version", "slabwright " + version());
+    app.require_subcommand(1);
+
+    CLI::App* plan_command = app.add_subcommand("plan", "plan the build of a pattern and write it to a folder");
+    plan_command->add_option("STL", options.stl, "the pattern")->required();
+    plan_command->add_option("-o,--out", options.out, "folder for the plan; a plan in it is replaced")->required();
+    add_common(*plan_command, options);
+    plan_command->add_option("--strategy", options.strategy, "of layer placement: optimal or printed")->check(CLI::IsMember({"optimal", "printed"}));
+    plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")->check(CLI::IsMember({"exact", "halving", "both"}));
+    plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
+
+    CLI::App* inspect_command = app.add_subcommand("inspect", "report on the mesh, its features and undercuts");
+    inspect_command->add_option("STL", options.stl, "the pattern")->required();
+    add_common(*inspect_command, options);
+    inspect_command->add_option("--finder", options.finder, "of features: exact, halving or both")
+        ->check(CLI::IsMember({"exact", "halving", "both"}));
+
+    CLI::App* slice_command = app.add_subcommand("slice", "cut the pattern by level planes");
+    slice_command->add_option("STL", options.stl, "the pattern")->required();
+    slice_command->add_option("--every", options.every, "mm from one section to the next")->required();
+    slice_command->add_option("-o,--out", options.out, "drawing: .svg, .dxf or .json")->required();
+    add_common(*slice_command, options);
+
+    CLI::App* job_command = app.add_subcommand("job", "job files");
+    job_command->add_flag("--defaults", options.defaults, "print every key with its default and a comment")->required();
+    job_command->add_flag("--json", options.json, "errors as JSON on stderr");
+
+    // An error of the command line comes before its options are known, so --json is looked for by hand.
+    const bool json_wanted = std::any_of(argv + 1, argv + argc, [](const char* argument) { return std::string_view(argument) == "--json"; });
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+        return report(Error(ErrorKind::usage, "usage", error.what(), "", "see slabwright --help"), json_wanted);
+    }
+    try {
+        if (*plan_command) run_plan(options);
+        else if (*inspect_command) run_inspect(options);
+        else if (*slice_command) run_slice(options);
+        else print(default_job_toml());
+        return 0;
+    } catch (const Error& error) {
+        return report(error, options.json);
+    } catch (const std::exception& error) {
+        return report(Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"), options.json);
+    }
+}
