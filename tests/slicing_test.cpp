@@ -6,11 +6,15 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <random>
 #include <set>
+#include <sstream>
 
+#include "io/stl.h"
 #include "kernels/errors.h"
 #include "kernels/slicing/slicing.h"
 
@@ -585,6 +589,91 @@ TEST(Slicing, RefusesWhatItCannotCut) {
     EXPECT_THROW((void)slice(poor, good.view(), plane), Error);
     context.cancel();
     EXPECT_EQ(kind_of(good, plane), std::pair(ErrorKind::cancelled, std::string("cancelled")));
+}
+
+/// Like brute_area(), at a height where vertices may lie: they count as the side says.
+double brute_area_at(const Mesh& mesh, const Plane& plane) {
+    double sum = 0;
+    for (const Index3& facet : mesh.facets) {
+        bool above[3];
+        for (int k = 0; k < 3; ++k) {
+            const double z = mesh.vertices[facet[static_cast<std::size_t>(k)]].z;
+            above[k] = plane.side == Side::above ? z > plane.z : z >= plane.z;
+        }
+        if (above[0] == above[1] && above[1] == above[2]) continue;
+        double x[2] = {}, y[2] = {};  // where the facet falls through the plane, where it rises
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::size_t next = (k + 1) % 3;
+            if (above[k] == above[next]) continue;
+            const Vec3f &p = mesh.vertices[facet[k]], &q = mesh.vertices[facet[next]];
+            const double wp = std::abs(q.z - plane.z), wq = std::abs(p.z - plane.z);
+            const int end = above[next] ? 1 : 0;
+            x[end] = (p.x * wp + q.x * wq) / (wp + wq);
+            y[end] = (p.y * wp + q.y * wq) / (wp + wq);
+        }
+        sum += 0.5 * (x[0] * y[1] - x[1] * y[0]);
+    }
+    return sum;
+}
+
+TEST(Slicing, CorpusIsClosedAtEveryHeight) {
+    const char* corpus = std::getenv("SLABWRIGHT_CORPUS");
+    if (!corpus) {
+        std::printf("skipped: SLABWRIGHT_CORPUS is not set\n");
+        return;
+    }
+    std::ifstream manifest(std::string(corpus) + "/MANIFEST.tsv");
+    ASSERT_TRUE(manifest) << "no MANIFEST.tsv in " << corpus;
+    std::string line;
+    std::getline(manifest, line);
+    int files = 0;
+    Context context;
+    while (std::getline(manifest, line)) {
+        std::vector<std::string> fields;
+        std::istringstream columns(line);
+        for (std::string field; std::getline(columns, field, '\t');) fields.push_back(field);
+        ASSERT_GE(fields.size(), 7u) << line;
+        if (fields[6] != "yes") continue;
+        StlMesh stl;
+        try {
+            stl = read_stl(context, std::string(corpus) + "/" + fields[0]);
+        } catch (const Error& error) {
+            if (error.kind() != ErrorKind::input) throw;
+            std::printf("%s is refused: %s\n", fields[0].c_str(), error.what());
+            continue;
+        }
+        const Mesh& mesh = stl.mesh;
+        if (stl.report.open_edges.count != 0 || stl.report.misoriented_edges.count != 0) {
+            std::printf("%s has open or misoriented edges, though the manifest calls it watertight\n", fields[0].c_str());
+            continue;
+        }
+        ++files;
+        std::set<double> flats;
+        for (const Index3& f : mesh.facets) {
+            const float z = mesh.vertices[f[0]].z;
+            if (z == mesh.vertices[f[1]].z && z == mesh.vertices[f[2]].z) flats.insert(z);
+        }
+        const Box3 box = bounds(mesh.view());
+        std::vector<Plane> planes;
+        for (int i = 0; i < 50; ++i) planes.push_back({box.min.z + (static_cast<double>(box.max.z) - box.min.z) * (i + 0.5) / 50, Side::above});
+        for (const double z : flats) {
+            planes.push_back({z, Side::above});
+            planes.push_back({z, Side::below});
+        }
+        const auto sections = slice(context, mesh.view(), planes);
+        std::size_t open = 0;
+        for (const Section& section : sections) open += section.open_chains.size();
+        EXPECT_EQ(open, 0u) << fields[0];
+        // Brute force looks at all facets for each plane: the 50 planes and up to 40 of the flats.
+        const std::size_t stride = std::max<std::size_t>(1, (planes.size() - 50) / 40);
+        for (std::size_t i = 0; i < planes.size(); i += i < 50 ? 1 : stride) {
+            const double expected = brute_area_at(mesh, planes[i]);
+            EXPECT_NEAR(area(sections[i].loops), expected, 1e-4 * (perimeter(sections[i].loops) + 1) + 1e-9 * std::abs(expected))
+                << fields[0] << " at " << planes[i].z;
+        }
+        std::printf("%s: %zu facets, %zu flats, %zu planes\n", fields[0].c_str(), mesh.facets.size(), flats.size(), planes.size());
+    }
+    EXPECT_GT(files, 10);
 }
 
 }  // namespace
