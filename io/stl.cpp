@@ -47,7 +47,8 @@ std::string reason(int error) { return std::error_code(error, std::generic_categ
 class MappedFile {
 public:
     explicit MappedFile(const std::string& path) {
-        const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+        // A pipe without a writer would keep open() waiting.
+        const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
         if (file < 0) {
             const int error = errno;
             if (error == ENOENT || error == ENOTDIR) refuse("missing", "there is no such file", path, "check the path");
