@@ -148,6 +148,18 @@ Feature point_feature(MeshView mesh, FeatureType type, std::uint32_t vertex) {
     return feature;
 }
 
+// Vertices of up-facing flats. What touches a flat and differs from it by less than the merging distance is the flat's.
+struct Flats {
+    std::vector<std::uint8_t> on;
+    double reach = 0;
+    [[nodiscard]] bool touched(MeshView mesh, std::span<const std::uint32_t> star_facets, float z) const {
+        for (const std::uint32_t f : star_facets)
+            for (const std::uint32_t v : mesh.facets[f])
+                if (on[v] && std::abs(static_cast<double>(mesh.vertices[v].z) - static_cast<double>(z)) <= reach) return true;
+        return false;
+    }
+};
+
 // Joins results of chunks in order.
 std::vector<Feature> append(std::vector<Feature> a, std::vector<Feature> b) {
     a.insert(a.end(), std::make_move_iterator(b.begin()), std::make_move_iterator(b.end()));
@@ -155,7 +167,7 @@ std::vector<Feature> append(std::vector<Feature> a, std::vector<Feature> b) {
 }
 
 // A vertex without neighbours of its own height.
-void judge_vertex(MeshView mesh, const Incidence& incidence, std::uint32_t v, std::vector<Feature>& found) {
+void judge_vertex(MeshView mesh, const Incidence& incidence, const Flats& flats, std::uint32_t v, std::vector<Feature>& found) {
     const auto facets = incidence.around(v);
     const float z = mesh.vertices[v].z;
     Star star;
@@ -163,11 +175,14 @@ void judge_vertex(MeshView mesh, const Incidence& incidence, std::uint32_t v, st
     FeatureType type{};
     if (star.mixed()) {
         // Two changes are a slope; anything else is a saddle or a place where several sheets touch.
-        if (star.changes != 2 && saddle(mesh, facets, z, star)) found.push_back(point_feature(mesh, FeatureType::saddle, v));
-    } else if (extremum(mesh, facets, v, star, type)) found.push_back(point_feature(mesh, type, v));
+        if (star.changes == 2 || !saddle(mesh, facets, z, star)) return;
+        type = FeatureType::saddle;
+    } else if (!extremum(mesh, facets, v, star, type)) return;
+    if (!flats.touched(mesh, facets, z)) found.push_back(point_feature(mesh, type, v));
 }
 
-void judge_plateau(MeshView mesh, const Incidence& incidence, std::span<const std::uint32_t> plateau, std::vector<Feature>& found) {
+void judge_plateau(MeshView mesh, const Incidence& incidence, const Flats& flats, std::span<const std::uint32_t> plateau,
+                   std::vector<Feature>& found) {
     const float z = mesh.vertices[plateau.front()].z;
     std::vector<std::uint32_t> facets;
     Star star;
@@ -184,6 +199,7 @@ void judge_plateau(MeshView mesh, const Incidence& incidence, std::span<const st
         if (!saddle(mesh, facets, z, star)) return;
         type = FeatureType::saddle;
     } else if (!extremum(mesh, facets, plateau.front(), star, type)) return;
+    if (flats.touched(mesh, facets, z)) return;
     // The plateau is placed at its vertex nearest to the vertices' mean.
     double x = 0, y = 0;
     for (const std::uint32_t v : plateau) {
@@ -206,10 +222,10 @@ void judge_plateau(MeshView mesh, const Incidence& incidence, std::span<const st
 
 }  // namespace
 
-std::vector<Feature> find_exact(Context& context, MeshView mesh, std::span<const Feature> flats) {
+std::vector<Feature> find_exact(Context& context, MeshView mesh, std::span<const Feature> flats, double flat_reach) {
     const std::size_t n = mesh.vertices.size();
     if (mesh.size() == 0) return {};
-    const MemoryCharge charge(context, mesh.size() * 12 + n * 14, "the search for peaks and valleys");
+    const MemoryCharge charge(context, mesh.size() * 12 + n * 15, "the search for peaks and valleys");
     const Incidence incidence = incidence_of(mesh);
     context.throw_if_cancelled();
 
@@ -245,11 +261,13 @@ std::vector<Feature> find_exact(Context& context, MeshView mesh, std::span<const
             b = find(b);
             leader[std::max(a, b)] = std::min(a, b);
         }
+    Flats touching{std::vector<std::uint8_t>(n, 0), flat_reach};
     for (const Feature& flat : flats)
-        if (flat.type == FeatureType::up_flat || flat.type == FeatureType::down_flat)
-            for (const std::uint32_t f : flat.facets)
-                for (const std::uint32_t v : mesh.facets[f])
-                    if (kind[v] != 0) kind[find(v)] = 2;
+        for (const std::uint32_t f : flat.facets)
+            for (const std::uint32_t v : mesh.facets[f]) {
+                if (kind[v] != 0) kind[find(v)] = 2;
+                if (flat.type == FeatureType::up_flat) touching.on[v] = 1;
+            }
     std::vector<std::uint32_t> members;  // of plateaus without flats, one after the other
     for (std::uint32_t v = 0; v < n; ++v)
         if (kind[v] != 0 && kind[find(v)] != 2) members.push_back(v);
@@ -271,7 +289,7 @@ std::vector<Feature> find_exact(Context& context, MeshView mesh, std::span<const
         [&](std::size_t begin, std::size_t end) {
             std::vector<Feature> part;
             for (std::size_t v = begin; v < end; ++v)
-                if (kind[v] == 0) judge_vertex(mesh, incidence, static_cast<std::uint32_t>(v), part);
+                if (kind[v] == 0) judge_vertex(mesh, incidence, touching, static_cast<std::uint32_t>(v), part);
             return part;
         },
         append);
@@ -280,7 +298,7 @@ std::vector<Feature> find_exact(Context& context, MeshView mesh, std::span<const
                                         [&](std::size_t begin, std::size_t end) {
                                             std::vector<Feature> part;
                                             for (std::size_t p = begin; p < end; ++p)
-                                                judge_plateau(mesh, incidence,
+                                                judge_plateau(mesh, incidence, touching,
                                                               std::span(sorted).subspan(plateau_starts[p], plateau_starts[p + 1] - plateau_starts[p]),
                                                               part);
                                             return part;

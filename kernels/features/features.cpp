@@ -65,26 +65,25 @@ void sort_features(std::vector<Feature>& features) {
     std::stable_sort(features.begin(), features.end(), [](const Feature& a, const Feature& b) { return sort_key(a) < sort_key(b); });
 }
 
-// Pairs what both finders saw: same type, heights within the bracket that halving ends with, the nearest in height and
-// then in plan first. What stays alone is a disagreement. Both lists are sorted.
+// Pairs what both finders saw: same type, heights within the bracket that halving ends with; each of halving's takes the
+// nearest in plan that is left. What stays alone is a disagreement. Both lists are sorted.
 std::vector<FinderDisagreement> compare(const std::vector<Feature>& exact, const std::vector<Feature>& halving, double resolution) {
-    struct Pair {
-        double dz, dxy;
-        std::size_t e, h;
-    };
-    std::vector<Pair> pairs;
-    for (std::size_t h = 0; h < halving.size(); ++h) {
-        const auto first = std::lower_bound(exact.begin(), exact.end(), std::pair(halving[h].type, halving[h].z_low - resolution),
-                                            [](const Feature& f, const auto& key) { return std::pair(f.type, f.z_low) < key; });
-        for (auto it = first; it != exact.end() && it->type == halving[h].type && it->z_low <= halving[h].z_low + resolution; ++it)
-            pairs.push_back({std::abs(it->z_low - halving[h].z_low), std::hypot(it->x - halving[h].x, it->y - halving[h].y),
-                             static_cast<std::size_t>(it - exact.begin()), h});
-    }
-    std::sort(pairs.begin(), pairs.end(),
-              [](const Pair& a, const Pair& b) { return std::tie(a.dxy, a.dz, a.e, a.h) < std::tie(b.dxy, b.dz, b.e, b.h); });
     std::vector<std::uint8_t> seen_e(exact.size(), 0), seen_h(halving.size(), 0);
-    for (const Pair& p : pairs)
-        if (!seen_e[p.e] && !seen_h[p.h]) seen_e[p.e] = seen_h[p.h] = 1;
+    for (std::size_t h = 0; h < halving.size(); ++h) {
+        const Feature& mine = halving[h];
+        auto it = std::lower_bound(exact.begin(), exact.end(), std::pair(mine.type, mine.z_low - resolution),
+                                   [](const Feature& f, const auto& key) { return std::pair(f.type, f.z_low) < key; });
+        std::size_t best = exact.size();
+        double least = HUGE_VAL;
+        for (; it != exact.end() && it->type == mine.type && it->z_low <= mine.z_low + resolution; ++it) {
+            const auto e = static_cast<std::size_t>(it - exact.begin());
+            const double dx = it->x - mine.x, dy = it->y - mine.y, d = dx * dx + dy * dy;
+            if (seen_e[e] || d >= least) continue;
+            least = d;
+            best = e;
+        }
+        if (best < exact.size()) seen_e[best] = seen_h[h] = 1;
+    }
     std::vector<FinderDisagreement> alone;
     for (std::size_t e = 0; e < exact.size(); ++e)
         if (!seen_e[e]) alone.push_back({exact[e].type, exact[e].z_low, exact[e].x, exact[e].y, FoundBy::exact});
@@ -110,7 +109,7 @@ FeatureSet find_features(Context& context, MeshView mesh, const FeatureOptions& 
     }
     std::vector<Feature> exact, halving;
     if (options.finder != Finder::halving) {
-        exact = find_exact(context, mesh, flats);
+        exact = find_exact(context, mesh, flats, options.flat_merge_mm);
         drop_near_flats(context, mesh, flats, options.flat_merge_mm, options.flat_merge_mm, exact);
         sort_features(exact);
     }

@@ -38,7 +38,7 @@ struct FinderDisagreement {
 struct FeatureOptions {
     Finder finder = Finder::exact;
     double chordal_deviation_mm = 0.0254;           ///< of the STL; a lone horizontal facet narrower than this is no flat
-    double flat_merge_mm = 1.0;                     ///< a peak or valley this near (in z, and touching in xy) an up-facing flat is dropped
+    double flat_merge_mm = 1.0;                     ///< a peak or valley this near (in z, and touching or as near in xy) an up-facing flat is dropped
     double shallow_limit_rad = 0.2617993877991494;  ///< 15° for MDF
     double halving_coarse_mm = 2.54;
     double halving_resolution_mm = 0.254;

@@ -17,8 +17,9 @@ namespace slabwright {
 /// Down-facing patches that are not horizontal.
 [[nodiscard]] std::vector<Feature> find_undercuts(MeshView mesh, std::vector<Patch>& patches);
 
-/// Peaks, valleys and saddles of the mesh by the signs around every vertex and plateau; `flats` are left out of them.
-[[nodiscard]] std::vector<Feature> find_exact(Context& context, MeshView mesh, std::span<const Feature> flats);
+/// Peaks, valleys and saddles of the mesh by the signs around every vertex and plateau. Plateaus with a flat (of either kind)
+/// are left out, and so is what differs by `flat_reach` or less (mm) from an up-facing flat that its facets touch.
+[[nodiscard]] std::vector<Feature> find_exact(Context& context, MeshView mesh, std::span<const Feature> flats, double flat_reach);
 
 /// Peaks, valleys and saddles by LUO's halving search.
 [[nodiscard]] std::vector<Feature> find_halving(Context& context, MeshView mesh, const FeatureOptions& options);

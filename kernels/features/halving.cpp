@@ -194,13 +194,19 @@ Feature feature_at(FeatureType type, double z, std::span<const Point2> loop) {
     feature.type = type;
     feature.found_by = FoundBy::halving;
     feature.z_low = feature.z_high = z;
+    // Placed at the loop's point nearest to their mean: unlike the mean, it is on the body.
+    if (loop.empty()) return feature;
+    double x = 0, y = 0, least = HUGE_VAL;
     for (const Point2 p : loop) {
-        feature.x += to_mm(p.x);
-        feature.y += to_mm(p.y);
+        x += to_mm(p.x) / static_cast<double>(loop.size());
+        y += to_mm(p.y) / static_cast<double>(loop.size());
     }
-    if (!loop.empty()) {
-        feature.x /= static_cast<double>(loop.size());
-        feature.y /= static_cast<double>(loop.size());
+    for (const Point2 p : loop) {
+        const double d = std::hypot(to_mm(p.x) - x, to_mm(p.y) - y);
+        if (d >= least) continue;
+        least = d;
+        feature.x = to_mm(p.x);
+        feature.y = to_mm(p.y);
     }
     return feature;
 }

@@ -53,25 +53,42 @@ struct Depth {
 
 class Measure {
 public:
-    Measure(Context& context, MeshView mesh, std::span<const std::uint32_t> all) : mesh_(mesh), bins_(context, mesh, all) {}
+    Measure(Context& context, MeshView mesh, std::span<const std::uint32_t> all) : mesh_(mesh), bins_(context, mesh, all), spans_(mesh.size()) {
+        parallel_for(context, mesh.size(), 4096, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t f = begin; f < end; ++f) {
+                const Index3 t = mesh.facets[f];
+                const auto [low, high] = std::minmax({mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z});
+                spans_[f] = {low, high};
+            }
+        });
+    }
 
     // How far the path stays under down-facing facets that lie under `top`, before it meets solid.
     [[nodiscard]] double covered(const Path& path, double top, std::vector<Interval>& intervals) const {
-        const double across = std::hypot(path.direction[0], path.direction[1]);
+        const double across = std::sqrt(path.direction[0] * path.direction[0] + path.direction[1] * path.direction[1]);
         const double step = across > 0 ? std::max(bins_.cell() / across, kJoin) : path.length;
         double reached = 0;
         for (double from = 0; from < path.length; from += step) {
             const double to = std::min(path.length, from + step);
             const double xa = path.start[0] + from * path.direction[0], xb = path.start[0] + to * path.direction[0];
             const double ya = path.start[1] + from * path.direction[1], yb = path.start[1] + to * path.direction[1];
+            const double lowest = path.start[2] + to * path.direction[2] - kInside;
             double hit = path.length;
             intervals.clear();
-            bins_.visit(std::min(xa, xb) - kInside, std::min(ya, yb) - kInside, std::max(xa, xb) + kInside, std::max(ya, yb) + kInside,
-                        [&](std::uint32_t f) {
-                            const Vec3d n = area_normal(mesh_, f);
-                            if (n[2] < 0) cover(f, n, path, top, reached, intervals);
-                            if (dot(n, path.direction) < 0) hit = std::min(hit, meet(f, n, path));
-                        });
+            const double x0 = std::min(xa, xb) - kInside, x1 = std::max(xa, xb) + kInside;
+            const double y0 = std::min(ya, yb) - kInside, y1 = std::max(ya, yb) + kInside;
+            bins_.visit(x0, y0, x1, y1, [&](std::uint32_t f) {
+                // Facets wholly under this stretch or over the layer neither cover nor stop it.
+                if (spans_[f].high < lowest || spans_[f].low > top) return;
+                const Index3 t = mesh_.facets[f];
+                const Vec3f &a = mesh_.vertices[t[0]], &b = mesh_.vertices[t[1]], &c = mesh_.vertices[t[2]];
+                if (std::max({a.x, b.x, c.x}) < x0 || std::min({a.x, b.x, c.x}) > x1 || std::max({a.y, b.y, c.y}) < y0 ||
+                    std::min({a.y, b.y, c.y}) > y1)
+                    return;
+                const Vec3d n = area_normal(mesh_, f);
+                if (n[2] < 0) cover(f, n, path, top, reached, intervals);
+                if (dot(n, path.direction) < 0) hit = std::min(hit, meet(f, n, path));
+            });
             std::sort(intervals.begin(), intervals.end(), [](const Interval& a, const Interval& b) { return a.from < b.from; });
             for (const Interval& i : intervals) {
                 if (i.from > reached + kJoin) break;
@@ -79,7 +96,7 @@ public:
             }
             // Only what happens within this stretch is final: facets of later cells may come before the rest.
             if (hit <= to) return std::min(hit, reached);
-            if (reached < to) return reached;
+            if (reached + kJoin < to) return reached;
         }
         return std::min(reached, path.length);
     }
@@ -89,7 +106,9 @@ public:
     [[nodiscard]] bool inside_solid(const Vec3d& q) const {
         int winding = 0;
         std::vector<std::uint32_t> near;
-        bins_.visit(q[0], q[1], q[0], q[1], [&](std::uint32_t f) { near.push_back(f); });
+        bins_.visit(q[0], q[1], q[0], q[1], [&](std::uint32_t f) {
+            if (spans_[f].high >= q[2]) near.push_back(f);
+        });
         for (const std::uint32_t f : near) {
             int turns = 0;
             for (int k = 0; k < 3; ++k) {
@@ -119,7 +138,7 @@ private:
         if (!(i.to > reached - kJoin) || !(i.to >= i.from)) return;
         for (int k = 0; k < 3; ++k) {
             const Vec3d a = to_double(mesh_.vertices[t[k]]), b = to_double(mesh_.vertices[t[(k + 1) % 3]]);
-            const double ex = b[0] - a[0], ey = b[1] - a[1], length = std::hypot(ex, ey);
+            const double ex = b[0] - a[0], ey = b[1] - a[1], length = std::sqrt(ex * ex + ey * ey);
             if (length == 0) return;
             // Down-facing facets run clockwise in plan: their inside is on the right.
             i.keep((ey * (s[0] - a[0]) - ex * (s[1] - a[1])) / length + kInside, (ey * d[0] - ex * d[1]) / length);
@@ -141,8 +160,12 @@ private:
         return at;
     }
 
+    struct Span {
+        float low, high;
+    };
     MeshView mesh_;
     PlanBins bins_;
+    std::vector<Span> spans_;  // of every facet in z
 };
 
 using Polygon = std::vector<Vec3d>;

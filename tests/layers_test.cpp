@@ -1,0 +1,405 @@
+#include "engine/layers/layers.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <ostream>
+#include <random>
+
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+void PrintTo(const LayerCost& c, std::ostream* out) {
+    *out << "type II " << c.broken_type2 << ", type I " << c.broken_type1 << ", thin " << c.thin_layers << ", glue " << c.exposed_glue
+         << ", type III " << c.broken_type3 << ", layers " << c.layers << ", wood " << c.wood << ", -Q " << c.minus_q;
+}
+
+namespace {
+
+Feature feature(FeatureType type, double low, double high, double area) {
+    Feature f;
+    f.type = type;
+    f.z_low = low;
+    f.z_high = high;
+    f.area = area;
+    return f;
+}
+Feature level(FeatureType type, double z, double area = 100) { return feature(type, z, z, area); }
+
+LayerRequest request(double height, std::vector<Feature> features) {
+    LayerRequest r;
+    r.height = height;
+    r.max_layer = 18.5;
+    r.min_layer = 2;
+    r.min_material = 5;
+    r.slab_thicknesses = {19};
+    r.facing_allowance = 0.5;
+    r.features = std::move(features);
+    r.section_area = [height](double z) { return 1000 * (1.5 - z / height); };
+    return r;
+}
+
+std::vector<double> tops(const LayerPlacement& p) {
+    std::vector<double> z;
+    for (const Boundary& b : p.boundaries) z.push_back(b.z);
+    return z;
+}
+
+bool has(const LayerPlacement& p, const std::string& code) {
+    return std::any_of(p.diagnostics.begin(), p.diagnostics.end(), [&](const Diagnostic& d) { return d.code == code; });
+}
+
+// What every placement must hold, whatever the features.
+void expect_placement(const LayerRequest& r, const LayerPlacement& p) {
+    ASSERT_FALSE(p.boundaries.empty());
+    EXPECT_EQ(p.boundaries.back().z, r.height);
+    double below = 0;
+    for (const Boundary& b : p.boundaries) {
+        EXPECT_GT(b.z, below);
+        EXPECT_LE(b.z - below, r.max_layer + kSameHeight * 1.001);
+        EXPECT_GE(b.slab_thickness + kSameHeight * 1.001, b.z - below + r.facing_allowance);
+        EXPECT_FALSE(b.reason.empty());
+        below = b.z;
+    }
+    EXPECT_TRUE(p.cost == layer_cost(r, tops(p)));
+    EXPECT_EQ(p.cost.layers, static_cast<int>(p.boundaries.size()));
+    EXPECT_EQ(p.cost.broken_type2, 0);
+    EXPECT_EQ(has(p, "layers.type2"), p.cost.broken_type2 > 0);
+    EXPECT_EQ(has(p, "layers.type1"), p.cost.broken_type1 > 0);
+    EXPECT_EQ(has(p, "layers.type3"), p.cost.broken_type3 > 0);
+    EXPECT_EQ(has(p, "layers.thin"), p.cost.thin_layers > 0);
+}
+
+TEST(Layers, PrintedAvoidsMeetsAndMoves) {
+    // Up to 18.5 a peak at 20 forbids (15, 20); from 15 on a down-facing flat at 30; from 30 a slope from 45 to 60 holds 48.5.
+    const LayerRequest r =
+        request(70, {level(FeatureType::peak, 20, 0), level(FeatureType::down_flat, 30), feature(FeatureType::shallow, 45, 60, 400)});
+    const LayerPlacement p = place_layers_printed(r);
+    EXPECT_EQ(tops(p), (std::vector<double>{15, 30, 45, 63.5, 70}));
+    expect_placement(r, p);
+    EXPECT_EQ(p.boundaries[0].reason, "5 mm below the peak at 20 mm");
+    EXPECT_EQ(p.boundaries[1].reason, "at the down-facing flat at 30 mm");
+    EXPECT_EQ(p.boundaries[2].reason, "at the lower end of the shallow slope from 45 to 60 mm");
+    EXPECT_EQ(p.boundaries[3].reason, "as high as a layer may be (18.5 mm)");
+    EXPECT_EQ(p.boundaries[4].reason, "top of the pattern");
+    EXPECT_TRUE(p.diagnostics.empty());
+}
+
+TEST(Layers, PrintedKeepsToAShallowRangeWhereMovingWouldNotEnd) {
+    // A tall dome: shallow from 2 mm on. Print moves to 2, then to 2 again, and never ends.
+    const LayerRequest r = request(100, {feature(FeatureType::shallow, 2, 100, 5000)});
+    const LayerPlacement p = place_layers_printed(r);
+    EXPECT_EQ(tops(p), (std::vector<double>{18.5, 37, 55.5, 74, 92.5, 100}));
+    expect_placement(r, p);
+    ASSERT_EQ(p.diagnostics.size(), 5u);
+    EXPECT_EQ(p.diagnostics[0].code, "layers.type3");
+    EXPECT_NE(p.diagnostics[0].message.find("from 2 to 100 mm"), std::string::npos) << p.diagnostics[0].message;
+}
+
+TEST(Layers, ARegionTallerThanALayerIsCrossedByFewestBoundariesThenLargestQ) {
+    // Flats every 4 mm from 10 to 50 forbid (5, 50). From 5 on, two boundaries inside reach 55 (5 + 18.5 + 18.5 + 18.5 > 55).
+    std::vector<Feature> features;
+    for (int z = 10; z <= 50; z += 4) features.push_back(level(FeatureType::up_flat, z));
+    LayerRequest r = request(55, features);
+    r.section_area = nullptr;  // Q is DT alone: every candidate lies 1 mm under a flat, but some lie at one
+    const LayerPlacement p = place_layers_printed(r);
+    expect_placement(r, p);
+    ASSERT_EQ(p.boundaries.size(), 4u);
+    EXPECT_EQ(p.boundaries[0].z, 5);
+    // Brute force over all pairs of candidates.
+    double best = -1;
+    std::vector<double> candidates;
+    for (double z = 9; z < 50; z += 4) candidates.push_back(z);
+    auto q = [&](double z) {
+        double above = std::numeric_limits<double>::infinity();
+        for (const Feature& f : features)
+            if (f.z_low > z + 1e-6) above = std::min(above, f.z_low - z);
+        return r.alpha * above / kInch;
+    };
+    for (const double a : candidates)
+        for (const double b : candidates)
+            if (a < b && a - 5 <= 18.5 && b - a <= 18.5 && 55 - b <= 18.5) best = std::max(best, q(a) + q(b));
+    EXPECT_NEAR(q(p.boundaries[1].z) + q(p.boundaries[2].z), best, 1e-5);
+    EXPECT_TRUE(has(p, "layers.type1"));
+}
+
+TEST(Layers, PrintedTallRegionsMatchBruteForce) {
+    const unsigned seed = std::random_device{}();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    for (int round = 0; round < 200; ++round) {
+        // One merged region from near the base to the top, few enough candidates for brute force.
+        std::vector<Feature> features;
+        double z = 6;
+        std::uniform_real_distribution<double> gap(1.0, 4.9);
+        while (z < 48) {
+            features.push_back(level(FeatureType::peak, z));
+            z += gap(random);
+        }
+        const double height = features.back().z_low + 0.5;
+        LayerRequest r = request(height, features);
+        r.section_area = [](double h) { return 2000 + 1500 * std::sin(h); };
+        const LayerPlacement p = place_layers_printed(r);
+        const double start = features.front().z_low - r.min_material;
+        std::vector<double> candidates;
+        for (const Feature& f : features)
+            if (f.z_low - r.min_material > start + 1e-6) candidates.push_back(f.z_low - r.min_material);
+        auto q = [&](double c) {
+            double above = height - c;
+            for (const Feature& f : features)
+                if (f.z_low > c + kSameHeight) above = std::min(above, f.z_low - c);
+            return r.alpha * above / kInch + r.beta * r.section_area(c) / (kInch * kInch);
+        };
+        std::size_t fewest = 99;
+        double largest = 0;
+        std::function<void(double, std::size_t, std::size_t, double)> walk = [&](double at, std::size_t from, std::size_t count, double sum) {
+            if (height - at <= r.max_layer + kSameHeight && (count < fewest || (count == fewest && sum > largest))) {
+                fewest = count;
+                largest = sum;
+            }
+            if (count >= fewest) return;
+            for (std::size_t i = from; i < candidates.size() && candidates[i] - at <= r.max_layer + kSameHeight; ++i)
+                walk(candidates[i], i + 1, count + 1, sum + q(candidates[i]));
+        };
+        walk(start, 0, 0, 0);
+        ASSERT_EQ(p.boundaries.size(), fewest + 2) << "round " << round;
+        double sum = 0;
+        for (std::size_t i = 1; i + 1 < p.boundaries.size(); ++i) sum += q(p.boundaries[i].z);
+        ASSERT_NEAR(sum, largest, 1e-4) << "round " << round;
+    }
+}
+
+TEST(Layers, TypeTwoSplitsARegion) {
+    const LayerRequest r = request(30, {level(FeatureType::peak, 20), level(FeatureType::down_flat, 17)});
+    const LayerPlacement p = place_layers_printed(r);
+    EXPECT_EQ(tops(p), (std::vector<double>{17, 30}));
+    EXPECT_EQ(p.cost.broken_type1, 100);
+    EXPECT_TRUE(has(p, "layers.type1"));
+}
+
+TEST(Layers, CostCountsEachBreach) {
+    LayerRequest r = request(40, {level(FeatureType::up_flat, 20, 300), level(FeatureType::peak, 21, 0), level(FeatureType::down_flat, 30, 70),
+                                  feature(FeatureType::shallow, 10, 18, 50), level(FeatureType::saddle, 19, 40)});
+    const LayerCost c = layer_cost(r, {17, 35.5, 40});
+    EXPECT_EQ(c.broken_type2, 70);
+    EXPECT_EQ(c.broken_type1, 301);  // a peak weighs a square millimetre
+    EXPECT_EQ(c.exposed_glue, 300);
+    EXPECT_EQ(c.broken_type3, 50);
+    EXPECT_EQ(c.thin_layers, 0);
+    EXPECT_EQ(c.layers, 3);
+    EXPECT_EQ(c.wood, 57);
+    // Both ends of the glue's range count, of the others' none; a boundary at a flat's own height shows its glue.
+    EXPECT_EQ(layer_cost(r, {15, 30, 40}).exposed_glue, 300);
+    EXPECT_EQ(layer_cost(r, {14.99, 30, 40}).exposed_glue, 0);
+    EXPECT_EQ(layer_cost(r, {15, 30, 40}).broken_type1, 0);
+    EXPECT_EQ(layer_cost(r, {15, 20, 30, 40}).exposed_glue, 600);
+    EXPECT_EQ(layer_cost(r, {20, 30, 40}).broken_type1, 1);
+    EXPECT_EQ(layer_cost(r, {10, 18, 30, 40}).broken_type3, 0);
+    EXPECT_EQ(layer_cost(r, {10, 18, 30, 40}).broken_type2, 0);
+    EXPECT_EQ(layer_cost(r, {10, 11.5, 30, 40}).thin_layers, 1);
+    r.saddles_constrain = true;
+    EXPECT_EQ(layer_cost(r, {17, 35.5, 40}).broken_type1, 341);
+    // The top is no joint.
+    EXPECT_EQ(layer_cost(request(10, {level(FeatureType::up_flat, 10)}), {10}).exposed_glue, 0);
+}
+
+TEST(Layers, TheThinnestSlabThatHoldsTheLayer) {
+    LayerRequest r = request(30, {level(FeatureType::down_flat, 6)});
+    r.slab_thicknesses = {19, 6.5, 12};
+    LayerPlacement p = place_layers_printed(r);
+    EXPECT_EQ(tops(p), (std::vector<double>{6, 24.5, 30}));
+    EXPECT_EQ(p.boundaries[0].slab_thickness, 6.5);
+    EXPECT_EQ(p.boundaries[1].slab_thickness, 19);
+    EXPECT_EQ(p.boundaries[2].slab_thickness, 6.5);
+    r.slab_thicknesses = {9};  // two must be bonded into one, and the plan says so
+    p = place_layers_printed(r);
+    EXPECT_EQ(p.boundaries[1].slab_thickness, 27);
+    EXPECT_TRUE(has(p, "layers.bonded"));
+    EXPECT_EQ(place_layers_optimal(r).cost.wood, layer_cost(r, tops(place_layers_optimal(r))).wood);
+}
+
+TEST(Layers, RequestsWithoutAnAnswerAreUsageErrors) {
+    const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
+    auto expect_error = [](const LayerRequest& r) {
+        for (auto place : {place_layers_printed, place_layers_optimal}) {
+            try {
+                (void)place(r);
+                ADD_FAILURE() << "no error";
+            } catch (const Error& e) {
+                EXPECT_EQ(e.kind(), ErrorKind::usage);
+                EXPECT_EQ(e.code(), "layers.request");
+            }
+        }
+    };
+    for (double LayerRequest::*key :
+         {&LayerRequest::height, &LayerRequest::max_layer, &LayerRequest::min_material, &LayerRequest::min_layer, &LayerRequest::facing_allowance})
+        for (const double bad : {-1.0, nan, inf}) {
+            LayerRequest r = request(30, {});
+            r.*key = bad;
+            expect_error(r);
+        }
+    LayerRequest r = request(30, {});
+    r.max_layer = 0;
+    expect_error(r);
+    r.max_layer = 1e-5;
+    expect_error(r);
+    r = request(30, {});
+    r.slab_thicknesses = {0};
+    expect_error(r);
+    r = request(30, {level(FeatureType::peak, nan)});
+    expect_error(r);
+}
+
+TEST(Layers, OddRequestsEnd) {
+    std::vector<Feature> features;
+    for (int i = 1; i < 40; ++i) features.push_back(level(i % 2 ? FeatureType::peak : FeatureType::up_flat, 1.7 * i));
+    for (const double material : {0.0, 5.0, 18.5, 40.0, 500.0})
+        for (const double tallest : {0.3, 5.0, 18.5, 200.0}) {
+            LayerRequest r = request(66, features);
+            r.min_material = material;
+            r.max_layer = tallest;
+            r.slab_thicknesses = {tallest + 0.5};
+            const LayerPlacement printed = place_layers_printed(r), optimal = place_layers_optimal(r);
+            expect_placement(r, printed);
+            expect_placement(r, optimal);
+            EXPECT_LE(optimal.cost, printed.cost);
+        }
+}
+
+TEST(Layers, TallDomesAndReliefsEnd) {
+    // Nested shallow ranges, as every relief has.
+    std::vector<Feature> features;
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> height(0, 200), size(0.1, 60);
+    for (int i = 0; i < 3000; ++i) {
+        const double low = height(random);
+        features.push_back(feature(FeatureType::shallow, low, std::min(200.0, low + size(random)), 10));
+    }
+    features.push_back(feature(FeatureType::shallow, 0, 200, 1));
+    const LayerRequest r = request(200, features);
+    expect_placement(r, place_layers_printed(r));
+    expect_placement(r, place_layers_optimal(r));
+}
+
+LayerRequest random_request(std::mt19937& random) {
+    auto real = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+    auto pick = [&](std::initializer_list<double> of) { return *(of.begin() + static_cast<std::ptrdiff_t>(random() % of.size())); };
+    const double height = pick({5, 18.5, 38.1, real(1, 20), real(20, 150)});
+    // Half the sets lie on a coarse grid, so that heights coincide, touch and split one another.
+    const double grid = pick({0, 0, 0.5, 2.54});
+    auto z = [&](double low, double high) {
+        const double v = real(low, high);
+        return grid > 0 ? std::clamp(std::round(v / grid) * grid, 0.0, height) : v;
+    };
+    std::vector<Feature> features;
+    for (std::size_t n = random() % 30; n > 0; --n) {
+        const auto type = static_cast<FeatureType>(random() % 7);
+        const double low = z(0, height), area = pick({0, 1, real(0, 500)});
+        features.push_back(feature(type, low, type == FeatureType::shallow || type == FeatureType::undercut ? z(low, height) : low, area));
+    }
+    LayerRequest r = request(height, features);
+    r.max_layer = pick({18.5, 17.78, real(2, 60), 5});
+    r.min_material = pick({0, 5.08, real(0, 10), real(0, 40)});
+    r.min_layer = pick({0, 2, real(0, 10)});
+    r.facing_allowance = pick({0, 0.5});
+    r.slab_thicknesses = {r.max_layer + r.facing_allowance};
+    if (random() % 2) r.slab_thicknesses.push_back(r.max_layer * 0.6);
+    if (random() % 3 == 0) r.slab_thicknesses.push_back(r.max_layer * 0.25);
+    r.saddles_constrain = random() % 2;
+    const double phase = real(0, 6);
+    r.section_area = [=](double h) { return 500 + 400 * std::sin(h / 7 + phase); };
+    return r;
+}
+
+TEST(Layers, ThousandRandomSetsOptimalIsNeverWorseAndBothHold) {
+    const unsigned seed = std::random_device{}();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    int better = 0;
+    for (int round = 0; round < 1000; ++round) {
+        const LayerRequest r = random_request(random);
+        const LayerPlacement printed = place_layers_printed(r), optimal = place_layers_optimal(r);
+        expect_placement(r, printed);
+        expect_placement(r, optimal);
+        ASSERT_LE(optimal.cost, printed.cost) << "round " << round;
+        better += optimal.cost < printed.cost;
+        if (HasFailure()) FAIL() << "round " << round;
+    }
+    EXPECT_GT(better, 100);
+}
+
+// The dynamic program against every subset of a few heights that are among its candidates.
+TEST(Layers, OptimalMatchesBruteForceOverFeatureHeights) {
+    const unsigned seed = std::random_device{}();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    int compared = 0;
+    for (int round = 0; round < 300; ++round) {
+        LayerRequest r = random_request(random);
+        if (r.features.size() > 4) r.features.resize(4);
+        if (r.height > 50 || r.max_layer < 4) continue;
+        std::vector<double> heights;
+        auto add = [&](double z) {
+            if (z > 0.01 && z < r.height - 0.01) heights.push_back(z);
+        };
+        for (const Feature& f : r.features) {
+            const bool type1 = f.type == FeatureType::peak || f.type == FeatureType::valley || f.type == FeatureType::up_flat;
+            if (type1 || f.type == FeatureType::down_flat) add(f.z_low);
+            if (f.type == FeatureType::shallow && f.z_high - f.z_low > 0.01) {
+                add(f.z_low);
+                add(f.z_high);
+            }
+            if (type1) add(f.z_low - r.min_material);
+        }
+        for (double z = r.max_layer; z < r.height - 0.01; z += r.max_layer) heights.push_back(z);
+        std::sort(heights.begin(), heights.end());
+        heights.erase(std::unique(heights.begin(), heights.end(), [](double a, double b) { return b - a < 0.01; }), heights.end());
+        if (heights.size() > 11) continue;
+        ++compared;
+        const LayerPlacement optimal = place_layers_optimal(r);
+        for (unsigned subset = 0; subset < (1u << heights.size()); ++subset) {
+            std::vector<double> z;
+            for (std::size_t i = 0; i < heights.size(); ++i)
+                if (subset >> i & 1u) z.push_back(heights[i]);
+            z.push_back(r.height);
+            double below = 0;
+            bool fits = true;
+            for (const double t : z) {
+                fits = fits && t - below <= r.max_layer;
+                below = t;
+            }
+            if (fits) {
+                LayerCost cost = layer_cost(r, z);
+                cost.minus_q += 1e-6;  // full layers piled up here are rounded once more than the program's own
+                ASSERT_LE(optimal.cost, cost) << "round " << round << " subset " << subset;
+            }
+        }
+    }
+    EXPECT_GT(compared, 50);
+}
+
+TEST(Layers, FiveThousandFeaturesAreQuick) {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> z(0, 400), area(0, 1000);
+    std::vector<Feature> features;
+    for (int i = 0; i < 5000; ++i) {
+        const double low = z(random);
+        const FeatureType type = i % 3 == 0 ? FeatureType::shallow : i % 3 == 1 ? FeatureType::peak : FeatureType::up_flat;
+        features.push_back(feature(type, low, type == FeatureType::shallow ? std::min(400.0, low + 1) : low, area(random)));
+    }
+    const LayerRequest r = request(400, features);
+    const auto start = std::chrono::steady_clock::now();
+    const LayerPlacement optimal = place_layers_optimal(r);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    expect_placement(r, optimal);
+    EXPECT_LT(seconds, 20);  // well under a second when optimised; the bound leaves room for sanitizers
+    EXPECT_LE(optimal.cost, place_layers_printed(r).cost);
+}
+
+}  // namespace
+}  // namespace slabwright
