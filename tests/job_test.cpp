@@ -1,0 +1,276 @@
+// The job: defaults that are valid, a file that round-trips, and errors that name file, line and the key that was meant.
+#include "engine/job.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+
+#include "io/job_keys.h"
+#include "io/job_toml.h"
+#include "kernels/errors.h"
+
+using namespace slabwright;
+
+namespace {
+
+Error error_of(const std::string& text) {
+    try {
+        (void)parse_job(text, "my.toml");
+    } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), ErrorKind::usage);
+        return error;
+    }
+    ADD_FAILURE() << "accepted: " << text;
+    return Error(ErrorKind::usage, "", "");
+}
+
+bool is_valid(const std::function<void(Job&)>& change) {
+    Job job;
+    change(job);
+    try {
+        validate(job);
+    } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), ErrorKind::usage);
+        return false;
+    }
+    return true;
+}
+
+/// Gives every key a value of its own, so that a round trip that drops or swaps one is seen.
+struct Scramble {
+    std::mt19937 random;
+    int tools = 0;
+    double real(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
+    void table(const char*, const char*) {}
+    void required() {}
+    void key(const char*, double& value, const char*) { value = value == 0 ? real(0, 1e-3) : value * (1 - real(0, 0.005)); }
+    void key(const char*, int& value, const char*) { value += 1; }
+    void key(const char*, bool& value, const char*) { value = !value; }
+    void key(const char*, std::string& value, const char*) { value += " \"quoted\" \\ \n\t \xC3\xA4"; }
+    void key(const char*, std::vector<double>& value, const char*) { value = {6.35, 12.7, real(18, 19), 25.4}; }
+    void degrees(const char*, double& value, const char*) { value = std::round(real(0, 40)) * std::numbers::pi / 180; }
+    template <class Enum, std::size_t N>
+    void word(const char*, Enum& value, const Word<Enum> (&words)[N], const char*) {
+        value = words[(static_cast<std::size_t>(value) + 1) % N].value;
+    }
+};
+
+}  // namespace
+
+TEST(Job, DefaultsAreValidAndRoundTrip) {
+    const Job defaults;
+    EXPECT_NO_THROW(validate(defaults));
+    const std::string text = job_toml(defaults);
+    const Job read = parse_job(text, "defaults");
+    EXPECT_EQ(job_toml(read), text);
+    EXPECT_EQ(read.tools.size(), 3u);
+    EXPECT_EQ(read.tools[1].stepdown_max, defaults.tools[1].stepdown_max);
+    EXPECT_EQ(read.tools[1].helix_rad, defaults.tools[1].helix_rad);
+    EXPECT_EQ(read.material.min_thickness, defaults.material.min_thickness);
+    const Job empty = parse_job("", "empty");
+    EXPECT_EQ(job_toml(empty), text) << "what a file leaves out keeps its default";
+}
+
+TEST(Job, EveryKeyRoundTrips) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    Job job;
+    Scramble scramble{std::mt19937(seed)};
+    visit_job_keys(job, scramble);
+    for (Tool& tool : job.tools) visit_tool_keys(tool, scramble);
+    const std::string text = job_toml(job);
+    EXPECT_NE(text, job_toml(Job{}));
+    const Job read = parse_job(text, "scrambled");
+    EXPECT_EQ(job_toml(read), text);
+    EXPECT_EQ(read.machine.name, job.machine.name);
+    EXPECT_EQ(read.slabs.thicknesses, job.slabs.thicknesses);
+    EXPECT_EQ(read.layers.strategy, LayerStrategy::printed);
+    EXPECT_EQ(read.cutting.finish_feed, job.cutting.finish_feed);
+    EXPECT_EQ(read.tools[2].stickout, job.tools[2].stickout);
+    EXPECT_EQ(read.tools[0].kind, ToolKind::drill);
+}
+
+TEST(Job, EveryKeyIsCommented) {
+    const std::string text = job_toml(Job{});
+    std::size_t keys = 0, comments = 0;
+    for (std::size_t begin = 0; begin < text.size();) {
+        const std::size_t end = text.find('\n', begin);
+        const std::string line = text.substr(begin, end - begin);
+        if (line.find(" = ") != std::string::npos && line[0] != '#') {
+            ++keys;
+            if (line.find("  # ") != std::string::npos) ++comments;
+        }
+        begin = end + 1;
+    }
+    EXPECT_GT(keys, 100u);
+    EXPECT_GE(comments, keys - 3) << "only names go without a comment";
+}
+
+TEST(Job, ValuesAreTaken) {
+    const Job job = parse_job(
+        "units = \"in\"\n[slabs]\nthicknesses = [12, 19.05]\n[machine]\nframe = \"layer-top\"\nclearance = 5\n[layers]\nfinder = "
+        "\"both\"\nsaddles_constrain = true\n"
+        "[[tool]]\nnumber = 7\nkind = \"ball\"\ndiameter = 3.175\nflute_length = 25\nstickout = 40\nshank_diameter = 3.175\nholder_diameter = "
+        "32\nstepdown_max = 1.5\nhelix_deg = 45\n",
+        "x");
+    EXPECT_EQ(job.units, LengthUnit::inch);
+    EXPECT_EQ(job.slabs.thicknesses, (std::vector<double>{12, 19.05}));
+    EXPECT_EQ(job.machine.frame, Frame::layer_top);
+    EXPECT_EQ(job.machine.clearance, 5);
+    EXPECT_EQ(job.layers.finder, Finder::both);
+    EXPECT_TRUE(job.layers.saddles_constrain);
+    ASSERT_EQ(job.tools.size(), 1u) << "a [[tool]] replaces the library";
+    EXPECT_EQ(job.tools[0].number, 7);
+    EXPECT_NEAR(job.tools[0].helix_rad, std::numbers::pi / 4, 1e-15);
+}
+
+TEST(Job, UnknownKeysNameTheNearest) {
+    Error error = error_of("# a job\n[machine]\nclearence = 5\n");
+    EXPECT_EQ(error.code(), "job.unknown_key");
+    EXPECT_EQ(error.place(), "my.toml:3");
+    EXPECT_NE(error.remedy().find("machine.clearance"), std::string::npos) << error.what();
+    error = error_of("unit = \"mm\"\n");
+    EXPECT_NE(error.remedy().find("units"), std::string::npos);
+    error = error_of("\n[machines]\nclearance = 5\n");
+    EXPECT_EQ(error.place(), "my.toml:2");
+    EXPECT_NE(error.remedy().find("machine"), std::string::npos);
+    error = error_of("[material]\nclearance = 5\n");
+    EXPECT_NE(error.remedy().find("machine.clearance"), std::string::npos) << "right key, wrong table: " << error.what();
+    error = error_of("[[tool]]\nnumber = 1\ndiametre = 5\n");
+    EXPECT_EQ(error.place(), "my.toml:3");
+    EXPECT_NE(error.remedy().find("tool.diameter"), std::string::npos);
+}
+
+TEST(Job, WrongTypesAndWordsNameFileAndLine) {
+    for (const char* text : {"\n[machine]\nclearance = \"5\"\n", "\n[machine]\nclearance = true\n", "\n[machine]\nclearance = nan\n",
+                             "\n[machine]\nclearance = inf\n", "\n[machine]\nclearance = [5]\n", "\n[slabs]\nthicknesses = 19\n",
+                             "\n[slabs]\nthicknesses = [19, \"25\"]\n", "\n[machine]\nname = 5\n", "\n[layers]\nsaddles_constrain = 1\n",
+                             "\n\ntool = 5\n", "\n\nmachine = 5\n", "\n\nallow_undercut = \"no\"\n", "\n[machine]\nclearance = 2026-01-01\n"}) {
+        const Error error = error_of(text);
+        EXPECT_EQ(error.code(), "job.type") << text;
+        EXPECT_EQ(error.place(), "my.toml:3") << text << error.what();
+        EXPECT_FALSE(error.remedy().empty());
+    }
+    const Error word = error_of("[layers]\nstrategy = \"optimum\"\n");
+    EXPECT_EQ(word.code(), "job.word");
+    EXPECT_EQ(word.place(), "my.toml:2");
+    EXPECT_NE(word.remedy().find("optimal"), std::string::npos);
+    const Error integer = error_of("[[tool]]\nnumber = 1.5\n");
+    EXPECT_EQ(integer.code(), "job.type");
+    const Error missing = error_of("[[tool]]\nnumber = 1\nkind = \"flat\"\n");
+    EXPECT_EQ(missing.code(), "job.missing_key");
+    EXPECT_NE(missing.message().find("diameter"), std::string::npos);
+}
+
+TEST(Job, RangesNameFileAndLine) {
+    Error error = error_of("[machine]\n\nclearance = -5\n");
+    EXPECT_EQ(error.code(), "job.range");
+    EXPECT_EQ(error.place(), "my.toml:3");
+    EXPECT_NE(error.message().find("machine.clearance"), std::string::npos);
+    error = error_of("[slabs]\nthicknesses = [25, 19]\n");
+    EXPECT_EQ(error.place(), "my.toml:2");
+    error = error_of("[slabs]\nthicknesses = []\n");
+    EXPECT_EQ(error.place(), "my.toml:2");
+    const std::string tool =
+        "[[tool]]\nnumber = 3\nkind = \"flat\"\ndiameter = 6\nflute_length = 25\nstickout = 40\nshank_diameter = 6\nholder_diameter = "
+        "32\nstepdown_max = 2\n";
+    error = error_of(tool + tool);
+    EXPECT_EQ(error.place(), "my.toml:11") << "the second tool's number";
+    error = error_of(tool + "stepdown_min = 3\n");
+    EXPECT_NE(error.message().find("stepdown_max"), std::string::npos);
+}
+
+TEST(Job, BrokenTomlNamesTheLine) {
+    for (const char* text :
+         {"[machine\n", "a = = 3\n", "x\n", "[machine]\nclearance = 1\nclearance = 2\n", "units = \"mm\n", "\xFF\xFE\n", "a = 1,5\n"}) {
+        const Error error = error_of(text);
+        EXPECT_EQ(error.code(), "job.syntax") << text;
+        EXPECT_EQ(error.place().rfind("my.toml:", 0), 0u) << error.place();
+    }
+}
+
+TEST(Job, GarbageNeverDoesMoreThanAnError) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    const std::string good = job_toml(Job{});
+    int refused = 0;
+    for (int round = 0; round < 300; ++round) {
+        std::string text = good;
+        for (int k = std::uniform_int_distribution<int>(1, 4)(random); k > 0; --k) {
+            const std::size_t at = std::uniform_int_distribution<std::size_t>(0, text.size() - 1)(random);
+            switch (std::uniform_int_distribution<int>(0, 2)(random)) {
+                case 0:
+                    text[at] = static_cast<char>(std::uniform_int_distribution<int>(0, 255)(random));
+                    break;
+                case 1:
+                    text.erase(at, 5);
+                    break;
+                default:
+                    text.insert(at, text.substr(std::uniform_int_distribution<std::size_t>(0, text.size() - 1)(random), 9));
+            }
+        }
+        try {
+            validate(parse_job(text, "garbage"));  // what it accepts is valid
+        } catch (const Error& error) {
+            EXPECT_EQ(error.kind(), ErrorKind::usage);
+            ++refused;
+        }
+    }
+    EXPECT_GT(refused, 100);
+}
+
+TEST(Job, ValidateRefusesWhatNoMachineHas) {
+    EXPECT_TRUE(is_valid([](Job&) {}));
+    EXPECT_FALSE(is_valid([](Job& j) { j.material.strength_mpa = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.material.shallow_limit_deg = 90; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.slabs.thicknesses.clear(); }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.slabs.thicknesses = {19, 19}; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.slabs.facing_allowance = 19; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.machine.acceleration = std::numeric_limits<double>::quiet_NaN(); }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.machine.rapid_feed = std::numeric_limits<double>::infinity(); }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.machine.base_board_cut = 20; }));
+    EXPECT_TRUE(is_valid([](Job& j) { j.machine.base_board_cut = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.bonding.max_pressure_mpa = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tolerances.cusp = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.layers.halving_resolution = 3; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.layers.min_layer = 18.6; })) << "no layer can be that thick";
+    EXPECT_FALSE(is_valid([](Job& j) { j.cutting.vertical_deg = 45; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.cutting.min_stepover = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools.clear(); }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].number = 1; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].stickout = 31; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].stepover = 1.1; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].flutes = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[2].flute_length = 5; })) << "no layer is left";
+}
+
+TEST(Job, TallestLayerIsTheLeastOfSlabAndTools) {
+    Job job;
+    EXPECT_DOUBLE_EQ(max_layer_thickness(job), 18.5);
+    job.slabs.thicknesses = {12, 50};
+    // Ball: 30 mm of flutes less 2 mm of clearance less R(1 - cos 89.5°).
+    EXPECT_NEAR(max_layer_thickness(job), 30 - 2 - 3.175 * (1 - std::cos(89.5 * std::numbers::pi / 180)), 1e-12);
+    job.tools[2].flute_length = 40;
+    job.tools[2].stickout = 50;
+    EXPECT_DOUBLE_EQ(max_layer_thickness(job), 30) << "the flat end mill's 32 mm less 2 mm";
+    job.tools[0].flute_length = 1;
+    EXPECT_DOUBLE_EQ(max_layer_thickness(job), 30) << "a face mill works on top only";
+}
+
+TEST(Job, ToolOfKind) {
+    Job job;
+    EXPECT_EQ(tool_of_kind(job, ToolKind::face).number, 1);
+    EXPECT_EQ(tool_of_kind(job, ToolKind::flat).number, 2);
+    EXPECT_EQ(tool_of_kind(job, ToolKind::ball).number, 3);
+    try {
+        (void)tool_of_kind(job, ToolKind::drill);
+        FAIL();
+    } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), ErrorKind::usage);
+        EXPECT_EQ(error.code(), "job.tool");
+    }
+}

@@ -1,0 +1,81 @@
+// Runs the built command as a user's shell would, with its output caught and its time taken.
+#pragma once
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace slabwright::support {
+
+struct CommandResult {
+    int exit = -1;   ///< −1 when a signal ended it
+    int signal = 0;  ///< that signal
+    std::string out, err;
+    double seconds = 0;          ///< from start to end
+    double after_interrupt = 0;  ///< from SIGINT to the end; 0 when it had ended before
+};
+
+/// @param interrupt_after seconds until SIGINT is sent; negative: never
+inline CommandResult run_command(const std::vector<std::string>& arguments, const std::vector<std::pair<std::string, std::string>>& environment = {},
+                                 double interrupt_after = -1) {
+    using Clock = std::chrono::steady_clock;
+    char out_name[] = "/tmp/command-out-XXXXXX", err_name[] = "/tmp/command-err-XXXXXX";
+    const int out = ::mkstemp(out_name), err = ::mkstemp(err_name);
+    if (out < 0 || err < 0) throw std::runtime_error("no temporary files");
+    const auto begin = Clock::now();
+    const pid_t child = ::fork();
+    if (child < 0) throw std::runtime_error("cannot fork");
+    if (child == 0) {
+        ::dup2(::open("/dev/null", O_RDONLY), 0);
+        ::dup2(out, 1);
+        ::dup2(err, 2);
+        for (const auto& [key, value] : environment) ::setenv(key.c_str(), value.c_str(), 1);
+        std::vector<char*> argv;
+        for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+        argv.push_back(nullptr);
+        ::execv(argv[0], argv.data());
+        ::_exit(127);
+    }
+    const auto since = [](Clock::time_point then) { return std::chrono::duration<double>(Clock::now() - then).count(); };
+    CommandResult result;
+    int status = 0;
+    bool interrupted = false;
+    Clock::time_point interrupt{};
+    while (::waitpid(child, &status, WNOHANG) == 0) {
+        if (interrupt_after >= 0 && !interrupted && since(begin) >= interrupt_after) {
+            interrupted = true;
+            interrupt = Clock::now();
+            ::kill(child, SIGINT);
+        }
+        ::usleep(2000);
+    }
+    result.seconds = since(begin);
+    if (interrupted) result.after_interrupt = since(interrupt);
+    if (WIFEXITED(status)) result.exit = WEXITSTATUS(status);
+    if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
+    const auto slurp = [](const char* name) {
+        std::ifstream in(name, std::ios::binary);
+        std::ostringstream text;
+        text << in.rdbuf();
+        return text.str();
+    };
+    result.out = slurp(out_name);
+    result.err = slurp(err_name);
+    ::close(out);
+    ::close(err);
+    ::unlink(out_name);
+    ::unlink(err_name);
+    return result;
+}
+
+}  // namespace slabwright::support
