@@ -117,7 +117,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 if (wanted && rest.nz > level_nz && floor_done(contact) && flat.drop(x, y).tip_z <= contact + 1e-3) wanted = false;
                 if (!wanted && points.empty()) continue;
                 // Short stretches between two wanted ones are travelled along the surface.
-                if (rest.tip_z < cut.layer.floor_below || (!wanted && ++idle * step > 3)) {
+                if (rest.tip_z < cut.layer.floor_below || (!wanted && static_cast<double>(++idle) * step > 3)) {
                     close();
                     continue;
                 }
