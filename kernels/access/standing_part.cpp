@@ -44,12 +44,6 @@ Polygon clip_z(const Polygon& in, double z, bool keep_above) {
     return out;
 }
 
-Point3 closest_on_segment(const Point3& c, const Point3& a, const Point3& b) {
-    const Point3 d = sub(b, a);
-    const double l = dot(d, d);
-    return l > 0 ? between(a, b, std::clamp(dot(sub(c, a), d) / l, 0.0, 1.0)) : a;
-}
-
 double distance_2d(P2 p, P2 a, P2 b) {
     const double dx = b.x - a.x, dy = b.y - a.y, l = dx * dx + dy * dy;
     const double t = l > 0 ? std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / l, 0.0, 1.0) : 0.0;
@@ -343,11 +337,53 @@ void StandingPart::walk(Enter&& enter, Visit&& visit) const {
 
 namespace {
 template <class NodeT>
-double xy_distance(const NodeT& n, double x, double y) {
+double xy_distance2(const NodeT& n, double x, double y) {
     const double dx = std::max({0.0, n.x0 - x, x - n.x1}), dy = std::max({0.0, n.y0 - y, y - n.y1});
-    return std::sqrt(dx * dx + dy * dy);
+    return dx * dx + dy * dy;
+}
+template <class NodeT>
+double xy_distance(const NodeT& n, double x, double y) {
+    return std::sqrt(xy_distance2(n, x, y));
+}
+/// Square of a lower bound of the distance between (x, y) and a facet.
+double xy_distance2(const std::array<Vec3f, 3>& v, double x, double y) {
+    const double x0 = std::min({v[0].x, v[1].x, v[2].x}), x1 = std::max({v[0].x, v[1].x, v[2].x});
+    const double y0 = std::min({v[0].y, v[1].y, v[2].y}), y1 = std::max({v[0].y, v[1].y, v[2].y});
+    const double dx = std::max({0.0, x0 - x, x - x1}), dy = std::max({0.0, y0 - y, y - y1});
+    return dx * dx + dy * dy;
 }
 }  // namespace
+
+/// Visits the facets of nodes with squared(box) < limit(), the nearer of siblings first, so that the limit falls early. Ties
+/// keep the order of the tree.
+template <class Squared, class Limit, class Visit>
+void StandingPart::walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit) const {
+    struct Item {
+        std::uint32_t level;
+        std::size_t index;
+        double d;
+    };
+    std::array<Item, 96> stack;
+    std::size_t size = 0;
+    if (facets_.empty()) return;
+    stack[size++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0, squared(levels_.back()[0])};
+    while (size > 0) {
+        const Item item = stack[--size];
+        if (!(item.d < limit())) continue;
+        if (item.level == 0) {
+            for (std::size_t k = item.index * kFan; k < std::min(facets_.size(), (item.index + 1) * kFan); ++k) visit(facets_[k]);
+            continue;
+        }
+        const std::size_t end = std::min(levels_[item.level - 1].size(), (item.index + 1) * kFan), first = size;
+        for (std::size_t k = end; k-- > item.index * kFan;) {
+            const double d = squared(levels_[item.level - 1][k]);
+            if (!(d < limit())) continue;
+            std::size_t at = size++;
+            for (; at > first && stack[at - 1].d < d; --at) stack[at] = stack[at - 1];
+            stack[at] = {item.level - 1, k, d};
+        }
+    }
+}
 
 Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
     const double top = z_top - kSheet;
@@ -381,14 +417,9 @@ Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& t
                     return dxy * dxy + dz * dz < reach * reach;
                 },
                 [&](const Facet& f) {
-                    {  // The facet's own box, before the exact distance.
-                        const double x0 = std::min({f.v[0].x, f.v[1].x, f.v[2].x}), x1 = std::max({f.v[0].x, f.v[1].x, f.v[2].x});
-                        const double y0 = std::min({f.v[0].y, f.v[1].y, f.v[2].y}), y1 = std::max({f.v[0].y, f.v[1].y, f.v[2].y});
-                        const double z1 = std::min<double>(top, std::max({f.v[0].z, f.v[1].z, f.v[2].z}));
-                        const double dx = std::max({0.0, x0 - mid[0], mid[0] - x1}), dy = std::max({0.0, y0 - mid[1], mid[1] - y1});
-                        const double dz = std::max(0.0, mid[2] - z1), reach = radius - result.depth + half;
-                        if (dx * dx + dy * dy + dz * dz >= reach * reach) return;
-                    }
+                    const double dz = std::max(0.0, mid[2] - std::min<double>(top, std::max({f.v[0].z, f.v[1].z, f.v[2].z})));
+                    const double reach = radius - result.depth + half;
+                    if (xy_distance2(f.v, mid[0], mid[1]) + dz * dz >= reach * reach) return;
                     below(f.v, top, [&](const Triangle& t) {
                         const Closest c = piece_distance(ca, cb, t, radius - result.depth);
                         if (radius - c.d > result.depth) found(radius - c.d, between(a, b, c.t));
@@ -524,13 +555,16 @@ StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_
         const double over = std::max(0.0, point[2] - top);
         best = {over, {0, 0, over}};
     }
-    walk(
+    walk_nearest(
         [&](const Node& n) {
-            if (n.z0 >= top) return false;
-            const double dxy = xy_distance(n, point[0], point[1]), dz = std::max(0.0, point[2] - std::min<double>(n.z1, top));
-            return dxy * dxy + dz * dz < best.distance * best.distance;
+            if (n.z0 >= top) return kInfinity;
+            const double dz = std::max(0.0, point[2] - std::min<double>(n.z1, top));
+            return xy_distance2(n, point[0], point[1]) + dz * dz;
         },
+        [&] { return best.distance * best.distance; },
         [&](const Facet& f) {
+            const double dz = std::max(0.0, point[2] - std::min<double>(std::max({f.v[0].z, f.v[1].z, f.v[2].z}), top));
+            if (xy_distance2(f.v, point[0], point[1]) + dz * dz >= best.distance * best.distance) return;
             below(f.v, top, [&](const Triangle& t) {
                 const RayDistance r = ray_distance(point, t);
                 if (r.d < best.distance) best = {r.d, r.vector};
@@ -545,26 +579,28 @@ StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, 
     if (point[2] >= top) return best;
     if (covered(point[0], point[1], top)) return {0, {0, 0, 0}};
     const P2 axis{point[0], point[1]};
-    walk([&](const Node& n) { return n.z0 < top && n.z1 > point[2] && xy_distance(n, axis.x, axis.y) < best.distance; },
-         [&](const Facet& f) {
-             if (f.v[0].z >= top && f.v[1].z >= top && f.v[2].z >= top) return;
-             Polygon poly;
-             poly.n = 3;
-             for (int k = 0; k < 3; ++k) poly.p[k] = to_point(f.v[k]);
-             poly = clip_z(clip_z(poly, top, false), point[2], true);
-             if (poly.n == 0) return;
-             if (distance_2d(poly, axis, axis) == 0) {
-                 best = {0, {0, 0, 0}};
-                 return;
-             }
-             for (int i = 0; i < poly.n; ++i) {
-                 Point3 s = poly.p[i], e = poly.p[(i + 1) % poly.n], from = point;
-                 s[2] = e[2] = from[2] = 0;
-                 const Point3 w = sub(from, closest_on_segment(from, s, e));
-                 const double d = std::sqrt(dot(w, w));
-                 if (d < best.distance) best = {d, w};
-             }
-         });
+    walk_nearest([&](const Node& n) { return n.z0 < top && n.z1 > point[2] ? xy_distance2(n, axis.x, axis.y) : kInfinity; },
+                 [&] { return best.distance * best.distance; },
+                 [&](const Facet& f) {
+                     if (xy_distance2(f.v, axis.x, axis.y) >= best.distance * best.distance) return;
+                     if (f.v[0].z >= top && f.v[1].z >= top && f.v[2].z >= top) return;
+                     Polygon poly;
+                     poly.n = 3;
+                     for (int k = 0; k < 3; ++k) poly.p[k] = to_point(f.v[k]);
+                     poly = clip_z(clip_z(poly, top, false), point[2], true);
+                     if (poly.n == 0) return;
+                     if (distance_2d(poly, axis, axis) == 0) {
+                         best = {0, {0, 0, 0}};
+                         return;
+                     }
+                     for (int i = 0; i < poly.n; ++i) {
+                         Point3 s = poly.p[i], e = poly.p[(i + 1) % poly.n], from = point;
+                         s[2] = e[2] = from[2] = 0;
+                         const Point3 w = sub(from, closest_on_segment(from, s, e));
+                         const double d = std::sqrt(dot(w, w));
+                         if (d < best.distance) best = {d, w};
+                     }
+                 });
     return best;
 }
 

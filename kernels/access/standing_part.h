@@ -76,6 +76,8 @@ private:
     };
     template <class Enter, class Visit>
     void walk(Enter&& enter, Visit&& visit) const;
+    template <class Squared, class Limit, class Visit>
+    void walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit) const;
     std::vector<Facet> facets_;              ///< in Morton order
     std::vector<std::vector<Node>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
     Box3 box_{};

@@ -12,12 +12,6 @@ double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] 
 Point3 cross(const Point3& a, const Point3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
 Point3 between(const Point3& a, const Point3& b, double t) { return {a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t}; }
 
-Point3 closest_on_segment(const Point3& c, const Point3& a, const Point3& b) {
-    const Point3 d = sub(b, a);
-    const double l = dot(d, d);
-    return l > 0 ? between(a, b, std::clamp(dot(sub(c, a), d) / l, 0.0, 1.0)) : a;
-}
-
 /// Which side of the line through two corners of a facet a point lies on. Both facets of an edge evaluate it from the
 /// same end, so that they cannot both claim or both miss a point.
 double side(const Vec3f& a, const Vec3f& b, double x, double y) {
@@ -38,6 +32,12 @@ std::uint64_t spread(std::uint32_t v) {  // 21 bits, two zeros between each
 }
 
 }  // namespace
+
+Point3 closest_on_segment(const Point3& c, const Point3& a, const Point3& b) {
+    const Point3 d = sub(b, a);
+    const double l = dot(d, d);
+    return l > 0 ? between(a, b, std::clamp(dot(sub(c, a), d) / l, 0.0, 1.0)) : a;
+}
 
 Point3 closest_on_triangle(const Point3& c, const Triangle& t) {
     const Point3 n = cross(sub(t[1], t[0]), sub(t[2], t[0]));

@@ -10,6 +10,9 @@ namespace slabwright {
 
 using Triangle = std::array<Point3, 3>;
 
+/// The nearest point of the segment from a to b.
+[[nodiscard]] Point3 closest_on_segment(const Point3& point, const Point3& a, const Point3& b);
+
 /// The nearest point of a triangle; of a degenerate one, the nearest of its edges.
 [[nodiscard]] Point3 closest_on_triangle(const Point3& point, const Triangle& triangle);
 

@@ -1,0 +1,613 @@
+#include "engine/simulate/simulate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "engine/simulate/reach.h"
+#include "kernels/access/closest_point.h"
+#include "kernels/errors.h"
+#include "kernels/parallel/parallel.h"
+#include "kernels/stock/stock.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr int kTileCells = 128;           // a side; a tile of 20 layers is 1.4 MB
+constexpr std::size_t kBlockSteps = 128;  // of a program under one box
+constexpr double kTaken = 0.002;          // mm: less is rounding of the text and of the stock's float
+constexpr double kStanding = 0.01;        // mm by which shank or holder must reach into stock to be reported
+
+/// The least box over some motions, widened by nothing yet.
+struct StepBox {
+    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300, z0 = 1e300;
+    void add(const ProgramStep& s) {
+        x0 = std::min(x0, s.x), x1 = std::max(x1, s.x);
+        y0 = std::min(y0, s.y), y1 = std::max(y1, s.y);
+        z0 = std::min(z0, s.z);
+    }
+    [[nodiscard]] bool meets(const CellGrid& g, double margin, double top) const {
+        return z0 < top && x0 - margin <= g.x(g.nx - 1) && g.x0 <= x1 + margin && y0 - margin <= g.y(g.ny - 1) && g.y0 <= y1 + margin;
+    }
+};
+
+StepBox box_of(const ProgramStep& a, const ProgramStep& b) {
+    StepBox box;
+    box.add(a);
+    box.add(b);
+    return box;
+}
+
+/// A program with what a tile needs to skip most of it.
+struct PreparedProgram {
+    const Program* program = nullptr;
+    const Tool* tool = nullptr;
+    CutterEnd end;
+    double widest = 0;  // radius of the widest of cutter, shank and holder
+    std::vector<StepBox> blocks;
+};
+
+CutterEnd cutter_end(const Tool& tool) {
+    switch (tool.kind) {
+        case ToolKind::ball:
+            return {CutterEnd::Form::ball, tool.diameter / 2, 0};
+        case ToolKind::drill:
+            return {CutterEnd::Form::cone, tool.diameter / 2, std::tan(31 * std::numbers::pi / 180)};  // a point of 118°
+        default:
+            return {CutterEnd::Form::flat, tool.diameter / 2, 0};
+    }
+}
+
+/// What one tile contributes to a program's and a layer's findings.
+struct TileProgram {
+    double removed = 0;
+    double lowest = 1e300, stock_top = -1e300;
+    Extreme rapid, over_flute, shank, holder;
+    std::uint32_t rapid_line = 0, over_flute_line = 0, shank_line = 0, holder_line = 0;
+    double most = 0;  // mm that any cell lost
+};
+struct TileLayer {
+    LayerFindings findings;
+    double squares = 0;
+};
+struct TileResult {
+    std::vector<TileProgram> programs;
+    std::vector<TileLayer> layers;
+    double board_cut = 0;
+    Extreme flask;
+};
+
+void raise(Extreme& a, double size, const Point3& where) {
+    if (size > a.size) a = {size, where};
+}
+/// Of two equal sizes the first stays, so the result depends on the order of tiles alone.
+void raise(Extreme& a, std::uint32_t& line, const Extreme& b, std::uint32_t b_line) {
+    if (b.size > a.size) a = b, line = b_line;
+}
+
+class Simulation {
+public:
+    Simulation(Context& context, const SimulationInput& input, const SimulationOptions& options)
+        : context_(context), input_(input), options_(options), part_(context, input.mesh), closest_(context, input.mesh) {}
+
+    SimulationReport run() {
+        check();
+        SimulationReport report;
+        report.cell = options_.cell > 0 ? options_.cell : simulation_cell(input_.tools, options_.cusp);
+        cell_ = report.cell;
+        const double width = input_.stock_max[0] - input_.stock_min[0], depth = input_.stock_max[1] - input_.stock_min[1];
+        report.nx = nx_ = std::max(1, static_cast<int>(std::ceil(width / cell_ - 1e-9)));
+        report.ny = ny_ = std::max(1, static_cast<int>(std::ceil(depth / cell_ - 1e-9)));
+        check_stack(report);
+        prepare(report);
+        check_motions(report);
+        cut(report);
+        judge(report);
+        return report;
+    }
+
+private:
+    void check() const {
+        auto bad = [](const std::string& what) { throw Error(ErrorKind::usage, "simulate.input", what, {}, "plan again"); };
+        if (input_.layers.empty()) bad("no layers");
+        for (int k = 0; k < 2; ++k)
+            if (!(input_.stock_max[k] > input_.stock_min[k]) || !std::isfinite(input_.stock_min[k]) || !std::isfinite(input_.stock_max[k]))
+                bad("the stock has no extent");
+        double below = -1e-6;
+        for (const SimulatedLayer& layer : input_.layers) {
+            if (!(layer.z_top > layer.z_bottom) || !(layer.slab_thickness > 0) || !(layer.z_bottom >= below) || !std::isfinite(layer.z_top))
+                bad("a layer that lies not on the one before, or has no height");
+            below = layer.z_top - 1e-6;
+        }
+        int layer = 0;
+        for (const Program& program : input_.programs) {
+            if (program.layer < layer || static_cast<std::size_t>(program.layer) >= input_.layers.size())
+                bad("programs that are not in the order of the layers");
+            layer = program.layer;
+        }
+    }
+
+    /// Whether slabs and layers can hold the part at all: what no slab covers cannot be missed by any cut.
+    void check_stack(SimulationReport& report) const {
+        const Box3 box = part_.box();
+        const double tolerance = 10 * StandingPart::kSheet;
+        const double over = box.max.z - input_.layers.back().z_top;
+        if (over > tolerance)
+            violate(report, "stack.short", fmt::format("the layers end {:.3f} mm below the pattern's top", over), nullptr, 0,
+                    Point3{box.max.x, box.max.y, box.max.z}, over);
+        const double beyond = std::max(
+            {input_.stock_min[0] - box.min.x, input_.stock_min[1] - box.min.y, box.max.x - input_.stock_max[0], box.max.y - input_.stock_max[1]});
+        if (beyond > tolerance)
+            violate(report, "stack.narrow", fmt::format("the pattern reaches {:.3f} mm past the slabs", beyond), nullptr, 0, {}, beyond);
+        double below = 0;
+        for (std::size_t l = 0; l < input_.layers.size(); ++l) {
+            const SimulatedLayer& layer = input_.layers[l];
+            if (std::abs(layer.z_bottom - below) > 1e-3)
+                violate(report, "stack.gap",
+                        fmt::format("layer {} begins at z {:.4f}, where the one below ends at {:.4f}", l + 1, layer.z_bottom, below), nullptr, 0, {},
+                        layer.z_bottom - below);
+            const double lacking = layer.z_top - layer.z_bottom - layer.slab_thickness;
+            if (lacking > 1e-6)
+                violate(report, "stack.thin", fmt::format("layer {} is {:.4f} mm taller than its slab", l + 1, lacking), nullptr, 0, {}, lacking);
+            below = layer.z_top;
+        }
+    }
+
+    const Tool* tool(int number) const {
+        for (const Tool& t : input_.tools)
+            if (t.number == number) return &t;
+        return nullptr;
+    }
+
+    void violate(SimulationReport& report, const std::string& code, const std::string& message, const Program* program, std::uint32_t line,
+                 std::optional<Point3> where, double size) const {
+        report.violations.push_back({code, message, program ? program->file : "", line, where, size});
+    }
+
+    void prepare(SimulationReport& report) {
+        for (const Program& program : input_.programs) {
+            PreparedProgram p;
+            p.program = &program;
+            p.tool = tool(program.tool);
+            if (!p.tool)
+                violate(report, "tool.unknown", fmt::format("loads tool {}, which the plan's library does not hold", program.tool), &program, 0, {},
+                        0);
+            else if (program.tool != program.planned_tool)
+                violate(report, "tool.wrong", fmt::format("loads tool {} where the plan names tool {}", program.tool, program.planned_tool), &program,
+                        0, {}, 0);
+            if (p.tool) {
+                p.end = cutter_end(*p.tool);
+                p.widest = std::max({p.tool->diameter, p.tool->shank_diameter, p.tool->holder_diameter}) / 2;
+            }
+            const auto& steps = program.steps;
+            for (std::size_t i = 1; i < steps.size(); i += kBlockSteps) {
+                StepBox box;
+                for (std::size_t k = i; k < std::min(steps.size(), i + kBlockSteps); ++k)
+                    if (steps[k - 1].known() && steps[k].known()) box.add(steps[k - 1]), box.add(steps[k]);
+                p.blocks.push_back(box);
+            }
+            prepared_.push_back(std::move(p));
+        }
+    }
+
+    /// All that needs no stock: the exact check, the spindle, the machine's travel, the time.
+    void check_motions(SimulationReport& report) {
+        report.programs.resize(input_.programs.size());
+        for (std::size_t i = 0; i < input_.programs.size(); ++i) {
+            const Program& program = input_.programs[i];
+            ProgramFindings& f = report.programs[i];
+            const SimulatedLayer& layer = input_.layers[static_cast<std::size_t>(program.layer)];
+            f.lowest = layer.z_top;
+            f.stock_top = -1e300;
+            f.seconds = program_seconds(program, input_.machine);
+            StepBox box;
+            double z1 = -1e300;
+            for (std::size_t k = 0; k < program.steps.size(); ++k) {
+                const ProgramStep& s = program.steps[k];
+                if (s.known()) box.add(s);
+                if (std::isfinite(s.z)) z1 = std::max(z1, s.z), box.z0 = std::min(box.z0, s.z);
+                if (!s.rapid() && !s.spindle && f.spindle_off_line == 0) f.spindle_off_line = s.line;
+                if (k == 0 || !program.steps[k - 1].known() || !s.known()) continue;
+                const ProgramStep& b = program.steps[k - 1];
+                (s.rapid() ? f.rapid_mm : f.cutting_mm) += std::hypot(s.x - b.x, s.y - b.y, s.z - b.z);
+            }
+            if (f.spindle_off_line != 0) violate(report, "spindle.off", "feeds while the spindle does not turn", &program, f.spindle_off_line, {}, 0);
+            const Machine& m = input_.machine;
+            auto travel = [&](const char* axis, double span, double limit) {
+                if (span > limit + 1e-6)
+                    violate(report, "travel.exceeded", fmt::format("moves over {:.3f} mm in {}; the machine travels {:.3f} mm", span, axis, limit),
+                            &program, 0, {}, span - limit);
+            };
+            if (box.x1 >= box.x0) {
+                travel("x", box.x1 - box.x0, m.travel_x);
+                travel("y", box.y1 - box.y0, m.travel_y);
+            }
+            if (z1 >= box.z0) travel("z", z1 - box.z0, m.travel_z);
+            if (prepared_[i].tool) f.gouge = check_gouge(context_, part_, layer.z_top, *prepared_[i].tool, program, {options_.gouge, 1e-5});
+            report.gouge_max = std::max(report.gouge_max, f.gouge.cutter.depth);
+            report.seconds += f.seconds;
+            report.cutting_mm += f.cutting_mm;
+            report.rapid_mm += f.rapid_mm;
+            context_.advance();
+        }
+    }
+
+    /// Tiles are independent: each builds its own stock from the first slab to the last and runs every program over it.
+    void cut(SimulationReport& report) {
+        const int tx = (nx_ + kTileCells - 1) / kTileCells, ty = (ny_ + kTileCells - 1) / kTileCells;
+        const std::size_t tiles = static_cast<std::size_t>(tx) * static_cast<std::size_t>(ty);
+        const std::uint64_t tile_bytes = static_cast<std::uint64_t>(kTileCells) * kTileCells * 4 * (input_.layers.size() + 4);
+        const std::uint64_t map_bytes =
+            options_.maps ? static_cast<std::uint64_t>(nx_) * static_cast<std::uint64_t>(ny_) * 4 * input_.layers.size() : 0;
+        const MemoryCharge charge(context_,
+                                  tile_bytes * static_cast<std::uint64_t>(context_.threads()) + map_bytes +
+                                      tiles * (input_.programs.size() * sizeof(TileProgram) + input_.layers.size() * sizeof(TileLayer)),
+                                  "the simulated stock");
+        report.layers.resize(input_.layers.size());
+        if (options_.maps)
+            for (LayerFindings& l : report.layers) l.map.assign(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), 0.0f);
+        std::vector<TileResult> results(tiles);
+        parallel_each(context_, tiles, [&](std::size_t t) {
+            const int i0 = static_cast<int>(t % static_cast<std::size_t>(tx)) * kTileCells,
+                      j0 = static_cast<int>(t / static_cast<std::size_t>(tx)) * kTileCells;
+            results[t] = run_tile(i0, j0, std::min(kTileCells, nx_ - i0), std::min(kTileCells, ny_ - j0), report);
+            context_.advance();
+        });
+        taken_.assign(prepared_.size(), 0);
+        std::vector<double> squares(input_.layers.size(), 0);
+        for (const TileResult& r : results) {
+            for (std::size_t i = 0; i < r.programs.size(); ++i) {
+                const TileProgram& p = r.programs[i];
+                ProgramFindings& f = report.programs[i];
+                f.removed_mm3 += p.removed * cell_ * cell_;
+                f.lowest = std::min(f.lowest, p.lowest);
+                f.stock_top = std::max(f.stock_top, p.stock_top);
+                taken_[i] = std::max(taken_[i], p.most);
+                raise(f.rapid, f.rapid_line, p.rapid, p.rapid_line);
+                raise(f.over_flute, f.over_flute_line, p.over_flute, p.over_flute_line);
+                raise(f.shank, f.shank_line, p.shank, p.shank_line);
+                raise(f.holder, f.holder_line, p.holder, p.holder_line);
+            }
+            for (std::size_t i = 0; i < r.layers.size(); ++i) {
+                const LayerFindings& l = r.layers[i].findings;
+                LayerFindings& f = report.layers[i];
+                f.cells += l.cells, f.gouge_cells += l.gouge_cells, f.over += l.over, f.unreachable += l.unreachable, f.missed += l.missed,
+                    f.waste += l.waste;
+                f.waste_mm3 += l.waste_mm3;
+                raise(f.gouge, l.gouge.size, l.gouge.where);
+                raise(f.left, l.left.size, l.left.where);
+                raise(f.unreachable_left, l.unreachable_left.size, l.unreachable_left.where);
+                raise(f.missed_left, l.missed_left.size, l.missed_left.where);
+                squares[i] += r.layers[i].squares;
+            }
+            report.board_cut = std::max(report.board_cut, r.board_cut);
+            raise(flask_cut_, r.flask.size, r.flask.where);
+        }
+        for (std::size_t i = 0; i < report.layers.size(); ++i) {
+            LayerFindings& f = report.layers[i];
+            f.left_rms = f.cells > 0 ? std::sqrt(squares[i] / static_cast<double>(f.cells)) : 0;
+            const std::uint64_t reachable = f.cells - f.unreachable;
+            f.within_share = reachable > 0 ? 1 - static_cast<double>(f.missed) / static_cast<double>(reachable) : 1;
+        }
+        for (const ProgramFindings& f : report.programs) report.removed_mm3 += f.removed_mm3;
+    }
+
+    TileResult run_tile(int i0, int j0, int nx, int ny, SimulationReport& report) const {
+        TileResult result;
+        result.programs.resize(prepared_.size());
+        result.layers.resize(input_.layers.size());
+        const CellGrid grid{input_.stock_min[0] + (i0 + 0.5) * cell_, input_.stock_min[1] + (j0 + 0.5) * cell_, cell_, nx, ny};
+        Stock stock(grid);
+        std::size_t next = 0;
+        for (std::size_t l = 0; l < input_.layers.size(); ++l) {
+            const SimulatedLayer& layer = input_.layers[l];
+            stock.add_slab(layer.z_bottom, layer.slab_thickness);
+            double top = layer.z_bottom + layer.slab_thickness;
+            for (; next < prepared_.size() && static_cast<std::size_t>(prepared_[next].program->layer) == l; ++next) {
+                result.programs[next].stock_top = top;
+                if (prepared_[next].tool && run_program(prepared_[next], stock, top, result.programs[next])) top = highest(stock);
+            }
+        }
+        for (std::size_t c = 0; c < grid.count(); ++c) result.board_cut = std::max(result.board_cut, stock.board_cut(c));
+        const std::vector<char> flask = flask_cells(grid);
+        std::vector<float> envelope(grid.count());
+        for (std::size_t l = 0; l < input_.layers.size(); ++l) {
+            context_.throw_if_cancelled();
+            measure_layer(l, stock, flask, envelope, result, i0, j0, report);
+        }
+        return result;
+    }
+
+    static double highest(const Stock& stock) {
+        double top = -1e300;
+        for (std::size_t c = 0; c < stock.grid().count(); ++c) top = std::max(top, stock.top(c));
+        return top;
+    }
+
+    /// Runs a program over a tile whose highest stock stands at `top`; whether it took anything.
+    bool run_program(const PreparedProgram& p, Stock& stock, double top, TileProgram& out) const {
+        const auto& steps = p.program->steps;
+        const CellGrid& grid = stock.grid();
+        const Tool& tool = *p.tool;
+        const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
+        bool any = false;
+        for (std::size_t block = 0; block < p.blocks.size(); ++block) {
+            if (!p.blocks[block].meets(grid, p.widest, top)) continue;
+            const std::size_t begin = 1 + block * kBlockSteps;
+            for (std::size_t i = begin; i < std::min(steps.size(), begin + kBlockSteps); ++i) {
+                const ProgramStep &a = steps[i - 1], &b = steps[i];
+                if (!a.known() || !b.known()) continue;
+                const StepBox box = box_of(a, b);
+                if (!box.meets(grid, p.widest, top)) continue;
+                const Point3 from{a.x, a.y, a.z}, to{b.x, b.y, b.z};
+                const double low = std::min(a.z, b.z);
+                if (box.meets(grid, radius, top)) {
+                    const CutEffect e = stock.cut(p.end, from, to);
+                    if (e.removed > 0) {
+                        any = true;
+                        out.removed += e.removed;
+                        out.lowest = std::min(out.lowest, e.lowest);
+                        out.most = std::max(out.most, e.deepest);
+                        const Point3 where{e.where[0], e.where[1], low};
+                        if (b.rapid() && e.deepest > kTaken && e.deepest > out.rapid.size) out.rapid = {e.deepest, where}, out.rapid_line = b.line;
+                        const double over = e.highest - low - tool.flute_length;
+                        if (tool.flute_length > 0 && over > kStanding && over > out.over_flute.size)
+                            out.over_flute = {over, where}, out.over_flute_line = b.line;
+                    }
+                }
+                auto follow = [&](double thick, double above, Extreme& extreme, std::uint32_t& line) {
+                    if (thick <= 0 || above <= 0 || low + above >= top) return;
+                    std::array<double, 2> where{};
+                    const double reach = stock.reach(thick, {a.x, a.y, a.z + above}, {b.x, b.y, b.z + above}, where);
+                    if (reach > kStanding && reach > extreme.size) extreme = {reach, {where[0], where[1], low + above}}, line = b.line;
+                };
+                if (shank > radius) follow(shank, tool.flute_length, out.shank, out.shank_line);
+                if (nose > radius) follow(nose, tool.stickout, out.holder, out.holder_line);
+            }
+        }
+        return any;
+    }
+
+    /// Which cells belong to the flask: by rows of crossings, in the even-odd manner (its loops are nested).
+    std::vector<char> flask_cells(const CellGrid& grid) const {
+        std::vector<char> inside(input_.flask.empty() ? 0 : grid.count(), 0);
+        if (inside.empty()) return inside;
+        std::vector<double> crossings;
+        for (int j = 0; j < grid.ny; ++j) {
+            const double y = grid.y(j) * kUnitsPerMm;
+            crossings.clear();
+            for (std::size_t l = 0; l < input_.flask.size(); ++l) {
+                const auto loop = input_.flask.loop(l);
+                for (std::size_t k = 0; k < loop.size(); ++k) {
+                    const Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
+                    if ((a.y <= y) == (b.y <= y)) continue;
+                    crossings.push_back((a.x + (y - a.y) / (static_cast<double>(b.y) - a.y) * (static_cast<double>(b.x) - a.x)) / kUnitsPerMm);
+                }
+            }
+            std::sort(crossings.begin(), crossings.end());
+            for (std::size_t k = 0; k + 1 < crossings.size(); k += 2)
+                for (int i = 0; i < grid.nx; ++i)
+                    if (grid.x(i) >= crossings[k] && grid.x(i) < crossings[k + 1]) inside[grid.index(i, j)] = 1;
+        }
+        return inside;
+    }
+
+    /// Compares one layer's stock with the part, when all programs of all layers have run.
+    void measure_layer(std::size_t l, const Stock& stock, const std::vector<char>& flask, std::vector<float>& envelope, TileResult& result, int i0,
+                       int j0, SimulationReport& report) const {
+        const SimulatedLayer& layer = input_.layers[l];
+        const CellGrid& grid = stock.grid();
+        TileLayer& out = result.layers[l];
+        LayerFindings& f = out.findings;
+        const float none = std::numeric_limits<float>::lowest();
+        part_.envelope_grid(grid.x0, grid.y0, grid.cell, grid.nx, grid.ny, layer.z_top, none, envelope.data());
+        const double limit = options_.cusp + options_.slack;
+        const double lowest = l == 0 && options_.board_cut >= 0 ? layer.z_bottom - options_.board_cut : -std::numeric_limits<double>::infinity();
+        const Reach reach(part_, input_.tools, layer.z_bottom, layer.z_top, lowest);
+        for (std::size_t c = 0; c < grid.count(); ++c) {
+            const auto nx = static_cast<std::size_t>(grid.nx);
+            const int i = static_cast<int>(c % nx), j = static_cast<int>(c / nx);
+            const double x = grid.x(i), y = grid.y(j), z = stock.surface(l, c);
+            if (!flask.empty() && flask[c]) {
+                raise(result.flask, layer.z_top - z, {x, y, z});
+                continue;
+            }
+            ++f.cells;
+            const bool beside = envelope[c] < layer.z_bottom + StandingPart::kSheet;
+            const double keep = beside ? layer.z_bottom : static_cast<double>(envelope[c]);
+            double over = z - keep;
+            if (over < 0) {
+                const double depth = depth_of_lost({x, y, z}, keep);
+                raise(f.gouge, depth, {x, y, z});
+                f.gouge_cells += depth > options_.gouge;
+                over = -depth;
+            } else if (over > 0) {
+                // Vertical height overstates what is left on a slope. Along the normal it is the distance from the finished surface,
+                // which beside the pattern is the layer's bottom.
+                if (over > options_.cusp) {
+                    const auto near = part_.from_shadow({x, y, z}, layer.z_top, over);
+                    over = std::min(over, near.distance);
+                    if (over > limit) judge_leftover(layer, reach, {x, y, z}, over, near, beside, z - keep, f);
+                }
+                raise(f.left, over, {x, y, z});
+                out.squares += over * over;
+            }
+            if (options_.maps)
+                report.layers[l].map[static_cast<std::size_t>(j0 + j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i0 + i)] =
+                    static_cast<float>(over);
+        }
+    }
+
+    /// How deep in the part the material was that a column has lost between the stock's surface and the part's: the greatest
+    /// distance of its points from the part's surface. (That of the lowest point alone would be 0 on the part's own bottom.)
+    double depth_of_lost(const Point3& surface, double keep) const {
+        const double height = keep - surface[2];
+        if (height <= options_.gouge) return height;
+        constexpr int kPoints = 8;
+        double depth = 0;
+        for (int k = 0; k < kPoints; ++k) {
+            const double z = surface[2] + height * k / kPoints, cap = std::min(height, keep - z);
+            if (cap <= depth) break;
+            depth = std::max(depth, closest_.query_unsigned({surface[0], surface[1], z}, cap).distance);
+        }
+        return depth;
+    }
+
+    /// Stock that stands `over` above the finished surface is excused as far as no tool reaches into it. What could have been taken
+    /// at a point of its surface is the greatest d for which tools reach the points d away from it towards the part, straight down and
+    /// down at 45° to four sides: a lump of that size, not the sliver beside what is out of reach. Found by halving.
+    void judge_leftover(const SimulatedLayer& layer, const Reach& reach, const Point3& s, double over, const StandingPart::Clearance& near,
+                        bool beside, double height, LayerFindings& f) const {
+        const double limit = options_.cusp + options_.slack;
+        Point3 n{0, 0, 1};
+        if (near.distance < height && near.distance > 0)
+            for (int k = 0; k < 3; ++k) n[k] = near.away[k] / near.distance;
+        const double h = std::sqrt(0.5);
+        const std::array<Point3, 6> ways{Point3{0, 0, 1}, n, {h, 0, h}, {-h, 0, h}, {0, h, h}, {0, -h, h}};
+        auto could_take = [&](double d) {
+            for (const Point3& w : ways)
+                if (!reach.reachable({s[0] - w[0] * d, s[1] - w[1] * d, std::max(layer.z_bottom, s[2] - w[2] * d)})) return false;
+            return true;
+        };
+        ++f.over;
+        if (!could_take(limit)) {
+            ++f.unreachable;
+            raise(f.unreachable_left, over, s);
+            return;
+        }
+        ++f.missed;
+        // Only the most matters, so a cell that cannot exceed it is not asked.
+        if (over > f.missed_left.size) {
+            double low = limit, high = over;
+            for (int i = 0; i < 5 && high - low > 0.02; ++i) {
+                const double mid = (low + high) / 2;
+                (could_take(mid) ? low : high) = mid;
+            }
+            raise(f.missed_left, low, s);
+        }
+        if (beside) {
+            ++f.waste;
+            f.waste_mm3 += height * cell_ * cell_;
+        }
+    }
+
+    /// Turns findings into violations, kind by kind.
+    void judge(SimulationReport& report) const {
+        auto each = [&](auto&& fn) {
+            for (std::size_t i = 0; i < report.programs.size(); ++i) fn(input_.programs[i], report.programs[i], i);
+        };
+        each([&](const Program& p, const ProgramFindings& f, std::size_t) {
+            if (f.gouge.cutter.depth > options_.gouge)
+                violate(report, "gouge.cutter",
+                        fmt::format("the cutter goes {:.4f} mm into the part ({} motions over {:.4f} mm)", f.gouge.cutter.depth, f.gouge.gouges,
+                                    options_.gouge),
+                        &p, f.gouge.cutter.line, f.gouge.cutter.tip, f.gouge.cutter.depth);
+        });
+        each([&](const Program& p, const ProgramFindings& f, std::size_t) {
+            if (f.gouge.shank.depth > options_.gouge)
+                violate(report, "contact.shank", fmt::format("the shank goes {:.4f} mm into the part", f.gouge.shank.depth), &p, f.gouge.shank.line,
+                        f.gouge.shank.tip, f.gouge.shank.depth);
+            if (f.gouge.holder.depth > options_.gouge)
+                violate(report, "contact.holder", fmt::format("the holder goes {:.4f} mm into the part", f.gouge.holder.depth), &p,
+                        f.gouge.holder.line, f.gouge.holder.tip, f.gouge.holder.depth);
+            if (f.shank.size > 0)
+                violate(report, "contact.shank", fmt::format("the shank runs into stock, {:.3f} mm deep", f.shank.size), &p, f.shank_line,
+                        f.shank.where, f.shank.size);
+            if (f.holder.size > 0)
+                violate(report, "contact.holder", fmt::format("the holder runs into stock, {:.3f} mm deep", f.holder.size), &p, f.holder_line,
+                        f.holder.where, f.holder.size);
+        });
+        each([&](const Program& p, const ProgramFindings& f, std::size_t) {
+            if (f.rapid.size > 0)
+                violate(report, "rapid.through_stock", fmt::format("a rapid takes {:.3f} mm of stock", f.rapid.size), &p, f.rapid_line, f.rapid.where,
+                        f.rapid.size);
+        });
+        each([&](const Program& p, const ProgramFindings& f, std::size_t) { unknown_start(report, p, f); });
+        each([&](const Program& p, const ProgramFindings& f, std::size_t) {
+            if (f.over_flute.size > 0)
+                violate(report, "flute.too_deep", fmt::format("cuts {:.3f} mm deeper than the flutes are long", f.over_flute.size), &p,
+                        f.over_flute_line, f.over_flute.where, f.over_flute.size);
+        });
+        each([&](const Program& p, const ProgramFindings&, std::size_t i) {
+            if (prepared_[i].tool && taken_[i] <= 1e-3) violate(report, "operation.empty", "removes nothing", &p, 0, {}, 0);
+        });
+        if (options_.board_cut >= 0 && report.board_cut > options_.board_cut + kStanding)
+            violate(report, "board.too_deep",
+                    fmt::format("the base board is cut {:.3f} mm deep, {:.3f} mm are allowed", report.board_cut, options_.board_cut), nullptr, 0, {},
+                    report.board_cut);
+        if (flask_cut_.size > options_.gouge)
+            violate(report, "gouge.flask", fmt::format("the flask is cut {:.3f} mm deep", flask_cut_.size), nullptr, 0, flask_cut_.where,
+                    flask_cut_.size);
+        for (std::size_t l = 0; l < report.layers.size(); ++l) {
+            const LayerFindings& f = report.layers[l];
+            if (f.gouge_cells > 0)
+                violate(report, "gouge.stock",
+                        fmt::format("layer {}: the stock is cut {:.4f} mm into the part, {:.2f} mm2 are deeper than {:.4f} mm", l + 1, f.gouge.size,
+                                    static_cast<double>(f.gouge_cells) * cell_ * cell_, options_.gouge),
+                        nullptr, 0, f.gouge.where, f.gouge.size);
+        }
+        for (std::size_t l = 0; l < report.layers.size(); ++l) {
+            const LayerFindings& f = report.layers[l];
+            if (f.missed_left.size > options_.leftover_limit)
+                violate(report, "left.too_much",
+                        fmt::format("layer {}: {:.3f} mm are left that a tool could take ({:.1f} mm2, {:.0f} mm3 of it waste beside the pattern)",
+                                    l + 1, f.missed_left.size, static_cast<double>(f.missed) * cell_ * cell_, f.waste_mm3),
+                        nullptr, 0, f.missed_left.where, f.missed_left.size);
+            if (f.within_share < options_.leftover_share)
+                violate(report, "left.missed",
+                        fmt::format("layer {}: only {:.3f} % of what tools reach is within {:.3f} mm", l + 1, 100 * f.within_share,
+                                    options_.cusp + options_.slack),
+                        nullptr, 0, f.missed_left.where, f.missed_left.size);
+        }
+    }
+
+    /// Until x and y are known only rapids above everything that stands are safe.
+    void unknown_start(SimulationReport& report, const Program& p, const ProgramFindings& f) const {
+        for (std::size_t i = 0; i < p.steps.size(); ++i) {
+            const ProgramStep& s = p.steps[i];
+            if (i > 0 && p.steps[i - 1].known()) return;
+            // The very first rise in z passes over heights that nobody knows; after it the height counts.
+            const double low = i > 0 && std::isfinite(p.steps[i - 1].z) ? std::min(p.steps[i - 1].z, s.z) : s.z;
+            if (std::isfinite(low) && low >= f.stock_top) continue;
+            violate(report, "rapid.unknown_start",
+                    std::isfinite(low)
+                        ? fmt::format("moves from a place that no line has set at z {:.3f}, while stock stands up to {:.3f}", low, f.stock_top)
+                        : std::string("moves in x or y from a height that no line has set"),
+                    &p, s.line, {}, std::isfinite(low) ? f.stock_top - low : 0);
+            return;
+        }
+    }
+
+    Context& context_;
+    const SimulationInput& input_;
+    SimulationOptions options_;
+    StandingPart part_;
+    ClosestPoint closest_;
+    double cell_ = 1;
+    int nx_ = 0, ny_ = 0;
+    std::vector<PreparedProgram> prepared_;
+    std::vector<double> taken_;  // mm, the most that any cell lost, by program
+    Extreme flask_cut_;
+};
+
+}  // namespace
+
+double simulation_cell(const std::vector<Tool>& tools, double cusp) {
+    double ball = 0, any = 0;
+    for (const Tool& t : tools) {
+        if (t.kind == ToolKind::ball && (ball == 0 || t.diameter < ball)) ball = t.diameter;
+        if (any == 0 || t.diameter < any) any = t.diameter;
+    }
+    const double radius = (ball > 0 ? ball : any) / 2;
+    return std::clamp(std::sqrt(2 * radius * std::max(cusp, 1e-4)) / 2, 0.05, 1.0);
+}
+
+SimulationReport simulate(Context& context, const SimulationInput& input, const SimulationOptions& options) {
+    return Simulation(context, input, options).run();
+}
+
+}  // namespace slabwright

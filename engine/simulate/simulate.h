@@ -1,0 +1,129 @@
+// What part would result if the machine ran these programs? Programs, tools, layers and the pattern go in as values,
+// a report comes out. Nothing of the planner's memory is used: all that is here was read from OUT.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/job.h"
+#include "engine/simulate/gouge.h"
+#include "engine/simulate/program.h"
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+#include "kernels/polygons/loops.h"
+
+namespace slabwright {
+
+/// A layer as plan.json states it, mm.
+struct SimulatedLayer {
+    double z_bottom = 0, z_top = 0, slab_thickness = 0;
+};
+
+/// All that the simulation starts from. The programs stand in the order of execution, layers ascending.
+struct SimulationInput {
+    MeshView mesh;  ///< pattern-base, millimetres
+    std::array<double, 2> stock_min{}, stock_max{};
+    std::vector<SimulatedLayer> layers;
+    std::vector<Tool> tools;
+    std::vector<Program> programs;
+    Machine machine;
+    Loops flask;  ///< what of the slab is to stay around the pattern, over each layer's whole height; empty: no flask
+};
+
+struct SimulationOptions {
+    double cell = 0;                ///< mm between the points of the stock; 0: simulation_cell()
+    double gouge = 0.01;            ///< mm along the normal
+    double cusp = 0.04;             ///< mm that finish passes may leave
+    double slack = 0.05;            ///< mm beyond the cusp that still count as done
+    double leftover_limit = 0.5;    ///< mm that nothing reachable may exceed
+    double leftover_share = 0.999;  ///< of the surface must be within cusp + slack, of what is reachable
+    double board_cut = -1;          ///< mm allowed into the base board; negative: not limited
+    bool maps = false;              ///< keep left-over and gouge of every point, LayerFindings::map
+};
+
+/// A size with the place where it is greatest, mm.
+struct Extreme {
+    double size = 0;
+    Point3 where{};
+};
+
+/// Something that must not be. The code's family names the kind of fault:
+/// stack.short, stack.narrow, stack.gap, stack.thin, gouge.cutter, gouge.stock, gouge.flask, contact.shank, contact.holder, rapid.through_stock, rapid.unknown_start,
+/// flute.too_deep, spindle.off, travel.exceeded, board.too_deep, operation.empty, tool.wrong, tool.unknown, left.missed,
+/// left.too_much; and by io/verify program.order, program.unplanned, program.missing, tool.table.
+struct Violation {
+    std::string code;
+    std::string message;  ///< one line, sizes with units
+    std::string file;     ///< the program, "" for what shows in the stock
+    std::uint32_t line = 0;
+    std::optional<Point3> where;
+    double size = 0;  ///< mm, or a count where the message says so
+};
+
+/// One layer when everything has been cut. Points are the stock's cells; shares are of all the slab's.
+struct LayerFindings {
+    std::uint64_t cells = 0;
+    Extreme gouge;                  ///< of the stock, along the normal
+    std::uint64_t gouge_cells = 0;  ///< deeper than the tolerance
+    Extreme left;                   ///< left over, along the normal, whether or not a tool could reach it
+    double left_rms = 0;
+    std::uint64_t over = 0;         ///< cells with more than cusp + slack left
+    std::uint64_t unreachable = 0;  ///< of those: no flat or ball end mill of the library gets cusp + slack deeper
+    Extreme unreachable_left;
+    std::uint64_t missed = 0;  ///< of those: a tool could
+    Extreme missed_left;       ///< how much of it a tool could have taken
+    double within_share = 1;   ///< reachable cells with at most cusp + slack
+    std::uint64_t waste = 0;   ///< cells beside the pattern (no part of it in the layer) that were missed
+    double waste_mm3 = 0;
+    /// With SimulationOptions::maps, row after row: left-over (positive) or gouge (negative) along the normal.
+    std::vector<float> map;
+};
+
+/// One program.
+struct ProgramFindings {
+    GougeReport gouge;
+    double removed_mm3 = 0;
+    double seconds = 0;  ///< under the machine's acceleration, dwells and tool change included
+    double cutting_mm = 0, rapid_mm = 0;
+    Extreme rapid;  ///< stock taken by a rapid
+    std::uint32_t rapid_line = 0;
+    Extreme over_flute;  ///< stock taken above the flutes' upper end
+    std::uint32_t over_flute_line = 0;
+    Extreme shank, holder;  ///< standing stock that they run into
+    std::uint32_t shank_line = 0, holder_line = 0;
+    double lowest = 0;     ///< z of the lowest point cut; the layer's top if none
+    double stock_top = 0;  ///< z of the highest stock when the program starts
+    std::uint32_t spindle_off_line = 0;
+};
+
+struct SimulationReport {
+    double cell = 0;
+    int nx = 0, ny = 0;
+    std::vector<LayerFindings> layers;
+    std::vector<ProgramFindings> programs;
+    double gouge_max = 0;  ///< mm, of the exact check over all programs
+    double seconds = 0;
+    double cutting_mm = 0, rapid_mm = 0, removed_mm3 = 0;
+    double board_cut = 0;               ///< mm
+    std::vector<Violation> violations;  ///< by kind, then in the order of the programs
+    [[nodiscard]] bool passed() const { return violations.empty(); }
+};
+
+/// The cell size that the tolerance asks for: a quarter of the distance of passes that leave the cusp, 2√(2Rc), under the smallest ball
+/// of the library (or its smallest cutter), within 0.05 and 1 mm.
+[[nodiscard]] double simulation_cell(const std::vector<Tool>& tools, double cusp);
+
+/// Runs everything. Stock at the cells' centres is exact, not sampled, so a gouge or left-over is what stands there; between
+/// the centres the exact check of every motion decides about gouges.
+/// @throws Error(usage) on layers or stock that make no sense, Error(no_plan, "memory.limit"), Error(cancelled)
+[[nodiscard]] SimulationReport simulate(Context& context, const SimulationInput& input, const SimulationOptions& options = {});
+
+/// Time of a program in seconds: trapezoids of speed under one acceleration, slowed at corners so that a path rounded by
+/// `corner` mm at most would need no more than that acceleration across (junction deviation).
+[[nodiscard]] double program_seconds(const Program& program, const Machine& machine, double corner = 0.02);
+
+}  // namespace slabwright

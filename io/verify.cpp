@@ -1,0 +1,447 @@
+#include "io/verify.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "io/gcode_reader.h"
+#include "io/job_keys.h"
+#include "io/json_text.h"
+#include "io/stl.h"
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+std::string read_text(const fs::path& path, const std::string& code) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw Error(ErrorKind::verification, code, "cannot be read", path.string(), "plan again");
+    std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    if (file.bad()) throw Error(ErrorKind::verification, code, "cannot be read to its end", path.string(), "plan again");
+    return text;
+}
+
+/// A value of plan.json with the way to it, so that what is missing can be named.
+class Field {
+public:
+    Field(const json& value, std::string way, const std::string& file) : value_(value), way_(std::move(way)), file_(file) {}
+
+    [[nodiscard]] Field operator[](const char* key) const {
+        if (!value_.is_object() || !value_.contains(key)) fail(way_ + "." + key, "is missing");
+        return {value_.at(key), way_ + "." + key, file_};
+    }
+    [[nodiscard]] bool has(const char* key) const { return value_.is_object() && value_.contains(key) && !value_.at(key).is_null(); }
+    [[nodiscard]] Field operator[](std::size_t i) const {
+        if (!value_.is_array() || i >= value_.size()) fail(way_ + "[" + std::to_string(i) + "]", "is missing");
+        return {value_.at(i), way_ + "[" + std::to_string(i) + "]", file_};
+    }
+    [[nodiscard]] std::size_t size() const {
+        if (!value_.is_array()) fail(way_, "is no list");
+        return value_.size();
+    }
+    [[nodiscard]] double number() const {
+        if (!value_.is_number()) fail(way_, "is no number");
+        const double v = value_.get<double>();
+        if (!std::isfinite(v)) fail(way_, "is not finite");
+        return v;
+    }
+    [[nodiscard]] int whole() const {
+        if (!value_.is_number_integer() || std::abs(number()) > 1e9) fail(way_, "is no whole number");
+        return value_.get<int>();
+    }
+    [[nodiscard]] std::string text() const {
+        if (!value_.is_string()) fail(way_, "is no text");
+        return value_.get<std::string>();
+    }
+    [[noreturn]] void fail(const std::string& way, const std::string& what) const {
+        throw Error(ErrorKind::verification, "verify.plan", way + " " + what, file_, "plan again");
+    }
+    [[noreturn]] void fail(const std::string& what) const { fail(way_, what); }
+
+private:
+    const json& value_;
+    std::string way_;
+    const std::string& file_;
+};
+
+template <class Enum, std::size_t N>
+Enum enumerator(const Word<Enum> (&words)[N], const Field& field) {
+    const std::string text = field.text();
+    for (const Word<Enum>& word : words)
+        if (text == word.text) return word.value;
+    field.fail("says \"" + text + "\", which is none of its words");
+}
+
+OperationKind operation_kind(const Field& field) {
+    const std::string text = field.text();
+    for (const OperationKind kind : {OperationKind::face, OperationKind::rough, OperationKind::semi_rough, OperationKind::finish,
+                                     OperationKind::corner, OperationKind::drill, OperationKind::edge})
+        if (text == name(kind)) return kind;
+    field.fail("says \"" + text + "\", which is no kind of operation");
+}
+
+Tool read_tool(const Field& t) {
+    Tool tool;
+    tool.number = t["number"].whole();
+    tool.kind = enumerator(kToolWords, t["kind"]);
+    tool.diameter = t["diameter"].number();
+    tool.flute_length = t["flute_length"].number();
+    tool.shank_diameter = t["shank_diameter"].number();
+    tool.holder_diameter = t["holder"]["diameter"].number();
+    tool.stickout = t["holder"]["stickout"].number();
+    if (!(tool.diameter > 0)) t["diameter"].fail("is no diameter");
+    if (t.has("name")) tool.name = t["name"].text();
+    if (t.has("max_rpm")) tool.max_rpm = t["max_rpm"].number();
+    return tool;
+}
+
+/// What of the job the simulation needs. A plan without a job is judged by the defaults.
+struct JobPart {
+    Job job;
+    bool stated = false;
+};
+JobPart read_job_part(const Field& plan) {
+    JobPart part;
+    if (!plan.has("job")) return part;
+    part.stated = true;
+    const Field job = plan["job"];
+    part.job.units = enumerator(kUnitWords, job["units"]);
+    const Field machine = job["machine"], tolerances = job["tolerances"];
+    Machine& m = part.job.machine;
+    for (const auto& [key, to] : {std::pair{"travel_x", &m.travel_x},
+                                  {"travel_y", &m.travel_y},
+                                  {"travel_z", &m.travel_z},
+                                  {"max_feed", &m.max_feed},
+                                  {"rapid_feed", &m.rapid_feed},
+                                  {"acceleration", &m.acceleration},
+                                  {"tool_change_s", &m.tool_change_s},
+                                  {"base_board_thickness", &m.base_board_thickness},
+                                  {"base_board_cut", &m.base_board_cut}}) {
+        *to = machine[key].number();
+    }
+    if (!(m.acceleration > 0) || !(m.rapid_feed > 0) || !(m.max_feed > 0)) machine.fail("states a machine that does not move");
+    part.job.tolerances.gouge = tolerances["gouge"].number();
+    part.job.tolerances.cusp = tolerances["cusp"].number();
+    part.job.tolerances.weld = tolerances["weld"].number();
+    return part;
+}
+
+/// Closed polygons as plan.json writes them.
+void add_polygon(Loops& loops, const Field& polygon) {
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+        const double x = polygon[i][std::size_t{0}].number(), y = polygon[i][std::size_t{1}].number();
+        if (std::abs(x) > 200000 || std::abs(y) > 200000) polygon.fail("reaches beyond 200 m");
+        loops.points.push_back({to_units(x), to_units(y)});
+    }
+    loops.close_loop();
+}
+
+fs::path find_pattern(const fs::path& directory, const std::string& file, const std::string& given) {
+    if (!given.empty()) return given;
+    const fs::path base = fs::path(file).filename();
+    if (base.empty()) throw Error(ErrorKind::input, "verify.no_pattern", "plan.json names no pattern", directory.string(), "name the STL with --stl");
+    const fs::path parent = fs::absolute(directory).lexically_normal();
+    for (const fs::path& place : {directory / base, (parent.has_filename() ? parent.parent_path() : parent.parent_path().parent_path()) / base, base})
+        if (std::error_code ignored; fs::exists(place, ignored)) return place;
+    throw Error(ErrorKind::input, "verify.no_pattern", "the pattern " + base.string() + " is neither in nor beside the folder", directory.string(),
+                "name the STL with --stl");
+}
+
+/// tool.tbl against the library: what the machine believes of a tool is what the paths were made for.
+void check_tool_table(const fs::path& path, const std::vector<Tool>& tools, std::vector<Violation>& violations) {
+    const std::string text = read_text(path, "verify.tool_table");
+    std::set<int> seen;
+    std::size_t at = 0;
+    std::uint32_t line_number = 0;
+    auto complain = [&](const std::string& message, double size) {
+        violations.push_back({"tool.table", message, path.filename().string(), line_number, {}, size});
+    };
+    while (at < text.size()) {
+        std::size_t end = text.find('\n', at);
+        if (end == std::string::npos) end = text.size();
+        std::string_view line(text.data() + at, end - at);
+        at = end + 1;
+        ++line_number;
+        if (const std::size_t comment = line.find(';'); comment != std::string_view::npos) line = line.substr(0, comment);
+        double t = -1, d = -1, z = 0;
+        std::size_t i = 0;
+        while (i < line.size()) {
+            if (line[i] == ' ' || line[i] == '\t' || line[i] == '\r') {
+                ++i;
+                continue;
+            }
+            const char letter = line[i++];
+            std::size_t stop = i;
+            while (stop < line.size() && line[stop] != ' ' && line[stop] != '\t' && line[stop] != '\r') ++stop;
+            std::string_view digits = line.substr(i, stop - i);
+            if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
+            double value = 0;
+            const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::fixed);
+            if (status != std::errc{} || rest != digits.data() + digits.size())
+                throw Error(ErrorKind::verification, "verify.tool_table", std::string("no number follows ") + letter,
+                            path.string() + ":" + std::to_string(line_number), "plan again");
+            if (letter == 'T') t = value;
+            if (letter == 'D') d = value;
+            if (letter == 'Z') z = value;
+            i = stop;
+        }
+        if (t < 0) continue;
+        const auto tool = std::find_if(tools.begin(), tools.end(), [&](const Tool& k) { return k.number == t; });
+        if (tool == tools.end()) {
+            complain(fmt::format("tool {} is not in the plan", t), 0);
+            continue;
+        }
+        seen.insert(tool->number);
+        if (std::abs(d - tool->diameter) > 1e-3)
+            complain(fmt::format("tool {} has the diameter {} where the plan says {}", t, d, tool->diameter), std::abs(d - tool->diameter));
+        if (z != 0) complain(fmt::format("tool {} has a length; the machine keeps what it measured", t), std::abs(z));
+    }
+    line_number = 0;
+    for (const Tool& tool : tools)
+        if (!seen.contains(tool.number)) complain(fmt::format("tool {} of the plan is not in the table", tool.number), 0);
+}
+
+void put_point(JsonText& text, const Point3& p) {
+    text.begin_array(JsonText::Shape::line);
+    for (const double v : p) text.rounded(v, 4);
+    text.end();
+}
+
+void put_extreme(JsonText& text, const char* key, const Extreme& e) {
+    text.key(key).begin_object(JsonText::Shape::line).key("mm").rounded(e.size, 5);
+    text.key("where");
+    if (e.size > 0) put_point(text, e.where);
+    else text.null();
+    text.end();
+}
+
+std::string report_json(const SimulationInput& input, const SimulationReport& r, const SimulationOptions& options, const std::string& pattern,
+                        bool job_stated) {
+    JsonText text;
+    text.begin_object();
+    text.key("schema").string("slabwright.verify/1");
+    text.key("passed").boolean(r.passed());
+    text.key("pattern").string(pattern);
+    text.key("limits").begin_object();
+    text.key("stated_by").string(job_stated ? "plan.json" : "defaults");
+    text.key("gouge_mm").exact(options.gouge);
+    text.key("left_over_mm").exact(options.cusp + options.slack);
+    text.key("left_over_share").exact(options.leftover_share);
+    text.key("left_over_max_mm").exact(options.leftover_limit);
+    text.key("board_cut_mm");
+    if (options.board_cut >= 0) text.exact(options.board_cut);
+    else text.null();
+    text.end();
+    text.key("resolution").begin_object();
+    text.key("cell_mm").exact(r.cell);
+    text.key("cells").begin_array(JsonText::Shape::line).integer(r.nx).integer(r.ny).end();
+    text.key("exact_check_error_mm").exact(StandingPart::kSheet);
+    text.end();
+    double gouge_stock = 0, left = 0, missed = 0, squares = 0;
+    std::uint64_t cells = 0, unreachable = 0, missed_cells = 0;
+    for (const LayerFindings& f : r.layers) {
+        gouge_stock = std::max(gouge_stock, f.gouge.size), left = std::max(left, f.left.size), missed = std::max(missed, f.missed_left.size);
+        squares += f.left_rms * f.left_rms * static_cast<double>(f.cells);
+        cells += f.cells, unreachable += f.unreachable, missed_cells += f.missed;
+    }
+    const double n = static_cast<double>(std::max<std::uint64_t>(1, cells)),
+                 reachable = static_cast<double>(std::max<std::uint64_t>(1, cells - unreachable));
+    text.key("totals").begin_object();
+    text.key("gouge_max_mm").rounded(r.gouge_max, 5);
+    text.key("gouge_stock_max_mm").rounded(gouge_stock, 5);
+    text.key("left_over_max_mm").rounded(left, 4);
+    text.key("left_over_rms_mm").rounded(std::sqrt(squares / n), 5);
+    text.key("left_over_missed_max_mm").rounded(missed, 4);
+    text.key("within_tolerance_share").rounded(1 - static_cast<double>(missed_cells) / reachable, 6);
+    text.key("unreachable_share").rounded(static_cast<double>(unreachable) / n, 6);
+    text.key("removed_mm3").rounded(r.removed_mm3, 0);
+    text.key("cutting_mm").rounded(r.cutting_mm, 1);
+    text.key("rapid_mm").rounded(r.rapid_mm, 1);
+    text.key("minutes").rounded(r.seconds / 60, 2);
+    text.key("board_cut_mm").rounded(r.board_cut, 4);
+    text.key("violations").count(r.violations.size());
+    text.end();
+    text.key("violations").begin_array();
+    for (const Violation& v : r.violations) {
+        text.begin_object(JsonText::Shape::line);
+        text.key("code").string(v.code).key("message").string(v.message);
+        text.key("file");
+        if (v.file.empty()) text.null();
+        else text.string(v.file);
+        text.key("line");
+        if (v.line == 0) text.null();
+        else text.count(v.line);
+        text.key("where");
+        if (v.where) put_point(text, *v.where);
+        else text.null();
+        text.key("size").rounded(v.size, 5).end();
+    }
+    text.end();
+    text.key("layers").begin_array();
+    for (std::size_t l = 0; l < r.layers.size(); ++l) {
+        const LayerFindings& f = r.layers[l];
+        const double area = r.cell * r.cell;
+        text.begin_object();
+        text.key("index").count(l + 1);
+        text.key("z_bottom").exact(input.layers[l].z_bottom).key("z_top").exact(input.layers[l].z_top);
+        put_extreme(text, "gouge", f.gouge);
+        text.key("gouge_mm2").rounded(static_cast<double>(f.gouge_cells) * area, 3);
+        put_extreme(text, "left_over", f.left);
+        text.key("left_over_rms_mm").rounded(f.left_rms, 5);
+        text.key("over_mm2").rounded(static_cast<double>(f.over) * area, 3);
+        text.key("unreachable_mm2").rounded(static_cast<double>(f.unreachable) * area, 3);
+        put_extreme(text, "unreachable", f.unreachable_left);
+        text.key("missed_mm2").rounded(static_cast<double>(f.missed) * area, 3);
+        put_extreme(text, "missed", f.missed_left);
+        text.key("within_tolerance_share").rounded(f.within_share, 6);
+        text.key("waste_mm2").rounded(static_cast<double>(f.waste) * area, 3);
+        text.key("waste_mm3").rounded(f.waste_mm3, 1);
+        text.end();
+    }
+    text.end();
+    text.key("programs").begin_array();
+    for (std::size_t i = 0; i < r.programs.size(); ++i) {
+        const ProgramFindings& f = r.programs[i];
+        const Program& p = input.programs[i];
+        text.begin_object(JsonText::Shape::line);
+        text.key("file").string("nc/" + p.file).key("layer").integer(p.layer + 1).key("kind").string(name(p.kind)).key("tool").integer(p.tool);
+        text.key("gouge_mm").rounded(f.gouge.cutter.depth, 5);
+        text.key("gouge_line");
+        if (f.gouge.cutter.line != 0) text.count(f.gouge.cutter.line);
+        else text.null();
+        text.key("shank_in_part_mm").rounded(f.gouge.shank.depth, 5).key("holder_in_part_mm").rounded(f.gouge.holder.depth, 5);
+        text.key("rapid_takes_mm").rounded(f.rapid.size, 4).key("removed_mm3").rounded(f.removed_mm3, 1).key("lowest_z").rounded(f.lowest, 4);
+        text.key("cutting_mm").rounded(f.cutting_mm, 1).key("rapid_mm").rounded(f.rapid_mm, 1).key("minutes").rounded(f.seconds / 60, 3).end();
+    }
+    text.end();
+    text.end();
+    return text.take();
+}
+
+}  // namespace
+
+Verification verify_folder(Context& context, const std::string& directory, const VerifyOptions& options) {
+    const fs::path out(directory);
+    const std::string plan_path = (out / "plan.json").string();
+    json document;
+    try {
+        document = json::parse(read_text(plan_path, "verify.plan"));
+    } catch (const json::exception& e) {
+        throw Error(ErrorKind::verification, "verify.plan", std::string("is no JSON: ") + e.what(), plan_path, "plan again");
+    }
+    const Field plan(document, "plan", plan_path);
+    if (plan["schema"].text() != "slabwright.plan/1") plan["schema"].fail("is not slabwright.plan/1");
+    if (plan["units"].text() != "mm") plan["units"].fail("is not mm");
+    const Frame frame = enumerator(kFrameWords, plan["frame"]);
+    const JobPart part = read_job_part(plan);
+
+    Verification result;
+    SimulationInput& input = result.input;
+    std::vector<Violation> violations;
+    input.machine = part.job.machine;
+    for (int k = 0; k < 2; ++k)
+        input.stock_min[k] = plan["stock"]["min"][static_cast<std::size_t>(k)].number(),
+        input.stock_max[k] = plan["stock"]["max"][static_cast<std::size_t>(k)].number();
+    const Field tools = plan["tools"];
+    for (std::size_t i = 0; i < tools.size(); ++i) input.tools.push_back(read_tool(tools[i]));
+    if (plan.has("flask")) {
+        add_polygon(input.flask, plan["flask"]["outer"]);
+        add_polygon(input.flask, plan["flask"]["inner"]);
+    }
+    check_tool_table(out / "tool.tbl", input.tools, violations);
+
+    const Field layers = plan["layers"];
+    std::set<std::string> planned;
+    std::string last;
+    for (std::size_t l = 0; l < layers.size(); ++l) {
+        const SimulatedLayer layer{layers[l]["z_bottom"].number(), layers[l]["z_top"].number(), layers[l]["slab_thickness"].number()};
+        input.layers.push_back(layer);
+        const Field operations = layers[l]["operations"];
+        for (std::size_t o = 0; o < operations.size(); ++o) {
+            const Field op = operations[o];
+            std::string file = op["file"].text();
+            if (file.rfind("nc/", 0) == 0) file.erase(0, 3);
+            if (file.empty() || file.find('/') != std::string::npos || file.find("..") != std::string::npos) op["file"].fail("is no file of nc/");
+            if (!planned.insert(file).second) op["file"].fail("names a program a second time");
+            if (file <= last) violations.push_back({"program.order", "its name sorts before that of the program before it, " + last, file, 0, {}, 0});
+            last = file;
+            const fs::path path = out / "nc" / file;
+            if (std::error_code ignored; !fs::exists(path, ignored)) {
+                violations.push_back({"program.missing", "plan.json names it, nc/ does not hold it", file, 0, {}, 0});
+                continue;
+            }
+            Program program = read_gcode(read_text(path, "verify.program"), "nc/" + file);
+            program.file = file;
+            program.layer = static_cast<int>(l);
+            program.kind = operation_kind(op["kind"]);
+            program.planned_tool = op["tool"].whole();
+            if (frame == Frame::layer_top)
+                for (ProgramStep& s : program.steps) s.z += layer.z_top;
+            input.programs.push_back(std::move(program));
+        }
+    }
+    if (std::error_code ignored; fs::is_directory(out / "nc", ignored)) {
+        std::vector<std::string> strangers;
+        for (const auto& entry : fs::directory_iterator(out / "nc"))
+            if (const std::string file = entry.path().filename().string(); !planned.contains(file)) strangers.push_back(file);
+        std::sort(strangers.begin(), strangers.end());
+        for (const std::string& file : strangers)
+            violations.push_back({"program.unplanned", "nc/ holds it, plan.json does not name it", file, 0, {}, 0});
+    }
+
+    const fs::path pattern = find_pattern(out, plan["input"]["file"].text(), options.stl);
+    StlOptions stl_options;
+    stl_options.units = part.job.units;
+    stl_options.weld_mm = part.job.tolerances.weld;
+    const StlMesh stl = read_stl(context, pattern.string(), stl_options);
+    if (const std::string planned_hash = plan["input"]["sha256"].text(); stl.input.sha256 != planned_hash)
+        throw Error(ErrorKind::input, "verify.other_pattern", "is not the pattern that was planned: its SHA-256 is " + stl.input.sha256,
+                    pattern.string(), "name the planned STL with --stl, or plan again");
+
+    SimulationOptions simulation;
+    simulation.cell = options.cell;
+    simulation.maps = options.maps;
+    simulation.gouge = part.job.tolerances.gouge;
+    simulation.cusp = part.job.tolerances.cusp;
+    simulation.board_cut = part.job.machine.base_board_cut;
+    if (simulation.board_cut < 0) {
+        // As deep as a ball end mill may pass the bottom: its radius.
+        simulation.board_cut = 0;
+        for (const Tool& tool : input.tools)
+            if (tool.kind == ToolKind::ball) simulation.board_cut = std::max(simulation.board_cut, tool.diameter / 2);
+    }
+    simulation.board_cut = std::min(simulation.board_cut, part.job.machine.base_board_thickness);
+    input.mesh = stl.mesh.view();
+    result.report = simulate(context, input, simulation);
+    input.mesh = {};
+    result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
+    result.json = report_json(input, result.report, simulation, pattern.filename().string(), part.stated);
+
+    if (options.write) {
+        const fs::path file = out / "verify.json", fresh = out / "verify.json.part";
+        {
+            std::ofstream stream(fresh, std::ios::binary | std::ios::trunc);
+            stream << result.json;
+            stream.flush();
+            if (!stream) throw Error(ErrorKind::input, "verify.write", "cannot be written", fresh.string(), "free space, or choose another folder");
+        }
+        std::error_code failed;
+        fs::rename(fresh, file, failed);
+        if (failed)
+            throw Error(ErrorKind::input, "verify.write", "cannot be written: " + failed.message(), file.string(),
+                        "free space, or choose another folder");
+    }
+    return result;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,31 @@
+// Proof: reads OUT as a stranger would, runs its programs, and says what part results.
+#pragma once
+
+#include <string>
+
+#include "engine/simulate/simulate.h"
+
+namespace slabwright {
+
+struct VerifyOptions {
+    std::string stl;    ///< the pattern; "" looks for the file that plan.json names: in OUT, beside OUT, in the working folder
+    double cell = 0;    ///< mm, SimulationOptions::cell
+    bool maps = false;  ///< keep the maps in the report
+    bool write = true;  ///< write OUT/verify.json
+};
+
+/// What was found, and the plan's own words that it was found about.
+struct Verification {
+    SimulationInput input;  ///< its mesh is not set: it ends with this function
+    SimulationReport report;
+    std::string json;  ///< what verify.json holds (schema slabwright.verify/1)
+};
+
+/// Reads plan.json, every program of nc/, tool.tbl and the STL, simulates, and writes OUT/verify.json (a whole file or none). The
+/// report's violations say what is wrong with programs and part; `report.passed()` is the verdict.
+/// @throws Error(verification) when OUT cannot be understood: plan.json missing or not of schema slabwright.plan/1 or without
+///   a key (names it), a program that read_gcode refuses (file:line)
+/// @throws Error(input) when the STL is missing, unreadable, or not the one that was planned (by its SHA-256)
+[[nodiscard]] Verification verify_folder(Context& context, const std::string& directory, const VerifyOptions& options = {});
+
+}  // namespace slabwright

@@ -1,0 +1,138 @@
+// The reader against the language as LinuxCNC documents it, and against everything that it must refuse.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "io/gcode_reader.h"
+#include "kernels/errors.h"
+
+using namespace slabwright;
+
+namespace {
+
+const std::string kHead = "(a comment)\nG21 G17 G90 G94 G40 G49 G80\nG54\nT3 M6\nG43 H3\nS18000 M3\nG4 P3\n";
+
+Program read(const std::string& body) { return read_gcode(kHead + body + "M5\nM2\n", "nc/test.ngc"); }
+
+/// The error's code and place.
+std::string refusal(const std::string& text) {
+    try {
+        (void)read_gcode(text, "nc/x.ngc");
+    } catch (const Error& e) {
+        EXPECT_EQ(e.kind(), ErrorKind::verification);
+        return e.code() + " " + e.place();
+    }
+    return "accepted";
+}
+std::string refused_body(const std::string& body) { return refusal(kHead + body + "M5\nM2\n"); }
+
+}  // namespace
+
+TEST(GcodeReader, ReadsWhatTheWriterEmits) {
+    const Program p = read("G0 Z30\nX10 Y-2.5\nZ1\nG1 Z-0.5 F1500\nX20.1234 F5000\nY4\nG0 Z30\n");
+    EXPECT_EQ(p.tool, 3);
+    EXPECT_EQ(p.spindle_rpm, 18000);
+    EXPECT_EQ(p.dwell_s, 3);
+    ASSERT_EQ(p.steps.size(), 7u);
+    EXPECT_FALSE(p.steps[0].known());
+    EXPECT_TRUE(std::isnan(p.steps[0].x));
+    EXPECT_EQ(p.steps[0].z, 30);
+    EXPECT_TRUE(p.steps[1].known() && p.steps[1].rapid());
+    EXPECT_EQ(p.steps[3].feed, 1500);
+    EXPECT_EQ(p.steps[3].z, -0.5);
+    EXPECT_EQ(p.steps[4].x, 20.1234);
+    EXPECT_EQ(p.steps[5].feed, 5000);
+    EXPECT_EQ(p.steps[5].line, 13u);
+    EXPECT_TRUE(p.steps[5].spindle);
+    EXPECT_TRUE(p.steps[6].rapid());
+}
+
+TEST(GcodeReader, SpindleAndUnits) {
+    const Program off = read("G0 Z30 X0 Y0\nM5\nG1 X5 F100\n");
+    EXPECT_FALSE(off.steps.back().spindle);
+    const Program slow = read("S0\nG0 X0 Y0 Z1\nG1 X1 F10\n");
+    EXPECT_FALSE(slow.steps.back().spindle) << "a spindle at S0 does not turn";
+    const Program inches = read("G20\nG0 X1 Y1 Z1\nG1 X2 F10\nG21\nX1\n");
+    EXPECT_DOUBLE_EQ(inches.steps[1].x, 50.8);
+    EXPECT_DOUBLE_EQ(inches.steps[1].feed, 254);
+    EXPECT_DOUBLE_EQ(inches.steps[2].x, 1);
+    const Program incremental = read("G0 X1 Y1 Z1\nG91\nG1 X2 Z-0.5 F10\nX2\nG90\nX0\n");
+    EXPECT_DOUBLE_EQ(incremental.steps[2].x, 5);
+    EXPECT_DOUBLE_EQ(incremental.steps[2].z, 0.5);
+    EXPECT_DOUBLE_EQ(incremental.steps[3].x, 0);
+    const Program stops = read_gcode("G0 Z1\nM2\nthis is never read\n", "x");
+    EXPECT_EQ(stops.steps.size(), 1u);
+    const Program small = read_gcode("%\nn10 g0 x 1.5 y-2 (lower case and blanks) z+3 ; the rest\nm30\n%\n", "x");
+    EXPECT_EQ(small.steps.at(0).x, 1.5);
+    EXPECT_EQ(small.steps.at(0).z, 3);
+}
+
+TEST(GcodeReader, ArcsStayWithinTheirTolerance) {
+    struct Case {
+        std::string text;
+        double cx, cy, r, sweep, end_z;
+    };
+    constexpr double pi = std::numbers::pi;
+    for (const Case& c : {Case{"G3 X0 Y10 I-10 J0\n", 0, 0, 10, pi / 2, 0}, Case{"G2 X0 Y10 I-10 J0\n", 0, 0, 10, -3 * pi / 2, 0},
+                          Case{"G3 X10 Y0 I-10\n", 0, 0, 10, 2 * pi, 0}, Case{"G2 X10 Y0 I-10 Z-3\n", 0, 0, 10, -2 * pi, -3},
+                          Case{"G3 X0 Y10 R10\n", 0, 0, 10, pi / 2, 0}, Case{"G3 X0 Y10 R-10\n", 10, 10, 10, 3 * pi / 2, 0},
+                          Case{"G2 X0 Y10 R10\n", 10, 10, 10, -pi / 2, 0}, Case{"G90.1 G3 X0 Y10 I0 J0\n", 0, 0, 10, pi / 2, 0}}) {
+        const Program p = read("G0 X10 Y0 Z0\nF1000\n" + c.text);
+        double length = 0;
+        ASSERT_GT(p.steps.size(), 3u) << c.text;
+        for (std::size_t i = 1; i < p.steps.size(); ++i) {
+            const ProgramStep &a = p.steps[i - 1], &b = p.steps[i];
+            EXPECT_NEAR(std::hypot(b.x - c.cx, b.y - c.cy), c.r, 1e-9) << c.text;
+            // The chord's middle lies inside the circle by at most the tolerance.
+            EXPECT_NEAR(std::hypot((a.x + b.x) / 2 - c.cx, (a.y + b.y) / 2 - c.cy), c.r - 0.0005, 0.00051) << c.text;
+            const double turn = (a.x - c.cx) * (b.y - c.cy) - (a.y - c.cy) * (b.x - c.cx);
+            EXPECT_GT(turn * c.sweep, 0) << c.text;
+            length += std::hypot(b.x - a.x, b.y - a.y);
+        }
+        EXPECT_NEAR(length, c.r * std::abs(c.sweep), 0.01) << c.text;
+        EXPECT_EQ(p.steps.back().z, c.end_z);
+    }
+    // Other planes: XZ is G18 with I and K, YZ is G19 with J and K; seen from +y, G3 turns from z towards x.
+    const Program xz = read("G0 X10 Y0 Z0\nF100\nG18 G3 X0 Z-10 I-10 K0\n");
+    for (const ProgramStep& s : xz.steps) EXPECT_NEAR(std::hypot(s.x, s.z), 10, 1e-9);
+    EXPECT_LT(xz.steps[xz.steps.size() / 2].z, 0);
+    const Program yz = read("G0 X0 Y10 Z0\nF100\nG19 G3 Y0 Z10 J-10 K0\n");
+    for (const ProgramStep& s : yz.steps) EXPECT_NEAR(std::hypot(s.y, s.z), 10, 1e-9);
+    EXPECT_GT(yz.steps[yz.steps.size() / 2].z, 0);
+}
+
+TEST(GcodeReader, RefusesWithFileAndLine) {
+    EXPECT_EQ(refused_body("G1 X1e3 F100\n"), "gcode.unknown_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 Z1\nG77\n"), "gcode.unknown_word nc/x.ngc:9");
+    EXPECT_EQ(refused_body("G53 G0 Z0\n"), "gcode.unknown_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G92 X0\n"), "gcode.unknown_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G10 L2 P1 X0\n"), "gcode.unknown_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("A90\n"), "gcode.unknown_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("M98 P100\n"), "gcode.unknown_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("#1=5\n"), "gcode.unknown_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 X#1\n"), "gcode.number nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 X1.2.3\n"), "gcode.number nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 X\n"), "gcode.number nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 X1 X2\n"), "gcode.twice nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 G1 X1\n"), "gcode.twice nc/x.ngc:8");
+    EXPECT_EQ(refused_body("(not closed\n"), "gcode.comment nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 X0 Y0 Z0\nG1 X1\n"), "gcode.feed nc/x.ngc:9");
+    EXPECT_EQ(refused_body("G1 Z1 F100\n"), "gcode.unknown_place nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 Z1\nG1 X1 Y1 F100\n"), "gcode.unknown_place nc/x.ngc:9");
+    EXPECT_EQ(refused_body("G91 G0 Z1\n"), "gcode.unknown_place nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G80\nX1\n"), "gcode.motion nc/x.ngc:9");
+    EXPECT_EQ(refused_body("M4\n"), "gcode.spindle nc/x.ngc:8");
+    EXPECT_EQ(refused_body("T2 M6\n"), "gcode.tool nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G43 H2\n"), "gcode.offset nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G55\n"), "gcode.offset nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 X1 Y1 Z1 I5\n"), "gcode.unused_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 X0 Y0 Z0\nG2 X1 Y1 F100\n"), "gcode.arc nc/x.ngc:9");
+    EXPECT_EQ(refused_body("G0 X0 Y0 Z0\nG2 X5 Y0 I1 F100\n"), "gcode.arc nc/x.ngc:9");
+    EXPECT_EQ(refused_body("G0 X0 Y0 Z0\nG2 X5 Y0 R1 F100\n"), "gcode.arc nc/x.ngc:9");
+    EXPECT_EQ(refused_body("G0 X300000\n"), "gcode.number nc/x.ngc:8");
+    EXPECT_EQ(refusal("G21\nM6\nM2\n"), "gcode.tool nc/x.ngc:2");
+    EXPECT_EQ(refusal(kHead + "G0 Z5\n").substr(0, 12), "gcode.no_end");
+    EXPECT_EQ(refusal("").substr(0, 12), "gcode.no_end");
+}

@@ -1,0 +1,437 @@
+// The simulator on a part whose programs are written by hand: the good ones pass, and each corruption is reported as what it is.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "engine/simulate/simulate.h"
+#include "kernels/errors.h"
+
+using namespace slabwright;
+
+namespace {
+
+struct Solid {
+    Mesh mesh;
+    void quad(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
+        for (const auto* t : {&a, &b, &c, &a, &c, &d}) {
+            mesh.vertices.push_back({static_cast<float>((*t)[0]), static_cast<float>((*t)[1]), static_cast<float>((*t)[2])});
+            if (mesh.vertices.size() % 3 == 0) {
+                const auto n = static_cast<std::uint32_t>(mesh.vertices.size());
+                mesh.facets.push_back({n - 3, n - 2, n - 1});
+            }
+        }
+    }
+    void box(const Point3& l, const Point3& h) {
+        quad({l[0], l[1], l[2]}, {l[0], h[1], l[2]}, {h[0], h[1], l[2]}, {h[0], l[1], l[2]});
+        quad({l[0], l[1], h[2]}, {h[0], l[1], h[2]}, {h[0], h[1], h[2]}, {l[0], h[1], h[2]});
+        quad({l[0], l[1], l[2]}, {h[0], l[1], l[2]}, {h[0], l[1], h[2]}, {l[0], l[1], h[2]});
+        quad({h[0], h[1], l[2]}, {l[0], h[1], l[2]}, {l[0], h[1], h[2]}, {h[0], h[1], h[2]});
+        quad({l[0], h[1], l[2]}, {l[0], l[1], l[2]}, {l[0], l[1], h[2]}, {l[0], h[1], h[2]});
+        quad({h[0], l[1], l[2]}, {h[0], h[1], l[2]}, {h[0], h[1], h[2]}, {h[0], l[1], h[2]});
+    }
+};
+
+/// Writes a program move by move.
+struct Writer {
+    Program p;
+    std::uint32_t line = 8;
+    Writer(const std::string& file, int layer, int tool, OperationKind kind) {
+        p.file = file;
+        p.layer = layer;
+        p.kind = kind;
+        p.tool = p.planned_tool = tool;
+        p.spindle_rpm = 18000;
+    }
+    Writer& to(double x, double y, double z, double feed = 0) {
+        p.steps.push_back({x, y, z, feed, line++, true});
+        return *this;
+    }
+    /// From wherever the machine stands to over (x, y).
+    Writer& start(double x, double y, double clearance) { return to(kUnknown, kUnknown, clearance).to(x, y, clearance); }
+};
+
+constexpr double kClear = 25;
+
+/// A 20 × 20 × 10 block in a 40 × 40 × 12 slab: faced by a 60 mm face mill, then cleared by a 10 mm flat end mill in rectangles.
+struct Block {
+    Solid solid;
+    SimulationInput input;
+    SimulationOptions options;
+
+    explicit Block(bool two_layers = false) {
+        solid.box({0, 0, 0}, {20, 20, two_layers ? 20.0 : 10.0});
+        input.stock_min = {-10, -10};
+        input.stock_max = {30, 30};
+        input.tools = {{1, ToolKind::face, "face", 60, 20, 20, 60, 60, 4, 0.0, 12000, 9000, 1000, 0.1, 4.0, 0.6},
+                       {2, ToolKind::flat, "flat", 10, 32, 10, 50, 40, 2, 0.5, 18000, 9000, 1500, 1, 6, 0.5},
+                       {3, ToolKind::ball, "ball", 6, 30, 6, 45, 32, 2, 0.5, 18000, 9000, 1500, 1, 3, 0.5}};
+        options.cell = 0.25;
+        add_layer(0);
+        if (two_layers) add_layer(10);
+    }
+    void add_layer(double z) {
+        const int layer = static_cast<int>(input.layers.size());
+        input.layers.push_back({z, z + 10, 12});
+        const std::string name = "L" + std::to_string(layer + 1);
+        input.programs.push_back(Writer(name + "_01", layer, 1, OperationKind::face)
+                                     .start(-45, 10, z + kClear)
+                                     .to(-45, 10, z + 10)
+                                     .to(65, 10, z + 10, 5000)
+                                     .to(65, 10, z + kClear)
+                                     .p);
+        Writer rough(name + "_02", layer, 2, OperationKind::rough);
+        rough.start(-20, -5, z + kClear);
+        for (const double level : {z + 5, z}) {
+            rough.to(-20, -5, level);
+            for (const double d : {9.0, 5.0})
+                rough.to(-d, -d, level, 5000)
+                    .to(20 + d, -d, level, 5000)
+                    .to(20 + d, 20 + d, level, 5000)
+                    .to(-d, 20 + d, level, 5000)
+                    .to(-d, -d, level, 5000);
+            rough.to(-5, -5, z + kClear).to(-20, -5, z + kClear);
+        }
+        input.programs.push_back(rough.p);
+    }
+    SimulationReport run(int threads = 0) {
+        input.mesh = solid.mesh.view();
+        Context context({.threads = threads});
+        return simulate(context, input, options);
+    }
+    Program& rough() { return input.programs[1]; }
+};
+
+std::string codes(const SimulationReport& r) {
+    std::string s;
+    for (const Violation& v : r.violations) s += (s.empty() ? "" : " ") + v.code;
+    return s;
+}
+const Violation* find(const SimulationReport& r, const std::string& code) {
+    for (const Violation& v : r.violations)
+        if (v.code == code) return &v;
+    return nullptr;
+}
+
+}  // namespace
+
+TEST(Simulate, GoodProgramsPass) {
+    Block block;
+    const SimulationReport r = block.run();
+    EXPECT_EQ(codes(r), "");
+    ASSERT_EQ(r.layers.size(), 1u);
+    EXPECT_EQ(r.nx, 160);
+    EXPECT_EQ(r.layers[0].cells, 160u * 160);
+    EXPECT_EQ(r.gouge_max, 0);
+    EXPECT_EQ(r.layers[0].gouge_cells, 0u);
+    EXPECT_LT(r.layers[0].left.size, 1e-4);
+    EXPECT_EQ(r.layers[0].within_share, 1);
+    EXPECT_NEAR(r.programs[0].removed_mm3, 40 * 40 * 2, 0.1);
+    EXPECT_NEAR(r.programs[1].removed_mm3, (1600 - 400) * 10, 1);
+    EXPECT_NEAR(r.removed_mm3, 3200 + 12000, 1);
+    EXPECT_NEAR(r.programs[1].lowest, 0, 1e-6);
+    EXPECT_NEAR(r.programs[0].stock_top, 12, 1e-6);
+    EXPECT_NEAR(r.programs[1].stock_top, 10, 1e-6);
+    EXPECT_EQ(r.board_cut, 0);
+}
+
+TEST(Simulate, TwoLayersPassAndAnyNumberOfThreadsAgrees) {
+    Block block(true);
+    const SimulationReport a = block.run(1), b = block.run(3);
+    EXPECT_EQ(codes(a), "");
+    ASSERT_EQ(a.layers.size(), 2u);
+    EXPECT_EQ(a.removed_mm3, b.removed_mm3);
+    EXPECT_EQ(a.seconds, b.seconds);
+    for (std::size_t l = 0; l < 2; ++l) {
+        EXPECT_EQ(a.layers[l].left_rms, b.layers[l].left_rms);
+        EXPECT_EQ(a.layers[l].left.where, b.layers[l].left.where);
+    }
+}
+
+TEST(Simulate, LoweredZIsAGouge) {
+    Block block;
+    for (ProgramStep& s : block.input.programs[0].steps)
+        if (!s.rapid()) s.z -= 0.5;
+    block.input.programs[0].steps[2].z -= 0.5;
+    const SimulationReport r = block.run();
+    const Violation* v = find(r, "gouge.cutter");
+    ASSERT_NE(v, nullptr) << codes(r);
+    EXPECT_EQ(v->file, "L1_01");
+    EXPECT_NEAR(v->size, 0.5, StandingPart::kSheet + 1e-6);
+    const Violation* stock = find(r, "gouge.stock");
+    ASSERT_NE(stock, nullptr);
+    EXPECT_NEAR(stock->size, 0.5, 1e-5);
+}
+
+TEST(Simulate, AShiftOfTwentyMicrometresIsCaughtWhereNoCellSees) {
+    Block block;
+    block.options.cell = 1;  // centres lie 0.5 mm inside the wall
+    for (ProgramStep& s : block.rough().steps) s.x += 0.02;
+    const SimulationReport r = block.run();
+    EXPECT_EQ(codes(r), "gouge.cutter");
+    EXPECT_NEAR(r.gouge_max, 0.02, 1e-6);
+    Block fine;
+    for (ProgramStep& s : fine.rough().steps) s.x += 0.008;
+    EXPECT_EQ(codes(fine.run()), "") << "within the tolerance";
+}
+
+TEST(Simulate, DroppedRetractIsARapidThroughStock) {
+    Block block;
+    auto& steps = block.rough().steps;
+    // The first level's retract and the way back, at depth: from inside the cleared ring straight across the block's corner.
+    for (std::size_t i = 0; i < steps.size(); ++i)
+        if (steps[i].rapid() && i > 3 && steps[i].z == kClear) {
+            steps[i].z = 5;
+            break;
+        }
+    steps.insert(steps.begin() + 13, {25, 25, 5, 0, 99, true});
+    const SimulationReport r = block.run();
+    EXPECT_NE(find(r, "gouge.cutter"), nullptr) << codes(r);
+    const Violation* v = find(r, "rapid.through_stock");
+    ASSERT_NE(v, nullptr) << codes(r);
+    EXPECT_EQ(v->file, "L1_02");
+    EXPECT_NEAR(v->size, 5, 1e-5);
+}
+
+TEST(Simulate, ARapidStraightDownIntoStock) {
+    Block block;
+    auto& steps = block.rough().steps;
+    steps[1].x = steps[2].x = -5;  // plunges where stock stands
+    const SimulationReport r = block.run();
+    const Violation* v = find(r, "rapid.through_stock");
+    ASSERT_NE(v, nullptr) << codes(r);
+    EXPECT_EQ(v->line, steps[2].line);
+    EXPECT_NEAR(v->size, 5, 1e-5);
+}
+
+TEST(Simulate, WrongAndUnknownTool) {
+    Block block;
+    block.rough().tool = 3;
+    SimulationReport r = block.run();
+    ASSERT_NE(find(r, "tool.wrong"), nullptr);
+    EXPECT_EQ(find(r, "tool.wrong")->file, "L1_02");
+    block.rough().tool = 7;
+    r = block.run();
+    ASSERT_NE(find(r, "tool.unknown"), nullptr);
+    EXPECT_NE(find(r, "left.too_much"), nullptr) << "and so nothing was roughed";
+}
+
+TEST(Simulate, DeletedLineLeavesStock) {
+    Block block;
+    auto& steps = block.rough().steps;
+    // The second level's inner rectangle loses its far corner: the way is cut short, through the block.
+    Block shorter;
+    shorter.rough().steps.erase(shorter.rough().steps.begin() + 17, shorter.rough().steps.begin() + 26);
+    const SimulationReport r = shorter.run();
+    EXPECT_NE(find(r, "left.too_much"), nullptr) << codes(r);
+    const LayerFindings& l = r.layers[0];
+    EXPECT_NEAR(l.missed_left.size, 5, 0.6);
+    EXPECT_GT(l.waste_mm3, 1000);
+    steps.erase(steps.begin() + 23);
+    const SimulationReport cut_short = block.run();
+    EXPECT_NE(find(cut_short, "gouge.cutter"), nullptr) << codes(cut_short);
+}
+
+TEST(Simulate, SpindleFlutesShankHolder) {
+    Block off;
+    for (ProgramStep& s : off.rough().steps) s.spindle = false;
+    EXPECT_EQ(codes(off.run()), "spindle.off");
+
+    Block flutes;
+    flutes.input.tools[1].flute_length = 3;  // steps of 5 mm
+    const SimulationReport f = flutes.run();
+    ASSERT_NE(find(f, "flute.too_deep"), nullptr) << codes(f);
+    EXPECT_NEAR(find(f, "flute.too_deep")->size, 2, 1e-4);
+
+    Block shank;
+    shank.input.tools[1].flute_length = 6;
+    shank.input.tools[1].shank_diameter = 12;  // on the lower level it begins at 6, and stands 1 mm into the block's wall
+    const SimulationReport s = shank.run();
+    ASSERT_NE(find(s, "contact.shank"), nullptr) << codes(s);
+    EXPECT_NEAR(find(s, "contact.shank")->size, 1, 1e-4);
+
+    Block holder;
+    holder.input.tools[1].stickout = 7;
+    holder.input.tools[1].holder_diameter = 40;
+    const SimulationReport h = holder.run();
+    EXPECT_NE(find(h, "contact.holder"), nullptr) << codes(h);
+}
+
+TEST(Simulate, EmptyOperationTravelAndUnknownStart) {
+    Block twice;
+    twice.input.programs.insert(twice.input.programs.begin() + 1, twice.input.programs[0]);
+    twice.input.programs[1].file = "L1_01b";
+    SimulationReport r = twice.run();
+    EXPECT_EQ(codes(r), "operation.empty");
+    EXPECT_EQ(r.violations[0].file, "L1_01b");
+
+    Block small;
+    small.input.machine.travel_x = 100;  // the face mill's way is 110 mm
+    EXPECT_EQ(codes(small.run()), "travel.exceeded");
+
+    Block low;
+    low.input.programs[0].steps[0].z = 11;  // the slab stands at 12
+    low.input.programs[0].steps[1].z = 11;
+    r = low.run();
+    ASSERT_NE(find(r, "rapid.unknown_start"), nullptr) << codes(r);
+    EXPECT_NEAR(find(r, "rapid.unknown_start")->size, 1, 1e-6);
+}
+
+TEST(Simulate, BoardAndLayersBelow) {
+    Block deep;
+    deep.options.board_cut = 2;
+    for (ProgramStep& s : deep.rough().steps)
+        if (s.z == 0) s.z = -3;
+    SimulationReport r = deep.run();
+    EXPECT_EQ(codes(r), "board.too_deep");
+    EXPECT_NEAR(r.board_cut, 3, 1e-5);
+
+    // The upper layer's cutter passes its bottom: beside the block there is nothing, so it may.
+    Block pass(true);
+    for (ProgramStep& s : pass.input.programs[3].steps)
+        if (s.z == 10) s.z = 8;
+    EXPECT_EQ(codes(pass.run()), "");
+    // But where the lower layer is wider, it may not.
+    Block step(true);
+    step.solid.box({-4, 5, 0}, {0, 15, 10});
+    for (ProgramStep& s : step.input.programs[3].steps)
+        if (s.z == 10) s.z = 9.9;
+    r = step.run();
+    const Violation* v = find(r, "gouge.stock");
+    EXPECT_NE(v, nullptr) << codes(r);
+}
+
+TEST(Simulate, WhatNoToolReachesIsExcusedAndTheRestIsNot) {
+    // A second block beside the first makes a slot of 4 mm: no tool enters it. The rectangles run outside both.
+    Block slot;
+    slot.solid = {};
+    slot.solid.box({0, 0, 0}, {8, 20, 10});
+    slot.solid.box({12, 0, 0}, {20, 20, 10});
+    slot.input.tools.pop_back();  // the ball would dip into it
+    SimulationReport r = slot.run();
+    EXPECT_EQ(codes(r), "") << r.layers[0].missed_left.where[0] << " " << r.layers[0].missed_left.where[1] << " " << r.layers[0].missed_left.where[2];
+    EXPECT_NEAR(static_cast<double>(r.layers[0].unreachable) * 0.0625, 80, 12);
+    EXPECT_NEAR(r.layers[0].unreachable_left.size, 2, 0.2);  // the middle of the slot is 2 mm from either wall
+    // A slot of 7 mm lets the ball in: that it was left is the plan's fault.
+    Block wide;
+    wide.solid = {};
+    wide.solid.box({0, 0, 0}, {6.5, 20, 10});
+    wide.solid.box({13.5, 0, 0}, {20, 20, 10});
+    r = wide.run();
+    EXPECT_NE(find(r, "left.too_much"), nullptr) << codes(r);
+    EXPECT_NEAR(r.layers[0].missed_left.size, 3.5, 0.3);
+    // ... unless the holder does not fit: too short a tool under a wide holder.
+    for (Tool& t : wide.input.tools) t.stickout = 0.5, t.holder_diameter = 60;
+    wide.input.tools[0].stickout = wide.input.tools[1].stickout = 50;
+    wide.input.tools[2].stickout = 2;
+    r = wide.run();
+    EXPECT_LT(r.layers[0].missed_left.size, 3.0);
+    EXPECT_GT(r.layers[0].unreachable, 0u);
+}
+
+TEST(Simulate, InnerCornersLeaveARoundThatIsExcused) {
+    // An L: its inner corner keeps a round of the end mill's radius 5 (or the ball's 3, which the plan did not use: missed).
+    Block ell;
+    ell.solid = {};
+    ell.solid.box({0, 0, 0}, {20, 10, 10});
+    ell.solid.box({0, 10, 0}, {10, 20, 10});
+    Writer corner("L1_03", 0, 2, OperationKind::rough);
+    corner.start(25, 25, kClear);
+    for (const double z : {5.0, 0.0})
+        corner.to(25, 25, z).to(25, 15, z, 3000).to(15, 15, z, 3000).to(15, 25, z, 3000).to(15, 25, kClear).to(25, 25, kClear);
+    ell.input.programs.push_back(corner.p);
+    SimulationReport r = ell.run();
+    EXPECT_GT(r.layers[0].missed, 0u) << "the ball gets deeper into the corner";
+    ell.input.tools.pop_back();
+    r = ell.run();
+    EXPECT_EQ(codes(r), "");
+    EXPECT_GT(r.layers[0].unreachable, 0u);
+    EXPECT_NEAR(r.layers[0].unreachable_left.size, 5 * (1 - std::sqrt(0.5)), 0.3);
+}
+
+TEST(Simulate, FlaskMustStay) {
+    Block block;
+    for (const auto& loop : {std::array<Point2, 4>{Point2{-95000, -95000}, {295000, -95000}, {295000, 295000}, {-95000, 295000}},
+                             std::array<Point2, 4>{Point2{-70000, -70000}, {-70000, 270000}, {270000, 270000}, {270000, -70000}}}) {
+        for (const Point2 p : loop) block.input.flask.points.push_back(p);
+        block.input.flask.close_loop();
+    }
+    const SimulationReport r = block.run();
+    ASSERT_NE(find(r, "gouge.flask"), nullptr) << codes(r);
+    EXPECT_NEAR(find(r, "gouge.flask")->size, 10, 1e-4);
+}
+
+TEST(Simulate, SlabsThatCannotHoldThePart) {
+    Block tall;
+    tall.solid = {};
+    tall.solid.box({0, 0, 0}, {20, 20, 11});
+    EXPECT_NE(find(tall.run(), "stack.short"), nullptr);
+    Block wide;
+    wide.solid = {};
+    wide.solid.box({-12, 0, 0}, {20, 20, 10});
+    EXPECT_NE(find(wide.run(), "stack.narrow"), nullptr);
+    Block thin;
+    thin.input.layers[0].slab_thickness = 9;
+    const SimulationReport r = thin.run();
+    EXPECT_NE(find(r, "stack.thin"), nullptr);
+    EXPECT_NE(find(r, "gouge.stock"), nullptr);
+}
+
+TEST(Simulate, TimeInClosedForm) {
+    Machine m;
+    m.acceleration = 1000, m.rapid_feed = 12000, m.max_feed = 9000, m.tool_change_s = 0;
+    Program p;
+    p.steps = {{0, 0, 0, 0, 1, true}, {100, 0, 0, 6000, 2, true}};
+    EXPECT_NEAR(program_seconds(p, m), 100.0 / 100 + 100.0 / 1000, 1e-9);  // L/v + v/a
+    p.steps[1].x = 1;                                                      // too short to reach 100 mm/s
+    EXPECT_NEAR(program_seconds(p, m), 2 * std::sqrt(1.0 / 1000), 1e-9);
+    p.steps = {{0, 0, 0, 0, 1, true}, {50, 0, 0, 6000, 2, true}, {100, 0, 0, 6000, 3, true}};
+    EXPECT_NEAR(program_seconds(p, m), 1.1, 1e-9);  // straight on: no stop
+    p.steps[2] = {0, 0, 0, 6000, 3, true};
+    EXPECT_NEAR(program_seconds(p, m), 2 * (0.5 + 0.1), 1e-9);  // back: a full stop
+    p.dwell_s = 3, m.tool_change_s = 15;
+    EXPECT_NEAR(program_seconds(p, m), 19.2, 1e-9);
+    // A corner of 90° bears √(a·δ·c/(1 − c)) with c = cos 45°.
+    m.tool_change_s = p.dwell_s = 0;
+    p.steps[2] = {50, 50, 0, 6000, 3, true};
+    const double c = std::sqrt(0.5), v = std::sqrt(1000 * 0.02 * c / (1 - c)),
+                 leg = 50.0 / 100 + (100.0 * 100 + (100 - v) * (100 - v)) / (2 * 1000 * 100);
+    EXPECT_NEAR(program_seconds(p, m), 2 * leg, 1e-9);
+}
+
+TEST(Simulate, MapsCancelMemoryAndNonsense) {
+    Block block;
+    block.options.maps = true;
+    block.rough().steps.resize(8);  // most of the rings are missing
+    SimulationReport r = block.run();
+    ASSERT_EQ(r.layers[0].map.size(), static_cast<std::size_t>(r.nx) * static_cast<std::size_t>(r.ny));
+    double most = 0;
+    for (const float v : r.layers[0].map) most = std::max<double>(most, v);
+    EXPECT_NEAR(most, r.layers[0].left.size, 1e-4);
+
+    block.input.mesh = block.solid.mesh.view();
+    Context cancelled;
+    cancelled.cancel();
+    try {
+        (void)simulate(cancelled, block.input, block.options);
+        FAIL() << "was not cancelled";
+    } catch (const Error& e) {
+        EXPECT_EQ(e.kind(), ErrorKind::cancelled);
+    }
+    Context poor({.threads = 1, .memory_bytes = 1000});
+    try {
+        (void)simulate(poor, block.input, block.options);
+        FAIL() << "took more than it may";
+    } catch (const Error& e) {
+        EXPECT_EQ(e.code(), "memory.limit");
+    }
+    Context context;
+    SimulationInput nonsense = block.input;
+    nonsense.layers[0].z_top = nonsense.layers[0].z_bottom;
+    EXPECT_THROW((void)simulate(context, nonsense, block.options), Error);
+    nonsense = block.input;
+    nonsense.stock_max[0] = nonsense.stock_min[0];
+    EXPECT_THROW((void)simulate(context, nonsense, block.options), Error);
+}
