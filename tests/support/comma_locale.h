@@ -7,7 +7,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <locale>
+#include <stdexcept>
 #include <string>
+
+#if defined(__SANITIZE_ADDRESS__)
+#include <sanitizer/lsan_interface.h>
+#endif
 
 namespace slabwright::support {
 
@@ -34,6 +39,9 @@ struct CommaScope {
     explicit CommaScope(const CommaLocale& locale) {
         if (!locale.made) return;
         ::setenv("LOCPATH", locale.folder.c_str(), 1);
+#if defined(__SANITIZE_ADDRESS__)
+        const __lsan::ScopedDisabler glibc_keeps_the_parsed_locpath;
+#endif
         try {
             before_ = std::locale::global(std::locale(locale.name));  // a named locale sets C's as well
             active = std::string(std::localeconv()->decimal_point) == ",";
