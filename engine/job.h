@@ -106,7 +106,7 @@ struct Cutting {
     double overlap_deg = 2;                              ///< both cut this far past the limit
     double vertical_deg = 89.5;                          ///< walls from here up go to the flat end mill
     double min_stepdown = 0.2, min_stepover = 0.2;       ///< floors of the finish steps; reported where they bite
-    double min_flat_area = 4.0;      ///< mm²; smaller up-facing flats get no level of their own, the ball covers them
+    double min_flat_area = 4.0;                          ///< mm²; smaller up-facing flats get no level of their own, the ball covers them
     double face_depth = 4.0;                             ///< deepest face-milling step
     double ramp_deg = 5;                                 ///< entry into stock
     double holder_clearance = 2.0;

@@ -19,12 +19,12 @@ void append_group(std::string& text, int code, const std::string& value) {
 }
 
 /// Real values are written with a point, as some readers tell them from integers by it.
-std::string real(std::string text) { return text.find('.') == std::string::npos ? text + ".0" : text; }
+std::string real(const std::string& text) { return text.find('.') == std::string::npos ? text + ".0" : text; }
 
 std::string real_mm(std::int64_t units) {
     std::string text;
     append_mm(text, units);
-    return real(std::move(text));
+    return real(text);
 }
 
 std::string layer_name(const Section& section, bool open) {

@@ -199,7 +199,8 @@ double LayerRules::slab_for(double thickness_mm) const {
     }
     if (best > 0) return best;
     if (thickest == 0) return request_.max_layer + request_.facing_allowance;  // no stock named: slabs made to fit the tallest layer
-    return thickest * static_cast<double>((need + to_ticks(thickest) - 1) / to_ticks(thickest));
+    const Ticks slabs = (need + to_ticks(thickest) - 1) / to_ticks(thickest);
+    return thickest * static_cast<double>(slabs);
 }
 
 std::size_t LayerRules::class_of(Ticks thickness) const {

@@ -238,9 +238,8 @@ Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& insi
         std::array<std::vector<Forbidden>, kBlock> found;
         for (std::uint32_t m = counts[block]; m < counts[block + 1]; ++m) {
             const SolidFacet& f = solid.facets[members[m]];
-            auto [first, last] = range(f);
-            first = std::max(first, begin);
-            last = std::min(last, end);
+            const auto crossed = range(f);
+            const std::size_t first = std::max(crossed.first, begin), last = std::min(crossed.second, end);
             std::array<Hull, kBlock> hulls;
             auto each_line = [&](auto&& element, auto... fixed) {
                 for (std::size_t l = first; l < last; ++l) element.meet(to_mm(lines[l]), hulls[l - begin], fixed...);
