@@ -118,6 +118,7 @@ std::string number(double value, int decimals) {
 }
 
 std::string duration(double minutes) {
+    if (minutes < 1) return fmt::format("{:.0f} s", minutes * 60);
     const long total = static_cast<long>(minutes + 0.5);
     return total < 60 ? fmt::format("{} min", total) : fmt::format("{} h {:02} min", total / 60, total % 60);
 }
