@@ -11,6 +11,7 @@
 #include "engine/schedule/motion_time.h"
 #include "engine/schedule/schedule.h"
 #include "kernels/errors.h"
+#include "kernels/features/section_areas.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/slicing/slicing.h"
 
@@ -114,10 +115,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     request.facing_allowance = job.slabs.facing_allowance;
     request.saddles_constrain = job.layers.saddles_constrain;
     request.features = plan.features;
-    request.section_area = [&](double z) {
-        const Plane plane{z, Side::above};
-        return std::abs(area(slice(context, view, {&plane, 1})[0].loops));
-    };
+    request.section_area = SectionAreas(context, view);
     LayerPlacement placement = job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request);
     plan.diagnostics.insert(plan.diagnostics.end(), placement.diagnostics.begin(), placement.diagnostics.end());
     std::vector<double> tops;
@@ -178,8 +176,11 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
         work.stock_min = plan.stock_min;
         work.stock_max = plan.stock_max;
         work.index = layer.index;
-        for (const Feature& f : plan.features)
-            if (f.type == FeatureType::up_flat && f.z_low > layer.z_bottom && f.z_low < layer.z_top) work.flats.push_back(&f);
+        for (const Feature& f : plan.features) {
+            if (f.type != FeatureType::up_flat || f.area < job.cutting.min_flat_area || f.z_low >= layer.z_top) continue;
+            if (f.z_low > layer.z_bottom) work.flats.push_back(&f);
+            if (f.z_low > work.floor_below) work.feet.push_back(&f);
+        }
         results[i] = plan_layer_paths(context, work);
         context.advance();
     });

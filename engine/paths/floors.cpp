@@ -12,8 +12,7 @@ Operation finish_floors(const LayerCut& cut) {
     const double r = tool.diameter / 2;
     const Cutter cutter{Cutter::Profile::flat, r};
     std::vector<double> heights;
-    for (const Feature* flat : cut.layer.flats)
-        if (flat->area >= cut.job.cutting.min_flat_area) heights.push_back(flat->z_low);
+    for (const Feature* flat : cut.layer.flats) heights.push_back(flat->z_low);
     std::sort(heights.begin(), heights.end(), std::greater<>());
     heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
     if (heights.empty()) return op;
@@ -46,6 +45,45 @@ Operation finish_floors(const LayerCut& cut) {
                     free[l].push_back(s);
         zigzag(path, cut, tool, lines, free, heights[i], std::min(cut.layer.z_top, heights[i] + cut.job.cutting.floor_allowance),
                [&](std::span<const std::int32_t> at) { return fibres(cut.context, cut.solid, inside[i].loops, cutter, heights[i], Axis::y, at); });
+        // Once along the border of the free region, where the zigzag's ends leave scallops.
+        const std::int32_t pitch = safe_pitch(r, cut.job.tolerances.gouge), z = to_units(heights[i]);
+        const FibreGrid grid = fibre_grid(cut.solid, cutter, pitch);
+        const Contours border = level_contours(cut.context, cut.solid, inside[i].loops, cutter, heights[i], grid);
+        const Fibres near_x = covering(cut.context, facets, r, Axis::x, grid.y), near_y = covering(cut.context, facets, r, Axis::y, grid.x);
+        auto near_floor = [&](Point2 p) {
+            const bool on_row = p.y % pitch == 0;
+            const auto& fibres_near = on_row ? near_x : near_y;
+            const std::int32_t line = ((on_row ? p.y - grid.y[0] : p.x - grid.x[0])) / pitch;
+            const double along = to_mm(on_row ? p.x : p.y);
+            for (const Forbidden& f : fibres_near.line(static_cast<std::size_t>(line)))
+                if (f.low < along && along < f.high) return true;
+            return false;
+        };
+        for (std::size_t c = 0; c < border.size(); ++c) {
+            const std::size_t first = border.starts[c], n = border.starts[c + 1] - first;
+            std::vector<char> wanted(n);
+            std::size_t start = 0;
+            for (std::size_t k = 0; k < n; ++k)
+                if (!(wanted[k] = near_floor(border.points[first + k]))) start = k;
+            std::vector<PathPoint> run;
+            auto close = [&] {
+                if (run.size() > 1) {
+                    run = simplify(run, simplify_tolerance_units(cut.job.tolerances.gouge));
+                    path.go_above({run[0].x, run[0].y});
+                    path.sink(to_units(std::min(cut.layer.z_top, heights[i] + cut.job.cutting.floor_allowance)));
+                    path.plunge(z);
+                    for (const PathPoint& p : run) path.cut({p.x, p.y}, z);
+                    path.retract();
+                }
+                run.clear();
+            };
+            for (std::size_t k = 0; k <= n; ++k) {
+                const std::size_t at = (start + k) % n;
+                if (wanted[at]) run.push_back({border.points[first + at].x, border.points[first + at].y, z});
+                else close();
+            }
+            close();
+        }
     }
     path.finish();
     return op;

@@ -102,8 +102,7 @@ Operation finish_walls(const LayerCut& cut) {
     if (low >= high) return op;
     // One level on every floor and on the layer's bottom, so that a wall is cut down to where it stands.
     std::vector<double> fixed{cut.layer.z_bottom};
-    for (const Feature* flat : cut.layer.flats)
-        if (flat->area >= cut.job.cutting.min_flat_area) fixed.push_back(flat->z_low);
+    for (const Feature* flat : cut.layer.flats) fixed.push_back(flat->z_low);
     std::sort(fixed.begin(), fixed.end(), std::greater<>());
     fixed.erase(std::unique(fixed.begin(), fixed.end()), fixed.end());
     std::vector<double> tips;
@@ -168,6 +167,16 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         op.stepdown = std::max(op.stepdown, step);
         tips.push_back(z);
     }
+    // The foot of a wall on a floor is a hollow: the ball turns from wall to floor within a small part of a step. Levels
+    // close above every floor cut what lies there, and only that.
+    const std::size_t regular = tips.size();
+    for (const Feature* flat : cut.layer.feet)
+        for (double above = tool.stepdown_max / 4; above > 0.02; above /= 2)
+            if (flat->z_low + above < high && flat->z_low + above > lowest) tips.push_back(flat->z_low + above);
+    std::sort(tips.begin() + static_cast<std::ptrdiff_t>(regular), tips.end(), std::greater<>());
+    tips.erase(std::unique(tips.begin() + static_cast<std::ptrdiff_t>(regular), tips.end()), tips.end());
+    const double foot_nz = std::cos(80 * degree);
+
     if (bite > 0)
         diagnostics.push_back({Severity::warning,
                                "finish.stepdown_floor",
@@ -193,6 +202,7 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             for (std::size_t k = 0; k < n; ++k) {
                 const double nz = level.nz[first + k], contact = tips[i] + r * (1 - nz);
                 if (nz > std::cos(split) || nz < -vertical || contact < cut.layer.z_bottom - 0.05 || contact > cut.layer.z_top + 1e-6) continue;
+                if (i >= regular && nz < foot_nz) continue;
                 wanted[k] = 1;
                 if (!flat || nz > vertical) continue;
                 const Point2 a = level.points[first + (k + n - 1) % n], p = level.points[first + k], b = level.points[first + (k + 1) % n];

@@ -33,6 +33,23 @@ void append(std::vector<PathPoint>& line, PathPoint p, double chord) {
     line.push_back(p);
 }
 
+// What the roughing cutter could not get at on the layer's bottom: its forbidden region there, shrunk by its radius, less
+// the part itself. Slivers under a tenth of a millimetre are left to the finish passes along the walls.
+Loops rough_unreached(const LayerCut& cut) {
+    const double flat_r = tool_of_kind(cut.job, ToolKind::flat).diameter / 2, bottom = cut.layer.z_bottom;
+    const Cutter cutter{Cutter::Profile::flat, flat_r};
+    const Contours border = std::move(cut.contours(cutter, {&bottom, 1}, safe_pitch(flat_r, cut.job.tolerances.gouge))[0]);
+    Loops forbidden;  // contours have the solid on their right, loops on their left
+    for (std::size_t c = 0; c < border.size(); ++c) {
+        for (std::size_t k = border.starts[c + 1]; k-- > border.starts[c];) forbidden.points.push_back(border.points[k]);
+        forbidden.close_loop();
+    }
+    const Plane plane{bottom, Side::above};
+    const Loops part = slice(cut.context, cut.layer.mesh, {&plane, 1}, {cut.job.tolerances.gap})[0].loops;
+    const Loops left = subtract(offset(forbidden, -flat_r, 0.01), offset(part, 0.05, 0.01));
+    return offset(offset(left, -0.05, 0.01), 0.05, 0.01);
+}
+
 }  // namespace
 
 Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
@@ -45,12 +62,14 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     std::vector<SolidFacet> shallow;
     for (const SolidFacet& f : cut.solid.facets)
         if (f.nz >= keep_nz && f.z_max > cut.layer.z_bottom && !(f.z_min == cut.layer.z_top)) shallow.push_back(f);
-    if (shallow.empty()) return op;
+    const Loops unreached = rough_unreached(cut);
+    if (shallow.empty() && unreached.empty()) return op;
 
     // How far the shallow facets face along y, by strips of y: that decides the step-over of the passes over them.
     double y_low = 1e300, y_high = -1e300;
     for (const SolidFacet& f : shallow)
         for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
+    for (const Point2& p : unreached.points) y_low = std::min(y_low, to_mm(p.y)), y_high = std::max(y_high, to_mm(p.y));
     constexpr double strip = 0.5;
     std::vector<float> facing(static_cast<std::size_t>((y_high - y_low) / strip) + 1, -1);  // −1: nothing shallow there
     for (const SolidFacet& f : shallow) {
@@ -83,53 +102,172 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const DropIndex ball(cut.context, cut.solid, {Cutter::Profile::ball, r});
     const double flat_r = tool_of_kind(cut.job, ToolKind::flat).diameter / 2;
     const DropIndex flat(cut.context, cut.solid, {Cutter::Profile::flat, flat_r - 0.02});
-    const Fibres reach = covering(cut.context, shallow, r, Axis::x, lines);
-    const double chord = safe_chord_mm(r, gouge), step = 0.75 * chord;
+    const double chord = safe_chord_mm(r, gouge);
+    // Samples stand on multiples of one step, so that those of neighbouring lines are neighbours.
+    const auto step = static_cast<std::int32_t>(0.75 * chord * kUnitsPerMm);
     auto floor_done = [&](double z) {
         for (const Feature* f : cut.layer.flats)
-            if (f->area >= cut.job.cutting.min_flat_area && std::abs(f->z_low - z) < 1e-6) return true;
+            if (std::abs(f->z_low - z) < 1e-6) return true;
         return false;
     };
 
-    std::vector<std::vector<Run>> runs(lines.size());
+    // A place of the ball on the surface: tip and contact.
+    struct Sample {
+        std::int32_t x = 0, z = 0;  // 0.1 µm
+        double tip = 0;             // mm
+        std::array<double, 3> contact{};
+        bool wanted = false, reachable = false, cut = false;
+    };
+    using Line = std::vector<Sample>;
+    auto sample = [&](std::int32_t ux, std::int32_t uy, std::span<const Span> waste) {
+        const double x = to_mm(ux), y = to_mm(uy);
+        const Rest rest = ball.drop(x, y);
+        Sample s;
+        s.x = ux;
+        s.contact = {x - r * rest.nx, y - r * rest.ny, rest.contact_z(r)};
+        const double contact = s.contact[2];
+        s.wanted = rest.nz >= keep_nz && !rest.on_cap && contact >= cut.layer.z_bottom - 0.02 && contact < cut.layer.z_top - 1e-6 &&
+                   rest.tip_z >= cut.layer.floor_below;
+        if (s.wanted && rest.nz > level_nz && floor_done(contact) && flat.drop(x, y).tip_z <= contact + 1e-3) s.wanted = false;
+        s.tip = rest.tip_z;
+        if (s.tip <= cut.layer.z_bottom)
+            for (const Span& w : waste)
+                if (ux >= w.low && ux <= w.high) s.wanted = true, s.tip = std::max(s.tip, cut.layer.z_bottom);
+        s.reachable = s.tip >= cut.layer.floor_below && !rest.on_cap;
+        if (s.reachable) s.z = to_units(s.tip) + 1;
+        return s;
+    };
+    // Between two places of the ball a cusp of about c·δ/(8r) stays, c the way between the contacts and δ the way of the
+    // ball: on a plane both are the same, in a hollow the contacts run ahead of the ball.
+    auto too_far = [&](const Sample& a, std::int32_t ya, const Sample& b, std::int32_t yb) {
+        if (!a.reachable || !b.reachable || (a.contact[2] < cut.layer.z_bottom && b.contact[2] < cut.layer.z_bottom)) return false;
+        const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
+        const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(ya) - to_mm(yb), a.tip - b.tip);
+        return c * d > 8 * r * cusp * 1.5;
+    };
+    const std::int32_t finest = to_units(0.02);
+    auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t y, std::span<const Span> waste) -> void {
+        if (!line.empty() && b.x - line.back().x <= step && b.x - line.back().x > 2 * finest && too_far(line.back(), y, b, y)) {
+            const Sample middle = sample(line.back().x + (b.x - line.back().x) / 2, y, waste);
+            self(self, line, middle, y, waste);
+            self(self, line, b, y, waste);
+            return;
+        }
+        line.push_back(b);
+    };
+
+    std::vector<Line> samples(lines.size());
+    std::vector<std::vector<Span>> wastes(lines.size());
+    const Fibres reach = covering(cut.context, shallow, r, Axis::x, lines);
     parallel_each(cut.context, lines.size(), [&](std::size_t l) {
-        const double y = to_mm(lines[l]);
-        for (const Forbidden& span : reach.line(l)) {
-            const double low = std::max(span.low, cut.low(0, r)), high = std::min(span.high, cut.high(0, r));
-            if (low >= high) continue;
-            const auto n = static_cast<std::size_t>(std::ceil((high - low) / step)) + 1;
-            std::vector<PathPoint> points;
-            std::size_t last_wanted = 0;  // length of `points` up to the last wanted one
-            std::size_t idle = 0;
-            auto close = [&] {
-                points.resize(last_wanted);
-                if (points.size() >= 2) runs[l].push_back({simplify(points, simplify_tolerance_units(gouge)), false});
-                points.clear();
-                last_wanted = idle = 0;
-            };
-            for (std::size_t k = 0; k < n; ++k) {
-                const std::int32_t ux = to_units(low + (high - low) * static_cast<double>(k) / static_cast<double>(n - 1));
-                const double x = to_mm(ux);
-                const Rest rest = ball.drop(x, y);
-                const double contact = rest.contact_z(r);
-                bool wanted = rest.nz >= keep_nz && !rest.on_cap && contact >= cut.layer.z_bottom - 0.02 && contact < cut.layer.z_top - 1e-6 &&
-                              rest.tip_z >= cut.layer.floor_below;
-                if (wanted && rest.nz > level_nz && floor_done(contact) && flat.drop(x, y).tip_z <= contact + 1e-3) wanted = false;
-                if (!wanted && points.empty()) continue;
-                // Short stretches between two wanted ones are travelled along the surface.
-                if (rest.tip_z < cut.layer.floor_below || (!wanted && static_cast<double>(++idle) * step > 3)) {
-                    close();
-                    continue;
-                }
-                append(points, {ux, lines[l], to_units(rest.tip_z) + 1}, chord * kUnitsPerMm);
-                if (wanted) {
-                    last_wanted = points.size();
-                    idle = 0;
-                }
+        // The surface within reach of the ball, and the waste that roughing could not get at, with one step around.
+        wastes[l] = line_spans(unreached, lines[l]);
+        std::vector<Span> spans = wastes[l];
+        for (const Forbidden& f : reach.line(l)) spans.push_back({f.low * kUnitsPerMm, f.high * kUnitsPerMm});
+        std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
+        const double low_limit = cut.low(0, r) * kUnitsPerMm, high_limit = cut.high(0, r) * kUnitsPerMm;
+        std::int32_t next = INT32_MIN;
+        for (const Span& span : spans) {
+            const auto first = static_cast<std::int32_t>(std::ceil(std::max(span.low - step, low_limit) / step)),
+                       last = static_cast<std::int32_t>(std::floor(std::min(span.high + step, high_limit) / step));
+            for (std::int32_t k = std::max(first, next); k <= last; ++k) {
+                next = k + 1;
+                append_between(append_between, samples[l], sample(k * step, lines[l], wastes[l]), lines[l], wastes[l]);
             }
-            close();
         }
     });
+    auto at = [](const Line& line, std::int32_t x) -> const Sample* {
+        const auto it = std::lower_bound(line.begin(), line.end(), x, [](const Sample& s, std::int32_t v) { return s.x < v; });
+        return it != line.end() && it->x == x ? &*it : nullptr;
+    };
+    // One sample and one line beyond what is wanted, so that the cusp at its rim is cut as well.
+    parallel_each(cut.context, lines.size(), [&](std::size_t l) {
+        Line& line = samples[l];
+        for (std::size_t i = 0; i < line.size(); ++i) {
+            Sample& s = line[i];
+            if (!s.reachable) continue;
+            s.cut = s.wanted || (i > 0 && s.x - line[i - 1].x <= step && line[i - 1].wanted) ||
+                    (i + 1 < line.size() && line[i + 1].x - s.x <= step && line[i + 1].wanted);
+            for (const std::size_t n : {l - 1, l + 1}) {
+                if (s.cut || n >= lines.size()) continue;
+                const Sample* beside = at(samples[n], s.x);
+                s.cut = beside && beside->wanted;
+            }
+        }
+    });
+    // Where the surface turns faster than the lines follow, lines in between, over those places only.
+    struct Between {
+        std::int32_t y = 0;
+        Line line;
+    };
+    std::vector<std::vector<Between>> between(lines.size());
+    parallel_each(cut.context, lines.size() - 1, [&](std::size_t l) {
+        auto refine = [&](auto&& self, const Line& a, std::int32_t ya, const Line& b, std::int32_t yb) -> void {
+            if (yb - ya < 2 * finest) return;
+            const std::int32_t y = ya + (yb - ya) / 2;
+            Line middle;
+            const std::vector<Span> waste = line_spans(unreached, y);
+            std::int32_t done = INT32_MIN;
+            for (const Sample& s : a) {
+                if (s.x % step != 0) continue;
+                const Sample* other = at(b, s.x);
+                if (!other || !too_far(s, ya, *other, yb)) continue;
+                for (const std::int32_t x : {s.x - step, s.x, s.x + step}) {
+                    if (x <= done) continue;
+                    append_between(append_between, middle, sample(x, y, waste), y, waste);
+                    done = x;
+                }
+            }
+            if (middle.empty()) return;
+            for (Sample& s : middle) s.cut = s.wanted;
+            self(self, a, ya, middle, y);
+            between[l].push_back({y, middle});
+            self(self, middle, y, b, yb);
+        };
+        refine(refine, samples[l], lines[l], samples[l + 1], lines[l + 1]);
+    });
+
+    auto runs_of = [&](const Line& line, std::int32_t y) {
+        std::vector<Run> runs;
+        std::vector<PathPoint> points;
+        std::size_t last_cut = 0;  // length of `points` up to the last one that cuts
+        std::int32_t before = 0, last_cut_x = 0;
+        auto close = [&] {
+            points.resize(last_cut);
+            if (points.size() >= 2) runs.push_back({simplify(points, simplify_tolerance_units(gouge)), false});
+            points.clear();
+            last_cut = 0;
+        };
+        for (const Sample& s : line) {
+            if (!points.empty() && s.x - before > step) close();
+            before = s.x;
+            if (!s.cut && points.empty()) continue;
+            // Short stretches between two that cut are travelled along the surface.
+            if (!s.reachable || (!s.cut && s.x - last_cut_x > to_units(3))) {
+                close();
+                continue;
+            }
+            append(points, {s.x, y, s.z}, chord * kUnitsPerMm);
+            if (s.cut) {
+                last_cut = points.size();
+                last_cut_x = s.x;
+            }
+        }
+        close();
+        return runs;
+    };
+    // First the even raster, then the lines between.
+    std::vector<std::int32_t> run_y;
+    std::vector<std::vector<Run>> runs;
+    for (std::size_t l = 0; l < lines.size(); ++l) {
+        run_y.push_back(lines[l]);
+        runs.push_back(runs_of(samples[l], lines[l]));
+    }
+    for (const auto& group : between)
+        for (const Between& b : group) {
+            run_y.push_back(b.y);
+            runs.push_back(runs_of(b.line, b.y));
+        }
 
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
                      cut.layer.z_top + 2);
@@ -137,7 +275,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         for (const PathPoint& p : points) path.cut({p.x, p.y}, p.z);
     };
     const double near = 3.0 * kUnitsPerMm;
-    for (std::size_t first = 0; first < lines.size(); ++first)
+    constexpr std::size_t look_ahead = 8;  // lines between may have nothing to cut here
+    for (std::size_t first = 0; first < runs.size(); ++first)
         for (std::size_t k = 0; k < runs[first].size(); ++k) {
             if (runs[first][k].done) continue;
             Run* run = &runs[first][k];
@@ -151,36 +290,41 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                     path.plunge(points[0].z);
                 }
                 follow(points);
-                // On to a run of the next line that begins or ends nearby, along the surface.
-                if (++l == lines.size()) break;
+                // On to a run of a next line that begins or ends nearby, along the surface.
                 Run* next = nullptr;
+                std::size_t next_line = l;
                 double best = near;
                 bool next_reversed = false;
-                for (Run& candidate : runs[l]) {
-                    if (candidate.done) continue;
-                    for (const bool back : {false, true}) {
-                        const PathPoint& p = back ? candidate.points.back() : candidate.points.front();
-                        const double d = std::hypot(static_cast<double>(p.x) - path.at().x, static_cast<double>(p.y) - path.at().y);
-                        if (d < best) best = d, next = &candidate, next_reversed = back;
+                for (std::size_t m = l + 1; m < std::min(runs.size(), l + 1 + look_ahead) && std::abs(run_y[m] - run_y[l]) < near; ++m)
+                    for (Run& candidate : runs[m]) {
+                        if (candidate.done) continue;
+                        for (const bool back : {false, true}) {
+                            const PathPoint& p = back ? candidate.points.back() : candidate.points.front();
+                            const double d = std::hypot(static_cast<double>(p.x) - path.at().x, static_cast<double>(p.y) - path.at().y);
+                            if (d < best) best = d, next = &candidate, next_reversed = back, next_line = m;
+                        }
                     }
-                }
                 if (!next) break;
                 const PathPoint from{path.at().x, path.at().y, path.z()}, to = next_reversed ? next->points.back() : next->points.front();
                 std::vector<PathPoint> link{from};
-                const auto n = static_cast<std::size_t>(std::ceil(best / (step * kUnitsPerMm)));
+                const auto n = static_cast<std::size_t>(std::ceil(best / step));
+                bool free = true;
                 for (std::size_t i = 1; i < n; ++i) {
                     const double t = static_cast<double>(i) / static_cast<double>(n);
                     PathPoint p{static_cast<std::int32_t>(from.x + t * (static_cast<double>(to.x) - from.x)),
                                 static_cast<std::int32_t>(from.y + t * (static_cast<double>(to.y) - from.y)), 0};
                     const double lerp = from.z + t * (static_cast<double>(to.z) - from.z);
                     const double rest = ball.drop(to_mm(p.x), to_mm(p.y)).tip_z;
-                    p.z = static_cast<std::int32_t>(std::ceil(std::max(lerp, rest * kUnitsPerMm)));
+                    free &= rest < cut.layer.z_top - 1e-3;  // not over the finished top
+                    p.z = static_cast<std::int32_t>(std::ceil(std::max(lerp, rest * kUnitsPerMm))) + 1;
                     append(link, p, chord * kUnitsPerMm);
                 }
+                if (!free) break;
                 append(link, to, chord * kUnitsPerMm);
                 follow(link);
                 run = next;
                 reversed = next_reversed;
+                l = next_line;
             }
             path.retract();
         }

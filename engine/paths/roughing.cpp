@@ -21,8 +21,7 @@ std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool) {
     const double floor = cut.job.cutting.floor_allowance, bottom = cut.layer.z_bottom, top = cut.layer.z_top;
     std::vector<RoughLevel> fixed;
     for (const Feature* flat : cut.layer.flats)
-        if (flat->area >= cut.job.cutting.min_flat_area && flat->z_low + floor < top && flat->z_low > bottom)
-            fixed.push_back({flat->z_low + floor, flat->z_low});
+        if (flat->z_low + floor < top && flat->z_low > bottom) fixed.push_back({flat->z_low + floor, flat->z_low});
     fixed.push_back({bottom, bottom});
     std::sort(fixed.begin(), fixed.end(), [](const RoughLevel& a, const RoughLevel& b) { return a.tip > b.tip; });
     std::vector<RoughLevel> levels;

@@ -12,11 +12,13 @@ namespace {
 
 struct Best {
     double tip_z = -std::numeric_limits<double>::infinity();
-    double nz = 0;
-    void offer(double z, double n) {
+    double nx = 0, ny = 0, nz = 0;
+    void offer(double z, double up, double east = 0, double north = 0) {
         if (z > tip_z) {
             tip_z = z;
-            nz = n;
+            nx = east;
+            ny = north;
+            nz = up;
         }
     }
 };
@@ -34,7 +36,7 @@ void drop_ball(const SolidFacet& f, double r, double x, double y, Best& best) {
         }
         if (inside) {
             const double pz = f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2];
-            best.offer(pz + r * n[2] - r, n[2]);
+            best.offer(pz + r * n[2] - r, n[2], n[0], n[1]);
             return;  // inside the prism no edge of this facet stands higher
         }
     }
@@ -45,7 +47,7 @@ void drop_ball(const SolidFacet& f, double r, double x, double y, Best& best) {
             const double d2 = (x - (*v)[0]) * (x - (*v)[0]) + (y - (*v)[1]) * (y - (*v)[1]);
             if (d2 >= r * r) continue;
             const double h = std::sqrt(r * r - d2);
-            best.offer((*v)[2] + h - r, h / r);
+            best.offer((*v)[2] + h - r, h / r, (x - (*v)[0]) / r, (y - (*v)[1]) / r);
         }
         const double dx = b[0] - a[0], dy = b[1] - a[1], dz = b[2] - a[2], l2 = dx * dx + dy * dy;
         if (l2 < 1e-18) continue;
@@ -59,7 +61,7 @@ void drop_ball(const SolidFacet& f, double r, double x, double y, Best& best) {
         if (foot < 0 || foot > l) continue;
         const double pz = a[2] + dz * foot / l;
         const double up = s * l / l3;
-        best.offer(pz + up - r, up / r);
+        best.offer(pz + up - r, up / r, (x - a[0] - foot * dx / l) / r, (y - a[1] - foot * dy / l) / r);
     }
 }
 
@@ -179,7 +181,7 @@ Rest DropIndex::drop(double x, double y) const {
     Rest rest;
     rest.tip_z = -std::numeric_limits<double>::infinity();
     if (columns_ == 0) return rest;
-    if (in_cap(x, y)) return {solid_.z_top, 1.0F, true};
+    if (in_cap(x, y)) return {solid_.z_top, 0.0F, 0.0F, 1.0F, true};
     const double r = cutter_.radius;
     if (x < solid_.min[0] - r || x > solid_.max[0] + r || y < solid_.min[1] - r || y > solid_.max[1] + r) return rest;
     auto clamp = [](double v, std::size_t n) { return std::min(n - 1, static_cast<std::size_t>(std::max(0.0, v))); };
@@ -197,6 +199,8 @@ Rest DropIndex::drop(double x, double y) const {
             }
         }
     rest.tip_z = best.tip_z;
+    rest.nx = static_cast<float>(best.nx);
+    rest.ny = static_cast<float>(best.ny);
     rest.nz = static_cast<float>(best.nz);
     return rest;
 }

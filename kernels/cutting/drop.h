@@ -13,9 +13,10 @@ namespace slabwright {
 
 /// Where a dropped cutter comes to rest.
 struct Rest {
-    double tip_z = 0;     ///< mm; −infinity where nothing is in reach
-    float nz = 0;         ///< upward part of the unit normal at the contact
-    bool on_cap = false;  ///< it rests on the layer's flat top
+    double tip_z = 0;      ///< mm; −infinity where nothing is in reach
+    float nx = 0, ny = 0;  ///< the unit normal at the contact (a flat cutter gives nz only)
+    float nz = 0;          ///< its upward part
+    bool on_cap = false;   ///< it rests on the layer's flat top
     /// Height of the contact.
     [[nodiscard]] double contact_z(double radius) const { return tip_z + radius * (1 - nz); }
 };

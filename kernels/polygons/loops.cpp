@@ -237,4 +237,28 @@ void nest(Loops& loops) {
     }
 }
 
+std::vector<Span> line_spans(const Loops& region, double y) {
+    std::vector<std::pair<double, int>> crossings;
+    for (std::size_t l = 0; l < region.size(); ++l) {
+        const auto loop = region.loop(l);
+        for (std::size_t i = 0; i < loop.size(); ++i) {
+            const Point2 a = loop[i], b = loop[i + 1 == loop.size() ? 0 : i + 1];
+            if ((a.y <= y) == (b.y <= y)) continue;
+            const double t = (y - a.y) / (static_cast<double>(b.y) - a.y);
+            crossings.emplace_back(a.x + t * (static_cast<double>(b.x) - a.x), a.y > b.y ? 1 : -1);
+        }
+    }
+    // Entering before leaving where two crossings coincide, so that touching loops make one span.
+    std::sort(crossings.begin(), crossings.end(),
+              [](const auto& a, const auto& b) { return a.first != b.first ? a.first < b.first : a.second > b.second; });
+    std::vector<Span> spans;
+    int depth = 0;
+    for (const auto& [x, turn] : crossings) {
+        if (depth <= 0 && depth + turn > 0) spans.push_back({x, x});
+        depth += turn;
+        if (depth <= 0 && depth - turn > 0) spans.back().high = x;
+    }
+    return spans;
+}
+
 }  // namespace slabwright

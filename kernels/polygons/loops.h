@@ -43,6 +43,12 @@ struct Loops {
 /// Winding number of the region's loops around p; points on the boundary count as either side.
 [[nodiscard]] int winding(const Loops& loops, Point2 p);
 
+/// Where the line at height y runs inside the region (winding number over 0): [low, high] in 0.1 µm, ascending.
+struct Span {
+    double low = 0, high = 0;
+};
+[[nodiscard]] std::vector<Span> line_spans(const Loops& region, double y);
+
 /// Fills `parents` by containment: the smallest larger loop around each. Loops may touch in points and along edges; where
 /// they cross (self-intersecting meshes) the answer is by one point inside each loop, and never cyclic. O(n) in points, plus
 /// for every loop the edge chains that one horizontal line meets.
