@@ -66,7 +66,8 @@ inline CanonProgram interpret_rs274(std::string_view program, std::string_view t
     } cleanup{folder};
     std::ofstream(folder + "/in.ngc", std::ios::binary) << program;
     std::ofstream(folder + "/tool.tbl", std::ios::binary) << tool_table;
-    const std::string command = "cd '" + folder + "' && rs274 -g -t tool.tbl in.ngc out.txt </dev/null >log.txt 2>&1";
+    // The interpreter keeps its tools in $HOME/.tool.mmap: two at once in one home die of bus errors.
+    const std::string command = "cd '" + folder + "' && HOME=\"$PWD\" rs274 -g -t tool.tbl in.ngc out.txt </dev/null >log.txt 2>&1";
     const int status = std::system(command.c_str());
     const auto slurp = [&](const char* name) {
         std::ifstream in(folder + "/" + name, std::ios::binary);
