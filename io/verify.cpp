@@ -385,6 +385,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
             program.layer = static_cast<int>(l);
             program.kind = operation_kind(op["kind"]);
             program.planned_tool = op["tool"].whole();
+            if (op.has("stepdown")) program.planned_stepdown = op["stepdown"].number();
             if (frame == Frame::layer_top)
                 for (ProgramStep& s : program.steps) s.z += layer.z_top;
             input.programs.push_back(std::move(program));

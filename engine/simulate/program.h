@@ -30,10 +30,11 @@ struct Program {
     std::string file;  ///< its name under nc/
     int layer = 0;     ///< index into the layers
     OperationKind kind{};
-    int tool = 0;            ///< that the program loads (T … M6)
-    int planned_tool = 0;    ///< that the plan names for it
-    double spindle_rpm = 0;  ///< highest
-    double dwell_s = 0;      ///< of all G4 together
+    int tool = 0;                 ///< that the program loads (T … M6)
+    int planned_tool = 0;         ///< that the plan names for it
+    double planned_stepdown = 0;  ///< mm, that the plan names for it; 0: none
+    double spindle_rpm = 0;       ///< highest
+    double dwell_s = 0;           ///< of all G4 together
     std::vector<ProgramStep> steps;
 };
 

@@ -7,11 +7,11 @@
 namespace slabwright {
 
 namespace {
-constexpr int kRounds = 16;        // of alternating projection from one start
+constexpr int kRounds = 40;        // of alternating projection from one start
 constexpr double kTouch = 1e-4;    // mm: a tool may touch the part, and this much is touching
 constexpr double kRests = 1e-3;    // mm: a floor this near under a flat end mill is touched, not cut
 constexpr double kCovered = 2e-4;  // mm by which covering a point may fall short
-constexpr double kStuck = 0.95;    // of the round before: the search has ended
+constexpr double kStuck = 0.99;    // of the round before: the search has ended
 constexpr int kSides = 4;          // starts beside the point
 }  // namespace
 
@@ -82,10 +82,10 @@ bool Reach::by(const Tool& tool, const Point3& point) const {
         }
         return false;
     };
-    const auto near = part_.from_shadow(point, z_top_, 4 * R);
+    const auto near = clear_of(point);
     Point3 start = point;
     const double d = length(near.away);
-    if (d > 0)
+    if (near.distance < R && d > 0)  // as far out as the tool still covers the point
         for (int k = 0; k < 3; ++k) start[k] += near.away[k] * (R / d);
     if (search(start)) return true;
     if (ball && search({point[0], point[1], point[2] + R})) return true;

@@ -20,6 +20,7 @@ namespace {
 constexpr int kTileCells = 128;           // a side; a tile of 20 layers is 1.4 MB
 constexpr std::size_t kBlockSteps = 128;  // of a program under one box
 constexpr double kTaken = 0.002;          // mm: less is rounding of the text and of the stock's float
+constexpr double kDeeper = 0.05;          // mm by which a roughing cut may pass its planned step
 constexpr double kStanding = 0.01;        // mm by which shank or holder must reach into stock to be reported
 
 /// The least box over some motions, widened by nothing yet.
@@ -66,8 +67,8 @@ CutterEnd cutter_end(const Tool& tool) {
 struct TileProgram {
     double removed = 0;
     double lowest = 1e300, stock_top = -1e300;
-    Extreme rapid, over_flute, shank, holder;
-    std::uint32_t rapid_line = 0, over_flute_line = 0, shank_line = 0, holder_line = 0;
+    Extreme rapid, over_flute, deepest, shank, holder;
+    std::uint32_t rapid_line = 0, over_flute_line = 0, deepest_line = 0, shank_line = 0, holder_line = 0;
     double most = 0;  // mm that any cell lost
 };
 struct TileLayer {
@@ -269,6 +270,7 @@ private:
                 taken_[i] = std::max(taken_[i], p.most);
                 raise(f.rapid, f.rapid_line, p.rapid, p.rapid_line);
                 raise(f.over_flute, f.over_flute_line, p.over_flute, p.over_flute_line);
+                raise(f.deepest, f.deepest_line, p.deepest, p.deepest_line);
                 raise(f.shank, f.shank_line, p.shank, p.shank_line);
                 raise(f.holder, f.holder_line, p.holder, p.holder_line);
             }
@@ -354,6 +356,7 @@ private:
                         out.most = std::max(out.most, e.deepest);
                         const Point3 where{e.where[0], e.where[1], low};
                         if (b.rapid() && e.deepest > kTaken && e.deepest > out.rapid.size) out.rapid = {e.deepest, where}, out.rapid_line = b.line;
+                        if (e.deepest > out.deepest.size) out.deepest = {e.deepest, where}, out.deepest_line = b.line;
                         const double over = e.highest - low - tool.flute_length;
                         if (tool.flute_length > 0 && over > kStanding && over > out.over_flute.size)
                             out.over_flute = {over, where}, out.over_flute_line = b.line;
@@ -443,16 +446,19 @@ private:
     }
 
     /// How deep in the part the material was that a column has lost between the stock's surface and the part's: the greatest
-    /// distance of its points from the part's surface. (That of the lowest point alone would be 0 on the part's own bottom.)
+    /// distance from the part's surface of those of its points that are within the part. (The lowest point alone will not do: it may lie
+    /// on the part's own bottom. Points under an overhang are in the part's shadow, but no part was lost there.)
     double depth_of_lost(const Point3& surface, double keep) const {
         const double height = keep - surface[2];
-        if (height <= options_.gouge) return height;
+        if (height <= options_.gouge / 5) return height;
         constexpr int kPoints = 8;
         double depth = 0;
         for (int k = 0; k < kPoints; ++k) {
             const double z = surface[2] + height * k / kPoints, cap = std::min(height, keep - z);
             if (cap <= depth) break;
-            depth = std::max(depth, closest_.query_unsigned({surface[0], surface[1], z}, cap).distance);
+            const Point3 lost{surface[0], surface[1], z};
+            if (closest_.winding(lost) <= 0) continue;
+            depth = std::max(depth, closest_.query_unsigned(lost, cap).distance);
         }
         return depth;
     }
@@ -531,6 +537,11 @@ private:
             if (f.over_flute.size > 0)
                 violate(report, "flute.too_deep", fmt::format("cuts {:.3f} mm deeper than the flutes are long", f.over_flute.size), &p,
                         f.over_flute_line, f.over_flute.where, f.over_flute.size);
+        });
+        each([&](const Program& p, const ProgramFindings& f, std::size_t) {
+            if (p.kind == OperationKind::rough && p.planned_stepdown > 0 && f.deepest.size > p.planned_stepdown + kDeeper)
+                violate(report, "cut.too_deep", fmt::format("cuts {:.3f} mm at once, {:.3f} mm are planned", f.deepest.size, p.planned_stepdown), &p,
+                        f.deepest_line, f.deepest.where, f.deepest.size - p.planned_stepdown);
         });
         each([&](const Program& p, const ProgramFindings&, std::size_t i) {
             if (prepared_[i].tool && taken_[i] <= 1e-3) violate(report, "operation.empty", "removes nothing", &p, 0, {}, 0);

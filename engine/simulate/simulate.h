@@ -53,7 +53,7 @@ struct Extreme {
 
 /// Something that must not be. The code's family names the kind of fault:
 /// stack.short, stack.narrow, stack.gap, stack.thin, gouge.cutter, gouge.stock, gouge.flask, contact.shank, contact.holder, rapid.through_stock, rapid.unknown_start,
-/// flute.too_deep, spindle.off, travel.exceeded, board.too_deep, operation.empty, tool.wrong, tool.unknown, left.missed,
+/// flute.too_deep, cut.too_deep, spindle.off, travel.exceeded, board.too_deep, operation.empty, tool.wrong, tool.unknown, left.missed,
 /// left.too_much; and by io/verify program.order, program.unplanned, program.missing, tool.table.
 struct Violation {
     std::string code;
@@ -93,6 +93,8 @@ struct ProgramFindings {
     std::uint32_t rapid_line = 0;
     Extreme over_flute;  ///< stock taken above the flutes' upper end
     std::uint32_t over_flute_line = 0;
+    Extreme deepest;  ///< most height that one motion took in one place
+    std::uint32_t deepest_line = 0;
     Extreme shank, holder;  ///< standing stock that they run into
     std::uint32_t shank_line = 0, holder_line = 0;
     double lowest = 0;     ///< z of the lowest point cut; the layer's top if none
