@@ -336,6 +336,9 @@ private:
         const CellGrid& grid = stock.grid();
         const Tool& tool = *p.tool;
         const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
+        // A sliver that stood between passes overloads nobody; a tenth of the cutter's disc does.
+        const double deep = p.program->planned_stepdown > 0 ? p.program->planned_stepdown + kDeeper : 1e300;
+        const double wide = 0.1 * std::numbers::pi * radius * radius;
         bool any = false;
         for (std::size_t block = 0; block < p.blocks.size(); ++block) {
             if (!p.blocks[block].meets(grid, p.widest, top)) continue;
@@ -348,7 +351,7 @@ private:
                 const Point3 from{a.x, a.y, a.z}, to{b.x, b.y, b.z};
                 const double low = std::min(a.z, b.z);
                 if (box.meets(grid, radius, top)) {
-                    const CutEffect e = stock.cut(p.end, from, to);
+                    const CutEffect e = stock.cut(p.end, from, to, deep);
                     if (e.removed > 0) {
                         any = true;
                         out.removed += e.removed;
@@ -356,7 +359,8 @@ private:
                         out.most = std::max(out.most, e.deepest);
                         const Point3 where{e.where[0], e.where[1], low};
                         if (b.rapid() && e.deepest > kTaken && e.deepest > out.rapid.size) out.rapid = {e.deepest, where}, out.rapid_line = b.line;
-                        if (e.deepest > out.deepest.size) out.deepest = {e.deepest, where}, out.deepest_line = b.line;
+                        if (e.deepest > out.deepest.size && static_cast<double>(e.deep_cells) * cell_ * cell_ > wide)
+                            out.deepest = {e.deepest, where}, out.deepest_line = b.line;
                         const double over = e.highest - low - tool.flute_length;
                         if (tool.flute_length > 0 && over > kStanding && over > out.over_flute.size)
                             out.over_flute = {over, where}, out.over_flute_line = b.line;

@@ -93,7 +93,7 @@ struct ProgramFindings {
     std::uint32_t rapid_line = 0;
     Extreme over_flute;  ///< stock taken above the flutes' upper end
     std::uint32_t over_flute_line = 0;
-    Extreme deepest;  ///< most height that one motion took in one place
+    Extreme deepest;  ///< most height that one motion took, where over a tenth of the cutter's disc it took more than planned
     std::uint32_t deepest_line = 0;
     Extreme shank, holder;  ///< standing stock that they run into
     std::uint32_t shank_line = 0, holder_line = 0;

@@ -6,7 +6,7 @@ void Stock::add_slab(double z_bottom, double thickness) {
     slabs_.push_back({z_bottom, thickness, std::vector<float>(grid_.count(), static_cast<float>(thickness))});
 }
 
-CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to) {
+CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep) {
     CutEffect effect;
     auto taken = [&](std::size_t cell, double before, double after, double& lost) {
         lost += before - after;
@@ -31,8 +31,9 @@ CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, co
                     height = left;
                 }
             }
-            if (z >= slab.bottom) return;
+            if (z >= slab.bottom) break;
         }
+        effect.deep_cells += lost > deep;
         if (-z > board_[cell]) {
             effect.lowest = std::min(effect.lowest, z);
             board_[cell] = static_cast<float>(-z);

@@ -16,6 +16,7 @@ struct CutEffect {
     double highest = -1e300;        ///< z of the highest stock that the motion took, before it was taken
     double lowest = 1e300;          ///< z of the lowest point cut
     std::array<double, 2> where{};  ///< the cell that lost most
+    std::uint64_t deep_cells = 0;   ///< cells that lost more than `deep`
 };
 
 /// The stock over a rectangle of cells. Slabs are added from below; a column that is cut through a slab's bottom shows what
@@ -27,8 +28,8 @@ public:
     /// Bonds a slab of `thickness` mm with its bottom at z_bottom, at or above what was added before.
     void add_slab(double z_bottom, double thickness);
 
-    /// Takes away what the cutter meets on its way.
-    CutEffect cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to);
+    /// Takes away what the cutter meets on its way. Cells that lose more than `deep` mm are counted.
+    CutEffect cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep = 1e300);
 
     /// Largest height by which stock stands above the lower face of an upright cylinder (shank or holder) anywhere on its way;
     /// 0 when it is free. `where` gets the place.
