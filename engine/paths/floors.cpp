@@ -11,10 +11,7 @@ Operation finish_floors(const LayerCut& cut) {
     Operation op = cut.operation(OperationKind::finish, "floors", tool);
     const double r = tool.diameter / 2;
     const Cutter cutter{Cutter::Profile::flat, r};
-    std::vector<double> heights;
-    for (const Feature* flat : cut.layer.flats) heights.push_back(flat->z_low);
-    std::sort(heights.begin(), heights.end(), std::greater<>());
-    heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
+    const std::vector<double>& heights = cut.floors;
     if (heights.empty()) return op;
     const std::vector<Section> inside = cut.insides(cutter, heights);
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
@@ -24,7 +21,7 @@ Operation finish_floors(const LayerCut& cut) {
         std::vector<SolidFacet> facets;
         double y_low = 1e300, y_high = -1e300;
         for (const SolidFacet& f : cut.solid.facets) {
-            if (f.z_min != f.z_max || f.z_max != heights[i] || f.normal[2] <= 0) continue;
+            if (f.z_min < heights[i] - kSameFloor || f.z_max > heights[i] || f.normal[2] < 0.9999) continue;
             facets.push_back(f);
             for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
         }

@@ -12,6 +12,9 @@
 
 namespace slabwright {
 
+/// Facets this near in height belong to one floor, mm.
+inline constexpr double kSameFloor = 0.005;
+
 struct LayerCut {
     Context& context;
     const LayerJob& layer;
@@ -31,9 +34,9 @@ struct LayerCut {
     [[nodiscard]] std::vector<Contours> contours(const Cutter& cutter, std::span<const double> tip_z, std::int32_t pitch) const;
     [[nodiscard]] Operation operation(OperationKind kind, const char* purpose, const Tool& tool) const;
 
-    struct SlopeBin {
-        double least = 0;
-    };
+    /// Heights of the floors that the flat end mill finishes, descending: the highest vertex of each flat, for the facets of
+    /// a flat may differ in their last bits. Flats within kSameFloor are one.
+    std::vector<double> floors;
     std::vector<std::vector<double>> slopes;  ///< by z bin: the slopes of its facets, ascending, thinned
     double slope_bin = 0.1;                   ///< mm
 };

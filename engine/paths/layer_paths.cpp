@@ -59,8 +59,7 @@ Operation LayerCut::operation(OperationKind kind, const char* purpose, const Too
 }
 
 LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
-    LayerCut cut{context, layer, *layer.job, layer_solid(context, layer.mesh, layer.floor_below, layer.z_top), layer.z_bottom + layer.slab_thickness,
-                 {},      0.1};
+    LayerCut cut{context, layer, *layer.job, layer_solid(context, layer.mesh, layer.floor_below, layer.z_top), layer.z_bottom + layer.slab_thickness, {}, {}, 0.1};
     // Slopes by height, rounded down to a tenth of a degree so that a bin holds few of them. Overhangs and level floors
     // are not machined by slope.
     cut.slopes.resize(static_cast<std::size_t>((layer.z_top - layer.floor_below) / cut.slope_bin) + 1);
@@ -78,6 +77,15 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     for (std::size_t b = 0; b < seen.size(); ++b)
         for (std::size_t s = 0; s < seen[b].size(); ++s)
             if (seen[b][s]) cut.slopes[b].push_back(static_cast<double>(s) * tenth);
+
+    for (const Feature* flat : layer.flats) {
+        double z = flat->z_low;
+        for (const std::uint32_t f : flat->facets)
+            for (const std::uint32_t v : layer.mesh.facets[f]) z = std::max(z, static_cast<double>(layer.mesh.vertices[v].z));
+        if (z < layer.z_top) cut.floors.push_back(z);
+    }
+    std::sort(cut.floors.begin(), cut.floors.end(), std::greater<>());
+    cut.floors.erase(std::unique(cut.floors.begin(), cut.floors.end(), [](double a, double b) { return a - b < kSameFloor; }), cut.floors.end());
 
     LayerResult result;
     auto take = [&](Operation&& operation) {

@@ -95,14 +95,14 @@ Operation finish_walls(const LayerCut& cut) {
     const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut);
     double low = 1e300, high = -1e300;  // of the vertical facets
     for (const SolidFacet& f : cut.solid.facets) {
-        if (std::abs(f.nz) > vertical || f.z_max <= cut.layer.z_bottom || (f.normal[0] == 0 && f.normal[1] == 0)) continue;
+        if (f.nz > vertical || f.z_max <= cut.layer.z_bottom || (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0)) continue;
         low = std::min(low, std::max(f.z_min, cut.layer.z_bottom));
         high = std::max(high, f.z_max);
     }
     if (low >= high) return op;
     // One level on every floor and on the layer's bottom, so that a wall is cut down to where it stands.
     std::vector<double> fixed{cut.layer.z_bottom};
-    for (const Feature* flat : cut.layer.flats) fixed.push_back(flat->z_low);
+    fixed.insert(fixed.end(), cut.floors.begin(), cut.floors.end());
     std::sort(fixed.begin(), fixed.end(), std::greater<>());
     fixed.erase(std::unique(fixed.begin(), fixed.end()), fixed.end());
     std::vector<double> tips;
@@ -128,7 +128,8 @@ Operation finish_walls(const LayerCut& cut) {
         std::vector<Run> runs;
         for (std::size_t c = 0; c < contours[i].size(); ++c) {
             std::vector<char> wanted;
-            for (std::size_t k = contours[i].starts[c]; k < contours[i].starts[c + 1]; ++k) wanted.push_back(std::abs(contours[i].nz[k]) <= vertical);
+            for (std::size_t k = contours[i].starts[c]; k < contours[i].starts[c + 1]; ++k)
+                wanted.push_back(contours[i].nz[k] <= vertical);  // under an overhang the shadow's border is the wall
             append_runs(contours[i], c, to_units(tips[i]), wanted, simplify_tolerance_units(gouge), runs);
         }
         cut_level(path, runs, at);
@@ -145,8 +146,8 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     double low = 1e300, high = -1e300;
     bool any_vertical = false;
     for (const SolidFacet& f : cut.solid.facets) {
-        if (f.nz > std::cos(split) || f.nz < -vertical || f.z_max <= cut.layer.z_bottom || (f.normal[0] == 0 && f.normal[1] == 0)) continue;
-        any_vertical |= std::abs(f.nz) <= vertical;
+        if (f.nz > std::cos(split) || f.z_max <= cut.layer.z_bottom || (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0)) continue;
+        any_vertical |= f.nz <= vertical;
         low = std::min(low, std::max(f.z_min, cut.layer.z_bottom));
         high = std::max(high, f.z_max);
     }
@@ -200,8 +201,8 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             const std::size_t first = level.starts[c], n = level.starts[c + 1] - first;
             std::vector<char> wanted(n, 0);
             for (std::size_t k = 0; k < n; ++k) {
-                const double nz = level.nz[first + k], contact = tips[i] + r * (1 - nz);
-                if (nz > std::cos(split) || nz < -vertical || contact < cut.layer.z_bottom - 0.05 || contact > cut.layer.z_top + 1e-6) continue;
+                const double nz = std::max(0.0F, level.nz[first + k]), contact = tips[i] + r * (1 - nz);
+                if (nz > std::cos(split) || contact < cut.layer.z_bottom - 0.05 || contact > cut.layer.z_top + 1e-6) continue;
                 if (i >= regular && nz < foot_nz) continue;
                 wanted[k] = 1;
                 if (!flat || nz > vertical) continue;

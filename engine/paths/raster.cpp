@@ -106,8 +106,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     // Samples stand on multiples of one step, so that those of neighbouring lines are neighbours.
     const auto step = static_cast<std::int32_t>(0.75 * chord * kUnitsPerMm);
     auto floor_done = [&](double z) {
-        for (const Feature* f : cut.layer.flats)
-            if (std::abs(f->z_low - z) < 1e-6) return true;
+        for (const double floor : cut.floors)
+            if (z <= floor + 1e-6 && z >= floor - kSameFloor) return true;
         return false;
     };
 

@@ -20,8 +20,8 @@ struct RoughLevel {
 std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool) {
     const double floor = cut.job.cutting.floor_allowance, bottom = cut.layer.z_bottom, top = cut.layer.z_top;
     std::vector<RoughLevel> fixed;
-    for (const Feature* flat : cut.layer.flats)
-        if (flat->z_low + floor < top && flat->z_low > bottom) fixed.push_back({flat->z_low + floor, flat->z_low});
+    for (const double z : cut.floors)
+        if (z + floor < top) fixed.push_back({z + floor, z});
     fixed.push_back({bottom, bottom});
     std::sort(fixed.begin(), fixed.end(), [](const RoughLevel& a, const RoughLevel& b) { return a.tip > b.tip; });
     std::vector<RoughLevel> levels;
