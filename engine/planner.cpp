@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <numbers>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -10,6 +11,7 @@
 #include "engine/paths/paths.h"
 #include "engine/schedule/motion_time.h"
 #include "engine/schedule/schedule.h"
+#include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
 #include "kernels/parallel/parallel.h"
@@ -88,6 +90,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     const double height = box.max.z;
     place_stock(plan, box);
 
+    const MemoryCharge mesh_memory(context, mesh.vertices.size() * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3), "the mesh");
     context.begin_phase("features", 0.10, 0.20);
     FeatureOptions options;
     options.finder = job.layers.finder;
@@ -163,6 +166,23 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     const double overrun = finish.diameter / 2;
     const double board = job.machine.base_board_cut >= 0 ? std::min(job.machine.base_board_cut, job.machine.base_board_thickness)
                                                          : std::min(overrun, job.machine.base_board_thickness);
+    // What the layers in work hold at once: their facets with an index of them, and the moves of all layers, of which a
+    // raster over the whole stock has about three a square millimetre.
+    std::vector<std::uint64_t> reach;
+    for (const Layer& layer : plan.layers) {
+        std::uint64_t count = 0;
+        for (const Index3& f : mesh.facets) {
+            const auto [low, high] = std::minmax({mesh.vertices[f[0]].z, mesh.vertices[f[1]].z, mesh.vertices[f[2]].z});
+            count += low < layer.z_top && high > layer.z_bottom - overrun;
+        }
+        reach.push_back(count);
+    }
+    std::sort(reach.begin(), reach.end(), std::greater<>());
+    const std::uint64_t held =
+        std::accumulate(reach.begin(), reach.begin() + std::min<std::ptrdiff_t>(std::ssize(reach), context.threads()), std::uint64_t{0});
+    const double plane = (plan.stock_max[0] - plan.stock_min[0]) * (plan.stock_max[1] - plan.stock_min[1]);
+    const MemoryCharge path_memory(context, held * (sizeof(SolidFacet) + 16) + static_cast<std::uint64_t>(3 * plane) * (sizeof(Move) + 64),
+                                   "the paths");
     std::vector<LayerResult> results(plan.layers.size());
     parallel_each(context, plan.layers.size(), [&](std::size_t i) {
         const Layer& layer = plan.layers[i];

@@ -23,6 +23,7 @@
 #include "io/sequence_json.h"
 #include "io/stl.h"
 #include "io/tool_table.h"
+#include "io/verify.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/slicing/slicing.h"
 
@@ -84,7 +85,16 @@ Plan plan(Context& context, const std::string& stl_path, const Job& job) {
         validate(job);
         StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld});
         require_solid(context, stl, stl_path);
-        Plan result = make_plan(context, stl.mesh, stl.input, job);
+        const auto planned = [&] {
+            try {
+                return make_plan(context, stl.mesh, stl.input, job);
+            } catch (const Error& error) {  // the engine knows no file; the user wants to hear of it
+                if (error.kind() != ErrorKind::no_plan) throw;
+                throw Error(error.kind(), error.code(), error.message(), error.place().empty() ? stl_path : stl_path + ", " + error.place(),
+                            error.remedy());
+            }
+        };
+        Plan result = planned();
         result.diagnostics.insert(result.diagnostics.begin(), stl.diagnostics.begin(), stl.diagnostics.end());
         return result;
     });
@@ -92,11 +102,11 @@ Plan plan(Context& context, const std::string& stl_path, const Job& job) {
 
 void write(Context& context, const Plan& plan, const std::string& directory) {
     guarded([&] {
-        struct Program {
+        struct PlannedProgram {
             const Layer* layer;
             const Operation* operation;
         };
-        std::vector<Program> programs;
+        std::vector<PlannedProgram> programs;
         for (const Layer& layer : plan.layers)
             for (const Operation& operation : layer.operations) programs.push_back({&layer, &operation});
         context.begin_phase("writing", 0.95, 1.0, programs.size() + 1);
@@ -123,6 +133,26 @@ void write(Context& context, const Plan& plan, const std::string& directory) {
         context.throw_if_cancelled();
         out.commit();
         context.advance();
+    });
+}
+
+VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path) {
+    return guarded([&] {
+        VerifyOptions options;
+        options.stl = stl_path;
+        const Verification found = verify_folder(context, directory, options);
+        VerifyResult result;
+        result.passed = found.report.passed();
+        result.gouge_mm = found.report.gouge_max;
+        result.cell_mm = found.report.cell;
+        result.minutes = found.report.seconds / 60;
+        for (const Violation& v : found.report.violations) {
+            Diagnostic d{Severity::error, v.code, v.message, v.where};
+            if (!v.file.empty())
+                d.message = v.line > 0 ? fmt::format("{}:{}: {}", v.file, v.line, v.message) : fmt::format("{}: {}", v.file, v.message);
+            result.violations.push_back(std::move(d));
+        }
+        return result;
     });
 }
 

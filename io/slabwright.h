@@ -37,6 +37,20 @@ namespace slabwright {
 /// @throws Error(input) when the place cannot be written
 SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string& directory);
 
+/// What the simulation of a folder's programs found.
+struct VerifyResult {
+    bool passed = false;
+    double gouge_mm = 0;                 ///< deepest place of a cutter in the part, along the normal
+    double cell_mm = 0;                  ///< between the points of the simulated stock
+    double minutes = 0;                  ///< of all programs on the plan's machine
+    std::vector<Diagnostic> violations;  ///< what must not be, with program, line and place; empty when passed
+};
+
+/// Simulates the programs in `directory` against the pattern, from the folder's text alone, and writes verify.json into it.
+/// @param stl_path the pattern; "" looks for the file that plan.json names: in the folder, beside it, where the caller stands
+/// @throws Error(verification) when the folder cannot be understood, Error(input) when the STL is missing or another one
+[[nodiscard]] SLABWRIGHT_API VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path = {});
+
 /// Mesh report, features and undercuts of a file as JSON (schema slabwright.inspect/1).
 [[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const std::string& stl_path, const Job& job);
 

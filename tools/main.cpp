@@ -224,6 +224,23 @@ void run_plan(const Options& options) {
     });
 }
 
+/// Returns whether the programs make the part.
+bool run_verify(const Options& options) {
+    bool passed = false;
+    with_context(options, [&](Context& context) {
+        const VerifyResult result = verify(context, options.out, options.stl);
+        passed = result.passed;
+        std::string text = fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, {:.0f} min\n", options.out,
+                                       passed ? "makes the part" : "does NOT make the part", result.gouge_mm, result.cell_mm, result.minutes);
+        constexpr std::size_t shown = 20;  // verify.json holds them all
+        for (std::size_t i = 0; i < std::min(shown, result.violations.size()); ++i)
+            text += fmt::format("{}: {}\n", result.violations[i].code, result.violations[i].message);
+        if (result.violations.size() > shown) text += fmt::format("{} more in verify.json\n", result.violations.size() - shown);
+        return text;
+    });
+    return passed;
+}
+
 void run_inspect(const Options& options) {
     const Job job = job_of(options);
     validate(job);
@@ -241,10 +258,16 @@ void run_slice(const Options& options) {
     });
 }
 
-void add_common(CLI::App& command, Options& options) {
+void add_limits(CLI::App& command, Options& options) {
     command.add_option("--threads", options.threads, "threads to use; all that the machine has if not given")->check(CLI::Range(1, 1024));
     command.add_option("--memory", options.memory_gib, "GiB of memory that may be used; 60 % of the machine's if not given")
         ->check(CLI::Range(0.001, 1e6));
+    command.add_flag("--json", options.json, "errors as JSON on stderr, results as JSON on stdout");
+    command.add_flag("--quiet", options.quiet, "no progress bar, nothing on stdout");
+}
+
+void add_common(CLI::App& command, Options& options) {
+    add_limits(command, options);
     command.add_option("--job", options.job_file, "job file; `slabwright job --defaults` prints one");
     command.add_option("--units", options.units, "of the STL: mm or in")->check(CLI::IsMember({"mm", "in"}));
     command
@@ -256,8 +279,6 @@ void add_common(CLI::App& command, Options& options) {
             },
             "mm: vertices this near are merged, and reported")
         ->check(CLI::Range(0.0, 100.0));
-    command.add_flag("--json", options.json, "errors as JSON on stderr, results as JSON on stdout");
-    command.add_flag("--quiet", options.quiet, "no progress bar, nothing on stdout");
 }
 
 }  // namespace
@@ -276,6 +297,11 @@ int main(int argc, char** argv) {
     plan_command->add_option("--strategy", options.strategy, "of layer placement: optimal or printed")->check(CLI::IsMember({"optimal", "printed"}));
     plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")->check(CLI::IsMember({"exact", "halving", "both"}));
     plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
+
+    CLI::App* verify_command = app.add_subcommand("verify", "simulate the programs of a plan against the pattern");
+    verify_command->add_option("OUT", options.out, "folder of the plan")->required();
+    verify_command->add_option("--stl", options.stl, "the pattern; the file that plan.json names, if not given");
+    add_limits(*verify_command, options);
 
     CLI::App* inspect_command = app.add_subcommand("inspect", "report on the mesh, its features and undercuts");
     inspect_command->add_option("STL", options.stl, "the pattern")->required();
@@ -303,6 +329,7 @@ int main(int argc, char** argv) {
     }
     try {
         if (*plan_command) run_plan(options);
+        else if (*verify_command) return run_verify(options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*inspect_command) run_inspect(options);
         else if (*slice_command) run_slice(options);
         else print(default_job_toml());
