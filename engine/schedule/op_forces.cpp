@@ -1,0 +1,70 @@
+#include "engine/schedule/op_forces.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/errors.h"
+#include "kernels/forces/deflection.h"
+
+namespace slabwright {
+
+namespace {
+
+/// The fastest feed of a move that travels in the plane; plunges drill, and are slower than they are heavy.
+double fastest_feed(const Operation& operation) {
+    std::uint32_t feed = 0;
+    for (std::size_t i = 1; i < operation.moves.size(); ++i) {
+        const Move &from = operation.moves[i - 1], &to = operation.moves[i];
+        if (from.x != to.x || from.y != to.y) feed = std::max(feed, to.feed);
+    }
+    return feed;
+}
+
+}  // namespace
+
+CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job& job) {
+    const Material& m = job.material;
+    CutSegment s;
+    s.profile = tool.kind == ToolKind::ball ? CutterProfile::ball : CutterProfile::flat;
+    s.flutes = tool.flutes;
+    s.radius_mm = tool.diameter / 2;
+    s.helix_rad = tool.helix_rad;
+    s.coefficients = resolve_coefficients({m.ktc, m.kte, m.kfc, m.kfe}, tool.helix_rad, CoefficientTransform::oblique);
+    s.spindle_rpm = operation.spindle_rpm;
+    const double feed = fastest_feed(operation);
+    if (feed == 0 || tool.kind == ToolKind::drill) return s;
+    if (!(operation.spindle_rpm > 0))
+        throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest", operation.purpose, "give the tool a speed");
+    s.chip_load_mm = feed / (operation.spindle_rpm * tool.flutes);
+
+    const double steps = s.profile == CutterProfile::ball ? job.tolerances.rough_cusp : 0, slot = 2 * s.radius_mm;
+    double depth = operation.stepdown, width = operation.stepover;
+    switch (operation.kind) {
+        case OperationKind::rough:
+        case OperationKind::semi_rough:
+            width = slot;
+            break;
+        case OperationKind::face:
+            break;
+        default:
+            if (depth > 0) width = job.cutting.wall_allowance + steps;
+            break;
+    }
+    if (!(depth > 0)) depth = job.cutting.floor_allowance + steps;
+    if (!(width > 0)) width = slot;
+    s.high_mm = depth;
+    const bool cap = s.profile == CutterProfile::ball && depth < s.radius_mm;
+    s.arc = engagement_arc(cap ? std::sqrt(depth * (2 * s.radius_mm - depth)) : s.radius_mm, width, MillingSense::up);
+    return s;
+}
+
+void rate_operation(Operation& operation, const Tool& tool, const Job& job) {
+    const CutSegment cut = heaviest_cut(operation, tool, job);
+    operation.peak_force_n = operation.deflection_mm = 0;
+    if (cut.high_mm <= 0) return;
+    const CutForce force = peak_force(cut);
+    operation.peak_force_n = force.peak_resultant_n;
+    operation.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, tool.diameter);
+}
+
+}  // namespace slabwright
