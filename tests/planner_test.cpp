@@ -1,0 +1,135 @@
+// Whole plans of the project's own models: what fits and what does not, and that no program touches the part, judged by
+// the exact check of engine/simulate from the emitted text.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "engine/planner.h"
+#include "io/slabwright.h"
+#include "kernels/errors.h"
+#include "kernels/mesh/weld.h"
+#include "tests/data/models.h"
+#include "tests/support/height_field.h"
+
+namespace slabwright {
+namespace {
+
+namespace fs = std::filesystem;
+
+Mesh box(Context& context, double x, double y, double z) {
+    Mesh mesh = test::height_field(context, 1, 1.0, [](double, double) { return 1.0; });
+    for (Vec3f& v : mesh.vertices) v = {static_cast<float>(v.x * x), static_cast<float>(v.y * y), static_cast<float>(v.z * z)};
+    return mesh;
+}
+
+std::string refusal(const Mesh& mesh, const Job& job, const char* code) {
+    Context context;
+    try {
+        (void)make_plan(context, mesh, {}, job);
+    } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), ErrorKind::no_plan);
+        EXPECT_EQ(error.code(), code);
+        EXPECT_FALSE(error.remedy().empty());
+        return error.what();
+    }
+    ADD_FAILURE() << "planned, though " << code << " was due";
+    return {};
+}
+
+TEST(Planner, SaysByHowMuchAPartIsTooLarge) {
+    Context context;
+    const Job job;
+    EXPECT_NE(refusal(box(context, 1172.5, 100, 20), job, "fit.slab").find("12.5 mm more than the slab's 1160.0 mm"), std::string::npos);
+    EXPECT_NE(refusal(box(context, 100, 1161, 20), job, "fit.slab").find("1.0 mm more"), std::string::npos);
+    EXPECT_NE(refusal(box(context, 100, 100, 1230), job, "fit.chamber").find("30.0 mm more than the build chamber's 1200.0 mm"), std::string::npos);
+    Job short_travel;
+    short_travel.machine.travel_x = 400;
+    EXPECT_NE(refusal(box(context, 401, 100, 20), short_travel, "fit.travel").find("1.0 mm more than the machine's travel of 400.0 mm"),
+              std::string::npos);
+    Job heavy;
+    heavy.machine.build_mass_kg = 2;
+    EXPECT_NE(refusal(box(context, 200, 200, 100), heavy, "fit.mass").find("kg more than the build platform carries"), std::string::npos);
+    Job low;
+    low.machine.travel_z = 15;
+    EXPECT_NE(refusal(box(context, 100, 100, 30), low, "fit.travel").find("leaves the machine's travel in z by"), std::string::npos);
+}
+
+TEST(Planner, APartThatFillsTheSlabStaysWithinTheTravel) {
+    Context context;
+    MetrePattern pattern;
+    pattern.facets = 20'000;
+    pattern.height_mm = 60;
+    std::vector<Facet> facets;
+    metre_pattern(pattern, [&](const Facet& f) { facets.push_back(f); });
+    const Mesh mesh = weld(context, facets);
+    const Box3 size = bounds(mesh.view());
+    ASSERT_NEAR(size.max.x - size.min.x, 1160, 0.01);
+    const Plan plan = make_plan(context, mesh, {}, Job{});
+    EXPECT_NEAR(plan.stock_max[0] - plan.stock_min[0], 1160, 0.01);
+    const double cx = 0.5 * (plan.stock_min[0] + plan.stock_max[0]), cy = 0.5 * (plan.stock_min[1] + plan.stock_max[1]);
+    std::size_t moves = 0;
+    for (const Layer& layer : plan.layers)
+        for (const Operation& op : layer.operations)
+            for (const Move& m : op.moves) {
+                ++moves;
+                ASSERT_LE(std::abs(to_mm(m.x) - cx), 610.0001) << op.purpose;
+                ASSERT_LE(std::abs(to_mm(m.y) - cy), 610.0001) << op.purpose;
+            }
+    EXPECT_GT(moves, 10'000U);
+}
+
+TEST(Planner, RapidsStayAboveTheStockAndMovesAboveTheirFloor) {
+    Context context;
+    const Mesh mesh = weld(context, pump_cover());
+    const Plan plan = make_plan(context, mesh, {}, Job{});
+    for (const Layer& layer : plan.layers)
+        for (const Operation& op : layer.operations) {
+            ASSERT_GE(op.moves.size(), 3U);
+            const double stock_top = op.kind == OperationKind::face ? layer.z_bottom + layer.slab_thickness : layer.z_top;
+            EXPECT_EQ(to_mm(op.moves.front().z), to_mm(to_units(op.clearance_z)));
+            EXPECT_EQ(op.moves.back().z, op.moves.front().z);
+            for (std::size_t k = 1; k < op.moves.size(); ++k) {
+                const Move &a = op.moves[k - 1], &b = op.moves[k];
+                if (b.feed == 0 && (a.x != b.x || a.y != b.y)) EXPECT_GT(std::min(to_mm(a.z), to_mm(b.z)), stock_top + 1) << op.purpose;
+                if (b.feed == 0 && a.x == b.x && a.y == b.y && b.z < a.z) EXPECT_GT(to_mm(b.z), stock_top + 1) << "a rapid goes down into the stock";
+                EXPECT_GE(to_mm(b.z), layer.z_bottom - 3.175 - 1e-4);
+            }
+        }
+}
+
+// The models as files, planned, written, read back and simulated.
+TEST(Planner, NoProgramTouchesTheOwnModels) {
+    for (const char* name : {"pump-cover", "half-sphere", "luo-tool-sample", "luo-layer-sample"}) {
+        SCOPED_TRACE(name);
+        Context context;
+        Job job;
+        job.allow_undercut = true;
+        const std::string stl = std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl";
+        std::string folder = (fs::temp_directory_path() / "slabwright-planner-XXXXXX").string();
+        ASSERT_NE(::mkdtemp(folder.data()), nullptr);
+        const std::string out = folder + "/out";
+        write(context, plan(context, stl, job), out);
+        const VerifyResult result = verify(context, out, stl);
+        EXPECT_LE(result.gouge_mm, 0.01);
+        EXPECT_GT(result.gouge_mm, 0) << "nothing touches: the check has seen nothing";
+        for (const Diagnostic& d : result.violations)  // what stays on the part is another matter than what touches it
+            EXPECT_TRUE(d.code.starts_with("left.")) << d.code << ' ' << d.message;
+        fs::remove_all(folder);
+    }
+}
+
+// The pump cover is made as planned: nothing above the cusp stays where a tool reaches.
+TEST(Planner, ThePumpCoverVerifies) {
+    Context context;
+    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl";
+    std::string folder = (fs::temp_directory_path() / "slabwright-planner-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(folder.data()), nullptr);
+    write(context, plan(context, stl, Job{}), folder + "/out");
+    const VerifyResult result = verify(context, folder + "/out", stl);
+    EXPECT_TRUE(result.passed) << (result.violations.empty() ? "" : result.violations[0].message);
+    fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace slabwright
