@@ -106,7 +106,7 @@ std::string sections_dxf(std::span<const Section> sections) {
     for (const Section& section : sections) {
         std::string height;
         append_decimal(height, section.plane.z);
-        height = real(std::move(height));
+        height = real(height);
         for (std::size_t i = 0; i < section.loops.size(); ++i) append_polyline(text, layer_name(section, false), height, section.loops.loop(i), true);
         for (std::size_t i = 0; i < section.open_chains.size(); ++i)
             append_polyline(text, layer_name(section, true), height, section.open_chains.loop(i), false);
