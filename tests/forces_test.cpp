@@ -23,7 +23,6 @@ namespace slabwright {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr ForceCoefficients kMdf{8.0, 0.62, 4.4, 1.0, 2.5, 0.56};
 
 // PoCL shows no device unless it may write its cache somewhere.
 const bool kCacheSet = [] {

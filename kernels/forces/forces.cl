@@ -67,6 +67,7 @@ __kernel void forces(__global const Segment* segments, __global float* out, cons
                     const float8 half_q = 0.5f * (qb - qa), mid_q = 0.5f * (qb + qa);
                     const float lag_q = 2.0f * s.radius * s.lag;
                     float8 bx = 0, by = 0, bz = 0, bt = 0;
+#pragma unroll
                     for (int i = 0; i < 6; ++i) {
                         const float8 q = mid_q + half_q * node[i], q2 = q * q, root = sqrt(1.0f - q2);
                         const float8 sin_k = 2.0f * q * root, cos_k = 1.0f - 2.0f * q2;
