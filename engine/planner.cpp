@@ -10,6 +10,7 @@
 #include "engine/layers/layers.h"
 #include "engine/paths/paths.h"
 #include "engine/schedule/motion_time.h"
+#include "engine/schedule/op_forces.h"
 #include "engine/schedule/schedule.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
@@ -214,6 +215,16 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
             op.cutting_mm = time.cutting_mm;
             op.rapid_mm = time.rapid_mm;
             op.minutes = time.minutes + job.machine.spindle_dwell_s / 60;
+            const auto tool = std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+            rate_operation(op, *tool, job);
+            const double allowance = std::min(job.cutting.wall_allowance, job.cutting.floor_allowance);
+            if (op.kind == OperationKind::rough && op.deflection_mm > allowance)
+                plan.diagnostics.push_back(
+                    {Severity::warning,
+                     "rough.deflection",
+                     fmt::format("layer {}: the roughing cutter may bend by {:.3f} mm, more than the {:.3f} mm it leaves for finishing",
+                                 plan.layers[i].index, op.deflection_mm, allowance),
+                     {}});
         }
     }
     if (operations == 0) throw refuse("plan.empty", "nothing would be cut", input.file, "check the units and the slabs");
