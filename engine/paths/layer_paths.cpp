@@ -59,7 +59,8 @@ Operation LayerCut::operation(OperationKind kind, const char* purpose, const Too
 }
 
 LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
-    LayerCut cut{context, layer, *layer.job, layer_solid(context, layer.mesh, layer.floor_below, layer.z_top), layer.z_bottom + layer.slab_thickness, {}, {}, 0.1};
+    LayerCut cut{context, layer, *layer.job, layer_solid(context, layer.mesh, layer.floor_below, layer.z_top), layer.z_bottom + layer.slab_thickness,
+                 {},      {},    0.1};
     // Slopes by height, rounded down to a tenth of a degree so that a bin holds few of them. Overhangs and level floors
     // are not machined by slope.
     cut.slopes.resize(static_cast<std::size_t>((layer.z_top - layer.floor_below) / cut.slope_bin) + 1);
