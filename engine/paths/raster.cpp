@@ -50,6 +50,12 @@ Loops rough_unreached(const LayerCut& cut) {
     return offset(offset(left, -0.05, 0.01), 0.05, 0.01);
 }
 
+// Where the ball does not fit between walls that reach the layer's top: it can only dip in as far as their edges let it.
+Loops narrow_at_top(const LayerCut& cut, double r) {
+    const Loops between = subtract(offset(offset(cut.solid.cap, r, 0.01), -r, 0.01), offset(cut.solid.cap, 0.05, 0.01));
+    return offset(offset(between, -0.2, 0.01), 0.2, 0.01);
+}
+
 }  // namespace
 
 Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
@@ -63,13 +69,15 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     for (const SolidFacet& f : cut.solid.facets)
         if (f.nz >= keep_nz && f.z_max > cut.layer.z_bottom && !(f.z_min == cut.layer.z_top)) shallow.push_back(f);
     const Loops unreached = rough_unreached(cut);
-    if (shallow.empty() && unreached.empty()) return op;
+    const Loops narrow = narrow_at_top(cut, r);
+    if (shallow.empty() && unreached.empty() && narrow.empty()) return op;
 
     // How far the shallow facets face along y, by strips of y: that decides the step-over of the passes over them.
     double y_low = 1e300, y_high = -1e300;
     for (const SolidFacet& f : shallow)
         for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
-    for (const Point2& p : unreached.points) y_low = std::min(y_low, to_mm(p.y)), y_high = std::max(y_high, to_mm(p.y));
+    for (const Loops* more : {&unreached, &narrow})
+        for (const Point2& p : more->points) y_low = std::min(y_low, to_mm(p.y)), y_high = std::max(y_high, to_mm(p.y));
     constexpr double strip = 0.5;
     std::vector<float> facing(static_cast<std::size_t>((y_high - y_low) / strip) + 1, -1);  // −1: nothing shallow there
     for (const SolidFacet& f : shallow) {
@@ -119,7 +127,13 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         bool wanted = false, reachable = false, cut = false;
     };
     using Line = std::vector<Sample>;
-    auto sample = [&](std::int32_t ux, std::int32_t uy, std::span<const Span> waste) {
+    struct LineSpans {
+        std::vector<Span> waste, narrow;
+    };
+    auto within = [](const std::vector<Span>& spans, double x) {
+        return std::any_of(spans.begin(), spans.end(), [&](const Span& s) { return x >= s.low && x <= s.high; });
+    };
+    auto sample = [&](std::int32_t ux, std::int32_t uy, const LineSpans& beside) {
         const double x = to_mm(ux), y = to_mm(uy);
         const Rest rest = ball.drop(x, y);
         Sample s;
@@ -130,9 +144,11 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                    rest.tip_z >= cut.layer.floor_below;
         if (s.wanted && rest.nz > level_nz && floor_done(contact) && flat.drop(x, y).tip_z <= contact + 1e-3) s.wanted = false;
         s.tip = rest.tip_z;
-        if (s.tip <= cut.layer.z_bottom)
-            for (const Span& w : waste)
-                if (ux >= w.low && ux <= w.high) s.wanted = true, s.tip = std::max(s.tip, cut.layer.z_bottom);
+        if (s.tip <= cut.layer.z_bottom && within(beside.waste, ux)) {
+            s.wanted = true;
+            s.tip = std::max(s.tip, cut.layer.z_bottom);
+        }
+        if (!rest.on_cap && contact > cut.layer.z_top - 1e-3 && s.tip < cut.layer.z_top - 0.02 && within(beside.narrow, ux)) s.wanted = true;
         s.reachable = s.tip >= cut.layer.floor_below && !rest.on_cap;
         if (s.reachable) s.z = to_units(s.tip) + 1;
         return s;
@@ -146,23 +162,24 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         return c * d > 8 * r * cusp * 1.5;
     };
     const std::int32_t finest = to_units(0.02);
-    auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t y, std::span<const Span> waste) -> void {
+    auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t y, const LineSpans& beside) -> void {
         if (!line.empty() && b.x - line.back().x <= step && b.x - line.back().x > 2 * finest && too_far(line.back(), y, b, y)) {
-            const Sample middle = sample(line.back().x + (b.x - line.back().x) / 2, y, waste);
-            self(self, line, middle, y, waste);
-            self(self, line, b, y, waste);
+            const Sample middle = sample(line.back().x + (b.x - line.back().x) / 2, y, beside);
+            self(self, line, middle, y, beside);
+            self(self, line, b, y, beside);
             return;
         }
         line.push_back(b);
     };
 
     std::vector<Line> samples(lines.size());
-    std::vector<std::vector<Span>> wastes(lines.size());
+    std::vector<LineSpans> besides(lines.size());
     const Fibres reach = covering(cut.context, shallow, r, Axis::x, lines);
     parallel_each(cut.context, lines.size(), [&](std::size_t l) {
         // The surface within reach of the ball, and the waste that roughing could not get at, with one step around.
-        wastes[l] = line_spans(unreached, lines[l]);
-        std::vector<Span> spans = wastes[l];
+        besides[l] = {line_spans(unreached, lines[l]), line_spans(narrow, lines[l])};
+        std::vector<Span> spans = besides[l].waste;
+        spans.insert(spans.end(), besides[l].narrow.begin(), besides[l].narrow.end());
         for (const Forbidden& f : reach.line(l)) spans.push_back({f.low * kUnitsPerMm, f.high * kUnitsPerMm});
         std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
         const double low_limit = cut.low(0, r) * kUnitsPerMm, high_limit = cut.high(0, r) * kUnitsPerMm;
@@ -172,7 +189,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                        last = static_cast<std::int32_t>(std::floor(std::min(span.high + step, high_limit) / step));
             for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                 next = k + 1;
-                append_between(append_between, samples[l], sample(k * step, lines[l], wastes[l]), lines[l], wastes[l]);
+                append_between(append_between, samples[l], sample(k * step, lines[l], besides[l]), lines[l], besides[l]);
             }
         }
     });
@@ -206,7 +223,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             if (yb - ya < 2 * finest) return;
             const std::int32_t y = ya + (yb - ya) / 2;
             Line middle;
-            const std::vector<Span> waste = line_spans(unreached, y);
+            const LineSpans beside{line_spans(unreached, y), line_spans(narrow, y)};
             std::int32_t done = INT32_MIN;
             for (const Sample& s : a) {
                 if (s.x % step != 0) continue;
@@ -214,7 +231,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 if (!other || !too_far(s, ya, *other, yb)) continue;
                 for (const std::int32_t x : {s.x - step, s.x, s.x + step}) {
                     if (x <= done) continue;
-                    append_between(append_between, middle, sample(x, y, waste), y, waste);
+                    append_between(append_between, middle, sample(x, y, beside), y, beside);
                     done = x;
                 }
             }
