@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "kernels/errors.h"
 
@@ -67,6 +68,17 @@ double max_layer_thickness(const Job& job) {
         thickness = std::min(thickness, tool.flute_length - overrun - job.cutting.holder_clearance);
     }
     return thickness;
+}
+
+FeatureOptions feature_options(const Job& job) {
+    FeatureOptions options;
+    options.finder = job.layers.finder;
+    options.chordal_deviation_mm = job.tolerances.chordal_deviation;
+    options.flat_merge_mm = job.layers.flat_merge;
+    options.shallow_limit_rad = job.material.shallow_limit_deg * std::numbers::pi / 180;
+    options.halving_coarse_mm = job.layers.halving_coarse;
+    options.halving_resolution_mm = job.layers.halving_resolution;
+    return options;
 }
 
 const Tool& tool_of_kind(const Job& job, ToolKind kind) {

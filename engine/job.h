@@ -137,6 +137,9 @@ struct Job {
 /// every tool its flutes less overrun and holder clearance.
 [[nodiscard]] double max_layer_thickness(const Job& job);
 
+/// What the job asks of the feature finders.
+[[nodiscard]] FeatureOptions feature_options(const Job& job);
+
 /// The first tool of a kind. @throws Error(usage, "job.tool") when the library has none
 [[nodiscard]] const Tool& tool_of_kind(const Job& job, ToolKind kind);
 

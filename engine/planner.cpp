@@ -93,13 +93,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
 
     const MemoryCharge mesh_memory(context, mesh.vertices.size() * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3), "the mesh");
     context.begin_phase("features", 0.10, 0.20);
-    FeatureOptions options;
-    options.finder = job.layers.finder;
-    options.chordal_deviation_mm = job.tolerances.chordal_deviation;
-    options.flat_merge_mm = job.layers.flat_merge;
-    options.shallow_limit_rad = job.material.shallow_limit_deg * std::numbers::pi / 180;
-    options.halving_coarse_mm = job.layers.halving_coarse;
-    options.halving_resolution_mm = job.layers.halving_resolution;
+    const FeatureOptions options = feature_options(job);
     FeatureSet found = find_features(context, view, options);
     plan.features = std::move(found.features);
     for (const FinderDisagreement& d : found.disagreements)

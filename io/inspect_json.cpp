@@ -52,13 +52,7 @@ Inspection inspect_stl(Context& context, const std::string& stl_path, const Job&
         result.unusable = error.what();
     }
     if (result.solid) {
-        FeatureOptions options;
-        options.finder = job.layers.finder;
-        options.chordal_deviation_mm = job.tolerances.chordal_deviation;
-        options.flat_merge_mm = job.layers.flat_merge;
-        options.shallow_limit_rad = job.material.shallow_limit_deg * std::numbers::pi / 180;
-        options.halving_coarse_mm = job.layers.halving_coarse;
-        options.halving_resolution_mm = job.layers.halving_resolution;
+        const FeatureOptions options = feature_options(job);
         context.begin_phase("features", 0.3, 0.7);
         FeatureSet found = find_features(context, stl.mesh.view(), options);
         result.features = std::move(found.features);

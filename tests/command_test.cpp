@@ -16,30 +16,18 @@
 #include "tests/support/comma_locale.h"
 #include "tests/support/command.h"
 #include "tests/support/rs274.h"
+#include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
 using slabwright::support::CommandResult;
 using slabwright::support::run_command;
+using slabwright::support::TemporaryFolder;
 namespace fs = std::filesystem;
 using nlohmann::json;
 
 namespace {
 
 const std::string kData = SLABWRIGHT_SOURCE_DIR "/tests/data/";
-
-struct TempFolder {
-    fs::path path;
-    TempFolder() {
-        std::string name = (fs::temp_directory_path() / "command-XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-        path = name;
-    }
-    ~TempFolder() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-    }
-    [[nodiscard]] std::string operator/(const std::string& name) const { return (path / name).string(); }
-};
 
 CommandResult slabwright_command(std::vector<std::string> arguments, const std::vector<std::pair<std::string, std::string>>& environment = {},
                                  double interrupt_after = -1) {
@@ -120,7 +108,7 @@ TEST(Command, HelpAndVersionSucceed) {
 }
 
 TEST(Command, WrongUseExitsTwoWithOneLine) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const std::string stl = kData + "half-sphere.stl", out = folder / "out";
     spit(folder.path / "bad.toml", "[machine]\nclearence = 5\n");
     const std::vector<std::vector<std::string>> wrong = {{},
@@ -160,7 +148,7 @@ TEST(Command, WrongUseExitsTwoWithOneLine) {
 }
 
 TEST(Command, UnusableInputExitsThree) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const std::string out = folder / "out";
     const std::string whole = stl_bytes("box", box({0, 0, 0}, {50, 40, 30}));
     spit(folder.path / "empty.stl", "");
@@ -182,7 +170,7 @@ TEST(Command, UnusableInputExitsThree) {
 }
 
 TEST(Command, ImpossiblePartExitsFourAndSaysWhere) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const std::string out = folder / "out";
     spit(folder.path / "wide.stl", stl_bytes("wide", box({0, 0, 0}, {3000, 40, 30})));
     spit(folder.path / "mushroom.stl", stl_bytes("mushroom", mushroom()));
@@ -201,7 +189,7 @@ TEST(Command, ImpossiblePartExitsFourAndSaysWhere) {
 }
 
 TEST(Command, ErrorsComeAsJsonOnRequest) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const std::vector<std::pair<int, std::vector<std::string>>> cases = {{3, {"plan", folder / "missing.stl", "-o", folder / "out", "--json"}},
                                                                          {2, {"plan", "--json"}},
                                                                          {2, {"plan", "x", "-o", folder / "out", "--json", "--threads", "0"}},
@@ -218,7 +206,7 @@ TEST(Command, ErrorsComeAsJsonOnRequest) {
 }
 
 TEST(Command, SameBytesOnAnyThreadsAndInAnyLocale) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const support::CommaLocale locale;
     if (!locale.made) std::printf("no locale with decimal commas could be made here; LC_ALL is tried without one\n");
     const std::vector<std::pair<std::string, std::string>> commas = {{"LOCPATH", locale.folder}, {"LC_ALL", locale.name}};
@@ -244,7 +232,7 @@ TEST(Command, SameBytesOnAnyThreadsAndInAnyLocale) {
 }
 
 TEST(Command, ProgramsOfAPlanPassTheInterpreter) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const std::string out = folder / "out";
     ASSERT_EQ(slabwright_command({"plan", kData + "luo-tool-sample.stl", "-o", out}).exit, 0);
     const json plan = json::parse(slurp(out + "/plan.json"));
@@ -267,7 +255,7 @@ TEST(Command, ProgramsOfAPlanPassTheInterpreter) {
 }
 
 TEST(Command, InterruptStopsWithinHalfASecondAndLeavesNothing) {
-    TempFolder folder;
+    TemporaryFolder folder;
     {
         MetrePattern pattern;
         pattern.size_mm = 1000;
@@ -301,7 +289,7 @@ TEST(Command, InterruptStopsWithinHalfASecondAndLeavesNothing) {
 }
 
 TEST(Command, InspectTellsPeopleAndPrograms) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const CommandResult text = slabwright_command({"inspect", kData + "pump-cover.stl"});
     EXPECT_EQ(text.exit, 0) << text.err;
     EXPECT_NE(text.out.find("200 x 150 x 60 mm"), std::string::npos) << text.out;
@@ -328,7 +316,7 @@ TEST(Command, InspectTellsPeopleAndPrograms) {
 }
 
 TEST(Command, SliceWritesEveryFormatWhole) {
-    TempFolder folder;
+    TemporaryFolder folder;
     for (const char* ending : {".svg", ".dxf", ".json"}) {
         const std::string out = folder / (std::string("sections") + ending);
         const CommandResult result = slabwright_command({"slice", kData + "half-sphere.stl", "--every", "12.5", "-o", out});
@@ -349,7 +337,7 @@ TEST(Command, SliceWritesEveryFormatWhole) {
 }
 
 TEST(Command, JobDefaultsPlanTheSameAsNoJob) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const CommandResult defaults = slabwright_command({"job", "--defaults"});
     ASSERT_EQ(defaults.exit, 0);
     spit(folder.path / "job.toml", defaults.out);
@@ -360,7 +348,7 @@ TEST(Command, JobDefaultsPlanTheSameAsNoJob) {
 }
 
 TEST(Command, SummaryTellsWhatToLoad) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const CommandResult result = slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out"});
     ASSERT_EQ(result.exit, 0) << result.err;
     for (const char* wanted : {"layers", "min", "slabs", "19 mm MDF", "T2 flat end mill 1/2 in", "layer   1: 0 to"})

@@ -27,25 +27,14 @@
 #include "io/tool_table.h"
 #include "kernels/errors.h"
 #include "tests/support/comma_locale.h"
+#include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
 namespace fs = std::filesystem;
 using nlohmann::json;
+using slabwright::support::TemporaryFolder;
 
 namespace {
-
-struct TempFolder {
-    fs::path path;
-    TempFolder() {
-        std::string name = (fs::temp_directory_path() / "plan-XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-        path = name;
-    }
-    ~TempFolder() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-    }
-};
 
 void spit(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 
@@ -67,7 +56,7 @@ std::map<std::string, std::string> tree(const fs::path& root) {
 
 /// What jsonschema (python3-jsonschema) says; "" when the text keeps the schema.
 std::string schema_complaint(const std::string& text, const char* schema) {
-    TempFolder folder;
+    TemporaryFolder folder;
     spit(folder.path / "it.json", text);
     const std::string command = "/usr/bin/python3 -m jsonschema -i '" + (folder.path / "it.json").string() + "' '" SLABWRIGHT_SOURCE_DIR "/io/" +
                                 schema + "' >'" + (folder.path / "log").string() + "' 2>&1 </dev/null";
@@ -254,7 +243,7 @@ TEST(PlanJson, NotANumberIsAnErrorNotAFile) {
     Plan plan = hand_made();
     plan.layers[1].operations[0].peak_force_n = std::nan("");
     EXPECT_THROW((void)plan_json(plan), Error);
-    TempFolder folder;
+    TemporaryFolder folder;
     Context context;
     EXPECT_THROW(write(context, plan, (folder.path / "out").string()), Error);
     EXPECT_TRUE(fs::is_empty(folder.path)) << "nothing half-written stays";
@@ -295,7 +284,7 @@ TEST(Locale, CommasChangeNothing) {
 }
 
 TEST(Write, HoldsTheContractAndReplacesOnlyItsOwn) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const fs::path out = folder.path / "a" / "b" / "out";
     Context context({.threads = 2, .memory_bytes = 0, .progress = {}});
     const Plan plan = hand_made();
@@ -353,7 +342,7 @@ TEST(Write, HoldsTheContractAndReplacesOnlyItsOwn) {
 }
 
 TEST(Write, CancelledAtAnyMomentLeavesTheOldPlan) {
-    TempFolder folder;
+    TemporaryFolder folder;
     const fs::path out = folder.path / "out";
     Plan plan = hand_made();
     Context first;

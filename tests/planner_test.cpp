@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include "engine/planner.h"
 #include "io/slabwright.h"
@@ -11,11 +10,10 @@
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
 #include "tests/support/height_field.h"
+#include "tests/support/temporary_folder.h"
 
 namespace slabwright {
 namespace {
-
-namespace fs = std::filesystem;
 
 Mesh box(Context& context, double x, double y, double z) {
     Mesh mesh = test::height_field(context, 1, 1.0, [](double, double) { return 1.0; });
@@ -111,16 +109,14 @@ TEST(Planner, NoProgramTouchesTheOwnModels) {
         Job job;
         job.allow_undercut = true;
         const std::string stl = std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl";
-        std::string folder = (fs::temp_directory_path() / "slabwright-planner-XXXXXX").string();
-        ASSERT_NE(::mkdtemp(folder.data()), nullptr);
-        const std::string out = folder + "/out";
+        const support::TemporaryFolder folder;
+        const std::string out = folder / "out";
         write(context, plan(context, stl, job), out);
         const VerifyResult result = verify(context, out, stl);
         EXPECT_LE(result.gouge_mm, 0.01);
         EXPECT_GT(result.gouge_mm, 0) << "nothing touches: the check has seen nothing";
         for (const Diagnostic& d : result.violations)  // what stays on the part is another matter than what touches it
             EXPECT_TRUE(d.code.starts_with("left.")) << d.code << ' ' << d.message;
-        fs::remove_all(folder);
     }
 }
 
@@ -128,12 +124,10 @@ TEST(Planner, NoProgramTouchesTheOwnModels) {
 TEST(Planner, ThePumpCoverVerifies) {
     Context context;
     const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl";
-    std::string folder = (fs::temp_directory_path() / "slabwright-planner-XXXXXX").string();
-    ASSERT_NE(::mkdtemp(folder.data()), nullptr);
-    write(context, plan(context, stl, Job{}), folder + "/out");
-    const VerifyResult result = verify(context, folder + "/out", stl);
+    const support::TemporaryFolder folder;
+    write(context, plan(context, stl, Job{}), folder / "out");
+    const VerifyResult result = verify(context, folder / "out", stl);
     EXPECT_TRUE(result.passed) << (result.violations.empty() ? "" : result.violations[0].message);
-    fs::remove_all(folder);
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "io/sha256.h"
 #include "kernels/errors.h"
 #include "tests/mesh_shapes.h"
+#include "tests/support/temporary_folder.h"
 
 namespace slabwright {
 namespace {
@@ -35,20 +36,14 @@ std::uint64_t fresh_seed() {
 /// A folder of its own for each test.
 class Stl : public ::testing::Test {
 protected:
-    void SetUp() override {
-        std::string name = (std::filesystem::temp_directory_path() / "slabwright-stl-XXXXXX").string();
-        ASSERT_NE(::mkdtemp(name.data()), nullptr);
-        folder = name;
-    }
-    void TearDown() override { std::filesystem::remove_all(folder); }
-
     std::string save(const std::string& name, const std::string& bytes) const {
         const std::string path = (folder / name).string();
         std::filesystem::remove(path);  // a fresh file costs microseconds, truncating a written one milliseconds
         std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
         return path;
     }
-    std::filesystem::path folder;
+    support::TemporaryFolder temporary;
+    const std::filesystem::path& folder = temporary.path;
 };
 
 std::string binary(const Facets& facets, std::string header = "binary", std::uint32_t count = 0xFFFFFFFFu) {

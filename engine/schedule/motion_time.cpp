@@ -1,55 +1,59 @@
 #include "engine/schedule/motion_time.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
 namespace slabwright {
 
-MotionTime motion_time(std::span<const Move> moves, const Machine& machine, double junction_mm) {
-    MotionTime total;
-    if (moves.size() < 2) return total;
-    const double a = machine.acceleration;  // mm/s²
-    struct Leg {
-        double length = 0, speed = 0, entry = 0;  // mm, mm/s
-    };
-    std::vector<Leg> legs;
-    std::array<double, 3> before{};
-    for (std::size_t i = 1; i < moves.size(); ++i) {
-        const std::array<double, 3> d{to_mm(std::int64_t{moves[i].x} - moves[i - 1].x), to_mm(std::int64_t{moves[i].y} - moves[i - 1].y),
-                                      to_mm(std::int64_t{moves[i].z} - moves[i - 1].z)};
-        const double length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-        if (length == 0) continue;
-        const bool rapid = moves[i].feed == 0;
-        (rapid ? total.rapid_mm : total.cutting_mm) += length;
-        Leg leg{length, std::min(rapid ? machine.rapid_feed : static_cast<double>(moves[i].feed), rapid ? machine.rapid_feed : machine.max_feed) / 60,
-                0};
-        const std::array<double, 3> unit{d[0] / length, d[1] / length, d[2] / length};
-        if (!legs.empty()) {
-            const double cosine = -(unit[0] * before[0] + unit[1] * before[1] + unit[2] * before[2]);  // of the angle between the legs
-            const double half = std::sqrt(std::clamp((1 - cosine) / 2, 0.0, 1.0));
-            const double corner = half > 0.999999 ? 1e9 : std::sqrt(a * junction_mm * half / (1 - half));
-            leg.entry = std::min({corner, leg.speed, legs.back().speed});
+double travel_seconds(std::span<const MotionLeg> legs, double acceleration, double junction_mm) {
+    const double a = acceleration;
+    std::vector<double> entry(legs.size() + 1, 0);  // highest speed at a leg's start
+    const MotionLeg* before = nullptr;
+    for (std::size_t i = 0; i < legs.size(); ++i) {
+        const MotionLeg& leg = legs[i];
+        if (leg.length <= 0) continue;
+        if (before) {
+            const auto &u = before->direction, &v = leg.direction;
+            const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0), half = std::sqrt((1 + cosine) / 2);
+            const double corner = half >= 1 - 1e-12 ? 1e9 : std::sqrt(a * junction_mm * half / (1 - half));
+            entry[i] = std::min({corner, before->speed, leg.speed});
         }
-        before = unit;
-        legs.push_back(leg);
+        before = &leg;
     }
-    // What the next corner allows, seen backwards, then what has been reached, seen forwards.
+    // Backwards: nobody may enter a leg faster than he can leave it. Forwards: nor faster than he can have become.
     double next = 0;
     for (std::size_t i = legs.size(); i-- > 0;) {
-        legs[i].entry = std::min(legs[i].entry, std::sqrt(next * next + 2 * a * legs[i].length));
-        next = legs[i].entry;
+        if (legs[i].length > 0) next = std::min(entry[i], std::sqrt(next * next + 2 * a * legs[i].length));
+        entry[i] = next;
     }
-    double seconds = 0, entry = 0;
+    double seconds = 0, v = 0;
     for (std::size_t i = 0; i < legs.size(); ++i) {
-        const double exit = std::min(i + 1 < legs.size() ? legs[i + 1].entry : 0.0, std::sqrt(entry * entry + 2 * a * legs[i].length));
-        const double peak = std::min(legs[i].speed, std::sqrt((entry * entry + exit * exit + 2 * a * legs[i].length) / 2));
-        const double ramps = (2 * peak * peak - entry * entry - exit * exit) / (2 * a);
-        seconds += (2 * peak - entry - exit) / a + std::max(0.0, legs[i].length - ramps) / peak;
-        entry = exit;
+        const double length = legs[i].length;
+        if (length <= 0) continue;
+        const double out = std::min(entry[i + 1], std::sqrt(v * v + 2 * a * length));
+        const double peak = std::min(legs[i].speed, std::sqrt((2 * a * length + v * v + out * out) / 2));
+        const double ramps = (2 * peak * peak - v * v - out * out) / (2 * a);
+        seconds += (2 * peak - v - out) / a + std::max(0.0, length - ramps) / std::max(peak, 1e-9);
+        v = out;
     }
-    total.minutes = seconds / 60;
+    return seconds;
+}
+
+MotionTime motion_time(std::span<const Move> moves, const Machine& machine) {
+    MotionTime total;
+    std::vector<MotionLeg> legs;
+    for (std::size_t i = 1; i < moves.size(); ++i) {
+        const Move &a = moves[i - 1], &b = moves[i];
+        const std::array<double, 3> d{to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y), to_mm(std::int64_t{b.z} - a.z)};
+        const double length = std::hypot(d[0], d[1], d[2]);
+        if (length == 0) continue;
+        const bool rapid = b.feed == 0;
+        (rapid ? total.rapid_mm : total.cutting_mm) += length;
+        legs.push_back(
+            {length, (rapid ? machine.rapid_feed : std::min<double>(b.feed, machine.max_feed)) / 60, {d[0] / length, d[1] / length, d[2] / length}});
+    }
+    total.minutes = travel_seconds(legs, machine.acceleration) / 60;
     return total;
 }
 

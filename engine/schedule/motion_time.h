@@ -1,20 +1,33 @@
 // How long a program takes on a machine that must accelerate and slow down in corners.
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "engine/plan.h"
 
 namespace slabwright {
 
+/// A straight stretch of a motion: its length in mm, the speed asked for in mm/s, and its unit direction.
+struct MotionLeg {
+    double length = 0, speed = 0;
+    std::array<double, 3> direction{};
+};
+
+/// How near a path may pass by its corners, mm.
+inline constexpr double kJunction = 0.02;
+
+/// Every leg is a trapezoid of speed under one acceleration (mm/s²); where two legs meet, the speed is limited to what an
+/// arc that passes the corner by `junction_mm` bears: v² = a·δ·c / (1 − c), c = cos(θ/2), θ the change of direction. Starts and
+/// ends at rest. Legs without length are passed over.
+[[nodiscard]] double travel_seconds(std::span<const MotionLeg> legs, double acceleration, double junction_mm = kJunction);
+
 struct MotionTime {
     double cutting_mm = 0, rapid_mm = 0;
     double minutes = 0;
 };
 
-/// Every move is a trapezoid of speed under the machine's acceleration (the same on all axes); between two moves the
-/// speed is limited to what turns the corner within `junction_mm` of it at that acceleration
-/// (v² = a·δ·sin(θ/2) / (1 − sin(θ/2)), θ the angle between the moves). Starts and ends at rest.
-[[nodiscard]] MotionTime motion_time(std::span<const Move> moves, const Machine& machine, double junction_mm = 0.05);
+/// Of a program's moves, the first of which is where it starts.
+[[nodiscard]] MotionTime motion_time(std::span<const Move> moves, const Machine& machine);
 
 }  // namespace slabwright

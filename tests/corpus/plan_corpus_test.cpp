@@ -13,11 +13,13 @@
 
 #include "io/gcode_reader.h"
 #include "tests/support/rs274.h"
+#include "tests/support/temporary_folder.h"
 
 namespace slabwright {
 namespace {
 
 namespace fs = std::filesystem;
+using support::TemporaryFolder;
 
 std::string slurp(const fs::path& path) {
     std::ifstream in(path, std::ios::binary);
@@ -38,18 +40,6 @@ Outcome run_command(const std::string& arguments, const fs::path& folder) {
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), slurp(folder / "stderr")};
 }
-
-struct TemporaryFolder {
-    TemporaryFolder() {
-        std::string name = (fs::temp_directory_path() / "slabwright-corpus-XXXXXX").string();
-        path = ::mkdtemp(name.data());
-    }
-    ~TemporaryFolder() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-    }
-    fs::path path;
-};
 
 // Every program is accepted, and the interpreter stops where our own reader says.
 void check_programs(const fs::path& out) {

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/support/temporary_folder.h"
+
 #if defined(__SANITIZE_ADDRESS__)
 #include <sanitizer/lsan_interface.h>
 #endif
@@ -18,17 +20,12 @@ namespace slabwright::support {
 
 /// Compiles de_DE.UTF-8 into a folder that lives as long as this object. LOCPATH must name `folder`, LC_ALL `name`.
 struct CommaLocale {
-    std::string folder, name = "de_DE.UTF-8";
+    TemporaryFolder temporary;
+    std::string folder = temporary.path.string(), name = "de_DE.UTF-8";
     bool made = false;
     CommaLocale() {
-        folder = (std::filesystem::temp_directory_path() / "locale-XXXXXX").string();
-        if (::mkdtemp(folder.data()) == nullptr) return;
         (void)std::system(("localedef -i de_DE -f UTF-8 '" + folder + "/" + name + "' >/dev/null 2>&1 </dev/null").c_str());
         made = std::filesystem::exists(folder + "/" + name);
-    }
-    ~CommaLocale() {
-        std::error_code ignored;
-        std::filesystem::remove_all(folder, ignored);
     }
     CommaLocale(const CommaLocale&) = delete;
     CommaLocale& operator=(const CommaLocale&) = delete;

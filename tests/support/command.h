@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/temporary_folder.h"
+
 namespace slabwright::support {
 
 struct CommandResult {
@@ -29,8 +31,9 @@ struct CommandResult {
 inline CommandResult run_command(const std::vector<std::string>& arguments, const std::vector<std::pair<std::string, std::string>>& environment = {},
                                  double interrupt_after = -1) {
     using Clock = std::chrono::steady_clock;
-    char out_name[] = "/tmp/command-out-XXXXXX", err_name[] = "/tmp/command-err-XXXXXX";
-    const int out = ::mkstemp(out_name), err = ::mkstemp(err_name);
+    const TemporaryFolder temporary;
+    const std::string out_name = temporary / "out", err_name = temporary / "err";
+    const int out = ::open(out_name.c_str(), O_RDWR | O_CREAT | O_EXCL, 0600), err = ::open(err_name.c_str(), O_RDWR | O_CREAT | O_EXCL, 0600);
     if (out < 0 || err < 0) throw std::runtime_error("no temporary files");
     const auto begin = Clock::now();
     const pid_t child = ::fork();
@@ -63,7 +66,7 @@ inline CommandResult run_command(const std::vector<std::string>& arguments, cons
     if (interrupted) result.after_interrupt = since(interrupt);
     if (WIFEXITED(status)) result.exit = WEXITSTATUS(status);
     if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
-    const auto slurp = [](const char* name) {
+    const auto slurp = [](const std::string& name) {
         std::ifstream in(name, std::ios::binary);
         std::ostringstream text;
         text << in.rdbuf();
@@ -73,8 +76,6 @@ inline CommandResult run_command(const std::vector<std::string>& arguments, cons
     result.err = slurp(err_name);
     ::close(out);
     ::close(err);
-    ::unlink(out_name);
-    ::unlink(err_name);
     return result;
 }
 

@@ -14,6 +14,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/support/temporary_folder.h"
+
 namespace slabwright::support {
 
 /// Where a straight motion ends, mm; `feed` is the rate in force (mm/min), 0 for a rapid.
@@ -55,15 +57,8 @@ inline std::vector<double> canon_numbers(std::string_view arguments) {
 /// refuses the program or is not installed
 inline CanonProgram interpret_rs274(std::string_view program, std::string_view tool_table) {
     namespace fs = std::filesystem;
-    std::string folder = (fs::temp_directory_path() / "rs274-XXXXXX").string();
-    if (::mkdtemp(folder.data()) == nullptr) throw std::runtime_error("no temporary folder for rs274");
-    struct Cleanup {
-        std::string folder;
-        ~Cleanup() {
-            std::error_code ignored;
-            fs::remove_all(folder, ignored);
-        }
-    } cleanup{folder};
+    const TemporaryFolder temporary;
+    const std::string folder = temporary.path.string();
     std::ofstream(folder + "/in.ngc", std::ios::binary) << program;
     std::ofstream(folder + "/tool.tbl", std::ios::binary) << tool_table;
     // The interpreter keeps its tools in $HOME/.tool.mmap: two at once in one home die of bus errors.
