@@ -9,13 +9,14 @@
 #include <vector>
 
 #include "engine/job.h"
+#include "kernels/export.h"
 #include "kernels/features/features.h"
 #include "kernels/polygons/loops.h"
 
 namespace slabwright {
 
 enum class Severity : std::uint8_t { note, warning, error };
-[[nodiscard]] std::string_view name(Severity severity);
+[[nodiscard]] SLABWRIGHT_API std::string_view name(Severity severity);
 
 /// Something the user should know, with a place (mm) when it has one.
 struct Diagnostic {
@@ -34,7 +35,7 @@ struct Move {
 };
 
 enum class OperationKind : std::uint8_t { face, rough, semi_rough, finish, corner, drill, edge };
-[[nodiscard]] std::string_view name(OperationKind kind);  ///< as plan.json spells it
+[[nodiscard]] SLABWRIGHT_API std::string_view name(OperationKind kind);  ///< as plan.json spells it
 
 /// One program: one tool, one purpose. Moves begin and end with a Z-only rapid at `clearance_z`.
 struct Operation {

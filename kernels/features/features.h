@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "kernels/export.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 
@@ -15,8 +16,8 @@ enum class FeatureType : std::uint8_t { peak, valley, up_flat, down_flat, shallo
 enum class FoundBy : std::uint8_t { exact, halving, facets };
 enum class Finder : std::uint8_t { halving, exact, both };
 
-[[nodiscard]] std::string_view name(FeatureType type);  ///< "peak", "valley", "up_flat", … as plan.json spells them
-[[nodiscard]] std::string_view name(FoundBy found_by);
+[[nodiscard]] SLABWRIGHT_API std::string_view name(FeatureType type);  ///< "peak", "valley", "up_flat", … as plan.json spells them
+[[nodiscard]] SLABWRIGHT_API std::string_view name(FoundBy found_by);
 
 /// One feature, millimetres. For `shallow` and `undercut` [z_low, z_high] is the patch's range; else both are its height.
 struct Feature {
