@@ -236,11 +236,12 @@ Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& insi
     parallel_each(context, blocks, [&](std::size_t block) {
         const std::size_t begin = block * kBlock, end = std::min(lines.size(), begin + kBlock);
         std::array<std::vector<Forbidden>, kBlock> found;
+        std::array<Hull, kBlock> hulls;
         for (std::uint32_t m = counts[block]; m < counts[block + 1]; ++m) {
             const SolidFacet& f = solid.facets[members[m]];
             const auto crossed = range(f);
             const std::size_t first = std::max(crossed.first, begin), last = std::min(crossed.second, end);
-            std::array<Hull, kBlock> hulls;
+            for (std::size_t l = first; l < last; ++l) hulls[l - begin] = Hull{};
             auto each_line = [&](auto&& element, auto... fixed) {
                 for (std::size_t l = first; l < last; ++l) element.meet(to_mm(lines[l]), hulls[l - begin], fixed...);
             };
@@ -261,7 +262,20 @@ Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& insi
             }
             for (std::size_t l = first; l < last; ++l) {
                 const Hull& h = hulls[l - begin];
-                if (h.low < h.high) found[l - begin].push_back({h.low, h.high, h.nz_low, h.nz_high});
+                if (!(h.low < h.high)) continue;
+                // Neighbouring facets mostly follow one another, so most intervals only stretch the one before.
+                std::vector<Forbidden>& on_line = found[l - begin];
+                if (!on_line.empty() && h.low <= on_line.back().high && h.high >= on_line.back().low) {
+                    Forbidden& before = on_line.back();
+                    if (h.low < before.low) {
+                        before.low = h.low;
+                        before.nz_low = h.nz_low;
+                    }
+                    if (h.high > before.high) {
+                        before.high = h.high;
+                        before.nz_high = h.nz_high;
+                    }
+                } else on_line.push_back({h.low, h.high, h.nz_low, h.nz_high});
             }
         }
         Fibres& part = parts[block];
