@@ -85,6 +85,7 @@ struct InputInfo {
     std::string file, sha256;
     std::uint64_t triangles = 0;
     std::array<double, 3> min{}, max{};  ///< mm, as in the STL (before the pattern is set on z = 0)
+    double volume_mm3 = 0;               ///< enclosed; an opening in the base plane counts as filled
 };
 
 struct Plan {

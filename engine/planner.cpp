@@ -84,6 +84,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     validate(job);
     Plan plan;
     plan.input = input;
+    plan.totals.part_volume_mm3 = input.volume_mm3;
     plan.job = job;
     if (mesh.facets.empty()) throw refuse("input.empty", "there is nothing to make: the mesh has no facets", input.file, "export the pattern again");
     const MeshView view = mesh.view();

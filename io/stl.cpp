@@ -564,6 +564,7 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
     }
     context.advance();
     stl.report = report_mesh(context, stl.mesh.view());
+    stl.input.volume_mm3 = stl.report.volume_mm3;
     context.advance();
     describe_report(stl.mesh, stl.report, stl.diagnostics);
     return stl;

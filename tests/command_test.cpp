@@ -15,13 +15,17 @@
 #include "tests/data/models.h"
 #include "tests/support/comma_locale.h"
 #include "tests/support/command.h"
+#include "tests/support/files.h"
 #include "tests/support/rs274.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
 using slabwright::support::CommandResult;
 using slabwright::support::run_command;
+using slabwright::support::slurp;
+using slabwright::support::spit;
 using slabwright::support::TemporaryFolder;
+using slabwright::support::tree;
 namespace fs = std::filesystem;
 using nlohmann::json;
 
@@ -33,22 +37,6 @@ CommandResult slabwright_command(std::vector<std::string> arguments, const std::
                                  double interrupt_after = -1) {
     arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
     return run_command(arguments, environment, interrupt_after);
-}
-
-void spit(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
-
-std::string slurp(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    std::ostringstream text;
-    text << in.rdbuf();
-    return text.str();
-}
-
-std::map<std::string, std::string> tree(const fs::path& root) {
-    std::map<std::string, std::string> files;
-    for (const auto& entry : fs::recursive_directory_iterator(root))
-        if (entry.is_regular_file()) files[fs::relative(entry.path(), root).string()] = slurp(entry.path());
-    return files;
 }
 
 /// An axis-parallel box, `open` without its top.

@@ -27,32 +27,18 @@
 #include "io/tool_table.h"
 #include "kernels/errors.h"
 #include "tests/support/comma_locale.h"
+#include "tests/support/files.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
 namespace fs = std::filesystem;
 using nlohmann::json;
+using slabwright::support::slurp;
+using slabwright::support::spit;
 using slabwright::support::TemporaryFolder;
+using slabwright::support::tree;
 
 namespace {
-
-void spit(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
-
-std::string slurp(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    std::ostringstream text;
-    text << in.rdbuf();
-    return text.str();
-}
-
-/// Every file under a folder with its bytes.
-std::map<std::string, std::string> tree(const fs::path& root) {
-    std::map<std::string, std::string> files;
-    if (!fs::exists(root)) return files;
-    for (const auto& entry : fs::recursive_directory_iterator(root))
-        files[fs::relative(entry.path(), root).string()] = entry.is_regular_file() ? slurp(entry.path()) : "";
-    return files;
-}
 
 /// What jsonschema (python3-jsonschema) says; "" when the text keeps the schema.
 std::string schema_complaint(const std::string& text, const char* schema) {

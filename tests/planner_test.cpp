@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "engine/planner.h"
 #include "io/slabwright.h"
@@ -118,6 +119,15 @@ TEST(Planner, NoProgramTouchesTheOwnModels) {
         for (const Diagnostic& d : result.violations)  // what stays on the part is another matter than what touches it
             EXPECT_TRUE(d.code.starts_with("left.")) << d.code << ' ' << d.message;
     }
+}
+
+// Totals know the wood: half a sphere of 50 mm, whose vertices lie on the sphere.
+TEST(Planner, TotalsHoldThePartsVolume) {
+    Context context;
+    const Plan result = plan(context, SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl", Job{});
+    const double whole = 2.0 / 3.0 * std::numbers::pi * 50 * 50 * 50;
+    EXPECT_NEAR(result.totals.part_volume_mm3, whole, 0.002 * whole);
+    EXPECT_LT(result.totals.part_volume_mm3, result.totals.stock_volume_mm3);
 }
 
 // The pump cover is made as planned: nothing above the cusp stays where a tool reaches.

@@ -53,7 +53,7 @@ struct LayerCut {
 /// @param free       per line
 /// @param tip_z      mm
 /// @param above_z    mm: where standing stock ends, so that a ramp starts there
-/// @param link_free  whether the tool may go straight along y at x (0.1 µm) between two neighbouring lines
+/// @param links      the fibres along y at given x (0.1 µm, ascending): where the tool may pass from line to line
 void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<const std::int32_t> line_y,
             const std::vector<std::vector<Stretch>>& free, double tip_z, double above_z,
             const std::function<Fibres(std::span<const std::int32_t>)>& links);

@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "io/gcode_reader.h"
+#include "tests/support/files.h"
 #include "tests/support/rs274.h"
 #include "tests/support/temporary_folder.h"
 
@@ -19,14 +20,8 @@ namespace slabwright {
 namespace {
 
 namespace fs = std::filesystem;
+using support::slurp;
 using support::TemporaryFolder;
-
-std::string slurp(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    std::ostringstream text;
-    text << in.rdbuf();
-    return text.str();
-}
 
 struct Outcome {
     int status = -1;  // exit status, 128 + signal for a crash
