@@ -1,0 +1,143 @@
+#include "engine/paths/standing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kRounding = 2e-5;  // mm: what rounding a height to float and a place to the grid may take away
+constexpr std::size_t kTable = 512;
+
+}  // namespace
+
+double Standing::cell_size(std::array<double, 2> min, std::array<double, 2> max) {
+    return std::max(kFinestCell, std::sqrt((max[0] - min[0]) * (max[1] - min[1]) / static_cast<double>(kMostCells)));
+}
+
+std::uint64_t Standing::bytes(std::array<double, 2> min, std::array<double, 2> max) {
+    const double cell = cell_size(min, max);
+    return static_cast<std::uint64_t>(std::ceil((max[0] - min[0]) / cell)) * static_cast<std::uint64_t>(std::ceil((max[1] - min[1]) / cell)) *
+           sizeof(float);
+}
+
+Standing::Standing(std::array<double, 2> min, std::array<double, 2> max, double top)
+    : cell_(cell_size(min, max)),
+      d_(cell_ * std::sqrt(0.5) + 1e-6),
+      x0_(min[0] + cell_ / 2),
+      y0_(min[1] + cell_ / 2),
+      top_(top),
+      nx_(std::max(1, static_cast<int>(std::ceil((max[0] - min[0]) / cell_)))),
+      ny_(std::max(1, static_cast<int>(std::ceil((max[1] - min[1]) / cell_)))),
+      height_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), static_cast<float>(kRounding)) {}
+
+Standing::BallTable Standing::ball_table(double radius) const {
+    BallTable table{radius, 0, std::vector<float>(kTable + 1)};
+    const double reach = radius - d_;
+    if (reach <= 0) return table;
+    table.scale = kTable / (reach * reach);
+    for (std::size_t k = 0; k <= kTable; ++k) {
+        const double rho = std::min(radius, std::min(reach, std::sqrt((static_cast<double>(k) + 1) / table.scale)) + d_);
+        table.height[k] = static_cast<float>(radius - std::sqrt(radius * radius - rho * rho));
+    }
+    return table;
+}
+
+// Calls row(j, first, last) for the cells whose centres lie within `radius` of the segment from a to b. The capsule is
+// convex: on a row it is one interval, whose ends lie on a disc or on one of the strip's long edges.
+template <class Row>
+void Standing::rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, Row&& row) const {
+    if (radius <= 0) return;
+    double dx = b[0] - a[0], dy = b[1] - a[1];
+    const double length = std::hypot(dx, dy);
+    if (length > 1e-9) dx *= radius / length, dy *= radius / length;
+    const double first_row = std::ceil((std::min(a[1], b[1]) - radius - y0_) / cell_),
+                 last_row = std::floor((std::max(a[1], b[1]) + radius - y0_) / cell_);
+    if (first_row >= ny_ || last_row < 0) return;
+    for (int j = static_cast<int>(std::max(0.0, first_row)), end = static_cast<int>(std::min(ny_ - 1.0, last_row)); j <= end; ++j) {
+        const double y = y0_ + j * cell_;
+        double low = 1e300, high = -1e300;
+        for (const auto* p : {&a, &b}) {
+            const double w2 = radius * radius - (y - (*p)[1]) * (y - (*p)[1]);
+            if (w2 < 0) continue;
+            const double w = std::sqrt(w2);
+            low = std::min(low, (*p)[0] - w), high = std::max(high, (*p)[0] + w);
+        }
+        if (length > 1e-9)
+            for (const double side : {-1.0, 1.0}) {
+                const double ax = a[0] - side * dy, ay = a[1] + side * dx, bx = b[0] - side * dy, by = b[1] + side * dx;
+                if ((ay <= y) == (by <= y)) continue;
+                const double x = ax + (y - ay) / (by - ay) * (bx - ax);
+                low = std::min(low, x), high = std::max(high, x);
+            }
+        const double i0 = std::ceil((low - x0_) / cell_), i1 = std::floor((high - x0_) / cell_);
+        if (i0 > i1 || i1 < 0 || i0 >= nx_) continue;
+        row(j, static_cast<int>(std::max(0.0, i0)), static_cast<int>(std::min(nx_ - 1.0, i1)));
+    }
+}
+
+void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to) {
+    const std::array<double, 2> a{from[0], from[1]}, b{to[0], to[1]};
+    const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
+    const double low = std::min(from[2], to[2]), high = std::max(from[2], to[2]);
+    if (low >= top_ || cutter.radius <= d_) return;
+    if (cutter.profile == Cutter::Profile::flat) {
+        // Each covered cell was covered at some place of the way, and no place is higher than its higher end.
+        const auto z = static_cast<float>((l2 > 0 ? high : low) - top_ + kRounding);
+        rows(cutter.radius - d_, a, b, [&](int j, int first, int last) {
+            float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
+            for (int i = first; i <= last; ++i) h[i] = std::min(h[i], z);
+        });
+        return;
+    }
+    auto found = std::find_if(tables_.begin(), tables_.end(), [&](const BallTable& t) { return t.radius == cutter.radius; });
+    if (found == tables_.end()) found = tables_.insert(tables_.end(), ball_table(cutter.radius));
+    const float* const profile = found->height.data();
+    const double scale = found->scale;
+    // The place of the way nearest to the cell's centre: on steep ways others may be lower, but this one is sure.
+    const double z0 = (l2 > 0 ? from[2] : low) - top_ + kRounding, rise = l2 > 0 ? to[2] - from[2] : 0.0, fx = l2 > 0 ? dx / l2 : 0.0,
+                 fy = l2 > 0 ? dy / l2 : 0.0;
+    rows(cutter.radius - d_, a, b, [&](int j, int first, int last) {
+        float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
+        const double py = y0_ + j * cell_ - a[1];
+        for (int i = first; i <= last; ++i) {
+            const double px = x0_ + i * cell_ - a[0];
+            const double t = std::clamp(px * fx + py * fy, 0.0, 1.0), ex = px - t * dx, ey = py - t * dy;
+            const auto bin = std::min(kTable, static_cast<std::size_t>((ex * ex + ey * ey) * scale));
+            h[i] = std::min(h[i], static_cast<float>(z0 + t * rise + static_cast<double>(profile[bin])));
+        }
+    });
+}
+
+double Standing::top(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b) const {
+    float most = -std::numeric_limits<float>::infinity();
+    rows(radius + d_, a, b, [&](int j, int first, int last) {
+        const float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
+        for (int i = first; i <= last; ++i) most = std::max(most, h[i]);
+    });
+    return top_ + static_cast<double>(most);
+}
+
+double Standing::free_tip(const Cutter& cutter, const std::array<double, 2>& a, const std::array<double, 2>& b) const {
+    if (cutter.profile == Cutter::Profile::flat) return top(cutter.radius - 2 * d_, a, b);
+    const auto found = std::find_if(tables_.begin(), tables_.end(), [&](const BallTable& t) { return t.radius == cutter.radius; });
+    const BallTable made = found == tables_.end() ? ball_table(cutter.radius) : BallTable{};
+    const BallTable& table = found == tables_.end() ? made : *found;
+    const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
+    double most = -std::numeric_limits<double>::infinity();
+    rows(cutter.radius - d_, a, b, [&](int j, int first, int last) {
+        const float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
+        const double py = y0_ + j * cell_ - a[1];
+        for (int i = first; i <= last; ++i) {
+            const double px = x0_ + i * cell_ - a[0], t = l2 > 0 ? std::clamp((px * dx + py * dy) / l2, 0.0, 1.0) : 0.0;
+            const double ex = px - t * dx, ey = py - t * dy;
+            const auto bin = std::min(kTable, static_cast<std::size_t>((ex * ex + ey * ey) * table.scale));
+            most = std::max(most, static_cast<double>(h[i] - table.height[bin]));
+        }
+    });
+    return top_ + most;
+}
+
+}  // namespace slabwright
