@@ -1,18 +1,37 @@
 #include "engine/simulate/reach.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace slabwright {
 
 namespace {
-constexpr int kRounds = 40;        // of alternating projection from one start
-constexpr double kTouch = 1e-4;    // mm: a tool may touch the part, and this much is touching
-constexpr double kRests = 1e-3;    // mm: a floor this near under a flat end mill is touched, not cut
-constexpr double kCovered = 2e-4;  // mm by which covering a point may fall short
-constexpr double kStuck = 0.99;    // of the round before: the search has ended
-constexpr int kSides = 4;          // starts beside the point
+constexpr double kRests = 1e-3;              // mm: a floor this near under a flat end mill is touched, not cut
+constexpr double kCovered = Reach::kTouch;   // mm by which covering a point may fall short
+constexpr std::size_t kPlaces = 12;          // free places remembered
+constexpr std::size_t kObstacles = 48;       // obstacles remembered
+constexpr int kSettlings = 3;                // narrowest places that are settled into, of one tool and point
+constexpr int kRounds = 30;                  // of settling
+constexpr double kStuck = 0.99;              // of the round before: settling has ended
+constexpr std::size_t kMostPatches = 20000;  // of one tool and point; a dozen to some hundreds are usual
+
+double length(const Point3& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+/// All places of a tool that may be worth trying for one point: for a ball its centre on the upper half sphere about the point (lower
+/// ones are more in the way, higher ones do not cover it); for a flat end mill the middle of its floor on the disc about the
+/// point, at the point's height. A patch is a range of the polar angle, or of the distance, and one of the azimuth.
+struct Patch {
+    double u, v;    // middle: polar angle or distance, azimuth
+    double du, dv;  // half the ranges
+    Point3 centre;
+    double spread;   // mm: no place of the patch is farther from its centre
+    double nearest;  // mm from the centre to the nearest obstacle known
+};
+
+bool worse(const Patch& a, const Patch& b) { return a.nearest != b.nearest ? a.nearest < b.nearest : a.spread < b.spread; }
 }  // namespace
 
 Reach::Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_bottom, double z_top, double lowest)
@@ -22,76 +41,156 @@ Reach::Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_
     std::stable_sort(tools_.begin(), tools_.end(), [](const Tool& a, const Tool& b) { return a.diameter < b.diameter; });
 }
 
-bool Reach::reachable(const Point3& point) const {
-    for (const Tool& tool : tools_)
+bool Reach::reachable(const Point3& point) {
+    // A place found for a neighbour mostly does for this point too.
+    for (const Place& place : places_) {
+        const Tool& tool = tools_[place.tool];
+        const Point3& c = place.centre;
+        const double R = tool.diameter / 2 + kCovered, dx = point[0] - c[0], dy = point[1] - c[1];
+        const double dz = tool.kind == ToolKind::ball ? std::max(0.0, c[2] - point[2]) : 0;
+        if (tool.kind != ToolKind::ball && point[2] < c[2]) continue;
+        if (dx * dx + dy * dy + dz * dz <= R * R) return true;
+    }
+    for (std::size_t tool = 0; tool < tools_.size(); ++tool)
         if (by(tool, point)) return true;
     return false;
 }
 
-bool Reach::by(const Tool& tool, const Point3& point) const {
+void Reach::remember(const Point3& obstacle) {
+    if (obstacles_.size() < kObstacles) obstacles_.push_back(obstacle);
+    else obstacles_[next_obstacle_++ % kObstacles] = obstacle;
+}
+
+bool Reach::holder_free(const Tool& tool, const Point3& tip) const {
+    for (const auto& [radius, above] : {std::pair{tool.shank_diameter / 2, tool.flute_length}, std::pair{tool.holder_diameter / 2, tool.stickout}}) {
+        if (radius <= tool.diameter / 2 || above <= 0) continue;
+        const Point3 at{tip[0], tip[1], tip[2] + above};
+        if (part_.cylinder(z_top_, at, at, radius, kTouch).found) return false;
+    }
+    return true;
+}
+
+// Branch and bound. Each place that is tried and found blocked yields an obstacle, a point with part at or above it, which blocks every
+// place nearer to it than the radius: patches that lie wholly in one obstacle's sphere are gone, others are halved. Obstacles hold for all
+// points and tools of the layer, so those of the neighbours mostly decide before the part itself is asked.
+bool Reach::by(std::size_t index, const Point3& point) {
+    const Tool& tool = tools_[index];
     const double R = tool.diameter / 2;
     const bool ball = tool.kind == ToolKind::ball;
-    // For a ball c is its centre, for a flat end mill the middle of its floor, which lies at the point's own height: lower would
-    // only be in the way, and higher would not cover it.
     const double floor = ball ? std::max(lowest_, z_bottom_ - R) + R : std::max(lowest_, z_bottom_);
-    if (!ball && point[2] < floor) return false;
-    auto clear_of = [&](const Point3& c) {
+    if (point[2] + (ball ? R : 0) < floor) return false;
+
+    std::vector<Point3> near;  // obstacles that can be in the way
+    auto add = [&](const Point3& q) {
+        const double dx = q[0] - point[0], dy = q[1] - point[1], dz = q[2] - point[2];
+        if (ball ? dx * dx + dy * dy + std::pow(std::max(0.0, -dz), 2) < 4 * R * R : dz >= kRests && dx * dx + dy * dy < 4 * R * R) near.push_back(q);
+    };
+    for (const Point3& q : obstacles_) add(q);
+    auto distance2 = [&](const Point3& c, const Point3& q) {
+        const double dx = c[0] - q[0], dy = c[1] - q[1], dz = ball ? std::max(0.0, c[2] - q[2]) : 0;
+        return dx * dx + dy * dy + dz * dz;
+    };
+    auto clearance = [&](const Point3& c) {
         if (ball) return part_.from_shadow(c, z_top_, R);
         return part_.beside({c[0], c[1], c[2] + kRests}, z_top_, R);  // what it stands on is not in its way
     };
-    auto length = [](const Point3& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); };
-    auto holder_free = [&](const Point3& c) {
-        const double tip = ball ? c[2] - R : c[2];
-        for (const auto& [radius, above] :
-             {std::pair{tool.shank_diameter / 2, tool.flute_length}, std::pair{tool.holder_diameter / 2, tool.stickout}}) {
-            if (radius <= R || above <= 0) continue;
-            const Point3 at{c[0], c[1], tip + above};
-            if (part_.cylinder(z_top_, at, at, radius, kTouch).found) return false;
-        }
+    auto met = [&](const Point3& c, const StandingPart::Clearance& found) {
+        const Point3 q{c[0] - found.away[0], c[1] - found.away[1], ball ? c[2] - found.away[2] : c[2] + kRests};
+        remember(q);
+        add(q);
+        return q;
+    };
+    auto takes = [&](const Point3& c) {
+        if (!holder_free(tool, {c[0], c[1], ball ? c[2] - R : c[2]})) return false;
+        if (places_.size() < kPlaces) places_.push_back({index, c});
+        else places_[next_place_++ % kPlaces] = {index, c};
         return true;
     };
-    auto search = [&](Point3 c) {
-        double lacking = 1e300;
+    auto at = [&](double u, double v) {
+        if (ball) return Point3{point[0] + R * std::sin(u) * std::cos(v), point[1] + R * std::sin(u) * std::sin(v), point[2] + R * std::cos(u)};
+        return Point3{point[0] + u * std::cos(v), point[1] + u * std::sin(v), point[2]};
+    };
+    std::vector<Patch> heap;  // the farthest from what is known to be in the way first
+    const double scale = ball ? R : 1, u_end = ball ? std::acos(std::clamp((floor - point[2]) / R, 0.0, 1.0)) : R;
+    // Puts a patch among those to look at unless one obstacle blocks all of it.
+    auto consider = [&](Patch p) {
+        const double u_most = std::min(p.u + p.du, ball ? std::numbers::pi / 2 : R), width = ball ? std::sin(u_most) * std::sin(p.u) : u_most * p.u;
+        p.centre = at(p.u, p.v);
+        p.spread = scale * std::sqrt(p.du * p.du + width * p.dv * p.dv);  // of two places: 4 sin²(Δu/2) + 4 sin u₁ sin u₂ sin²(Δv/2)
+        p.nearest = std::numeric_limits<double>::infinity();
+        for (const Point3& q : near) p.nearest = std::min(p.nearest, distance2(p.centre, q));
+        p.nearest = std::sqrt(p.nearest);
+        if (p.nearest + p.spread < R - kTouch) return;
+        heap.push_back(p);
+        std::push_heap(heap.begin(), heap.end(), worse);
+    };
+    // From a place that lacks little: off the nearest of the part, and back to where the point is covered, in turn.
+    auto settles = [&](Point3 c) {
+        double lacking = std::numeric_limits<double>::infinity();
         for (int round = 0; round < kRounds; ++round) {
-            // Cover the point: the nearest place from which the ball, or the shank above its centre, holds it.
-            if (ball && c[2] < floor) c[2] = floor;
+            const auto found = clearance(c);
+            if (found.distance >= R - kTouch) return takes(c);
+            met(c, found);
+            const double lack = R - found.distance, away = length(found.away);
+            if (away <= 0 || lack > kStuck * lacking) return false;
+            lacking = lack;
+            for (int k = 0; k < 3; ++k) c[k] += found.away[k] * (lack / away);
+            if (!ball) c[2] = point[2];
             const Point3 v{c[0] - point[0], c[1] - point[1], ball ? std::max(0.0, c[2] - point[2]) : 0};
             const double d = length(v);
-            if (d > R + kCovered) {
-                for (int k = 0; k < 3; ++k) c[k] -= v[k] * (1 - R / d);
-                if (ball && c[2] < floor) {  // the floor leaves less room sideways
-                    c[2] = floor;
-                    const double over = std::max(0.0, c[2] - point[2]), room = R * R - over * over;
-                    if (room < 0) return false;
-                    const double r = std::hypot(c[0] - point[0], c[1] - point[1]);
-                    if (r * r > room) {
-                        const double s = std::sqrt(room) / r;
-                        c[0] = point[0] + (c[0] - point[0]) * s, c[1] = point[1] + (c[1] - point[1]) * s;
-                    }
-                }
-            }
-            const auto clearance = clear_of(c);
-            if (clearance.distance >= R - kTouch) return holder_free(c);
-            // What is lacking shrinks by a factor each round where the two meet, and stays where they do not.
-            const double lack = R - clearance.distance;
-            if (round > 1 && lack > kStuck * lacking) return false;
-            lacking = lack;
-            const double away = length(clearance.away);
-            if (away <= 0) return false;  // inside the part: no way out is known
-            for (int k = 0; k < 3; ++k) c[k] += clearance.away[k] * (lack / away);
+            if (d > R)
+                for (int k = 0; k < 3; ++k) c[k] = point[k] + v[k] * (R / d);
+            if (ball && c[2] < floor) return false;
         }
         return false;
     };
-    const auto near = clear_of(point);
-    Point3 start = point;
-    const double d = length(near.away);
-    if (near.distance < R && d > 0)  // as far out as the tool still covers the point
-        for (int k = 0; k < 3; ++k) start[k] += near.away[k] * (R / d);
-    if (search(start)) return true;
-    if (ball && search({point[0], point[1], point[2] + R})) return true;
-    for (int i = 0; i < kSides; ++i) {
-        const double a = 2 * std::numbers::pi * i / kSides;
-        if (search({point[0] + R * std::cos(a), point[1] + R * std::sin(a), point[2]})) return true;
+
+    for (int k = 0; k < 3; ++k) consider({u_end / 2, (2 * k + 1) * std::numbers::pi / 3, u_end / 2, std::numbers::pi / 3, {}, 0, 0});
+    int settlings = 0;
+    for (std::size_t patches = 0; !heap.empty() && patches < kMostPatches; ++patches) {
+        std::pop_heap(heap.begin(), heap.end(), worse);
+        Patch p = heap.back();
+        heap.pop_back();
+        // Obstacles met since may block it.
+        double nearest2 = std::numeric_limits<double>::infinity();
+        for (const Point3& q : near) nearest2 = std::min(nearest2, distance2(p.centre, q));
+        p.nearest = std::sqrt(nearest2);
+        if (p.nearest >= R - kTouch) {
+            const auto found = clearance(p.centre);
+            if (found.distance >= R - kTouch) {
+                if (takes(p.centre)) return true;
+                // Shank or holder is in the way. Where it is even with the tip as high as the patch goes, less the patch's size, the patch is gone.
+                const double tip = ball ? point[2] + R * std::cos(p.u - p.du) - R : point[2];
+                bool gone = false;
+                for (const auto& [radius, above] :
+                     {std::pair{tool.shank_diameter / 2, tool.flute_length}, std::pair{tool.holder_diameter / 2, tool.stickout}})
+                    if (radius > R && above > 0)
+                        gone = gone || part_.beside({p.centre[0], p.centre[1], tip + above}, z_top_, radius).distance + p.spread < radius - kTouch;
+                if (gone) continue;
+            } else {
+                met(p.centre, found);
+                p.nearest = found.distance;
+            }
+        }
+        if (p.nearest + p.spread < R - kTouch) continue;
+        if (p.spread < kResolution) {
+            if (settlings < kSettlings && p.nearest < R - kTouch) {
+                ++settlings;
+                if (settles(p.centre)) return true;
+            }
+            continue;
+        }
+        Patch a = p, b = p;
+        const double across = ball ? std::sin(std::min(p.u + p.du, std::numbers::pi / 2)) : p.u + p.du;
+        if (p.du >= across * p.dv) {
+            a.du = b.du = p.du / 2;
+            a.u -= a.du, b.u += b.du;
+        } else {
+            a.dv = b.dv = p.dv / 2;
+            a.v -= a.dv, b.v += b.dv;
+        }
+        consider(a);
+        consider(b);
     }
     return false;
 }

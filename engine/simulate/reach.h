@@ -1,6 +1,7 @@
 // What no tool of the library reaches: computed by the simulator alone, from the part and the tools.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "engine/job.h"
@@ -9,22 +10,37 @@
 namespace slabwright {
 
 /// Decides, for points of air over a layer's finished surface, whether some flat or ball end mill of the library can cover
-/// them without touching the part (below z_top), the holder included. Const functions may be called from many threads.
+/// them without touching the part (below z_top), the holder included. Borrows the part. It remembers places and obstacles that it has met,
+/// which makes neighbouring points cheap: one object serves one thread.
 class Reach {
 public:
-    /// @param bottom the layer's bottom; flat end mills stop there, ball end mills may pass it by their radius, but no tip
+    /// mm: a point that a tool this much thicker could cover is always called reachable.
+    static constexpr double kResolution = 0.005;
+    /// mm: a tool may touch the part, and this much is touching; no point out of reach by more than twice this is called reachable.
+    static constexpr double kTouch = 1e-4;
+
+    /// @param z_bottom the layer's bottom; flat end mills stop there, ball end mills may pass it by their radius, but no tip
     ///        goes below `lowest` (the base board's limit)
     Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_bottom, double z_top, double lowest);
 
-    /// True when a place for a tool was found. The search projects in turn onto "covers the point" and "clear of the part",
-    /// from several starts; where the free space is contorted it may fail to find a place that exists.
-    [[nodiscard]] bool reachable(const Point3& point) const;
+    /// Whether a tool covers the point. Exact but for kResolution and kTouch: a branch and bound over all of the tool's places.
+    [[nodiscard]] bool reachable(const Point3& point);
 
 private:
-    [[nodiscard]] bool by(const Tool& tool, const Point3& point) const;
+    struct Place {
+        std::size_t tool;
+        Point3 centre;
+    };
+    [[nodiscard]] bool by(std::size_t tool, const Point3& point);
+    [[nodiscard]] bool holder_free(const Tool& tool, const Point3& tip) const;
+    void remember(const Point3& obstacle);
+
     const StandingPart& part_;
     std::vector<Tool> tools_;  ///< smallest first
     double z_bottom_, z_top_, lowest_;
+    std::vector<Place> places_;      ///< free ones, found lately
+    std::vector<Point3> obstacles_;  ///< points with part at or above them, met lately
+    std::size_t next_place_ = 0, next_obstacle_ = 0;
 };
 
 }  // namespace slabwright

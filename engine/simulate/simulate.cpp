@@ -414,7 +414,7 @@ private:
         part_.envelope_grid(grid.x0, grid.y0, grid.cell, grid.nx, grid.ny, layer.z_top, none, envelope.data());
         const double limit = options_.cusp + options_.slack;
         const double lowest = l == 0 && options_.board_cut >= 0 ? layer.z_bottom - options_.board_cut : -std::numeric_limits<double>::infinity();
-        const Reach reach(part_, input_.tools, layer.z_bottom, layer.z_top, lowest);
+        Reach reach(part_, input_.tools, layer.z_bottom, layer.z_top, lowest);
         for (std::size_t c = 0; c < grid.count(); ++c) {
             const auto nx = static_cast<std::size_t>(grid.nx);
             const int i = static_cast<int>(c % nx), j = static_cast<int>(c / nx);
@@ -470,7 +470,7 @@ private:
     /// Stock that stands `over` above the finished surface is excused as far as no tool reaches into it. What could have been taken
     /// at a point of its surface is the greatest d for which tools reach the points d away from it towards the part, straight down and
     /// down at 45° to four sides: a lump of that size, not the sliver beside what is out of reach. Found by halving.
-    void judge_leftover(const SimulatedLayer& layer, const Reach& reach, const Point3& s, double over, const StandingPart::Clearance& near,
+    void judge_leftover(const SimulatedLayer& layer, Reach& reach, const Point3& s, double over, const StandingPart::Clearance& near,
                         bool beside, double height, LayerFindings& f) const {
         const double limit = options_.cusp + options_.slack;
         Point3 n{0, 0, 1};
