@@ -111,6 +111,7 @@ struct Cutting {
     double ramp_deg = 5;                                 ///< entry into stock
     double holder_clearance = 2.0;
     double finish_feed = 5000;
+    bool arcs = true;  ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
 };
 
 struct Job {

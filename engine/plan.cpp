@@ -1,5 +1,9 @@
 #include "engine/plan.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 namespace slabwright {
 
 std::string_view name(Severity severity) {
@@ -32,6 +36,36 @@ std::string_view name(OperationKind kind) {
             return "edge";
     }
     return "";
+}
+
+double ArcShape::length() const { return radius * std::abs(sweep); }
+
+std::array<double, 4> ArcShape::box() const {
+    std::array<double, 4> box{1e300, 1e300, -1e300, -1e300};
+    auto take = [&](double angle) {
+        const double px = x + radius * std::cos(angle), py = y + radius * std::sin(angle);
+        box = {std::min(box[0], px), std::min(box[1], py), std::max(box[2], px), std::max(box[3], py)};
+    };
+    take(start);
+    take(start + sweep);
+    // Between its ends an arc turns back only where it crosses an axis through its centre.
+    constexpr double quarter = std::numbers::pi / 2;
+    const double low = std::min(start, start + sweep), high = std::max(start, start + sweep);
+    for (double k = std::ceil(low / quarter); k * quarter <= high; ++k) take(k * quarter);
+    return box;
+}
+
+ArcShape arc_shape(const Move& from, const Move& arc) {
+    const std::int64_t ax = -std::int64_t{arc.i}, ay = -std::int64_t{arc.j};
+    const std::int64_t bx = std::int64_t{arc.x} - from.x + ax, by = std::int64_t{arc.y} - from.y + ay;
+    ArcShape shape;
+    shape.x = to_mm(std::int64_t{from.x} + arc.i);
+    shape.y = to_mm(std::int64_t{from.y} + arc.j);
+    const double u = static_cast<double>(ax), v = static_cast<double>(ay), p = static_cast<double>(bx), q = static_cast<double>(by);
+    shape.radius = std::hypot(u, v) / kUnitsPerMm;
+    shape.start = std::atan2(v, u);
+    shape.sweep = std::atan2(u * q - v * p, u * p + v * q);
+    return shape;
 }
 
 }  // namespace slabwright

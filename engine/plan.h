@@ -27,12 +27,29 @@ struct Diagnostic {
     friend bool operator==(const Diagnostic&, const Diagnostic&) = default;
 };
 
-/// One straight move to (x, y, z) in 0.1 µm, frame pattern-base; feed in mm/min, 0 for a rapid.
+/// One move to (x, y, z) in 0.1 µm, frame pattern-base; feed in mm/min, 0 for a rapid. Straight where i = j = 0; else, by feed
+/// and at one z only, along the arc of less than half a circle whose centre lies (i, j) from where the move begins. That it is
+/// the shorter arc says which way it turns: against the clock where the centre lies left of the way from begin to end.
 struct Move {
     std::int32_t x = 0, y = 0, z = 0;
     std::uint32_t feed = 0;
+    std::int32_t i = 0, j = 0;
+    [[nodiscard]] bool is_arc() const { return i != 0 || j != 0; }
     friend bool operator==(const Move&, const Move&) = default;
 };
+
+/// An arc in the plane, mm and radians; the sweep is positive against the clock and less than π either way. The end's radius
+/// differs from the begin's by what rounding to 0.1 µm does; `radius` is the begin's.
+struct ArcShape {
+    double x = 0, y = 0, radius = 0;  ///< the centre
+    double start = 0, sweep = 0;
+    [[nodiscard]] double length() const;
+    /// Smallest x and y, then largest x and y, of all its points.
+    [[nodiscard]] std::array<double, 4> box() const;
+};
+
+/// The arc of a move that is one, from where the move before it ended.
+[[nodiscard]] ArcShape arc_shape(const Move& from, const Move& arc);
 
 enum class OperationKind : std::uint8_t { face, rough, semi_rough, finish, corner, drill, edge };
 [[nodiscard]] SLABWRIGHT_API std::string_view name(OperationKind kind);  ///< as plan.json spells it

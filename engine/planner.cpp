@@ -62,9 +62,18 @@ void check_travel(const Plan& plan) {
     for (const Layer& layer : plan.layers)
         for (const Operation& op : layer.operations) {
             double over_x = 0, over_y = 0, low = 1e300, high = -1e300;
-            for (const Move& m : op.moves) {
-                over_x = std::max(over_x, std::abs(to_mm(m.x) - cx) - machine.travel_x / 2);
-                over_y = std::max(over_y, std::abs(to_mm(m.y) - cy) - machine.travel_y / 2);
+            auto reach = [&](double x, double y) {
+                over_x = std::max(over_x, std::abs(x - cx) - machine.travel_x / 2);
+                over_y = std::max(over_y, std::abs(y - cy) - machine.travel_y / 2);
+            };
+            for (std::size_t i = 0; i < op.moves.size(); ++i) {
+                const Move& m = op.moves[i];
+                reach(to_mm(m.x), to_mm(m.y));
+                if (m.is_arc()) {
+                    const std::array<double, 4> box = arc_shape(op.moves[i - 1], m).box();
+                    reach(box[0], box[1]);
+                    reach(box[2], box[3]);
+                }
                 low = std::min(low, to_mm(m.z));
                 high = std::max(high, to_mm(m.z));
             }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "io/decimal.h"
 #include "io/json_text.h"
@@ -36,6 +37,13 @@ void require_safe(const Layer& layer, const Operation& operation, const Tool* to
     const Move &last = moves.back(), &before = moves[moves.size() - 2];
     if (last.feed != 0 || last.z != clearance || last.x != before.x || last.y != before.y)
         refuse("it does not end with a Z-only rapid to the clearance height");
+    for (std::size_t i = 0; i < moves.size(); ++i) {
+        const Move& arc = moves[i];
+        if (!arc.is_arc()) continue;
+        if (i == 0 || arc.feed == 0 || arc.z != moves[i - 1].z) refuse("an arc is rapid or leaves its plane");
+        if (std::abs(arc_shape(moves[i - 1], arc).sweep) >= std::numbers::pi * (1 - 1e-9) || (arc.x == moves[i - 1].x && arc.y == moves[i - 1].y))
+            refuse("an arc turns by half a circle or more");
+    }
 }
 
 /// Writes modal motion: a word appears when its value changes, and G when the kind of motion does.
@@ -55,16 +63,26 @@ public:
     void move(const Move& to) {
         const bool x = !xy_known_ || to.x != x_, y = !xy_known_ || to.y != y_, z = to.z != z_;
         if (!x && !y && !z) return;
-        const int motion = to.feed == 0 ? 0 : 1;
+        int motion = to.feed == 0 ? 0 : 1;
+        if (to.is_arc()) {  // against the clock (G3) where the centre lies left of the chord
+            const std::int64_t dx = to.x - x_, dy = to.y - y_;
+            motion = dx * to.j > dy * to.i ? 3 : 2;
+        }
         if (motion != motion_) {
-            text_ += motion == 0 ? "G0 " : "G1 ";
+            text_ += 'G';
+            text_ += static_cast<char>('0' + motion);
+            text_ += ' ';
             motion_ = motion;
         }
         const std::size_t start = text_.size();
         if (x) word('X', to.x, start);
         if (y) word('Y', to.y, start);
         if (z) word('Z', to.z - z_origin_, start);
-        if (motion == 1 && to.feed != feed_) {
+        if (to.is_arc()) {
+            word('I', to.i, start);
+            word('J', to.j, start);
+        }
+        if (motion != 0 && to.feed != feed_) {
             feed_ = to.feed;
             text_ += fmt::format(" F{}", feed_);
         }
@@ -124,6 +142,8 @@ void write_program(const Plan& plan, const Layer& layer, const Operation& operat
                         decimal(plan.job.machine.spindle_dwell_s, 3));
 
     const std::vector<Move>& moves = operation.moves;
+    // Centres count from where an arc begins, whatever the program before has left in force.
+    if (std::any_of(moves.begin(), moves.end(), [](const Move& m) { return m.is_arc(); })) text += "G91.1\n";
     const std::int32_t clearance = to_units(operation.clearance_z);
     MotionText motion(text, layer_top ? to_units(layer.z_top) : 0);
     motion.rapid_z(clearance);

@@ -13,12 +13,12 @@ namespace slabwright {
 using TextSink = std::function<void(std::string_view)>;
 
 /// Writes the program of one operation: comment header, G21 G17 G90 G94 G40 G49 G80, G54, tool and length offset, spindle with
-/// dwell, the moves as G0 and G1, M5, M2. Coordinates are exact from the integers of 0.1 µm: at most four decimals, no
+/// dwell, the moves as G0 and G1 (arcs as G2 and G3 with I and J, after G91.1), M5, M2. Coordinates are exact from the integers of 0.1 µm: at most four decimals, no
 /// exponent. Words are modal. The first and the last motion are Z-only G0 to the clearance height. With the frame layer-top, z counts
 /// from the layer's top.
 /// @param sink is given pieces of about a megabyte, so that a program of any length takes little memory
 /// @throws Error(no_plan, "program.unsafe") when the operation does not begin and end with a rapid to its clearance height,
-///         the last one Z-only, has no tool of the job's library, or a feed move has no feed; nothing has been given to the sink then
+///         the last one Z-only, has no tool of the job's library, or an arc is none (Move); nothing has been given to the sink then
 void write_program(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink);
 
 /// The same text as one string.

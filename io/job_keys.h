@@ -140,6 +140,7 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("ramp_deg", job.cutting.ramp_deg, "degrees, entry into stock");
     visit.key("holder_clearance", job.cutting.holder_clearance, "mm between the holder and anything that stands");
     visit.key("finish_feed", job.cutting.finish_feed, "mm/min");
+    visit.key("arcs", job.cutting.arcs, "arcs (G2, G3) where a path turns evenly; false: straight moves only");
 }
 
 }  // namespace slabwright

@@ -345,6 +345,10 @@ Verification verify_folder(Context& context, const std::string& directory, const
     const Frame frame = enumerator(kFrameWords, plan["frame"]);
     const JobPart part = read_job_part(plan);
 
+    // Chords that stand for an arc take next to nothing of the gouge tolerance that the paths were made for.
+    GcodeLimits limits;
+    limits.arc_error = std::clamp(0.02 * part.job.tolerances.gouge, 1e-5, limits.arc_error);
+
     Verification result;
     SimulationInput& input = result.input;
     std::vector<Violation> violations;
@@ -380,7 +384,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
                 violations.push_back({"program.missing", "plan.json names it, nc/ does not hold it", file, 0, {}, 0});
                 continue;
             }
-            Program program = read_gcode(read_text(path, "verify.program"), "nc/" + file);
+            Program program = read_gcode(read_text(path, "verify.program"), "nc/" + file, limits);
             program.file = file;
             program.layer = static_cast<int>(l);
             program.kind = operation_kind(op["kind"]);

@@ -42,10 +42,12 @@ struct LayerCut {
 };
 
 /// Longest chord between exact cutter locations that stays within 0.65 of the gouge tolerance (see level_contours), in
-/// 0.1 µm for a grid's pitch (chord/√2), and what simplifying may add.
+/// 0.1 µm for a grid's pitch (chord/√2), and what simplifying may add (0.12 of it). The arcs and longer chords that are fitted to
+/// a finished operation may add 0.18 more, so that all of them stay within 0.95.
 [[nodiscard]] double safe_chord_mm(double radius, double gouge);
 [[nodiscard]] std::int32_t safe_pitch(double radius, double gouge);
 [[nodiscard]] double simplify_tolerance_units(double gouge);
+[[nodiscard]] double arc_tolerance_units(double gouge);
 
 /// Clears a region given as free stretches on parallel lines along x, chained into zigzags; each chain is entered from
 /// outside the stock where it begins there, else by a ramp.

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/paths/arcs.h"
 #include "engine/paths/layer_cut.h"
 #include "kernels/parallel/parallel.h"
 
@@ -11,7 +12,8 @@ double safe_chord_mm(double radius, double gouge) { return std::sqrt(8 * radius 
 std::int32_t safe_pitch(double radius, double gouge) {
     return static_cast<std::int32_t>(std::floor(safe_chord_mm(radius, gouge) / std::numbers::sqrt2 * kUnitsPerMm));
 }
-double simplify_tolerance_units(double gouge) { return 0.3 * gouge * kUnitsPerMm; }
+double simplify_tolerance_units(double gouge) { return 0.12 * gouge * kUnitsPerMm; }
+double arc_tolerance_units(double gouge) { return 0.18 * gouge * kUnitsPerMm; }
 
 // The machine's travel is centred on the stock; the planner has made sure that the stock lies within it.
 double LayerCut::low(int axis, double beyond) const {
@@ -89,7 +91,9 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     cut.floors.erase(std::unique(cut.floors.begin(), cut.floors.end(), [](double a, double b) { return a - b < kSameFloor; }), cut.floors.end());
 
     LayerResult result;
+    const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};
     auto take = [&](Operation&& operation) {
+        fit_arcs(operation.moves, fit);
         if (!operation.moves.empty()) result.operations.push_back(std::move(operation));
         context.throw_if_cancelled();
     };

@@ -14,7 +14,7 @@ double travel_seconds(std::span<const MotionLeg> legs, double acceleration, doub
         const MotionLeg& leg = legs[i];
         if (leg.length <= 0) continue;
         if (before) {
-            const auto &u = before->direction, &v = leg.direction;
+            const auto &u = before->leaving, &v = leg.direction;
             const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0), half = std::sqrt((1 + cosine) / 2);
             const double corner = half >= 1 - 1e-12 ? 1e9 : std::sqrt(a * junction_mm * half / (1 - half));
             entry[i] = std::min({corner, before->speed, leg.speed});
@@ -49,6 +49,17 @@ MotionTime motion_time(std::span<const Move> moves, const Machine& machine) {
         const double length = std::hypot(d[0], d[1], d[2]);
         if (length == 0) continue;
         const bool rapid = b.feed == 0;
+        if (b.is_arc()) {
+            const ArcShape arc = arc_shape(a, b);
+            const double side = arc.sweep > 0 ? 1 : -1, end = arc.start + arc.sweep;
+            const double speed = std::min(std::min<double>(b.feed, machine.max_feed) / 60, std::sqrt(machine.acceleration * arc.radius));
+            total.cutting_mm += arc.length();
+            legs.push_back({arc.length(),
+                            speed,
+                            {-side * std::sin(arc.start), side * std::cos(arc.start), 0},
+                            {-side * std::sin(end), side * std::cos(end), 0}});
+            continue;
+        }
         (rapid ? total.rapid_mm : total.cutting_mm) += length;
         legs.push_back(
             {length, (rapid ? machine.rapid_feed : std::min<double>(b.feed, machine.max_feed)) / 60, {d[0] / length, d[1] / length, d[2] / length}});

@@ -8,10 +8,11 @@
 
 namespace slabwright {
 
-/// A straight stretch of a motion: its length in mm, the speed asked for in mm/s, and its unit direction.
+/// A smooth stretch of a motion: its length in mm, the highest speed in mm/s, and its unit direction.
 struct MotionLeg {
     double length = 0, speed = 0;
-    std::array<double, 3> direction{};
+    std::array<double, 3> direction{};          ///< at its start
+    std::array<double, 3> leaving = direction;  ///< at its end
 };
 
 /// How near a path may pass by its corners, mm.
@@ -27,7 +28,8 @@ struct MotionTime {
     double minutes = 0;
 };
 
-/// Of a program's moves, the first of which is where it starts.
+/// Of a program's moves, the first of which is where it starts. On an arc the speed is also limited to what its radius bears
+/// under the machine's acceleration: v² = a·r.
 [[nodiscard]] MotionTime motion_time(std::span<const Move> moves, const Machine& machine);
 
 }  // namespace slabwright
