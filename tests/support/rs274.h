@@ -18,7 +18,7 @@
 
 namespace slabwright::support {
 
-/// Where a straight motion ends, mm; `feed` is the rate in force (mm/min), 0 for a rapid.
+/// Where a motion ends, mm; an arc in the XY plane is one motion; `feed` is the rate in force (mm/min), 0 for a rapid.
 struct CanonMotion {
     double x = 0, y = 0, z = 0;
     bool rapid = false;
@@ -94,8 +94,10 @@ inline CanonProgram interpret_rs274(std::string_view program, std::string_view t
         else if (call == "SET_SPINDLE_SPEED") canon.spindle_rpm = n.at(1);
         else if (call == "START_SPINDLE_CLOCKWISE") canon.clockwise = true;
         else if (call == "DWELL") canon.dwell_s += n.at(0);
-        else if (call == "ARC_FEED") ++canon.arcs;
-        else if (call == "PROGRAM_END") canon.ended = true;
+        else if (call == "ARC_FEED") {
+            ++canon.arcs;
+            canon.motions.push_back({n.at(0), n.at(1), n.at(5), false, feed});
+        } else if (call == "PROGRAM_END") canon.ended = true;
     }
     return canon;
 }
