@@ -4,6 +4,7 @@
 
 #include "engine/paths/arcs.h"
 #include "engine/paths/layer_cut.h"
+#include "engine/paths/rest.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -101,8 +102,20 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     take(rough_layer(cut));
     take(finish_floors(cut));
     take(finish_walls(cut));
-    take(finish_levels(cut, result.diagnostics));
-    take(finish_raster(cut, result.diagnostics));
+    // What stands now decides the rest: waste where the roughing cutter does not fit before the ball finishes, and after it
+    // the corners that the ball leaves, by the flat end mill, and what is left of the cusps' limit anywhere.
+    const Tool &ball = tool_of_kind(cut.job, ToolKind::ball), &flat = tool_of_kind(cut.job, ToolKind::flat);
+    LayerStock stock(cut, stock_cell(cut.job, layer.stock_max[0] - layer.stock_min[0], layer.stock_max[1] - layer.stock_min[1]));
+    for (const Operation& op : result.operations)
+        if (op.kind != OperationKind::face) stock.cut(cut, op, flat);
+    take(cut_rest(cut, stock, ball, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
+    for (Operation op : {finish_levels(cut, result.diagnostics), finish_raster(cut, result.diagnostics)}) {
+        stock.cut(cut, op, ball);
+        take(std::move(op));
+    }
+    const double limit = cut.job.tolerances.cusp + 0.02;
+    take(cut_rest(cut, stock, flat, {OperationKind::corner, "corners", limit, false}));
+    take(cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", limit, false}));
     return result;
 }
 

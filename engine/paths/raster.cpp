@@ -33,29 +33,6 @@ void append(std::vector<PathPoint>& line, PathPoint p, double chord) {
     line.push_back(p);
 }
 
-// What the roughing cutter could not get at on the layer's bottom: its forbidden region there, shrunk by its radius, less
-// the part itself. Slivers under a tenth of a millimetre are left to the finish passes along the walls.
-Loops rough_unreached(const LayerCut& cut) {
-    const double flat_r = tool_of_kind(cut.job, ToolKind::flat).diameter / 2, bottom = cut.layer.z_bottom;
-    const Cutter cutter{Cutter::Profile::flat, flat_r};
-    const Contours border = std::move(cut.contours(cutter, {&bottom, 1}, safe_pitch(flat_r, cut.job.tolerances.gouge))[0]);
-    Loops forbidden;  // contours have the solid on their right, loops on their left
-    for (std::size_t c = 0; c < border.size(); ++c) {
-        for (std::size_t k = border.starts[c + 1]; k-- > border.starts[c];) forbidden.points.push_back(border.points[k]);
-        forbidden.close_loop();
-    }
-    const Plane plane{bottom, Side::above};
-    const Loops part = slice(cut.context, cut.layer.mesh, {&plane, 1}, {cut.job.tolerances.gap})[0].loops;
-    const Loops left = subtract(offset(forbidden, -flat_r, 0.01), offset(part, 0.05, 0.01));
-    return offset(offset(left, -0.05, 0.01), 0.05, 0.01);
-}
-
-// Where the ball does not fit between walls that reach the layer's top: it can only dip in as far as their edges let it.
-Loops narrow_at_top(const LayerCut& cut, double r) {
-    const Loops between = subtract(offset(offset(cut.solid.cap, r, 0.01), -r, 0.01), offset(cut.solid.cap, 0.05, 0.01));
-    return offset(offset(between, -0.2, 0.01), 0.2, 0.01);
-}
-
 }  // namespace
 
 Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
@@ -68,16 +45,12 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     std::vector<SolidFacet> shallow;
     for (const SolidFacet& f : cut.solid.facets)
         if (f.nz >= keep_nz && f.z_max > cut.layer.z_bottom && !(f.z_min == cut.layer.z_top)) shallow.push_back(f);
-    const Loops unreached = rough_unreached(cut);
-    const Loops narrow = narrow_at_top(cut, r);
-    if (shallow.empty() && unreached.empty() && narrow.empty()) return op;
+    if (shallow.empty()) return op;
 
     // How far the shallow facets face along y, by strips of y: that decides the step-over of the passes over them.
     double y_low = 1e300, y_high = -1e300;
     for (const SolidFacet& f : shallow)
         for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
-    for (const Loops* more : {&unreached, &narrow})
-        for (const Point2& p : more->points) y_low = std::min(y_low, to_mm(p.y)), y_high = std::max(y_high, to_mm(p.y));
     constexpr double strip = 0.5;
     std::vector<float> facing(static_cast<std::size_t>((y_high - y_low) / strip) + 1, -1);  // −1: nothing shallow there
     for (const SolidFacet& f : shallow) {
@@ -127,13 +100,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         bool wanted = false, reachable = false, cut = false;
     };
     using Line = std::vector<Sample>;
-    struct LineSpans {
-        std::vector<Span> waste, narrow;
-    };
-    auto within = [](const std::vector<Span>& spans, double x) {
-        return std::any_of(spans.begin(), spans.end(), [&](const Span& s) { return x >= s.low && x <= s.high; });
-    };
-    auto sample = [&](std::int32_t ux, std::int32_t uy, const LineSpans& beside) {
+    auto sample = [&](std::int32_t ux, std::int32_t uy) {
         const double x = to_mm(ux), y = to_mm(uy);
         const Rest rest = ball.drop(x, y);
         Sample s;
@@ -144,11 +111,6 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                    rest.tip_z >= cut.layer.floor_below;
         if (s.wanted && rest.nz > level_nz && floor_done(contact) && flat.drop(x, y).tip_z <= contact + 1e-3) s.wanted = false;
         s.tip = rest.tip_z;
-        if (s.tip <= cut.layer.z_bottom && within(beside.waste, ux)) {
-            s.wanted = true;
-            s.tip = std::max(s.tip, cut.layer.z_bottom);
-        }
-        if (!rest.on_cap && contact > cut.layer.z_top - 1e-3 && s.tip < cut.layer.z_top - 0.02 && within(beside.narrow, ux)) s.wanted = true;
         s.reachable = s.tip >= cut.layer.floor_below && !rest.on_cap;
         if (s.reachable) s.z = to_units(s.tip) + 1;
         return s;
@@ -162,24 +124,21 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         return c * d > 8 * r * cusp * 1.5;
     };
     const std::int32_t finest = to_units(0.02);
-    auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t y, const LineSpans& beside) -> void {
+    auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t y) -> void {
         if (!line.empty() && b.x - line.back().x <= step && b.x - line.back().x > 2 * finest && too_far(line.back(), y, b, y)) {
-            const Sample middle = sample(line.back().x + (b.x - line.back().x) / 2, y, beside);
-            self(self, line, middle, y, beside);
-            self(self, line, b, y, beside);
+            const Sample middle = sample(line.back().x + (b.x - line.back().x) / 2, y);
+            self(self, line, middle, y);
+            self(self, line, b, y);
             return;
         }
         line.push_back(b);
     };
 
     std::vector<Line> samples(lines.size());
-    std::vector<LineSpans> besides(lines.size());
     const Fibres reach = covering(cut.context, shallow, r, Axis::x, lines);
     parallel_each(cut.context, lines.size(), [&](std::size_t l) {
-        // The surface within reach of the ball, and the waste that roughing could not get at, with one step around.
-        besides[l] = {line_spans(unreached, lines[l]), line_spans(narrow, lines[l])};
-        std::vector<Span> spans = besides[l].waste;
-        spans.insert(spans.end(), besides[l].narrow.begin(), besides[l].narrow.end());
+        // The surface within reach of the ball, with one step around.
+        std::vector<Span> spans;
         for (const Forbidden& f : reach.line(l)) spans.push_back({f.low * kUnitsPerMm, f.high * kUnitsPerMm});
         std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
         const double low_limit = cut.low(0, r) * kUnitsPerMm, high_limit = cut.high(0, r) * kUnitsPerMm;
@@ -189,7 +148,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                        last = static_cast<std::int32_t>(std::floor(std::min(span.high + step, high_limit) / step));
             for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                 next = k + 1;
-                append_between(append_between, samples[l], sample(k * step, lines[l], besides[l]), lines[l], besides[l]);
+                append_between(append_between, samples[l], sample(k * step, lines[l]), lines[l]);
             }
         }
     });
@@ -223,7 +182,6 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             if (yb - ya < 2 * finest) return;
             const std::int32_t y = ya + (yb - ya) / 2;
             Line middle;
-            const LineSpans beside{line_spans(unreached, y), line_spans(narrow, y)};
             std::int32_t done = INT32_MIN;
             for (const Sample& s : a) {
                 if (s.x % step != 0) continue;
@@ -231,7 +189,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 if (!other || !too_far(s, ya, *other, yb)) continue;
                 for (const std::int32_t x : {s.x - step, s.x, s.x + step}) {
                     if (x <= done) continue;
-                    append_between(append_between, middle, sample(x, y, beside), y, beside);
+                    append_between(append_between, middle, sample(x, y), y);
                     done = x;
                 }
             }

@@ -1,0 +1,129 @@
+#include "engine/paths/layer_stock.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr int kBand = 32;            // rows of cells that one task cuts
+constexpr std::size_t kBlock = 128;  // moves that share one box
+
+struct Box {
+    double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300, z0 = 1e300;
+    void add(const Move& m) {
+        x0 = std::min(x0, to_mm(m.x)), x1 = std::max(x1, to_mm(m.x));
+        y0 = std::min(y0, to_mm(m.y)), y1 = std::max(y1, to_mm(m.y));
+        z0 = std::min(z0, to_mm(m.z));
+    }
+};
+
+}  // namespace
+
+double stock_cell(const Job& job, double width, double depth) {
+    const double r = tool_of_kind(job, ToolKind::ball).diameter / 2;
+    return std::clamp(std::max(std::sqrt(2 * r * job.tolerances.cusp) / 2, std::sqrt(width * depth / kStockCells)), 0.05, 1.0);
+}
+
+CutterEnd cutter_end(const Tool& tool) { return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0}; }
+
+LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z_bottom) {
+    const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
+    grid_ = {lo[0] + cell / 2, lo[1] + cell / 2, cell, std::max(1, static_cast<int>(std::ceil((hi[0] - lo[0]) / cell - 0.5))),
+             std::max(1, static_cast<int>(std::ceil((hi[1] - lo[1]) / cell - 0.5)))};
+    const double top = cut.layer.z_top - z_bottom_;
+    height_.assign(grid_.count(), static_cast<float>(top));
+    surface_.assign(grid_.count(), 0.0F);
+    nz_.assign(grid_.count(), 255);
+    // Facets by the bands of rows that they meet, so that bands can be drawn in parallel.
+    const int bands = (grid_.ny + kBand - 1) / kBand;
+    auto band_of = [&](double y) { return std::clamp(static_cast<int>((y - grid_.y0) / cell) / kBand, 0, bands - 1); };
+    std::vector<std::uint32_t> starts(static_cast<std::size_t>(bands) + 1, 0), members;
+    auto rows = [&](const SolidFacet& f) { return std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]}); };
+    auto matters = [&](const SolidFacet& f) { return f.normal[2] > 0 && f.z_max > z_bottom_; };
+    for (const SolidFacet& f : cut.solid.facets)
+        if (matters(f))
+            for (int b = band_of(rows(f).first); b <= band_of(rows(f).second); ++b) ++starts[static_cast<std::size_t>(b) + 1];
+    for (std::size_t b = 1; b < starts.size(); ++b) starts[b] += starts[b - 1];
+    members.resize(starts.back());
+    std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
+    for (std::size_t i = 0; i < cut.solid.facets.size(); ++i)
+        if (matters(cut.solid.facets[i]))
+            for (int b = band_of(rows(cut.solid.facets[i]).first); b <= band_of(rows(cut.solid.facets[i]).second); ++b)
+                members[next[static_cast<std::size_t>(b)]++] = static_cast<std::uint32_t>(i);
+    parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
+        const int first = static_cast<int>(band) * kBand, last = std::min(first + kBand, grid_.ny) - 1;
+        for (std::uint32_t m = starts[band]; m < starts[band + 1]; ++m) {
+            const SolidFacet& f = cut.solid.facets[members[m]];
+            const auto [y_low, y_high] = rows(f);
+            const int j0 = std::max(first, static_cast<int>(std::ceil((y_low - grid_.y0) / cell)));
+            const int j1 = std::min(last, static_cast<int>(std::floor((y_high - grid_.y0) / cell)));
+            const auto share = static_cast<std::uint8_t>(std::lround(255 * std::clamp(f.normal[2], 0.0, 1.0)));
+            for (int j = j0; j <= j1; ++j) {
+                const double y = grid_.y(j);
+                double low = 1e300, high = -1e300;
+                for (int k = 0; k < 3; ++k) {
+                    const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
+                    if ((a[1] <= y) == (b[1] <= y)) continue;
+                    const double x = a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
+                    low = std::min(low, x), high = std::max(high, x);
+                }
+                const int i0 = std::max(0, static_cast<int>(std::ceil((low - grid_.x0) / cell)));
+                const int i1 = std::min<int>(grid_.nx - 1, static_cast<int>(std::floor((high - grid_.x0) / cell)));
+                for (int i = i0; i <= i1; ++i) {
+                    const double z = f.p[0][2] - (f.normal[0] * (grid_.x(i) - f.p[0][0]) + f.normal[1] * (y - f.p[0][1])) / f.normal[2];
+                    const auto rise = static_cast<float>(std::min(z, f.z_max) - z_bottom_);
+                    const std::size_t c = grid_.index(i, j);
+                    if (rise > surface_[c]) surface_[c] = rise, nz_[c] = std::max<std::uint8_t>(1, share);
+                }
+            }
+        }
+        for (int j = first; j <= last; ++j)
+            for (const Span& s : line_spans(cut.solid.cap, to_units(grid_.y(j)))) {
+                const int i0 = std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid_.x0) / cell)));
+                const int i1 = std::min<int>(grid_.nx - 1, static_cast<int>(std::floor((s.high / kUnitsPerMm - grid_.x0) / cell)));
+                for (int i = i0; i <= i1; ++i) surface_[grid_.index(i, j)] = static_cast<float>(top), nz_[grid_.index(i, j)] = 255;
+            }
+    });
+}
+
+void LayerStock::cut(const LayerCut& cut, const Operation& operation, const Tool& tool) {
+    const std::vector<Move>& moves = operation.moves;
+    if (moves.size() < 2) return;
+    const CutterEnd end = cutter_end(tool);
+    const double r = end.radius, top = cut.layer.z_top;
+    std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock);
+    for (std::size_t i = 0; i < moves.size(); ++i) {
+        boxes[i / kBlock].add(moves[i]);
+        if (i % kBlock == 0 && i > 0) boxes[i / kBlock].add(moves[i - 1]);
+    }
+    const int bands = (grid_.ny + kBand - 1) / kBand;
+    parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
+        const int first = static_cast<int>(band) * kBand, rows = std::min(kBand, grid_.ny - first);
+        const CellGrid part{grid_.x0, grid_.y(first), grid_.cell, grid_.nx, rows};
+        const double y0 = part.y0 - r, y1 = part.y(rows - 1) + r;
+        float* height = height_.data() + grid_.index(0, first);
+        for (std::size_t b = 0; b < boxes.size(); ++b) {
+            if (boxes[b].y1 < y0 || boxes[b].y0 > y1 || boxes[b].z0 >= top) continue;
+            for (std::size_t i = std::max<std::size_t>(1, b * kBlock); i < std::min(moves.size(), (b + 1) * kBlock); ++i) {
+                const Move &p = moves[i - 1], &q = moves[i];
+                if (q.feed == 0) continue;
+                const double py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
+                if (std::max(py, qy) < y0 || std::min(py, qy) > y1 || std::min(pz, qz) >= top) continue;
+                sweep(part, end, {to_mm(p.x), py, pz}, {to_mm(q.x), qy, qz},
+                      [&](std::size_t c, double z) { height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_))); });
+            }
+        }
+    });
+}
+
+void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) {
+    sweep(grid_, end, {x, y, tip_z}, {x, y, tip_z},
+          [&](std::size_t c, double z) { height_[c] = std::min(height_[c], static_cast<float>(std::max(0.0, z - z_bottom_))); });
+}
+
+}  // namespace slabwright

@@ -1,0 +1,51 @@
+// What stands of one layer while it is planned: the slab, cut by the operations planned so far, over the finished surface.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/paths/layer_cut.h"
+#include "kernels/stock/sweep.h"
+
+namespace slabwright {
+
+/// Heights over a grid of cells, mm above the layer's bottom; each stands for its cell's centre, where it is exact (kernels/stock/sweep).
+/// Only what lies within the layer is kept: cuts below its bottom clear nothing that is left to do.
+class LayerStock {
+public:
+    /// The faced slab, `cell` mm fine, and the solid's upper surface over the same cells.
+    LayerStock(const LayerCut& cut, double cell);
+
+    /// Takes away what the operation's feed moves meet. Rows in parallel.
+    void cut(const LayerCut& cut, const Operation& operation, const Tool& tool);
+    /// Takes away what one place of a cutter covers.
+    void cut_at(const CutterEnd& end, double x, double y, double tip_z);
+
+    [[nodiscard]] const CellGrid& grid() const { return grid_; }
+    [[nodiscard]] double z_bottom() const { return z_bottom_; }
+    /// mm above the layer's bottom
+    [[nodiscard]] float height(std::size_t cell) const { return height_[cell]; }
+    [[nodiscard]] float surface(std::size_t cell) const { return surface_[cell]; }
+    /// Share of a height that is a distance from the facet below: the upward part of its normal; 1 beside the pattern.
+    [[nodiscard]] float nz(std::size_t cell) const { return static_cast<float>(nz_[cell]) / 255.0F; }
+    /// What is left over in a cell, mm along the normal of the facet below.
+    [[nodiscard]] float left(std::size_t cell) const { return (height_[cell] - surface_[cell]) * nz(cell); }
+
+    /// Bytes of a stock of this many cells.
+    [[nodiscard]] static std::uint64_t bytes(std::size_t cells) { return cells * 9; }
+
+private:
+    CellGrid grid_;
+    double z_bottom_ = 0;
+    std::vector<float> height_, surface_;
+    std::vector<std::uint8_t> nz_;
+};
+
+/// Cells that resolve what passes of the finest cutter leave: a quarter of their distance, coarser where the layer would
+/// take more than kStockCells of them.
+inline constexpr double kStockCells = 24e6;
+[[nodiscard]] double stock_cell(const Job& job, double width, double depth);
+
+[[nodiscard]] CutterEnd cutter_end(const Tool& tool);
+
+}  // namespace slabwright

@@ -1,0 +1,412 @@
+// A raster of drops over what is left, refined where the cutter's rest jumps; of all places only those are kept that lower the
+// stock, in the order coarse before fine. So a wide rest is cleared by an even raster, and a corner by the few places along it.
+#include "engine/paths/rest.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "kernels/cutting/drop.h"
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kFinest = 0.04;  // mm between places where the rest jumps: a wall is met within this
+constexpr double kJump = 0.05;    // mm by which a flat end mill's tip may step between neighbouring places
+constexpr double kSettle = 0.01;  // mm by which a low point of a line lies under its neighbours
+constexpr double kBridge = 3.0;   // mm between two useful stretches that are travelled along the surface
+
+// A place of the cutter on the surface.
+struct Place {
+    std::int32_t x = 0, z = 0;  // 0.1 µm
+    double tip = 0;             // mm
+    std::array<double, 3> contact{};
+    bool reachable = false, useful = false, cut = false;
+};
+
+struct Line {
+    std::int32_t y = 0;
+    std::vector<Place> places;
+};
+
+using Spans = std::vector<std::array<std::int32_t, 2>>;  // 0.1 µm, ascending and disjoint
+
+// The cells worth a visit, row by row, and the stretches of a line from which a cutter covers some of them.
+class Targets {
+public:
+    Targets(const LayerStock& stock, double limit) : stock_(stock), rows_(static_cast<std::size_t>(stock.grid().ny)) {
+        const CellGrid& grid = stock.grid();
+        marked_.assign(grid.count(), 0);
+        for (int j = 0; j < grid.ny; ++j)
+            for (int i = 0; i < grid.nx; ++i) {
+                const std::size_t c = grid.index(i, j);
+                if (stock.left(c) <= limit) continue;
+                marked_[c] = 1;
+                ++count_;
+                auto& row = rows_[static_cast<std::size_t>(j)];
+                if (!row.empty() && row.back()[1] + 1 == i) row.back()[1] = i;
+                else row.push_back({i, i});
+            }
+    }
+    [[nodiscard]] std::size_t count() const { return count_; }
+    [[nodiscard]] bool marked(std::size_t cell) const { return marked_[cell] != 0; }
+    [[nodiscard]] std::array<int, 2> rows() const {
+        int first = 0, last = stock_.grid().ny - 1;
+        while (first <= last && rows_[static_cast<std::size_t>(first)].empty()) ++first;
+        while (last >= first && rows_[static_cast<std::size_t>(last)].empty()) --last;
+        return {first, last};
+    }
+    [[nodiscard]] Spans around(double y, double radius, double x_low, double x_high) const {
+        const CellGrid& grid = stock_.grid();
+        const int j0 = std::max(0, static_cast<int>(std::ceil((y - radius - grid.y0) / grid.cell)));
+        const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + radius - grid.y0) / grid.cell)));
+        Spans all;
+        for (int j = j0; j <= j1; ++j) {
+            const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, radius * radius - dy * dy));
+            for (const auto& run : rows_[static_cast<std::size_t>(j)]) {
+                const double low = std::max(grid.x(run[0]) - w, x_low), high = std::min(grid.x(run[1]) + w, x_high);
+                if (low < high) all.push_back({to_units(low), to_units(high)});
+            }
+        }
+        std::sort(all.begin(), all.end());
+        Spans merged;
+        for (const auto& s : all)
+            if (!merged.empty() && s[0] <= merged.back()[1]) merged.back()[1] = std::max(merged.back()[1], s[1]);
+            else merged.push_back(s);
+        return merged;
+    }
+
+private:
+    const LayerStock& stock_;
+    std::vector<char> marked_;
+    std::vector<std::vector<std::array<int, 2>>> rows_;
+    std::size_t count_ = 0;
+};
+
+class Rester {
+public:
+    Rester(const LayerCut& cut, LayerStock& stock, const Tool& tool, const RestPass& pass)
+        : cut_(cut),
+          stock_(stock),
+          tool_(tool),
+          pass_(pass),
+          ball_(tool.kind == ToolKind::ball),
+          r_(tool.diameter / 2),
+          end_(cutter_end(tool)),
+          targets_(stock, pass.limit),
+          chord_(safe_chord_mm(r_, cut.job.tolerances.gouge)),
+          step_(static_cast<std::int32_t>(0.75 * chord_ * kUnitsPerMm)) {}
+
+    Operation run() {
+        Operation op = cut_.operation(pass_.kind, pass_.purpose, tool_);
+        if (targets_.count() == 0) return op;
+        index_ = std::make_unique<DropIndex>(cut_.context, cut_.solid, Cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_});
+        lay_lines();
+        settle();
+        keep_what_lowers();
+        std::vector<std::vector<PathPoint>> runs;
+        for (const Line& line : lines_) append_runs(line, runs);
+        op.stepover = to_mm(spacing_);
+        op.stepdown = pass_.in_steps ? tool_.stepdown_max : 0;
+        emit(op, runs);
+        stock_.cut(cut_, op, tool_);
+        return op;
+    }
+
+private:
+    [[nodiscard]] double worth(std::size_t cell) const { return std::clamp(0.2 * static_cast<double>(stock_.left(cell)), 0.015, 0.05); }
+
+    // Whether the cutter, here, lowers a cell that is worth it.
+    [[nodiscard]] bool lowers(double x, double y, double tip) const {
+        const CellGrid& grid = stock_.grid();
+        const int j0 = std::max(0, static_cast<int>(std::ceil((y - r_ - grid.y0) / grid.cell)));
+        const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + r_ - grid.y0) / grid.cell)));
+        const double above = tip - stock_.z_bottom();
+        for (int j = j0; j <= j1; ++j) {
+            const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, r_ * r_ - dy * dy));
+            const int i0 = std::max(0, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
+            const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + w - grid.x0) / grid.cell)));
+            for (int i = i0; i <= i1; ++i) {
+                const std::size_t c = grid.index(i, j);
+                if (!targets_.marked(c) || stock_.height(c) <= above) continue;
+                double z = above;
+                if (ball_) {
+                    const double dx = grid.x(i) - x;
+                    z += r_ - std::sqrt(std::max(0.0, r_ * r_ - dx * dx - dy * dy));
+                }
+                z = std::max(z, static_cast<double>(stock_.surface(c)));
+                if ((stock_.height(c) - z) * stock_.nz(c) > worth(c)) return true;
+            }
+        }
+        return false;
+    }
+
+    [[nodiscard]] Place place(std::int32_t ux, std::int32_t uy) const {
+        const double x = to_mm(ux), y = to_mm(uy);
+        const Rest rest = index_->drop(x, y);
+        Place p;
+        p.x = ux;
+        // A flat end mill stands on the layer's bottom; a ball may pass it where its shape needs it, over waste it does not.
+        const double lowest = ball_ && rest.tip_z > cut_.layer.z_bottom - r_ ? cut_.layer.floor_below : cut_.layer.z_bottom;
+        p.tip = std::max(rest.tip_z, std::max(lowest, cut_.layer.floor_below));
+        p.contact = {x - r_ * rest.nx, y - r_ * rest.ny, p.tip + r_ * (1 - rest.nz)};
+        p.reachable = !rest.on_cap && p.tip < cut_.layer.z_top - 1e-3;
+        if (p.reachable) {
+            p.z = to_units(p.tip) + 1;
+            p.useful = lowers(x, y, p.tip);
+        }
+        return p;
+    }
+
+    [[nodiscard]] bool too_far(const Place& a, std::int32_t ya, const Place& b, std::int32_t yb) const {
+        if (!a.useful && !b.useful) return false;
+        if (!ball_ || !a.reachable || !b.reachable) return std::abs(a.tip - b.tip) > kJump;
+        const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
+        const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(ya) - to_mm(yb), a.tip - b.tip);
+        return c * d > 8 * r_ * cut_.job.tolerances.cusp;
+    }
+
+    void append_between(std::vector<Place>& line, std::int32_t y, Place b) const {
+        if (!line.empty() && b.x - line.back().x <= step_ && b.x - line.back().x > 2 * to_units(kFinest) && too_far(line.back(), y, b, y)) {
+            append_between(line, y, place(line.back().x + (b.x - line.back().x) / 2, y));
+            append_between(line, y, b);
+            return;
+        }
+        line.push_back(b);
+    }
+
+    static const Place* at(const Line& line, std::int32_t x) {
+        const auto it = std::lower_bound(line.places.begin(), line.places.end(), x, [](const Place& p, std::int32_t v) { return p.x < v; });
+        return it != line.places.end() && it->x == x ? &*it : nullptr;
+    }
+
+    // An even raster over the targets, then lines between its lines where the rest jumps from one to the next.
+    void lay_lines() {
+        const CellGrid& grid = stock_.grid();
+        const auto [first, last] = targets_.rows();
+        spacing_ = to_units(ball_ ? std::sqrt(8 * r_ * cut_.job.tolerances.cusp) : std::min(1.0, r_ / 4));
+        const auto low = static_cast<std::int32_t>(std::floor((grid.y(first) - r_) * kUnitsPerMm / spacing_)),
+                   high = static_cast<std::int32_t>(std::ceil((grid.y(last) + r_) * kUnitsPerMm / spacing_));
+        const double y_low = cut_.low(1, r_), y_high = cut_.high(1, r_);
+        std::vector<Line> even;
+        for (std::int32_t k = low; k <= high; ++k)
+            if (to_mm(k * spacing_) >= y_low && to_mm(k * spacing_) <= y_high) even.push_back({k * spacing_, {}});
+        const double x_low = cut_.low(0, r_), x_high = cut_.high(0, r_);
+        parallel_each(cut_.context, even.size(), [&](std::size_t l) {
+            for (const auto& span : targets_.around(to_mm(even[l].y), r_, x_low, x_high)) {
+                const std::int32_t from = (span[0] >= 0 ? span[0] / step_ : -((-span[0] + step_ - 1) / step_)), to = span[1] / step_ + 1;
+                for (std::int32_t k = from; k <= to; ++k) {
+                    if (!even[l].places.empty() && k * step_ <= even[l].places.back().x) continue;
+                    append_between(even[l].places, even[l].y, place(k * step_, even[l].y));
+                }
+            }
+        });
+        std::vector<std::vector<Line>> between(even.size());
+        parallel_each(cut_.context, even.empty() ? 0 : even.size() - 1, [&](std::size_t l) {
+            auto refine = [&](auto&& self, const Line& a, const Line& b) -> void {
+                if (b.y - a.y < 2 * to_units(kFinest)) return;
+                Line middle{a.y + (b.y - a.y) / 2, {}};
+                for (const Place& p : a.places) {
+                    if (p.x % step_ != 0) continue;
+                    const Place* other = at(b, p.x);
+                    if (!other || !too_far(p, a.y, *other, b.y)) continue;
+                    for (const std::int32_t x : {p.x - step_, p.x, p.x + step_})
+                        if (middle.places.empty() || x > middle.places.back().x) append_between(middle.places, middle.y, place(x, middle.y));
+                }
+                if (middle.places.empty()) return;
+                self(self, a, middle);
+                between[l].push_back(middle);
+                self(self, middle, b);
+            };
+            refine(refine, even[l], even[l + 1]);
+        });
+        lines_ = std::move(even);
+        for (std::vector<Line>& group : between)
+            for (Line& line : group) lines_.push_back(std::move(line));
+    }
+
+    // Where the cutter sinks deepest between walls (a hole narrower than itself, the meeting of three faces) no raster hits the
+    // place: from every low point of a line it slides down to where it rests on all sides.
+    void settle() {
+        std::vector<std::vector<Line>> found(lines_.size());
+        parallel_each(cut_.context, lines_.size(), [&](std::size_t l) {
+            const std::vector<Place>& places = lines_[l].places;
+            for (std::size_t i = 1; i + 1 < places.size(); ++i) {
+                const Place& p = places[i];
+                if (!p.useful || places[i + 1].x - places[i - 1].x > 2 * step_) continue;
+                if (p.tip > places[i - 1].tip - kSettle || p.tip > places[i + 1].tip - kSettle) continue;
+                std::int32_t x = p.x, y = lines_[l].y;
+                double tip = p.tip;
+                for (std::int32_t stride = to_units(0.1); stride >= to_units(0.0005); stride /= 2)
+                    for (bool moved = true; moved;) {
+                        moved = false;
+                        for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
+                            const double lower = index_->drop(to_mm(x + dx * stride), to_mm(y + dy * stride)).tip_z;
+                            if (lower >= tip - 1e-4) continue;
+                            x += dx * stride, y += dy * stride, tip = lower, moved = true;
+                            break;
+                        }
+                    }
+                Line single{y, {place(x, y)}};
+                if (single.places[0].useful) found[l].push_back(std::move(single));
+            }
+        });
+        std::vector<Line> all;
+        for (auto& lines : found)
+            for (Line& line : lines) all.push_back(std::move(line));
+        for (Line& line : all) lines_.push_back(std::move(line));
+    }
+
+    // Coarse lines before fine ones: what a place no longer lowers after those before it is not visited.
+    void keep_what_lowers() {
+        if (pass_.in_steps) before_ = stock_;
+        for (Line& line : lines_)
+            for (Place& p : line.places) {
+                if (!p.useful || !lowers(to_mm(p.x), to_mm(line.y), p.tip)) continue;
+                p.cut = true;
+                stock_.cut_at(end_, to_mm(p.x), to_mm(line.y), p.tip);
+            }
+    }
+
+    // Straight up is always free, and so is a level chord of safe length at the height of the higher rest.
+    void append(std::vector<PathPoint>& points, PathPoint p) const {
+        if (!points.empty()) {
+            const PathPoint& q = points.back();
+            const double dx = static_cast<double>(p.x) - q.x, dy = static_cast<double>(p.y) - q.y, dz = static_cast<double>(p.z) - q.z;
+            const bool corner = ball_ ? dx * dx + dy * dy + dz * dz > chord_ * chord_ * kUnitsPerMm * kUnitsPerMm : dz != 0;
+            if (corner) {
+                const PathPoint c = dz > 0 ? PathPoint{q.x, q.y, p.z} : PathPoint{p.x, p.y, q.z};
+                if (!(c == q) && !(c == p)) points.push_back(c);
+            }
+        }
+        points.push_back(p);
+    }
+
+    void append_runs(const Line& line, std::vector<std::vector<PathPoint>>& runs) const {
+        std::vector<PathPoint> points;
+        std::size_t last_cut = 0;
+        const Place* before = nullptr;
+        std::int32_t last_cut_x = 0;
+        auto close = [&] {
+            points.resize(last_cut);
+            if (!points.empty()) runs.push_back(simplify(points, simplify_tolerance_units(cut_.job.tolerances.gouge)));
+            points.clear();
+            last_cut = 0;
+        };
+        for (const Place& p : line.places) {
+            const bool apart = before && p.x - before->x > step_;
+            if (!points.empty() && (apart || !p.reachable || (!p.cut && p.x - last_cut_x > to_units(kBridge)))) close();
+            if (p.reachable && (p.cut || !points.empty())) {
+                // One place beside the first: the cutter comes in along the surface instead of straight down.
+                if (points.empty() && before && !apart && before->reachable) append(points, {before->x, line.y, before->z});
+                append(points, {p.x, line.y, p.z});
+                if (p.cut) last_cut = points.size(), last_cut_x = p.x;
+            }
+            before = &p;
+        }
+        close();
+    }
+
+    // The highest stock under the cutter before this pass, mm.
+    [[nodiscard]] double stood(std::int32_t ux, std::int32_t uy) const {
+        const CellGrid& grid = before_->grid();
+        const double x = to_mm(ux), y = to_mm(uy);
+        double top = -1e300;
+        sweep(grid, {CutterEnd::Form::flat, r_, 0}, {x, y, 0}, {x, y, 0},
+              [&](std::size_t c, double) { top = std::max(top, static_cast<double>(before_->height(c))); });
+        return top + before_->z_bottom();
+    }
+
+    void emit(Operation& op, const std::vector<std::vector<PathPoint>>& runs) const {
+        const double safe = cut_.layer.z_top + 2;
+        PathBuilder path(op, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed), cut_.layer.z_top + cut_.job.machine.clearance,
+                         safe);
+        auto follow = [&](const std::vector<PathPoint>& points) {
+            path.go_above({points[0].x, points[0].y});
+            path.plunge(points[0].z);
+            for (std::size_t k = 1; k < points.size(); ++k) path.cut({points[k].x, points[k].y}, points[k].z);
+        };
+        if (pass_.in_steps) {
+            for (const auto& points : runs) {
+                std::vector<double> stood_here;
+                double top = -1e300, tip = 1e300;
+                for (const PathPoint& p : points) {
+                    stood_here.push_back(stood(p.x, p.y));
+                    top = std::max(top, stood_here.back());
+                    tip = std::min(tip, to_mm(p.z));
+                }
+                const int steps = std::max(1, static_cast<int>(std::ceil((top - tip) / tool_.stepdown_max - 1e-9)));
+                for (int k = 1; k <= steps; ++k) {
+                    const double level = k == steps ? tip : top - (top - tip) * k / steps, above = top - (top - tip) * (k - 1) / steps;
+                    std::vector<PathPoint> part;
+                    auto close = [&] {
+                        if (!part.empty()) follow(part);
+                        part.clear();
+                    };
+                    for (std::size_t i = 0; i < points.size(); ++i) {
+                        const PathPoint& p = points[i];
+                        // Nothing to do here on this level: it was cut on the one before, or nothing stands above it.
+                        if (to_mm(p.z) >= above - 1e-6 || (k < steps && stood_here[i] <= level + 1e-3)) {
+                            close();
+                            continue;
+                        }
+                        part.push_back({p.x, p.y, std::max(p.z, to_units(level))});
+                    }
+                    close();
+                }
+            }
+        } else {
+            std::vector<char> done(runs.size(), 0);
+            for (std::size_t first = 0; first < runs.size(); ++first) {
+                std::size_t next = first;
+                if (done[first]) continue;
+                // On to the nearest end of a run not far on in the order, as long as one begins nearby.
+                bool reversed = false;
+                while (next < runs.size()) {
+                    done[next] = 1;
+                    std::vector<PathPoint> points = runs[next];
+                    if (reversed) std::reverse(points.begin(), points.end());
+                    follow(points);
+                    const Point2 here = path.at();
+                    double best = 20.0 * kUnitsPerMm;
+                    std::size_t found = runs.size();
+                    for (std::size_t k = first + 1; k < std::min(runs.size(), first + 400); ++k) {
+                        if (done[k]) continue;
+                        for (const bool back : {false, true}) {
+                            const PathPoint& p = back ? runs[k].back() : runs[k].front();
+                            const double d = std::hypot(static_cast<double>(p.x) - here.x, static_cast<double>(p.y) - here.y);
+                            if (d < best) best = d, found = k, reversed = back;
+                        }
+                    }
+                    next = found;
+                }
+            }
+        }
+        path.finish();
+    }
+
+    const LayerCut& cut_;
+    LayerStock& stock_;
+    const Tool& tool_;
+    const RestPass& pass_;
+    bool ball_;
+    double r_;
+    CutterEnd end_;
+    Targets targets_;
+    double chord_;
+    std::int32_t step_;
+    std::int32_t spacing_ = 0;
+    std::unique_ptr<DropIndex> index_;
+    std::vector<Line> lines_;
+    std::optional<LayerStock> before_;
+};
+
+}  // namespace
+
+Operation cut_rest(const LayerCut& cut, LayerStock& stock, const Tool& tool, const RestPass& pass) { return Rester(cut, stock, tool, pass).run(); }
+
+}  // namespace slabwright

@@ -1,0 +1,20 @@
+// Rest machining: what earlier operations of the layer left standing, and only that, is cut by a cutter dropped onto the
+// surface over it (method.md section 11: corners that a ball does not reach; waste where the roughing cutter does not fit).
+#pragma once
+
+#include "engine/paths/layer_cut.h"
+#include "engine/paths/layer_stock.h"
+
+namespace slabwright {
+
+struct RestPass {
+    OperationKind kind = OperationKind::corner;
+    const char* purpose = "";
+    double limit = 0;       ///< mm along the normal: what stands higher over the finished surface is worth a visit
+    bool in_steps = false;  ///< level by level from the top, no deeper at once than the tool's stepdown
+};
+
+/// Cuts what is left over the limit wherever this tool can lower it, and takes it off the stock.
+[[nodiscard]] Operation cut_rest(const LayerCut& cut, LayerStock& stock, const Tool& tool, const RestPass& pass);
+
+}  // namespace slabwright
