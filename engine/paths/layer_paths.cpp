@@ -92,9 +92,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     cut.floors.erase(std::unique(cut.floors.begin(), cut.floors.end(), [](double a, double b) { return a - b < kSameFloor; }), cut.floors.end());
 
     LayerResult result;
-    const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};
     auto take = [&](Operation&& operation) {
-        fit_arcs(operation.moves, fit);
         if (!operation.moves.empty()) result.operations.push_back(std::move(operation));
         context.throw_if_cancelled();
     };
@@ -116,6 +114,9 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     const double limit = cut.job.tolerances.cusp + 0.02;
     take(cut_rest(cut, stock, flat, {OperationKind::corner, "corners", limit, false}));
     take(cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", limit, false}));
+    // Last, so that everything before has straight moves only to think of.
+    const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};
+    for (Operation& op : result.operations) fit_arcs(op.moves, fit);
     return result;
 }
 

@@ -16,7 +16,7 @@ public:
     /// The faced slab, `cell` mm fine, and the solid's upper surface over the same cells.
     LayerStock(const LayerCut& cut, double cell);
 
-    /// Takes away what the operation's feed moves meet. Rows in parallel.
+    /// Takes away what the operation's feed moves meet, all of them straight (arcs are fitted when a layer is planned). Rows in parallel.
     void cut(const LayerCut& cut, const Operation& operation, const Tool& tool);
     /// Takes away what one place of a cutter covers.
     void cut_at(const CutterEnd& end, double x, double y, double tip_z);
