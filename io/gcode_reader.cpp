@@ -304,10 +304,11 @@ private:
             while (sweep <= 0) sweep += turn;
             if (full) sweep = turn;
         }
-        // A chord of angle φ misses the arc by r(1 − cos(φ/2)).
-        const double r = std::max(r0, r1), widest = 2 * std::acos(std::max(0.0, 1 - limits_.arc_error / r));
-        const int chords = std::max(1, static_cast<int>(std::ceil(std::abs(sweep) / std::max(widest, 1e-4))));
+        // A chord of angle φ misses the arc by r(1 − cos(φ/2)) = 2r·sin²(φ/4), which stays exact where the cosine is near one.
+        const double r = std::max(r0, r1), widest = 4 * std::asin(std::sqrt(std::min(1.0, limits_.arc_error / (2 * r))));
+        const int chords = std::max(1, static_cast<int>(std::min(1e7, std::ceil(std::abs(sweep) / widest))));
         const std::array<double, 3> from = at_;
+        const std::size_t begin = program_.steps.size();
         for (int i = 1; i < chords; ++i) {
             const double t = static_cast<double>(i) / chords, angle = start + sweep * t, radius = r0 + (r1 - r0) * t;
             std::array<double, 3> p{};
@@ -317,6 +318,10 @@ private:
             step(p, feed_);
         }
         step(to, feed_);
+        const double turned = std::abs(sweep) / chords;
+        program_.arc_error = std::max(program_.arc_error, 2 * r * std::pow(std::sin(turned / 4), 2));
+        if (c == 2 && from[2] == to[2] && std::abs(r0 - r1) <= 2 * limits_.arc_error)
+            program_.arcs.push_back({begin, program_.steps.size(), {ca, cb, to[2], (r0 + r1) / 2, start, sweep}});
     }
 
     void step(const std::array<double, 3>& to, double feed) {

@@ -245,7 +245,10 @@ std::string report_json(const SimulationInput& input, const SimulationReport& r,
     text.key("resolution").begin_object();
     text.key("cell_mm").exact(r.cell);
     text.key("cells").begin_array(JsonText::Shape::line).integer(r.nx).integer(r.ny).end();
-    text.key("exact_check_error_mm").exact(StandingPart::kSheet);
+    double arc_error = 0;
+    for (const Program& p : input.programs) arc_error = std::max(arc_error, p.arc_error);
+    text.key("exact_check_error_mm").exact(StandingPart::kSheet + arc_error);
+    text.key("arc_error_mm").exact(arc_error);
     text.end();
     double gouge_stock = 0, left = 0, missed = 0, squares = 0;
     std::uint64_t cells = 0, unreachable = 0, missed_cells = 0;
@@ -390,8 +393,10 @@ Verification verify_folder(Context& context, const std::string& directory, const
             program.kind = operation_kind(op["kind"]);
             program.planned_tool = op["tool"].whole();
             if (op.has("stepdown")) program.planned_stepdown = op["stepdown"].number();
-            if (frame == Frame::layer_top)
+            if (frame == Frame::layer_top) {
                 for (ProgramStep& s : program.steps) s.z += layer.z_top;
+                for (ProgramArc& a : program.arcs) a.arc.z += layer.z_top;
+            }
             input.programs.push_back(std::move(program));
         }
     }

@@ -328,7 +328,14 @@ TEST(Simulate, WhatNoToolReachesIsExcusedAndTheRestIsNot) {
     wide.input.tools[2].stickout = 2;
     r = wide.run();
     EXPECT_LT(r.layers[0].missed_left.size, 3.0);
+    // Even beside the wall some of the stock can still be taken: the tip stays above 8, and a centre between x = 9.328, where the ball
+    // clears the wall's edge, and 9.366 covers the point 0.09 mm below the cell at 6.625.
+    EXPECT_EQ(r.layers[0].unreachable, 0u);
+    // With the holder 0.5 mm above the tip it would need x ≥ 8.158 and x ≤ 8.120.
+    wide.input.tools[2].stickout = 0.5;
+    r = wide.run();
     EXPECT_GT(r.layers[0].unreachable, 0u);
+    EXPECT_GT(r.layers[0].missed, r.layers[0].unreachable) << "the middle of the slot can be dipped into";
 }
 
 TEST(Simulate, InnerCornersLeaveARoundThatIsExcused) {

@@ -61,6 +61,80 @@ TEST(Sweep, AgreesWithBruteForce) {
     }
 }
 
+// An arc cuts what many chords of it cut, and whatever stands lower than the cutter gets may be left out.
+TEST(Sweep, ArcsAgreeWithChords) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-2, 12), ur(0.4, 4), ua(-2 * std::numbers::pi, 2 * std::numbers::pi);
+    const CellGrid grid{0.1, 0.2, 0.31, 30, 28};
+    for (int trial = 0; trial < 200; ++trial) {
+        const CutterEnd end{static_cast<CutterEnd::Form>(trial % 3), ur(random), 0.6};
+        LevelArc arc{u(random), u(random), 1.5, trial % 4 == 0 ? 30 * ur(random) : ur(random), ua(random), ua(random)};
+        if (trial % 4 == 0) arc.x -= arc.radius * std::cos(arc.start), arc.y -= arc.radius * std::sin(arc.start), arc.turn /= 20;
+        if (trial % 5 == 0) arc.turn = trial % 2 == 0 ? 2 * std::numbers::pi : -2 * std::numbers::pi;
+        std::vector<double> exact(grid.count(), 1e9), chords(grid.count(), 1e9);
+        sweep(grid, end, arc, [&](std::size_t c, double z) {
+            EXPECT_EQ(exact[c], 1e9) << "a cell came twice";
+            exact[c] = z;
+        });
+        const int n = 2000;  // chords miss the arc by r(turn / n)² / 8
+        const double error = arc.radius * std::pow(arc.turn / n, 2) / 8;
+        for (int k = 0; k < n; ++k) {
+            auto at = [&](int i) {
+                const double a = arc.start + arc.turn * i / n;
+                return std::array<double, 3>{arc.x + arc.radius * std::cos(a), arc.y + arc.radius * std::sin(a), arc.z};
+            };
+            sweep(grid, end, at(k), at(k + 1), [&](std::size_t c, double z) { chords[c] = std::min(chords[c], z); });
+        }
+        std::vector<double> standing(grid.count());
+        for (double& s : standing) s = 1 + u(random) / 4;
+        std::vector<char> given(grid.count(), 0);
+        sweep_above(
+            grid, end, arc, [&](std::size_t c) { return standing[c]; },
+            [&](std::size_t c, double z) {
+                EXPECT_EQ(z, exact[c]);
+                given[c] = 1;
+            });
+        for (std::size_t c = 0; c < grid.count(); ++c) {
+            EXPECT_EQ(given[c] != 0, exact[c] < standing[c]);
+            if ((exact[c] > 1e8) != (chords[c] > 1e8)) {  // only where the arc grazes it
+                const double d =
+                    std::hypot(grid.x(static_cast<int>(c) % grid.nx) - arc.x, grid.y(static_cast<int>(c) / grid.nx) - arc.y) - arc.radius;
+                EXPECT_NEAR(std::abs(d), end.radius, 2 * error + 1e-9) << "trial " << trial;
+            } else if (exact[c] < 1e8) {
+                EXPECT_NEAR(exact[c], chords[c], std::sqrt(2 * end.radius * error) + error + 1e-9) << "trial " << trial;
+            }
+        }
+    }
+}
+
+// Cells that stand lower than the cutter gets are left out, all others are the same.
+TEST(Sweep, LeavesOutWhatStandsLower) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-1, 11), uz(-3, 3), ur(0.4, 4);
+    const CellGrid grid{0.1, 0.2, 0.31, 30, 28};
+    for (int trial = 0; trial < 300; ++trial) {
+        const CutterEnd end{static_cast<CutterEnd::Form>(trial % 3), ur(random), 0.6};
+        const std::array<double, 3> a{u(random), u(random), uz(random)};
+        std::array<double, 3> b{u(random), u(random), uz(random)};
+        if (trial % 2 == 0) b[2] = a[2];
+        std::vector<double> all(grid.count(), 1e9), standing(grid.count());
+        for (double& s : standing) s = uz(random) + 1;
+        sweep(grid, end, a, b, [&](std::size_t c, double z) { all[c] = z; });
+        std::vector<char> given(grid.count(), 0);
+        sweep_above(
+            grid, end, a, b, [&](std::size_t c) { return standing[c]; },
+            [&](std::size_t c, double z) {
+                EXPECT_EQ(z, all[c]);
+                given[c] = 1;
+            });
+        for (std::size_t c = 0; c < grid.count(); ++c) EXPECT_EQ(given[c] != 0, all[c] < standing[c]) << "trial " << trial;
+    }
+}
+
 // Level passes of a ball on a plane at α leave L = R − √(R² − (SD / (2 sin α))²) (method.md section 5).
 TEST(Stock, CuspOfLevelPassesOnAPlane) {
     const double R = 3.175, alpha = 50 * std::numbers::pi / 180, cusp = 0.1;

@@ -45,7 +45,7 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 if (!from.known() || !to.known()) continue;
                 const Point3 a{from.x, from.y, from.z}, b{to.x, to.y, to.z};
                 ++r.motions;
-                r.length_mm += std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+                r.length_mm += std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
                 if (std::min(a[2], b[2]) >= z_top) continue;
                 const Penetration p = tool.kind == ToolKind::ball ? part.ball(z_top, a, b, radius, floor(r.cutter))
                                                                   : part.cylinder(z_top, a, b, radius, floor(r.cutter));

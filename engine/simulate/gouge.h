@@ -34,7 +34,7 @@ struct GougeOptions {
 };
 
 /// Checks every motion, feed or rapid, from known place to known place. The error of a depth is at most
-/// StandingPart::kSheet under the layer's top and StandingPart::kNumericalError elsewhere (and the reader's for arcs).
+/// StandingPart::kSheet under the layer's top and StandingPart::kNumericalError elsewhere, and more by Program::arc_error where arcs are.
 /// Drills are checked as cylinders of their diameter, which can only overstate.
 [[nodiscard]] GougeReport check_gouge(Context& context, const StandingPart& part, double z_top, const Tool& tool, const Program& program,
                                       const GougeOptions& options = {});

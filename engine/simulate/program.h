@@ -1,4 +1,4 @@
-// A program as the machine would run it: straight motions of the tool's tip, in the order of their lines.
+// A program as the machine would run it: straight motions of the tool's tip, in the order of their lines, and which of them are arcs.
 #pragma once
 
 #include <cmath>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/plan.h"
+#include "kernels/stock/sweep.h"
 
 namespace slabwright {
 
@@ -25,6 +26,13 @@ struct ProgramStep {
     [[nodiscard]] bool known() const { return std::isfinite(x) && std::isfinite(y) && std::isfinite(z); }
 };
 
+/// Steps [begin, end) are chords of a level arc, which starts where step begin − 1 ended: their ends lie on it, and no point
+/// of it is farther from them than GcodeLimits::arc_error. What can, takes the arc itself.
+struct ProgramArc {
+    std::size_t begin = 0, end = 0;
+    LevelArc arc;
+};
+
 /// One program and what it says of itself.
 struct Program {
     std::string file;  ///< its name under nc/
@@ -36,6 +44,8 @@ struct Program {
     double spindle_rpm = 0;       ///< highest
     double dwell_s = 0;           ///< of all G4 together
     std::vector<ProgramStep> steps;
+    std::vector<ProgramArc> arcs;  ///< in the order of their steps
+    double arc_error = 0;          ///< mm: how far any arc is from its chords at most
 };
 
 }  // namespace slabwright

@@ -23,6 +23,8 @@ constexpr double kTaken = 0.002;          // mm: less is rounding of the text an
 constexpr double kDeeper = 0.05;          // mm by which a roughing cut may pass its planned step
 constexpr double kStanding = 0.01;        // mm by which shank or holder must reach into stock to be reported
 
+constexpr double kArcError = 0.001;  // mm: more than an arc's chords may miss of it
+
 /// The least box over some motions, widened by nothing yet.
 struct StepBox {
     double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300, z0 = 1e300;
@@ -214,7 +216,8 @@ private:
                 if (!s.rapid() && !s.spindle && f.spindle_off_line == 0) f.spindle_off_line = s.line;
                 if (k == 0 || !program.steps[k - 1].known() || !s.known()) continue;
                 const ProgramStep& b = program.steps[k - 1];
-                (s.rapid() ? f.rapid_mm : f.cutting_mm) += std::hypot(s.x - b.x, s.y - b.y, s.z - b.z);
+                (s.rapid() ? f.rapid_mm : f.cutting_mm) +=
+                    std::sqrt((s.x - b.x) * (s.x - b.x) + (s.y - b.y) * (s.y - b.y) + (s.z - b.z) * (s.z - b.z));
             }
             if (f.spindle_off_line != 0) violate(report, "spindle.off", "feeds while the spindle does not turn", &program, f.spindle_off_line, {}, 0);
             const Machine& m = input_.machine;
@@ -339,6 +342,8 @@ private:
         // A sliver that stood between passes overloads nobody; a tenth of the cutter's disc does.
         const double deep = p.program->planned_stepdown > 0 ? p.program->planned_stepdown + kDeeper : 1e300;
         const double wide = 0.1 * std::numbers::pi * radius * radius;
+        const auto& arcs = p.program->arcs;
+        std::size_t arc = 0, cut_arcs = 0;  // the arc at hand or next; how many have been cut
         bool any = false;
         for (std::size_t block = 0; block < p.blocks.size(); ++block) {
             if (!p.blocks[block].meets(grid, p.widest, top)) continue;
@@ -350,8 +355,12 @@ private:
                 if (!box.meets(grid, p.widest, top)) continue;
                 const Point3 from{a.x, a.y, a.z}, to{b.x, b.y, b.z};
                 const double low = std::min(a.z, b.z);
-                if (box.meets(grid, radius, top)) {
-                    const CutEffect e = stock.cut(p.end, from, to, deep);
+                // An arc is cut whole at the first of its chords that comes near; the others then have nothing to do.
+                while (arc < arcs.size() && arcs[arc].end <= i) ++arc;
+                const bool in_arc = arc < arcs.size() && arcs[arc].begin <= i, cut_before = in_arc && arc < cut_arcs;
+                if (box.meets(grid, radius + kArcError, top) && !cut_before) {
+                    const CutEffect e = in_arc ? stock.cut(p.end, arcs[arc].arc, deep) : stock.cut(p.end, from, to, deep);
+                    if (in_arc) cut_arcs = arc + 1;
                     if (e.removed > 0) {
                         any = true;
                         out.removed += e.removed;
@@ -470,8 +479,8 @@ private:
     /// Stock that stands `over` above the finished surface is excused as far as no tool reaches into it. What could have been taken
     /// at a point of its surface is the greatest d for which tools reach the points d away from it towards the part, straight down and
     /// down at 45° to four sides: a lump of that size, not the sliver beside what is out of reach. Found by halving.
-    void judge_leftover(const SimulatedLayer& layer, Reach& reach, const Point3& s, double over, const StandingPart::Clearance& near,
-                        bool beside, double height, LayerFindings& f) const {
+    void judge_leftover(const SimulatedLayer& layer, Reach& reach, const Point3& s, double over, const StandingPart::Clearance& near, bool beside,
+                        double height, LayerFindings& f) const {
         const double limit = options_.cusp + options_.slack;
         Point3 n{0, 0, 1};
         if (near.distance < height && near.distance > 0)

@@ -47,7 +47,8 @@ Polygon clip_z(const Polygon& in, double z, bool keep_above) {
 double distance_2d(P2 p, P2 a, P2 b) {
     const double dx = b.x - a.x, dy = b.y - a.y, l = dx * dx + dy * dy;
     const double t = l > 0 ? std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / l, 0.0, 1.0) : 0.0;
-    return std::hypot(p.x - a.x - t * dx, p.y - a.y - t * dy);
+    const double ex = p.x - a.x - t * dx, ey = p.y - a.y - t * dy;
+    return std::sqrt(ex * ex + ey * ey);
 }
 
 double cross_2d(P2 a, P2 b, P2 c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
@@ -461,6 +462,9 @@ Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point
                     return xy_distance(n, mid[0], mid[1]) < radius - result.depth + half;
                 },
                 [&](const Facet& f) {
+                    const double reach = radius - result.depth + half;
+                    if (std::min<double>(std::max({f.v[0].z, f.v[1].z, f.v[2].z}), top) - lowest <= result.depth) return;
+                    if (xy_distance2(f.v, mid[0], mid[1]) >= reach * reach) return;
                     Polygon poly;
                     poly.n = 3;
                     int under = 0;

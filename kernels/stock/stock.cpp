@@ -6,40 +6,53 @@ void Stock::add_slab(double z_bottom, double thickness) {
     slabs_.push_back({z_bottom, thickness, std::vector<float>(grid_.count(), static_cast<float>(thickness))});
 }
 
-CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep) {
+/// Cuts by sweep(standing, fn), which gives every cell that the cutter gets lower than standing(cell).
+template <class Sweep>
+CutEffect Stock::take(double deep, Sweep&& sweep) {
     CutEffect effect;
+    const auto nx = static_cast<std::size_t>(grid_.nx);
+    std::size_t deepest_cell = 0;
     auto taken = [&](std::size_t cell, double before, double after, double& lost) {
         lost += before - after;
         effect.highest = std::max(effect.highest, before);
         effect.lowest = std::min(effect.lowest, after);
         effect.removed += before - after;
-        if (lost > effect.deepest) {
-            effect.deepest = lost;
-            const auto nx = static_cast<std::size_t>(grid_.nx);
-            effect.where = {grid_.x(static_cast<int>(cell % nx)), grid_.y(static_cast<int>(cell / nx))};
-        }
+        if (lost > effect.deepest) effect.deepest = lost, deepest_cell = cell;
     };
-    sweep(grid_, end, from, to, [&](std::size_t cell, double z) {
-        double lost = 0;
-        for (std::size_t k = slabs_.size(); k-- > 0;) {
-            Slab& slab = slabs_[k];
-            float& height = slab.height[cell];
-            if (height > 0) {
-                const auto left = static_cast<float>(std::max(0.0, z - slab.bottom));
-                if (left < height) {
-                    taken(cell, slab.bottom + height, slab.bottom + left, lost);
-                    height = left;
-                }
-            }
-            if (z >= slab.bottom) break;
-        }
-        effect.deep_cells += lost > deep;
-        if (-z > board_[cell]) {
-            effect.lowest = std::min(effect.lowest, z);
-            board_[cell] = static_cast<float>(-z);
-        }
-    });
+    // The topmost slab's surface decides: a cutter that stays above it takes nothing there, nor of what lies below.
+    const double bottom = slabs_.empty() ? 1e300 : slabs_.back().bottom;
+    const float* const heights = slabs_.empty() ? board_.data() : slabs_.back().height.data();
+    sweep([&](std::size_t cell) { return bottom + heights[cell]; },
+          [&](std::size_t cell, double z) {
+              double lost = 0;
+              for (std::size_t k = slabs_.size(); k-- > 0;) {
+                  Slab& slab = slabs_[k];
+                  float& height = slab.height[cell];
+                  if (height > 0) {
+                      const auto left = static_cast<float>(std::max(0.0, z - slab.bottom));
+                      if (left < height) {
+                          taken(cell, slab.bottom + height, slab.bottom + left, lost);
+                          height = left;
+                      }
+                  }
+                  if (z >= slab.bottom) break;
+              }
+              effect.deep_cells += lost > deep;
+              if (-z > board_[cell]) {
+                  effect.lowest = std::min(effect.lowest, z);
+                  board_[cell] = static_cast<float>(-z);
+              }
+          });
+    if (effect.deepest > 0) effect.where = {grid_.x(static_cast<int>(deepest_cell % nx)), grid_.y(static_cast<int>(deepest_cell / nx))};
     return effect;
+}
+
+CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep) {
+    return take(deep, [&](auto&& standing, auto&& fn) { sweep_above(grid_, end, from, to, standing, fn); });
+}
+
+CutEffect Stock::cut(const CutterEnd& end, const LevelArc& arc, double deep) {
+    return take(deep, [&](auto&& standing, auto&& fn) { sweep_above(grid_, end, arc, standing, fn); });
 }
 
 double Stock::top(std::size_t cell) const {

@@ -30,6 +30,8 @@ public:
 
     /// Takes away what the cutter meets on its way. Cells that lose more than `deep` mm are counted.
     CutEffect cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep = 1e300);
+    /// The same along a level arc.
+    CutEffect cut(const CutterEnd& end, const LevelArc& arc, double deep = 1e300);
 
     /// Largest height by which stock stands above the lower face of an upright cylinder (shank or holder) anywhere on its way;
     /// 0 when it is free. `where` gets the place.
@@ -46,6 +48,8 @@ public:
     [[nodiscard]] std::uint64_t bytes() const { return grid_.count() * 4 * (slabs_.size() + 1); }
 
 private:
+    template <class Sweep>
+    CutEffect take(double deep, Sweep&& sweep);
     struct Slab {
         double bottom, thickness;
         std::vector<float> height;  ///< above the slab's bottom: a float holds 50 mm to 4e-6

@@ -1,10 +1,13 @@
-// The exact envelope of a cutter along a straight way: over each cell's centre, the lowest z that the cutter reaches.
+// The exact envelope of a cutter along a straight way or a level arc: over each cell's centre, the lowest z that the cutter reaches.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <numbers>
 
 namespace slabwright {
 
@@ -28,24 +31,34 @@ struct CutterEnd {
     double slope = 0;   ///< of the cone
 };
 
-/// Calls fn(cell index, z) for every cell whose centre the cutter covers while its tip goes straight from `from` to `to`.
+/// A part of a circle at one height that the tip runs along, mm and radians: from the angle `start` (from +x, counter-clockwise) on over
+/// `turn`, negative for clockwise, a whole circle at most.
+struct LevelArc {
+    double x = 0, y = 0, z = 0, radius = 0;
+    double start = 0, turn = 0;
+};
+
+/// Calls fn(cell index, z) for every cell whose centre the cutter covers while its tip goes straight from `from` to `to`, unless
+/// standing(cell index) ≤ z: what stands lower than the cutter gets is left out, mostly before anything costly is computed.
 /// With s the way along the motion in the plane, s0 the foot of the centre on it, q its distance from it and m the way's slope, the
 /// height over the centre at s is z + m·s + end(√(q² + (s − s0)²)): convex in s, so its least value lies where the derivative
 /// vanishes, moved into [0, L] and to where the cutter covers the centre at all. The result is exact, not sampled.
-template <class Fn>
-void sweep(const CellGrid& grid, const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, Fn&& fn) {
+template <class Standing, class Fn>
+void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, Standing&& standing,
+                 Fn&& fn) {
     const double R = end.radius, R2 = R * R;
     double dx = to[0] - from[0], dy = to[1] - from[1];
     const double length = std::sqrt(dx * dx + dy * dy);
     double z = from[2], slope = 0;
     if (length > 1e-9) dx /= length, dy /= length, slope = (to[2] - from[2]) / length;
     else dx = 1, dy = 0, z = std::min(from[2], to[2]);
-    const double run = length > 1e-9 ? length : 0;
+    const double run = length > 1e-9 ? length : 0, lowest = std::min(from[2], to[2]);
     const double y_low = std::min(from[1], to[1]) - R, y_high = std::max(from[1], to[1]) + R;
     const int j0 = std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - grid.y0) / grid.cell))));
     const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high - grid.y0) / grid.cell))));
     const double ball_lead = slope / std::sqrt(1 + slope * slope);
     const double cone_lead = end.slope > std::abs(slope) ? slope / std::sqrt(end.slope * end.slope - slope * slope) : 0;
+    const bool level_ball = slope == 0 && end.form == CutterEnd::Form::ball;
     for (int j = j0; j <= j1; ++j) {
         const double y = grid.y(j);
         // The capsule's span on this row: where the row meets either disc, or the strip between them.
@@ -67,11 +80,23 @@ void sweep(const CellGrid& grid, const CutterEnd& end, const std::array<double, 
         if (low > high) continue;
         const int i0 = std::max(0, static_cast<int>(std::floor(std::clamp((low - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
         const int i1 = std::min(grid.nx - 1, static_cast<int>(std::ceil(std::clamp((high - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
+        const std::size_t row = grid.index(0, j);
         for (int i = i0; i <= i1; ++i) {
+            const std::size_t cell = row + static_cast<std::size_t>(i);
+            const double stands = standing(cell);
+            if (stands <= lowest) continue;
             const double px = grid.x(i) - from[0], py = y - from[1];
             const double s0 = px * dx + py * dy, q2 = std::max(0.0, px * px + py * py - s0 * s0);
             const double w2 = R2 - q2;
             if (w2 < 0) continue;
+            if (level_ball) {
+                const double over = s0 - std::clamp(s0, 0.0, run), h2 = w2 - over * over;
+                // R − √(R² − d²) is at least d² / 2R.
+                if (h2 < 0 || stands <= z + (R2 - h2) / (2 * R)) continue;
+                const double height = z + R - std::sqrt(h2);
+                if (stands > height) fn(cell, height);
+                continue;
+            }
             const double w = std::sqrt(w2);
             const double s_low = std::max(0.0, s0 - w), s_high = std::min(run, s0 + w);
             if (s_low > s_high) continue;
@@ -92,9 +117,74 @@ void sweep(const CellGrid& grid, const CutterEnd& end, const std::array<double, 
                     break;
                 }
             }
-            fn(grid.index(i, j), z + slope * s + height);
+            height += z + slope * s;
+            if (stands > height) fn(cell, height);
         }
     }
+}
+
+/// The same along an arc: at one height the least value lies where the arc is nearest to the centre, at the radius or at an end.
+template <class Standing, class Fn>
+void sweep_above(const CellGrid& grid, const CutterEnd& end, const LevelArc& arc, Standing&& standing, Fn&& fn) {
+    const double R = end.radius, R2 = R * R, r = arc.radius;
+    const double half = std::abs(arc.turn) / 2, middle = arc.start + arc.turn / 2;
+    const double mx = std::cos(middle), my = std::sin(middle), opening = half >= std::numbers::pi ? -2 : std::cos(half);
+    const std::array<double, 2> a{arc.x + r * std::cos(arc.start), arc.y + r * std::sin(arc.start)};
+    const std::array<double, 2> b{arc.x + r * std::cos(arc.start + arc.turn), arc.y + r * std::sin(arc.start + arc.turn)};
+    // A direction lies within the arc's angle if its cosine with the middle is not less than the opening's.
+    auto within = [&](double px, double py, double d) { return px * mx + py * my >= opening * d; };
+    double x_low = std::min(a[0], b[0]), x_high = std::max(a[0], b[0]), y_low = std::min(a[1], b[1]), y_high = std::max(a[1], b[1]);
+    if (within(1, 0, 1)) x_high = arc.x + r;
+    if (within(-1, 0, 1)) x_low = arc.x - r;
+    if (within(0, 1, 1)) y_high = arc.y + r;
+    if (within(0, -1, 1)) y_low = arc.y - r;
+    const int j0 = std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - R - grid.y0) / grid.cell))));
+    const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high + R - grid.y0) / grid.cell))));
+    const double inner = std::max(0.0, r - R);
+    for (int j = j0; j <= j1; ++j) {
+        const double y = grid.y(j), py = y - arc.y, out2 = (r + R) * (r + R) - py * py;
+        if (out2 < 0) continue;
+        const double out = std::sqrt(out2), hole = std::sqrt(std::max(0.0, inner * inner - py * py));
+        const double low = std::max(x_low - R, arc.x - out), high = std::min(x_high + R, arc.x + out);
+        if (low > high) continue;
+        const int i0 = std::max(0, static_cast<int>(std::floor(std::clamp((low - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
+        const int i1 = std::min(grid.nx - 1, static_cast<int>(std::ceil(std::clamp((high - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
+        const std::size_t row = grid.index(0, j);
+        for (int i = i0; i <= i1; ++i) {
+            const double px = grid.x(i) - arc.x;
+            if (px > -hole && px < hole) {  // to the hole's far side at once
+                i = std::max(i, static_cast<int>(std::min<double>(i1, std::ceil((arc.x + hole - grid.x0) / grid.cell) - 1)));
+                continue;
+            }
+            const std::size_t cell = row + static_cast<std::size_t>(i);
+            const double stands = standing(cell);
+            if (stands <= arc.z) continue;
+            const double d = std::sqrt(px * px + py * py);
+            double distance2 = (d - r) * (d - r);
+            if (distance2 > R2) continue;
+            if (!within(px, py, d)) {
+                const double ax = grid.x(i) - a[0], ay = y - a[1], bx = grid.x(i) - b[0], by = y - b[1];
+                distance2 = std::min(ax * ax + ay * ay, bx * bx + by * by);
+                if (distance2 > R2) continue;
+            }
+            double height = arc.z;
+            if (end.form == CutterEnd::Form::ball) height += R - std::sqrt(R2 - distance2);
+            else if (end.form == CutterEnd::Form::cone) height += end.slope * std::sqrt(distance2);
+            if (stands > height) fn(cell, height);
+        }
+    }
+}
+
+/// Calls fn(cell index, z) for every cell whose centre the cutter covers.
+template <class Fn>
+void sweep(const CellGrid& grid, const CutterEnd& end, const LevelArc& arc, Fn&& fn) {
+    sweep_above(
+        grid, end, arc, [](std::size_t) { return std::numeric_limits<double>::infinity(); }, fn);
+}
+template <class Fn>
+void sweep(const CellGrid& grid, const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, Fn&& fn) {
+    sweep_above(
+        grid, end, from, to, [](std::size_t) { return std::numeric_limits<double>::infinity(); }, fn);
 }
 
 }  // namespace slabwright
