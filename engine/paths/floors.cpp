@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "engine/paths/layer_cut.h"
+#include "engine/paths/order.h"
 
 namespace slabwright {
 
@@ -16,6 +17,8 @@ Operation finish_floors(const LayerCut& cut) {
     const std::vector<Section> inside = cut.insides(cutter, heights);
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
                      cut.layer.z_top + 2);
+    const DropIndex& part = cut.drops(cutter);
+    path.know(cut.around(tool, &part));
     op.stepover = tool.stepover * tool.diameter;
     for (std::size_t i = 0; i < heights.size(); ++i) {
         std::vector<SolidFacet> facets;
@@ -56,6 +59,7 @@ Operation finish_floors(const LayerCut& cut) {
                 if (f.low < along && along < f.high) return true;
             return false;
         };
+        std::vector<std::vector<PathPoint>> runs;
         for (std::size_t c = 0; c < border.size(); ++c) {
             const std::size_t first = border.starts[c], n = border.starts[c + 1] - first;
             std::vector<char> wanted(n);
@@ -64,14 +68,7 @@ Operation finish_floors(const LayerCut& cut) {
                 if (!(wanted[k] = near_floor(border.points[first + k]))) start = k;
             std::vector<PathPoint> run;
             auto close = [&] {
-                if (run.size() > 1) {
-                    run = simplify(run, simplify_tolerance_units(cut.job.tolerances.gouge));
-                    path.go_above({run[0].x, run[0].y});
-                    path.sink(to_units(std::min(cut.layer.z_top, heights[i] + cut.job.cutting.floor_allowance)));
-                    path.plunge(z);
-                    for (const PathPoint& p : run) path.cut({p.x, p.y}, z);
-                    path.retract();
-                }
+                if (run.size() > 1) runs.push_back(simplify(run, simplify_tolerance_units(cut.job.tolerances.gouge)));
                 run.clear();
             };
             for (std::size_t k = 0; k <= n; ++k) {
@@ -80,6 +77,13 @@ Operation finish_floors(const LayerCut& cut) {
                 else close();
             }
             close();
+        }
+        std::vector<Beginning> beginnings;
+        for (const std::vector<PathPoint>& run : runs)
+            beginnings.push_back({{run.front().x, run.front().y}, {run.back().x, run.back().y}, static_cast<std::uint32_t>(beginnings.size()), 0});
+        for (const Beginning& next : nearest_order(std::move(beginnings), runs.size(), path.at())) {
+            add_leads(path, cut, part, safe_chord_mm(r, cut.job.tolerances.gouge), runs[next.run]);
+            path.follow(runs[next.run]);
         }
     }
     path.finish();

@@ -39,6 +39,13 @@ struct LayerCut {
     std::vector<double> floors;
     std::vector<std::vector<double>> slopes;  ///< by z bin: the slopes of its facets, ascending, thinned
     double slope_bin = 0.1;                   ///< mm
+
+    /// Drops of a cutter; made at the first call and kept. Call it from the layer's own thread only.
+    [[nodiscard]] const DropIndex& drops(const Cutter& cutter) const;
+    /// What a tool's links must know; `part` as for Surroundings.
+    [[nodiscard]] Surroundings around(const Tool& tool, const DropIndex* part) const;
+    Standing* standing = nullptr;  ///< what stands after the operations so far; null: not known
+    mutable std::vector<std::pair<Cutter, std::unique_ptr<DropIndex>>> made_drops{};
 };
 
 /// Longest chord between exact cutter locations that stays within 0.65 of the gouge tolerance (see level_contours), in
@@ -48,6 +55,12 @@ struct LayerCut {
 [[nodiscard]] std::int32_t safe_pitch(double radius, double gouge);
 [[nodiscard]] double simplify_tolerance_units(double gouge);
 [[nodiscard]] double arc_tolerance_units(double gouge);
+
+/// Gives a finish run at one level a tangential arc into the cut and one out of it, on its free side, where drops of the
+/// cutter prove the room and nothing stands that would be entered head-on. The part is on the right of the run. A closed run
+/// (its last point is its first) is cut a little past its beginning, so that no mark stays there.
+/// @returns whether the arc into the cut found room
+bool add_leads(PathBuilder& path, const LayerCut& cut, const DropIndex& part, double chord, std::vector<PathPoint>& run);
 
 /// Clears a region given as free stretches on parallel lines along x, chained into zigzags; each chain is entered from
 /// outside the stock where it begins there, else by a ramp.

@@ -52,6 +52,18 @@ std::vector<Contours> LayerCut::contours(const Cutter& cutter, std::span<const d
     return result;
 }
 
+const DropIndex& LayerCut::drops(const Cutter& cutter) const {
+    for (const auto& [of, index] : made_drops)
+        if (of.profile == cutter.profile && of.radius == cutter.radius) return *index;
+    made_drops.emplace_back(cutter, std::make_unique<DropIndex>(context, solid, cutter));
+    return *made_drops.back().second;
+}
+
+Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
+    const Cutter cutter{tool.kind == ToolKind::ball ? Cutter::Profile::ball : Cutter::Profile::flat, tool.diameter / 2};
+    return {standing, part, cutter, safe_chord_mm(cutter.radius, job.tolerances.gouge), job.cutting.ramp_deg, layer.z_bottom + PathBuilder::kStop};
+}
+
 Operation LayerCut::operation(OperationKind kind, const char* purpose, const Tool& tool) const {
     Operation op;
     op.kind = kind;
@@ -62,8 +74,9 @@ Operation LayerCut::operation(OperationKind kind, const char* purpose, const Too
 }
 
 LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
-    LayerCut cut{context, layer, *layer.job, layer_solid(context, layer.mesh, layer.floor_below, layer.z_top), layer.z_bottom + layer.slab_thickness,
-                 {},      {},    0.1};
+    LayerCut cut{
+        context, layer,   *layer.job, layer_solid(context, layer.mesh, layer.floor_below, layer.z_top), layer.z_bottom + layer.slab_thickness, {}, {},
+        0.1,     nullptr, {}};
     // Slopes by height, rounded down to a tenth of a degree so that a bin holds few of them. Overhangs and level floors
     // are not machined by slope.
     cut.slopes.resize(static_cast<std::size_t>((layer.z_top - layer.floor_below) / cut.slope_bin) + 1);
@@ -90,6 +103,10 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     }
     std::sort(cut.floors.begin(), cut.floors.end(), std::greater<>());
     cut.floors.erase(std::unique(cut.floors.begin(), cut.floors.end(), [](double a, double b) { return a - b < kSameFloor; }), cut.floors.end());
+
+    // What stands once the slab has been faced; every operation after that cuts its moves into it.
+    Standing standing(layer.stock_min, layer.stock_max, std::min(cut.stock_top, layer.z_top));
+    cut.standing = &standing;
 
     LayerResult result;
     auto take = [&](Operation&& operation) {

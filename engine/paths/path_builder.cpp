@@ -2,8 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace slabwright {
+
+namespace {
+
+constexpr double kMiddle = 0.75;  // of the cutter's radius: what counts as head-on
+
+}  // namespace
 
 PathBuilder::PathBuilder(Operation& operation, const Tool& tool, double feed, double clearance_z, double link_z)
     : operation_(operation),
@@ -28,6 +35,7 @@ void PathBuilder::add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint3
             const bool same = axes == 1 && (ax == 0) == (bx == 0) && (ay == 0) == (by == 0) && (az == 0) == (bz == 0);
             if (same && (ax > 0) == (bx > 0) && (ay > 0) == (by > 0) && (az > 0) == (bz > 0)) {
                 last = {x, y, z, feed};
+                learnt_ = std::min(learnt_, n - 1);
                 x_ = x, y_ = y, z_ = z;
                 return;
             }
@@ -38,23 +46,162 @@ void PathBuilder::add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint3
     started_ = true;
 }
 
+void PathBuilder::know(const Surroundings& around) {
+    around_ = around;
+    learnt_ = operation_.moves.size();
+}
+
+// Cuts the moves made since the last question into what stands. Of moves much shorter than a cell only some are needed:
+// whatever is left out, the bound stays a bound.
+void PathBuilder::learn() {
+    const std::vector<Move>& moves = operation_.moves;
+    double since = 0;
+    for (std::size_t i = std::max<std::size_t>(learnt_, 1); i < moves.size(); ++i) {
+        if (moves[i].feed == 0) continue;
+        const std::array<double, 3> from{to_mm(moves[i - 1].x), to_mm(moves[i - 1].y), to_mm(moves[i - 1].z)},
+            to{to_mm(moves[i].x), to_mm(moves[i].y), to_mm(moves[i].z)};
+        since += std::hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
+        if (since < around_.standing->cell() && i + 1 < moves.size() && moves[i + 1].feed > 0) continue;
+        around_.standing->cut(around_.cutter, from, to);
+        since = 0;
+    }
+    learnt_ = moves.size();
+}
+
+double PathBuilder::standing_tip(Point2 at) {
+    if (around_.standing == nullptr) return to_mm(link_);
+    learn();
+    const std::array<double, 2> p{to_mm(at.x), to_mm(at.y)};
+    return around_.standing->free_tip(around_.cutter, p, p);
+}
+
+double PathBuilder::standing_middle(Point2 at) {
+    if (around_.standing == nullptr) return to_mm(link_);
+    learn();
+    const std::array<double, 2> p{to_mm(at.x), to_mm(at.y)};
+    return around_.standing->free_tip({around_.cutter.profile, kMiddle * around_.cutter.radius}, p, p);
+}
+
 void PathBuilder::go_above(Point2 p) {
     if (!started_) {
         add(p.x, p.y, clearance_, 0);
         z_ = clearance_;
-        add(p.x, p.y, link_, 0);
-        return;
+    } else if (around_.standing == nullptr) {
+        if (down_) retract();
+    } else if (p.x != x_ || p.y != y_) {
+        learn();
+        const double top = around_.standing->top(around_.cutter.radius, {to_mm(x_), to_mm(y_)}, {to_mm(p.x), to_mm(p.y)});
+        const double lowest = std::max({top + kOver, to_mm(z_), around_.lowest_rapid});
+        const std::int32_t over = lowest < to_mm(link_) ? to_units(lowest) : std::max(z_, link_);
+        add(x_, y_, over, 0);
+        add(p.x, p.y, over, 0);
     }
-    if (down_) retract();
-    add(p.x, p.y, link_, 0);
+    down_ = false;
+    if (around_.standing == nullptr) return add(p.x, p.y, link_, 0);
+    learn();
+    const double top = around_.standing->top(around_.cutter.radius, {to_mm(p.x), to_mm(p.y)}, {to_mm(p.x), to_mm(p.y)});
+    above_ = std::min(link_, to_units(std::max(top + kStop, around_.lowest_rapid)));
+}
+
+// The way between two free places at one height, looked at in steps that no part can hide between.
+bool PathBuilder::straight_is_free(Point2 to, std::int32_t z) {
+    const std::array<double, 2> a{to_mm(x_), to_mm(y_)}, b{to_mm(to.x), to_mm(to.y)};
+    const double way = std::hypot(b[0] - a[0], b[1] - a[1]);
+    if (way > kLongestWay) return false;
+    learn();
+    if (around_.standing->free_tip(around_.cutter, a, b) > to_mm(z) + kBite) return false;
+    const int steps = static_cast<int>(std::ceil(way / around_.chord));
+    for (int k = 1; k < steps; ++k) {
+        const double t = static_cast<double>(k) / steps;
+        if (around_.part->drop(a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])).tip_z > to_mm(z)) return false;
+    }
+    return true;
+}
+
+// By rapid to where stock may stand, and never quite to the cut.
+void PathBuilder::land(std::int32_t z) {
+    if (down_ || around_.standing == nullptr) return;
+    const std::int32_t stop = std::max(above_, z + to_units(kStop));
+    if (stop < z_) add(x_, y_, stop, 0);
+}
+
+// On from there fast to where the cutter meets something.
+void PathBuilder::descend(const PathPoint& to) {
+    land(to.z);
+    const double tip = standing_tip({x_, y_});
+    const std::int32_t met = tip > -1e9 ? to_units(tip + kStop) : to.z;
+    if (std::max(met, to.z) < z_) sink(std::max(met, to.z));
+}
+
+// From above the start of a run down to it. A slice along a wall is no plunge: only what stands under the middle of the
+// cutter asks for a ramp, to and fro over the run's beginning, every point of it raised by what is still to go down.
+void PathBuilder::enter(std::span<const PathPoint> run) {
+    const PathPoint& first = run.front();
+    descend(first);
+    if (to_mm(z_ - first.z) > kPlunge && standing_middle({first.x, first.y}) > to_mm(first.z) + kPlunge) {
+        const Cutter middle{around_.cutter.profile, kMiddle * around_.cutter.radius};
+        const double longest = 4 * around_.cutter.radius * kUnitsPerMm;
+        double length = 0, height = standing_middle({first.x, first.y}) - to_mm(first.z);
+        std::vector<PathPoint> stretch{first};
+        for (std::size_t k = 1; k < run.size() && length < longest; ++k) {
+            const PathPoint& p = run[k - 1];
+            PathPoint q = run[k];
+            const double way = std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
+            if (length + way > longest) {
+                const double t = (longest - length) / way;
+                q = {p.x + static_cast<std::int32_t>(t * (static_cast<double>(q.x) - p.x)),
+                     p.y + static_cast<std::int32_t>(t * (static_cast<double>(q.y) - p.y)), std::max(p.z, q.z)};
+            }
+            length += std::min(way, longest - length);
+            height =
+                std::max(height, around_.standing->free_tip(middle, {to_mm(p.x), to_mm(p.y)}, {to_mm(q.x), to_mm(q.y)}) - to_mm(std::min(p.z, q.z)));
+            stretch.push_back(q);
+        }
+        const double drop = (height + 0.1) * kUnitsPerMm, slope = std::tan(around_.ramp_deg * std::numbers::pi / 180);
+        const double legs = length > kUnitsPerMm ? 2 * std::ceil(drop / (2 * length * slope)) : 0;
+        if (legs > 0 && legs < 1000) {
+            sink(first.z + static_cast<std::int32_t>(drop));
+            double done = 0;
+            for (int leg = 0; leg < static_cast<int>(legs); ++leg) {
+                if (leg > 0) std::reverse(stretch.begin(), stretch.end());
+                for (std::size_t k = 1; k < stretch.size(); ++k) {
+                    const PathPoint &p = stretch[k - 1], &q = stretch[k];
+                    done += std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
+                    cut({q.x, q.y}, q.z + static_cast<std::int32_t>(std::ceil(std::max(0.0, drop * (1 - done / (length * legs))))));
+                }
+            }
+        }
+    }
+    plunge(first.z);
+}
+
+void PathBuilder::follow(std::span<const PathPoint> run) {
+    if (run.empty()) return;
+    const Point2 first{run.front().x, run.front().y};
+    if (around_.standing == nullptr) {
+        go_above(first);
+        plunge(run.front().z);
+    } else {
+        const std::int32_t level = std::max(z_, run.front().z);
+        if (started_ && z_ < link_ && around_.part != nullptr && straight_is_free(first, level)) {
+            sink(level);
+            cut(first, level);
+        } else {
+            go_above(first);
+        }
+        enter(run);
+    }
+    for (const PathPoint& p : run.subspan(1)) cut({p.x, p.y}, p.z);
 }
 
 void PathBuilder::plunge(std::int32_t z) {
+    land(z);
     add(x_, y_, z, plunge_feed_);
     down_ = true;
 }
 
 void PathBuilder::sink(std::int32_t z) {
+    land(z);
     add(x_, y_, z, sink_feed_);
     down_ = true;
 }
@@ -66,7 +213,7 @@ void PathBuilder::cut(Point2 to, std::int32_t z) {
 
 void PathBuilder::retract() {
     if (!down_) return;
-    add(x_, y_, link_, 0);
+    if (around_.standing == nullptr) add(x_, y_, link_, 0);
     down_ = false;
 }
 
@@ -74,6 +221,7 @@ bool PathBuilder::finish() {
     if (!started_) return false;
     retract();
     add(x_, y_, clearance_, 0);
+    if (around_.standing != nullptr) learn();
     return true;
 }
 

@@ -1,11 +1,30 @@
-// Puts moves one after another into an operation: rapids only above the stock, down by feed.
+// Puts moves one after another into an operation: rapids only above the stock, down by feed. A builder that knows what
+// stands around it links its cuts by the shortest way that it can prove.
 #pragma once
 
 #include <span>
 
+#include "engine/paths/standing.h"
 #include "engine/plan.h"
+#include "kernels/cutting/drop.h"
 
 namespace slabwright {
+
+/// What a cutter must know of its surroundings to go straight from one cut to the next.
+struct Surroundings {
+    Standing* standing = nullptr;     ///< what may stand; the builder cuts its own moves into it
+    const DropIndex* part = nullptr;  ///< drops of this very cutter, or of a wider one; none: it never stays down
+    Cutter cutter;
+    double chord = 0;            ///< mm: longest chord between free places that is safe (safe_chord_mm)
+    double ramp_deg = 5;         ///< entry into stock
+    double lowest_rapid = -1e9;  ///< mm: rapids go no deeper
+};
+
+/// A point of a path, 0.1 µm.
+struct PathPoint {
+    std::int32_t x = 0, y = 0, z = 0;
+    friend bool operator==(const PathPoint&, const PathPoint&) = default;
+};
 
 class PathBuilder {
 public:
@@ -13,15 +32,24 @@ public:
     /// @param link_z      above all standing stock, mm: rapids between cuts run here
     PathBuilder(Operation& operation, const Tool& tool, double feed, double clearance_z, double link_z);
 
-    /// Rapid to above (x, y), if not there already (0.1 µm).
+    /// From now on links are as low as what stands allows. Before this, rapids run at the link height.
+    void know(const Surroundings& around);
+
+    /// Rapid to above (x, y), if not there already (0.1 µm): as low as is proven to be air on the way and over the target,
+    /// else at the link height.
     void go_above(Point2 at);
+    /// From where the tool is to the first point of a run, then along it. Straight at the height of the higher end where that
+    /// way is free of the part and of standing stock; else above what stands. What stands at the run's start is entered on a
+    /// ramp along the run, to and fro; up to kPlunge of it straight down.
+    /// Every point of the run must be free, and so must be what lies straight above it (as of a drop or a level contour).
+    void follow(std::span<const PathPoint> run);
     /// Straight down (or up) by plunge feed to z.
     void plunge(std::int32_t z);
     /// Fast down to z through air that is known to be empty: space already cut, or beside the stock. Still by feed.
     void sink(std::int32_t z);
     /// Cuts to a point.
     void cut(Point2 to, std::int32_t z);
-    /// Up to the link height.
+    /// Done with this cut: up to the link height, or, with known surroundings, as far up as the next link needs.
     void retract();
     /// Ends the program; drops it when nothing was cut. Returns whether something was.
     bool finish();
@@ -29,10 +57,28 @@ public:
     [[nodiscard]] bool is_down() const { return down_; }
     [[nodiscard]] Point2 at() const { return {x_, y_}; }
     [[nodiscard]] std::int32_t z() const { return z_; }
+    /// How low the cutter gets over a place before it meets what is known to stand; −infinity when nothing is.
+    [[nodiscard]] double standing_tip(Point2 at);
+    /// The same for the cutter's middle: what stands there would be entered head-on, not sliced from its side.
+    [[nodiscard]] double standing_middle(Point2 at);
+
+    static constexpr double kOver = 1.0;         ///< mm of air under a rapid that goes across
+    static constexpr double kStop = 0.5;         ///< mm of air where a rapid or fast feed goes down
+    static constexpr double kPlunge = 0.5;       ///< mm of stock that an end mill may enter straight down
+    static constexpr double kBite = 0.1;         ///< mm that a tool may meet where it stays down
+    static constexpr double kLongestWay = 40.0;  ///< mm that it stays down; above, lifting is quicker
 
 private:
     void add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t feed);
+    void learn();
+    [[nodiscard]] bool straight_is_free(Point2 to, std::int32_t z);
+    void descend(const PathPoint& to);
+    void land(std::int32_t z);
+    void enter(std::span<const PathPoint> run);
     Operation& operation_;
+    Surroundings around_;
+    std::size_t learnt_ = 0;          // moves that have been cut into what stands
+    std::int32_t above_ = INT32_MIN;  // where the air ends over the place that go_above() went to, as far as is proven
     std::uint32_t feed_, plunge_feed_, sink_feed_;
     std::int32_t clearance_, link_;
     std::int32_t x_ = 0, y_ = 0, z_ = 0;
@@ -42,10 +88,6 @@ private:
 /// Leaves out points of a polyline that lie within `tolerance` (0.1 µm units) of the chord between kept ones
 /// (Ramer–Douglas–Peucker in three dimensions). First and last stay. Every point of the result lies within `tolerance`
 /// of the polyline given.
-struct PathPoint {
-    std::int32_t x = 0, y = 0, z = 0;
-    friend bool operator==(const PathPoint&, const PathPoint&) = default;
-};
 [[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double tolerance);
 
 }  // namespace slabwright
