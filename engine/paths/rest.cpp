@@ -120,14 +120,15 @@ public:
 private:
     [[nodiscard]] double worth(std::size_t cell) const { return std::clamp(0.2 * static_cast<double>(stock_.left(cell)), 0.015, 0.05); }
 
-    // Whether the cutter, here, lowers a cell that is worth it.
-    [[nodiscard]] bool lowers(double x, double y, double tip) const {
+    // Whether the cutter, here or up to `slack` mm beside, lowers a cell that is worth it.
+    [[nodiscard]] bool lowers(double x, double y, double tip, double slack = 0) const {
         const CellGrid& grid = stock_.grid();
-        const int j0 = std::max(0, static_cast<int>(std::ceil((y - r_ - grid.y0) / grid.cell)));
-        const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + r_ - grid.y0) / grid.cell)));
+        const double reach = r_ + slack;
+        const int j0 = std::max(0, static_cast<int>(std::ceil((y - reach - grid.y0) / grid.cell)));
+        const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + reach - grid.y0) / grid.cell)));
         const double above = tip - stock_.z_bottom();
         for (int j = j0; j <= j1; ++j) {
-            const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, r_ * r_ - dy * dy));
+            const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, reach * reach - dy * dy));
             const int i0 = std::max(0, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
             const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + w - grid.x0) / grid.cell)));
             for (int i = i0; i <= i1; ++i) {
@@ -135,8 +136,8 @@ private:
                 if (!targets_.marked(c) || stock_.height(c) <= above) continue;
                 double z = above;
                 if (ball_) {
-                    const double dx = grid.x(i) - x;
-                    z += r_ - std::sqrt(std::max(0.0, r_ * r_ - dx * dx - dy * dy));
+                    const double from_axis = std::max(0.0, std::hypot(grid.x(i) - x, dy) - slack);
+                    z += r_ - std::sqrt(std::max(0.0, r_ * r_ - from_axis * from_axis));
                 }
                 z = std::max(z, static_cast<double>(stock_.surface(c)));
                 if ((stock_.height(c) - z) * stock_.nz(c) > worth(c)) return true;
@@ -163,8 +164,15 @@ private:
     }
 
     [[nodiscard]] bool too_far(const Place& a, std::int32_t ya, const Place& b, std::int32_t yb) const {
+        if (!a.reachable && !b.reachable) return false;
+        if (!ball_ || !a.reachable || !b.reachable) {
+            if (std::abs(a.tip - b.tip) <= kJump) return false;
+            if (a.useful || b.useful) return true;
+            // Neither place helps, but one between them may, where the lower of them is stopped by a wall.
+            const Place& low = a.tip < b.tip ? a : b;
+            return lowers(to_mm(low.x), to_mm(a.tip < b.tip ? ya : yb), low.tip, std::max(to_mm(std::abs(b.x - a.x)), to_mm(std::abs(yb - ya))));
+        }
         if (!a.useful && !b.useful) return false;
-        if (!ball_ || !a.reachable || !b.reachable) return std::abs(a.tip - b.tip) > kJump;
         const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
         const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(ya) - to_mm(yb), a.tip - b.tip);
         return c * d > 8 * r_ * cut_.job.tolerances.cusp;
