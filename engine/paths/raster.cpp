@@ -6,34 +6,12 @@
 
 #include <fmt/format.h>
 
+#include "engine/paths/chains.h"
 #include "engine/paths/layer_cut.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
-
-namespace {
-
-struct Run {
-    std::vector<PathPoint> points;
-    bool done = false;
-};
-
-// The chord between two rests is short enough to stay out of the part, or goes over the corner above the lower one:
-// straight up is always free, and so is level travel at the height of the higher rest.
-void append(std::vector<PathPoint>& line, PathPoint p, double chord) {
-    if (!line.empty()) {
-        const PathPoint& q = line.back();
-        const double dx = static_cast<double>(p.x) - q.x, dy = static_cast<double>(p.y) - q.y, dz = static_cast<double>(p.z) - q.z;
-        if (dx * dx + dy * dy + dz * dz > chord * chord) {
-            const PathPoint corner = dz > 0 ? PathPoint{q.x, q.y, p.z} : PathPoint{p.x, p.y, q.z};
-            if (!(corner == q) && !(corner == p)) line.push_back(corner);
-        }
-    }
-    line.push_back(p);
-}
-
-}  // namespace
 
 Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
     const Tool& tool = tool_of_kind(cut.job, ToolKind::ball);
@@ -80,7 +58,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                                            cut.job.cutting.min_stepover, cusp),
                                {}});
 
-    const DropIndex ball(cut.context, cut.solid, {Cutter::Profile::ball, r});
+    const DropIndex& ball = cut.drops({Cutter::Profile::ball, r});
     const double flat_r = tool_of_kind(cut.job, ToolKind::flat).diameter / 2;
     const DropIndex flat(cut.context, cut.solid, {Cutter::Profile::flat, flat_r - 0.02});
     const double chord = safe_chord_mm(r, gouge);
@@ -202,14 +180,15 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         refine(refine, samples[l], lines[l], samples[l + 1], lines[l + 1]);
     });
 
-    auto runs_of = [&](const Line& line, std::int32_t y) {
-        std::vector<Run> runs;
+    const Slide slide{&ball, true, chord, cut.layer.z_top, 3};
+    std::vector<std::vector<PathPoint>> runs;
+    auto append_runs = [&](const Line& line, std::int32_t y) {
         std::vector<PathPoint> points;
         std::size_t last_cut = 0;  // length of `points` up to the last one that cuts
         std::int32_t before = 0, last_cut_x = 0;
         auto close = [&] {
             points.resize(last_cut);
-            if (points.size() >= 2) runs.push_back({simplify(points, simplify_tolerance_units(gouge)), false});
+            if (points.size() >= 2) runs.push_back(simplify(points, simplify_tolerance_units(gouge)));
             points.clear();
             last_cut = 0;
         };
@@ -222,87 +201,23 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 close();
                 continue;
             }
-            append(points, {s.x, y, s.z}, chord * kUnitsPerMm);
+            append_free(points, {s.x, y, s.z}, slide);
             if (s.cut) {
                 last_cut = points.size();
                 last_cut_x = s.x;
             }
         }
         close();
-        return runs;
     };
     // First the even raster, then the lines between.
-    std::vector<std::int32_t> run_y;
-    std::vector<std::vector<Run>> runs;
-    for (std::size_t l = 0; l < lines.size(); ++l) {
-        run_y.push_back(lines[l]);
-        runs.push_back(runs_of(samples[l], lines[l]));
-    }
+    for (std::size_t l = 0; l < lines.size(); ++l) append_runs(samples[l], lines[l]);
     for (const auto& group : between)
-        for (const Between& b : group) {
-            run_y.push_back(b.y);
-            runs.push_back(runs_of(b.line, b.y));
-        }
+        for (const Between& b : group) append_runs(b.line, b.y);
 
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
                      cut.layer.z_top + 2);
-    auto follow = [&](const std::vector<PathPoint>& points) {
-        for (const PathPoint& p : points) path.cut({p.x, p.y}, p.z);
-    };
-    const double near = 3.0 * kUnitsPerMm;
-    constexpr std::size_t look_ahead = 8;  // lines between may have nothing to cut here
-    for (std::size_t first = 0; first < runs.size(); ++first)
-        for (std::size_t k = 0; k < runs[first].size(); ++k) {
-            if (runs[first][k].done) continue;
-            Run* run = &runs[first][k];
-            bool reversed = false;
-            for (std::size_t l = first;;) {
-                run->done = true;
-                std::vector<PathPoint> points = run->points;
-                if (reversed) std::reverse(points.begin(), points.end());
-                if (!path.is_down()) {
-                    path.go_above({points[0].x, points[0].y});
-                    path.plunge(points[0].z);
-                }
-                follow(points);
-                // On to a run of a next line that begins or ends nearby, along the surface.
-                Run* next = nullptr;
-                std::size_t next_line = l;
-                double best = near;
-                bool next_reversed = false;
-                for (std::size_t m = l + 1; m < std::min(runs.size(), l + 1 + look_ahead) && std::abs(run_y[m] - run_y[l]) < near; ++m)
-                    for (Run& candidate : runs[m]) {
-                        if (candidate.done) continue;
-                        for (const bool back : {false, true}) {
-                            const PathPoint& p = back ? candidate.points.back() : candidate.points.front();
-                            const double d = std::hypot(static_cast<double>(p.x) - path.at().x, static_cast<double>(p.y) - path.at().y);
-                            if (d < best) best = d, next = &candidate, next_reversed = back, next_line = m;
-                        }
-                    }
-                if (!next) break;
-                const PathPoint from{path.at().x, path.at().y, path.z()}, to = next_reversed ? next->points.back() : next->points.front();
-                std::vector<PathPoint> link{from};
-                const auto n = static_cast<std::size_t>(std::ceil(best / step));
-                bool free = true;
-                for (std::size_t i = 1; i < n; ++i) {
-                    const double t = static_cast<double>(i) / static_cast<double>(n);
-                    PathPoint p{static_cast<std::int32_t>(from.x + t * (static_cast<double>(to.x) - from.x)),
-                                static_cast<std::int32_t>(from.y + t * (static_cast<double>(to.y) - from.y)), 0};
-                    const double lerp = from.z + t * (static_cast<double>(to.z) - from.z);
-                    const double rest = ball.drop(to_mm(p.x), to_mm(p.y)).tip_z;
-                    free &= rest < cut.layer.z_top - 1e-3;  // not over the finished top
-                    p.z = static_cast<std::int32_t>(std::ceil(std::max(lerp, rest * kUnitsPerMm))) + 1;
-                    append(link, p, chord * kUnitsPerMm);
-                }
-                if (!free) break;
-                append(link, to, chord * kUnitsPerMm);
-                follow(link);
-                run = next;
-                reversed = next_reversed;
-                l = next_line;
-            }
-            path.retract();
-        }
+    path.know(cut.around(tool, &ball));
+    follow_nearest(path, chained(std::move(runs), slide));
     path.finish();
     return op;
 }

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "engine/paths/chains.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/parallel/parallel.h"
 
@@ -330,69 +331,40 @@ private:
     }
 
     void emit(Operation& op, const std::vector<std::vector<PathPoint>>& runs) const {
-        const double safe = cut_.layer.z_top + 2;
         PathBuilder path(op, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed), cut_.layer.z_top + cut_.job.machine.clearance,
-                         safe);
-        auto follow = [&](const std::vector<PathPoint>& points) {
-            path.go_above({points[0].x, points[0].y});
-            path.plunge(points[0].z);
-            for (std::size_t k = 1; k < points.size(); ++k) path.cut({points[k].x, points[k].y}, points[k].z);
-        };
-        if (pass_.in_steps) {
-            for (const auto& points : runs) {
-                std::vector<double> stood_here;
-                double top = -1e300, tip = 1e300;
-                for (const PathPoint& p : points) {
-                    stood_here.push_back(stood(p.x, p.y));
-                    top = std::max(top, stood_here.back());
-                    tip = std::min(tip, to_mm(p.z));
-                }
-                const int steps = std::max(1, static_cast<int>(std::ceil((top - tip) / tool_.stepdown_max - 1e-9)));
-                for (int k = 1; k <= steps; ++k) {
-                    const double level = k == steps ? tip : top - (top - tip) * k / steps, above = top - (top - tip) * (k - 1) / steps;
-                    std::vector<PathPoint> part;
-                    auto close = [&] {
-                        if (!part.empty()) follow(part);
-                        part.clear();
-                    };
-                    for (std::size_t i = 0; i < points.size(); ++i) {
-                        const PathPoint& p = points[i];
-                        // Nothing to do here on this level: it was cut on the one before, or nothing stands above it.
-                        if (to_mm(p.z) >= above - 1e-6 || (k < steps && stood_here[i] <= level + 1e-3)) {
-                            close();
-                            continue;
-                        }
-                        part.push_back({p.x, p.y, std::max(p.z, to_units(level))});
-                    }
-                    close();
+                         cut_.layer.z_top + 2);
+        path.know(cut_.around(tool_, index_.get()));
+        const Slide slide{index_.get(), ball_, chord_, cut_.layer.z_top, kBridge};
+        if (!pass_.in_steps) {
+            follow_nearest(path, chained(runs, slide));
+            path.finish();
+            return;
+        }
+        // Level by level from the layer's top, so that beside the cutter nothing stands by more than a step.
+        std::vector<std::vector<double>> stood_at(runs.size());
+        std::vector<double> tops(runs.size(), -1e300);
+        double lowest = cut_.layer.z_top;
+        for (std::size_t r = 0; r < runs.size(); ++r)
+            for (const PathPoint& p : runs[r]) {
+                stood_at[r].push_back(stood(p.x, p.y));
+                tops[r] = std::max(tops[r], stood_at[r].back());
+                lowest = std::min(lowest, to_mm(p.z));
+            }
+        const double step = tool_.stepdown_max > 0 ? tool_.stepdown_max : cut_.layer.z_top - cut_.layer.z_bottom;
+        for (double above = cut_.layer.z_top; above > lowest + 1e-6; above -= step) {
+            const double level = above - step;
+            std::vector<std::vector<PathPoint>> parts;
+            for (std::size_t r = 0; r < runs.size(); ++r) {
+                if (tops[r] <= level + 1e-3) continue;
+                std::vector<PathPoint> part;
+                for (std::size_t i = 0; i <= runs[r].size(); ++i) {
+                    // Nothing to do here on this level: it was cut on the one before, or nothing stands above it.
+                    const bool nothing = i == runs[r].size() || to_mm(runs[r][i].z) >= above - 1e-6 || stood_at[r][i] <= level + 1e-3;
+                    if (!nothing) part.push_back({runs[r][i].x, runs[r][i].y, std::max(runs[r][i].z, to_units(level))});
+                    else if (!part.empty()) parts.push_back(std::move(part)), part.clear();
                 }
             }
-        } else {
-            std::vector<char> done(runs.size(), 0);
-            for (std::size_t first = 0; first < runs.size(); ++first) {
-                std::size_t next = first;
-                if (done[first]) continue;
-                // On to the nearest end of a run not far on in the order, as long as one begins nearby.
-                bool reversed = false;
-                while (next < runs.size()) {
-                    done[next] = 1;
-                    std::vector<PathPoint> points = runs[next];
-                    if (reversed) std::reverse(points.begin(), points.end());
-                    follow(points);
-                    const Point2 here = path.at();
-                    double best = 20.0 * kUnitsPerMm;
-                    std::size_t found = runs.size();
-                    for (std::size_t k = first + 1; k < std::min(runs.size(), first + 400); ++k) {
-                        if (done[k]) continue;
-                        for (const bool back : {false, true}) {
-                            const PathPoint& p = back ? runs[k].back() : runs[k].front();
-                            const double d = std::hypot(static_cast<double>(p.x) - here.x, static_cast<double>(p.y) - here.y);
-                            if (d < best) best = d, found = k, reversed = back;
-                        }
-                    }
-                    next = found;
-                }
-            }
+            follow_nearest(path, chained(std::move(parts), slide));
         }
         path.finish();
     }

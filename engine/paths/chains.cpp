@@ -1,0 +1,97 @@
+#include "engine/paths/chains.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "engine/paths/order.h"
+
+namespace slabwright {
+
+namespace {
+
+Point2 flat_of(const PathPoint& p) { return {p.x, p.y}; }
+
+double way(const PathPoint& a, Point2 b) { return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y); }
+
+// The places between two along the surface; none where the way climbs onto the top.
+std::optional<std::vector<PathPoint>> slide_between(const PathPoint& from, const PathPoint& to, const Slide& slide) {
+    std::vector<PathPoint> link{from};
+    const auto n = static_cast<std::size_t>(std::ceil(way(from, flat_of(to)) / (0.75 * slide.chord * kUnitsPerMm)));
+    for (std::size_t i = 1; i < n; ++i) {
+        const double t = static_cast<double>(i) / static_cast<double>(n);
+        PathPoint p{static_cast<std::int32_t>(from.x + t * (static_cast<double>(to.x) - from.x)),
+                    static_cast<std::int32_t>(from.y + t * (static_cast<double>(to.y) - from.y)), 0};
+        const double lerp = from.z + t * (static_cast<double>(to.z) - from.z), rest = slide.part->drop(to_mm(p.x), to_mm(p.y)).tip_z;
+        if (rest >= slide.top - 1e-3) return std::nullopt;
+        p.z = static_cast<std::int32_t>(std::ceil(std::max(lerp, rest * kUnitsPerMm))) + 1;
+        append_free(link, p, slide);
+    }
+    append_free(link, to, slide);
+    link.erase(link.begin());
+    return link;
+}
+
+std::vector<Beginning> both_ends(const std::vector<std::vector<PathPoint>>& runs) {
+    std::vector<Beginning> ends;
+    for (std::uint32_t k = 0; k < runs.size(); ++k) {
+        const Point2 a = flat_of(runs[k].front()), b = flat_of(runs[k].back());
+        ends.push_back({a, b, k, 0});
+        if (!(a == b)) ends.push_back({b, a, k, 1});
+    }
+    return ends;
+}
+
+}  // namespace
+
+void append_free(std::vector<PathPoint>& line, PathPoint p, const Slide& slide) {
+    if (!line.empty()) {
+        const PathPoint& q = line.back();
+        const double dx = static_cast<double>(p.x) - q.x, dy = static_cast<double>(p.y) - q.y, dz = static_cast<double>(p.z) - q.z,
+                     chord = slide.chord * kUnitsPerMm;
+        if (slide.ball ? dx * dx + dy * dy + dz * dz > chord * chord : dz != 0) {
+            const PathPoint corner = dz > 0 ? PathPoint{q.x, q.y, p.z} : PathPoint{p.x, p.y, q.z};
+            if (!(corner == q) && !(corner == p)) line.push_back(corner);
+        }
+    }
+    line.push_back(p);
+}
+
+std::vector<std::vector<PathPoint>> chained(std::vector<std::vector<PathPoint>> runs, const Slide& slide) {
+    NearestRuns left(both_ends(runs), runs.size());
+    std::vector<char> done(runs.size(), 0);
+    std::vector<std::vector<PathPoint>> chains;
+    for (std::uint32_t first = 0; first < runs.size(); ++first) {
+        if (done[first]) continue;
+        std::vector<PathPoint> chain = runs[first];
+        done[first] = 1;
+        left.remove(first);
+        while (!left.empty()) {
+            const Beginning next = left.nearest(flat_of(chain.back()));
+            if (way(chain.back(), next.at) > slide.near * kUnitsPerMm) break;
+            std::vector<PathPoint>& run = runs[next.run];
+            if (next.place == 1) std::reverse(run.begin(), run.end());
+            const auto link = slide_between(chain.back(), run.front(), slide);
+            if (!link) {
+                if (next.place == 1) std::reverse(run.begin(), run.end());
+                break;
+            }
+            chain.insert(chain.end(), link->begin(), link->end());
+            chain.insert(chain.end(), run.begin() + 1, run.end());
+            done[next.run] = 1;
+            left.remove(next.run);
+        }
+        chains.push_back(std::move(chain));
+    }
+    return chains;
+}
+
+void follow_nearest(PathBuilder& path, const std::vector<std::vector<PathPoint>>& chains) {
+    for (const Beginning& next : nearest_order(both_ends(chains), chains.size(), path.at())) {
+        std::vector<PathPoint> chain = chains[next.run];
+        if (next.place == 1) std::reverse(chain.begin(), chain.end());
+        path.follow(chain);
+    }
+}
+
+}  // namespace slabwright

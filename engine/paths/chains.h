@@ -1,0 +1,31 @@
+// Runs along the surface joined to chains: from the end of one on to the nearest other without leaving the surface.
+#pragma once
+
+#include <vector>
+
+#include "engine/paths/layer_cut.h"
+
+namespace slabwright {
+
+/// How a cutter goes along the surface from one run to another.
+struct Slide {
+    const DropIndex* part = nullptr;  ///< drops of this cutter
+    bool ball = true;
+    double chord = 0;  ///< mm: safe between free places
+    double top = 0;    ///< mm: it does not climb onto this height, the finished top
+    double near = 3;   ///< mm that it goes at most
+};
+
+/// Appends a free place to a line whose last place is free: straight where that is short enough to stay out of the part, else
+/// over the corner above the lower of the two. Straight up is always free, and so is level travel at the height of the
+/// higher; with a flat end mill only what is level is straight.
+void append_free(std::vector<PathPoint>& line, PathPoint p, const Slide& slide);
+
+/// Joins runs, each of which may be cut either way. A chain begins with the first run left, and goes on with that which
+/// begins or ends nearest to its end, as long as the way along the surface is free and short.
+[[nodiscard]] std::vector<std::vector<PathPoint>> chained(std::vector<std::vector<PathPoint>> runs, const Slide& slide);
+
+/// Cuts chains, each either way, the nearest first.
+void follow_nearest(PathBuilder& path, const std::vector<std::vector<PathPoint>>& chains);
+
+}  // namespace slabwright
