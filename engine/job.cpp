@@ -70,6 +70,14 @@ double max_layer_thickness(const Job& job) {
     return thickness;
 }
 
+double least_flask_gap(const Job& job) {
+    constexpr double kRoom = 1;  // mm
+    double widest = 0;
+    for (const Tool& tool : job.tools)
+        if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball) widest = std::max(widest, tool.diameter);
+    return widest + job.cutting.wall_allowance + kRoom;
+}
+
 FeatureOptions feature_options(const Job& job) {
     FeatureOptions options;
     options.finder = job.layers.finder;
@@ -179,6 +187,17 @@ void validate(const Job& job) {
     require("cutting.ramp_deg", k.ramp_deg, 0, 90, Ends::open_low);
     require("cutting.holder_clearance", k.holder_clearance, 0, 1000);
     require("cutting.finish_feed", k.finish_feed, 1, 1e6);
+
+    const FlaskShape& f = job.flask;
+    require("flask.gap", f.gap, 0, 10000);
+    require("flask.wall", f.wall, 0, 10000, Ends::open_low);
+    require("flask.draft_deg", f.draft_deg, 0, 45);
+    if (f.enabled && f.gap < least_flask_gap(job))
+        refuse("flask.gap", fmt::format("flask.gap is {}: the cutters do not pass between pattern and flask", f.gap),
+               fmt::format("give at least {} (the widest end mill, the wall allowance and room)", least_flask_gap(job)));
+    if (f.enabled && !(f.wall > 2 * b.edge_setback))
+        refuse("flask.wall", fmt::format("flask.wall is {}: glue that keeps {} mm from every edge finds no place on it", f.wall, b.edge_setback),
+               fmt::format("give more than {}, or less bonding.edge_setback", 2 * b.edge_setback));
 
     if (job.tools.empty()) throw Error(ErrorKind::usage, "job.tool", "the tool library is empty", "tool", "add a [[tool]] to the job file");
     for (std::size_t i = 0; i < job.tools.size(); ++i) {

@@ -114,6 +114,14 @@ struct Cutting {
     bool arcs = true;  ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
 };
 
+/// A frame of the slab that stays around the pattern in every layer (engine/flask).
+struct FlaskShape {
+    bool enabled = false;
+    double gap = 20;       ///< between the pattern's silhouette and the opening, at the pattern's bottom
+    double wall = 25;      ///< thinnest wall between the opening and the slab's edge
+    double draft_deg = 1;  ///< of the opening, wider at the top
+};
+
 struct Job {
     LengthUnit units = LengthUnit::mm;  ///< of the STL
     bool allow_undercut = false;
@@ -124,6 +132,7 @@ struct Job {
     Tolerances tolerances;
     LayerPlanning layers;
     Cutting cutting;
+    FlaskShape flask;
     /// The fixed set: face mill, 1/2 in flat end mill, 1/4 in ball end mill (LUO's comparison set).
     std::vector<Tool> tools{
         {1, ToolKind::face, "face mill 50 mm", 50, 20, 20, 60, 60, 4, 0.0, 12000, 9000, 1000, 0.1, 4.0, 0.6},
@@ -137,6 +146,10 @@ struct Job {
 /// The tallest layer this job can cut (LTmax, method.md section 4): the thickest slab less the facing allowance, and for
 /// every tool its flutes less overrun and holder clearance.
 [[nodiscard]] double max_layer_thickness(const Job& job);
+
+/// The narrowest flask.gap in which every flat and ball end mill of the job passes between pattern and flask: the widest
+/// cutter, what roughing leaves on the pattern's walls, and a millimetre of room.
+[[nodiscard]] double least_flask_gap(const Job& job);
 
 /// What the job asks of the feature finders.
 [[nodiscard]] FeatureOptions feature_options(const Job& job);

@@ -84,11 +84,20 @@ struct Layer {
 struct SequenceStep {
     int id = 0;
     int layer = 0;
-    std::string action;  ///< "take_slab", "clamp", "glue", "place", "press", "table", "touch_off", "face", "mill", "inspect"…
+    std::string action;  ///< "take_slab", "clamp", "glue", "place", "press", "table", "touch_off", "face", "mill", "unload", "mould_box"
     std::vector<int> needs;
     std::vector<std::pair<std::string, double>> numbers;     ///< named quantities, names end in their unit
     std::vector<std::pair<std::string, std::string>> words;  ///< programs, materials
     double seconds = 0;
+};
+
+/// What stays around the pattern (engine/flask). Millimetres.
+struct Flask {
+    Loops outer;               ///< one loop: the stock's rectangle
+    std::vector<Loops> inner;  ///< one loop for each layer, ascending: the opening, wider from layer to layer where there is draft
+    double wall_mm = 0;        ///< where it is thinnest
+    double volume_mm3 = 0;     ///< of the frame
+    double opening_mm3 = 0;    ///< of what it encloses, the pattern's volume included
 };
 
 struct Totals {
@@ -109,6 +118,7 @@ struct Plan {
     InputInfo input;
     Job job;
     std::array<double, 2> stock_min{}, stock_max{};
+    std::optional<Flask> flask;
     std::vector<Feature> features;
     std::vector<Layer> layers;
     std::vector<SequenceStep> sequence;

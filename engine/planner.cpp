@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/flask/flask.h"
 #include "engine/layers/layers.h"
 #include "engine/paths/paths.h"
 #include "engine/schedule/motion_time.h"
@@ -45,7 +46,15 @@ void place_stock(Plan& plan, const Box3& box) {
                          fmt::format("the pattern is {:.1f} mm in {}, {:.1f} mm more than the machine's travel of {:.1f} mm", size, axis[k],
                                      size - travel[k], travel[k]),
                          axis[k], "use a larger machine, turn or split the pattern");
-        const double margin = std::min({job.slabs.margin, (slab[k] - size) / 2, (travel[k] - size) / 2});
+        // A flask needs its room; without one the stock takes what the slab leaves.
+        const double room = std::min((slab[k] - size) / 2, (travel[k] - size) / 2);
+        const double needed = job.flask.enabled ? flask_margin(job.flask, box.max.z) : 0;
+        if (needed > room)
+            throw refuse("fit.flask",
+                         fmt::format("the flask needs {:.1f} mm on either side of the pattern in {}, {:.1f} mm more than the {} leaves", needed,
+                                     axis[k], needed - room, slab[k] <= travel[k] ? "slab" : "machine's travel"),
+                         axis[k], "use larger slabs, a smaller flask.gap or flask.wall, or turn the pattern");
+        const double margin = std::min(std::max(job.slabs.margin, needed), room);
         plan.stock_min[k] = lo[k] - margin;
         plan.stock_max[k] = hi[k] + margin;
     }
@@ -164,6 +173,8 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
                                     std::array{deepest->x, deepest->y, deepest->z}});
     }
 
+    if (job.flask.enabled) plan.flask = place_flask(context, view, plan);
+
     // A gap in the mesh shows as an open chain; sections at every boundary and feature would miss one in between, so the
     // loader has refused all open edges but those in the base plane already. What is left here is proof by section.
     context.begin_phase("paths", 0.25, 0.92, plan.layers.size());
@@ -201,6 +212,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
         work.stock_min = plan.stock_min;
         work.stock_max = plan.stock_max;
         work.index = layer.index;
+        if (plan.flask) work.opening = plan.flask->inner[i];
         for (const Feature& f : plan.features) {
             if (f.type != FeatureType::up_flat || f.area < job.cutting.min_flat_area || f.z_low >= layer.z_top) continue;
             if (f.z_low > layer.z_bottom) work.flats.push_back(&f);
@@ -238,7 +250,11 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     std::vector<Plane> joints;
     for (const Layer& layer : plan.layers) joints.push_back({layer.z_bottom, layer.index == 1 ? Side::above : Side::below});
     const std::vector<Section> sections = slice(context, view, joints, {job.tolerances.gap});
-    for (std::size_t i = 0; i < plan.layers.size(); ++i) bond_layer(plan.layers[i], sections[i].loops, plan, plan.diagnostics);
+    for (std::size_t i = 0; i < plan.layers.size(); ++i) {
+        // A slab lies on the flask below as on the pattern, and is glued to what of it stays in this layer.
+        const Loops below = plan.flask ? unite(sections[i].loops, flask_frame(*plan.flask, i)) : sections[i].loops;
+        bond_layer(plan.layers[i], below, plan, plan.diagnostics);
+    }
     schedule(plan);
     if (plan.totals.stack_mass_kg > job.machine.build_mass_kg)
         throw refuse("fit.mass",

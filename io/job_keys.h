@@ -141,6 +141,12 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("holder_clearance", job.cutting.holder_clearance, "mm between the holder and anything that stands");
     visit.key("finish_feed", job.cutting.finish_feed, "mm/min");
     visit.key("arcs", job.cutting.arcs, "arcs (G2, G3) where a path turns evenly; false: straight moves only");
+
+    visit.table("flask", "a frame of every slab that stays around the pattern, to carry it while it is cut and as moulding box");
+    visit.key("enabled", job.flask.enabled, "leave a flask");
+    visit.key("gap", job.flask.gap, "mm from the pattern's outline to the opening, at the bottom; the widest end mill must pass");
+    visit.key("wall", job.flask.wall, "mm, the thinnest wall around the opening");
+    visit.key("draft_deg", job.flask.draft_deg, "degrees by which the opening widens upwards, in one step a layer");
 }
 
 }  // namespace slabwright

@@ -96,6 +96,32 @@ void put_layer(JsonText& json, const Layer& layer) {
     json.end().end();
 }
 
+void put_loop(JsonText& json, const Loops& region) {
+    json.begin_array(Shape::line);
+    for (const Point2 p : region.loop(0)) json.begin_array().units(p.x).units(p.y).end();
+    json.end();
+}
+
+void put_flask(JsonText& json, const Plan& plan) {
+    if (!plan.flask) {
+        json.null();
+        return;
+    }
+    const Flask& flask = *plan.flask;
+    json.begin_object();
+    json.key("gap_mm").exact(plan.job.flask.gap);
+    json.key("wall_mm").rounded(flask.wall_mm, kLength);
+    json.key("draft_deg").exact(plan.job.flask.draft_deg);
+    json.key("mass_kg").rounded(flask.volume_mm3 * 1e-9 * plan.job.material.density_kg_m3, kForce);
+    json.key("outer");
+    put_loop(json, flask.outer);
+    json.key("inner");
+    put_loop(json, flask.inner.front());
+    json.key("inner_by_layer").begin_array();
+    for (const Loops& inner : flask.inner) put_loop(json, inner);
+    json.end().end();
+}
+
 void put_totals(JsonText& json, const Totals& totals) {
     json.begin_object();
     json.key("layers").integer(totals.layers);
@@ -185,7 +211,8 @@ std::string plan_json(const Plan& plan) {
     json.key("max");
     put_xy(json, plan.stock_max);
     json.end();
-    json.key("flask").null();
+    json.key("flask");
+    put_flask(json, plan);
     json.key("tools").begin_array();
     for (const Tool& tool : plan.job.tools) put_tool(json, tool);
     json.end();

@@ -361,10 +361,6 @@ Verification verify_folder(Context& context, const std::string& directory, const
         input.stock_max[k] = plan["stock"]["max"][static_cast<std::size_t>(k)].number();
     const Field tools = plan["tools"];
     for (std::size_t i = 0; i < tools.size(); ++i) input.tools.push_back(read_tool(tools[i]));
-    if (plan.has("flask")) {
-        add_polygon(input.flask, plan["flask"]["outer"]);
-        add_polygon(input.flask, plan["flask"]["inner"]);
-    }
     check_tool_table(out / "tool.tbl", input.tools, violations);
 
     const Field layers = plan["layers"];
@@ -373,6 +369,13 @@ Verification verify_folder(Context& context, const std::string& directory, const
     for (std::size_t l = 0; l < layers.size(); ++l) {
         const SimulatedLayer layer{layers[l]["z_bottom"].number(), layers[l]["z_top"].number(), layers[l]["slab_thickness"].number()};
         input.layers.push_back(layer);
+        if (plan.has("flask")) {
+            const Field flask = plan["flask"];
+            Loops outer, inner;
+            add_polygon(outer, flask["outer"]);
+            add_polygon(inner, flask.has("inner_by_layer") ? flask["inner_by_layer"][l] : flask["inner"]);
+            input.layers.back().flask = subtract(outer, inner);
+        }
         const Field operations = layers[l]["operations"];
         for (std::size_t o = 0; o < operations.size(); ++o) {
             const Field op = operations[o];

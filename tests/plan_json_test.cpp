@@ -225,6 +225,25 @@ TEST(PlanJson, SaysWhatThePlanHolds) {
     EXPECT_EQ(plan_json(plan), text);
 }
 
+TEST(PlanJson, SaysWhatStaysOfTheSlabs) {
+    Plan plan = hand_made();
+    const auto square = [](std::int32_t half) {
+        Loops loops;
+        loops.points = {{-half, -half}, {half, -half}, {half, half}, {-half, half}};
+        loops.close_loop();
+        return loops;
+    };
+    plan.flask = Flask{square(1000001), {square(500000), square(510000)}, 24.5, 2e6, 1e6};
+    const std::string text = plan_json(plan);
+    EXPECT_EQ(schema_complaint(text, "plan.schema.json"), "");
+    const json flask = json::parse(text)["flask"];
+    EXPECT_EQ(flask["outer"][0], json::array({-100.0001, -100.0001}));
+    EXPECT_EQ(flask["inner"], flask["inner_by_layer"][0]);
+    EXPECT_EQ(flask["inner_by_layer"][1][2], json::array({51, 51}));
+    EXPECT_EQ(flask["mass_kg"], 1.5);
+    EXPECT_EQ(flask["wall_mm"], 24.5);
+}
+
 TEST(PlanJson, NotANumberIsAnErrorNotAFile) {
     Plan plan = hand_made();
     plan.layers[1].operations[0].peak_force_n = std::nan("");

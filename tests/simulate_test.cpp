@@ -362,8 +362,8 @@ TEST(Simulate, FlaskMustStay) {
     Block block;
     for (const auto& loop : {std::array<Point2, 4>{Point2{-95000, -95000}, {295000, -95000}, {295000, 295000}, {-95000, 295000}},
                              std::array<Point2, 4>{Point2{-70000, -70000}, {-70000, 270000}, {270000, 270000}, {270000, -70000}}}) {
-        for (const Point2 p : loop) block.input.flask.points.push_back(p);
-        block.input.flask.close_loop();
+        for (const Point2 p : loop) block.input.layers[0].flask.points.push_back(p);
+        block.input.layers[0].flask.close_loop();
     }
     const SimulationReport r = block.run();
     ASSERT_NE(find(r, "gouge.flask"), nullptr) << codes(r);

@@ -15,6 +15,7 @@ struct LayerJob {
     double floor_below = 0;                          ///< the lowest z that a tip may reach: z_bottom less what may be cut under it
     std::array<double, 2> stock_min{}, stock_max{};  ///< mm
     int index = 0;
+    Loops opening;                      ///< of the flask in this layer; empty: no flask
     std::vector<const Feature*> flats;  ///< up-facing flats of at least cutting.min_flat_area strictly between z_bottom and z_top
     std::vector<const Feature*> feet;   ///< up-facing flats on which walls of this layer may stand: `flats` and those just below
 };

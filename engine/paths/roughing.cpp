@@ -1,10 +1,12 @@
 // Roughing: level by level from the top, zigzag inside what the shadow leaves free, then once along its border. A level
-// lies on every up-facing flat (plus allowance) and on the layer's bottom; between them the stepdowns of section 5.
+// lies on every up-facing flat (plus allowance) and on the layer's bottom; between them the stepdowns of section 5. The
+// last level cuts the slab through where nothing lies under it, so it goes in rings that leave what hangs over held to the end.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "engine/paths/layer_cut.h"
+#include "engine/paths/rings.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"
 
@@ -43,22 +45,6 @@ std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool) {
     return levels;
 }
 
-// Down along a closed ring, as often around as the slope asks for; ends at the ring's start.
-void ramp_along(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_t above, std::int32_t z, double ramp_deg) {
-    path.sink(above);
-    double length = 0;
-    for (std::size_t k = 1; k < ring.size(); ++k) length += std::hypot(ring[k].x - ring[k - 1].x, ring[k].y - ring[k - 1].y);
-    const double drop = static_cast<double>(above) - z;
-    if (length < 1 || drop <= 0) return path.plunge(z);
-    const double turns = std::max(1.0, std::ceil(drop / (length * std::tan(ramp_deg * std::numbers::pi / 180))));
-    double done = 0;
-    for (int turn = 0; turn < static_cast<int>(turns); ++turn)
-        for (std::size_t k = 1; k < ring.size(); ++k) {
-            done += std::hypot(ring[k].x - ring[k - 1].x, ring[k].y - ring[k - 1].y);
-            path.cut({ring[k].x, ring[k].y}, std::max(z, above - static_cast<std::int32_t>(drop * done / (length * turns))));
-        }
-}
-
 }  // namespace
 
 Operation rough_layer(const LayerCut& cut) {
@@ -86,9 +72,12 @@ Operation rough_layer(const LayerCut& cut) {
         std::vector<std::vector<Stretch>> free;
         Contours border;
     };
+    const bool flask = !cut.layer.opening.empty();
+    const Loops room = flask ? flask_room(cut, r) : Loops{};
     std::vector<Level> cuts(levels.size());
     parallel_each(cut.context, levels.size(), [&](std::size_t i) {
-        const Fibres forbidden = fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::x, lines);
+        const Fibres forbidden =
+            beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::x, lines), Axis::x, lines);
         for (std::size_t l = 0; l < lines.size(); ++l) cuts[i].free.push_back(free_stretches(forbidden.line(l), from, to, 0.2));
         cuts[i].border = level_contours(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, grid);
     });
@@ -99,8 +88,14 @@ Operation rough_layer(const LayerCut& cut) {
     double above = cut.layer.z_top;
     for (std::size_t i = 0; i < levels.size(); ++i) {
         op.stepdown = std::max(op.stepdown, above - levels[i].tip);
+        if (i + 1 == levels.size() && (flask || cuts[i].border.size() > 0)) {
+            Loops forbidden = forbidden_region(cuts[i].border);
+            if (flask) forbidden = unite(forbidden, beyond_room(cut, r, room));
+            op.stepover = std::max(op.stepover, clear_from_afar(path, cut, tool, forbidden, levels[i].tip, above));
+            break;
+        }
         zigzag(path, cut, tool, lines, cuts[i].free, levels[i].tip, above, [&](std::span<const std::int32_t> at) {
-            return fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::y, at);
+            return beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::y, at), Axis::y, at);
         });
         // Along the border, begun where a zigzag line ends and the cutter has been already.
         const Contours& border = cuts[i].border;
@@ -129,9 +124,20 @@ Operation rough_layer(const LayerCut& cut) {
             }
             const std::vector<PathPoint> ring = simplify(line, 0.02 * kUnitsPerMm);
             path.go_above({ring[0].x, ring[0].y});
-            if (nearest <= 2 * std::int64_t{pitch}) path.sink(z);
-            else ramp_along(path, ring, to_units(above), z, cut.job.cutting.ramp_deg);  // a pocket that no line met
+            if (nearest > 2 * std::int64_t{pitch}) {  // a pocket that no line met
+                cut_ring(path, ring, to_units(above), z, cut.job.cutting.ramp_deg);
+                continue;
+            }
+            path.sink(z);
             for (const PathPoint& p : ring) path.cut({p.x, p.y}, z);
+        }
+        // Along the flask, which is finished with that.
+        for (std::size_t l = 0; l < room.size(); ++l) {
+            std::vector<PathPoint> ring;
+            for (const Point2 p : room.loop(l)) ring.push_back({p.x, p.y, z});
+            ring.push_back(ring.front());
+            path.go_above({ring[0].x, ring[0].y});
+            cut_ring(path, ring, to_units(above), z, cut.job.cutting.ramp_deg);
         }
         above = levels[i].tip;
     }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/polygons/hull.h"
+
 namespace slabwright {
 
 namespace {
@@ -48,28 +50,6 @@ AreaMoments moments(const Loops& loops) {
         m.reach_y = std::max(m.reach_y, std::fabs(to_mm(p.y) - m.y));
     }
     return m;
-}
-
-/// Convex hull, counter-clockwise, without points on its edges (Andrew's monotone chain).
-std::vector<Point2> convex_hull(std::vector<Point2> points) {
-    std::sort(points.begin(), points.end());
-    points.erase(std::unique(points.begin(), points.end()), points.end());
-    if (points.size() < 3) return points;
-    const auto turn = [](Point2 a, Point2 b, Point2 c) {
-        return static_cast<double>(std::int64_t{b.x} - a.x) * static_cast<double>(std::int64_t{c.y} - a.y) -
-               static_cast<double>(std::int64_t{b.y} - a.y) * static_cast<double>(std::int64_t{c.x} - a.x);
-    };
-    std::vector<Point2> hull;
-    for (int pass = 0; pass < 2; ++pass) {
-        const std::size_t start = hull.size();
-        for (const Point2 p : points) {
-            while (hull.size() >= start + 2 && turn(hull[hull.size() - 2], hull.back(), p) <= 0) hull.pop_back();
-            hull.push_back(p);
-        }
-        hull.pop_back();
-        std::reverse(points.begin(), points.end());
-    }
-    return hull;
 }
 
 /// How far (x, y) lies outside a convex polygon, mm; 0 inside.
@@ -296,7 +276,15 @@ void schedule(Plan& plan) {
         }
         stack_ready = last;
     }
-    add(plan.layers.empty() ? 0 : plan.layers.back().index, "unload", {stack_ready}, 0);
+    const int last_layer = plan.layers.empty() ? 0 : plan.layers.back().index;
+    const int unloaded = add(last_layer, "unload", {stack_ready}, 0).id;
+    if (plan.flask) {
+        // The frame around the pattern is the moulding box: sand goes between the two and leaves upwards with the box's draft.
+        SequenceStep& box = add(last_layer, "mould_box", {unloaded}, 0);
+        box.numbers = {{"flask_mass_kg", plan.flask->volume_mm3 * 1e-9 * job.material.density_kg_m3},
+                       {"height_mm", plan.layers.empty() ? 0 : plan.layers.back().z_top},
+                       {"sand_litres", std::max(0.0, plan.flask->opening_mm3 - totals.part_volume_mm3) * 1e-6}};
+    }
 
     totals.build_minutes = totals.cutting_minutes + totals.bonding_minutes + totals.tool_change_minutes;
     totals.stack_mass_kg = (totals.stock_volume_mm3 + stock_x * stock_y * job.machine.base_board_thickness) * 1e-9 * job.material.density_kg_m3;

@@ -105,6 +105,7 @@ public:
         const double width = input_.stock_max[0] - input_.stock_min[0], depth = input_.stock_max[1] - input_.stock_min[1];
         report.nx = nx_ = std::max(1, static_cast<int>(std::ceil(width / cell_ - 1e-9)));
         report.ny = ny_ = std::max(1, static_cast<int>(std::ceil(depth / cell_ - 1e-9)));
+        place_flasks();
         check_stack(report);
         prepare(report);
         check_motions(report);
@@ -131,6 +132,22 @@ private:
             if (program.layer < layer || static_cast<std::size_t>(program.layer) >= input_.layers.size())
                 bad("programs that are not in the order of the layers");
             layer = program.layer;
+        }
+    }
+
+    /// The flasks of the layers with the tolerances of their walls. The grid's last cells may lie past the stock's edge, where no
+    /// cutter has to go because of them: they count as border too.
+    void place_flasks() {
+        Loops slab;
+        const Point2 low{to_units(input_.stock_min[0]), to_units(input_.stock_min[1])},
+            high{to_units(input_.stock_max[0]), to_units(input_.stock_max[1])};
+        slab.points = {low, {high.x, low.y}, high, {low.x, high.y}};
+        slab.close_loop();
+        for (const SimulatedLayer& layer : input_.layers) {
+            flasks_.emplace_back();
+            if (layer.flask.empty()) continue;
+            flasks_.back().core = offset(layer.flask, -options_.gouge, 1e-3);
+            flasks_.back().border = unite(offset(layer.flask, options_.cusp + options_.slack, 1e-2), subtract(offset(slab, 2 * cell_, 1e-2), slab));
         }
     }
 
@@ -318,11 +335,10 @@ private:
             }
         }
         for (std::size_t c = 0; c < grid.count(); ++c) result.board_cut = std::max(result.board_cut, stock.board_cut(c));
-        const std::vector<char> flask = flask_cells(grid);
         std::vector<float> envelope(grid.count());
         for (std::size_t l = 0; l < input_.layers.size(); ++l) {
             context_.throw_if_cancelled();
-            measure_layer(l, stock, flask, envelope, result, i0, j0, report);
+            measure_layer(l, stock, envelope, result, i0, j0, report);
         }
         return result;
     }
@@ -388,35 +404,30 @@ private:
         return any;
     }
 
-    /// Which cells belong to the flask: by rows of crossings, in the even-odd manner (its loops are nested).
-    std::vector<char> flask_cells(const CellGrid& grid) const {
-        std::vector<char> inside(input_.flask.empty() ? 0 : grid.count(), 0);
-        if (inside.empty()) return inside;
-        std::vector<double> crossings;
-        for (int j = 0; j < grid.ny; ++j) {
-            const double y = grid.y(j) * kUnitsPerMm;
-            crossings.clear();
-            for (std::size_t l = 0; l < input_.flask.size(); ++l) {
-                const auto loop = input_.flask.loop(l);
-                for (std::size_t k = 0; k < loop.size(); ++k) {
-                    const Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
-                    if ((a.y <= y) == (b.y <= y)) continue;
-                    crossings.push_back((a.x + (y - a.y) / (static_cast<double>(b.y) - a.y) * (static_cast<double>(b.x) - a.x)) / kUnitsPerMm);
-                }
-            }
-            std::sort(crossings.begin(), crossings.end());
-            for (std::size_t k = 0; k + 1 < crossings.size(); k += 2)
-                for (int i = 0; i < grid.nx; ++i)
-                    if (grid.x(i) >= crossings[k] && grid.x(i) < crossings[k + 1]) inside[grid.index(i, j)] = 1;
-        }
-        return inside;
+    /// A layer's flask with the tolerances of its walls: nothing of the core may be lost, nothing need be gone within the border.
+    struct Kept {
+        Loops core, border;
+    };
+    enum class FlaskCell : char { none, border, core };
+
+    /// Which cells belong to a layer's flask, row by row.
+    std::vector<FlaskCell> flask_cells(const Kept& kept, const CellGrid& grid) const {
+        std::vector<FlaskCell> cells(kept.border.empty() ? 0 : grid.count(), FlaskCell::none);
+        if (cells.empty()) return cells;
+        for (int j = 0; j < grid.ny; ++j)
+            for (const auto& [region, what] : {std::pair{&kept.border, FlaskCell::border}, {&kept.core, FlaskCell::core}})
+                for (const Span& span : line_spans(*region, grid.y(j) * kUnitsPerMm))
+                    for (int i = 0; i < grid.nx; ++i)
+                        if (const double x = grid.x(i) * kUnitsPerMm; x >= span.low && x < span.high) cells[grid.index(i, j)] = what;
+        return cells;
     }
 
     /// Compares one layer's stock with the part, when all programs of all layers have run.
-    void measure_layer(std::size_t l, const Stock& stock, const std::vector<char>& flask, std::vector<float>& envelope, TileResult& result, int i0,
-                       int j0, SimulationReport& report) const {
+    void measure_layer(std::size_t l, const Stock& stock, std::vector<float>& envelope, TileResult& result, int i0, int j0,
+                       SimulationReport& report) const {
         const SimulatedLayer& layer = input_.layers[l];
         const CellGrid& grid = stock.grid();
+        const std::vector<FlaskCell> flask = flask_cells(flasks_[l], grid);
         TileLayer& out = result.layers[l];
         LayerFindings& f = out.findings;
         const float none = std::numeric_limits<float>::lowest();
@@ -428,8 +439,8 @@ private:
             const auto nx = static_cast<std::size_t>(grid.nx);
             const int i = static_cast<int>(c % nx), j = static_cast<int>(c / nx);
             const double x = grid.x(i), y = grid.y(j), z = stock.surface(l, c);
-            if (!flask.empty() && flask[c]) {
-                raise(result.flask, layer.z_top - z, {x, y, z});
+            if (!flask.empty() && flask[c] != FlaskCell::none) {
+                if (flask[c] == FlaskCell::core) raise(result.flask, layer.z_top - z, {x, y, z});
                 continue;
             }
             ++f.cells;
@@ -615,6 +626,7 @@ private:
     int nx_ = 0, ny_ = 0;
     std::vector<PreparedProgram> prepared_;
     std::vector<double> taken_;  // mm, the most that any cell lost, by program
+    std::vector<Kept> flasks_;   // by layer
     Extreme flask_cut_;
 };
 

@@ -21,6 +21,7 @@ namespace slabwright {
 /// A layer as plan.json states it, mm.
 struct SimulatedLayer {
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
+    Loops flask{};  ///< what of the slab is to stay around the pattern, over the layer's whole height; empty: no flask
 };
 
 /// All that the simulation starts from. The programs stand in the order of execution, layers ascending.
@@ -31,7 +32,6 @@ struct SimulationInput {
     std::vector<Tool> tools;
     std::vector<Program> programs;
     Machine machine;
-    Loops flask;  ///< what of the slab is to stay around the pattern, over each layer's whole height; empty: no flask
 };
 
 struct SimulationOptions {
