@@ -180,6 +180,7 @@ TEST_P(FlaskPlan, IsMadeAndStays) {
     ASSERT_FALSE(v.input.layers[0].flask.empty());
     for (const LayerFindings& f : v.report.layers) EXPECT_LT(f.waste_mm3, 1) << "stock stands between pattern and flask";  // cusps of a tenth
 
+    if (std::string(GetParam()) != "half-sphere") return;  // once is enough for what follows
     // The same programs beside a flask that was said to reach half a millimetre further in: its wall is gone.
     nlohmann::json document = nlohmann::json::parse(std::ifstream(out + "/plan.json"));
     for (nlohmann::json& loop : document["flask"]["inner_by_layer"]) {

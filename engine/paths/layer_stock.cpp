@@ -89,6 +89,18 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
                 for (int i = i0; i <= i1; ++i) surface_[grid_.index(i, j)] = static_cast<float>(top), nz_[grid_.index(i, j)] = 255;
             }
     });
+    if (cut.layer.opening.empty()) return;
+    // The flask is to stay, so nothing is left over on it; nor is what roughing keeps off its wall.
+    constexpr double beside = 0.1;  // mm
+    const Loops opening = offset(cut.layer.opening, -beside, 0.01);
+    for (int j = 0; j < grid_.ny; ++j) {
+        std::vector<char> free(static_cast<std::size_t>(grid_.nx), 0);
+        for (const Span& s : line_spans(opening, to_units(grid_.y(j))))
+            for (int i = 0; i < grid_.nx; ++i)
+                if (const double x = grid_.x(i) * kUnitsPerMm; x >= s.low && x <= s.high) free[static_cast<std::size_t>(i)] = 1;
+        for (int i = 0; i < grid_.nx; ++i)
+            if (!free[static_cast<std::size_t>(i)]) surface_[grid_.index(i, j)] = static_cast<float>(top), nz_[grid_.index(i, j)] = 255;
+    }
 }
 
 void LayerStock::cut(const LayerCut& cut, const Operation& operation, const Tool& tool) {

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "engine/paths/chains.h"
+#include "engine/paths/rings.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/parallel/parallel.h"
 
@@ -105,6 +106,7 @@ public:
     Operation run() {
         Operation op = cut_.operation(pass_.kind, pass_.purpose, tool_);
         if (targets_.count() == 0) return op;
+        find_room();
         index_ = std::make_unique<DropIndex>(cut_.context, cut_.solid, Cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_});
         lay_lines();
         settle();
@@ -147,6 +149,25 @@ private:
         return false;
     }
 
+    // Whether the cutter stands clear of the flask, by the cell that its middle is in.
+    [[nodiscard]] bool beside_flask(double x, double y) const {
+        if (room_.empty()) return true;
+        const CellGrid& grid = stock_.grid();
+        const long i = std::lround((x - grid.x0) / grid.cell), j = std::lround((y - grid.y0) / grid.cell);
+        return i >= 0 && j >= 0 && i < grid.nx && j < grid.ny && room_[grid.index(static_cast<int>(i), static_cast<int>(j))];
+    }
+
+    void find_room() {
+        if (cut_.layer.opening.empty()) return;
+        const CellGrid& grid = stock_.grid();
+        const Loops room = flask_room(cut_, r_ + 0.75 * grid.cell);  // a cell's corners are as clear as its middle
+        room_.assign(grid.count(), 0);
+        for (int j = 0; j < grid.ny; ++j)
+            for (const Span& s : line_spans(room, to_units(grid.y(j))))
+                for (int i = 0; i < grid.nx; ++i)
+                    if (const double x = grid.x(i) * kUnitsPerMm; x >= s.low && x <= s.high) room_[grid.index(i, j)] = 1;
+    }
+
     [[nodiscard]] Place place(std::int32_t ux, std::int32_t uy) const {
         const double x = to_mm(ux), y = to_mm(uy);
         const Rest rest = index_->drop(x, y);
@@ -156,7 +177,7 @@ private:
         const double lowest = ball_ && rest.tip_z > cut_.layer.z_bottom - r_ ? cut_.layer.floor_below : cut_.layer.z_bottom;
         p.tip = std::max(rest.tip_z, std::max(lowest, cut_.layer.floor_below));
         p.contact = {x - r_ * rest.nx, y - r_ * rest.ny, p.tip + r_ * (1 - rest.nz)};
-        p.reachable = !rest.on_cap && p.tip < cut_.layer.z_top - 1e-3;
+        p.reachable = !rest.on_cap && p.tip < cut_.layer.z_top - 1e-3 && beside_flask(x, y);
         if (p.reachable) {
             p.z = to_units(p.tip) + 1;
             p.useful = lowers(x, y, p.tip);
@@ -383,6 +404,7 @@ private:
     std::unique_ptr<DropIndex> index_;
     std::vector<Line> lines_;
     std::optional<LayerStock> before_;
+    std::vector<char> room_;  // by the stock's cells, with a flask only
 };
 
 }  // namespace
