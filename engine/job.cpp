@@ -71,7 +71,7 @@ double max_layer_thickness(const Job& job) {
 }
 
 double least_flask_gap(const Job& job) {
-    constexpr double kRoom = 1;  // mm
+    constexpr double kRoom = 2.5;  // mm: the leads of finish passes swing out by 2
     double widest = 0;
     for (const Tool& tool : job.tools)
         if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball) widest = std::max(widest, tool.diameter);

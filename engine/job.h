@@ -148,7 +148,7 @@ struct Job {
 [[nodiscard]] double max_layer_thickness(const Job& job);
 
 /// The narrowest flask.gap in which every flat and ball end mill of the job passes between pattern and flask: the widest
-/// cutter, what roughing leaves on the pattern's walls, and a millimetre of room.
+/// cutter, what roughing leaves on the pattern's walls, and room for leads.
 [[nodiscard]] double least_flask_gap(const Job& job);
 
 /// What the job asks of the feature finders.

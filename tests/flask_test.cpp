@@ -256,7 +256,7 @@ TEST(FlaskPlan, SaysWhatRoomIsMissing) {
     job.machine.travel_y = 190;
     EXPECT_NE(refusal(job, "fit.flask", ErrorKind::no_plan).find("in y, 0.2 mm more than the machine's travel leaves"), std::string::npos);
     job = with_flask();
-    job.flask.gap = 13;
+    job.flask.gap = 15;
     EXPECT_NE(refusal(job, "job.range", ErrorKind::usage).find("flask.gap"), std::string::npos);
     job = with_flask();
     job.flask.wall = 6;
