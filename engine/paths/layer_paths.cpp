@@ -2,8 +2,11 @@
 #include <cmath>
 #include <numbers>
 
+#include <fmt/format.h>
+
 #include "engine/paths/arcs.h"
 #include "engine/paths/layer_cut.h"
+#include "engine/paths/loose.h"
 #include "engine/paths/rest.h"
 #include "kernels/parallel/parallel.h"
 
@@ -73,6 +76,33 @@ Operation LayerCut::operation(OperationKind kind, const char* purpose, const Too
     return op;
 }
 
+namespace {
+
+// Whatever the order of the cuts was meant to do: what comes loose is found from sections and moves alone.
+void report_loose(const LayerCut& cut, LayerResult& result) {
+    const LayerJob& layer = cut.layer;
+    HeldSlab slab{layer.stock_min, layer.stock_max, layer.z_bottom, layer.z_top, {}, {}};
+    const std::array<Plane, 2> planes{Plane{layer.z_bottom, Side::above}, Plane{layer.z_bottom, Side::below}};
+    const std::vector<Section> sections = slice(cut.context, layer.mesh, planes, {cut.job.tolerances.gap});
+    slab.kept = simplify(sections[0].loops);
+    slab.glued = simplify(sections[1].loops);
+    if (!layer.opening.empty()) {
+        Loops stock;
+        const Point2 low{to_units(layer.stock_min[0]), to_units(layer.stock_min[1])},
+            high{to_units(layer.stock_max[0]), to_units(layer.stock_max[1])};
+        stock.points = {low, {high.x, low.y}, high, {low.x, high.y}};
+        stock.close_loop();
+        slab.kept = unite(slab.kept, subtract(stock, layer.opening));
+    }
+    for (const LoosePiece& piece : loose_pieces(cut.context, slab, result.operations, cut.job.tools))
+        result.diagnostics.push_back({Severity::warning, "waste.loose",
+                                      fmt::format("layer {}: a piece of waste of {:.0f} mm², up to {:.1f} mm thick, comes loose while the {} are cut",
+                                                  layer.index, piece.area_mm2, piece.thickness_mm, result.operations[piece.operation].purpose),
+                                      std::array<double, 3>{piece.x, piece.y, layer.z_bottom}});
+}
+
+}  // namespace
+
 LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     LayerCut cut{
         context, layer,   *layer.job, layer_solid(context, layer.mesh, layer.floor_below, layer.z_top), layer.z_bottom + layer.slab_thickness, {}, {},
@@ -131,6 +161,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     const double limit = cut.job.tolerances.cusp + 0.02;
     take(cut_rest(cut, stock, flat, {OperationKind::corner, "corners", limit, false}));
     take(cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", limit, false}));
+    report_loose(cut, result);
     // Last, so that everything before has straight moves only to think of.
     const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};
     for (Operation& op : result.operations) fit_arcs(op.moves, fit);

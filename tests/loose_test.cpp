@@ -1,0 +1,201 @@
+// Pieces that come loose: against flood filling after every move, hand-made moves, and a plan over an open cavity.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <queue>
+#include <random>
+
+#include "engine/paths/layer_stock.h"
+#include "engine/paths/loose.h"
+#include "engine/planner.h"
+#include "kernels/mesh/weld.h"
+#include "kernels/stock/sweep.h"
+#include "tests/data/sweep.h"
+
+namespace slabwright {
+namespace {
+
+Loops rectangle(double x0, double y0, double x1, double y1) {
+    Loops loops;
+    loops.points = {{to_units(x0), to_units(y0)}, {to_units(x1), to_units(y0)}, {to_units(x1), to_units(y1)}, {to_units(x0), to_units(y1)}};
+    loops.close_loop();
+    return loops;
+}
+
+Move to(double x, double y, double z) { return {to_units(x), to_units(y), to_units(z), 1000}; }
+
+// A frame of 60 mm around a cavity of 40: its cover hangs on the frame's inner edge.
+struct Cover {
+    HeldSlab slab;
+    Tool tool;
+    Operation op;
+    Cover() {
+        slab.min = {0, 0}, slab.max = {60, 60};
+        slab.z_bottom = 10, slab.z_top = 20;
+        slab.kept = subtract(rectangle(0, 0, 60, 60), rectangle(10, 10, 50, 50));
+        tool.number = 1, tool.kind = ToolKind::flat, tool.diameter = 8;
+        op.kind = OperationKind::rough;
+        op.tool = 1;
+    }
+    void ring(double inset, double z) {
+        op.moves.push_back({to_units(inset), to_units(inset), to_units(30), 0});
+        op.moves.push_back(to(inset, inset, z));
+        for (const auto& [x, y] : {std::pair{60 - inset, inset}, {60 - inset, 60 - inset}, {inset, 60 - inset}, {inset, inset}})
+            op.moves.push_back(to(x, y, z));
+        op.moves.push_back({to_units(inset), to_units(inset), to_units(30), 0});
+    }
+    std::vector<LoosePiece> run() {
+        Context context;
+        return loose_pieces(context, slab, {&op, 1}, {&tool, 1}, kChip, 0.5);
+    }
+};
+
+TEST(Loose, CutAlongItsBorderFirstACoverFalls) {
+    Cover cover;
+    cover.ring(14, 13);
+    cover.ring(14, 10);
+    cover.ring(20, 10);
+    cover.ring(26, 10);
+    const auto pieces = cover.run();
+    ASSERT_EQ(pieces.size(), 1U);
+    EXPECT_NEAR(pieces[0].area_mm2, 24 * 24, 20);
+    EXPECT_NEAR(pieces[0].thickness_mm, 3, 1e-9);
+    EXPECT_NEAR(pieces[0].x, 30, 0.5);
+    EXPECT_NEAR(pieces[0].y, 30, 0.5);
+    EXPECT_EQ(pieces[0].operation, 0U);
+    EXPECT_EQ(pieces[0].move, 12U) << "the last side of the second ring";
+}
+
+TEST(Loose, FromTheMiddleOutwardsNothingFalls) {
+    Cover cover;
+    cover.ring(14, 13);
+    for (const double inset : {29.0, 26.0, 20.0, 14.0}) cover.ring(inset, 10);
+    EXPECT_TRUE(cover.run().empty());
+}
+
+TEST(Loose, WhatIsGluedBelowIsHeld) {
+    Cover cover;
+    cover.slab.glued = rectangle(25, 25, 35, 35);
+    cover.ring(14, 10);
+    EXPECT_TRUE(cover.run().empty());
+    cover.slab.glued = {};
+    const auto pieces = cover.run();
+    ASSERT_EQ(pieces.size(), 1U);
+    EXPECT_NEAR(pieces[0].thickness_mm, 10, 1e-9) << "nothing ever cut it";
+}
+
+// Every piece that is cut off, found by filling from what holds, move after move.
+TEST(Loose, AgreesWithFillingAfterEveryMove) {
+    const std::uint32_t seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    auto at = [&] { return static_cast<double>(random() % 401) / 10; };
+    std::size_t seen = 0;
+    for (int round = 0; round < 60; ++round) {
+        HeldSlab slab;
+        slab.max = {40, 40};
+        slab.z_top = 5;
+        for (int k = 0; k < 3; ++k) {
+            const double x = at() + 0.03, y = at() + 0.03;  // no edge through the middle of a cell
+            slab.kept = unite(slab.kept, rectangle(x, y, x + 4, y + 4));
+        }
+        const double gx = at() + 0.03, gy = at() + 0.03;
+        slab.glued = rectangle(gx, gy, gx + 6, gy + 6);
+        Tool tool;
+        tool.number = 1, tool.diameter = 3;
+        Operation op;
+        op.kind = OperationKind::rough, op.tool = 1;
+        for (int k = 0; k < 40; ++k) {
+            Move m = to(at(), at(), 0);
+            if (k == 0 || random() % 6 == 0) m.feed = 0;
+            op.moves.push_back(m);
+        }
+        Context context;
+        const auto found = loose_pieces(context, slab, {&op, 1}, {&tool, 1}, 0.5, 1);
+
+        const CellGrid grid{0.5, 0.5, 1, 40, 40};
+        std::vector<char> there(grid.count(), 1), was_loose(grid.count(), 0);
+        auto loose_now = [&] {
+            std::vector<char> held(grid.count(), 0);
+            std::queue<std::size_t> open;
+            for (int j = 0; j < 40; ++j)
+                for (int i = 0; i < 40; ++i) {
+                    const Point2 p{to_units(grid.x(i)), to_units(grid.y(j))};
+                    const std::size_t c = grid.index(i, j);
+                    if (there[c] && (winding(slab.kept, p) > 0 || winding(slab.glued, p) > 0)) held[c] = 1, open.push(c);
+                }
+            auto spread = [&](std::queue<std::size_t>& queue, std::vector<char>& mark) {
+                std::size_t count = 0;
+                while (!queue.empty()) {
+                    const std::size_t c = queue.front();
+                    queue.pop();
+                    ++count;
+                    const auto i = static_cast<int>(c % 40), j = static_cast<int>(c / 40);
+                    for (const auto& [x, y] : {std::pair{i - 1, j}, {i + 1, j}, {i, j - 1}, {i, j + 1}}) {
+                        if (x < 0 || y < 0 || x > 39 || y > 39) continue;
+                        const std::size_t n = grid.index(x, y);
+                        if (there[n] && !mark[n]) mark[n] = 1, queue.push(n);
+                    }
+                }
+                return count;
+            };
+            spread(open, held);
+            std::vector<std::size_t> fresh;
+            std::vector<char> mark = held;
+            for (std::size_t c = 0; c < grid.count(); ++c) {
+                if (!there[c] || mark[c]) continue;
+                const bool known = was_loose[c];
+                std::queue<std::size_t> queue;
+                queue.push(c), mark[c] = 1;
+                const std::size_t count = spread(queue, mark);
+                if (!known) fresh.push_back(count);
+            }
+            for (std::size_t c = 0; c < grid.count(); ++c) was_loose[c] = there[c] && !held[c];
+            return fresh;
+        };
+        (void)loose_now();
+        std::vector<std::pair<std::size_t, std::size_t>> expected, got;
+        for (std::size_t i = 1; i < op.moves.size(); ++i) {
+            const Move &a = op.moves[i - 1], &b = op.moves[i];
+            if (b.feed == 0) continue;
+            sweep(grid, cutter_end(tool), {to_mm(a.x), to_mm(a.y), 0}, {to_mm(b.x), to_mm(b.y), 0}, [&](std::size_t c, double) { there[c] = 0; });
+            for (const std::size_t count : loose_now()) expected.emplace_back(i, count);
+        }
+        for (const LoosePiece& p : found) got.emplace_back(p.move, static_cast<std::size_t>(std::lround(p.area_mm2)));
+        std::sort(expected.begin(), expected.end());
+        std::sort(got.begin(), got.end());
+        EXPECT_EQ(got, expected) << "round " << round;
+        seen += got.size();
+    }
+    EXPECT_GT(seen, 20U) << "the moves cut nothing off";
+}
+
+// A box of two layers with a cavity that is open upwards through both: the second slab covers the first one's part of it.
+TEST(Loose, ACoverOverACavityIsCutFromTheMiddle) {
+    std::vector<Facet> facets;
+    auto outline = [](double half_x, double half_y) {
+        const std::vector<Corner> corners{{-half_x, -half_y, 10}, {half_x, -half_y, 10}, {half_x, half_y, 10}, {-half_x, half_y, 10}};
+        return rounded_polygon(corners, 0.01);
+    };
+    const Outline outside = outline(60, 50), inside = outline(45, 35);
+    const Ring bottom = ring(outside, {0, 0}), top = ring(outside, {0, 34}), rim = ring(inside, {0, 34}), floor = ring(inside, {0, 5});
+    flat(facets, bottom, {}, false);
+    strip(facets, bottom, top);
+    flat(facets, top, {rim}, true);
+    strip(facets, rim, floor);
+    flat(facets, floor, {}, true);
+    for (const bool flask : {false, true}) {
+        Context context;
+        const Mesh mesh = weld(context, facets);
+        Job job;
+        job.flask.enabled = flask;
+        const Plan plan = make_plan(context, mesh, {}, job);
+        ASSERT_EQ(plan.layers.size(), 2U);
+        for (const Diagnostic& d : plan.diagnostics) EXPECT_NE(d.code, "waste.loose") << d.message;
+    }
+}
+
+}  // namespace
+}  // namespace slabwright
