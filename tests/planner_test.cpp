@@ -112,6 +112,22 @@ TEST(Planner, RapidsTakeNoStockAndMovesStayAboveTheirFloor) {
     EXPECT_GT(low, 10U) << "no rapid makes use of what has been cleared";
 }
 
+// What links cost: the cuts of one operation lie near each other, and the cutter stays down or lifts just over what stands.
+// Retracting above the layer after every run, raster and level contours of this part have 57 and 5.5 m of rapids.
+TEST(Planner, RapidsAreAFractionOfTheCuts) {
+    Context context;
+    const Mesh mesh = weld(context, pump_cover());
+    const Plan plan = make_plan(context, mesh, {}, Job{});
+    double cutting = 0, rapid = 0;
+    for (const Layer& layer : plan.layers)
+        for (const Operation& op : layer.operations) {
+            cutting += op.cutting_mm, rapid += op.rapid_mm;
+            const double most = op.purpose == "projected raster" ? 0.1 : op.purpose == "level contours" ? 0.25 : 1e9;
+            EXPECT_LT(op.rapid_mm, most * op.cutting_mm) << op.purpose << " of layer " << layer.index;
+        }
+    EXPECT_LT(rapid, 0.15 * cutting);
+}
+
 // The models as files, planned, written, read back and simulated.
 TEST(Planner, NoProgramTouchesTheOwnModels) {
     for (const char* name : {"pump-cover", "half-sphere", "luo-tool-sample", "luo-layer-sample"}) {

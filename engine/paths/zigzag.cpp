@@ -1,9 +1,9 @@
 // Zigzag clearing of free stretches on parallel lines.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "engine/paths/layer_cut.h"
+#include "engine/paths/order.h"
 
 namespace slabwright {
 
@@ -25,7 +25,7 @@ struct Link {
 }  // namespace
 
 void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<const std::int32_t> line_y,
-            const std::vector<std::vector<Stretch>>& free, double tip_z, double above_z,
+            const std::vector<std::vector<Stretch>>& free, double tip_z, double /*above_z*/,
             const std::function<Fibres(std::span<const std::int32_t>)>& links) {
     std::vector<Node> nodes;
     std::vector<std::size_t> first(line_y.size() + 1, 0);
@@ -69,40 +69,25 @@ void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<
     for (const Link& l : pairs) ++of[l.a + 1];
     for (std::size_t k = 1; k < of.size(); ++k) of[k] += of[k - 1];
 
-    const std::int32_t z = to_units(tip_z), above = to_units(above_z);
-    const double slope = std::tan(cut.job.cutting.ramp_deg * std::numbers::pi / 180);
+    const std::int32_t z = to_units(tip_z);
     const auto outside_low = to_units(cut.layer.stock_min[0] - tool.diameter / 2),
                outside_high = to_units(cut.layer.stock_max[0] + tool.diameter / 2);
+    auto outside = [&](Point2 p) { return p.x <= outside_low || p.x >= outside_high; };
 
-    auto enter = [&](const Node& n, bool from_low) {
-        const std::int32_t y = line_y[n.line], start = from_low ? n.low : n.high, end = from_low ? n.high : n.low;
-        path.go_above({start, y});
-        if (start <= outside_low || start >= outside_high) {
-            path.sink(z);
-            return;
-        }
-        path.sink(above);
-        // Down the slope to and fro along the stretch, to end at its start again.
-        const double drop = static_cast<double>(above) - z,
-                     length = std::min(std::abs(static_cast<double>(end) - start), 2.0 * tool.diameter * kUnitsPerMm);
-        if (drop <= 0 || length <= 0) return path.plunge(z);
-        const auto legs = std::max<long>(2, 2 * static_cast<long>(std::ceil(drop / (length * slope) / 2)));
-        const double leg = std::min(length, drop / slope / static_cast<double>(legs) + 1);
-        for (long k = 1; k <= legs; ++k) {
-            const std::int32_t x = k % 2 ? start + static_cast<std::int32_t>((end > start ? 1 : -1) * leg) : start;
-            path.cut({x, y}, k == legs ? z : above - static_cast<std::int32_t>(drop * static_cast<double>(k) / static_cast<double>(legs)));
-        }
-    };
-
+    std::vector<std::vector<PathPoint>> chains;
     for (std::size_t begin = 0; begin < nodes.size(); ++begin) {
         if (nodes[begin].done) continue;
         std::size_t n = begin;
-        bool upward = true;  // along x
-        if (nodes[n].low > outside_low && nodes[n].high >= outside_high) upward = false;
-        enter(nodes[n], upward);
+        std::vector<PathPoint> chain;
+        auto go = [&](std::int32_t x) {
+            const PathPoint p{x, line_y[nodes[n].line], z};
+            if (chain.empty() || !(chain.back() == p)) chain.push_back(p);
+        };
+        bool upward = nodes[n].low <= outside_low || nodes[n].high < outside_high;  // along x
+        go(upward ? nodes[n].low : nodes[n].high);
         for (;;) {
             nodes[n].done = true;
-            path.cut({upward ? nodes[n].high : nodes[n].low, line_y[nodes[n].line]}, z);
+            go(upward ? nodes[n].high : nodes[n].low);
             // The nearest free way to an uncut stretch of the next line.
             const Link* best = nullptr;
             std::int32_t best_x = 0;
@@ -113,21 +98,31 @@ void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<
                 for (const bool high : {true, false}) {
                     if (!(high ? l.high_free : l.low_free)) continue;
                     const std::int32_t x = high ? l.x_high : l.x_low;
-                    const std::int64_t way = std::abs(std::int64_t{x} - path.at().x) +
+                    const std::int64_t way = std::abs(std::int64_t{x} - chain.back().x) +
                                              std::min(std::abs(std::int64_t{x} - nodes[l.b].low), std::abs(std::int64_t{x} - nodes[l.b].high));
                     if (!best || way < best_way) best = &l, best_x = x, best_way = way;
                 }
             }
             if (!best) break;
-            path.cut({best_x, line_y[nodes[n].line]}, z);
+            go(best_x);
             n = best->b;
-            path.cut({best_x, line_y[nodes[n].line]}, z);
+            go(best_x);
             // From here to the nearer end first, then all the way to the other.
-            const bool low_nearer = std::abs(std::int64_t{best_x} - nodes[n].low) <= std::abs(std::int64_t{nodes[n].high} - best_x);
-            path.cut({low_nearer ? nodes[n].low : nodes[n].high, line_y[nodes[n].line]}, z);
-            upward = low_nearer;
+            upward = std::abs(std::int64_t{best_x} - nodes[n].low) <= std::abs(std::int64_t{nodes[n].high} - best_x);
+            go(upward ? nodes[n].low : nodes[n].high);
         }
-        path.retract();
+        chains.push_back(std::move(chain));
+    }
+    // Either way round, but from outside the stock where one end lies there.
+    std::vector<Beginning> beginnings;
+    for (std::uint32_t k = 0; k < chains.size(); ++k) {
+        const Point2 a{chains[k].front().x, chains[k].front().y}, b{chains[k].back().x, chains[k].back().y};
+        if (outside(a) || !outside(b)) beginnings.push_back({a, b, k, 0});
+        if (outside(b) || !outside(a)) beginnings.push_back({b, a, k, 1});
+    }
+    for (const Beginning& next : nearest_order(std::move(beginnings), chains.size(), path.at())) {
+        if (next.place == 1) std::reverse(chains[next.run].begin(), chains[next.run].end());
+        path.follow(chains[next.run]);
     }
 }
 

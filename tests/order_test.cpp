@@ -1,0 +1,90 @@
+// The nearest run among those left, against brute force; and the order that comes of it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <tuple>
+#include <vector>
+
+#include "engine/paths/order.h"
+
+using namespace slabwright;
+
+namespace {
+
+std::int64_t way(Point2 a, Point2 b) {
+    const std::int64_t dx = std::int64_t{a.x} - b.x, dy = std::int64_t{a.y} - b.y;
+    return dx * dx + dy * dy;
+}
+
+}  // namespace
+
+TEST(NearestRuns, AgreesWithBruteForce) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    for (const std::int32_t size : {6, 1000, 11'600'000}) {  // the first has many ties
+        std::uniform_int_distribution<std::int32_t> u(-size, size);
+        const std::uint32_t runs = 400;
+        std::vector<Beginning> beginnings;
+        for (std::uint32_t k = 0; k < runs; ++k)
+            for (std::uint32_t p = 0; p < 1 + k % 3; ++p) beginnings.push_back({{u(random), u(random)}, {u(random), u(random)}, k, p});
+        std::vector<char> done(runs, 0);
+        NearestRuns left(beginnings, runs);
+        for (std::uint32_t k = 0; k < runs; ++k) {
+            ASSERT_FALSE(left.empty());
+            const Point2 at{u(random), u(random)};
+            const Beginning found = left.nearest(at);
+            const auto best = std::min_element(beginnings.begin(), beginnings.end(), [&](const Beginning& a, const Beginning& b) {
+                return std::tuple(done[a.run], way(a.at, at), a.run, a.place) < std::tuple(done[b.run], way(b.at, at), b.run, b.place);
+            });
+            ASSERT_EQ(found.run, best->run);
+            ASSERT_EQ(found.place, best->place);
+            EXPECT_EQ(found.at, best->at);
+            done[found.run] = 1;
+            left.remove(found.run);
+        }
+        EXPECT_TRUE(left.empty());
+    }
+}
+
+TEST(NearestRuns, OrderVisitsEveryRunOnceAndGoesOnFromItsEnd) {
+    // Three lines, boustrophedon: up the first, down the second, up the third.
+    std::vector<Beginning> ends;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+        const Point2 a{0, static_cast<std::int32_t>(k) * 10}, b{1000, static_cast<std::int32_t>(k) * 10};
+        ends.push_back({a, b, k, 0});
+        ends.push_back({b, a, k, 1});
+    }
+    const std::vector<Beginning> order = nearest_order(ends, 3, {0, -5});
+    ASSERT_EQ(order.size(), 3U);
+    for (std::uint32_t k = 0; k < 3; ++k) {
+        EXPECT_EQ(order[k].run, k);
+        EXPECT_EQ(order[k].place, k % 2);
+    }
+    EXPECT_TRUE(nearest_order({}, 0, {0, 0}).empty());
+}
+
+TEST(NearestRuns, TakesOneHundredThousand) {
+    std::mt19937 random(5);
+    std::uniform_int_distribution<std::int32_t> u(0, 11'600'000);
+    const std::uint32_t runs = 100'000;
+    std::vector<Beginning> ends;
+    std::vector<char> seen(runs, 0);
+    for (std::uint32_t k = 0; k < runs; ++k) {
+        const Point2 a{u(random), u(random)}, b{a.x + 3000, a.y};
+        ends.push_back({a, b, k, 0});
+        ends.push_back({b, a, k, 1});
+    }
+    const std::vector<Beginning> order = nearest_order(ends, runs, {0, 0});
+    ASSERT_EQ(order.size(), runs);
+    double total = 0;
+    for (std::size_t k = 0; k < order.size(); ++k) {
+        ASSERT_FALSE(seen[order[k].run]++);
+        if (k > 0) total += std::sqrt(static_cast<double>(way(order[k - 1].end, order[k].at)));
+    }
+    // A tour through n even random places in a square of side L is about 0.71 √n L; the nearest neighbour's is a quarter longer.
+    EXPECT_LT(total, 1.3 * 0.7124 * std::sqrt(runs) * 11'600'000);
+}
