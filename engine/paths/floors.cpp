@@ -43,7 +43,7 @@ Operation finish_floors(const LayerCut& cut) {
                 for (const Stretch& s :
                      free_stretches(forbidden.line(l), std::max(near.low, cut.low(0, r + 2)), std::min(near.high, cut.high(0, r + 2)), 0.01))
                     free[l].push_back(s);
-        zigzag(path, cut, tool, lines, free, heights[i], std::min(cut.layer.z_top, heights[i] + cut.job.cutting.floor_allowance),
+        zigzag(path, cut, tool, lines, free, heights[i],
                [&](std::span<const std::int32_t> at) { return fibres(cut.context, cut.solid, inside[i].loops, cutter, heights[i], Axis::y, at); });
         // Once along the border of the free region, where the zigzag's ends leave scallops.
         const std::int32_t pitch = safe_pitch(r, cut.job.tolerances.gouge), z = to_units(heights[i]);

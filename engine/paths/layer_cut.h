@@ -62,16 +62,14 @@ struct LayerCut {
 /// @returns whether the arc into the cut found room
 bool add_leads(PathBuilder& path, const LayerCut& cut, const DropIndex& part, double chord, std::vector<PathPoint>& run);
 
-/// Clears a region given as free stretches on parallel lines along x, chained into zigzags; each chain is entered from
-/// outside the stock where it begins there, else by a ramp.
+/// Clears a region given as free stretches on parallel lines along x, chained into zigzags, the nearest first; each chain is
+/// begun outside the stock where one of its ends lies there. `path` must know its surroundings, so that it ramps down elsewhere.
 /// @param line_y     0.1 µm, ascending
 /// @param free       per line
 /// @param tip_z      mm
-/// @param above_z    mm: where standing stock ends, so that a ramp starts there
 /// @param links      the fibres along y at given x (0.1 µm, ascending): where the tool may pass from line to line
 void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<const std::int32_t> line_y,
-            const std::vector<std::vector<Stretch>>& free, double tip_z, double above_z,
-            const std::function<Fibres(std::span<const std::int32_t>)>& links);
+            const std::vector<std::vector<Stretch>>& free, double tip_z, const std::function<Fibres(std::span<const std::int32_t>)>& links);
 
 [[nodiscard]] Operation face_layer(const LayerCut& cut);
 [[nodiscard]] Operation rough_layer(const LayerCut& cut);

@@ -8,6 +8,7 @@
 #include "engine/paths/layer_cut.h"
 #include "engine/paths/loose.h"
 #include "engine/paths/rest.h"
+#include "engine/paths/rings.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -64,7 +65,12 @@ const DropIndex& LayerCut::drops(const Cutter& cutter) const {
 
 Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
     const Cutter cutter{tool.kind == ToolKind::ball ? Cutter::Profile::ball : Cutter::Profile::flat, tool.diameter / 2};
-    return {standing, part, cutter, safe_chord_mm(cutter.radius, job.tolerances.gouge), job.cutting.ramp_deg, layer.z_bottom + PathBuilder::kStop};
+    Surroundings around{standing, part, cutter};
+    around.chord = safe_chord_mm(cutter.radius, job.tolerances.gouge);
+    around.ramp_deg = job.cutting.ramp_deg;
+    around.lowest_rapid = layer.z_bottom + PathBuilder::kStop;
+    if (!layer.opening.empty()) around.room = std::make_shared<const Loops>(flask_room(*this, cutter.radius));
+    return around;
 }
 
 Operation LayerCut::operation(OperationKind kind, const char* purpose, const Tool& tool) const {

@@ -112,8 +112,8 @@ bool PathBuilder::straight_is_free(Point2 to, std::int32_t z) {
     if (around_.standing->free_tip(around_.cutter, a, b) > to_mm(z) + kBite) return false;
     const int steps = static_cast<int>(std::ceil(way / around_.chord));
     for (int k = 1; k < steps; ++k) {
-        const double t = static_cast<double>(k) / steps;
-        if (around_.part->drop(a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])).tip_z > to_mm(z)) return false;
+        const double t = static_cast<double>(k) / steps, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
+        if (around_.part->drop(x, y).tip_z > to_mm(z) || !has_room({to_units(x), to_units(y)})) return false;
     }
     return true;
 }

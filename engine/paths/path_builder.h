@@ -2,6 +2,7 @@
 // stands around it links its cuts by the shortest way that it can prove.
 #pragma once
 
+#include <memory>
 #include <span>
 
 #include "engine/paths/standing.h"
@@ -15,9 +16,10 @@ struct Surroundings {
     Standing* standing = nullptr;     ///< what may stand; the builder cuts its own moves into it
     const DropIndex* part = nullptr;  ///< drops of this very cutter, or of a wider one; none: it never stays down
     Cutter cutter;
-    double chord = 0;            ///< mm: longest chord between free places that is safe (safe_chord_mm)
-    double ramp_deg = 5;         ///< entry into stock
-    double lowest_rapid = -1e9;  ///< mm: rapids go no deeper
+    double chord = 0;                     ///< mm: longest chord between free places that is safe (safe_chord_mm)
+    double ramp_deg = 5;                  ///< entry into stock
+    std::shared_ptr<const Loops> room{};  ///< where the cutter's middle may be beside a flask; none: anywhere
+    double lowest_rapid = -1e9;           ///< mm: rapids go no deeper
 };
 
 /// A point of a path, 0.1 µm.
@@ -57,6 +59,8 @@ public:
     [[nodiscard]] bool is_down() const { return down_; }
     [[nodiscard]] Point2 at() const { return {x_, y_}; }
     [[nodiscard]] std::int32_t z() const { return z_; }
+    /// Whether a flask leaves room for the cutter's middle here.
+    [[nodiscard]] bool has_room(Point2 at) const { return !around_.room || winding(*around_.room, at) > 0; }
     /// How low the cutter gets over a place before it meets what is known to stand; −infinity when nothing is.
     [[nodiscard]] double standing_tip(Point2 at);
     /// The same for the cutter's middle: what stands there would be entered head-on, not sliced from its side.

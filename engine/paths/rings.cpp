@@ -108,33 +108,6 @@ std::vector<PathPoint> started_at(const std::vector<PathPoint>& ring, std::size_
     return result;
 }
 
-// To and fro along an open line from its start, down a slope; ends at the start.
-void ramp_to_and_fro(PathBuilder& path, const std::vector<PathPoint>& line, std::int32_t above, std::int32_t z, double ramp_deg) {
-    path.sink(above);
-    double whole = 0;
-    for (std::size_t k = 1; k < line.size(); ++k) whole += length(line[k - 1], line[k]);
-    const double drop = static_cast<double>(above) - z, way = drop / std::tan(ramp_deg * std::numbers::pi / 180);
-    if (whole < 1 || drop <= 0) return path.plunge(z);
-    const double legs = 2 * std::ceil(way / (2 * whole)), leg = way / legs;  // to and fro, as often as the slope asks
-    double done = 0;
-    auto cut_to = [&](const PathPoint& p, double travelled) {
-        path.cut({p.x, p.y}, std::max(z, above - static_cast<std::int32_t>(drop * travelled / way)));
-    };
-    for (long k = 0; k < std::lround(legs / 2); ++k) {
-        std::vector<PathPoint> out{line[0]};
-        double left = leg;
-        for (std::size_t i = 1; i < line.size() && left > 0; ++i) {
-            const double l = length(line[i - 1], line[i]), t = l > 0 ? std::min(1.0, left / l) : 1;
-            out.push_back({static_cast<std::int32_t>(std::lround(line[i - 1].x + t * (static_cast<double>(line[i].x) - line[i - 1].x))),
-                           static_cast<std::int32_t>(std::lround(line[i - 1].y + t * (static_cast<double>(line[i].y) - line[i - 1].y))), z});
-            left -= l;
-        }
-        for (std::size_t i = 1; i < out.size(); ++i) cut_to(out[i], done += length(out[i - 1], out[i]));
-        for (std::size_t i = out.size() - 1; i-- > 0;) cut_to(out[i], done += length(out[i + 1], out[i]));
-    }
-    path.cut({line[0].x, line[0].y}, z);
-}
-
 // A rectangle well past the stock and the tool's reach.
 Loops around_stock(const LayerCut& cut, double r) {
     const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
@@ -228,11 +201,11 @@ void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_
     }
 }
 
-double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double above_z) {
+double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z) {
     const double r = tool.diameter / 2, step = std::min(kStepShare, tool.stepover) * tool.diameter;
     const Rect rect{cut.low(0, r + 2) * kUnitsPerMm, cut.low(1, r + 2) * kUnitsPerMm, cut.high(0, r + 2) * kUnitsPerMm,
                     cut.high(1, r + 2) * kUnitsPerMm};
-    const std::int32_t z = to_units(tip_z), above = to_units(above_z);
+    const std::int32_t z = to_units(tip_z);
     std::vector<std::vector<Piece>> rings;
     for (Loops region = simplify(forbidden);;) {
         std::vector<Piece> pieces;
@@ -242,10 +215,6 @@ double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool,
         region = offset(region, step, kRingTolerance);
         cut.context.throw_if_cancelled();
     }
-    const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
-    auto beside_stock = [&](const PathPoint& p) {
-        return to_mm(p.x) <= lo[0] - r || to_mm(p.x) >= hi[0] + r || to_mm(p.y) <= lo[1] - r || to_mm(p.y) >= hi[1] + r;
-    };
     for (std::size_t k = rings.size(); k-- > 0;) {
         std::vector<Piece>& pieces = rings[k];
         for (std::size_t n = 0; n < pieces.size(); ++n) {
@@ -271,14 +240,7 @@ double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool,
                 for (const PathPoint& p : next->points) path.cut({p.x, p.y}, z);
                 continue;
             }
-            path.go_above({start.x, start.y});
-            if (next->closed) {
-                cut_ring(path, next->points, above, z, cut.job.cutting.ramp_deg);
-                continue;
-            }
-            if (beside_stock(start)) path.sink(z);
-            else ramp_to_and_fro(path, next->points, above, z, cut.job.cutting.ramp_deg);
-            for (const PathPoint& p : next->points) path.cut({p.x, p.y}, z);
+            path.follow(next->points);
         }
     }
     path.retract();

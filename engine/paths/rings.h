@@ -30,8 +30,8 @@ void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_
 /// edge inwards. What still stands hangs on what stays: from each of its points the shortest way to the forbidden region runs
 /// through standing stock. Neighbouring rings are at most 0.45 of the tool's diameter apart.
 /// @param forbidden of the tool's middle, outer loops counter-clockwise; the flask's included
-/// @param tip_z, above_z mm; the stock stands up to above_z
+/// @param tip_z mm
 /// @return the largest distance of two rings, mm
-double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double above_z);
+double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z);
 
 }  // namespace slabwright

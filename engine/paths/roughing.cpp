@@ -91,10 +91,10 @@ Operation rough_layer(const LayerCut& cut) {
         if (i + 1 == levels.size() && (flask || cuts[i].border.size() > 0)) {
             Loops forbidden = forbidden_region(cuts[i].border);
             if (flask) forbidden = unite(forbidden, beyond_room(cut, r, room));
-            op.stepover = std::max(op.stepover, clear_from_afar(path, cut, tool, forbidden, levels[i].tip, above));
+            op.stepover = std::max(op.stepover, clear_from_afar(path, cut, tool, forbidden, levels[i].tip));
             break;
         }
-        zigzag(path, cut, tool, lines, cuts[i].free, levels[i].tip, above, [&](std::span<const std::int32_t> at) {
+        zigzag(path, cut, tool, lines, cuts[i].free, levels[i].tip, [&](std::span<const std::int32_t> at) {
             return beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::y, at), Axis::y, at);
         });
         // Along the border, begun where a zigzag line ends and the cutter has been already.

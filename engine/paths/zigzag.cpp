@@ -25,8 +25,7 @@ struct Link {
 }  // namespace
 
 void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<const std::int32_t> line_y,
-            const std::vector<std::vector<Stretch>>& free, double tip_z, double /*above_z*/,
-            const std::function<Fibres(std::span<const std::int32_t>)>& links) {
+            const std::vector<std::vector<Stretch>>& free, double tip_z, const std::function<Fibres(std::span<const std::int32_t>)>& links) {
     std::vector<Node> nodes;
     std::vector<std::size_t> first(line_y.size() + 1, 0);
     for (std::size_t i = 0; i < line_y.size(); ++i) {
