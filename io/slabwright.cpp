@@ -136,10 +136,11 @@ void write(Context& context, const Plan& plan, const std::string& directory) {
     });
 }
 
-VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path) {
+VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path, const std::string& maps_directory) {
     return guarded([&] {
         VerifyOptions options;
         options.stl = stl_path;
+        options.maps_directory = maps_directory;
         const Verification found = verify_folder(context, directory, options);
         VerifyResult result;
         result.passed = found.report.passed();

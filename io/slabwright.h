@@ -48,8 +48,11 @@ struct VerifyResult {
 
 /// Simulates the programs in `directory` against the pattern, from the folder's text alone, and writes verify.json into it.
 /// @param stl_path the pattern; "" looks for the file that plan.json names: in the folder, beside it, where the caller stands
+/// @param maps_directory where a picture of each layer is written, layer_01.ppm and so on: what is left over, missed, unreachable or
+///        gouged; "": none
 /// @throws Error(verification) when the folder cannot be understood, Error(input) when the STL is missing or another one
-[[nodiscard]] SLABWRIGHT_API VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path = {});
+[[nodiscard]] SLABWRIGHT_API VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path = {},
+                                                 const std::string& maps_directory = {});
 
 /// Mesh report, features and undercuts of a file as JSON (schema slabwright.inspect/1).
 [[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const std::string& stl_path, const Job& job);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -333,6 +334,48 @@ std::string report_json(const SimulationInput& input, const SimulationReport& r,
 
 }  // namespace
 
+void write_maps(const SimulationReport& report, const std::string& directory) {
+    auto colour = [](CellKind kind) -> std::array<unsigned char, 3> {
+        switch (kind) {
+            case CellKind::beside:
+                return {235, 235, 235};
+            case CellKind::pattern:
+                return {160, 160, 160};
+            case CellKind::left:
+                return {240, 228, 66};
+            case CellKind::missed:
+                return {230, 120, 0};
+            case CellKind::unreachable:
+                return {0, 114, 178};
+            case CellKind::gouge:
+                return {220, 0, 0};
+            case CellKind::flask:
+                break;
+        }
+        return {60, 60, 60};
+    };
+    std::error_code failed;
+    fs::create_directories(directory, failed);
+    if (failed) throw Error(ErrorKind::input, "verify.write", "cannot be made: " + failed.message(), directory, "choose another folder for the maps");
+    for (std::size_t l = 0; l < report.layers.size(); ++l) {
+        const std::vector<CellKind>& kinds = report.layers[l].kinds;
+        const fs::path file = fs::path(directory) / fmt::format("layer_{:02}.ppm", l + 1);
+        std::ofstream stream(file, std::ios::binary | std::ios::trunc);
+        stream << "P6\n" << std::to_string(report.nx) << ' ' << std::to_string(report.ny) << "\n255\n";
+        std::vector<char> row(3 * static_cast<std::size_t>(report.nx));
+        for (int j = report.ny; j-- > 0 && !kinds.empty();) {
+            for (int i = 0; i < report.nx; ++i) {
+                const auto c = colour(kinds[static_cast<std::size_t>(j) * static_cast<std::size_t>(report.nx) + static_cast<std::size_t>(i)]);
+                for (std::size_t k = 0; k < 3; ++k) row[3 * static_cast<std::size_t>(i) + k] = static_cast<char>(c[k]);
+            }
+            stream.write(row.data(), static_cast<std::streamsize>(row.size()));
+        }
+        stream.flush();
+        if (!stream)
+            throw Error(ErrorKind::input, "verify.write", "cannot be written", file.string(), "free space, or choose another folder for the maps");
+    }
+}
+
 Verification verify_folder(Context& context, const std::string& directory, const VerifyOptions& options) {
     const fs::path out(directory);
     const std::string plan_path = (out / "plan.json").string();
@@ -423,7 +466,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
 
     SimulationOptions simulation;
     simulation.cell = options.cell;
-    simulation.maps = options.maps;
+    simulation.maps = options.maps || !options.maps_directory.empty();
     simulation.gouge = part.job.tolerances.gouge;
     simulation.cusp = part.job.tolerances.cusp;
     simulation.board_cut = part.job.machine.base_board_cut;
@@ -440,6 +483,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
     result.json = report_json(input, result.report, simulation, pattern.filename().string(), part.stated);
 
+    if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);
     if (options.write) {
         const fs::path file = out / "verify.json", fresh = out / "verify.json.part";
         {

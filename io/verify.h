@@ -8,10 +8,11 @@
 namespace slabwright {
 
 struct VerifyOptions {
-    std::string stl;    ///< the pattern; "" looks for the file that plan.json names: in OUT, beside OUT, in the working folder
-    double cell = 0;    ///< mm, SimulationOptions::cell
-    bool maps = false;  ///< keep the maps in the report
-    bool write = true;  ///< write OUT/verify.json
+    std::string stl;               ///< the pattern; "" looks for the file that plan.json names: in OUT, beside OUT, in the working folder
+    double cell = 0;               ///< mm, SimulationOptions::cell
+    bool maps = false;             ///< keep the maps in the report
+    std::string maps_directory{};  ///< "": none; write layer_01.ppm and so on there (write_maps())
+    bool write = true;             ///< write OUT/verify.json
 };
 
 /// What was found, and the plan's own words that it was found about.
@@ -27,5 +28,10 @@ struct Verification {
 ///   a key (names it), a program that read_gcode refuses (file:line)
 /// @throws Error(input) when the STL is missing, unreadable, or not the one that was planned (by its SHA-256)
 [[nodiscard]] Verification verify_folder(Context& context, const std::string& directory, const VerifyOptions& options = {});
+
+/// Writes one picture (binary PPM, a pixel a cell, y upwards) for each layer of a report with maps: beside the pattern light grey, the
+/// pattern grey, left-over above the cusp but within tolerance yellow, missed orange, unreachable blue, gouge red, flask dark grey.
+/// The directory is made if it is not there. @throws Error(input, "verify.write") when it cannot be written
+void write_maps(const SimulationReport& report, const std::string& directory);
 
 }  // namespace slabwright

@@ -86,13 +86,24 @@ TEST(GcodeReader, ArcsStayWithinTheirTolerance) {
             const ProgramStep &a = p.steps[i - 1], &b = p.steps[i];
             EXPECT_NEAR(std::hypot(b.x - c.cx, b.y - c.cy), c.r, 1e-9) << c.text;
             // The chord's middle lies inside the circle by at most the tolerance.
-            EXPECT_NEAR(std::hypot((a.x + b.x) / 2 - c.cx, (a.y + b.y) / 2 - c.cy), c.r - 0.0005, 0.00051) << c.text;
+            EXPECT_NEAR(std::hypot((a.x + b.x) / 2 - c.cx, (a.y + b.y) / 2 - c.cy), c.r - 0.00005, 0.000051) << c.text;
             const double turn = (a.x - c.cx) * (b.y - c.cy) - (a.y - c.cy) * (b.x - c.cx);
             EXPECT_GT(turn * c.sweep, 0) << c.text;
             length += std::hypot(b.x - a.x, b.y - a.y);
         }
         EXPECT_NEAR(length, c.r * std::abs(c.sweep), 0.01) << c.text;
         EXPECT_EQ(p.steps.back().z, c.end_z);
+        EXPECT_GT(p.arc_error, 0);
+        EXPECT_LE(p.arc_error, 1e-4);
+        ASSERT_EQ(p.arcs.size(), c.end_z == 0 ? 1u : 0u) << "a helix is no level arc";
+        if (p.arcs.empty()) continue;
+        const ProgramArc& a = p.arcs[0];
+        EXPECT_EQ(a.begin, 1u);
+        EXPECT_EQ(a.end, p.steps.size());
+        EXPECT_NEAR(a.arc.x, c.cx, 1e-9);
+        EXPECT_NEAR(a.arc.y, c.cy, 1e-9);
+        EXPECT_NEAR(a.arc.radius, c.r, 1e-9);
+        EXPECT_NEAR(a.arc.turn, c.sweep, 1e-9);
     }
     // Other planes: XZ is G18 with I and K, YZ is G19 with J and K; seen from +y, G3 turns from z towards x.
     const Program xz = read("G0 X10 Y0 Z0\nF100\nG18 G3 X0 Z-10 I-10 K0\n");

@@ -2,11 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <functional>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "engine/simulate/simulate.h"
+#include "io/gcode_reader.h"
 #include "kernels/errors.h"
 
 using namespace slabwright;
@@ -356,6 +359,85 @@ TEST(Simulate, InnerCornersLeaveARoundThatIsExcused) {
     EXPECT_EQ(codes(r), "");
     EXPECT_GT(r.layers[0].unreachable, 0u);
     EXPECT_NEAR(r.layers[0].unreachable_left.size, 5 * (1 - std::sqrt(0.5)), 0.3);
+}
+
+// The stock measured at its cells can show no deeper gouge than the exact check of all motions, but for the sheet under a layer's top
+// and the stock's float.
+TEST(Simulate, NoCellIsGougedDeeperThanTheExactCheckSays) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    int gouged = 0;
+    for (int trial = 0; trial < 16; ++trial) {
+        Block block(true);
+        block.solid = {};
+        // Walls that lean inwards or outwards, over both layers, and one with an undercut below it.
+        for (int k = 0; k < 3; ++k) {
+            const double x = uniform(0, 12), y = uniform(0, 12), w = uniform(3, 8), lean = uniform(-2, 2), z0 = k == 2 ? uniform(3, 12) : 0;
+            const double z1 = k == 0 ? 20 : uniform(z0 + 1, 20);
+            const std::array<Point3, 8> c{Point3{x, y, z0},  {x + w, y, z0},        {x + w, y + w, z0},        {x, y + w, z0},
+                                          {x + lean, y, z1}, {x + w + lean, y, z1}, {x + w + lean, y + w, z1}, {x + lean, y + w, z1}};
+            block.solid.quad(c[0], c[3], c[2], c[1]);
+            block.solid.quad(c[4], c[5], c[6], c[7]);
+            for (std::size_t i = 0; i < 4; ++i) block.solid.quad(c[i], c[(i + 1) % 4], c[4 + (i + 1) % 4], c[4 + i]);
+        }
+        block.input.programs.clear();
+        Context context;
+        const StandingPart part(context, block.solid.mesh.view());
+        const bool ball = trial % 2 == 0;
+        for (int layer = 0; layer < 2; ++layer) {
+            Writer cuts("L" + std::to_string(layer + 1), layer, ball ? 3 : 2, OperationKind::finish);
+            const double top = 10.0 * layer + 10;
+            for (int k = 0; k < 30; ++k) {
+                // A cut lowered until it is as deep in the part as it should be, or at the bottom.
+                Point3 from{uniform(-3, 23), uniform(-3, 23), 0}, to{uniform(-3, 23), uniform(-3, 23), uniform(-1, 1)};
+                const double wanted = uniform(0.005, 0.4);
+                double low = 10.0 * layer - (ball ? 2 : 0) + 1, high = top + 2;
+                for (int i = 0; i < 24; ++i) {
+                    const double z = (low + high) / 2;
+                    const Point3 a{from[0], from[1], z}, b{to[0], to[1], z + to[2]};
+                    const double depth = ball ? part.ball(top, a, b, 3, 0).depth : part.cylinder(top, a, b, 5, 0).depth;
+                    (depth > wanted ? low : high) = z;
+                }
+                cuts.to(from[0], from[1], kClear).to(from[0], from[1], high, 3000).to(to[0], to[1], high + to[2], 3000).to(to[0], to[1], kClear);
+            }
+            block.input.programs.push_back(cuts.p);
+        }
+        block.options.cell = uniform(0.25, 0.5);
+        const SimulationReport r = block.run();
+        // A point that is d deep in the part and in a ball has, d towards the ball's centre, part that is d deep in the ball. In a
+        // cylinder the depth is the lesser of those from wall and floor, so at its rim d is √2 times the depth.
+        const double bound = (ball ? 1 : std::sqrt(2.0)) * r.gouge_max + StandingPart::kSheet + 1e-5;
+        ASSERT_LT(r.gouge_max, 1);
+        for (const LayerFindings& l : r.layers) {
+            EXPECT_LE(l.gouge.size, bound) << "trial " << trial;
+            gouged += l.gouge.size > 0.05;
+        }
+    }
+    EXPECT_GT(gouged, 8);
+}
+
+// A program of arcs, cut as arcs, does to the stock what its chords do.
+TEST(Simulate, ArcsCutWhatTheirChordsCut) {
+    std::string text = "T3 M6\nG21 G17 G90\nS12000 M3\nG0 X-5 Y-5 Z25\nZ7\nF3000\n";
+    for (const char* z : {"7", "4", "1"})
+        text += std::string("G1 Z") + z + "\nG2 X25 Y25 I15 J15\nG3 X-5 Y-5 I-30 J0\nG2 X-5 Y-5 I4 J2\nG3 X-8 Y20 R40\nG1 X-5 Y-5\n";
+    text += "G0 Z25\nM5\nM2\n";
+    Block block;
+    Program p = read_gcode(text, "arcs");
+    ASSERT_EQ(p.arcs.size(), 12u);
+    p.file = "L1_02", p.planned_tool = 3, p.kind = OperationKind::finish;
+    block.rough() = p;
+    const SimulationReport arcs = block.run(1);
+    block.rough().arcs.clear();
+    const SimulationReport chords = block.run(1);
+    EXPECT_GT(arcs.programs[1].removed_mm3, 1000);
+    EXPECT_NEAR(arcs.programs[1].removed_mm3, chords.programs[1].removed_mm3, 1e-4 * chords.programs[1].removed_mm3);
+    EXPECT_NEAR(arcs.layers[0].gouge.size, chords.layers[0].gouge.size, 0.002);
+    EXPECT_NEAR(arcs.layers[0].left_rms, chords.layers[0].left_rms, 0.002);
+    EXPECT_EQ(arcs.gouge_max, chords.gouge_max);
+    EXPECT_EQ(codes(arcs), codes(chords));
 }
 
 TEST(Simulate, FlaskMustStay) {

@@ -135,6 +135,39 @@ TEST(Verify, AGoodFolderPassesAndWritesItsReport) {
     EXPECT_FALSE(fs::exists(f.path / "verify.json.part"));
 }
 
+TEST(Verify, MapsShowEachLayer) {
+    Folder f("maps");
+    write_block(f.path);
+    // The second level's first straight cut is gone: the strip beside the block stays 5 mm high. And the top is faced too deep.
+    replace(f.path / "nc/L1_02.ngc", "G1 X29 Y-9 F5000\nY29\nX-9\nY-9", "G1 F5000\nY29\nX-9\nY-9", true);
+    replace(f.path / "nc/L1_01.ngc", "Z10", "Z9.9");
+    Context context;
+    const Verification v = verify_folder(context, f.path.string(), {.stl = {}, .cell = 0.5, .maps_directory = (f.path / "pictures/of").string()});
+    const std::string text = slurp(f.path / "pictures/of/layer_01.ppm"), start = "P6\n80 80\n255\n";
+    ASSERT_EQ(text.size(), start.size() + 80 * 80 * 3);
+    EXPECT_EQ(text.substr(0, start.size()), start);
+    auto pixel = [&](double x, double y) {
+        const auto i = static_cast<std::size_t>((x + 10) / 0.5), j = static_cast<std::size_t>((30 - y) / 0.5);
+        std::array<int, 3> c{};
+        for (std::size_t k = 0; k < 3; ++k) c[k] = static_cast<unsigned char>(text[start.size() + (j * 80 + i) * 3 + k]);
+        return c;
+    };
+    EXPECT_EQ(pixel(10.1, 10.1), (std::array<int, 3>{220, 0, 0})) << "gouged";
+    EXPECT_EQ(pixel(-5, 10.1), (std::array<int, 3>{235, 235, 235})) << "beside";
+    std::size_t missed = 0;
+    const LayerFindings& l = v.report.layers[0];
+    for (const CellKind k : l.kinds) missed += k == CellKind::missed;
+    EXPECT_GT(missed, 0u);
+    EXPECT_EQ(missed, l.missed);
+    spill(f.path / "file", "");
+    try {
+        (void)verify_folder(context, f.path.string(), {.stl = {}, .cell = 0.5, .maps_directory = (f.path / "file").string()});
+        FAIL() << "a file is no folder";
+    } catch (const Error& e) {
+        EXPECT_EQ(e.code(), "verify.write");
+    }
+}
+
 TEST(Verify, LayerTopFrameMeansTheSame) {
     Folder f("frame");
     write_block(f.path);

@@ -33,7 +33,7 @@ extern "C" void on_signal(int signal) {
 }
 
 struct Options {
-    std::string stl, out, job_file, units, strategy, finder;
+    std::string stl, out, maps, job_file, units, strategy, finder;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0;
     bool allow_undercut = false, json = false, quiet = false, defaults = false, weld_given = false;
@@ -228,7 +228,7 @@ void run_plan(const Options& options) {
 bool run_verify(const Options& options) {
     bool passed = false;
     with_context(options, [&](Context& context) {
-        const VerifyResult result = verify(context, options.out, options.stl);
+        const VerifyResult result = verify(context, options.out, options.stl, options.maps);
         passed = result.passed;
         std::string text = fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, {:.0f} min\n", options.out,
                                        passed ? "makes the part" : "does NOT make the part", result.gouge_mm, result.cell_mm, result.minutes);
@@ -301,6 +301,7 @@ int main(int argc, char** argv) {
     CLI::App* verify_command = app.add_subcommand("verify", "simulate the programs of a plan against the pattern");
     verify_command->add_option("OUT", options.out, "folder of the plan")->required();
     verify_command->add_option("--stl", options.stl, "the pattern; the file that plan.json names, if not given");
+    verify_command->add_option("--maps", options.maps, "folder for a picture of each layer: left over, missed, unreachable, gouged");
     add_limits(*verify_command, options);
 
     CLI::App* inspect_command = app.add_subcommand("inspect", "report on the mesh, its features and undercuts");

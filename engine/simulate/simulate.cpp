@@ -263,14 +263,17 @@ private:
         const std::size_t tiles = static_cast<std::size_t>(tx) * static_cast<std::size_t>(ty);
         const std::uint64_t tile_bytes = static_cast<std::uint64_t>(kTileCells) * kTileCells * 4 * (input_.layers.size() + 4);
         const std::uint64_t map_bytes =
-            options_.maps ? static_cast<std::uint64_t>(nx_) * static_cast<std::uint64_t>(ny_) * 4 * input_.layers.size() : 0;
+            options_.maps ? static_cast<std::uint64_t>(nx_) * static_cast<std::uint64_t>(ny_) * 5 * input_.layers.size() : 0;
         const MemoryCharge charge(context_,
                                   tile_bytes * static_cast<std::uint64_t>(context_.threads()) + map_bytes +
                                       tiles * (input_.programs.size() * sizeof(TileProgram) + input_.layers.size() * sizeof(TileLayer)),
                                   "the simulated stock");
         report.layers.resize(input_.layers.size());
         if (options_.maps)
-            for (LayerFindings& l : report.layers) l.map.assign(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), 0.0f);
+            for (LayerFindings& l : report.layers) {
+                l.map.assign(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), 0.0f);
+                l.kinds.assign(l.map.size(), CellKind::beside);
+            }
         std::vector<TileResult> results(tiles);
         parallel_each(context_, tiles, [&](std::size_t t) {
             const int i0 = static_cast<int>(t % static_cast<std::size_t>(tx)) * kTileCells,
@@ -422,6 +425,10 @@ private:
         return cells;
     }
 
+    [[nodiscard]] std::size_t map_cell(int i, int j) const {
+        return static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i);
+    }
+
     /// Compares one layer's stock with the part, when all programs of all layers have run.
     void measure_layer(std::size_t l, const Stock& stock, std::vector<float>& envelope, TileResult& result, int i0, int j0,
                        SimulationReport& report) const {
@@ -441,16 +448,19 @@ private:
             const double x = grid.x(i), y = grid.y(j), z = stock.surface(l, c);
             if (!flask.empty() && flask[c] != FlaskCell::none) {
                 if (flask[c] == FlaskCell::core) raise(result.flask, layer.z_top - z, {x, y, z});
+                if (options_.maps) report.layers[l].kinds[map_cell(i0 + i, j0 + j)] = CellKind::flask;
                 continue;
             }
             ++f.cells;
             const bool beside = envelope[c] < layer.z_bottom + StandingPart::kSheet;
             const double keep = beside ? layer.z_bottom : static_cast<double>(envelope[c]);
             double over = z - keep;
+            CellKind kind = beside ? CellKind::beside : CellKind::pattern;
             if (over < 0) {
                 const double depth = depth_of_lost({x, y, z}, keep);
                 raise(f.gouge, depth, {x, y, z});
                 f.gouge_cells += depth > options_.gouge;
+                if (depth > options_.gouge) kind = CellKind::gouge;
                 over = -depth;
             } else if (over > 0) {
                 // Vertical height overstates what is left on a slope. Along the normal it is the distance from the finished surface,
@@ -458,14 +468,16 @@ private:
                 if (over > options_.cusp) {
                     const auto near = part_.from_shadow({x, y, z}, layer.z_top, over);
                     over = std::min(over, near.distance);
-                    if (over > limit) judge_leftover(layer, reach, {x, y, z}, over, near, beside, z - keep, f);
+                    if (over > options_.cusp) kind = CellKind::left;
+                    if (over > limit) kind = judge_leftover(layer, reach, {x, y, z}, over, near, beside, z - keep, f);
                 }
                 raise(f.left, over, {x, y, z});
                 out.squares += over * over;
             }
-            if (options_.maps)
-                report.layers[l].map[static_cast<std::size_t>(j0 + j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i0 + i)] =
-                    static_cast<float>(over);
+            if (options_.maps) {
+                report.layers[l].map[map_cell(i0 + i, j0 + j)] = static_cast<float>(over);
+                report.layers[l].kinds[map_cell(i0 + i, j0 + j)] = kind;
+            }
         }
     }
 
@@ -490,8 +502,8 @@ private:
     /// Stock that stands `over` above the finished surface is excused as far as no tool reaches into it. What could have been taken
     /// at a point of its surface is the greatest d for which tools reach the points d away from it towards the part, straight down and
     /// down at 45° to four sides: a lump of that size, not the sliver beside what is out of reach. Found by halving.
-    void judge_leftover(const SimulatedLayer& layer, Reach& reach, const Point3& s, double over, const StandingPart::Clearance& near, bool beside,
-                        double height, LayerFindings& f) const {
+    CellKind judge_leftover(const SimulatedLayer& layer, Reach& reach, const Point3& s, double over, const StandingPart::Clearance& near, bool beside,
+                            double height, LayerFindings& f) const {
         const double limit = options_.cusp + options_.slack;
         Point3 n{0, 0, 1};
         if (near.distance < height && near.distance > 0)
@@ -507,7 +519,7 @@ private:
         if (!could_take(limit)) {
             ++f.unreachable;
             raise(f.unreachable_left, over, s);
-            return;
+            return CellKind::unreachable;
         }
         ++f.missed;
         // Only the most matters, so a cell that cannot exceed it is not asked.
@@ -523,6 +535,7 @@ private:
             ++f.waste;
             f.waste_mm3 += height * cell_ * cell_;
         }
+        return CellKind::missed;
     }
 
     /// Turns findings into violations, kind by kind.

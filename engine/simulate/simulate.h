@@ -42,7 +42,7 @@ struct SimulationOptions {
     double leftover_limit = 0.5;    ///< mm that nothing reachable may exceed
     double leftover_share = 0.999;  ///< of the surface must be within cusp + slack, of what is reachable
     double board_cut = -1;          ///< mm allowed into the base board; negative: not limited
-    bool maps = false;              ///< keep left-over and gouge of every point, LayerFindings::map
+    bool maps = false;              ///< keep left-over, gouge and kind of every point, LayerFindings::map and kinds
 };
 
 /// A size with the place where it is greatest, mm.
@@ -64,6 +64,17 @@ struct Violation {
     double size = 0;  ///< mm, or a count where the message says so
 };
 
+/// What a point of the stock is, when everything has been cut.
+enum class CellKind : std::uint8_t {
+    beside,       ///< the pattern, cut down to the layer's bottom
+    pattern,      ///< its surface, with no more left over than the cusp
+    left,         ///< more than the cusp, within cusp + slack
+    missed,       ///< more than that, and a tool could take it
+    unreachable,  ///< more than that, and none can
+    gouge,        ///< deeper than the tolerance in the part
+    flask
+};
+
 /// One layer when everything has been cut. Points are the stock's cells; shares are of all the slab's.
 struct LayerFindings {
     std::uint64_t cells = 0;
@@ -81,6 +92,7 @@ struct LayerFindings {
     double waste_mm3 = 0;
     /// With SimulationOptions::maps, row after row: left-over (positive) or gouge (negative) along the normal.
     std::vector<float> map;
+    std::vector<CellKind> kinds;  ///< the same points
 };
 
 /// One program.
