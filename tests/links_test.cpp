@@ -1,0 +1,164 @@
+// Links, entries and leads around a box: down where it is free, over it where it is not, on a ramp into stock, on an arc to a wall.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "engine/paths/layer_cut.h"
+#include "tests/support/height_field.h"
+
+using namespace slabwright;
+
+namespace {
+
+constexpr double kTop = 15, kLink = 17, kClearance = 25;
+
+// A box of 20 × 20 × 15 mm in the middle of stock of 80 × 80 mm, a cutter of 10 mm and what stands.
+struct Bench {
+    Context context;
+    Mesh mesh;
+    LayerJob layer;
+    Job job;
+    Tool tool = tool_of_kind(job, ToolKind::flat);
+    LayerCut cut;
+    Standing standing{{-30, -30}, {50, 50}, kTop};
+    DropIndex part;
+    Operation operation;
+
+    static Mesh box(Context& context) {
+        Mesh mesh = test::height_field(context, 1, 1.0, [](double, double) { return 1.0; });
+        for (Vec3f& v : mesh.vertices) v = {(v.x + 0.5F) * 20, (v.y + 0.5F) * 20, v.z * static_cast<float>(kTop)};
+        return mesh;
+    }
+    Bench()
+        : mesh(box(context)),
+          layer(),
+          cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, {}, 0.1, nullptr, {}},
+          part(context, cut.solid, {Cutter::Profile::flat, 5}) {
+        tool.diameter = 10;
+        layer.mesh = mesh.view();
+        layer.job = &job;
+        layer.z_top = kTop;
+        layer.stock_min = {-30, -30};
+        layer.stock_max = {50, 50};
+        cut.standing = &standing;
+    }
+    // Everything at least 5 mm from the box, down to z.
+    void clear(double z) {
+        const Cutter cutter{Cutter::Profile::flat, 5};
+        for (double y = -30; y <= 50; y += 2)
+            for (double x = -30; x <= 50; x += 2)
+                if (part.drop(x, y).tip_z <= z) standing.cut(cutter, {x, y, z}, {x, y, z});
+        for (double s = -5; s < 25; s += 0.5)
+            for (const auto& [x, y] : {std::pair{s, -5.0}, {s, 25.0}, {-5.0, s}, {25.0, s}}) standing.cut(cutter, {x, y, z}, {x, y, z});
+    }
+    PathBuilder builder() {
+        PathBuilder path(operation, tool, 3000, kClearance, kLink);
+        path.know(cut.around(tool, &part));
+        return path;
+    }
+    [[nodiscard]] double highest(std::size_t from, std::size_t to) const {
+        std::int32_t z = INT32_MIN;
+        for (std::size_t k = from; k < to; ++k) z = std::max(z, operation.moves[k].z);
+        return to_mm(z);
+    }
+};
+
+std::vector<PathPoint> line(double x0, double y0, double x1, double y1, double z) {
+    return {{to_units(x0), to_units(y0), to_units(z)}, {to_units(x1), to_units(y1), to_units(z)}};
+}
+
+}  // namespace
+
+TEST(Links, StayDownWhereTheWayIsFree) {
+    Bench bench;
+    bench.clear(5);
+    PathBuilder path = bench.builder();
+    path.follow(line(0, -6, 10, -6, 5));
+    const std::size_t before = bench.operation.moves.size();
+    path.follow(line(18, -8, 25, -8, 5));
+    for (std::size_t k = before; k < bench.operation.moves.size(); ++k) {
+        EXPECT_EQ(bench.operation.moves[k].z, to_units(5));
+        EXPECT_GT(bench.operation.moves[k].feed, 0U);
+    }
+}
+
+TEST(Links, LiftJustOverThePartAndNotOverStockThatIsGone) {
+    Bench bench;
+    bench.clear(5);
+    PathBuilder path = bench.builder();
+    path.follow(line(0, -8, 10, -8, 5));
+    std::size_t before = bench.operation.moves.size();
+    path.follow(line(10, 28, 0, 28, 5));  // the box stands between
+    EXPECT_NEAR(bench.highest(before, bench.operation.moves.size()), kTop + PathBuilder::kOver, 0.01);
+    before = bench.operation.moves.size();
+    path.follow(line(45, 45, 40, 45, 5));  // farther than it stays down, but nothing on the way
+    EXPECT_LE(bench.highest(before, bench.operation.moves.size()), 5 + PathBuilder::kOver + 0.01);
+    EXPECT_TRUE(path.finish());
+    EXPECT_EQ(bench.operation.moves.back().z, to_units(kClearance));
+}
+
+TEST(Links, DoNotCrossStockThatStands) {
+    Bench bench;  // nothing has been cleared
+    PathBuilder path = bench.builder();
+    path.follow(line(-40, -15, -36, -15, 5));
+    const std::size_t before = bench.operation.moves.size();
+    path.follow(line(-36, -20, -40, -20, 5));  // beside the stock all the way
+    EXPECT_LE(bench.highest(before, bench.operation.moves.size()), 5 + PathBuilder::kOver + 0.01);
+    const std::size_t then = bench.operation.moves.size();
+    path.follow(line(-10, -20, 10, -20, 12));
+    EXPECT_GE(bench.highest(then, bench.operation.moves.size()), kTop + PathBuilder::kStop - 0.01);
+}
+
+TEST(Links, StockIsEnteredOnARamp) {
+    Bench bench;
+    PathBuilder path = bench.builder();
+    path.follow(line(-20, -15, 10, -15, 12));
+    double vertical = 0, steepest = 0;
+    for (std::size_t k = 1; k < bench.operation.moves.size(); ++k) {
+        const Move &a = bench.operation.moves[k - 1], &b = bench.operation.moves[k];
+        const double run = to_mm(1) * std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y),
+                     fall = to_mm(std::int64_t{a.z} - b.z);
+        if (b.feed == 0) continue;
+        if (run == 0 && to_mm(b.z) < kTop) vertical += std::max(0.0, fall);
+        if (run > 0) steepest = std::max(steepest, fall / run);
+    }
+    EXPECT_EQ(vertical, 0) << "plunged into the stock";
+    EXPECT_LE(steepest, std::tan(bench.job.cutting.ramp_deg * std::numbers::pi / 180) + 1e-3);
+    EXPECT_GT(steepest, 0.01);
+    EXPECT_EQ(bench.operation.moves.back().z, to_units(12));
+}
+
+TEST(Leads, AreTangentFreeAndOverlapClosedRuns) {
+    Bench bench;
+    bench.clear(5);
+    PathBuilder path = bench.builder();
+    // Around the box with it on the right: clockwise seen from above is with the solid on the right.
+    std::vector<PathPoint> ring;
+    for (const auto& [x, y] : {std::pair{-5.0, 5.0},
+                               {-5.0, 20.0},
+                               {0.0, 25.0},
+                               {20.0, 25.0},
+                               {25.0, 20.0},
+                               {25.0, 0.0},
+                               {20.0, -5.0},
+                               {0.0, -5.0},
+                               {-5.0, 0.0},
+                               {-5.0, 5.0}})
+        ring.push_back({to_units(x), to_units(y), to_units(5)});
+    const std::vector<PathPoint> bare = ring;
+    ASSERT_TRUE(add_leads(path, bench.cut, bench.part, 0.4, ring));
+    EXPECT_EQ(ring.front(), (PathPoint{to_units(-7), to_units(3), to_units(5)}));  // 2 mm before and 2 mm off the wall
+    EXPECT_EQ(ring.back(), (PathPoint{to_units(-7), to_units(8), to_units(5)}));   // 1 mm of overlap, then off again
+    const auto start = std::find(ring.begin(), ring.end(), bare.front());
+    ASSERT_NE(start, ring.end());
+    // The arc comes in nearly along the run, and every place of it is free.
+    const PathPoint& last = *(start - 1);
+    EXPECT_LT(std::abs(std::atan2(static_cast<double>(start->x) - last.x, static_cast<double>(start->y) - last.y)), 0.12);
+    for (const PathPoint& p : ring) EXPECT_LE(bench.part.drop(to_mm(p.x), to_mm(p.y)).tip_z, p.x < to_units(-5.001) ? 5 : kTop);
+    EXPECT_EQ(std::count(ring.begin(), ring.end(), PathPoint{to_units(-5), to_units(6), to_units(5)}), 1) << "no overlap";
+    // The other way round the box is on the left, and there is no room for an arc.
+    std::vector<PathPoint> wrong(bare.rbegin(), bare.rend());
+    EXPECT_FALSE(add_leads(path, bench.cut, bench.part, 0.4, wrong));
+}
