@@ -10,6 +10,7 @@
 #include "engine/flask/flask.h"
 #include "engine/layers/layers.h"
 #include "engine/paths/paths.h"
+#include "engine/paths/standing.h"
 #include "engine/schedule/motion_time.h"
 #include "engine/schedule/op_forces.h"
 #include "engine/schedule/schedule.h"
@@ -197,7 +198,8 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     const std::uint64_t held =
         std::accumulate(reach.begin(), reach.begin() + std::min<std::ptrdiff_t>(std::ssize(reach), context.threads()), std::uint64_t{0});
     const double plane = (plan.stock_max[0] - plan.stock_min[0]) * (plan.stock_max[1] - plan.stock_min[1]);
-    const MemoryCharge path_memory(context, held * (sizeof(SolidFacet) + 16) + static_cast<std::uint64_t>(3 * plane) * (sizeof(Move) + 64),
+    const std::uint64_t standing = Standing::bytes(plan.stock_min, plan.stock_max) * std::min<std::uint64_t>(reach.size(), context.threads());
+    const MemoryCharge path_memory(context, held * (sizeof(SolidFacet) + 16) + static_cast<std::uint64_t>(3 * plane) * (sizeof(Move) + 64) + standing,
                                    "the paths");
     std::vector<LayerResult> results(plan.layers.size());
     parallel_each(context, plan.layers.size(), [&](std::size_t i) {
