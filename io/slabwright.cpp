@@ -17,6 +17,7 @@
 #include "io/job_toml.h"
 #include "io/output_folder.h"
 #include "io/plan_json.h"
+#include "io/report_html.h"
 #include "io/sections_dxf.h"
 #include "io/sections_json.h"
 #include "io/sections_svg.h"
@@ -96,11 +97,13 @@ Plan plan(Context& context, const std::string& stl_path, const Job& job) {
         };
         Plan result = planned();
         result.diagnostics.insert(result.diagnostics.begin(), stl.diagnostics.begin(), stl.diagnostics.end());
+        if (!reports_are_built())
+            result.diagnostics.push_back({Severity::note, "report.not_built", "this build of slabwright writes no report.html", std::nullopt});
         return result;
     });
 }
 
-void write(Context& context, const Plan& plan, const std::string& directory) {
+void write(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path) {
     guarded([&] {
         struct PlannedProgram {
             const Layer* layer;
@@ -130,10 +133,15 @@ void write(Context& context, const Plan& plan, const std::string& directory) {
         write_whole("tool.tbl", tool_table(plan.job));
         write_whole("sequence.json", sequence_json(plan));
         write_whole("plan.json", plan_json(plan));
+        if (!stl_path.empty() && reports_are_built()) write_report(context, out.path("").string(), {stl_path});
         context.throw_if_cancelled();
         out.commit();
         context.advance();
     });
+}
+
+void report(Context& context, const std::string& directory, const std::string& stl_path, bool three_d, double size_limit_mb) {
+    guarded([&] { write_report(context, directory, {stl_path, three_d, size_limit_mb}); });
 }
 
 VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path, const std::string& maps_directory) {

@@ -34,8 +34,17 @@ namespace slabwright {
 
 /// Writes plan.json, nc/, tool.tbl and sequence.json into `directory`, all or nothing: a fresh folder beside it is
 /// filled and then takes its place; an existing folder is replaced only if it holds a plan.json of ours or is empty.
+/// @param stl_path the pattern that was planned: with it report.html is written too, where this library can (plan() notes when it cannot)
 /// @throws Error(input) when the place cannot be written
-SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string& directory);
+SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path = {});
+
+/// Makes report.html of a folder again, from what lies in it (verify.json among it) and the pattern.
+/// @param stl_path as verify's. @param three_d false: a light page without model and paths
+/// @param size_limit_mb the page is made no larger, by showing less detail; it says how much
+/// @throws Error(usage) when the library was built without the page or the limit cannot be kept, Error(input) when the folder cannot be
+///         understood, the STL is missing or another one, or the place cannot be written
+SLABWRIGHT_API void report(Context& context, const std::string& directory, const std::string& stl_path = {}, bool three_d = true,
+                           double size_limit_mb = 10);
 
 /// What the simulation of a folder's programs found.
 struct VerifyResult {

@@ -1,4 +1,4 @@
-// The `slabwright` command: plan, inspect, slice, job. Errors are one line on stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, report, inspect, slice, job. Errors are one line on stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -35,8 +35,8 @@ extern "C" void on_signal(int signal) {
 struct Options {
     std::string stl, out, maps, job_file, units, strategy, finder;
     int threads = 0;
-    double memory_gib = 0, weld = 0, every = 0;
-    bool allow_undercut = false, json = false, quiet = false, defaults = false, weld_given = false;
+    double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10;
+    bool allow_undercut = false, json = false, quiet = false, defaults = false, weld_given = false, no_3d = false;
 };
 
 /// A bar with phase and time left, redrawn at most ten times a second on a terminal's last line.
@@ -86,7 +86,7 @@ const char* kind_name(ErrorKind kind) {
     return "";
 }
 
-int report(const Error& error, bool as_json) {
+int complain(const Error& error, bool as_json) {
     std::string line;
     if (as_json) {
         JsonText json;
@@ -219,7 +219,7 @@ void run_plan(const Options& options) {
     require_replaceable(options.out);  // before an hour of planning, not after it
     with_context(options, [&](Context& context) {
         const Plan result = plan(context, options.stl, job);
-        write(context, result, options.out);
+        write(context, result, options.out, options.stl);
         return options.json ? summary_json(result, options.out) : summary(result, options.out);
     });
 }
@@ -239,6 +239,17 @@ bool run_verify(const Options& options) {
         return text;
     });
     return passed;
+}
+
+void run_report(const Options& options) {
+    with_context(options, [&](Context& context) {
+        report(context, options.out, options.stl, !options.no_3d, options.size_limit_mb);
+        const std::string page = options.out + "/report.html";
+        if (!options.json) return page + "\n";
+        JsonText json;
+        json.begin_object().key("report").string(page).end();
+        return json.take();
+    });
 }
 
 void run_inspect(const Options& options) {
@@ -304,6 +315,14 @@ int main(int argc, char** argv) {
     verify_command->add_option("--maps", options.maps, "folder for a picture of each layer: left over, missed, unreachable, gouged");
     add_limits(*verify_command, options);
 
+    CLI::App* report_command = app.add_subcommand("report", "make OUT/report.html again: the build to be seen before the wood is cut");
+    report_command->add_option("OUT", options.out, "folder of the plan")->required();
+    report_command->add_option("--stl", options.stl, "the pattern; the file that plan.json names, if not given");
+    report_command->add_flag("--no-3d", options.no_3d, "a light page: no model, no paths");
+    report_command->add_option("--size-limit", options.size_limit_mb, "MB that the page may have; detail is left out to keep to it")
+        ->check(CLI::Range(0.1, 1000.0));
+    add_limits(*report_command, options);
+
     CLI::App* inspect_command = app.add_subcommand("inspect", "report on the mesh, its features and undercuts");
     inspect_command->add_option("STL", options.stl, "the pattern")->required();
     add_common(*inspect_command, options);
@@ -326,18 +345,19 @@ int main(int argc, char** argv) {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-        return report(Error(ErrorKind::usage, "usage", error.what(), "", "see slabwright --help"), json_wanted);
+        return complain(Error(ErrorKind::usage, "usage", error.what(), "", "see slabwright --help"), json_wanted);
     }
     try {
         if (*plan_command) run_plan(options);
         else if (*verify_command) return run_verify(options) ? 0 : static_cast<int>(ErrorKind::verification);
+        else if (*report_command) run_report(options);
         else if (*inspect_command) run_inspect(options);
         else if (*slice_command) run_slice(options);
         else print(default_job_toml());
         return 0;
     } catch (const Error& error) {
-        return report(error, options.json);
+        return complain(error, options.json);
     } catch (const std::exception& error) {
-        return report(Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"), options.json);
+        return complain(Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"), options.json);
     }
 }

@@ -1,0 +1,84 @@
+// Tables that sort, lead to their place in the 3D view, and can be taken along as CSV.
+
+import {duration, figure, make, words} from './dom.js';
+import {layerMinutes, operationName, operations, phases, plan, remarks, toolOf, toolUse} from './report.js';
+
+// columns: {name, of: row => value, text: row => shown, numeric}
+function sortable(id, title, columns, rows, place, show) {
+    const body = make('tbody');
+    const elements = rows.map(row => {
+        const target = place(row);
+        const element = make('tr', {}, columns.map((column, c) => {
+            const text = String((column.text ?? column.of)(row) ?? '');
+            const shown = c === 0 && show && target
+                ? make('button', {class: 'link', type: 'button', 'aria-label': `${text}: show in 3D`, onclick: () => choose(element, target)}, text) : text;
+            return make('td', {class: column.numeric ? 'n' : (column.tone ? column.tone(row) : null)}, shown);
+        }));
+        return {row, element};
+    });
+    function choose(element, target) {
+        for (const old of document.querySelectorAll('tr[data-chosen]')) old.removeAttribute('data-chosen');
+        element.setAttribute('data-chosen', '');
+        show(target);
+    }
+    let sorted = -1, direction = 1;
+    const heads = columns.map((column, c) => make('th', {scope: 'col', class: column.numeric ? 'n' : null},
+        make('button', {type: 'button', onclick: () => sort(c)}, column.name)));
+    function sort(c) {
+        direction = sorted === c ? -direction : 1;
+        sorted = c;
+        const value = columns[c].of;
+        // Equal rows keep the plan's order.
+        elements.map((e, i) => [e, i]).sort(([a, i], [b, j]) => {
+            const x = value(a.row), y = value(b.row);
+            const order = typeof x === 'number' && typeof y === 'number' ? x - y : String(x ?? '').localeCompare(String(y ?? ''), 'en', {numeric: true});
+            return direction * order || i - j;
+        }).forEach(([e]) => body.append(e.element));
+        heads.forEach((head, k) => k === c ? head.setAttribute('aria-sort', direction > 0 ? 'ascending' : 'descending') : head.removeAttribute('aria-sort'));
+    }
+    body.append(...elements.map(e => e.element));
+    const csv = () => {
+        const quote = value => /[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value;
+        const lines = [columns.map(c => c.name), ...rows.map(row => columns.map(c => c.of(row) ?? ''))].map(line => line.map(v => quote(String(v))).join(','));
+        const link = make('a', {download: `${id}.csv`, href: URL.createObjectURL(new Blob([lines.join('\r\n') + '\r\n'], {type: 'text/csv'}))});
+        link.click();
+        setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    };
+    return make('div', {class: 'card'},
+        make('div', {class: 'tools-head'}, make('h3', {id: `${id}-title`}, title),
+            make('button', {class: 'act', type: 'button', onclick: csv, 'aria-label': `${title} as CSV`}, 'CSV')),
+        rows.length === 0 ? make('p', {class: 'note'}, 'None.') : make('div', {class: 'scroll tall', tabindex: 0, role: 'region', 'aria-labelledby': `${id}-title`},
+            make('table', {id}, make('thead', {}, make('tr', {}, heads)), body)));
+}
+
+const number = (name, of, decimals = 2) => ({name, of, text: row => figure(of(row), decimals), numeric: true});
+const text = (name, of, shown) => ({name, of, text: shown});
+
+export function buildTables(section, show) {
+    section.classList.add('tables');
+    const minutes = layerMinutes().map(row => phases.reduce((sum, phase) => sum + row[phase.key], 0));
+    const layers = plan.layers.map((layer, l) => ({layer, l}));
+    const height = row => row.layer.z_top - row.layer.z_bottom;
+    section.append(
+        sortable('layers', 'Layers', [
+            number('Layer', r => r.layer.index, 0), number('Bottom, mm', r => r.layer.z_bottom, 3), number('Top, mm', r => r.layer.z_top, 3),
+            number('Height, mm', height, 3), number('Slab, mm', r => r.layer.slab_thickness, 3), text('Boundary', r => r.layer.reason),
+            number('Glue, cm²', r => r.layer.glue_area_mm2 / 100, 1), number('Press, N', r => r.layer.press_force_n, 0),
+            number('Programs', r => r.layer.operations.length, 0), {...number('Minutes', r => minutes[r.l]), text: r => duration(minutes[r.l])},
+        ], layers, r => ({layer: r.l}), show),
+        sortable('operations', 'Operations', [
+            text('Program', r => r.name), number('Layer', r => plan.layers[r.layer].index, 0), text('Kind', r => words(r.kind)), text('Purpose', r => r.purpose),
+            text('Tool', r => r.tool, r => `T${r.tool} ${toolOf(r.tool)?.name ?? ''}`), number('Step down, mm', r => r.stepdown, 3), number('Step over, mm', r => r.stepover, 3),
+            number('Spindle, rpm', r => r.spindle_rpm, 0), number('Cutting, m', r => r.cutting_mm / 1000), number('Rapid, m', r => r.rapid_mm / 1000),
+            {...number('Minutes', r => r.minutes), text: r => duration(r.minutes)}, number('Peak force, N', r => r.peak_force_n, 1), number('Deflection, mm', r => r.deflection_mm, 4),
+        ], operations, r => ({layer: r.layer, operation: r.index, text: operationName(r)}), show),
+        sortable('tools', 'Tools', [
+            text('Tool', r => r.tool.number, r => `T${r.tool.number}`), text('Name', r => r.tool.name), text('Kind', r => words(r.tool.kind)), number('Diameter, mm', r => r.tool.diameter, 3),
+            number('Flutes, mm', r => r.tool.flute_length, 1), number('Shank, mm', r => r.tool.shank_diameter, 3), number('Stick-out, mm', r => r.tool.holder.stickout, 1),
+            number('Holder, mm', r => r.tool.holder.diameter, 1), number('Programs', r => r.uses.length, 0), {...number('Minutes', r => r.minutes), text: r => duration(r.minutes)},
+        ], toolUse(), r => r.uses.length ? {layer: r.uses[0].layer, operation: r.uses[0].index, text: `first use of T${r.tool.number}: ${operationName(r.uses[0])}`} : null, show),
+        sortable('remarks', 'Remarks and findings', [
+            text('Code', r => r.code), {...text('Severity', r => r.severity), tone: r => r.severity}, text('From', r => r.source), text('Message', r => r.message),
+            number('x', r => r.where?.[0]), number('y', r => r.where?.[1]), number('z', r => r.where?.[2]),
+        ], remarks, r => r.where ? {where: r.where, text: r.message} : null, show));
+}

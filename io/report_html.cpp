@@ -1,0 +1,633 @@
+#include "io/report_html.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "engine/simulate/reach.h"
+#include "engine/simulate/replay.h"
+#include "io/base64.h"
+#include "io/gcode_reader.h"
+#include "io/job_keys.h"
+#include "io/output_folder.h"
+#include "io/report_template.h"
+#include "io/stl.h"
+#include "io/thinned_path.h"
+#include "kernels/access/deviation.h"
+#include "kernels/errors.h"
+#include "kernels/mesh/decimate.h"
+#include "kernels/mesh/slopes.h"
+#include "kernels/parallel/parallel.h"
+#include "kernels/slicing/slicing.h"
+
+namespace slabwright {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;  // keys stay in the order in which plan.json has them
+
+namespace {
+
+constexpr std::size_t kMostFacets = 80'000, kFewestFacets = 2'000;   // of the model in the page
+constexpr std::size_t kMostPoints = 400'000, kFewestPoints = 4'000;  // of all paths together
+constexpr double kPathTolerance = 0.02;                              // mm, first try
+constexpr double kWidestTolerance = 2.0;                             // mm; paths that need more are left out, longest first
+constexpr double kStockCells = 36'000, kAllStockCells = 400'000;     // of one layer's map, and of all
+constexpr double kFinestCell = 0.25;                                 // mm
+constexpr int kSilhouetteRows = 140, kSlopeRows = 200;
+constexpr double kOutlineTolerance = 0.05;  // mm, of sections and glue
+constexpr double kHundredths = 100;         // outlines are written in 0.01 mm
+constexpr double kReachCells = 2'500;       // of the surface, that the accessibility map aims at
+constexpr double kReachDistance = 0.1;      // mm from the surface that a tool must come to reach it
+
+constexpr std::string_view kDataMark = "/*slabwright:data*/null";
+constexpr std::string_view kModelBegin = "<!--slabwright:3d-->", kModelEnd = "<!--/slabwright:3d-->";
+
+std::string read_text(const fs::path& path, const char* code) {
+    std::ifstream file(path, std::ios::binary);
+    std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    if (!file) throw Error(ErrorKind::input, code, "cannot be read", path.string(), "plan again");
+    return text;
+}
+
+/// Runs `body` over a document of OUT; what the JSON library says against it becomes an error that names the file.
+template <class Body>
+auto understood(const fs::path& path, const char* code, Body&& body) {
+    try {
+        return body();
+    } catch (const nlohmann::json::exception& e) {
+        throw Error(ErrorKind::input, code, std::string("cannot be understood: ") + e.what(), path.string(), "plan again");
+    }
+}
+
+Json read_json(const fs::path& path, const char* code) {
+    const std::string text = read_text(path, code);
+    return understood(path, code, [&] { return Json::parse(text); });
+}
+
+double rounded(double value, int decimals) {
+    const double scale = std::pow(10.0, decimals), r = std::round(value * scale) / scale;
+    return r == 0 ? 0 : r;  // never −0
+}
+
+template <class Enum, std::size_t N>
+Enum word_value(const Word<Enum> (&words)[N], const std::string& text) {
+    for (const Word<Enum>& word : words)
+        if (text == word.text) return word.value;
+    throw Error(ErrorKind::input, "report.plan", "\"" + text + "\" is a word that this version does not know", "plan.json", "plan again");
+}
+
+/// One program as plan.json names it.
+struct Named {
+    std::string file;
+    int layer = 0, tool = 0;
+    double minutes = 0;
+};
+
+/// What plan.json says, as far as figures are made from it. The page itself shows the document.
+struct PlanFolder {
+    Json plan;
+    SimulationInput input;  ///< without mesh and programs
+    Material material;
+    Tolerances tolerances;
+    LengthUnit units = LengthUnit::mm;
+    Frame frame = Frame::pattern_base;
+    double base_board_cut = -1;
+    std::vector<Named> programs;
+};
+
+Tool read_tool(const Json& t) {
+    Tool tool;
+    tool.number = t.at("number").get<int>();
+    tool.kind = word_value(kToolWords, t.at("kind").get<std::string>());
+    tool.diameter = t.at("diameter").get<double>();
+    tool.flute_length = t.at("flute_length").get<double>();
+    tool.shank_diameter = t.at("shank_diameter").get<double>();
+    tool.holder_diameter = t.at("holder").at("diameter").get<double>();
+    tool.stickout = t.at("holder").at("stickout").get<double>();
+    tool.flutes = t.at("flutes").get<int>();
+    tool.helix_rad = t.at("helix_deg").get<double>() * std::numbers::pi / 180;
+    return tool;
+}
+
+void add_polygon(Loops& loops, const Json& polygon) {
+    for (const Json& p : polygon) loops.points.push_back({to_units(p.at(0).get<double>()), to_units(p.at(1).get<double>())});
+    loops.close_loop();
+}
+
+PlanFolder read_plan_folder(const fs::path& out) {
+    PlanFolder folder;
+    const fs::path path = out / "plan.json";
+    folder.plan = read_json(path, "report.plan");
+    understood(path, "report.plan", [&] {
+        const Json& plan = folder.plan;
+        if (plan.at("schema") != "slabwright.plan/1")
+            throw Error(ErrorKind::input, "report.plan", "is not of schema slabwright.plan/1", path.string(), "plan again");
+        folder.frame = word_value(kFrameWords, plan.at("frame").get<std::string>());
+        const Json &job = plan.at("job"), &material = job.at("material"), &machine = job.at("machine"), &tolerances = job.at("tolerances");
+        folder.units = word_value(kUnitWords, job.at("units").get<std::string>());
+        for (const auto& [key, to] :
+             {std::pair{"ktc", &folder.material.ktc}, {"kte", &folder.material.kte}, {"kfc", &folder.material.kfc}, {"kfe", &folder.material.kfe}})
+            *to = material.at(key).get<double>();
+        folder.tolerances.cusp = tolerances.at("cusp").get<double>();
+        folder.tolerances.gouge = tolerances.at("gouge").get<double>();
+        folder.tolerances.weld = tolerances.at("weld").get<double>();
+        folder.base_board_cut = machine.at("base_board_cut").get<double>();
+        SimulationInput& input = folder.input;
+        input.machine.rapid_feed = machine.at("rapid_feed").get<double>();
+        if (!(input.machine.rapid_feed > 0))
+            throw Error(ErrorKind::input, "report.plan", "states a machine that does not move", path.string(), "plan again");
+        for (std::size_t k = 0; k < 2; ++k) {
+            input.stock_min[k] = plan.at("stock").at("min").at(k).get<double>();
+            input.stock_max[k] = plan.at("stock").at("max").at(k).get<double>();
+            if (!(input.stock_max[k] > input.stock_min[k]))
+                throw Error(ErrorKind::input, "report.plan", "states a stock of no size", path.string(), "plan again");
+        }
+        for (const Json& tool : plan.at("tools")) input.tools.push_back(read_tool(tool));
+        if (plan.contains("flask") && plan.at("flask").is_object()) {
+            add_polygon(input.flask, plan.at("flask").at("outer"));
+            add_polygon(input.flask, plan.at("flask").at("inner"));
+        }
+        for (const Json& layer : plan.at("layers")) {
+            input.layers.push_back({layer.at("z_bottom").get<double>(), layer.at("z_top").get<double>(), layer.at("slab_thickness").get<double>()});
+            for (const Json& operation : layer.at("operations")) {
+                Named named{operation.at("file").get<std::string>(), static_cast<int>(input.layers.size()) - 1, operation.at("tool").get<int>(),
+                            operation.at("minutes").get<double>()};
+                if (named.file.rfind("nc/", 0) != 0 || named.file.find("..") != std::string::npos || named.file.find('/', 3) != std::string::npos)
+                    throw Error(ErrorKind::input, "report.plan", "names a program that is no file of nc/: " + named.file, path.string(),
+                                "plan again");
+                folder.programs.push_back(std::move(named));
+            }
+        }
+        if (input.layers.empty()) throw Error(ErrorKind::input, "report.plan", "has no layers", path.string(), "plan again");
+        return 0;
+    });
+    return folder;
+}
+
+/// Where the pattern lies: as named, or where plan.json's file name leads.
+fs::path find_pattern(const fs::path& out, const std::string& file, const std::string& given) {
+    if (!given.empty()) return given;
+    const fs::path base = fs::path(file).filename();
+    fs::path folder = fs::absolute(out).lexically_normal();
+    if (!folder.has_filename()) folder = folder.parent_path();
+    for (const fs::path& place : {folder / base, folder.parent_path() / base, base})
+        if (std::error_code ignored; !base.empty() && fs::exists(place, ignored)) return place;
+    throw Error(ErrorKind::input, "report.no_pattern", "the pattern " + base.string() + " is neither in nor beside the folder", out.string(),
+                "name the STL with --stl");
+}
+
+/// Douglas and Peucker on a closed loop, from its first point and the one farthest from that.
+std::vector<Point2> thinned_loop(std::span<const Point2> loop, double tolerance_mm) {
+    const std::size_t n = loop.size();
+    if (n < 5) return {loop.begin(), loop.end()};
+    const auto at = [&](std::size_t k) { return loop[k % n]; };
+    const auto length = [](double x, double y) { return std::sqrt(x * x + y * y); };
+    std::size_t far = 1;
+    double most = -1;
+    for (std::size_t k = 1; k < n; ++k)
+        if (const double d = length(static_cast<double>(at(k).x) - at(0).x, static_cast<double>(at(k).y) - at(0).y); d > most) most = d, far = k;
+    std::vector<char> kept(n + 1, 0);
+    kept[0] = kept[far] = kept[n] = 1;
+    std::vector<std::pair<std::size_t, std::size_t>> open{{0, far}, {far, n}};
+    while (!open.empty()) {
+        const auto [a, b] = open.back();
+        open.pop_back();
+        const double ax = at(a).x, ay = at(a).y, ux = at(b).x - ax, uy = at(b).y - ay, uu = ux * ux + uy * uy;
+        std::size_t worst = a;
+        double distance = tolerance_mm * kUnitsPerMm;
+        for (std::size_t k = a + 1; k < b; ++k) {
+            const double wx = at(k).x - ax, wy = at(k).y - ay, t = uu > 0 ? std::clamp((wx * ux + wy * uy) / uu, 0.0, 1.0) : 0;
+            if (const double d = length(wx - t * ux, wy - t * uy); d > distance) distance = d, worst = k;
+        }
+        if (worst == a) continue;
+        kept[worst] = 1;
+        open.emplace_back(a, worst);
+        open.emplace_back(worst, b);
+    }
+    std::vector<Point2> result;
+    for (std::size_t k = 0; k < n; ++k)
+        if (kept[k]) result.push_back(loop[k]);
+    return result;
+}
+
+/// One loop as [x, y, x, y…] in 0.01 mm.
+Json outline(std::span<const Point2> loop) {
+    Json flat = Json::array();
+    for (const Point2 p : thinned_loop(loop, kOutlineTolerance)) {
+        flat.push_back(std::llround(to_mm(p.x) * kHundredths));
+        flat.push_back(std::llround(to_mm(p.y) * kHundredths));
+    }
+    return flat;
+}
+
+/// Loops with the loop that is around each, or −1.
+Json outlines(const Loops& loops) {
+    Json list = Json::array();
+    for (std::size_t i = 0; i < loops.size(); ++i)
+        list.push_back({{"parent", loops.parents.empty() ? -1 : loops.parents[i]}, {"points", outline(loops.loop(i))}});
+    return list;
+}
+
+/// The pattern seen along y and along x: per height, the intervals that it covers, [[x0, x1, …], …] in mm.
+Json silhouette(const std::vector<Section>& sections, bool along_y) {
+    Json rows = Json::array();
+    for (const Section& section : sections) {
+        std::vector<std::pair<double, double>> spans;
+        for (std::size_t i = 0; i < section.loops.size(); ++i) {
+            double low = 1e300, high = -1e300;
+            for (const Point2 p : section.loops.loop(i)) {
+                const double v = to_mm(along_y ? p.x : p.y);
+                low = std::min(low, v), high = std::max(high, v);
+            }
+            if (section.loops.parents.empty() || section.loops.parents[i] < 0) spans.emplace_back(low, high);
+        }
+        std::sort(spans.begin(), spans.end());
+        std::vector<std::pair<double, double>> merged;
+        for (const auto& span : spans)
+            if (!merged.empty() && span.first <= merged.back().second) merged.back().second = std::max(merged.back().second, span.second);
+            else merged.push_back(span);
+        Json row = Json::array();
+        for (const auto& [low, high] : merged) row.push_back(rounded(low, 2)), row.push_back(rounded(high, 2));
+        rows.push_back(std::move(row));
+    }
+    return rows;
+}
+
+/// What no budget changes.
+struct Figures {
+    Json data;
+    std::vector<std::vector<PathPoint>> paths;  ///< by program
+    Json replay;                                ///< the stock's cells, left-over maps
+};
+
+double stock_cell(const SimulationInput& input) {
+    const double area = (input.stock_max[0] - input.stock_min[0]) * (input.stock_max[1] - input.stock_min[1]);
+    const double cells = std::min(kStockCells, kAllStockCells / static_cast<double>(input.layers.size()));
+    return std::max(kFinestCell, std::ceil(std::sqrt(area / cells) * 100) / 100);
+}
+
+/// A left-over as one byte: 0 … 253 is the root of its size, so that small ones keep their digits; 254 is cut into the part deeper than the
+/// tolerance, 255 the flask.
+std::uint8_t left_over_code(float left, double gouge) {
+    if (std::isnan(left)) return 255;
+    if (left < -gouge) return 254;
+    return static_cast<std::uint8_t>(std::min(253.0, std::round(100 * std::sqrt(std::max(0.0, static_cast<double>(left))))));
+}
+
+/// Reads and runs every program. The replay's figures go into the page with a light page too; its maps only with the model.
+void replay_programs(Context& context, const fs::path& out, const PlanFolder& folder, const SimulationInput& input, bool three_d, Figures& figures) {
+    ReplayOptions options;
+    options.cell = stock_cell(input);
+    options.cusp = folder.tolerances.cusp;
+    options.material = folder.material;
+    Replay replay(context, input, options);
+    Json engagement = Json::array();
+    figures.paths.resize(folder.programs.size());
+    for (std::size_t begin = 0; begin < folder.programs.size();) {
+        std::size_t end = begin;
+        while (end < folder.programs.size() && folder.programs[end].layer == folder.programs[begin].layer) ++end;
+        std::vector<Program> programs(end - begin);
+        parallel_each(context, programs.size(), [&](std::size_t i) {
+            const Named& named = folder.programs[begin + i];
+            Program& program = programs[i];
+            const std::string text = read_text(out / named.file, "report.program");
+            try {
+                program = read_gcode(text, named.file);
+            } catch (const Error& e) {
+                throw Error(ErrorKind::input, "report.program", e.message(), e.place(), e.remedy());
+            }
+            program.file = named.file;
+            program.layer = named.layer;
+            if (folder.frame == Frame::layer_top)
+                for (ProgramStep& s : program.steps) s.z += input.layers[static_cast<std::size_t>(named.layer)].z_top;
+            if (!three_d) return;
+            figures.paths[begin + i] = path_of(program, input.machine.rapid_feed);
+            thin(figures.paths[begin + i], kPathTolerance);
+        });
+        for (const Program& program : programs) {
+            const ReplayedProgram found = replay.run(program);
+            Json depth = Json::array(), width = Json::array(), force = Json::array(), deflection = Json::array();
+            for (const ReplayPiece& piece : found.pieces) {
+                depth.push_back(rounded(piece.depth_mm, 3)), width.push_back(rounded(piece.width_mm, 3));
+                force.push_back(rounded(piece.force_n, 2)), deflection.push_back(rounded(piece.deflection_mm, 5));
+            }
+            engagement.push_back(
+                {{"file", program.file}, {"depth_mm", depth}, {"width_mm", width}, {"force_n", force}, {"deflection_mm", deflection}});
+            context.advance();
+        }
+        begin = end;
+    }
+    figures.data["engagement"] = std::move(engagement);
+    figures.data["stock"] = {
+        {"cell_mm", options.cell}, {"nx", replay.nx()}, {"ny", replay.ny()}, {"x0", replay.first()[0]}, {"y0", replay.first()[1]}};
+    if (!three_d) return;
+    figures.replay = Json::array();
+    for (std::size_t l = 0; l < input.layers.size(); ++l) {
+        std::string codes;
+        for (const float left : replay.left_over(l)) codes += static_cast<char>(left_over_code(left, folder.tolerances.gouge));
+        figures.replay.push_back(base64(codes));
+    }
+}
+
+/// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
+void draw_figures(Context& context, MeshView mesh, const PlanFolder& folder, const Json& sequence, Json& data) {
+    const SimulationInput& input = folder.input;
+    const Box3 box = bounds(mesh);
+    std::vector<Plane> planes;
+    for (const SimulatedLayer& layer : input.layers) {
+        planes.push_back({layer.z_bottom, Side::above});
+        planes.push_back({std::min(layer.z_top, static_cast<double>(box.max.z)), Side::below});
+    }
+    const double step = (static_cast<double>(box.max.z) - box.min.z) / kSilhouetteRows;
+    for (int i = 0; i < kSilhouetteRows; ++i) planes.push_back({box.min.z + (i + 0.5) * step, Side::above});
+    std::vector<Section> sections = slice(context, mesh, planes);
+    Json layers = Json::array();
+    for (std::size_t l = 0; l < input.layers.size(); ++l)
+        layers.push_back({{"bottom", outlines(sections[2 * l].loops)}, {"top", outlines(sections[2 * l + 1].loops)}, {"glue", Json::array()}});
+    sections.erase(sections.begin(), sections.begin() + static_cast<std::ptrdiff_t>(2 * input.layers.size()));
+    if (sequence.is_object()) {
+        const Json& glue = sequence.at("glue");
+        for (std::size_t l = 0; l < std::min(glue.size(), layers.size()); ++l)
+            for (const Json& loop : glue[l].at("loops")) {
+                std::vector<Point2> points;
+                for (const Json& p : loop) points.push_back({to_units(p.at(0).get<double>()), to_units(p.at(1).get<double>())});
+                layers[l]["glue"].push_back(outline(points));
+            }
+    }
+    data["outlines"] = {{"unit_mm", 1 / kHundredths}, {"tolerance_mm", kOutlineTolerance}, {"layers", std::move(layers)}};
+    data["silhouette"] = {{"z0", rounded(box.min.z, 4)}, {"dz", step}, {"x", silhouette(sections, true)}, {"y", silhouette(sections, false)}};
+    const SlopeProfile slopes = slope_profile(mesh, kSlopeRows);
+    Json least = Json::array(), areas = Json::array();
+    for (const double v : slopes.least_deg) least.push_back(rounded(v, 2));
+    for (const double v : slopes.area_mm2) areas.push_back(rounded(v, 1));
+    data["slopes"] = {
+        {"z0", rounded(slopes.z_low, 4)}, {"dz", (slopes.z_high - slopes.z_low) / kSlopeRows}, {"least_deg", std::move(least)},
+        {"area_mm2", std::move(areas)},   {"down_flat_mm2", rounded(slopes.down_flat_mm2, 1)}, {"undercut_mm2", rounded(slopes.undercut_mm2, 1)}};
+}
+
+/// For every facet of the picture: 0 faces down, 1 some tool reaches its middle, 2 none was found that does. Facets that lie in one small
+/// cell and face about the same way share the answer of the first of them, because a search without success is long.
+struct ReachMap {
+    std::string codes;
+    double cell_mm = 0;
+};
+ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder& folder, MeshView model) {
+    const SimulationInput& input = folder.input;
+    double board = std::max(0.0, folder.base_board_cut);
+    if (folder.base_board_cut < 0)
+        for (const Tool& tool : input.tools)
+            if (tool.kind == ToolKind::ball) board = std::max(board, tool.diameter / 2);
+    std::vector<Reach> reaches;
+    for (std::size_t l = 0; l < input.layers.size(); ++l)
+        reaches.emplace_back(part, input.tools, input.layers[l].z_bottom, input.layers[l].z_top, l == 0 ? input.layers[l].z_bottom - board : -1e300);
+
+    struct Side {
+        Point3 middle{}, normal{};
+        double area = 0;
+    };
+    const auto side_of = [&](std::size_t f) {
+        const Vec3f &a = model.vertices[model.facets[f][0]], &b = model.vertices[model.facets[f][1]], &c = model.vertices[model.facets[f][2]];
+        const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z;
+        const double vx = double{c.x} - a.x, vy = double{c.y} - a.y, vz = double{c.z} - a.z;
+        const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx, n = std::sqrt(nx * nx + ny * ny + nz * nz);
+        Side side{{(double{a.x} + b.x + c.x) / 3, (double{a.y} + b.y + c.y) / 3, (double{a.z} + b.z + c.z) / 3}, {}, n / 2};
+        if (n > 0) side.normal = {nx / n, ny / n, nz / n};
+        return side;
+    };
+    ReachMap map;
+    map.codes.assign(model.facets.size(), '\0');
+    double area = 0;
+    for (std::size_t f = 0; f < model.facets.size(); ++f) area += side_of(f).area;
+    map.cell_mm = std::max(0.1, std::sqrt(area / kReachCells));
+    std::map<std::array<long, 6>, std::size_t> groups;
+    std::vector<Side> asked;
+    std::vector<std::size_t> group(model.facets.size(), 0);
+    for (std::size_t f = 0; f < model.facets.size(); ++f) {
+        const Side side = side_of(f);
+        if (!(side.area > 0) || side.normal[2] < -1e-3) continue;
+        std::array<long, 6> key{};
+        for (std::size_t k = 0; k < 3; ++k) {
+            key[k] = std::lround(std::floor(side.middle[k] / map.cell_mm));
+            key[k + 3] = std::lround(2 * side.normal[k]);
+        }
+        const auto [entry, fresh] = groups.try_emplace(key, asked.size());
+        if (fresh) asked.push_back(side);
+        group[f] = entry->second + 1;
+    }
+    std::string answers(asked.size(), '\0');
+    parallel_for(context, asked.size(), 64, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            Point3 p = asked[i].middle;
+            std::size_t layer = 0;
+            while (layer + 1 < input.layers.size() && p[2] > input.layers[layer].z_top) ++layer;
+            for (std::size_t k = 0; k < 3; ++k) p[k] += kReachDistance * asked[i].normal[k];
+            answers[i] = reaches[layer].reachable(p) ? 1 : 2;
+        }
+    });
+    for (std::size_t f = 0; f < model.facets.size(); ++f)
+        if (group[f] > 0) map.codes[f] = answers[group[f] - 1];
+    return map;
+}
+
+/// The pattern for the 3D view: places as 16-bit shares of its box.
+Json model_json(Context& context, MeshView mesh, const StandingPart& part, const PlanFolder& folder, std::size_t facets) {
+    Mesh model = decimate(context, mesh, facets);
+    const Box3 box = bounds(mesh);
+    const float low[3] = {box.min.x, box.min.y, box.min.z}, high[3] = {box.max.x, box.max.y, box.max.z};
+    std::string vertices, indices;
+    for (Vec3f& v : model.vertices) {
+        float* const at[3] = {&v.x, &v.y, &v.z};
+        for (std::size_t k = 0; k < 3; ++k) {
+            const double extent = std::max(1e-9, static_cast<double>(high[k]) - low[k]);
+            const auto share = static_cast<std::uint16_t>(std::clamp(std::round((*at[k] - low[k]) / extent * 65535), 0.0, 65535.0));
+            append_little_endian(vertices, share);
+            *at[k] = static_cast<float>(low[k] + share * extent / 65535);  // so that the stated error is that of what is shown
+        }
+    }
+    const ReachMap reach = reach_map(context, part, folder, model.view());
+    const bool narrow = model.vertices.size() <= 65536;
+    for (const Index3& f : model.facets)
+        for (const std::uint32_t v : f) {
+            if (narrow) append_little_endian(indices, static_cast<std::uint16_t>(v));
+            else append_little_endian(indices, v);
+        }
+    return {{"facets", model.facets.size()},
+            {"of", mesh.facets.size()},
+            {"error_mm", rounded(surface_deviation(context, mesh, model.view()), 4)},
+            {"min", {low[0], low[1], low[2]}},
+            {"max", {high[0], high[1], high[2]}},
+            {"index_bytes", narrow ? 2 : 4},
+            {"vertices", base64(vertices)},
+            {"indices", base64(indices)},
+            {"reach_mm", kReachDistance},
+            {"reach_cell_mm", rounded(reach.cell_mm, 2)},
+            {"reach", base64(reach.codes)}};
+}
+
+/// All paths within a number of points: the tolerance is doubled until they fit, then the longest are left out.
+Json paths_json(std::vector<std::vector<PathPoint>> paths, const PlanFolder& folder, std::size_t most) {
+    const auto count = [&] {
+        std::size_t points = 0;
+        for (const auto& path : paths) points += path.size();
+        return points;
+    };
+    double tolerance = kPathTolerance, error = kPathTolerance;
+    while (count() > most && tolerance < kWidestTolerance) {
+        tolerance *= 2;
+        error += tolerance;  // each thinning works on what the one before left
+        for (auto& path : paths) thin(path, tolerance);
+    }
+    std::vector<char> left_out(paths.size(), 0);
+    while (count() > most) {
+        const auto longest = std::max_element(paths.begin(), paths.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
+        left_out[static_cast<std::size_t>(longest - paths.begin())] = 1;
+        longest->clear();
+    }
+    double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
+    for (const auto& path : paths)
+        for (const PathPoint& p : path) {
+            const double at[3] = {p.x, p.y, p.z};
+            for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], at[k]), high[k] = std::max(high[k], at[k]);
+        }
+    double quantum = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (high[k] < low[k]) low[k] = high[k] = 0;
+        quantum = std::max(quantum, (high[k] - low[k]) / 65535 / 2);
+    }
+    Json programs = Json::array();
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+        // x, y, z as shares of the box; time as a share of the program's, its lowest bit says rapid.
+        std::string bytes;
+        const double seconds = paths[i].empty() ? 0 : paths[i].back().seconds;
+        for (const PathPoint& p : paths[i]) {
+            const double at[3] = {p.x, p.y, p.z};
+            for (std::size_t k = 0; k < 3; ++k)
+                append_little_endian(bytes, static_cast<std::uint16_t>(std::round((at[k] - low[k]) / std::max(1e-9, high[k] - low[k]) * 65535)));
+            const auto share = static_cast<std::uint16_t>(seconds > 0 ? std::floor(p.seconds / seconds * 32767) : 0);
+            append_little_endian(bytes, static_cast<std::uint16_t>(share << 1 | static_cast<unsigned>(p.rapid)));
+        }
+        programs.push_back({{"file", folder.programs[i].file}, {"points", paths[i].size()}, {"left_out", left_out[i] != 0}, {"data", base64(bytes)}});
+    }
+    return {{"tolerance_mm", rounded(error + quantum * std::sqrt(3.0), 4)},
+            {"min", {low[0], low[1], low[2]}},
+            {"max", {high[0], high[1], high[2]}},
+            {"programs", std::move(programs)}};
+}
+
+/// A document as it may stand in a script element: nothing in it can end the element.
+std::string script_text(const Json& document) {
+    const std::string text = document.dump(-1, ' ', false, Json::error_handler_t::replace);
+    std::string safe;
+    safe.reserve(text.size());
+    for (const char c : text) {
+        if (c == '<') safe += "\\u003c";
+        else safe += c;
+    }
+    return safe;
+}
+
+std::string page(const Json& data, bool three_d) {
+    std::string text(report_template());
+    if (!three_d)
+        for (std::size_t begin = 0; (begin = text.find(kModelBegin)) != std::string::npos;) {
+            const std::size_t end = text.find(kModelEnd, begin);
+            text.erase(begin, end - begin + kModelEnd.size());
+        }
+    const std::size_t mark = text.find(kDataMark);
+    if (mark == std::string::npos)
+        throw Error(ErrorKind::usage, "report.not_built", "the page that was built in has no place for data", "", "build again");
+    return text.replace(mark, kDataMark.size(), script_text(data));
+}
+
+}  // namespace
+
+bool reports_are_built() { return !report_template().empty(); }
+
+std::string report_html(Context& context, const std::string& directory, const ReportOptions& options) {
+    if (!reports_are_built())
+        throw Error(ErrorKind::usage, "report.not_built", "this build of slabwright has no report page", "",
+                    "run tools/setup, which fetches its parts, and build again with SLABWRIGHT_REPORT=ON");
+    if (!(options.size_limit_mb > 0))
+        throw Error(ErrorKind::usage, "report.size_limit", "a page of no size is none", "--size-limit", "give megabytes");
+    const fs::path out(directory);
+    const PlanFolder folder = read_plan_folder(out);
+    const Json sequence = fs::exists(out / "sequence.json") ? read_json(out / "sequence.json", "report.sequence") : Json();
+    const Json verify = fs::exists(out / "verify.json") ? read_json(out / "verify.json", "report.verify") : Json();
+    const fs::path pattern = find_pattern(
+        out, understood(out / "plan.json", "report.plan", [&] { return folder.plan.at("input").at("file").get<std::string>(); }), options.stl);
+    const StlMesh stl = read_stl(context, pattern.string(), {folder.units, folder.tolerances.weld});
+    if (folder.plan["input"].value("sha256", "") != stl.input.sha256)
+        throw Error(ErrorKind::input, "report.other_pattern", "is not the pattern that was planned: its SHA-256 is " + stl.input.sha256,
+                    pattern.string(), "name the planned STL with --stl, or plan again");
+
+    context.begin_phase("report", 0.96, 1.0, folder.programs.size() + 2);
+    Figures figures;
+    figures.data = {{"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", folder.plan}, {"verify", verify}};
+    understood(out / "sequence.json", "report.sequence", [&] {
+        Json steps = Json::array();
+        if (sequence.is_object())
+            for (const Json& step : sequence.at("steps"))
+                steps.push_back({step.at("layer").get<int>(), step.at("action").get<std::string>(), step.at("seconds").get<double>(),
+                                 step.contains("program") ? step.at("program") : Json()});
+        figures.data["steps"] = std::move(steps);
+        draw_figures(context, stl.mesh.view(), folder, sequence, figures.data);
+        return 0;
+    });
+    SimulationInput input = folder.input;
+    input.mesh = stl.mesh.view();
+    replay_programs(context, out, folder, input, options.three_d, figures);
+    context.throw_if_cancelled();
+
+    const auto limit = static_cast<std::size_t>(options.size_limit_mb * 1e6);
+    const auto too_large = [&](std::size_t size) {
+        return Error(ErrorKind::usage, "report.size_limit",
+                     fmt::format("the page has {:.2f} MB at least, {:.2f} MB are allowed", static_cast<double>(size) / 1e6, options.size_limit_mb),
+                     "--size-limit", options.three_d ? "allow more, or leave out the model with --no-3d" : "allow more");
+    };
+    if (!options.three_d) {
+        std::string text = page(figures.data, false);
+        if (text.size() > limit) throw too_large(text.size());
+        return text;
+    }
+    figures.data["left_over"] = {{"layers", figures.replay}};
+    const StandingPart part(context, stl.mesh.view());
+    std::size_t facets = kMostFacets, points = kMostPoints;
+    Json model = model_json(context, stl.mesh.view(), part, folder, facets), paths = paths_json(figures.paths, folder, points);
+    for (;;) {
+        figures.data["model"] = model;
+        figures.data["paths"] = paths;
+        std::string text = page(figures.data, true);
+        context.throw_if_cancelled();
+        if (text.size() <= limit) {
+            context.advance(2);
+            return text;
+        }
+        // Paths are thinned before the model: they take more, and lose less.
+        if (points > kFewestPoints) {
+            points /= 2;
+            paths = paths_json(figures.paths, folder, points);
+        } else if (facets > kFewestFacets) {
+            facets /= 2;
+            model = model_json(context, stl.mesh.view(), part, folder, facets);
+        } else {
+            throw too_large(text.size());
+        }
+    }
+}
+
+void write_report(Context& context, const std::string& directory, const ReportOptions& options) {
+    write_file_whole((fs::path(directory) / "report.html").string(), report_html(context, directory, options));
+}
+
+}  // namespace slabwright

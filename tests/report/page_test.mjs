@@ -1,0 +1,249 @@
+// The report of the pump cover as a pattern maker meets it, in headless Chromium.
+//     node page_test.mjs SOURCE COMMAND WORK_FOLDER
+
+import {execFileSync} from 'node:child_process';
+import {copyFileSync, mkdirSync, readFileSync, rmSync, statSync} from 'node:fs';
+import {browser, Checks, open, pdfPages} from './browser.mjs';
+
+const [,, source, command, work] = process.argv;
+const {started, axe, missing} = await browser(source);
+if (missing) {
+    console.log(`skipped: ${missing}`);
+    process.exit(0);
+}
+const check = new Checks();
+rmSync(work, {recursive: true, force: true});
+mkdirSync(work, {recursive: true});
+const out = `${work}/out`;
+copyFileSync(`${source}/tests/data/pump-cover.stl`, `${work}/pump-cover.stl`);
+execFileSync(command, ['plan', `${work}/pump-cover.stl`, '-o', out, '--quiet']);
+const file = `${out}/report.html`;
+const plan = JSON.parse(readFileSync(`${out}/plan.json`, 'utf8'));
+const layers = plan.layers.length;
+
+// Before the simulation the page says that nothing is proven.
+{
+    const {page, complaints} = await open(started, file);
+    check.that('unverified: does not say yes', !(await page.locator('#verdict .answer').textContent()).startsWith('Yes'));
+    check.that('unverified: says how', (await page.locator('#verdict').textContent()).includes('slabwright verify'));
+    check.equal('unverified: no complaints', complaints, []);
+    await page.close();
+}
+execFileSync(command, ['verify', out, '--quiet']);
+execFileSync(command, ['report', out, '--quiet']);
+const verify = JSON.parse(readFileSync(`${out}/verify.json`, 'utf8'));
+const {page, complaints, requests} = await open(started, file);
+const change = (selector, value) => page.locator(selector).evaluate((element, v) => {
+    element.value = v;
+    element.dispatchEvent(new Event(element.tagName === 'SELECT' ? 'change' : 'input', {bubbles: true}));
+}, value);
+const stage = name => page.locator('#scene').getAttribute(`data-${name}`);
+const numbers = text => text.split(',').map(Number);
+
+// What it says equals what it was made from.
+{
+    const data = await page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent));
+    check.equal('data: plan.json', data.plan, plan);
+    check.equal('data: verify.json', data.verify, verify);
+    const text = await page.locator('#summary').textContent();
+    const minutes = Math.round(plan.totals.build_minutes);
+    check.that('summary: build time', (await page.locator('#build-time').textContent()) === `${Math.floor(minutes / 60)} h ${String(minutes % 60).padStart(2, '0')} min`);
+    check.that('summary: verdict', (await page.locator('#verdict .answer').textContent()).startsWith(verify.passed ? 'Yes' : 'No'));
+    check.that('summary: gouge', text.includes(`${Number(verify.totals.gouge_max_mm.toFixed(4))} mm`));
+    check.that('summary: left-over', text.includes(`${Number(verify.totals.left_over_missed_max_mm.toFixed(3))} mm`));
+    const glue = plan.layers.reduce((sum, layer) => sum + layer.glue_area_mm2, 0) / 100;
+    check.that('summary: glue', text.includes(`${glue.toFixed(1)} cm²`), glue);
+    const magazine = await page.locator('#magazine tbody tr td:first-child').allTextContents();
+    const used = new Set(plan.layers.flatMap(layer => layer.operations.map(o => o.tool)));
+    check.equal('summary: tools in the order of the magazine', magazine, plan.tools.map(t => t.number).filter(n => used.has(n)).sort((a, b) => a - b).map(n => `T${n}`));
+    // The parts of the build time, from the page's own plot data, are the whole.
+    const steps = data.steps.reduce((sum, step) => sum + step[2], 0) / 60;
+    check.that('data: steps are the build time', Math.abs(steps - plan.totals.build_minutes) < 0.02 * plan.totals.build_minutes, `${steps} ${plan.totals.build_minutes}`);
+    check.equal('tables: rows', [await page.locator('#layers tbody tr').count(), await page.locator('#operations tbody tr').count(), await page.locator('#tools tbody tr').count()],
+        [layers, plan.totals.operations, plan.tools.length]);
+    check.that('data: forces along every program', data.engagement.length === plan.totals.operations && data.engagement.every(e => e.force_n.length > 0 && e.force_n.some(f => f > 0)));
+    // A force along a roughing program stays near the plan's nominal heaviest cut: same model, depth and width from the stock.
+    const operations = plan.layers.flatMap(layer => layer.operations);
+    operations.forEach((operation, i) => {
+        if (operation.kind !== 'rough') return;
+        const most = Math.max(...data.engagement[i].force_n);
+        check.that(`data: force of ${operation.file}`, most > 0.3 * operation.peak_force_n && most < 1.5 * operation.peak_force_n, `${most} ${operation.peak_force_n}`);
+    });
+}
+
+// The slider moves layers.
+{
+    const before = numbers(await stage('layers'));
+    check.that('explode: together at first', before.every(z => z === 0) && before.length === layers);
+    await change('#explode', '0.5');
+    const after = numbers(await stage('layers'));
+    check.that('explode: each above the one below', after.every((z, l) => l === 0 ? z === 0 : z > after[l - 1] + 1), String(after));
+    await change('#explode', '0');
+    check.that('explode: back', numbers(await stage('layers')).every(z => z === 0));
+}
+
+// A row leads to its place.
+{
+    await page.locator('#layers tbody tr').nth(1).locator('button').click();
+    check.equal('row: layer', await stage('layer'), '1');
+    check.that('row: marked', await page.locator('#layers tbody tr').nth(1).getAttribute('data-chosen') !== null);
+    const z = numbers(await stage('place'))[2];
+    check.that('row: in the layer', z > plan.layers[1].z_bottom && z < plan.layers[1].z_top);
+    await page.locator('#operations tbody tr').nth(7).locator('button').click();
+    check.equal('row: operation', await stage('operation'), '7');
+    check.equal('row: chosen in the view', await page.locator('#operation').inputValue(), '7');
+}
+
+// Time runs along the program: the tip ends where the program ends, and the stock only shrinks.
+{
+    const operations = plan.layers.flatMap(layer => layer.operations);
+    const rough = operations.findIndex(o => o.kind === 'rough');
+    await change('#operation', String(rough));
+    const stock = [];
+    for (const share of ['0', '0.3', '0.7', '1']) {
+        await change('#time', share);
+        stock.push(Number(await stage('stock')));
+    }
+    check.that('stock: shrinks', stock.every((v, i) => i === 0 || v < stock[i - 1]), String(stock));
+    const tip = numbers(await stage('tip'));
+    const last = {};
+    for (const line of readFileSync(`${out}/${operations[rough].file}`, 'utf8').split('\n'))
+        for (const [, axis, value] of line.replace(/\([^)]*\)/g, '').matchAll(/([XYZ])(-?[\d.]+)/g)) last[axis] = Number(value);
+    const {min, max} = await page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent).paths);
+    const quantum = Math.max(...max.map((v, k) => v - min[k])) / 65535;
+    const top = plan.frame === 'layer-top' ? plan.layers[0].z_top : 0;
+    check.that('path: ends where the program ends', Math.hypot(tip[0] - last.X, tip[1] - last.Y, tip[2] - last.Z - top) < 2 * quantum + 0.002, `${tip} ${JSON.stringify(last)}`);
+    await change('#time', '0.3');
+    check.equal('stock: going back gives the same', Number(await stage('stock')), stock[1]);
+    await change('#operation', '-1');
+}
+
+// Colours and section do not fail, and change the picture.
+{
+    const picture = async () => { await page.waitForTimeout(60); return (await page.locator('#canvas').screenshot()).toString('base64'); };
+    await page.locator('#view').scrollIntoViewIfNeeded();
+    const seen = new Set([await picture()]);
+    for (const mode of ['surfaces', 'slope', 'reach', 'left']) {
+        await change('#mode', mode);
+        seen.add(await picture());
+    }
+    await change('#axis', 'y');
+    seen.add(await picture());
+    await change('#axis', 'none');
+    check.equal('view: six pictures', seen.size, 6);
+}
+
+// Sorting, both ways; CSV.
+{
+    const column = () => page.locator('#operations tbody tr td:nth-child(11)').allTextContents();
+    const head = page.locator('#operations thead th').nth(11);
+    await head.locator('button').click();
+    check.equal('sort: told', await head.getAttribute('aria-sort'), 'ascending');
+    const force = (await page.locator('#operations tbody tr td:nth-child(12)').allTextContents()).map(Number);
+    check.that('sort: ascending', force.every((v, i) => i === 0 || v >= force[i - 1]), String(force));
+    await head.locator('button').click();
+    const falling = (await page.locator('#operations tbody tr td:nth-child(12)').allTextContents()).map(Number);
+    check.that('sort: descending', falling.every((v, i) => i === 0 || v <= falling[i - 1]));
+    check.equal('sort: nothing lost', (await column()).length, plan.totals.operations);
+    const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('button', {name: 'Layers as CSV'}).click()]);
+    const csv = readFileSync(await download.path(), 'utf8').trim().split('\r\n');
+    check.equal('csv: lines', csv.length, layers + 1);
+    check.that('csv: exact figures', csv[1].split(',')[2] === String(plan.layers[0].z_top), csv[1]);
+}
+
+// The keyboard alone reaches everything that can be operated, and operates it.
+{
+    const all = await page.evaluate(() => {
+        const list = [...document.querySelectorAll('a[href], button, select, input, summary, [tabindex="0"]')].filter(e => !e.disabled && e.getClientRects().length > 0);
+        list.forEach((element, i) => { element.dataset.reach = String(i); });
+        return list.length;
+    });
+    await page.evaluate(() => { document.activeElement?.blur(); window.scrollTo(0, 0); getSelection().removeAllRanges(); });
+    const reached = new Set();
+    await page.locator('.skip').focus();
+    for (let i = 0; i < all + 20; ++i) {
+        const at = await page.evaluate(() => document.activeElement?.dataset?.reach);
+        if (at !== undefined) reached.add(at);
+        await page.keyboard.press('Tab');
+    }
+    check.equal('keyboard: everything is reached', reached.size, all);
+    await page.locator('#explode').focus();
+    await page.keyboard.press('End');
+    check.that('keyboard: pulls layers apart', numbers(await stage('layers'))[1] > 1);
+    await page.keyboard.press('Home');
+    await page.locator('#canvas').focus();
+    for (const key of ['ArrowLeft', 'ArrowUp', 'Shift+ArrowRight', '+', '-', '1', '2', '3', 'Home']) {
+        const before = await stage('camera');
+        await page.keyboard.press(key);
+        const moved = await page.waitForFunction(old => document.querySelector('#scene').dataset.camera !== old, before, {timeout: 5000}).then(() => true, () => false);
+        check.that(`keyboard: ${key} moves the view`, moved);
+    }
+    await page.locator('#layers tbody tr').nth(2).locator('button').focus();
+    await page.keyboard.press('Enter');
+    check.equal('keyboard: a row leads to its place', await stage('layer'), '2');
+    await page.locator('#operations tbody tr').first().locator('button').focus();
+    await page.keyboard.press('Enter');
+    await page.locator('#canvas').focus();
+    await page.keyboard.press('Space');
+    await page.waitForTimeout(200);
+    await page.keyboard.press('Space');
+    check.that('keyboard: plays', Number(await stage('share')) > 0.5, await stage('share'));
+}
+
+// The accessibility checker, on the whole page and again in a narrow window.
+async function violations(on) {
+    await on.evaluate(axe);
+    const result = await on.evaluate(() => globalThis.axe.run(document, {runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice']}));
+    return result.violations.map(v => `${v.id}: ${v.nodes.slice(0, 3).map(n => n.html.slice(0, 120)).join(' | ')}`);
+}
+check.equal('axe: no violations', await violations(page), []);
+await page.setViewportSize({width: 420, height: 800});
+check.equal('axe: no violations when narrow', await violations(page), []);
+check.that('narrow: no sideways scrolling', await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth + 1), await page.evaluate(() => document.documentElement.scrollWidth));
+await page.setViewportSize({width: 1280, height: 900});
+
+check.equal('print: one page for each layer', pdfPages(await page.pdf({preferCSSPageSize: true})), layers);
+check.equal('no complaints', complaints, []);
+check.equal('no request leaves the page', requests, []);
+check.that('size', statSync(file).size < 10e6);
+await page.close();
+
+// The light page, and a page made to be small.
+execFileSync(command, ['report', out, '--quiet', '--no-3d']);
+{
+    const light = await open(started, file);
+    check.that('light: smaller', statSync(file).size < 1e6, statSync(file).size);
+    check.equal('light: no view', await light.page.locator('canvas').count(), 0);
+    check.equal('light: sheets', await light.page.locator('.sheet').count(), layers);
+    check.equal('light: no complaints', light.complaints, []);
+    check.equal('light: axe', await violations(light.page), []);
+    await light.page.close();
+}
+execFileSync(command, ['report', out, '--quiet', '--size-limit', '1.3']);
+{
+    const small = await open(started, file);
+    check.that('small: kept', statSync(file).size <= 1.3e6, statSync(file).size);
+    const {paths} = await small.page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent));
+    check.that('small: says what it cost', paths.tolerance_mm > 0.03, paths.tolerance_mm);
+    check.equal('small: no complaints', small.complaints, []);
+    await small.page.close();
+}
+let refused = 0;
+try { execFileSync(command, ['report', out, '--quiet', '--size-limit', '0.2'], {stdio: 'pipe'}); } catch (error) { refused = error.status; }
+check.equal('a limit that cannot be kept is refused', refused, 2);
+
+// Without WebGL the rest of the page stays.
+{
+    const context = await started.newContext();
+    const bare = await context.newPage();
+    await bare.addInitScript(() => { HTMLCanvasElement.prototype.getContext = () => null; });
+    const thrown = [];
+    bare.on('pageerror', error => thrown.push(error.message));
+    await bare.goto(`file://${file}`);
+    check.equal('no WebGL: says so', await bare.locator('#no-webgl').count(), 1);
+    check.equal('no WebGL: tables', await bare.locator('#layers tbody tr').count(), layers);
+    check.equal('no WebGL: nothing thrown', thrown, []);
+    await context.close();
+}
+await started.close();
+check.end();
