@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <unordered_map>
@@ -80,6 +81,7 @@ public:
         std::vector<Mean> means;
         std::vector<std::uint32_t> to(vertices_.size());
         for (std::size_t i = 0; i < vertices_.size(); ++i) {
+            if (i % 65536 == 0) context_.throw_if_cancelled();
             std::array<std::int32_t, 3> key{};
             for (int k = 0; k < 3; ++k) key[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(std::floor(vertices_[i][k] / cell));
             const auto [entry, fresh] = cells.try_emplace(key, static_cast<std::uint32_t>(means.size()));
@@ -222,6 +224,8 @@ private:
     void round(std::size_t wished) {
         find_facets_around();
         std::vector<Edge> edges;
+        edges.reserve(facets_.size() * 3 / 2 + 16);
+        context_.throw_if_cancelled();
         for (const Index3& f : facets_)
             for (std::size_t k = 0; k < 3; ++k) {
                 const std::uint32_t a = f[k], b = f[(k + 1) % 3];
@@ -237,8 +241,10 @@ private:
         std::sort(edges.begin(), edges.end());
         std::vector<char> used(vertices_.size(), 0);
         std::size_t left = facets_.size();
+        std::size_t since = 0;
         for (const Edge& edge : edges) {
             if (left <= wished) break;
+            if (++since % 4096 == 0) context_.throw_if_cancelled();
             if (used[edge.a] || used[edge.b] || !allowed(edge)) continue;
             used[edge.a] = used[edge.b] = 1;
             vertices_[edge.a] = edge.place;
