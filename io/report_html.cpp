@@ -154,12 +154,16 @@ PlanFolder read_plan_folder(const fs::path& out) {
                 throw Error(ErrorKind::input, "report.plan", "states a stock of no size", path.string(), "plan again");
         }
         for (const Json& tool : plan.at("tools")) input.tools.push_back(read_tool(tool));
-        if (plan.contains("flask") && plan.at("flask").is_object()) {
-            add_polygon(input.flask, plan.at("flask").at("outer"));
-            add_polygon(input.flask, plan.at("flask").at("inner"));
-        }
+        const Json flask = plan.value("flask", Json());
         for (const Json& layer : plan.at("layers")) {
-            input.layers.push_back({layer.at("z_bottom").get<double>(), layer.at("z_top").get<double>(), layer.at("slab_thickness").get<double>()});
+            input.layers.push_back(
+                {layer.at("z_bottom").get<double>(), layer.at("z_top").get<double>(), layer.at("slab_thickness").get<double>(), {}});
+            if (flask.is_object()) {
+                Loops outer, inner;
+                add_polygon(outer, flask.at("outer"));
+                add_polygon(inner, flask.contains("inner_by_layer") ? flask.at("inner_by_layer").at(input.layers.size() - 1) : flask.at("inner"));
+                input.layers.back().flask = subtract(outer, inner);
+            }
             for (const Json& operation : layer.at("operations")) {
                 Named named{operation.at("file").get<std::string>(), static_cast<int>(input.layers.size()) - 1, operation.at("tool").get<int>(),
                             operation.at("minutes").get<double>()};

@@ -187,7 +187,7 @@ std::vector<float> Replay::left_over(std::size_t layer) const {
             for (int i = 0; i < g.nx; ++i) {
                 const std::size_t c = g.index(i, j);
                 const double x = g.x(i), y = g.y(j), z = stock.surface(layer, c);
-                if (!r.input.flask.empty() && winding(r.input.flask, {to_units(x), to_units(y)}) % 2 != 0) {
+                if (!l.flask.empty() && winding(l.flask, {to_units(x), to_units(y)}) > 0) {
                     out[c] = std::numeric_limits<float>::quiet_NaN();
                     continue;
                 }

@@ -129,6 +129,12 @@ export function totals() {
     };
 }
 
+// The flask's borders in a layer: its outside and its opening.
+export function flaskRings(l) {
+    const {flask} = plan;
+    return flask ? [flask.outer, flask.inner_by_layer?.[l] ?? flask.inner] : [];
+}
+
 export function size() {
     const {min, max} = plan.input.bbox;
     return max.map((v, k) => v - min[k]);

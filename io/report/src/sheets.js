@@ -1,7 +1,7 @@
 // One printed page for each layer: what the operator needs at the machine.
 
 import {duration, figure, make, words} from './dom.js';
-import {data, layerMinutes, operations, phases, plan, toolOf, verify} from './report.js';
+import {data, flaskRings, layerMinutes, operations, phases, plan, toolOf, verify} from './report.js';
 
 function pathOf(loops) {
     const unit = data.outlines.unit_mm;
@@ -18,7 +18,7 @@ function picture(l) {
     const {bottom, top, glue} = data.outlines.layers[l], layer = plan.layers[l];
     const thin = Math.max(width, depth) / 500;
     const loops = glue, bare = loops.length === 0;
-    const flask = plan.flask ? [plan.flask.outer, plan.flask.inner].filter(Array.isArray) : [];
+    const flask = flaskRings(l);
     return make('svg', {viewBox: `${x0 - edge} ${-y1 - edge} ${width + 2 * edge} ${depth + 2 * edge}`, role: 'img',
         'aria-label': `Slab of layer ${layer.index} from above, ${figure(width, 1)} by ${figure(depth, 1)} mm; glue on ${figure(layer.glue_area_mm2 / 100, 1)} square centimetres`},
     make('g', {transform: 'scale(1 -1)'},

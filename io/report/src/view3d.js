@@ -4,7 +4,7 @@ import * as THREE from 'three';
 import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
 import {bytesOf, figure, make} from './dom.js';
 import {pathOf} from './paths.js';
-import {data, featureKinds, featureRange, layerName, operationName, operations, plan, toolOf} from './report.js';
+import {data, featureKinds, flaskRings, featureRange, layerName, operationName, operations, plan, toolOf} from './report.js';
 import {Run, StockField} from './stock.js';
 
 const layerColors = ['#b9c7cc', '#d9c49a'], cutColor = '#c98f4a';
@@ -177,7 +177,7 @@ class View {
             const corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
             lines.add(ring(corners, layer.z_top, '#17636b'));
             if (l === 0) lines.add(ring(corners, layer.z_bottom, '#8a94a0'));
-            if (plan.flask) for (const loop of [plan.flask.outer, plan.flask.inner]) if (Array.isArray(loop) && Array.isArray(loop[0])) lines.add(ring(loop, layer.z_top, '#8a6a3a'));
+            for (const loop of flaskRings(l)) lines.add(ring(loop, layer.z_top, '#8a6a3a'));
             group.add(lines);
             const text = `${layer.index}: ${figure(layer.z_top, 2)} mm, ${layer.reason}`;
             const label = make('span', {title: text}, text);
