@@ -15,6 +15,11 @@ namespace slabwright {
 enum class LengthUnit : std::uint8_t { mm, inch };
 enum class LayerStrategy : std::uint8_t { printed, optimal };
 enum class Frame : std::uint8_t { pattern_base, layer_top };
+/// Which slopes level contours finish and which projected paths do (SHAPING 5): each its own side of the steep limit, one of
+/// them everything, or both everything, each in the steps that it needs at the limit.
+enum class FinishStrategy : std::uint8_t { split, levels, projection, both };
+/// Projected paths run on parallel lines, or on curves offset again and again from the border of what they finish.
+enum class Projection : std::uint8_t { raster, offset };
 enum class ToolKind : std::uint8_t { flat, ball, face, drill };
 
 inline constexpr double kInch = 25.4;
@@ -111,7 +116,10 @@ struct Cutting {
     double ramp_deg = 5;                                 ///< entry into stock
     double holder_clearance = 2.0;
     double finish_feed = 5000;
-    bool arcs = true;  ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
+    FinishStrategy finish_strategy = FinishStrategy::split;
+    Projection projection = Projection::raster;
+    bool uniform_steps = false;  ///< one stepdown and one step-over a layer, for its worst slope, and nothing cut again (SHAPING 3, to compare)
+    bool arcs = true;            ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
 };
 
 /// A frame of the slab that stays around the pattern in every layer (engine/flask).

@@ -16,6 +16,9 @@ struct Word {
 inline constexpr Word<LengthUnit> kUnitWords[] = {{"mm", LengthUnit::mm}, {"in", LengthUnit::inch}};
 inline constexpr Word<LayerStrategy> kStrategyWords[] = {{"printed", LayerStrategy::printed}, {"optimal", LayerStrategy::optimal}};
 inline constexpr Word<Finder> kFinderWords[] = {{"halving", Finder::halving}, {"exact", Finder::exact}, {"both", Finder::both}};
+inline constexpr Word<FinishStrategy> kFinishWords[] = {
+    {"split", FinishStrategy::split}, {"levels", FinishStrategy::levels}, {"projection", FinishStrategy::projection}, {"both", FinishStrategy::both}};
+inline constexpr Word<Projection> kProjectionWords[] = {{"raster", Projection::raster}, {"offset", Projection::offset}};
 inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}};
 inline constexpr Word<ToolKind> kToolWords[] = {
     {"flat", ToolKind::flat}, {"ball", ToolKind::ball}, {"face", ToolKind::face}, {"drill", ToolKind::drill}};
@@ -140,6 +143,11 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("ramp_deg", job.cutting.ramp_deg, "degrees, entry into stock");
     visit.key("holder_clearance", job.cutting.holder_clearance, "mm between the holder and anything that stands");
     visit.key("finish_feed", job.cutting.finish_feed, "mm/min");
+    visit.word("finish_strategy", job.cutting.finish_strategy, kFinishWords,
+               "split at the steep limit, levels alone, projection alone, or both over everything (SHAPING 5)");
+    visit.word("projection", job.cutting.projection, kProjectionWords, "raster: parallel lines; offset: curves offset inwards from the border");
+    visit.key("uniform_steps", job.cutting.uniform_steps,
+              "one stepdown and one stepover a layer, for its worst slope, and no rest machining: to compare methods");
     visit.key("arcs", job.cutting.arcs, "arcs (G2, G3) where a path turns evenly; false: straight moves only");
 
     visit.table("flask", "a frame of every slab that stays around the pattern, to carry it while it is cut and as moulding box");

@@ -62,6 +62,14 @@ struct LayerCut {
 /// @returns whether the arc into the cut found room
 bool add_leads(PathBuilder& path, const LayerCut& cut, const DropIndex& part, double chord, std::vector<PathPoint>& run);
 
+/// The slopes, in radians from level, that the job's finish strategy gives to level contours (from `levels_from` up, over π/2:
+/// none) and to projected paths (up to `projection_to`, negative: none), and those on which the cusp decides their steps.
+struct FinishSlopes {
+    double levels_from = 0, levels_keep = 0;
+    double projection_to = 0, projection_keep = 0;
+};
+[[nodiscard]] FinishSlopes finish_slopes(const Cutting& cutting);
+
 /// Clears a region given as free stretches on parallel lines along x, chained into zigzags, the nearest first; each chain is
 /// begun outside the stock where one of its ends lies there. `path` must know its surroundings, so that it ramps down elsewhere.
 /// @param line_y     0.1 µm, ascending
@@ -77,5 +85,6 @@ void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<
 [[nodiscard]] Operation finish_walls(const LayerCut& cut);
 [[nodiscard]] Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics);
 [[nodiscard]] Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics);
+[[nodiscard]] Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnostics);
 
 }  // namespace slabwright

@@ -20,6 +20,24 @@ std::int32_t safe_pitch(double radius, double gouge) {
 double simplify_tolerance_units(double gouge) { return 0.12 * gouge * kUnitsPerMm; }
 double arc_tolerance_units(double gouge) { return 0.18 * gouge * kUnitsPerMm; }
 
+FinishSlopes finish_slopes(const Cutting& cutting) {
+    constexpr double degree = std::numbers::pi / 180, none = 2;
+    // Contours of what is as good as level run anywhere; a ball's place over a wall is decided by the last bit.
+    const double level = 0.5 * degree, wall = std::min(cutting.vertical_deg, 89.9) * degree, limit = cutting.steep_limit_deg * degree,
+                 overlap = cutting.overlap_deg * degree;
+    switch (cutting.finish_strategy) {
+        case FinishStrategy::levels:
+            return {level, level, -1, -1};
+        case FinishStrategy::projection:
+            return {none, none, wall, wall};
+        case FinishStrategy::both:
+            return {level, limit, wall, limit};
+        case FinishStrategy::split:
+            break;
+    }
+    return {limit - overlap, limit - overlap, limit + overlap, limit + overlap};
+}
+
 // The machine's travel is centred on the stock; the planner has made sure that the stock lies within it.
 double LayerCut::low(int axis, double beyond) const {
     const double travel = axis == 0 ? job.machine.travel_x : job.machine.travel_y;
@@ -153,20 +171,29 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     take(rough_layer(cut));
     take(finish_floors(cut));
     take(finish_walls(cut));
-    // What stands now decides the rest: waste where the roughing cutter does not fit before the ball finishes, and after it
-    // the corners that the ball leaves, by the flat end mill, and what is left of the cusps' limit anywhere.
-    const Tool &ball = tool_of_kind(cut.job, ToolKind::ball), &flat = tool_of_kind(cut.job, ToolKind::flat);
-    LayerStock stock(cut, stock_cell(cut.job, layer.stock_max[0] - layer.stock_min[0], layer.stock_max[1] - layer.stock_min[1]));
-    for (const Operation& op : result.operations)
-        if (op.kind != OperationKind::face) stock.cut(cut, op, flat);
-    take(cut_rest(cut, stock, ball, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
-    for (Operation op : {finish_levels(cut, result.diagnostics), finish_raster(cut, result.diagnostics)}) {
-        stock.cut(cut, op, ball);
-        take(std::move(op));
+    auto finish = [&](auto&& done) {
+        for (Operation op :
+             {finish_levels(cut, result.diagnostics),
+              cut.job.cutting.projection == Projection::offset ? finish_offsets(cut, result.diagnostics) : finish_raster(cut, result.diagnostics)}) {
+            done(op);
+            take(std::move(op));
+        }
+    };
+    if (cut.job.cutting.uniform_steps) {
+        finish([](const Operation&) {});
+    } else {
+        // What stands now decides the rest: waste where the roughing cutter does not fit before the ball finishes, and after it
+        // the corners that the ball leaves, by the flat end mill, and what is left of the cusps' limit anywhere.
+        const Tool &ball = tool_of_kind(cut.job, ToolKind::ball), &flat = tool_of_kind(cut.job, ToolKind::flat);
+        LayerStock stock(cut, stock_cell(cut.job, layer.stock_max[0] - layer.stock_min[0], layer.stock_max[1] - layer.stock_min[1]));
+        for (const Operation& op : result.operations)
+            if (op.kind != OperationKind::face) stock.cut(cut, op, flat);
+        take(cut_rest(cut, stock, ball, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
+        finish([&](const Operation& op) { stock.cut(cut, op, ball); });
+        const double limit = cut.job.tolerances.cusp + 0.02;
+        take(cut_rest(cut, stock, flat, {OperationKind::corner, "corners", limit, false}));
+        take(cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", limit, false}));
     }
-    const double limit = cut.job.tolerances.cusp + 0.02;
-    take(cut_rest(cut, stock, flat, {OperationKind::corner, "corners", limit, false}));
-    take(cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", limit, false}));
     report_loose(cut, result);
     // Last, so that everything before has straight moves only to think of.
     const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};

@@ -244,7 +244,9 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const Tool& tool = tool_of_kind(cut.job, ToolKind::ball);
     Operation op = cut.operation(OperationKind::finish, "level contours", tool);
     const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut), degree = std::numbers::pi / 180;
-    const double split = (cut.job.cutting.steep_limit_deg - cut.job.cutting.overlap_deg) * degree;
+    const FinishSlopes slopes = finish_slopes(cut.job.cutting);
+    const double split = slopes.levels_from;
+    if (split > std::numbers::pi / 2) return op;
     double low = 1e300, high = -1e300;
     bool any_vertical = false;
     for (const SolidFacet& f : cut.solid.facets) {
@@ -260,7 +262,8 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const double lowest = std::max(cut.layer.floor_below, low - r);
     double bite = 0;
     for (double z = high; z > lowest;) {
-        const double alpha = cut.least_slope(z - tool.stepdown_max, std::min(high, z + r), split);
+        const bool everywhere = cut.job.cutting.uniform_steps;
+        const double alpha = cut.least_slope(everywhere ? low : z - tool.stepdown_max, everywhere ? high : std::min(high, z + r), slopes.levels_keep);
         double step = std::min(ball_level_stepdown(r, alpha, cut.job.tolerances.cusp), tool.stepdown_max);
         if (step < cut.job.cutting.min_stepdown) {
             bite = std::max(bite, ball_level_cusp(r, alpha, cut.job.cutting.min_stepdown));

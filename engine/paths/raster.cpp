@@ -17,7 +17,11 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const Tool& tool = tool_of_kind(cut.job, ToolKind::ball);
     Operation op = cut.operation(OperationKind::finish, "projected raster", tool);
     const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, cusp = cut.job.tolerances.cusp;
-    const double keep_nz = std::cos((cut.job.cutting.steep_limit_deg + cut.job.cutting.overlap_deg) * std::numbers::pi / 180);
+    const FinishSlopes slopes = finish_slopes(cut.job.cutting);
+    if (slopes.projection_to < 0) return op;
+    // Steeper than step_nz the cusp is kept by the level contours, where both cut everything.
+    const double keep_nz = std::cos(slopes.projection_to), step_nz = std::cos(slopes.projection_keep) - 1e-9;
+    const bool uniform = cut.job.cutting.uniform_steps, steeper = slopes.projection_keep < slopes.projection_to;
     constexpr double level_nz = 0.999999;
 
     std::vector<SolidFacet> shallow;
@@ -32,19 +36,22 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     constexpr double strip = 0.5;
     std::vector<float> facing(static_cast<std::size_t>((y_high - y_low) / strip) + 1, -1);  // −1: nothing shallow there
     for (const SolidFacet& f : shallow) {
+        if (f.nz < step_nz) continue;
         const auto [low, high] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
         for (auto s = static_cast<std::size_t>((low - y_low) / strip), e = static_cast<std::size_t>((high - y_low) / strip); s <= e; ++s)
             facing[s] = std::max(facing[s], static_cast<float>(std::abs(f.normal[1])));
     }
     std::vector<std::int32_t> lines;
     bool floor_bites = false;
-    for (double y = y_low - 0.5 * r; y <= y_high + 0.5 * r;) {
+    const float worst = *std::max_element(facing.begin(), facing.end());
+    const double reach_beside = r * std::sqrt(1 - keep_nz * keep_nz);  // how far the ball stands from its contact
+    for (double y = y_low - reach_beside; y <= y_high + reach_beside;) {
         lines.push_back(to_units(y));
         // The ball at y touches within r of it; the pass must be near enough for the steepest face in between.
         const auto index = [&](double v) {
             return std::clamp<long>(static_cast<long>(std::floor((v - y_low) / strip)), 0, static_cast<long>(facing.size()) - 1);
         };
-        float most = 0;
+        float most = uniform ? std::max(worst, 0.0F) : 0;
         for (long s = index(y - r); s <= index(y + r); ++s) most = std::max(most, facing[static_cast<std::size_t>(s)]);
         double d = raster_stepover(r, cusp, most);
         if (d < cut.job.cutting.min_stepover) d = cut.job.cutting.min_stepover, floor_bites = true;
@@ -76,6 +83,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         double tip = 0;             // mm
         std::array<double, 3> contact{};
         bool wanted = false, reachable = false, cut = false;
+        bool steep = false;  // the level contours keep the cusp here
     };
     using Line = std::vector<Sample>;
     auto sample = [&](std::int32_t ux, std::int32_t uy) {
@@ -83,6 +91,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         const Rest rest = ball.drop(x, y);
         Sample s;
         s.x = ux;
+        s.steep = steeper && rest.nz < step_nz;
         s.contact = {x - r * rest.nx, y - r * rest.ny, rest.contact_z(r)};
         const double contact = s.contact[2];
         s.wanted = rest.nz >= keep_nz && !rest.on_cap && contact >= cut.layer.z_bottom - 0.02 && contact < cut.layer.z_top - 1e-6 &&
@@ -96,14 +105,22 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     // Between two places of the ball a cusp of about c·δ/(8r) stays, c the way between the contacts and δ the way of the
     // ball: on a plane both are the same, in a hollow the contacts run ahead of the ball.
     auto too_far = [&](const Sample& a, std::int32_t ya, const Sample& b, std::int32_t yb) {
-        if (!a.reachable || !b.reachable || (a.contact[2] < cut.layer.z_bottom && b.contact[2] < cut.layer.z_bottom)) return false;
+        if (!a.reachable || !b.reachable || (a.steep && b.steep) || (a.contact[2] < cut.layer.z_bottom && b.contact[2] < cut.layer.z_bottom))
+            return false;
         const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
         const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(ya) - to_mm(yb), a.tip - b.tip);
         return c * d > 8 * r * cusp * 1.5;
     };
-    const std::int32_t finest = to_units(0.02);
+    // Where walls are projected too, a line follows them in safe chords, down to the last place that the ball reaches.
+    const bool walls = cut.job.cutting.finish_strategy != FinishStrategy::split;
+    const std::int32_t finest = to_units(walls ? 0.005 : 0.02);
+    auto apart = [&](const Sample& a, const Sample& b) {
+        if (!a.reachable || !b.reachable) return a.reachable != b.reachable;
+        return std::hypot(to_mm(a.x) - to_mm(b.x), a.tip - b.tip) > chord;
+    };
     auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t y) -> void {
-        if (!line.empty() && b.x - line.back().x <= step && b.x - line.back().x > 2 * finest && too_far(line.back(), y, b, y)) {
+        if (!line.empty() && b.x - line.back().x <= step && b.x - line.back().x > 2 * finest &&
+            (too_far(line.back(), y, b, y) || (walls && apart(line.back(), b)))) {
             const Sample middle = sample(line.back().x + (b.x - line.back().x) / 2, y);
             self(self, line, middle, y);
             self(self, line, b, y);
@@ -155,7 +172,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         Line line;
     };
     std::vector<std::vector<Between>> between(lines.size());
-    parallel_each(cut.context, lines.size() - 1, [&](std::size_t l) {
+    parallel_each(cut.context, uniform ? 0 : lines.size() - 1, [&](std::size_t l) {
         auto refine = [&](auto&& self, const Line& a, std::int32_t ya, const Line& b, std::int32_t yb) -> void {
             if (yb - ya < 2 * finest) return;
             const std::int32_t y = ya + (yb - ya) / 2;
