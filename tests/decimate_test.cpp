@@ -1,0 +1,177 @@
+// Fewer facets for a picture: how many, how near, how closed, and the same on any number of threads.
+#include "kernels/mesh/decimate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "kernels/access/closest_point.h"
+#include "kernels/access/deviation.h"
+#include "kernels/errors.h"
+#include "kernels/mesh/slopes.h"
+#include "kernels/mesh/weld.h"
+#include "tests/data/models.h"
+
+namespace slabwright {
+namespace {
+
+Mesh welded(Context& context, const std::vector<Facet>& facets) { return weld(context, facets); }
+
+double volume(MeshView mesh) {
+    double six = 0;
+    for (const Index3& f : mesh.facets) {
+        const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
+        six += a.x * (double{b.y} * c.z - double{b.z} * c.y) - a.y * (double{b.x} * c.z - double{b.z} * c.x) +
+               a.z * (double{b.x} * c.y - double{b.y} * c.x);
+    }
+    return six / 6;
+}
+
+/// Every edge of a closed, oriented mesh is used as often in one direction as in the other.
+bool closed(MeshView mesh) {
+    std::map<std::pair<std::uint32_t, std::uint32_t>, int> balance;
+    for (const Index3& f : mesh.facets)
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint32_t a = f[k], b = f[(k + 1) % 3];
+            balance[{std::min(a, b), std::max(a, b)}] += a < b ? 1 : -1;
+        }
+    for (const auto& [edge, sum] : balance)
+        if (sum != 0) return false;
+    return true;
+}
+
+TEST(Decimate, KeepsTheShapeOfOwnModels) {
+    Context context;
+    for (const auto& facets : {half_sphere(), pump_cover()}) {
+        const Mesh mesh = welded(context, facets);
+        const std::size_t wished = mesh.facets.size() / 4;
+        const Mesh few = decimate(context, mesh.view(), wished);
+        EXPECT_LE(few.facets.size(), wished);
+        EXPECT_GT(few.facets.size(), wished * 9 / 10);
+        EXPECT_TRUE(closed(few.view()));
+        EXPECT_NEAR(volume(few.view()), volume(mesh.view()), 0.003 * volume(mesh.view()));
+        const double error = surface_deviation(context, mesh.view(), few.view());
+        const Box3 box = bounds(mesh.view());
+        EXPECT_GT(error, 0);
+        EXPECT_LT(error, 0.003 * (box.max.x - box.min.x));
+    }
+}
+
+TEST(Decimate, FlatPlatesNeedFewFacets) {
+    // A plate whose top is a fine grid: all of that is flat, so hardly anything of it is needed, and nothing moves.
+    std::vector<Facet> facets;
+    const int n = 30;
+    const auto quad = [&](Vec3f a, Vec3f b, Vec3f c, Vec3f d) {
+        facets.push_back({a, b, c});
+        facets.push_back({a, c, d});
+    };
+    const auto f = [](int v) { return static_cast<float>(v); };
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+            quad({f(i), f(j), 5}, {f(i + 1), f(j), 5}, {f(i + 1), f(j + 1), 5}, {f(i), f(j + 1), 5});
+            quad({f(i), f(j), 0}, {f(i), f(j + 1), 0}, {f(i + 1), f(j + 1), 0}, {f(i + 1), f(j), 0});
+        }
+    for (int i = 0; i < n; ++i) {
+        quad({f(i), 0, 0}, {f(i + 1), 0, 0}, {f(i + 1), 0, 5}, {f(i), 0, 5});
+        quad({f(i + 1), f(n), 0}, {f(i), f(n), 0}, {f(i), f(n), 5}, {f(i + 1), f(n), 5});
+        quad({0, f(i + 1), 0}, {0, f(i), 0}, {0, f(i), 5}, {0, f(i + 1), 5});
+        quad({f(n), f(i), 0}, {f(n), f(i + 1), 0}, {f(n), f(i + 1), 5}, {f(n), f(i), 5});
+    }
+    Context context;
+    const Mesh mesh = welded(context, facets);
+    ASSERT_TRUE(closed(mesh.view()));
+    const Mesh few = decimate(context, mesh.view(), 60);
+    EXPECT_LE(few.facets.size(), 60u);
+    EXPECT_TRUE(closed(few.view()));
+    EXPECT_LT(surface_deviation(context, mesh.view(), few.view()), 1e-3);
+    EXPECT_NEAR(volume(few.view()), 5.0 * n * n, 1e-2);
+}
+
+TEST(Decimate, SameOnAnyThreadsAndUntouchedWhenSmall) {
+    Context one({.threads = 1}), four({.threads = 4});
+    const Mesh mesh = welded(one, pump_cover());
+    const Mesh a = decimate(one, mesh.view(), 3000), b = decimate(four, mesh.view(), 3000);
+    EXPECT_EQ(a.vertices, b.vertices);
+    EXPECT_EQ(a.facets, b.facets);
+    const Mesh same = decimate(one, mesh.view(), mesh.facets.size());
+    EXPECT_EQ(same.facets.size(), mesh.facets.size());
+    EXPECT_LT(surface_deviation(one, mesh.view(), same.view()), 1e-9);
+    EXPECT_TRUE(decimate(one, MeshView{}, 100).facets.empty());
+}
+
+TEST(Decimate, Cancels) {
+    Context context;
+    const Mesh mesh = welded(context, pump_cover());
+    context.cancel();
+    EXPECT_THROW((void)decimate(context, mesh.view(), 1000), Error);
+}
+
+TEST(Deviation, IsTheDistanceOfShiftedPlanes) {
+    Context context;
+    const std::uint32_t seed = 7;
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    for (int round = 0; round < 20; ++round) {
+        const float up = std::uniform_real_distribution<float>(0.01f, 3.0f)(random);
+        Mesh a, b;
+        a.vertices = {{0, 0, 0}, {10, 0, 0}, {0, 10, 0}};
+        b.vertices = {{0, 0, up}, {10, 0, up}, {0, 10, up}};
+        a.facets = b.facets = {{0, 1, 2}};
+        EXPECT_NEAR(surface_deviation(context, a.view(), b.view()), up, 1e-6);
+    }
+}
+
+TEST(Slopes, OfACone) {
+    // A cone of slope 60° on a base: every height but the base has the slope of its facets.
+    std::vector<Facet> facets;
+    const int n = 360;
+    const float radius = 20, height = static_cast<float>(radius * std::tan(M_PI / 3));
+    const auto rim = [&](int i) {
+        const double angle = 2 * M_PI * (i % n) / n;
+        return Vec3f{static_cast<float>(radius * std::cos(angle)), static_cast<float>(radius * std::sin(angle)), 0};
+    };
+    for (int i = 0; i < n; ++i) {
+        facets.push_back({Vec3f{0, 0, height}, rim(i), rim(i + 1)});
+        facets.push_back({Vec3f{0, 0, 0}, rim(i + 1), rim(i)});
+    }
+    Context context;
+    const Mesh mesh = welded(context, facets);
+    const SlopeProfile profile = slope_profile(mesh.view(), 50);
+    for (const double least : profile.least_deg) EXPECT_NEAR(least, 60, 0.05);
+    double sum = 0;
+    for (const double area : profile.area_mm2) sum += area;
+    EXPECT_NEAR(sum, M_PI * radius * 2 * radius, 0.5);  // slant length is twice the radius
+    EXPECT_NEAR(profile.down_flat_mm2, M_PI * radius * radius, 0.3);
+    EXPECT_EQ(profile.undercut_mm2, 0);
+}
+
+TEST(Slopes, AgreeWithBruteForceOnThePumpCover) {
+    Context context;
+    const Mesh mesh = welded(context, pump_cover());
+    const int steps = 37;
+    const SlopeProfile profile = slope_profile(mesh.view(), steps);
+    const double step = (profile.z_high - profile.z_low) / steps;
+    for (int i = 0; i < steps; ++i) {
+        const double low = profile.z_low + i * step, high = low + step;
+        double least = 90;
+        for (const Index3& f : mesh.facets) {
+            const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
+            if (std::max({a.z, b.z, c.z}) <= low + 1e-6 || std::min({a.z, b.z, c.z}) >= high - 1e-6) continue;
+            const double nx = (double{b.y} - a.y) * (double{c.z} - a.z) - (double{b.z} - a.z) * (double{c.y} - a.y);
+            const double ny = (double{b.z} - a.z) * (double{c.x} - a.x) - (double{b.x} - a.x) * (double{c.z} - a.z);
+            const double nz = (double{b.x} - a.x) * (double{c.y} - a.y) - (double{b.y} - a.y) * (double{c.x} - a.x);
+            if (nz < 0) continue;
+            least = std::min(least, std::atan2(std::hypot(nx, ny), nz) * 180 / M_PI);
+        }
+        // Flats at a step's very border belong to one side of it; the profile may take them where brute force does not.
+        EXPECT_LE(profile.least_deg[static_cast<std::size_t>(i)], least + 1e-6) << i;
+        if (profile.least_deg[static_cast<std::size_t>(i)] > 0.01) {
+            EXPECT_NEAR(profile.least_deg[static_cast<std::size_t>(i)], least, 1e-6) << i;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace slabwright
