@@ -188,9 +188,10 @@ const numbers = text => text.split(',').map(Number);
     await page.keyboard.press('Enter');
     await page.locator('#canvas').focus();
     await page.keyboard.press('Space');
-    await page.waitForTimeout(200);
+    const plays = await page.waitForFunction(() => Number(document.querySelector('#scene').dataset.share) > 0.5, null, {timeout: 20000}).then(() => true, () => false);
+    check.that('keyboard: plays', plays, await stage('share'));
     await page.keyboard.press('Space');
-    check.that('keyboard: plays', Number(await stage('share')) > 0.5, await stage('share'));
+    check.equal('keyboard: and pauses', await page.locator('#play').textContent(), 'Play');
 }
 
 // The accessibility checker, on the whole page and again in a narrow window.
