@@ -103,40 +103,79 @@ Plan plan(Context& context, const std::string& stl_path, const Job& job) {
     });
 }
 
+namespace {
+
+// All of a plan but what is found about it, into a folder under way.
+void fill(Context& context, const Plan& plan, const OutputFolder& out) {
+    struct PlannedProgram {
+        const Layer* layer;
+        const Operation* operation;
+    };
+    std::vector<PlannedProgram> programs;
+    for (const Layer& layer : plan.layers)
+        for (const Operation& operation : layer.operations) programs.push_back({&layer, &operation});
+    context.begin_phase("writing", 0.95, 1.0, programs.size() + 1);
+    std::filesystem::create_directory(out.path("nc"));
+    const auto write_whole = [&](const char* name, const std::string& text) {
+        OutputFile file(out.path(name));
+        file.write(text);
+        file.close();
+    };
+    // Each program is a file of its own, so threads cannot mix their texts.
+    parallel_each(context, programs.size(), [&](std::size_t i) {
+        OutputFile file(out.path("nc/" + programs[i].operation->file));
+        write_program(plan, *programs[i].layer, *programs[i].operation, [&](std::string_view piece) {
+            context.throw_if_cancelled();
+            file.write(piece);
+        });
+        file.close();
+        context.advance();
+    });
+    write_whole("tool.tbl", tool_table(plan.job));
+    write_whole("sequence.json", sequence_json(plan));
+    write_whole("plan.json", plan_json(plan));
+    context.throw_if_cancelled();
+    context.advance();
+}
+
+VerifyResult verdict(const Verification& found) {
+    VerifyResult result;
+    result.passed = found.report.passed();
+    result.gouge_mm = found.report.gouge_max;
+    result.cell_mm = found.report.cell;
+    result.minutes = found.report.seconds / 60;
+    for (const Violation& v : found.report.violations) {
+        Diagnostic d{Severity::error, v.code, v.message, v.where};
+        if (!v.file.empty()) d.message = v.line > 0 ? fmt::format("{}:{}: {}", v.file, v.line, v.message) : fmt::format("{}: {}", v.file, v.message);
+        result.violations.push_back(std::move(d));
+    }
+    return result;
+}
+
+}  // namespace
+
 void write(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path) {
     guarded([&] {
-        struct PlannedProgram {
-            const Layer* layer;
-            const Operation* operation;
-        };
-        std::vector<PlannedProgram> programs;
-        for (const Layer& layer : plan.layers)
-            for (const Operation& operation : layer.operations) programs.push_back({&layer, &operation});
-        context.begin_phase("writing", 0.95, 1.0, programs.size() + 1);
         OutputFolder out(directory);
-        std::filesystem::create_directory(out.path("nc"));
-        const auto write_whole = [&](const char* name, const std::string& text) {
-            OutputFile file(out.path(name));
-            file.write(text);
-            file.close();
-        };
-        // Each program is a file of its own, so threads cannot mix their texts.
-        parallel_each(context, programs.size(), [&](std::size_t i) {
-            OutputFile file(out.path("nc/" + programs[i].operation->file));
-            write_program(plan, *programs[i].layer, *programs[i].operation, [&](std::string_view piece) {
-                context.throw_if_cancelled();
-                file.write(piece);
-            });
-            file.close();
-            context.advance();
-        });
-        write_whole("tool.tbl", tool_table(plan.job));
-        write_whole("sequence.json", sequence_json(plan));
-        write_whole("plan.json", plan_json(plan));
+        fill(context, plan, out);
         if (!stl_path.empty() && reports_are_built()) write_report(context, out.path("").string(), {stl_path});
         context.throw_if_cancelled();
         out.commit();
-        context.advance();
+    });
+}
+
+VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path) {
+    return guarded([&] {
+        OutputFolder out(directory);
+        fill(context, plan, out);
+        VerifyOptions options;
+        options.stl = stl_path;
+        context.share_progress(0.5, 1);
+        const VerifyResult result = verdict(verify_folder(context, out.path("").string(), options));
+        if (reports_are_built()) write_report(context, out.path("").string(), {stl_path});
+        context.throw_if_cancelled();
+        out.commit();
+        return result;
     });
 }
 
@@ -149,19 +188,7 @@ VerifyResult verify(Context& context, const std::string& directory, const std::s
         VerifyOptions options;
         options.stl = stl_path;
         options.maps_directory = maps_directory;
-        const Verification found = verify_folder(context, directory, options);
-        VerifyResult result;
-        result.passed = found.report.passed();
-        result.gouge_mm = found.report.gouge_max;
-        result.cell_mm = found.report.cell;
-        result.minutes = found.report.seconds / 60;
-        for (const Violation& v : found.report.violations) {
-            Diagnostic d{Severity::error, v.code, v.message, v.where};
-            if (!v.file.empty())
-                d.message = v.line > 0 ? fmt::format("{}:{}: {}", v.file, v.line, v.message) : fmt::format("{}: {}", v.file, v.message);
-            result.violations.push_back(std::move(d));
-        }
-        return result;
+        return verdict(verify_folder(context, directory, options));
     });
 }
 

@@ -55,6 +55,13 @@ struct VerifyResult {
     std::vector<Diagnostic> violations;  ///< what must not be, with program, line and place; empty when passed
 };
 
+/// Writes as write() does, and verifies what it wrote before it takes its place: `directory` then holds verify.json too, also when the
+/// programs do not make the part. Cancelled or refused, it is as it was before.
+/// @param stl_path the pattern that was planned
+/// @throws Error as write() and verify()
+[[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
+                                                         const std::string& stl_path);
+
 /// Simulates the programs in `directory` against the pattern, from the folder's text alone, and writes verify.json into it.
 /// @param stl_path the pattern; "" looks for the file that plan.json names: in the folder, beside it, where the caller stands
 /// @param maps_directory where a picture of each layer is written, layer_01.ppm and so on: what is left over, missed, unreachable or

@@ -37,7 +37,7 @@ struct Options {
     std::string stl, out, maps, job_file, units, strategy, finder;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10;
-    bool allow_undercut = false, json = false, quiet = false, defaults = false, weld_given = false, no_3d = false;
+    bool allow_undercut = false, no_verify = false, json = false, quiet = false, defaults = false, weld_given = false, no_3d = false;
 };
 
 /// A bar with phase and time left, redrawn at most ten times a second on a terminal's last line.
@@ -162,7 +162,19 @@ std::string summary(const Plan& plan, const std::string& out) {
     return text;
 }
 
-std::string summary_json(const Plan& plan, const std::string& out) {
+/// What the simulation of the programs says.
+std::string verdict(const VerifyResult& result, const std::string& out) {
+    std::string text =
+        fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, {}\n", out, result.passed ? "makes the part" : "does NOT make the part",
+                    result.gouge_mm, result.cell_mm, duration(result.minutes));
+    constexpr std::size_t shown = 20;  // verify.json holds them all
+    for (std::size_t i = 0; i < std::min(shown, result.violations.size()); ++i)
+        text += fmt::format("{}: {}\n", result.violations[i].code, result.violations[i].message);
+    if (result.violations.size() > shown) text += fmt::format("{} more in verify.json\n", result.violations.size() - shown);
+    return text;
+}
+
+std::string summary_json(const Plan& plan, const std::string& out, const VerifyResult* found) {
     JsonText json;
     json.begin_object();
     json.key("plan").string(out + "/plan.json");
@@ -170,6 +182,10 @@ std::string summary_json(const Plan& plan, const std::string& out) {
     json.key("build_minutes").rounded(plan.totals.build_minutes, 4);
     json.key("diagnostics");
     put_diagnostics(json, plan.diagnostics);
+    if (found) {
+        json.key("verified").boolean(found->passed).key("violations");
+        put_diagnostics(json, found->violations);
+    }
     json.end();
     return json.take();
 }
@@ -215,14 +231,23 @@ void with_context(const Options& options, Body&& body) {
     if (!options.quiet) print(output);
 }
 
-void run_plan(const Options& options) {
+/// Returns whether the programs make the part, as far as that was asked.
+bool run_plan(const Options& options) {
     const Job job = job_of(options);
     require_replaceable(options.out);  // before an hour of planning, not after it
+    bool passed = true;
     with_context(options, [&](Context& context) {
+        if (!options.no_verify) context.share_progress(0, 0.5);
         const Plan result = plan(context, options.stl, job);
-        write(context, result, options.out, options.stl);
-        return options.json ? summary_json(result, options.out) : summary(result, options.out);
+        if (options.no_verify) {
+            write(context, result, options.out, options.stl);
+            return options.json ? summary_json(result, options.out, nullptr) : summary(result, options.out);
+        }
+        const VerifyResult found = write_verified(context, result, options.out, options.stl);
+        passed = found.passed;
+        return options.json ? summary_json(result, options.out, &found) : summary(result, options.out) + verdict(found, options.out);
     });
+    return passed;
 }
 
 /// A report that lies in the folder is made again, as light or as full as it was, so that it tells what the simulation found. What keeps it
@@ -243,19 +268,12 @@ std::string refresh_report(Context& context, const Options& options) {
     }
 }
 
-/// Returns whether the programs make the part.
 bool run_verify(const Options& options) {
     bool passed = false;
     with_context(options, [&](Context& context) {
         const VerifyResult result = verify(context, options.out, options.stl, options.maps);
         passed = result.passed;
-        std::string text = fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, {:.0f} min\n", options.out,
-                                       passed ? "makes the part" : "does NOT make the part", result.gouge_mm, result.cell_mm, result.minutes);
-        constexpr std::size_t shown = 20;  // verify.json holds them all
-        for (std::size_t i = 0; i < std::min(shown, result.violations.size()); ++i)
-            text += fmt::format("{}: {}\n", result.violations[i].code, result.violations[i].message);
-        if (result.violations.size() > shown) text += fmt::format("{} more in verify.json\n", result.violations.size() - shown);
-        return text + refresh_report(context, options);
+        return verdict(result, options.out) + refresh_report(context, options);
     });
     return passed;
 }
@@ -328,6 +346,8 @@ int main(int argc, char** argv) {
     plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")->check(CLI::IsMember({"exact", "halving", "both"}));
     plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
 
+    plan_command->add_flag("--no-verify", options.no_verify, "write the plan without simulating its programs");
+
     CLI::App* verify_command = app.add_subcommand("verify", "simulate the programs of a plan against the pattern");
     verify_command->add_option("OUT", options.out, "folder of the plan")->required();
     verify_command->add_option("--stl", options.stl, "the pattern; the file that plan.json names, if not given");
@@ -367,7 +387,7 @@ int main(int argc, char** argv) {
         return complain(Error(ErrorKind::usage, "usage", error.what(), "", "see slabwright --help"), json_wanted);
     }
     try {
-        if (*plan_command) run_plan(options);
+        if (*plan_command) return run_plan(options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*verify_command) return run_verify(options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*report_command) run_report(options);
         else if (*inspect_command) run_inspect(options);

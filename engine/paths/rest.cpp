@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <optional>
 
 #include "engine/paths/chains.h"
@@ -24,7 +25,7 @@ constexpr double kBridge = 3.0;   // mm between two useful stretches that are tr
 
 // A place of the cutter on the surface.
 struct Place {
-    std::int32_t x = 0, z = 0;  // 0.1 µm
+    std::int32_t x = 0, y = 0, z = 0;  // 0.1 µm
     double tip = 0;             // mm
     std::array<double, 3> contact{};
     bool reachable = false, useful = false, cut = false;
@@ -173,6 +174,7 @@ private:
         const Rest rest = index_->drop(x, y);
         Place p;
         p.x = ux;
+        p.y = uy;
         // A flat end mill stands on the layer's bottom; a ball may pass it where its shape needs it, over waste it does not.
         const double lowest = ball_ && rest.tip_z > cut_.layer.z_bottom - r_ ? cut_.layer.floor_below : cut_.layer.z_bottom;
         p.tip = std::max(rest.tip_z, std::max(lowest, cut_.layer.floor_below));
@@ -185,23 +187,22 @@ private:
         return p;
     }
 
-    [[nodiscard]] bool too_far(const Place& a, std::int32_t ya, const Place& b, std::int32_t yb) const {
+    [[nodiscard]] bool too_far(const Place& a, const Place& b) const {
         if (!a.reachable && !b.reachable) return false;
         if (!ball_ || !a.reachable || !b.reachable) {
             if (std::abs(a.tip - b.tip) <= kJump) return false;
             if (a.useful || b.useful) return true;
             // Neither place helps, but one between them may, where the lower of them is stopped by a wall.
             const Place& low = a.tip < b.tip ? a : b;
-            return lowers(to_mm(low.x), to_mm(a.tip < b.tip ? ya : yb), low.tip, std::max(to_mm(std::abs(b.x - a.x)), to_mm(std::abs(yb - ya))));
+            return lowers(to_mm(low.x), to_mm(low.y), low.tip, to_mm(std::max(std::abs(b.x - a.x), std::abs(b.y - a.y))));
         }
-        if (!a.useful && !b.useful) return false;
         const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
-        const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(ya) - to_mm(yb), a.tip - b.tip);
+        const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(a.y) - to_mm(b.y), a.tip - b.tip);
         return c * d > 8 * r_ * cut_.job.tolerances.cusp;
     }
 
     void append_between(std::vector<Place>& line, std::int32_t y, Place b) const {
-        if (!line.empty() && b.x - line.back().x <= step_ && b.x - line.back().x > 2 * to_units(kFinest) && too_far(line.back(), y, b, y)) {
+        if (!line.empty() && b.x - line.back().x <= step_ && b.x - line.back().x > 2 * to_units(kFinest) && too_far(line.back(), b)) {
             append_between(line, y, place(line.back().x + (b.x - line.back().x) / 2, y));
             append_between(line, y, b);
             return;
@@ -243,7 +244,7 @@ private:
                 for (const Place& p : a.places) {
                     if (p.x % step_ != 0) continue;
                     const Place* other = at(b, p.x);
-                    if (!other || !too_far(p, a.y, *other, b.y)) continue;
+                    if (!other || !too_far(p, *other)) continue;
                     for (const std::int32_t x : {p.x - step_, p.x, p.x + step_})
                         if (middle.places.empty() || x > middle.places.back().x) append_between(middle.places, middle.y, place(x, middle.y));
                 }
@@ -259,46 +260,71 @@ private:
             for (Line& line : group) lines_.push_back(std::move(line));
     }
 
-    // Where the cutter sinks deepest between walls (a hole narrower than itself, the meeting of three faces) no raster hits the
-    // place: from every low point of a line it slides down to where it rests on all sides.
+    // Where the cutter sinks deepest between walls (a slot hardly wider than itself, a hole narrower, the meeting of three faces)
+    // no raster hits the place: from where a line, or the lines beside it, are higher on both sides it slides down to where it
+    // rests on all sides. What lies in a row is travelled as a line.
     void settle() {
+        std::vector<std::size_t> by_y(lines_.size());
+        std::iota(by_y.begin(), by_y.end(), std::size_t{0});
+        std::sort(by_y.begin(), by_y.end(), [&](std::size_t a, std::size_t b) { return std::pair(lines_[a].y, a) < std::pair(lines_[b].y, b); });
+        auto higher = [&](const Place* beside, const Place& p) { return beside && p.tip < beside->tip - kSettle; };
+        auto beside = [&](std::size_t rank, bool after, std::int32_t x) -> const Place* {
+            constexpr std::size_t look = 4;  // lines between may not come by here
+            for (std::size_t k = 1; k <= look; ++k) {
+                if (after ? rank + k >= by_y.size() : k > rank) return nullptr;
+                if (const Place* p = at(lines_[by_y[after ? rank + k : rank - k]], x)) return p;
+            }
+            return nullptr;
+        };
         std::vector<std::vector<Line>> found(lines_.size());
-        parallel_each(cut_.context, lines_.size(), [&](std::size_t l) {
+        parallel_each(cut_.context, lines_.size(), [&](std::size_t rank) {
+            const std::size_t l = by_y[rank];
             const std::vector<Place>& places = lines_[l].places;
-            for (std::size_t i = 1; i + 1 < places.size(); ++i) {
+            for (std::size_t i = 0; i < places.size(); ++i) {
                 const Place& p = places[i];
-                if (!p.useful || places[i + 1].x - places[i - 1].x > 2 * step_) continue;
-                if (p.tip > places[i - 1].tip - kSettle || p.tip > places[i + 1].tip - kSettle) continue;
-                std::int32_t x = p.x, y = lines_[l].y;
-                double tip = p.tip;
-                for (std::int32_t stride = to_units(0.1); stride >= to_units(0.0005); stride /= 2)
-                    for (bool moved = true; moved;) {
-                        moved = false;
-                        for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
-                            const double lower = index_->drop(to_mm(x + dx * stride), to_mm(y + dy * stride)).tip_z;
-                            if (lower >= tip - 1e-4) continue;
-                            x += dx * stride, y += dy * stride, tip = lower, moved = true;
-                            break;
-                        }
-                    }
-                Line single{y, {place(x, y)}};
-                if (single.places[0].useful) found[l].push_back(std::move(single));
+                if (!p.reachable) continue;
+                const bool in_line = i > 0 && i + 1 < places.size() && places[i + 1].x - places[i - 1].x <= 2 * step_ && higher(&places[i - 1], p) &&
+                                     higher(&places[i + 1], p);
+                const bool across = !in_line && p.x % step_ == 0 && higher(beside(rank, false, p.x), p) && higher(beside(rank, true, p.x), p);
+                if (!in_line && !across) continue;
+                const Place low = slide(p);
+                if (!low.useful) continue;
+                std::vector<Line>& lines = found[l];
+                if (!lines.empty() && apart(lines.back().places.back(), low) <= chord_ * kUnitsPerMm) lines.back().places.push_back(low);
+                else lines.push_back({low.y, {low}});
             }
         });
-        std::vector<Line> all;
-        for (auto& lines : found)
-            for (Line& line : lines) all.push_back(std::move(line));
-        for (Line& line : all) lines_.push_back(std::move(line));
+        for (std::size_t rank = 0; rank < by_y.size(); ++rank)
+            for (Line& line : found[by_y[rank]]) lines_.push_back(std::move(line));
     }
+
+    [[nodiscard]] Place slide(const Place& from) const {
+        std::int32_t x = from.x, y = from.y;
+        double tip = from.tip;
+        for (std::int32_t stride = to_units(0.1); stride >= to_units(0.0005); stride /= 2)
+            for (bool moved = true; moved;) {
+                moved = false;
+                for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
+                    const double lower = index_->drop(to_mm(x + dx * stride), to_mm(y + dy * stride)).tip_z;
+                    if (lower >= tip - 1e-4) continue;
+                    x += dx * stride, y += dy * stride, tip = lower, moved = true;
+                    break;
+                }
+                if (tip < cut_.layer.floor_below) break;
+            }
+        return place(x, y);
+    }
+
+    static double apart(const Place& a, const Place& b) { return std::hypot(static_cast<double>(a.x) - b.x, static_cast<double>(a.y) - b.y); }
 
     // Coarse lines before fine ones: what a place no longer lowers after those before it is not visited.
     void keep_what_lowers() {
         if (pass_.in_steps) before_ = stock_;
         for (Line& line : lines_)
             for (Place& p : line.places) {
-                if (!p.useful || !lowers(to_mm(p.x), to_mm(line.y), p.tip)) continue;
+                if (!p.useful || !lowers(to_mm(p.x), to_mm(p.y), p.tip)) continue;
                 p.cut = true;
-                stock_.cut_at(end_, to_mm(p.x), to_mm(line.y), p.tip);
+                stock_.cut_at(end_, to_mm(p.x), to_mm(p.y), p.tip);
             }
     }
 
@@ -320,7 +346,7 @@ private:
         std::vector<PathPoint> points;
         std::size_t last_cut = 0;
         const Place* before = nullptr;
-        std::int32_t last_cut_x = 0;
+        const Place* last = nullptr;  // that cuts
         auto close = [&] {
             points.resize(last_cut);
             if (!points.empty()) runs.push_back(simplify(points, simplify_tolerance_units(cut_.job.tolerances.gouge)));
@@ -328,13 +354,13 @@ private:
             last_cut = 0;
         };
         for (const Place& p : line.places) {
-            const bool apart = before && p.x - before->x > step_;
-            if (!points.empty() && (apart || !p.reachable || (!p.cut && p.x - last_cut_x > to_units(kBridge)))) close();
+            const bool gap = before && apart(p, *before) > chord_ * kUnitsPerMm;
+            if (!points.empty() && (gap || !p.reachable || (!p.cut && apart(p, *last) > to_units(kBridge)))) close();
             if (p.reachable && (p.cut || !points.empty())) {
                 // One place beside the first: the cutter comes in along the surface instead of straight down.
-                if (points.empty() && before && !apart && before->reachable) append(points, {before->x, line.y, before->z});
-                append(points, {p.x, line.y, p.z});
-                if (p.cut) last_cut = points.size(), last_cut_x = p.x;
+                if (points.empty() && before && !gap && before->reachable) append(points, {before->x, before->y, before->z});
+                append(points, {p.x, p.y, p.z});
+                if (p.cut) last_cut = points.size(), last = &p;
             }
             before = &p;
         }

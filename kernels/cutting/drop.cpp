@@ -110,6 +110,19 @@ DropIndex::DropIndex(Context& context, const LayerSolid& solid, const Cutter& cu
     rows_ = static_cast<std::size_t>(depth / cell_) + 1;
     auto column = [&](double x) { return std::min(columns_ - 1, static_cast<std::size_t>(std::max(0.0, (x - x0_) / cell_))); };
     auto row = [&](double y) { return std::min(rows_ - 1, static_cast<std::size_t>(std::max(0.0, (y - y0_) / cell_))); };
+    bounds_.resize(solid.facets.size());
+    parallel_for(context, solid.facets.size(), std::size_t{1} << 14, [&](std::size_t begin, std::size_t end) {
+        constexpr float inf = std::numeric_limits<float>::infinity();
+        for (std::size_t i = begin; i < end; ++i) {
+            const SolidFacet& f = solid.facets[i];
+            const auto [xl, xh] = std::minmax({f.p[0][0], f.p[1][0], f.p[2][0]});
+            const auto [yl, yh] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
+            bounds_[i] = {std::nextafter(static_cast<float>(xl), -inf), std::nextafter(static_cast<float>(xh), inf),
+                          std::nextafter(static_cast<float>(yl), -inf), std::nextafter(static_cast<float>(yh), inf),
+                          std::nextafter(static_cast<float>(f.z_max), inf), static_cast<std::uint16_t>(column(xl)),
+                          static_cast<std::uint16_t>(row(yl))};
+        }
+    });
     starts_.assign(columns_ * rows_ + 1, 0);
     for (int pass = 0; pass < 2; ++pass) {
         for (std::size_t i = 0; i < solid.facets.size(); ++i) {
@@ -192,8 +205,12 @@ Rest DropIndex::drop(double x, double y) const {
     for (std::size_t row = r0; row <= r1; ++row)
         for (std::size_t column = c0; column <= c1; ++column) {
             for (std::uint32_t k = starts_[row * columns_ + column]; k < starts_[row * columns_ + column + 1]; ++k) {
+                const Bounds& b = bounds_[members_[k]];
+                if (b.z_max <= best.tip_z) break;
+                // Listed in several cells of this window it is looked at in the first of them; and only if it is near.
+                if (column != std::max<std::size_t>(c0, b.column) || row != std::max<std::size_t>(r0, b.row)) continue;
+                if (x + r < b.x_low || x - r > b.x_high || y + r < b.y_low || y - r > b.y_high) continue;
                 const SolidFacet& f = solid_.facets[members_[k]];
-                if (f.z_max <= best.tip_z) break;
                 if (ball) drop_ball(f, r, x, y, best);
                 else drop_flat(f, r, x, y, best);
             }

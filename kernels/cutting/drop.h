@@ -34,6 +34,12 @@ private:
     Cutter cutter_;
     double x0_ = 0, y0_ = 0, cell_ = 1;
     std::size_t columns_ = 0, rows_ = 0;
+    // Of a facet what decides whether it needs a look: its box, a little wider, and the first cell that lists it.
+    struct Bounds {
+        float x_low, x_high, y_low, y_high, z_max;
+        std::uint16_t column, row;
+    };
+    std::vector<Bounds> bounds_;
     std::vector<std::uint32_t> starts_, members_;  // facets by cell, highest first
     std::vector<std::uint32_t> cap_starts_;        // cap segments by row of cells
     struct CapSegment {

@@ -102,7 +102,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
             const Index3& facet = mesh.facets[f];
             const double z0 = mesh.vertices[facet[0]].z, z1 = mesh.vertices[facet[1]].z, z2 = mesh.vertices[facet[2]].z;
             const double low = std::min({z0, z1, z2}), high = std::max({z0, z1, z2});
-            if (low >= z_top || high < z_low) continue;  // a flat at the top itself belongs to the cap
+            if (low >= z_top - kTopSheet || high < z_low) continue;  // a flat at the top itself belongs to the cap
             append_facet(mesh, static_cast<std::uint32_t>(f), z_top, part);
         }
     });
@@ -113,7 +113,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
         solid.facets.insert(solid.facets.end(), part.begin(), part.end());
         std::vector<SolidFacet>().swap(part);
     }
-    const Plane top{z_top, Side::below};
+    const Plane top{z_top - kTopSheet, Side::below};
     solid.cap = std::move(slice(context, mesh, {&top, 1})[0].loops);
     solid.min = {1e300, 1e300};
     solid.max = {-1e300, -1e300};

@@ -26,9 +26,13 @@ struct SolidFacet {
 struct LayerSolid {
     double z_low = 0, z_top = 0;         ///< facets wholly below z_low are left out
     std::vector<SolidFacet> facets;      ///< in the order of the mesh
-    Loops cap;                           ///< the section just below z_top: the solid's flat upper end
+    Loops cap;                           ///< the section kTopSheet below z_top: the solid's flat upper end
     std::array<double, 2> min{}, max{};  ///< of the facets, in x and y
 };
+
+/// Material thinner than this under the layer's top is not counted, mm: a facet that lies in the top plane to within rounding belongs to
+/// the next layer.
+inline constexpr double kTopSheet = 0.001;
 
 /// @param z_low how far down a cutter of this layer can touch anything
 [[nodiscard]] LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_top);

@@ -48,6 +48,9 @@ public:
     /// Names the running phase and its share [from, to] of the whole; then advance() counts within it.
     void begin_phase(std::string_view name, double from, double to, std::uint64_t steps = 1);
     void advance(std::uint64_t steps = 1);
+    /// The phases that follow are shares of [from, to] of the whole, until the next call: one request may hold several,
+    /// each of which counts from 0 to 1.
+    void share_progress(double from, double to);
 
     [[nodiscard]] std::uint64_t memory_limit() const noexcept { return memory_limit_; }
     [[nodiscard]] std::uint64_t memory_charged() const noexcept { return charged_.load(std::memory_order_relaxed); }

@@ -37,6 +37,7 @@ struct Context::Impl {
     ProgressSink sink;
     std::mutex mutex;  // guards everything below
     std::string phase;
+    double share_from = 0, share_to = 1;  // of the whole, that phases divide
     double from = 0, to = 0, reported = 0;
     std::uint64_t steps = 1;
     std::atomic<std::uint64_t> done{0};
@@ -66,12 +67,18 @@ void Context::begin_phase(std::string_view name, double from, double to, std::ui
     throw_if_cancelled();
     const std::lock_guard lock(impl_->mutex);
     impl_->phase = name;
-    impl_->from = from;
-    impl_->to = to;
+    impl_->from = impl_->share_from + from * (impl_->share_to - impl_->share_from);
+    impl_->to = impl_->share_from + to * (impl_->share_to - impl_->share_from);
     impl_->steps = std::max<std::uint64_t>(1, steps);
     impl_->done.store(0, std::memory_order_relaxed);
-    impl_->reported = std::max(impl_->reported, from);
+    impl_->reported = std::max(impl_->reported, impl_->from);
     if (impl_->sink) impl_->sink({impl_->phase, impl_->reported});
+}
+
+void Context::share_progress(double from, double to) {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->share_from = from;
+    impl_->share_to = to;
 }
 
 void Context::advance(std::uint64_t steps) {
