@@ -61,7 +61,8 @@ void append_facet(MeshView mesh, std::uint32_t f, double z_top, std::vector<Soli
         const bool a_in = a[2] <= z_top, b_in = b[2] <= z_top;
         if (a_in) {
             corner[corners] = a;
-            edge[corners++] = matters[k] || (a[2] == z_top && b[2] == z_top);  // what lies beyond the top is not there
+            // What lies beyond an edge in the top is not there to test it.
+            edge[corners++] = matters[k] || (a[2] >= z_top - kTopSheet && b[2] >= z_top - kTopSheet);
         }
         if (a_in != b_in && a[2] != z_top && b[2] != z_top) {
             corner[corners] = cross_plane(a, b, z_top);
