@@ -189,7 +189,9 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         for (const Operation& op : result.operations)
             if (op.kind != OperationKind::face) stock.cut(cut, op, flat);
         take(cut_rest(cut, stock, ball, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
-        finish([&](const Operation& op) { stock.cut(cut, op, ball); });
+        finish([&](Operation& op) {
+            if (stock.cut(cut, op, ball) <= kEmpty) op.moves.clear();
+        });
         const double limit = cut.job.tolerances.cusp + 0.02;
         take(cut_rest(cut, stock, flat, {OperationKind::corner, "corners", limit, false}));
         take(cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", limit, false}));

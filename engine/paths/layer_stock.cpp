@@ -103,9 +103,9 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
     }
 }
 
-void LayerStock::cut(const LayerCut& cut, const Operation& operation, const Tool& tool) {
+float LayerStock::cut(const LayerCut& cut, const Operation& operation, const Tool& tool) {
     const std::vector<Move>& moves = operation.moves;
-    if (moves.size() < 2) return;
+    if (moves.size() < 2) return 0;
     const CutterEnd end = cutter_end(tool);
     const double r = end.radius, top = cut.layer.z_top;
     std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock);
@@ -114,6 +114,7 @@ void LayerStock::cut(const LayerCut& cut, const Operation& operation, const Tool
         if (i % kBlock == 0 && i > 0) boxes[i / kBlock].add(moves[i - 1]);
     }
     const int bands = (grid_.ny + kBand - 1) / kBand;
+    std::vector<float> most(static_cast<std::size_t>(bands), 0);
     parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
         const int first = static_cast<int>(band) * kBand, rows = std::min(kBand, grid_.ny - first);
         const CellGrid part{grid_.x0, grid_.y(first), grid_.cell, grid_.nx, rows};
@@ -126,11 +127,14 @@ void LayerStock::cut(const LayerCut& cut, const Operation& operation, const Tool
                 if (q.feed == 0) continue;
                 const double py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
                 if (std::max(py, qy) < y0 || std::min(py, qy) > y1 || std::min(pz, qz) >= top) continue;
-                sweep(part, end, {to_mm(p.x), py, pz}, {to_mm(q.x), qy, qz},
-                      [&](std::size_t c, double z) { height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_))); });
+                sweep(part, end, {to_mm(p.x), py, pz}, {to_mm(q.x), qy, qz}, [&](std::size_t c, double z) {
+                    const auto left = static_cast<float>(std::max(0.0, z - z_bottom_));
+                    if (left < height[c]) most[band] = std::max(most[band], height[c] - left), height[c] = left;
+                });
             }
         }
     });
+    return *std::max_element(most.begin(), most.end());
 }
 
 void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) {

@@ -17,9 +17,14 @@ public:
     LayerStock(const LayerCut& cut, double cell);
 
     /// Takes away what the operation's feed moves meet, all of them straight (arcs are fitted when a layer is planned). Rows in parallel.
-    void cut(const LayerCut& cut, const Operation& operation, const Tool& tool);
+    /// @return the most that a cell lost, mm
+    float cut(const LayerCut& cut, const Operation& operation, const Tool& tool);
     /// Takes away what one place of a cutter covers.
     void cut_at(const CutterEnd& end, double x, double y, double tip_z);
+
+    /// All heights, to try something and undo it.
+    [[nodiscard]] const std::vector<float>& heights() const { return height_; }
+    void restore(std::vector<float> heights) { height_ = std::move(heights); }
 
     [[nodiscard]] const CellGrid& grid() const { return grid_; }
     [[nodiscard]] double z_bottom() const { return z_bottom_; }
@@ -40,6 +45,9 @@ private:
     std::vector<float> height_, surface_;
     std::vector<std::uint8_t> nz_;
 };
+
+/// An operation from which no cell of the stock loses more than this, mm, has nothing to do.
+inline constexpr float kEmpty = 2e-3F;
 
 /// Cells that resolve what passes of the finest cutter leave: a quarter of their distance, coarser where the layer would
 /// take more than kStockCells of them.

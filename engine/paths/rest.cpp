@@ -26,7 +26,7 @@ constexpr double kBridge = 3.0;   // mm between two useful stretches that are tr
 // A place of the cutter on the surface.
 struct Place {
     std::int32_t x = 0, y = 0, z = 0;  // 0.1 µm
-    double tip = 0;             // mm
+    double tip = 0;                    // mm
     std::array<double, 3> contact{};
     bool reachable = false, useful = false, cut = false;
 };
@@ -117,12 +117,17 @@ public:
         op.stepover = to_mm(spacing_);
         op.stepdown = pass_.in_steps ? tool_.stepdown_max : 0;
         emit(op, runs);
-        stock_.cut(cut_, op, tool_);
+        stock_.restore(std::move(before_));
+        const float most = stock_.cut(cut_, op, tool_);
+        if (most <= kEmpty) op.moves.clear();
         return op;
     }
 
 private:
-    [[nodiscard]] double worth(std::size_t cell) const { return std::clamp(0.2 * static_cast<double>(stock_.left(cell)), 0.015, 0.05); }
+    // What a cell must lose, mm along the normal, for a place to be visited.
+    [[nodiscard]] double worth(std::size_t cell) const {
+        return pass_.in_steps ? pass_.limit / 2 : std::clamp(0.2 * static_cast<double>(stock_.left(cell)), 0.015, 0.05);
+    }
 
     // Whether the cutter, here or up to `slack` mm beside, lowers a cell that is worth it.
     [[nodiscard]] bool lowers(double x, double y, double tip, double slack = 0) const {
@@ -198,7 +203,7 @@ private:
         }
         const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
         const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(a.y) - to_mm(b.y), a.tip - b.tip);
-        return c * d > 8 * r_ * cut_.job.tolerances.cusp;
+        return c * d > 8 * r_ * (pass_.in_steps ? pass_.limit / 2 : cut_.job.tolerances.cusp);
     }
 
     void append_between(std::vector<Place>& line, std::int32_t y, Place b) const {
@@ -219,7 +224,7 @@ private:
     void lay_lines() {
         const CellGrid& grid = stock_.grid();
         const auto [first, last] = targets_.rows();
-        spacing_ = to_units(ball_ ? std::sqrt(8 * r_ * cut_.job.tolerances.cusp) : std::min(1.0, r_ / 4));
+        spacing_ = to_units(pass_.in_steps ? 0.7 * r_ : ball_ ? std::sqrt(8 * r_ * cut_.job.tolerances.cusp) : std::min(1.0, r_ / 4));
         const auto low = static_cast<std::int32_t>(std::floor((grid.y(first) - r_) * kUnitsPerMm / spacing_)),
                    high = static_cast<std::int32_t>(std::ceil((grid.y(last) + r_) * kUnitsPerMm / spacing_));
         const double y_low = cut_.low(1, r_), y_high = cut_.high(1, r_);
@@ -319,7 +324,7 @@ private:
 
     // Coarse lines before fine ones: what a place no longer lowers after those before it is not visited.
     void keep_what_lowers() {
-        if (pass_.in_steps) before_ = stock_;
+        before_ = stock_.heights();
         for (Line& line : lines_)
             for (Place& p : line.places) {
                 if (!p.useful || !lowers(to_mm(p.x), to_mm(p.y), p.tip)) continue;
@@ -349,7 +354,7 @@ private:
         const Place* last = nullptr;  // that cuts
         auto close = [&] {
             points.resize(last_cut);
-            if (!points.empty()) runs.push_back(simplify(points, simplify_tolerance_units(cut_.job.tolerances.gouge)));
+            if (!points.empty()) runs.push_back(pass_.in_steps ? points : simplify(points, simplify_tolerance_units(cut_.job.tolerances.gouge)));
             points.clear();
             last_cut = 0;
         };
@@ -369,12 +374,12 @@ private:
 
     // The highest stock under the cutter before this pass, mm.
     [[nodiscard]] double stood(std::int32_t ux, std::int32_t uy) const {
-        const CellGrid& grid = before_->grid();
+        const CellGrid& grid = stock_.grid();
         const double x = to_mm(ux), y = to_mm(uy);
         double top = -1e300;
         sweep(grid, {CutterEnd::Form::flat, r_, 0}, {x, y, 0}, {x, y, 0},
-              [&](std::size_t c, double) { top = std::max(top, static_cast<double>(before_->height(c))); });
-        return top + before_->z_bottom();
+              [&](std::size_t c, double) { top = std::max(top, static_cast<double>(before_[c])); });
+        return top + stock_.z_bottom();
     }
 
     void emit(Operation& op, const std::vector<std::vector<PathPoint>>& runs) const {
@@ -408,7 +413,7 @@ private:
                     // Nothing to do here on this level: it was cut on the one before, or nothing stands above it.
                     const bool nothing = i == runs[r].size() || to_mm(runs[r][i].z) >= above - 1e-6 || stood_at[r][i] <= level + 1e-3;
                     if (!nothing) part.push_back({runs[r][i].x, runs[r][i].y, std::max(runs[r][i].z, to_units(level))});
-                    else if (!part.empty()) parts.push_back(std::move(part)), part.clear();
+                    else if (!part.empty()) parts.push_back(simplify(part, simplify_tolerance_units(cut_.job.tolerances.gouge))), part.clear();
                 }
             }
             follow_nearest(path, chained(std::move(parts), slide));
@@ -429,8 +434,8 @@ private:
     std::int32_t spacing_ = 0;
     std::unique_ptr<DropIndex> index_;
     std::vector<Line> lines_;
-    std::optional<LayerStock> before_;
-    std::vector<char> room_;  // by the stock's cells, with a flask only
+    std::vector<float> before_;  // heights of the stock when the pass begins
+    std::vector<char> room_;     // by the stock's cells, with a flask only
 };
 
 }  // namespace
