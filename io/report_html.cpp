@@ -42,7 +42,7 @@ constexpr std::size_t kMostFacets = 80'000, kFewestFacets = 2'000;   // of the m
 constexpr std::size_t kMostPoints = 400'000, kFewestPoints = 4'000;  // of all paths together
 constexpr double kPathTolerance = 0.02;                              // mm, first try
 constexpr double kWidestTolerance = 2.0;                             // mm; paths that need more are left out, longest first
-constexpr double kStockCells = 36'000, kAllStockCells = 400'000;     // of one layer's map, and of all
+constexpr double kStockCells = 80'000, kAllStockCells = 800'000;     // of one layer's map, and of all
 constexpr double kFinestCell = 0.25;                                 // mm
 constexpr int kSilhouetteRows = 140, kSlopeRows = 200;
 constexpr double kOutlineTolerance = 0.05;  // mm, of sections and glue

@@ -271,7 +271,7 @@ private:
 }  // namespace
 
 Mesh decimate(Context& context, MeshView mesh, std::size_t facets) {
-    const MemoryCharge charge(context, 200 * mesh.vertices.size() + 60 * mesh.facets.size(), "fewer facets for the report");
+    const MemoryCharge charge(context, 200 * mesh.vertices.size() + 160 * mesh.facets.size(), "fewer facets for the report");
     Decimation decimation(context, mesh);
     if (mesh.facets.size() > kClusterFrom) decimation.cluster();
     decimation.collapse_to(std::max<std::size_t>(4, facets));

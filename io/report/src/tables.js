@@ -1,7 +1,7 @@
 // Tables that sort, lead to their place in the 3D view, and can be taken along as CSV.
 
 import {duration, figure, make, words} from './dom.js';
-import {layerMinutes, operationName, operations, phases, plan, remarks, toolOf, toolUse} from './report.js';
+import {layerMinutes, operationName, operations, phases, plan, remarks, toolUse} from './report.js';
 
 // columns: {name, of: row => value, text: row => shown, numeric}
 function sortable(id, title, columns, rows, place, show) {
@@ -68,7 +68,7 @@ export function buildTables(section, show) {
         ], layers, r => ({layer: r.l}), show),
         sortable('operations', 'Operations', [
             text('Program', r => r.name), number('Layer', r => plan.layers[r.layer].index, 0), text('Kind', r => words(r.kind)), text('Purpose', r => r.purpose),
-            text('Tool', r => r.tool, r => `T${r.tool} ${toolOf(r.tool)?.name ?? ''}`), number('Step down, mm', r => r.stepdown, 3), number('Step over, mm', r => r.stepover, 3),
+            text('Tool', r => r.tool, r => `T${r.tool}`), number('Step down, mm', r => r.stepdown, 3), number('Step over, mm', r => r.stepover, 3),
             number('Spindle, rpm', r => r.spindle_rpm, 0), number('Cutting, m', r => r.cutting_mm / 1000), number('Rapid, m', r => r.rapid_mm / 1000),
             {...number('Minutes', r => r.minutes), text: r => duration(r.minutes)}, number('Peak force, N', r => r.peak_force_n, 1), number('Deflection, mm', r => r.deflection_mm, 4),
         ], operations, r => ({layer: r.layer, operation: r.index, text: operationName(r)}), show),

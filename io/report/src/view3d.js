@@ -263,8 +263,8 @@ class View {
             geometry.setAttribute('position', new THREE.BufferAttribute(points, 3));
             const pairs = rapid => { const list = []; for (let i = 1; i < path.count; ++i) if (path.rapid(i) === rapid) list.push(i - 1, i); return list; };
             const lines = (list, material) => { const g = new THREE.BufferGeometry(); g.setAttribute('position', geometry.attributes.position); g.setIndex(list); return new THREE.LineSegments(g, material); };
-            this.faint = lines(pairs(false), new THREE.LineBasicMaterial({color: '#17636b', transparent: true, opacity: 0.18}));
-            this.rapids = lines(pairs(true), new THREE.LineBasicMaterial({color: '#c2571a', transparent: true, opacity: 0.35}));
+            this.faint = lines(pairs(false), new THREE.LineBasicMaterial({color: '#17636b', transparent: true, opacity: path.count > 20000 ? 0.05 : 0.18}));
+            this.rapids = lines(pairs(true), new THREE.LineBasicMaterial({color: '#c2571a', transparent: true, opacity: path.count > 20000 ? 0.12 : 0.35}));
             this.way = new THREE.Line(geometry, new THREE.LineBasicMaterial({color: '#0b3d91'}));
             this.machine.add(this.faint, this.rapids, this.way);
         }
@@ -289,7 +289,9 @@ class View {
         this.refreshStock();
         this.cutter.visible = true;
         this.cutter.position.set(x, y, z);
-        this.way.geometry.setDrawRange(0, segment + 1);
+        // The last stretch stands out; all of a long program would hide what it cuts.
+        const trail = Math.min(segment + 1, 1500);
+        this.way.geometry.setDrawRange(segment + 1 - trail, trail);
         const rapid = path.rapid(Math.min(path.count - 1, segment + 1));
         const seconds = share * operation.minutes * 60;
         this.readout.textContent = `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, '0')} of ${figure(operation.minutes, 1)} min · x ${figure(x, 1)} y ${figure(y, 1)} z ${figure(z, 2)} · ${rapid ? 'rapid' : 'feed'}`
@@ -339,8 +341,9 @@ class View {
         });
         this.machine.position.z = milled >= 0 ? this.shift(milled) : 0;
         this.stockMesh.visible = this.ticks.stock.checked;
+        for (const lines of [this.way, this.faint, this.rapids]) if (lines) lines.visible = this.ticks.way.checked;
         this.stockMesh.material.clippingPlanes = cut;
-        this.features.mesh.visible = this.ticks.features.checked;
+        this.features.mesh.visible = this.ticks.features.checked && (milled < 0 || !this.ticks.stock.checked);
         this.features.mesh.material.clippingPlanes = cut;
         this.placeFeatures();
         this.stage.dataset.layers = this.layers.map(e => e.group.position.z.toFixed(3)).join(',');
@@ -420,7 +423,8 @@ class View {
         const [boundaryTick, boundaries] = tick('Boundaries and reasons', true, () => this.place());
         const [featureTick, features] = tick(`Features (${plan.features.length})`, plan.features.length <= 80, () => { this.place(); this.legend(); });
         const [stockTick, stock] = tick('Stock as simulated', true, () => this.place());
-        this.ticks = {pattern, boundaries, features, stock};
+        const [wayTick, way] = tick('Tool path', true, () => this.place());
+        this.ticks = {pattern, boundaries, features, stock, way};
         this.legendBox = make('div', {id: 'legend'});
         const [operation, select] = choice('Operation', 'operation', [['-1', 'none'], ...operations.map(o => [String(o.index), operationName(o)])], value => this.chooseOperation(Number(value)));
         this.select = select;
@@ -434,7 +438,7 @@ class View {
                 button('+', () => this.zoom(0.8), {'aria-label': 'Nearer'}), button('−', () => this.zoom(1.25), {'aria-label': 'Farther'}))),
             make('fieldset', {}, make('legend', {}, 'Layers'), explode, axis, section, this.sectionReadout),
             make('fieldset', {}, make('legend', {}, 'Show'), mode, patternTick, boundaryTick, featureTick, this.legendBox),
-            make('fieldset', {}, make('legend', {}, 'Cutting'), operation, time, make('div', {class: 'row'}, this.playButton), this.readout, stockTick,
+            make('fieldset', {}, make('legend', {}, 'Cutting'), operation, time, make('div', {class: 'row'}, this.playButton), this.readout, make('div', {class: 'row ticks'}, stockTick, wayTick),
                 make('p', {class: 'note'}, `The stock has ${figure(data.stock.cell_mm, 2)} mm between its points; ways are drawn within ${figure(data.paths.tolerance_mm, 3)} mm, time by feed.`)),
             make('details', {}, make('summary', {}, 'Keys and mouse'), make('p', {class: 'note'},
                 'Drag turns, right drag or two fingers move, wheel or pinch zooms, a double click tells what is there. With the view focused: ', make('kbd', {}, '← → ↑ ↓'), ' turn, with ', make('kbd', {}, 'Shift'), ' move, ',
