@@ -21,11 +21,11 @@ const patterns = [];
 execFileSync(makeModels, ['metre', `${work}/metre.stl`, '--facets', '60000', '--height', '30'], {stdio: 'pipe'});
 // One thick slab, and passes as wide as they may be: the test is of the page.
 writeFileSync(`${work}/metre.toml`, '[slabs]\nthicknesses = [38.0]\n[tolerances]\ncusp = 0.4\n');
-patterns.push([`${work}/metre.stl`, ['--job', `${work}/metre.toml`, '--allow-undercut']]);
+patterns.push([`${work}/metre.stl`, ['--job', `${work}/metre.toml`, '--allow-undercut', '--no-verify']]);
 if (process.env.SLABWRIGHT_CORPUS) {
     for (const name of ['castings/mold_cavity_ktool.stl', 'castings/midget_crankcase_front_pattern.stl', 'castings/bearing_block.stl']) {
         copyFileSync(`${process.env.SLABWRIGHT_CORPUS}/${name}`, `${work}/${basename(name)}`);
-        patterns.push([`${work}/${basename(name)}`, ['--allow-undercut']]);
+        patterns.push([`${work}/${basename(name)}`, name.includes('ktool') ? [] : ['--allow-undercut', '--no-verify']]);
     }
 } else {
     console.log('skipped: SLABWRIGHT_CORPUS is not set');
@@ -34,13 +34,20 @@ if (process.env.SLABWRIGHT_CORPUS) {
 for (const [stl, options] of patterns) {
     const name = basename(stl, '.stl'), out = `${work}/${name}`;
     const begin = Date.now();
-    execFileSync(command, ['plan', stl, '-o', out, '--quiet', ...options]);
+    try {
+        execFileSync(command, ['plan', stl, '-o', out, '--quiet', ...options]);
+    } catch (error) {
+        if (error.status !== 5) throw error; // a plan that does not make the part is told of in the page
+    }
     const plan = JSON.parse(readFileSync(`${out}/plan.json`, 'utf8')), size = statSync(`${out}/report.html`).size;
     check.that(`${name}: size`, size <= 10e6, String(size));
     const {page, complaints, requests} = await open(started, `${out}/report.html`);
     const data = await page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent));
     check.equal(`${name}: plan.json`, data.plan, plan);
-    check.equal(`${name}: verify.json`, data.verify, null);
+    const verify = options.includes('--no-verify') ? null : JSON.parse(readFileSync(`${out}/verify.json`, 'utf8'));
+    check.equal(`${name}: verify.json`, data.verify, verify);
+    const answer = await page.locator('#verdict .answer').textContent();
+    check.that(`${name}: verdict`, verify ? answer.startsWith(verify.passed ? 'Yes' : 'No') : answer.startsWith('Planned'), answer);
     check.equal(`${name}: rows`, await page.locator('#operations tbody tr').count(), plan.totals.operations);
     check.equal(`${name}: every program's way is there`, data.paths.programs.filter(p => p.left_out).length, 0);
     check.that(`${name}: model within a stated error`, data.model.facets <= 80000 && data.model.error_mm < 0.002 * Math.max(...data.model.max.map((v, k) => v - data.model.min[k])), JSON.stringify(data.model.error_mm));
