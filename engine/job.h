@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "kernels/features/features.h"
+#include "kernels/forces/forces.h"
 
 namespace slabwright {
 
@@ -46,10 +47,12 @@ struct Tool {
 struct Material {
     std::string name = "MDF";
     double strength_mpa = 27;            ///< LUO 6.5.2
-    double min_thickness = 0.2 * kInch;  ///< MTmin, thinnest material above a boundary
+    double min_thickness = 0.2 * kInch;  ///< MTmin, thinnest material above a boundary; 0: from the cutters' forces
     double shallow_limit_deg = 15;       ///< Type III
     double density_kg_m3 = 750;
-    double ktc = 8.8575, kte = 1.1268, kfc = 0.6188, kfe = 2.4948;  ///< LUO 6.5.1: N/mm², N/mm
+    double ktc = 8.8575, kte = 1.1268, kfc = 0.6188, kfe = 2.4948;         ///< LUO 6.5.1: N/mm², N/mm, from orthogonal cutting
+    std::string source = "Luo 6.5.1: orthogonal cutting of MDF (Dippon)";  ///< of these four, in words
+    CoefficientTransform transform = CoefficientTransform::oblique;        ///< how they become those of a helical edge
 };
 
 struct Slabs {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "engine/flask/flask.h"
+#include "engine/forces/min_material.h"
 #include "engine/layers/layers.h"
 #include "engine/paths/paths.h"
 #include "engine/paths/standing.h"
@@ -127,6 +128,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     request.max_layer = max_layer_thickness(job);
     request.min_layer = job.layers.min_layer;
     request.min_material = job.material.min_thickness;
+    if (job.material.min_thickness == 0) request.min_material_at = min_material(context, view, plan);
     request.alpha = job.layers.alpha;
     request.beta = job.layers.beta;
     request.slab_thicknesses = job.slabs.thicknesses;

@@ -19,6 +19,8 @@ inline constexpr Word<Finder> kFinderWords[] = {{"halving", Finder::halving}, {"
 inline constexpr Word<FinishStrategy> kFinishWords[] = {
     {"split", FinishStrategy::split}, {"levels", FinishStrategy::levels}, {"projection", FinishStrategy::projection}, {"both", FinishStrategy::both}};
 inline constexpr Word<Projection> kProjectionWords[] = {{"raster", Projection::raster}, {"offset", Projection::offset}};
+inline constexpr Word<CoefficientTransform> kTransformWords[] = {{"printed", CoefficientTransform::printed},
+                                                                 {"oblique", CoefficientTransform::oblique}};
 inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}};
 inline constexpr Word<ToolKind> kToolWords[] = {
     {"flat", ToolKind::flat}, {"ball", ToolKind::ball}, {"face", ToolKind::face}, {"drill", ToolKind::drill}};
@@ -68,13 +70,17 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.table("material", "what the slabs are made of");
     visit.key("name", job.material.name, "");
     visit.key("strength_mpa", job.material.strength_mpa, "MPa");
-    visit.key("min_thickness", job.material.min_thickness, "mm, MTmin: thinnest material above a layer boundary");
+    visit.key("min_thickness", job.material.min_thickness,
+              "mm, MTmin: thinnest material above a layer boundary; 0: what bears the cutters where the slab hangs over (Luo 6.3)");
     visit.key("shallow_limit_deg", job.material.shallow_limit_deg, "degrees from horizontal: shallower slopes are features (Type III)");
     visit.key("density_kg_m3", job.material.density_kg_m3, "kg/m^3");
     visit.key("ktc", job.material.ktc, "N/mm^2, cutting coefficient along the cut (LUO 6.5.1)");
     visit.key("kte", job.material.kte, "N/mm, edge coefficient along the cut");
     visit.key("kfc", job.material.kfc, "N/mm^2, cutting coefficient across the cut");
     visit.key("kfe", job.material.kfe, "N/mm, edge coefficient across the cut");
+    visit.key("source", job.material.source, "where these four come from: orthogonal cutting of this material");
+    visit.word("transform", job.material.transform, kTransformWords,
+               "of the four to a helical edge: oblique, or printed (Luo 6.2.2, whose matrix repeats a row)");
 
     visit.table("slabs", "what lies in stock");
     visit.key("thicknesses", job.slabs.thicknesses, "mm, ascending");

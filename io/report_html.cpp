@@ -139,6 +139,7 @@ PlanFolder read_plan_folder(const fs::path& out) {
         for (const auto& [key, to] :
              {std::pair{"ktc", &folder.material.ktc}, {"kte", &folder.material.kte}, {"kfc", &folder.material.kfc}, {"kfe", &folder.material.kfe}})
             *to = material.at(key).get<double>();
+        folder.material.transform = word_value(kTransformWords, material.at("transform").get<std::string>());
         folder.tolerances.cusp = tolerances.at("cusp").get<double>();
         folder.tolerances.gouge = tolerances.at("gouge").get<double>();
         folder.tolerances.weld = tolerances.at("weld").get<double>();

@@ -70,6 +70,8 @@ TEST(Job, DefaultsAreValidAndRoundTrip) {
     EXPECT_EQ(read.tools[1].stepdown_max, defaults.tools[1].stepdown_max);
     EXPECT_EQ(read.tools[1].helix_rad, defaults.tools[1].helix_rad);
     EXPECT_EQ(read.material.min_thickness, defaults.material.min_thickness);
+    EXPECT_EQ(read.material.source, defaults.material.source);
+    EXPECT_EQ(read.material.transform, CoefficientTransform::oblique);
     const Job empty = parse_job("", "empty");
     EXPECT_EQ(job_toml(empty), text) << "what a file leaves out keeps its default";
 }
@@ -137,6 +139,7 @@ TEST(Job, UnknownKeysNameTheNearest) {
     error = error_of("\n[machines]\nclearance = 5\n");
     EXPECT_EQ(error.place(), "my.toml:2");
     EXPECT_NE(error.remedy().find("machine"), std::string::npos);
+    EXPECT_EQ(parse_job("[material]\ntransform = \"printed\"\nsource = \"own\"\n", "job").material.transform, CoefficientTransform::printed);
     error = error_of("[material]\nclearance = 5\n");
     EXPECT_NE(error.remedy().find("machine.clearance"), std::string::npos) << "right key, wrong table: " << error.what();
     error = error_of("[[tool]]\nnumber = 1\ndiametre = 5\n");

@@ -207,12 +207,23 @@ std::size_t LayerRules::class_of(Ticks thickness) const {
     return static_cast<std::size_t>(std::lower_bound(class_limits_.begin(), class_limits_.end(), thickness) - class_limits_.begin());
 }
 
+Ticks LayerRules::min_material(Ticks z) const { return request_.min_material_at ? to_ticks(request_.min_material_at(mm_of(z))) : min_material_; }
+
+Ticks LayerRules::highest_below(Ticks h) const {
+    // MTmin falls or rises slowly with height, so a few steps find where z + MTmin(z) is h; the last is taken downwards.
+    Ticks z = h - min_material(h);
+    if (!request_.min_material_at) return z;
+    for (int i = 0; i < 4 && z + min_material(z) != h; ++i) z = h - min_material(z);
+    return std::min(z, h - min_material(z));
+}
+
 CostUnits LayerRules::joint(Ticks z) const {
     CostUnits c;
+    const Ticks least = min_material(z);
     // Type I: z in the open region (h − MTmin, h); so h in (z, z + MTmin).
-    c.broken_type1 = weight_between(type1_, type1_sums_, z + kSame + 1, z + min_material_ - kSame - 1);
+    c.broken_type1 = weight_between(type1_, type1_sums_, z + kSame + 1, z + least - kSame - 1);
     // Glue: z in the closed [h − MTmin, h].
-    c.exposed_glue = weight_between(up_flats_, up_flat_sums_, z - kSame, z + min_material_ + kSame);
+    c.exposed_glue = weight_between(up_flats_, up_flat_sums_, z - kSame, z + least + kSame);
     c.broken_type3 = weight_up_to(lows_, z - kSame - 1) - weight_up_to(highs_, z + kSame);
     return c;
 }
@@ -250,7 +261,8 @@ std::int64_t LayerRules::minus_q(Ticks z) const {
         largest_section_ = 0;
         for (int i = 0; i < 16; ++i) largest_section_ = std::max(largest_section_, section_area(height_ / 16 * i));
     }
-    const double dt = mm_of(above(z)) / (min_material_ > 0 ? mm_of(min_material_) : 1.0);
+    const Ticks least = min_material(z);
+    const double dt = mm_of(above(z)) / (least > 0 ? mm_of(least) : 1.0);
     const double a = largest_section_ > 0 ? section_area(z) / largest_section_ : 0;
     return -std::llround((request_.alpha * dt + request_.beta * a) * kQUnits);
 }
@@ -285,9 +297,10 @@ std::string LayerRules::describe(Ticks below, Ticks z) const {
     for (const Level& l : type2_)
         if (is(l.z, z)) return "at the down-facing flat at " + words_mm(request_.features[l.feature].z_low) + " mm";
     const Level* best = nullptr;  // the weightiest feature that has just its minimum thickness (or hardly more) above z
+    const Ticks least = min_material(z);
     constexpr Ticks hardly = static_cast<Ticks>(0.02 * kTicksPerMm);
     for (const Level& l : type1_)
-        if (l.z >= z + min_material_ - kSame && l.z <= z + min_material_ + hardly && (!best || l.weight > best->weight)) best = &l;
+        if (l.z >= z + least - kSame && l.z <= z + least + hardly && (!best || l.weight > best->weight)) best = &l;
     if (best) return below_words(z, *best);
     if (is(z - below, max_layer_)) return "as high as a layer may be (" + words_mm(request_.max_layer) + " mm)";
     for (const Range& r : type3_) {
@@ -338,11 +351,12 @@ std::vector<Diagnostic> LayerRules::diagnose(const std::vector<double>& tops) co
         if (i + 1 == tops.size()) break;
 
         const auto first = std::upper_bound(type1_.begin(), type1_.end(), z + kSame, [](Ticks t, const Level& l) { return t < l.z; });
-        const auto last = std::lower_bound(first, type1_.end(), z + min_material_ - kSame, [](const Level& l, Ticks t) { return l.z < t; });
+        const Ticks least = min_material(z);
+        const auto last = std::lower_bound(first, type1_.end(), z + least - kSame, [](const Level& l, Ticks t) { return l.z < t; });
         if (first < last) {
             const auto worst = std::max_element(first, last, [](const Level& a, const Level& b) { return a.weight < b.weight; });
             found.push_back({Severity::warning, "layers.type1",
-                             boundary + "leaves less than " + words_mm(request_.min_material) + " mm of material: it is " + below_words(z, *worst) +
+                             boundary + "leaves less than " + words_mm(mm_of(least)) + " mm of material: it is " + below_words(z, *worst) +
                                  others(static_cast<std::size_t>(last - first) - 1, "features"),
                              place(worst->feature, tops[i])});
         }

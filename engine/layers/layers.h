@@ -19,6 +19,9 @@ struct LayerRequest {
     double max_layer = 0;     ///< LTmax; layers keep to it within kSameHeight
     double min_layer = 0;     ///< thinner layers are reported
     double min_material = 0;  ///< MTmin
+    /// MTmin above a boundary at z, where it is not the same at every height; a pure function, at least 0 and at most 1e6. Then
+    /// `min_material` is not looked at.
+    std::function<double(double z)> min_material_at{};
     double alpha = 0.7, beta = 0.3;
     std::vector<double> slab_thicknesses;  ///< in stock; empty: slabs made to fit max_layer
     double facing_allowance = 0;

@@ -73,10 +73,10 @@ std::vector<Ticks> candidate_heights(const LayerRules& rules, const LayerPlaceme
     };
     for (const Level& l : rules.type1()) {
         add(l.z);
-        add(l.z - rules.min_material());
+        add(rules.highest_below(l.z));
     }
     // Glue counts as exposed up to and with MTmin under a flat, so a boundary 0.01 mm lower exposes none.
-    for (const Level& l : rules.up_flats()) add(l.z - rules.min_material() - static_cast<Ticks>(0.01 * kTicksPerMm));
+    for (const Level& l : rules.up_flats()) add(rules.highest_below(l.z) - static_cast<Ticks>(0.01 * kTicksPerMm));
     for (const Range& r : rules.type3()) {
         add(r.low);
         add(r.high);

@@ -25,9 +25,15 @@ std::vector<Region> non_deposition_regions(const LayerRules& rules) {
     std::vector<Region> merged;
     const auto& levels = rules.type1();
     for (std::size_t i = 0; i < levels.size(); ++i) {
-        const Ticks low = std::max<Ticks>(0, levels[i].z - rules.min_material()), high = levels[i].z;
+        const Ticks low = std::max<Ticks>(0, rules.highest_below(levels[i].z)), high = levels[i].z;
         if (high - low <= kSame) continue;
+        // Features ascend, but where MTmin rises with height a later region may begin under an earlier one.
+        while (merged.size() > 1 && low < merged[merged.size() - 2].high - kSame) {
+            merged[merged.size() - 2].last = merged.back().last;
+            merged.pop_back();
+        }
         if (!merged.empty() && low < merged.back().high - kSame) {
+            merged.back().low = std::min(merged.back().low, low);
             merged.back().high = high;
             merged.back().last = i + 1;
         } else merged.push_back({low, high, i, i + 1});
@@ -67,7 +73,7 @@ std::vector<Ticks> boundaries_within(const LayerRules& rules, const Region& regi
     const Ticks step = rules.max_layer();
     std::vector<Ticks> wanted{region.low};
     for (std::size_t i = region.first; i < region.last; ++i) {
-        const Ticks z = rules.type1()[i].z - rules.min_material();
+        const Ticks z = rules.highest_below(rules.type1()[i].z);
         if (region.holds(z)) wanted.push_back(z);
     }
     std::sort(wanted.begin(), wanted.end());
@@ -158,11 +164,11 @@ LayerPlacement place_printed(const LayerRules& rules) {
             if (r->low > below + kSame) {
                 z = r->low;
                 reason = rules.below_words(z, rules.type1()[r->first]);
-                if (z != rules.type1()[r->first].z - rules.min_material()) reason = rules.describe(below, z);
+                if (z != rules.highest_below(rules.type1()[r->first].z)) reason = rules.describe(below, z);
             } else reason = rules.describe(below, z);
         } else {
             if (const Region* range = region_around(shallow, z))
-                if (range->low >= below + std::max(rules.min_material(), kSame + 1) && !region_around(regions, range->low)) z = range->low;
+                if (range->low >= below + std::max(rules.min_material(below), kSame + 1) && !region_around(regions, range->low)) z = range->low;
             reason = rules.describe(below, z);
         }
         place(z, std::move(reason));

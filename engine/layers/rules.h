@@ -51,7 +51,10 @@ public:
     [[nodiscard]] const LayerRequest& request() const { return request_; }
     [[nodiscard]] Ticks height() const { return height_; }
     [[nodiscard]] Ticks max_layer() const { return max_layer_; }
-    [[nodiscard]] Ticks min_material() const { return min_material_; }
+    /// MTmin above a boundary at z.
+    [[nodiscard]] Ticks min_material(Ticks z) const;
+    /// The highest boundary under a feature at h that leaves MTmin below it, or near enough to that.
+    [[nodiscard]] Ticks highest_below(Ticks h) const;
     [[nodiscard]] const std::vector<Level>& type1() const { return type1_; }        ///< ascending
     [[nodiscard]] const std::vector<Level>& type2() const { return type2_; }        ///< ascending, equal heights merged
     [[nodiscard]] const std::vector<Range>& type3() const { return type3_; }        ///< ascending by low, then high

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/forces/cuts.h"
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
 
@@ -23,13 +24,7 @@ double fastest_feed(const Operation& operation) {
 }  // namespace
 
 CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job& job) {
-    const Material& m = job.material;
-    CutSegment s;
-    s.profile = tool.kind == ToolKind::ball ? CutterProfile::ball : CutterProfile::flat;
-    s.flutes = tool.flutes;
-    s.radius_mm = tool.diameter / 2;
-    s.helix_rad = tool.helix_rad;
-    s.coefficients = resolve_coefficients({m.ktc, m.kte, m.kfc, m.kfe}, tool.helix_rad, CoefficientTransform::oblique);
+    CutSegment s = idle_cut(job, tool);
     s.spindle_rpm = operation.spindle_rpm;
     const double feed = fastest_feed(operation);
     if (feed == 0 || tool.kind == ToolKind::drill) return s;

@@ -13,7 +13,7 @@ namespace slabwright {
 ///   * finish, corner, edge: what the tool before left. With a stepdown, the wall allowance wide; with a stepover, the floor
 ///     allowance deep; a ball meets the steps of roughing too (the job's rough cusp).
 /// A ball that cuts less deep than its radius engages over the arc that its width has on the circle at that depth.
-/// Coefficients by the oblique transform of the job's material at the tool's helix. No moves that mill, or a drill (it
+/// Coefficients by the job's transform of its material at the tool's helix. No moves that mill, or a drill (it
 /// does not mill): a segment without depth.
 /// @throws Error(usage, "forces.spindle") when it mills with a spindle speed of 0
 [[nodiscard]] CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job& job);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/forces/cuts.h"
 #include "kernels/polygons/hull.h"
 
 namespace slabwright {
@@ -76,17 +77,12 @@ struct Box2 {
     [[nodiscard]] bool holds(Point2 p) const { return p.x >= min.x && p.x <= max.x && p.y >= min.y && p.y <= max.y; }
 };
 
-/// The sideways force of the hardest cut this job makes, N: the edge-force model of LUO 6.2 for a slot as deep as the
-/// flat end mill's largest stepdown, at its full feed, with two edges in the cut at once.
+/// The sideways force of the hardest cut this job makes, N: of every end mill at its largest stepdown.
 double sideways_force(const Job& job) {
     double force = 0;
-    for (const Tool& tool : job.tools) {
-        if (tool.kind != ToolKind::flat && tool.kind != ToolKind::ball) continue;
-        const double rpm = std::min(tool.max_rpm, job.machine.max_rpm);
-        const double chip = std::min(tool.max_feed, job.machine.max_feed) / (rpm * tool.flutes);
-        const double along = job.material.ktc * chip + job.material.kte, across = job.material.kfc * chip + job.material.kfe;
-        force = std::max(force, std::min(tool.flutes, 2) * tool.stepdown_max * std::hypot(along, across));
-    }
+    for (const Tool& tool : job.tools)
+        if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball)
+            force = std::max(force, peak_force(hardest_cut(job, tool, tool.stepdown_max)).peak_in_plane_n);
     return force;
 }
 

@@ -1,4 +1,5 @@
 #include "engine/simulate/replay.h"
+#include "engine/forces/cuts.h"
 
 #include <algorithm>
 #include <cmath>
@@ -41,7 +42,7 @@ void rate(ReplayPiece& piece, const Tool& tool, const Material& m, double feed, 
     s.flutes = tool.flutes;
     s.radius_mm = radius;
     s.helix_rad = tool.helix_rad;
-    s.coefficients = resolve_coefficients({m.ktc, m.kte, m.kfc, m.kfe}, tool.helix_rad, CoefficientTransform::oblique);
+    s.coefficients = coefficients_of(m, tool.helix_rad);
     s.spindle_rpm = rpm;
     s.chip_load_mm = feed / (rpm * tool.flutes);
     s.high_mm = std::min(piece.depth_mm, 64 * radius);

@@ -1,0 +1,40 @@
+#include "engine/forces/cuts.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace slabwright {
+
+ForceCoefficients coefficients_of(const Material& material, double helix_rad) {
+    return resolve_coefficients({material.ktc, material.kte, material.kfc, material.kfe}, helix_rad, material.transform);
+}
+
+CutSegment idle_cut(const Job& job, const Tool& tool) {
+    CutSegment cut;
+    cut.profile = tool.kind == ToolKind::ball ? CutterProfile::ball : CutterProfile::flat;
+    cut.flutes = tool.flutes;
+    cut.radius_mm = tool.diameter / 2;
+    cut.helix_rad = tool.helix_rad;
+    cut.coefficients = coefficients_of(job.material, tool.helix_rad);
+    cut.spindle_rpm = std::min(tool.max_rpm, job.machine.max_rpm);
+    return cut;
+}
+
+CutSegment slot_cut(const Job& job, const Tool& tool, double depth_mm) {
+    CutSegment cut = idle_cut(job, tool);
+    cut.chip_load_mm = std::min(tool.max_feed, job.machine.max_feed) / (cut.spindle_rpm * tool.flutes);
+    cut.high_mm = depth_mm;
+    cut.arc = engagement_arc(cut.radius_mm, tool.diameter, MillingSense::up);
+    return cut;
+}
+
+CutSegment hardest_cut(const Job& job, const Tool& tool, double depth_mm) {
+    CutSegment cut = slot_cut(job, tool, depth_mm);
+    if (tool.kind != ToolKind::ball) return cut;
+    cut.chip_load_mm = std::min({tool.max_feed, job.machine.max_feed, job.cutting.finish_feed}) / (cut.spindle_rpm * tool.flutes);
+    const double r = cut.radius_mm, circle = depth_mm < r ? std::sqrt(depth_mm * (2 * r - depth_mm)) : r;
+    cut.arc = engagement_arc(circle, job.cutting.wall_allowance + job.tolerances.rough_cusp, MillingSense::up);
+    return cut;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,33 @@
+// How thick the wood above a layer boundary must be to bear being cut where its slab hangs over (LUO 6.3; method.md section 9).
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "engine/plan.h"
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// The thinnest slab, mm, that bears the hardest cut of every end mill of the job `overhang_mm` from where it is glued: LUO's strip
+/// as wide as the cutter's radius, cut as deep as the cutter may step or as it is thick, whichever is less, the force in the
+/// middle of that depth above the joint. In LUO 6.5.2 (2 in, 3 mm deep) that is .124 in.
+/// @throws Error(usage, "forces.segment") for a tool or material that the force model does not take
+[[nodiscard]] double least_material(const Job& job, double overhang_mm);
+
+/// How far, in mm, the slab that is glued at height z reaches past what carries it there: the largest distance of any place of the
+/// stock's rectangle from the section just below z, or from the flask where there is one, and the glue's setback on top of it.
+/// The section is drawn on a grid of 1/256 of the stock's longer side, so the answer is too large by up to three of its
+/// cells. Taken at the features' heights (at most 128); between two of them it is the larger of the two.
+struct SlabOverhang {
+    std::vector<double> heights, overhangs;  ///< mm, heights ascending
+};
+
+/// @param plan its job, stock and features
+[[nodiscard]] SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan);
+
+/// least_material over the slab's overhang, as a function of the boundary's height.
+[[nodiscard]] std::function<double(double z)> min_material(Context& context, MeshView mesh, const Plan& plan);
+
+}  // namespace slabwright
