@@ -136,6 +136,18 @@ const numbers = text => text.split(',').map(Number);
     check.equal('view: six pictures', seen.size, 6);
 }
 
+// The layer stack from the other side: another silhouette, as wide as the pattern is there.
+{
+    const stack = () => page.locator('#plots figure').first().locator('svg[role=img]').innerHTML();
+    const before = await stack();
+    await change('#stack-side', '1');
+    check.that('stack: the other side', await stack() !== before);
+    const {y} = await page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent).silhouette);
+    const {min, max} = plan.input.bbox, widest = Math.max(...y.map(row => row[row.length - 1] - row[0]));
+    check.that('stack: as wide as the pattern', Math.abs(widest - (max[1] - min[1])) < 0.5, String(widest));
+    await change('#stack-side', '0');
+}
+
 // Sorting, both ways; CSV.
 {
     const column = () => page.locator('#operations tbody tr td:nth-child(11)').allTextContents();

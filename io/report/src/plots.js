@@ -18,7 +18,7 @@ function roundValues(low, high) {
 
 function framed(title, label, caption, draw, wide = false) {
     const svg = draw();
-    const drawing = svg.tagName.toLowerCase() === 'svg' ? svg : svg.querySelector('svg:last-of-type');
+    const drawing = svg.tagName.toLowerCase() === 'svg' ? svg : svg.querySelector(':scope > svg'); // beside its legend
     for (const part of svg.querySelectorAll('[aria-label]')) part.removeAttribute('aria-label'); // Plot names its marks; the picture has one name
     for (const part of svg.querySelectorAll('[aria-description]')) part.removeAttribute('aria-description');
     drawing.setAttribute('role', 'img');
@@ -27,24 +27,25 @@ function framed(title, label, caption, draw, wide = false) {
 }
 
 // The picture a planner argues with: the silhouette, the boundaries, and beside them what asks for boundaries or forbids them.
-function stack() {
-    const {z0, dz, x} = data.silhouette;
-    const rows = x.flatMap((row, i) => {
+// k: which axis runs to the right, 0 for x (seen along y) and 1 for y (seen along x).
+function stack(k) {
+    const {z0, dz} = data.silhouette;
+    const rows = data.silhouette['xy'[k]].flatMap((row, i) => {
         const cells = [];
-        for (let k = 0; k < row.length; k += 2) cells.push({x1: row[k], x2: row[k + 1], y1: z0 + i * dz, y2: z0 + (i + 1) * dz});
+        for (let c = 0; c < row.length; c += 2) cells.push({x1: row[c], x2: row[c + 1], y1: z0 + i * dz, y2: z0 + (i + 1) * dz});
         return cells;
     });
-    const [s0] = plan.stock.min, [s1] = plan.stock.max, width = s1 - s0;
-    const lane = k => [s1 + width * (0.03 + 0.13 * k), s1 + width * (0.03 + 0.13 * k + 0.1)];
+    const s0 = plan.stock.min[k], s1 = plan.stock.max[k], width = s1 - s0;
+    const lane = n => [s1 + width * (0.03 + 0.13 * n), s1 + width * (0.03 + 0.13 * n + 0.1)];
     const none = lane(0), shallow = lane(1), points = lane(2), end = points[1] + width * 0.02;
     const height = Math.max(...plan.layers.map(l => l.z_bottom + l.slab_thickness));
-    const marks = plan.features.filter(f => f.type !== 'shallow').map(f => ({x: points[0] + (points[1] - points[0]) * ((f.xy[0] - s0) / width), z: featureRange(f)[0], type: featureKinds[f.type]?.name ?? f.type}));
+    const marks = plan.features.filter(f => f.type !== 'shallow').map(f => ({x: points[0] + (points[1] - points[0]) * ((f.xy[k] - s0) / width), z: featureRange(f)[0], type: featureKinds[f.type]?.name ?? f.type}));
     const names = Object.values(featureKinds).filter(kind => marks.some(m => m.type === kind.name));
     const above = height * 1.03;
     return Plot.plot({
         width: 1180, height: 470, marginLeft: 55, marginTop: 26, style,
         x: {label: null, domain: [s0, end], axis: null}, y: {label: 'z, mm', domain: [0, height * 1.06], grid: false},
-        color: {domain: names.map(k => k.name), range: names.map(k => k.color), legend: names.length > 0},
+        color: {domain: names.map(n => n.name), range: names.map(n => n.color), legend: names.length > 0},
         marks: [
             Plot.axisX(roundValues(s0, s1), {label: null}),
             Plot.rect(plan.layers, {x1: s0, x2: s1, y1: l => l.z_top, y2: l => l.z_bottom + l.slab_thickness, fill: '#efe3cd', stroke: '#c9b48c', strokeDasharray: '3,3'}),
@@ -149,11 +150,25 @@ function forces() {
             + 'then gives the peak over one turn at the piece’s fastest feed. The plan’s own figure is for the heaviest nominal cut of the whole operation. Between the stock’s points cuts go unseen, so fine passes show gaps.'));
 }
 
+function stacks(height) {
+    const box = make('div');
+    const select = make('select', {id: 'stack-side', onchange: () => draw()}, make('option', {value: 0}, 'along y'), make('option', {value: 1}, 'along x'));
+    function draw() {
+        const k = Number(select.value), [right, seen] = k === 0 ? ['x', 'y'] : ['y', 'x'];
+        box.replaceChildren(framed('Layer stack', `Layers beside the silhouette of the pattern, seen along ${seen}: ${plan.layers.length} layers over ${figure(height, 1)} mm`,
+            `Grey: the pattern seen along ${seen}, ${right} to the right, mm. Lines: boundaries. Dashed: what facing takes off. Beside: heights where a boundary would leave less than ${figure(plan.job.material.min_thickness, 2)} mm of material, shallow slopes under ${figure(plan.job.material.shallow_limit_deg, 1)}°, and features by height (left to right as they lie in ${right}).`,
+            () => stack(k), true));
+        box.querySelector('h3').after(make('p', {}, make('label', {for: 'stack-side'}, 'Seen '), select));
+    }
+    draw();
+    box.className = 'wide';
+    return box;
+}
+
 export function buildPlots(section) {
     const height = size()[2];
     section.append(make('div', {class: 'plots'},
-        framed('Layer stack', `Layers beside the silhouette of the pattern, seen along y: ${plan.layers.length} layers over ${figure(height, 1)} mm`,
-            `Grey: the pattern seen along y, x to the right, mm. Lines: boundaries. Dashed: what facing takes off. Beside: heights where a boundary would leave less than ${figure(plan.job.material.min_thickness, 2)} mm of material, shallow slopes under ${figure(plan.job.material.shallow_limit_deg, 1)}°, and features by height (left to right as they lie in x).`, stack, true),
+        stacks(height),
         framed('α-map', 'Least slope at each height', 'The least slope of what is to be machined at each height; thin lines are boundaries.', alphaMap),
         framed('Area by slope', 'Area of the surface by its slope', `0° is flat, 90° upright. Facing down: ${figure(data.slopes.down_flat_mm2 / 100, 1)} cm² level (the base among them), ${figure(data.slopes.undercut_mm2 / 100, 2)} cm² undercut.`, slopeAreas),
         framed('Tool over height', 'Which tool cuts at which height, and for how long', plan.tools.map(t => `T${t.number} ${t.name}`).join(' · '), toolOverHeight),
