@@ -171,7 +171,7 @@ VerifyResult write_verified(Context& context, const Plan& plan, const std::strin
         VerifyOptions options;
         options.stl = stl_path;
         context.share_progress(0.5, 1);
-        const VerifyResult result = verdict(verify_folder(context, out.path("").string(), options));
+        VerifyResult result = verdict(verify_folder(context, out.path("").string(), options));
         if (reports_are_built()) write_report(context, out.path("").string(), {stl_path});
         context.throw_if_cancelled();
         out.commit();

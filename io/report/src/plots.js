@@ -154,9 +154,12 @@ function stacks(height) {
     const box = make('div');
     const select = make('select', {id: 'stack-side', onchange: () => draw()}, make('option', {value: 0}, 'along y'), make('option', {value: 1}, 'along x'));
     function draw() {
+        const material = plan.job.material.min_thickness;
+        const least = material > 0 ? `heights where a boundary would leave less than ${figure(material, 2)} mm of material`
+            : 'no heights without boundaries, since the job leaves the least thickness to the forces and plan.json does not state it';
         const k = Number(select.value), [right, seen] = k === 0 ? ['x', 'y'] : ['y', 'x'];
         box.replaceChildren(framed('Layer stack', `Layers beside the silhouette of the pattern, seen along ${seen}: ${plan.layers.length} layers over ${figure(height, 1)} mm`,
-            `Grey: the pattern seen along ${seen}, ${right} to the right, mm. Lines: boundaries. Dashed: what facing takes off. Beside: heights where a boundary would leave less than ${figure(plan.job.material.min_thickness, 2)} mm of material, shallow slopes under ${figure(plan.job.material.shallow_limit_deg, 1)}°, and features by height (left to right as they lie in ${right}).`,
+            `Grey: the pattern seen along ${seen}, ${right} to the right, mm. Lines: boundaries. Dashed: what facing takes off. Beside: ${least}, shallow slopes under ${figure(plan.job.material.shallow_limit_deg, 1)}°, and features by height (left to right as they lie in ${right}).`,
             () => stack(k), true));
         box.querySelector('h3').after(make('p', {}, make('label', {for: 'stack-side'}, 'Seen '), select));
     }

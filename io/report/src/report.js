@@ -105,6 +105,7 @@ export function featureRange(feature) {
 // Heights where no boundary may lie: less than the least thickness of material above it (method: z in (h − MTmin, h)).
 export function nonDeposition() {
     const least = plan.job.material.min_thickness;
+    if (!(least > 0)) return [];
     const ranges = plan.features.filter(f => f.type === 'peak' || f.type === 'valley' || f.type === 'up_flat')
         .map(f => [Math.max(0, featureRange(f)[0] - least), featureRange(f)[0]]).sort((a, b) => a[0] - b[0]);
     const merged = [];
