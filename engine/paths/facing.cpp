@@ -30,16 +30,14 @@ Operation face_layer(const LayerCut& cut) {
             const double w = hi[0] - lo[0] - 2 * inset, d = hi[1] - lo[1] - 2 * inset;
             const double left = std::max(lo[0] + inset, cut.low(0, r)), right = std::min(hi[0] - inset, cut.high(0, r));
             const double south = std::max(lo[1] + inset, cut.low(1, r)), north = std::min(hi[1] - inset, cut.high(1, r));
-            if (w <= 0 || d <= 0) {  // what is left is a strip narrower than two step-overs: along its middle
-                if (std::max(w, d) > 0 || inset == stepover - r) {
-                    const double cx = 0.5 * (lo[0] + hi[0]), cy = 0.5 * (lo[1] + hi[1]);
-                    if (w > d) {
-                        path.cut({to_units(left), to_units(cy)}, z);
-                        path.cut({to_units(right), to_units(cy)}, z);
-                    } else {
-                        path.cut({to_units(cx), to_units(south)}, z);
-                        path.cut({to_units(cx), to_units(north)}, z);
-                    }
+            if (w <= 0 || d <= 0) {  // what is left is narrower than two step-overs: along its middle, if only to its centre
+                const double cx = 0.5 * (lo[0] + hi[0]), cy = 0.5 * (lo[1] + hi[1]);
+                if (w > d) {
+                    path.cut({to_units(std::min(left, cx)), to_units(cy)}, z);
+                    path.cut({to_units(std::max(right, cx)), to_units(cy)}, z);
+                } else {
+                    path.cut({to_units(cx), to_units(std::min(south, cy))}, z);
+                    path.cut({to_units(cx), to_units(std::max(north, cy))}, z);
                 }
                 break;
             }
