@@ -21,6 +21,8 @@ enum class Frame : std::uint8_t { pattern_base, layer_top };
 enum class FinishStrategy : std::uint8_t { split, levels, projection, both };
 /// Projected paths run on parallel lines, or on curves offset again and again from the border of what they finish.
 enum class Projection : std::uint8_t { raster, offset };
+/// What a cut is taken to meet: what the operations before have left standing, or the most that its steps can leave it.
+enum class Engagement : std::uint8_t { simulated, nominal };
 enum class ToolKind : std::uint8_t { flat, ball, face, drill };
 
 inline constexpr double kInch = 25.4;
@@ -122,7 +124,9 @@ struct Cutting {
     FinishStrategy finish_strategy = FinishStrategy::split;
     Projection projection = Projection::raster;
     bool uniform_steps = false;  ///< one stepdown and one step-over a layer, for its worst slope, and nothing cut again (SHAPING 3, to compare)
-    bool arcs = true;            ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
+    Engagement engagement = Engagement::simulated;  ///< from which the forces are computed
+    bool adapt_feed = true;                         ///< feeds by chip load and deflection (engine/forces/feeds.h), where engagement is simulated
+    bool arcs = true;                               ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
 };
 
 /// A frame of the slab that stays around the pattern in every layer (engine/flask).

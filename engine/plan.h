@@ -66,7 +66,9 @@ struct Operation {
     std::vector<Move> moves;
     std::string file;  ///< name under nc/, "" until named
     double cutting_mm = 0, rapid_mm = 0, minutes = 0;
-    double peak_force_n = 0, deflection_mm = 0;
+    double peak_force_n = 0, deflection_mm = 0;    ///< the largest of all its cuts
+    double wall_error_mm = 0;                      ///< the most that the cutter, bending, leaves on a wall or takes from it
+    std::optional<std::array<double, 3>> peak_at;  ///< mm, where the cut of peak_force_n ends; none where it is the nominal cut's
 };
 
 struct Layer {

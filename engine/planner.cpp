@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "engine/flask/flask.h"
+#include "engine/forces/feeds.h"
 #include "engine/forces/min_material.h"
 #include "engine/layers/layers.h"
 #include "engine/paths/paths.h"
@@ -229,12 +230,20 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     for (std::size_t i = 0; i < results.size(); ++i) {
         plan.layers[i].operations = std::move(results[i].operations);
         operations += plan.layers[i].operations.size();
+    }
+    // Forces, and the feeds that they allow, of the finished programs in the order in which they run.
+    std::vector<std::vector<Diagnostic>> forces(results.size());
+    if (job.cutting.engagement == Engagement::simulated)
+        parallel_each(context, plan.layers.size(), [&](std::size_t i) { rate_layer(context, plan.layers[i], plan, forces[i]); });
+    for (std::size_t i = 0; i < results.size(); ++i) {
         plan.diagnostics.insert(plan.diagnostics.end(), results[i].diagnostics.begin(), results[i].diagnostics.end());
+        plan.diagnostics.insert(plan.diagnostics.end(), forces[i].begin(), forces[i].end());
         for (Operation& op : plan.layers[i].operations) {
             const MotionTime time = motion_time(op.moves, job.machine);
             op.cutting_mm = time.cutting_mm;
             op.rapid_mm = time.rapid_mm;
             op.minutes = time.minutes + job.machine.spindle_dwell_s / 60;
+            if (job.cutting.engagement == Engagement::simulated) continue;
             const auto tool = std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
             rate_operation(op, *tool, job);
             const double allowance = std::min(job.cutting.wall_allowance, job.cutting.floor_allowance);

@@ -22,6 +22,7 @@ inline constexpr Word<Projection> kProjectionWords[] = {{"raster", Projection::r
 inline constexpr Word<CoefficientTransform> kTransformWords[] = {{"printed", CoefficientTransform::printed},
                                                                  {"oblique", CoefficientTransform::oblique}};
 inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}};
+inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated}, {"nominal", Engagement::nominal}};
 inline constexpr Word<ToolKind> kToolWords[] = {
     {"flat", ToolKind::flat}, {"ball", ToolKind::ball}, {"face", ToolKind::face}, {"drill", ToolKind::drill}};
 
@@ -148,12 +149,16 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("face_depth", job.cutting.face_depth, "mm, deepest step of the face mill");
     visit.key("ramp_deg", job.cutting.ramp_deg, "degrees, entry into stock");
     visit.key("holder_clearance", job.cutting.holder_clearance, "mm between the holder and anything that stands");
-    visit.key("finish_feed", job.cutting.finish_feed, "mm/min");
+    visit.key("finish_feed", job.cutting.finish_feed, "mm/min; faster where the chip is thin, see adapt_feed");
     visit.word("finish_strategy", job.cutting.finish_strategy, kFinishWords,
                "split at the steep limit, levels alone, projection alone, or both over everything (SHAPING 5)");
     visit.word("projection", job.cutting.projection, kProjectionWords, "raster: parallel lines; offset: curves offset inwards from the border");
     visit.key("uniform_steps", job.cutting.uniform_steps,
               "one stepdown and one stepover a layer, for its worst slope, and no rest machining: to compare methods");
+    visit.word("engagement", job.cutting.engagement, kEngagementWords,
+               "what forces are computed from: simulated, what stands when a move cuts; nominal, an operation's largest steps");
+    visit.key("adapt_feed", job.cutting.adapt_feed,
+              "feeds lowered where the cutter would bend too far, raised where the chip is thin; needs simulated engagement");
     visit.key("arcs", job.cutting.arcs, "arcs (G2, G3) where a path turns evenly; false: straight moves only");
 
     visit.table("flask", "a frame of every slab that stays around the pattern, to carry it while it is cut and as moulding box");

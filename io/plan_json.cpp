@@ -64,6 +64,16 @@ void put_tool(JsonText& json, const Tool& tool) {
     json.end();
 }
 
+void put_place(JsonText& json, const std::optional<std::array<double, 3>>& place) {
+    if (!place) {
+        json.null();
+        return;
+    }
+    json.begin_array();
+    for (const double v : *place) json.rounded(v, kLength);
+    json.end();
+}
+
 void put_operation(JsonText& json, const Operation& operation) {
     json.begin_object(Shape::line);
     json.key("kind").string(name(operation.kind));
@@ -78,6 +88,9 @@ void put_operation(JsonText& json, const Operation& operation) {
     json.key("spindle_rpm").rounded(operation.spindle_rpm, 0);
     json.key("peak_force_n").rounded(operation.peak_force_n, kForce);
     json.key("deflection_mm").rounded(operation.deflection_mm, kDeflection);
+    json.key("wall_error_mm").rounded(operation.wall_error_mm, kDeflection);
+    json.key("peak_at");
+    put_place(json, operation.peak_at);
     json.end();
 }
 
@@ -179,13 +192,7 @@ void put_diagnostics(JsonText& json, const std::vector<Diagnostic>& diagnostics)
         json.key("code").string(diagnostic.code);
         json.key("message").string(diagnostic.message);
         json.key("where");
-        if (diagnostic.where) {
-            json.begin_array();
-            for (const double v : *diagnostic.where) json.rounded(v, kLength);
-            json.end();
-        } else {
-            json.null();
-        }
+        put_place(json, diagnostic.where);
         json.end();
     }
     json.end();

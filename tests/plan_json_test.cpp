@@ -107,6 +107,8 @@ Plan hand_made() {
             operation.minutes = 1.0 / 3;
             operation.peak_force_n = 20.5;
             operation.deflection_mm = 1.25e-5;
+            operation.wall_error_mm = 1e-5;
+            operation.peak_at = {1, 2, 3};
             layer.operations.push_back(operation);
         }
         plan.layers.push_back(layer);
@@ -215,6 +217,8 @@ TEST(PlanJson, SaysWhatThePlanHolds) {
     EXPECT_EQ(operation["file"], "nc/L002_03_semi_rough_T3.ngc");
     EXPECT_EQ(operation["minutes"], 0.3333);
     EXPECT_NEAR(operation["deflection_mm"].get<double>(), 1.25e-5, 0.5e-6);
+    EXPECT_NEAR(operation["wall_error_mm"].get<double>(), 1e-5, 0.5e-6);
+    EXPECT_EQ(operation["peak_at"], json::array({1, 2, 3}));
     EXPECT_EQ(j["totals"]["layers"], 2);
     EXPECT_EQ(j["totals"]["tool_changes"], 6);
     EXPECT_TRUE(j["diagnostics"][0]["where"].is_null());

@@ -55,11 +55,13 @@ CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job&
 
 void rate_operation(Operation& operation, const Tool& tool, const Job& job) {
     const CutSegment cut = heaviest_cut(operation, tool, job);
-    operation.peak_force_n = operation.deflection_mm = 0;
+    operation.peak_force_n = operation.deflection_mm = operation.wall_error_mm = 0;
+    operation.peak_at.reset();
     if (cut.high_mm <= 0) return;
     const CutForce force = peak_force(cut);
     operation.peak_force_n = force.peak_resultant_n;
     operation.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, tool.diameter);
+    operation.wall_error_mm = operation.deflection_mm;
 }
 
 }  // namespace slabwright

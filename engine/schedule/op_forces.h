@@ -18,7 +18,7 @@ namespace slabwright {
 /// @throws Error(usage, "forces.spindle") when it mills with a spindle speed of 0
 [[nodiscard]] CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job& job);
 
-/// Fills peak_force_n (the resultant) and deflection_mm (of the tip, by the largest force in the plane, over the tool's
+/// Fills peak_force_n (the resultant), deflection_mm and wall_error_mm (both of the tip, by the largest force in the plane, over the tool's
 /// stickout) from the closed form or the double reference, so that they are the same on every device.
 /// @throws as heaviest_cut; Error(usage, "forces.segment") for a tool or material that the force model does not take
 void rate_operation(Operation& operation, const Tool& tool, const Job& job);

@@ -138,7 +138,7 @@ function forces() {
         // A limit far above everything would flatten the curve; then it is told, not drawn.
         const limits = [{v: o.deflection_mm, name: 'plan: heaviest cut'}, ...(allowed.v < 4 * most ? [allowed] : [])];
         pictures.replaceChildren(
-            framed('Force', `Peak force along ${o.name}`, `Plan: ${figure(o.peak_force_n, 2)} N at the heaviest nominal cut.`,
+            framed('Force', `Peak force along ${o.name}`, `Plan: ${figure(o.peak_force_n, 2)} N at the heaviest cut.`,
                 () => along(i, 'force_n', 'peak force, N', [{v: o.peak_force_n, name: 'plan: heaviest cut'}], toolColor(o.tool))),
             framed('Deflection', `Deflection of the tip along ${o.name}`, `Plan: ${figure(o.deflection_mm, 4)} mm; limit: ${allowed.name} ${figure(allowed.v, 3)} mm.`,
                 () => along(i, 'deflection_mm', 'deflection, mm', limits, toolColor(o.tool))));
@@ -147,7 +147,7 @@ function forces() {
     return make('div', {class: 'card wide'}, make('h3', {}, 'Force and deflection along a program'),
         make('p', {}, make('label', {for: 'force-operation'}, 'Program '), select), pictures,
         make('p', {class: 'note'}, `Depth and width of cut are read off the stock as simulated at ${figure(data.stock.cell_mm, 2)} mm between its points, over pieces of equal time; the force model (edge forces, ${plan.job.material.name}) `
-            + 'then gives the peak over one turn at the piece’s fastest feed. The plan’s own figure is for the heaviest nominal cut of the whole operation. Between the stock’s points cuts go unseen, so fine passes show gaps.'));
+            + 'then gives the peak over one turn at the piece’s fastest feed. The plan’s own figure is for the heaviest cut of the whole operation, found from a finer stock. Between the stock’s points cuts go unseen, so fine passes show gaps.'));
 }
 
 function stacks(height) {

@@ -1,0 +1,244 @@
+// What stands before a cutter, and the feeds and forces that follow from it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <random>
+#include <set>
+
+#include "engine/forces/cuts.h"
+#include "engine/forces/feeds.h"
+#include "engine/forces/op_cuts.h"
+#include "kernels/forces/deflection.h"
+
+namespace slabwright {
+namespace {
+
+Move at(double x, double y, double z, std::uint32_t feed) { return {to_units(x), to_units(y), to_units(z), feed}; }
+
+Plan plate() {
+    Plan plan;
+    plan.stock_min = {0, 0};
+    plan.stock_max = {120, 80};
+    plan.layers.resize(1);
+    plan.layers[0].index = 1;
+    plan.layers[0].z_top = 18;
+    plan.layers[0].slab_thickness = 18;
+    return plan;
+}
+
+Operation line(const Plan& plan, OperationKind kind, int tool, std::vector<Move> moves) {
+    Operation op;
+    op.kind = kind;
+    op.purpose = "line";
+    op.tool = tool;
+    op.spindle_rpm = plan.job.tools[static_cast<std::size_t>(tool) - 1].max_rpm;
+    op.moves = std::move(moves);
+    return op;
+}
+
+std::vector<CutStretch> stretches(StandingSlab& slab, const Operation& op, const Tool& tool) {
+    std::vector<CutStretch> all;
+    slab.run(op, tool, [&](const CutStretch& s) { all.push_back(s); });
+    return all;
+}
+
+TEST(OpCuts, SlotThenHalfThenAir) {
+    Plan plan = plate();
+    const Tool& flat = plan.job.tools[1];
+    StandingSlab slab(plan.stock_min, plan.stock_max, 0, 18, 0.25);
+    const double r = flat.diameter / 2;
+    const auto pass = [&](double y, double z) {
+        return line(plan, OperationKind::rough, 2, {at(-10, y, 30, 0), at(-10, y, z, 0), at(130, y, z, 5000), at(130, y, 30, 0)});
+    };
+    int checked = 0;
+    for (const CutStretch& s : stretches(slab, pass(40, 15), flat)) {
+        if (s.at[0] < 10 || s.at[0] > 110) continue;
+        EXPECT_NEAR(s.width, 2 * r, 0.3);
+        EXPECT_NEAR(s.high - s.low, 3, 1e-5);
+        ++checked;
+    }
+    EXPECT_GT(checked, 10);
+    // The next pass half a diameter to the left meets half the width, on its left.
+    for (const CutStretch& s : stretches(slab, pass(40 + r, 15), flat)) {
+        if (s.at[0] < 10 || s.at[0] > 110) continue;
+        EXPECT_NEAR(s.width, r, 0.3);
+        EXPECT_TRUE(s.left);
+    }
+    for (const CutStretch& s : stretches(slab, pass(40, 15), flat)) EXPECT_FALSE(s.cuts());
+    // And one to the right, on its right; deeper, everything again.
+    for (const CutStretch& s : stretches(slab, pass(40 - r / 2, 15), flat))
+        if (s.at[0] > 10 && s.at[0] < 110) {
+            EXPECT_NEAR(s.width, r / 2, 0.3);
+            EXPECT_FALSE(s.left);
+        }
+    for (const CutStretch& s : stretches(slab, pass(40, 13), flat))
+        if (s.at[0] > 10 && s.at[0] < 110) {
+            EXPECT_NEAR(s.high - s.low, 2, 1e-5);
+        }
+}
+
+// Volumes add up: what the stretches tell is what is gone, for any path that does not end in the wood.
+TEST(OpCuts, StretchesHoldWhatWasTakenAway) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> x(8, 112), y(8, 72), z(6, 17);
+    Plan plan = plate();
+    for (const int tool : {2, 3}) {
+        const Tool& cutter = plan.job.tools[static_cast<std::size_t>(tool) - 1];
+        StandingSlab slab(plan.stock_min, plan.stock_max, 0, 18, 0.2);
+        std::vector<Move> moves{at(10, 10, 30, 0), at(10, 10, 19, 0)};
+        for (int i = 0; i < 40; ++i) moves.push_back(at(x(random), y(random), z(random), 4000));
+        const Operation op = line(plan, OperationKind::rough, tool, moves);
+        double told = 0;
+        for (const CutStretch& s : stretches(slab, op, cutter))
+            if (s.cuts() && s.width < cutter.diameter) told += s.width * (s.high - s.low) * s.length;
+        EXPECT_GT(told, 100);
+        // Run again, nothing is left to take.
+        for (const CutStretch& s : stretches(slab, op, cutter)) EXPECT_FALSE(s.cuts());
+    }
+}
+
+TEST(Feeds, AStiffCutterKeepsItsFeedAndAnElasticOneSlowsDown) {
+    Plan plan = plate();
+    const auto slot = [&](double y) {
+        return line(plan, OperationKind::rough, 2, {at(-10, y, 30, 0), at(-10, y, 14.2, 0), at(130, y, 14.2, 9000), at(130, y, 30, 0)});
+    };
+    Context context;
+    std::vector<Diagnostic> diagnostics;
+    plan.layers[0].operations = {slot(40)};
+    rate_layer(context, plan.layers[0], plan, diagnostics);
+    const Operation stiff = plan.layers[0].operations[0];
+    EXPECT_TRUE(diagnostics.empty());
+    EXPECT_EQ(stiff.moves[2].feed, 9000U);
+    // As the kernel says for the slot, up to the class of depth.
+    const CutForce exact = peak_force(slot_cut(plan.job, plan.job.tools[1], 3.8));
+    EXPECT_GE(stiff.peak_force_n, exact.peak_resultant_n * 0.98);
+    EXPECT_LE(stiff.peak_force_n, exact.peak_resultant_n * 1.12);
+    ASSERT_TRUE(stiff.peak_at);
+    EXPECT_NEAR((*stiff.peak_at)[1], 40, 1e-6);
+
+    Job& job = plan.job;
+    job.cutting.wall_allowance = job.cutting.floor_allowance = 0.06;
+    job.tolerances.cusp = 0.01;
+    job.tools[1].stickout = 118;
+    plan.layers[0].operations = {slot(40)};
+    rate_layer(context, plan.layers[0], plan, diagnostics);
+    const Operation elastic = plan.layers[0].operations[0];
+    ASSERT_EQ(diagnostics.size(), 1U);
+    EXPECT_EQ(diagnostics[0].code, "feed.lowered");
+    ASSERT_TRUE(diagnostics[0].where);
+    EXPECT_LT(elastic.moves[2].feed, 9000U);
+    EXPECT_LE(elastic.wall_error_mm, bending_limit(elastic, job));
+    EXPECT_LT(elastic.peak_force_n, stiff.peak_force_n);
+
+    // Off by the switch; then it bends too far, and is reported as that.
+    diagnostics.clear();
+    job.cutting.adapt_feed = false;
+    plan.layers[0].operations = {slot(40)};
+    rate_layer(context, plan.layers[0], plan, diagnostics);
+    EXPECT_EQ(plan.layers[0].operations[0].moves[2].feed, 9000U);
+    ASSERT_EQ(diagnostics.size(), 1U);
+    EXPECT_EQ(diagnostics[0].code, "cut.deflection");
+
+    // Too elastic for any feed.
+    diagnostics.clear();
+    job.cutting.adapt_feed = true;
+    job.tools[1].stickout = 300;
+    plan.layers[0].operations = {slot(40)};
+    rate_layer(context, plan.layers[0], plan, diagnostics);
+    ASSERT_EQ(diagnostics.size(), 2U);
+    EXPECT_EQ(diagnostics[1].code, "cut.deflection");
+    EXPECT_GE(plan.layers[0].operations[0].moves[2].feed, 9000U / 8);
+}
+
+TEST(Feeds, ThinChipsAndAirGoFasterAndThickOnesDoNot) {
+    Plan plan = plate();
+    Context context;
+    std::vector<Diagnostic> diagnostics;
+    const double r = plan.job.tools[1].diameter / 2;
+    // A slot by roughing, then .3 mm off its wall by finishing, and a slot by finishing.
+    plan.layers[0].operations = {
+        line(plan, OperationKind::rough, 2, {at(-10, 30, 30, 0), at(-10, 30, 15, 0), at(130, 30, 15, 9000), at(130, 30, 30, 0)}),
+        line(plan, OperationKind::finish, 2,
+             {at(-10, 30.3, 30, 0), at(-10, 30.3, 15, 0), at(130, 30.3, 15, 5000), at(130, 30.3, 30, 0), at(-10, 30 + 3 * r, 30, 0),
+              at(-10, 30 + 3 * r, 15, 0), at(130, 30 + 3 * r, 15, 5000), at(130, 30 + 3 * r, 30, 0)})};
+    rate_layer(context, plan.layers[0], plan, diagnostics);
+    const Operation& finish = plan.layers[0].operations[1];
+    EXPECT_GT(finish.moves[2].feed, 5000U);
+    EXPECT_LE(finish.moves[2].feed, 9000U);
+    EXPECT_EQ(finish.moves[6].feed, 5000U);
+    EXPECT_EQ(finish.moves[4].feed, 0U);
+    for (const Operation& op : plan.layers[0].operations) EXPECT_LE(op.wall_error_mm, bending_limit(op, plan.job));
+}
+
+// Over random programs: no feed over tool and machine, few different ones, rapids and plunges as they were, the limit kept
+// wherever the feed is above the floor, and the same bytes on any number of threads.
+TEST(Feeds, RandomPrograms) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> x(-5, 125), y(-5, 85), z(4, 18), stickout(35, 120);
+    for (int trial = 0; trial < 12; ++trial) {
+        Plan plan = plate();
+        for (Tool& t : plan.job.tools) t.stickout = stickout(random);
+        std::vector<Operation> operations;
+        for (int i = 0; i < 4; ++i) {
+            const int tool = 2 + static_cast<int>(random() % 2);
+            std::vector<Move> moves{at(0, 0, 30, 0)};
+            for (int k = 0; k < 60; ++k) {
+                const auto last = moves.back();
+                switch (random() % 6) {
+                    case 0:
+                        moves.push_back({last.x, last.y, to_units(30), 0});
+                        moves.push_back(at(x(random), y(random), 30, 0));
+                        break;
+                    case 1:
+                        moves.push_back({last.x, last.y, to_units(z(random)), 1500});
+                        break;
+                    default:
+                        moves.push_back(at(x(random), y(random), last.z == to_units(30) ? 30 : to_mm(last.z), 5000));
+                }
+            }
+            operations.push_back(line(plan, i == 0 ? OperationKind::rough : i == 1 ? OperationKind::semi_rough : OperationKind::finish, tool, moves));
+        }
+        plan.layers[0].operations = operations;
+        Context one({.threads = 1}), two({.threads = 2});
+        std::vector<Diagnostic> d1, d2;
+        Layer other = plan.layers[0];
+        rate_layer(one, plan.layers[0], plan, d1);
+        rate_layer(two, other, plan, d2);
+        EXPECT_EQ(d1, d2);
+        for (std::size_t o = 0; o < operations.size(); ++o) {
+            const Operation &before = operations[o], &after = plan.layers[0].operations[o];
+            EXPECT_EQ(after.moves, other.operations[o].moves);
+            EXPECT_EQ(after.peak_force_n, other.operations[o].peak_force_n);
+            ASSERT_EQ(before.moves.size(), after.moves.size());
+            std::set<std::uint32_t> feeds;
+            double slowest = 1e9;
+            for (std::size_t k = 1; k < before.moves.size(); ++k) {
+                const Move &a = before.moves[k], &b = after.moves[k];
+                EXPECT_EQ(std::tie(a.x, a.y, a.z), std::tie(b.x, b.y, b.z));
+                const bool plunge = a.x == before.moves[k - 1].x && a.y == before.moves[k - 1].y;
+                if (a.feed == 0 || plunge) {
+                    EXPECT_EQ(a.feed, b.feed);
+                } else {
+                    EXPECT_GE(b.feed, 5000U / 8);
+                    EXPECT_LE(b.feed, after.kind == OperationKind::rough ? 5000U : 9000U);
+                    feeds.insert(b.feed);
+                    slowest = std::min<double>(slowest, b.feed);
+                }
+            }
+            EXPECT_LE(feeds.size(), static_cast<std::size_t>(kFeedSteps) + 1);
+            // Too far only where the feed went as low as it may.
+            if (after.wall_error_mm > bending_limit(after, plan.job)) {
+                EXPECT_LE(slowest, 5000.0 / 8 + 9000.0 / kFeedSteps);
+            }
+        }
+    }
+}
+
+}  // namespace
+}  // namespace slabwright
