@@ -118,15 +118,17 @@ TEST_P(Cutting, ContoursTouchAndSpareThePart) {
                 loops.points.push_back(a);
                 ASSERT_LE(std::hypot(a.x - b.x, a.y - b.y), 1.4143 * pitch) << "a chord leaves its cell";
                 if (random() % 8) continue;
-                EXPECT_NEAR(room(mesh, z_top, cutter, to_mm(a.x), to_mm(a.y), tip), 0, 2e-4) << to_mm(a.x) << ' ' << to_mm(a.y) << " tip " << tip;
-                EXPECT_GE(room(mesh, z_top, cutter, 0.5 * to_mm(std::int64_t{a.x} + b.x), 0.5 * to_mm(std::int64_t{a.y} + b.y), tip), -miss);
+                EXPECT_NEAR(room(mesh, z_top - kTopSheet, cutter, to_mm(a.x), to_mm(a.y), tip), 0, 2e-4)
+                    << to_mm(a.x) << ' ' << to_mm(a.y) << " tip " << tip;
+                EXPECT_GE(room(mesh, z_top - kTopSheet, cutter, 0.5 * to_mm(std::int64_t{a.x} + b.x), 0.5 * to_mm(std::int64_t{a.y} + b.y), tip),
+                          -miss);
             }
             loops.close_loop();
         }
         // Nothing is missing: wherever there is clearly room, or clearly none, the contours say the same.
         for (int k = 0; k < 200; ++k) {
             const double x = static_cast<double>(random() % 2600) / 100 - 13, y = static_cast<double>(random() % 2600) / 100 - 13;
-            const double r = room(mesh, z_top, cutter, x, y, tip);
+            const double r = room(mesh, z_top - kTopSheet, cutter, x, y, tip);
             if (std::abs(r) < 0.05) continue;
             EXPECT_EQ(winding(loops, {to_units(x), to_units(y)}) != 0, r < 0) << x << ' ' << y << " tip " << tip << " room " << r;
         }
@@ -147,11 +149,12 @@ TEST_P(Cutting, DropRestsOnThePart) {
         const double x = static_cast<double>(random() % 26000) / 1000 - 13, y = static_cast<double>(random() % 26000) / 1000 - 13;
         const Rest rest = index.drop(x, y);
         if (rest.tip_z < -2.5) {
-            EXPECT_GE(room(mesh, z_top, cutter, x, y, -2.4), 0);
+            EXPECT_GE(room(mesh, z_top - kTopSheet, cutter, x, y, -2.4), 0);
             continue;
         }
-        EXPECT_GE(room(mesh, z_top, cutter, x, y, rest.tip_z + 1e-6), -1e-6) << x << ' ' << y;
-        EXPECT_LT(room(mesh, z_top, cutter, x, y, rest.tip_z - 1e-3), 0) << x << ' ' << y << " could go lower than " << rest.tip_z;
+        EXPECT_GE(room(mesh, z_top - kTopSheet, cutter, x, y, rest.tip_z + 1e-6), -1e-6) << x << ' ' << y;
+        EXPECT_LT(room(mesh, z_top - kTopSheet, cutter, x, y, rest.tip_z - 1.1e-3 - kTopSheet), 0)
+            << x << ' ' << y << " could go lower than " << rest.tip_z;
     }
 }
 

@@ -125,7 +125,7 @@ TEST(Planner, RapidsAreAFractionOfTheCuts) {
             const double most = op.purpose == "projected raster" ? 0.1 : op.purpose == "level contours" ? 0.25 : 1e9;
             EXPECT_LT(op.rapid_mm, most * op.cutting_mm) << op.purpose << " of layer " << layer.index;
         }
-    EXPECT_LT(rapid, 0.15 * cutting);
+    EXPECT_LT(rapid, 0.2 * cutting);
 }
 
 // The models as files, planned, written, read back and simulated.

@@ -62,7 +62,7 @@ void append_facet(MeshView mesh, std::uint32_t f, double z_top, std::vector<Soli
         if (a_in) {
             corner[corners] = a;
             // What lies beyond an edge in the top is not there to test it.
-            edge[corners++] = matters[k] || (a[2] >= z_top - kTopSheet && b[2] >= z_top - kTopSheet);
+            edge[corners++] = matters[k] || (a[2] == z_top && b[2] == z_top);
         }
         if (a_in != b_in && a[2] != z_top && b[2] != z_top) {
             corner[corners] = cross_plane(a, b, z_top);
@@ -95,6 +95,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     LayerSolid solid;
     solid.z_low = z_low;
     solid.z_top = z_top;
+    const double cut_off = z_top - kTopSheet;  // the part is cut off here, facets and cap alike
     constexpr std::size_t grain = std::size_t{1} << 14;
     std::vector<std::vector<SolidFacet>> parts((mesh.size() + grain - 1) / grain);
     parallel_for(context, mesh.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -103,8 +104,8 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
             const Index3& facet = mesh.facets[f];
             const double z0 = mesh.vertices[facet[0]].z, z1 = mesh.vertices[facet[1]].z, z2 = mesh.vertices[facet[2]].z;
             const double low = std::min({z0, z1, z2}), high = std::max({z0, z1, z2});
-            if (low >= z_top - kTopSheet || high < z_low) continue;  // a flat at the top itself belongs to the cap
-            append_facet(mesh, static_cast<std::uint32_t>(f), z_top, part);
+            if (low >= cut_off || high < z_low) continue;  // a flat at the top itself belongs to the cap
+            append_facet(mesh, static_cast<std::uint32_t>(f), cut_off, part);
         }
     });
     std::size_t total = 0;
@@ -114,7 +115,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
         solid.facets.insert(solid.facets.end(), part.begin(), part.end());
         std::vector<SolidFacet>().swap(part);
     }
-    const Plane top{z_top - kTopSheet, Side::below};
+    const Plane top{cut_off, Side::below};
     solid.cap = std::move(slice(context, mesh, {&top, 1})[0].loops);
     solid.min = {1e300, 1e300};
     solid.max = {-1e300, -1e300};

@@ -14,7 +14,7 @@ namespace slabwright {
 
 using Vec3d = std::array<double, 3>;
 
-/// A facet of the layer's solid, cut off at the layer's top.
+/// A facet of the layer's solid, cut off kTopSheet below the layer's top.
 struct SolidFacet {
     std::array<Vec3d, 3> p;
     Vec3d normal{};  ///< unit, outward; zero for a facet without area
