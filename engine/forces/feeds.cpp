@@ -217,8 +217,9 @@ void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Di
             if (worst)
                 diagnostics.push_back(
                     {Severity::note, "feed.lowered",
-                     fmt::format("layer {}: the feed of the {} is lowered in {:.0f} % of the way, to {:.0f} % where the cutter would bend most",
-                                 layer.index, op.purpose, 100 * way / static_cast<double>(seen.size()), 100 * lowest_share),
+                     fmt::format(
+                         "layer {}, {}: the feed is lowered in {:.1f} % of the way, to {:.0f} % of what was planned where the cutter would bend most",
+                         layer.index, op.purpose, 100 * way / static_cast<double>(seen.size()), 100 * lowest_share),
                      place(*worst)});
             set_feeds(op, std::move(wanted), level);
         }
@@ -237,8 +238,9 @@ void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Di
         if (op.wall_error_mm > limit)
             diagnostics.push_back(
                 {Severity::warning, "cut.deflection",
-                 fmt::format("layer {}: the cutter may bend by {:.3f} mm while the {} are cut, more than the {:.3f} mm allowed: {}", layer.index,
-                             op.wall_error_mm, op.purpose, limit, "use a shorter or thicker tool or a smaller stepdown"),
+                 fmt::format("layer {}, {}: the cutter may bend by {:.4f} mm, more than the {:.4f} mm allowed; use a shorter or thicker tool "
+                             "or a smaller stepdown",
+                             layer.index, op.purpose, op.wall_error_mm, limit),
                  place(*furthest)});
     }
 }

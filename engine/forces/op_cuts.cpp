@@ -29,41 +29,65 @@ StandingSlab::StandingSlab(std::array<double, 2> stock_min, std::array<double, 2
 void StandingSlab::run(const Operation& operation, const Tool& tool, const std::function<void(const CutStretch&)>& stretch) {
     const CutterEnd end = end_of(tool);
     const double enough = std::max(end.radius / 2, 3 * grid_.cell), area = grid_.cell * grid_.cell;
+    /// What a stretch has met so far.
+    struct Met {
+        double volume = 0, low = 1e300, high = -1e300, side = 0;
+    };
     CutStretch now;
-    double volume = 0, low = 1e300, high = -1e300, side = 0;
+    Met met;
     const auto finish = [&] {
         if (now.length > 0) {
-            if (volume > 0) {
-                now.low = std::max(0.0, low), now.high = high;
-                now.width = std::min(tool.diameter, volume / (std::max(now.length, 2 * grid_.cell) * (now.high - now.low)));
-                now.left = side > 0;
+            if (met.volume > 0) {
+                now.low = std::max(0.0, met.low), now.high = met.high;
+                now.width = std::min(tool.diameter, met.volume / (std::max(now.length, 2 * grid_.cell) * (now.high - now.low)));
+                now.left = met.side > 0;
             }
             stretch(now);
         }
         now = {};
-        volume = 0, low = 1e300, high = -1e300, side = 0;
+        met = {};
     };
-    // One short straight way.
-    const auto step = [&](std::uint32_t move, const std::array<double, 3>& from, const std::array<double, 3>& to) {
-        const double dx = to[0] - from[0], dy = to[1] - from[1], length = std::hypot(dx, dy), tip = std::min(from[2], to[2]);
+    // One straight way, told in equal parts. A cell is met when the cutter's leading edge comes to it, or at the way's begin.
+    std::vector<Met> parts;
+    const auto step = [&](std::uint32_t move, const std::array<double, 3>& from, const std::array<double, 3>& to, std::size_t count) {
+        const double length = std::hypot(to[0] - from[0], to[1] - from[1]), slope = length > 0 ? (to[2] - from[2]) / length : 0;
+        const double dx = length > 0 ? (to[0] - from[0]) / length : 0, dy = length > 0 ? (to[1] - from[1]) / length : 0;
+        const double per_mm = length > 0 ? static_cast<double>(count) / length : 0, part = length / static_cast<double>(count),
+                     r2 = end.radius * end.radius;
+        parts.assign(count, {});
         sweep_above(
             grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_}, [&](std::size_t c) { return height_[c]; },
             [&](std::size_t c, double z) {
                 const double stood = height_[c], left = std::max(0.0, z);
                 if (stood - left < kLeastTaken) return;
                 height_[c] = static_cast<float>(left);
-                volume += (stood - left) * area;
-                low = std::min(low, left + bottom_ - tip);
-                high = std::max(high, stood + bottom_ - tip);
                 const auto j = static_cast<int>(c / static_cast<std::size_t>(grid_.nx)), i = static_cast<int>(c % static_cast<std::size_t>(grid_.nx));
-                side += (stood - left) * (dx * (grid_.y(j) - from[1]) - dy * (grid_.x(i) - from[0]));
+                const double px = grid_.x(i) - from[0], py = grid_.y(j) - from[1], along = px * dx + py * dy, across = dx * py - dy * px;
+                std::size_t p = 0;
+                if (count > 1) {
+                    const double first = along - std::sqrt(std::max(0.0, r2 - across * across));
+                    p = std::min(count - 1, static_cast<std::size_t>(std::max(0.0, first) * per_mm));
+                }
+                Met& m = parts[p];
+                const double tip = std::min(from[2] + slope * static_cast<double>(p) * part, from[2] + slope * static_cast<double>(p + 1) * part);
+                m.volume += (stood - left) * area;
+                m.low = std::min(m.low, left + bottom_ - tip);
+                m.high = std::max(m.high, stood + bottom_ - tip);
+                m.side += (stood - left) * across;
             });
         if (length == 0) return;
-        if (now.length == 0) now.first = move;
-        now.last = move;
-        now.length += length;
-        now.at = to;
-        if (now.length >= enough) finish();
+        for (std::size_t p = 0; p < count; ++p) {
+            const Met& m = parts[p];
+            met = {met.volume + m.volume, std::min(met.low, m.low), std::max(met.high, m.high), met.side + m.side};
+            if (now.length == 0) now.first = move;
+            now.last = move;
+            now.length += part;
+            const double t = static_cast<double>(p + 1) / static_cast<double>(count);
+            now.at = p + 1 == count
+                         ? to
+                         : std::array<double, 3>{from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1]), from[2] + t * (to[2] - from[2])};
+            if (now.length >= enough || count > 1) finish();
+        }
     };
     for (std::size_t k = 1; k < operation.moves.size(); ++k) {
         const Move &a = operation.moves[k - 1], &b = operation.moves[k];
@@ -76,36 +100,28 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, const std::
         if (now.length > 0 && operation.moves[now.last].feed != b.feed) finish();
         if (a.x == b.x && a.y == b.y) {
             finish();
-            step(move, from, to);
-            volume = 0, low = 1e300, high = -1e300, side = 0;
+            step(move, from, to, 1);
             continue;
         }
         if (b.is_arc()) {
             // Chords that miss the arc by less than a tenth of a cell, and are no longer than a stretch.
             const ArcShape arc = arc_shape(a, b);
             const double most = std::min({2 * std::acos(std::max(0.0, 1 - 0.1 * grid_.cell / arc.radius)), enough / arc.radius, 0.5});
-            const int parts = std::max(1, static_cast<int>(std::ceil(std::abs(arc.sweep) / most)));
+            const int chords = std::max(1, static_cast<int>(std::ceil(std::abs(arc.sweep) / most)));
             std::array<double, 3> last = from;
-            for (int p = 1; p <= parts; ++p) {
-                const double angle = arc.start + arc.sweep * p / parts;
+            for (int p = 1; p <= chords; ++p) {
+                const double angle = arc.start + arc.sweep * p / chords;
                 const std::array<double, 3> next =
-                    p == parts ? to : std::array<double, 3>{arc.x + arc.radius * std::cos(angle), arc.y + arc.radius * std::sin(angle), to[2]};
-                step(move, last, next);
+                    p == chords ? to : std::array<double, 3>{arc.x + arc.radius * std::cos(angle), arc.y + arc.radius * std::sin(angle), to[2]};
+                step(move, last, next, 1);
                 last = next;
             }
             continue;
         }
         const double length = std::hypot(to[0] - from[0], to[1] - from[1]);
-        const int parts = std::max(1, static_cast<int>(std::ceil(length / (2 * enough))));
-        std::array<double, 3> last = from;
-        for (int p = 1; p <= parts; ++p) {
-            const double t = static_cast<double>(p) / parts;
-            const std::array<double, 3> next =
-                p == parts ? to
-                           : std::array<double, 3>{from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1]), from[2] + t * (to[2] - from[2])};
-            step(move, last, next);
-            last = next;
-        }
+        const auto count = static_cast<std::size_t>(std::max(1.0, std::floor(length / enough)));
+        if (count > 1) finish();
+        step(move, from, to, count);
     }
     finish();
 }

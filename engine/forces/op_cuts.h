@@ -35,9 +35,10 @@ public:
     /// down, is taken as at least two cells long. Moves straight down take away and tell nothing: they drill.
     void run(const Operation& operation, const Tool& tool, const std::function<void(const CutStretch&)>& stretch);
 
-    /// The cells for a job's stock: as fine as what roughing leaves on a wall, coarser where there would be more than kMostCells.
+    /// The cells for a job's stock, mm: as fine as what roughing leaves on a wall, coarser where there would be more than kMostCells. A
+    /// strip along the grid that is thinner than a cell is met as a whole cell or not at all.
     [[nodiscard]] static double cell_for(const Job& job, std::array<double, 2> stock_min, std::array<double, 2> stock_max);
-    static constexpr double kMostCells = 4e6;
+    static constexpr double kMostCells = 1e6;
     [[nodiscard]] std::uint64_t bytes() const { return height_.size() * sizeof(float); }
 
 private:
