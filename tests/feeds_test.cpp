@@ -10,7 +10,8 @@
 #include "engine/forces/cuts.h"
 #include "engine/forces/feeds.h"
 #include "engine/forces/op_cuts.h"
-#include "kernels/forces/deflection.h"
+#include "engine/planner.h"
+#include "tests/support/height_field.h"
 
 namespace slabwright {
 namespace {
@@ -238,6 +239,42 @@ TEST(Feeds, RandomPrograms) {
             }
         }
     }
+}
+
+// In a whole plan: the paths stay as they are, the build takes no longer, and nominal engagement leaves feeds and places alone.
+TEST(Feeds, OfAWholePlan) {
+    Context context;
+    const Mesh mesh = test::height_field(context, 12, 5.0, [](double x, double y) { return std::max(std::abs(x), std::abs(y)) < 16 ? 14.0 : 6.0; });
+    Job job;
+    const Plan adapted = make_plan(context, mesh, {}, job);
+    job.cutting.adapt_feed = false;
+    const Plan planned = make_plan(context, mesh, {}, job);
+    job.cutting.engagement = Engagement::nominal;
+    const Plan nominal = make_plan(context, mesh, {}, job);
+    ASSERT_EQ(adapted.layers.size(), planned.layers.size());
+    int faster = 0;
+    for (std::size_t l = 0; l < planned.layers.size(); ++l) {
+        ASSERT_EQ(adapted.layers[l].operations.size(), planned.layers[l].operations.size());
+        for (std::size_t o = 0; o < planned.layers[l].operations.size(); ++o) {
+            const Operation &a = adapted.layers[l].operations[o], &p = planned.layers[l].operations[o], &n = nominal.layers[l].operations[o];
+            EXPECT_EQ(p.moves, n.moves);
+            EXPECT_GT(n.peak_force_n, 0);
+            EXPECT_FALSE(n.peak_at);
+            EXPECT_EQ(p.peak_at.has_value(), p.peak_force_n > 0);
+            EXPECT_LE(p.wall_error_mm, p.deflection_mm);
+            ASSERT_EQ(a.moves.size(), p.moves.size());
+            for (std::size_t k = 0; k < p.moves.size(); ++k) {
+                Move as_planned = a.moves[k];
+                faster += as_planned.feed > p.moves[k].feed;
+                as_planned.feed = p.moves[k].feed;
+                EXPECT_EQ(as_planned, p.moves[k]);
+                EXPECT_EQ(a.moves[k].feed == 0, p.moves[k].feed == 0);
+            }
+        }
+    }
+    EXPECT_GT(faster, 0);
+    EXPECT_LT(adapted.totals.build_minutes, planned.totals.build_minutes);
+    EXPECT_EQ(planned.totals.build_minutes, nominal.totals.build_minutes);
 }
 
 }  // namespace
