@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
@@ -393,9 +394,10 @@ ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder&
     if (folder.base_board_cut < 0)
         for (const Tool& tool : input.tools)
             if (tool.kind == ToolKind::ball) board = std::max(board, tool.diameter / 2);
-    std::vector<Reach> reaches;
-    for (std::size_t l = 0; l < input.layers.size(); ++l)
-        reaches.emplace_back(part, input.tools, input.layers[l].z_bottom, input.layers[l].z_top, l == 0 ? input.layers[l].z_bottom - board : -1e300);
+    const auto reach_of = [&](std::size_t l) {
+        const SimulatedLayer& layer = input.layers[l];
+        return std::make_unique<Reach>(part, input.tools, layer.z_bottom, layer.z_top, l == 0 ? layer.z_bottom - board : -1e300);
+    };
 
     struct Side {
         Point3 middle{}, normal{};
@@ -432,12 +434,14 @@ ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder&
     }
     std::string answers(asked.size(), '\0');
     parallel_for(context, asked.size(), 64, [&](std::size_t begin, std::size_t end) {
+        std::vector<std::unique_ptr<Reach>> reaches(input.layers.size());  // a search remembers, so that no two threads may share it
         for (std::size_t i = begin; i < end; ++i) {
             Point3 p = asked[i].middle;
             std::size_t layer = 0;
             while (layer + 1 < input.layers.size() && p[2] > input.layers[layer].z_top) ++layer;
             for (std::size_t k = 0; k < 3; ++k) p[k] += kReachDistance * asked[i].normal[k];
-            answers[i] = reaches[layer].reachable(p) ? 1 : 2;
+            if (!reaches[layer]) reaches[layer] = reach_of(layer);
+            answers[i] = reaches[layer]->reachable(p) ? 1 : 2;
         }
     });
     for (std::size_t f = 0; f < model.facets.size(); ++f)
