@@ -139,6 +139,19 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     request.section_area = SectionAreas(context, view);
     LayerPlacement placement = job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request);
     plan.diagnostics.insert(plan.diagnostics.end(), placement.diagnostics.begin(), placement.diagnostics.end());
+    if (request.min_material_at) {
+        double most = 0, where = 0;
+        for (std::size_t i = 0; i + 1 < placement.boundaries.size(); ++i)
+            if (const double z = placement.boundaries[i].z, least = request.min_material_at(z); least > most) most = least, where = z;
+        if (most > request.max_layer)
+            plan.diagnostics.push_back(
+                {Severity::warning,
+                 "layers.overhang",
+                 fmt::format("the slab glued at {:.2f} mm hangs over so far that {:.1f} mm of it would be needed to bear the cutters, more than the "
+                             "tallest layer's {:.1f} mm; a flask would carry it",
+                             where, most, request.max_layer),
+                 {}});
+    }
     std::vector<double> tops;
     for (const Boundary& b : placement.boundaries) {
         Layer layer;

@@ -1,6 +1,7 @@
 // The thinnest material that bears the cutters (LUO 6.3, 6.5.2), and what layers make of it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -162,6 +163,21 @@ TEST(LeastMaterial, AComputedThicknessPlans) {
                 EXPECT_GE(f.z_low - z, need - 1e-3);
             }
     }
+}
+
+TEST(LeastMaterial, ASlabThatHangsOverTooFarIsReported) {
+    Context context;
+    // A post of 12 mm on a base of 120 mm: the slabs around the post reach 85 mm past it.
+    const Mesh mesh = test::height_field(context, 20, 6.0, [](double x, double y) { return std::max(std::abs(x), std::abs(y)) < 7 ? 60.0 : 8.0; });
+    Job job;
+    job.material.min_thickness = 0;
+    const auto reported = [&] {
+        const Plan plan = make_plan(context, mesh, {}, job);
+        return std::any_of(plan.diagnostics.begin(), plan.diagnostics.end(), [](const Diagnostic& d) { return d.code == "layers.overhang"; });
+    };
+    EXPECT_TRUE(reported());
+    job.material.strength_mpa = 1000;
+    EXPECT_FALSE(reported());
 }
 
 }  // namespace
