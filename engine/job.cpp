@@ -89,6 +89,8 @@ FeatureOptions feature_options(const Job& job) {
     return options;
 }
 
+bool plunges_by_default(ToolKind kind) { return kind == ToolKind::ball || kind == ToolKind::drill; }
+
 const Tool& tool_of_kind(const Job& job, ToolKind kind) {
     static constexpr const char* words[] = {"flat end mill", "ball end mill", "face mill", "drill"};
     static constexpr const char* keys[] = {"flat", "ball", "face", "drill"};
@@ -185,6 +187,7 @@ void validate(const Job& job) {
     require("cutting.min_flat_area", k.min_flat_area, 0, 1e6);
     require("cutting.face_depth", k.face_depth, 0, 1000, Ends::open_low);
     require("cutting.ramp_deg", k.ramp_deg, 0, 90, Ends::open_low);
+    require("cutting.max_engagement", k.max_engagement, 0, 1, Ends::open_low);
     require("cutting.holder_clearance", k.holder_clearance, 0, 1000);
     require("cutting.finish_feed", k.finish_feed, 1, 1e6);
 

@@ -23,6 +23,8 @@ enum class FinishStrategy : std::uint8_t { split, levels, projection, both };
 enum class Projection : std::uint8_t { raster, offset };
 /// What a cut is taken to meet: what the operations before have left standing, or the most that its steps can leave it.
 enum class Engagement : std::uint8_t { simulated, nominal };
+/// How roughing clears a level: in rings offset again and again from what stays, or on parallel lines to and fro.
+enum class RoughPattern : std::uint8_t { contour, zigzag };
 enum class ToolKind : std::uint8_t { flat, ball, face, drill };
 
 inline constexpr double kInch = 25.4;
@@ -44,6 +46,7 @@ struct Tool {
     double plunge_feed = 1500;                  ///< mm/min, straight down
     double stepdown_min = 0, stepdown_max = 0;  ///< LUO table 5.4
     double stepover = 0.5;                      ///< share of the diameter, for clearing
+    bool plunges = false;                       ///< cuts straight down into stock (plunges_by_default)
 };
 
 struct Material {
@@ -119,6 +122,9 @@ struct Cutting {
     double min_flat_area = 4.0;                          ///< mm²; smaller up-facing flats get no level of their own, the ball covers them
     double face_depth = 4.0;                             ///< deepest face-milling step
     double ramp_deg = 5;                                 ///< entry into stock
+    RoughPattern rough_pattern = RoughPattern::contour;
+    bool climb = true;            ///< contour roughing keeps the stock on its right everywhere; false: either way, where that is shorter
+    double max_engagement = 0.7;  ///< share of the diameter that roughing meets at its full feed; 1: a slot
     double holder_clearance = 2.0;
     double finish_feed = 5000;
     FinishStrategy finish_strategy = FinishStrategy::split;
@@ -154,7 +160,7 @@ struct Job {
         {2, ToolKind::flat, "flat end mill 1/2 in", 0.5 * kInch, 32, 0.5 * kInch, 50, 40, 2, std::numbers::pi / 6, 18000, 9000, 1500, 0.1 * kInch,
          0.15 * kInch, 0.5},
         {3, ToolKind::ball, "ball end mill 1/4 in", 0.25 * kInch, 30, 0.25 * kInch, 45, 32, 2, std::numbers::pi / 6, 18000, 9000, 1500,
-         0.0625 * kInch, 0.125 * kInch, 0.5},
+         0.0625 * kInch, 0.125 * kInch, 0.5, true},
     };
 };
 
@@ -168,6 +174,10 @@ struct Job {
 
 /// What the job asks of the feature finders.
 [[nodiscard]] FeatureOptions feature_options(const Job& job);
+
+/// Whether tools of a kind mill straight down unless the job says otherwise: ball end mills and drills do; the edges of a face
+/// mill do not reach its middle, nor do those of many flat end mills.
+[[nodiscard]] bool plunges_by_default(ToolKind kind);
 
 /// The first tool of a kind. @throws Error(usage, "job.tool") when the library has none
 [[nodiscard]] const Tool& tool_of_kind(const Job& job, ToolKind kind);

@@ -21,6 +21,7 @@ inline constexpr Word<FinishStrategy> kFinishWords[] = {
 inline constexpr Word<Projection> kProjectionWords[] = {{"raster", Projection::raster}, {"offset", Projection::offset}};
 inline constexpr Word<CoefficientTransform> kTransformWords[] = {{"printed", CoefficientTransform::printed},
                                                                  {"oblique", CoefficientTransform::oblique}};
+inline constexpr Word<RoughPattern> kRoughWords[] = {{"contour", RoughPattern::contour}, {"zigzag", RoughPattern::zigzag}};
 inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}};
 inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated}, {"nominal", Engagement::nominal}};
 inline constexpr Word<ToolKind> kToolWords[] = {
@@ -60,6 +61,7 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.required();
     visit.key("stepdown_max", tool.stepdown_max, "mm (LUO table 5.4)");
     visit.key("stepover", tool.stepover, "share of the diameter, for clearing");
+    visit.key("plunges", tool.plunges, "cuts straight down into stock; when left out: true for ball and drill, false for flat and face");
 }
 
 /// Walks every key of the job but the tools: first those of the top, then table by table.
@@ -147,7 +149,11 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("min_stepover", job.cutting.min_stepover, "mm, floor of the finish stepover; reported where it bites");
     visit.key("min_flat_area", job.cutting.min_flat_area, "mm^2: smaller up-facing flats get no level of their own");
     visit.key("face_depth", job.cutting.face_depth, "mm, deepest step of the face mill");
-    visit.key("ramp_deg", job.cutting.ramp_deg, "degrees, entry into stock");
+    visit.key("ramp_deg", job.cutting.ramp_deg, "degrees, entry into stock: on a helix where there is room, else to and fro");
+    visit.word("rough_pattern", job.cutting.rough_pattern, kRoughWords, "contour: rings around what stays; zigzag: parallel lines to and fro");
+    visit.key("climb", job.cutting.climb, "contour roughing climbs everywhere; false: either way, where that is shorter");
+    visit.key("max_engagement", job.cutting.max_engagement,
+              "share of the diameter that roughing meets at full feed; slower in proportion where it meets more; 1: no limit");
     visit.key("holder_clearance", job.cutting.holder_clearance, "mm between the holder and anything that stands");
     visit.key("finish_feed", job.cutting.finish_feed, "mm/min; faster where the chip is thin, see adapt_feed");
     visit.word("finish_strategy", job.cutting.finish_strategy, kFinishWords,

@@ -333,6 +333,7 @@ Job parse_job(std::string_view text, const std::string& file) {
             reader.enter(&values, fmt::format("tool[{}].", ++position));
             Tool tool;
             visit_tool_keys(tool, reader);
+            if (values.get("plunges") == nullptr) tool.plunges = plunges_by_default(tool.kind);
             job.tools.push_back(std::move(tool));
         }
     }

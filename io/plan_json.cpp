@@ -61,6 +61,7 @@ void put_tool(JsonText& json, const Tool& tool) {
     json.key("plunge_feed").exact(tool.plunge_feed);
     json.key("stepdown").begin_array().exact(tool.stepdown_min).exact(tool.stepdown_max).end();
     json.key("stepover").exact(tool.stepover);
+    json.key("plunges").boolean(tool.plunges);
     json.end();
 }
 

@@ -127,6 +127,7 @@ TEST(Job, ValuesAreTaken) {
     ASSERT_EQ(job.tools.size(), 1u) << "a [[tool]] replaces the library";
     EXPECT_EQ(job.tools[0].number, 7);
     EXPECT_NEAR(job.tools[0].helix_rad, std::numbers::pi / 4, 1e-15);
+    EXPECT_TRUE(job.tools[0].plunges) << "a ball end mill does, unless the job says otherwise";
 }
 
 TEST(Job, UnknownKeysNameTheNearest) {
@@ -243,6 +244,9 @@ TEST(Job, ValidateRefusesWhatNoMachineHas) {
     EXPECT_FALSE(is_valid([](Job& j) { j.layers.min_layer = 18.6; })) << "no layer can be that thick";
     EXPECT_FALSE(is_valid([](Job& j) { j.cutting.vertical_deg = 45; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.cutting.min_stepover = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.cutting.max_engagement = 0; }));
+    EXPECT_TRUE(is_valid([](Job& j) { j.cutting.max_engagement = 1; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.cutting.max_engagement = 1.1; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.tools.clear(); }));
     EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].number = 1; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].stickout = 31; }));

@@ -11,89 +11,128 @@ namespace {
 constexpr double kBeyond = 20;           // mm that the flask's region reaches past the stock
 constexpr double kRingTolerance = 0.02;  // mm, as that of roughing's borders
 constexpr double kStepShare = 0.45;      // of the diameter: less than the radius by what offsets and thinning may add
+constexpr double kBeside = 0.5;          // mm of air between the stock and a cutter that goes down beside it
+constexpr double kOnEdge = 0.1;          // mm
+constexpr double kSlide = 1.2;           // steps along the next ring that the way to it slants
 
 double length(const PathPoint& a, const PathPoint& b) { return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y); }
 
-// What a ring shows within a rectangle: the whole ring, or pieces of it.
+// What a ring shows near the stock: the whole ring, or pieces of it. All pieces around one region of the free area are cut
+// before those around the wider region that it lies in.
 struct Piece {
     std::vector<PathPoint> points;
+    std::array<double, 4> box{};  // smallest x and y, largest x and y
+    std::size_t region = 0;
     bool closed = false;
-    bool done = false;
 };
 
-struct Rect {
-    double x0 = 0, y0 = 0, x1 = 0, y1 = 0;  // 0.1 µm
+// A connected part of what is free at one distance from the forbidden region. Within it, farther off, lie others.
+struct Region {
+    std::size_t ring = 0, around = SIZE_MAX;  // how many steps off; the region one step nearer that holds this one
+    std::size_t waits_for = 0;                // regions within this one that are not cut yet
+    std::vector<std::size_t> pieces;
+    std::size_t left = 0;  // pieces not cut yet
 };
 
-// Liang and Barsky: the part of a segment within the rectangle, as parameters.
-bool clip(const Rect& r, const PathPoint& a, const PathPoint& b, double& t0, double& t1) {
-    const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y;
-    t0 = 0, t1 = 1;
-    for (const auto& [p, q] : {std::pair{-dx, a.x - r.x0}, {dx, r.x1 - a.x}, {-dy, a.y - r.y0}, {dy, r.y1 - a.y}}) {
-        if (p == 0) {
-            if (q < 0) return false;
-        } else if (p < 0) {
-            t0 = std::max(t0, q / p);
-        } else {
-            t1 = std::min(t1, q / p);
-        }
+// Where the middle of a cutter may be of use: the stock grown by `reach`, its corners rounded, as far as the machine travels.
+struct Bound {
+    std::array<double, 4> stock{}, travel{};  // 0.1 µm: smallest x and y, largest x and y
+    double reach = 0;
+
+    // Whether a point lies on the edge, or within a hair of it.
+    [[nodiscard]] bool on_edge(double x, double y) const {
+        const double dx = std::max({stock[0] - x, x - stock[2], 0.0}), dy = std::max({stock[1] - y, y - stock[3], 0.0});
+        const double inside = std::min({reach - std::hypot(dx, dy), x - travel[0], travel[2] - x, y - travel[1], travel[3] - y});
+        return inside < kOnEdge * kUnitsPerMm;
     }
-    return t0 <= t1;
-}
+};
 
-// Travelled with the region on the right, so that the cutter climbs.
-void append_pieces(std::span<const Point2> loop, std::int32_t z, const Rect& rect, std::vector<Piece>& out) {
-    std::vector<PathPoint> ring;
-    for (std::size_t k = loop.size(); k-- > 0;) ring.push_back({loop[k].x, loop[k].y, z});
-    auto outside = [&](const PathPoint& p) { return p.x < rect.x0 || p.x > rect.x1 || p.y < rect.y0 || p.y > rect.y1; };
-    const auto first_out = std::find_if(ring.begin(), ring.end(), outside);
+// The pieces of one loop of the free area that are no edge of the bound. Outer loops run counter-clockwise and holes clockwise, so
+// the free area is on the left, what stays on the right, and the cutter climbs.
+void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bound, std::size_t region, std::vector<Piece>& out) {
     const double tolerance = kRingTolerance * kUnitsPerMm;
-    if (first_out == ring.end()) {
-        ring.push_back(ring.front());
-        out.push_back({simplify(ring, tolerance), true, false});
-        return;
-    }
-    std::rotate(ring.begin(), first_out, ring.end());
-    ring.push_back(ring.front());
-    Piece piece;
-    auto close = [&] {
-        if (piece.points.size() > 1) out.push_back({simplify(piece.points, tolerance), false, false});
-        piece.points.clear();
+    const std::size_t n = loop.size();
+    auto on_edge = [&](std::size_t k) {
+        const Point2 &a = loop[k % n], &b = loop[(k + 1) % n];
+        return bound.on_edge(a.x, a.y) && bound.on_edge(b.x, b.y) && bound.on_edge(0.5 * (a.x + static_cast<double>(b.x)), 0.5 * (a.y + static_cast<double>(b.y)));
     };
-    for (std::size_t k = 0; k + 1 < ring.size(); ++k) {
-        const PathPoint &a = ring[k], &b = ring[k + 1];
-        double t0 = 0, t1 = 0;
-        if (!clip(rect, a, b, t0, t1)) {
-            close();
+    auto point = [&](std::size_t k) { return PathPoint{loop[k % n].x, loop[k % n].y, z}; };
+    auto take = [&](std::vector<PathPoint>& points, bool closed) {
+        if (points.size() > 1) {
+            Piece piece{simplify(points, tolerance), {1e300, 1e300, -1e300, -1e300}, region, closed};
+            for (const PathPoint& p : piece.points)
+                piece.box = {std::min<double>(piece.box[0], p.x), std::min<double>(piece.box[1], p.y), std::max<double>(piece.box[2], p.x),
+                             std::max<double>(piece.box[3], p.y)};
+            out.push_back(std::move(piece));
+        }
+        points.clear();
+    };
+    std::size_t first = 0;
+    while (first < n && !on_edge(first)) ++first;
+    std::vector<PathPoint> points;
+    if (first == n) {
+        for (std::size_t k = 0; k <= n; ++k) points.push_back(point(k));
+        return take(points, true);
+    }
+    for (std::size_t k = first + 1; k <= first + n; ++k) {
+        if (on_edge(k)) {
+            take(points, false);
             continue;
         }
-        auto at = [&](double t) {
-            return PathPoint{static_cast<std::int32_t>(std::lround(a.x + t * (static_cast<double>(b.x) - a.x))),
-                             static_cast<std::int32_t>(std::lround(a.y + t * (static_cast<double>(b.y) - a.y))), z};
-        };
-        if (t0 > 0) close();
-        if (piece.points.empty()) piece.points.push_back(t0 > 0 ? at(t0) : a);
-        piece.points.push_back(t1 < 1 ? at(t1) : b);
-        if (t1 < 1) close();
+        if (points.empty()) points.push_back(point(k));
+        points.push_back(point(k + 1));
     }
-    close();
+    take(points, false);
 }
 
-// The nearest point of a piece: of an open one, its start only.
-double nearest(const Piece& piece, Point2 from, std::size_t& segment, PathPoint& at) {
+// Where a piece may begin.
+struct Start {
+    double way = 1e300;  // 0.1 µm, from where the tool is
+    std::size_t segment = 0;
+    PathPoint at;
+    bool reversed = false;
+};
+
+// The nearest beginning of a piece, as long as that is nearer than `best`: of a closed one, the nearest point; of an open one its first,
+// or either end.
+bool nearer(const Piece& piece, Point2 from, bool either_end, Start& best) {
     const PathPoint q{from.x, from.y, 0};
-    segment = 0;
-    at = piece.points.front();
-    double best = length(q, at);
-    if (!piece.closed) return best;
+    const double bx = std::max({piece.box[0] - q.x, q.x - piece.box[2], 0.0}), by = std::max({piece.box[1] - q.y, q.y - piece.box[3], 0.0});
+    if (std::hypot(bx, by) >= best.way) return false;
+    bool found = false;
+    auto offer = [&](std::size_t segment, const PathPoint& p, bool reversed) {
+        if (const double d = length(q, p); d < best.way) best = {d, segment, p, reversed}, found = true;
+    };
+    offer(0, piece.points.front(), false);
+    if (!piece.closed) {
+        if (either_end) offer(0, piece.points.back(), true);
+        return found;
+    }
     for (std::size_t k = 0; k + 1 < piece.points.size(); ++k) {
         const PathPoint &a = piece.points[k], &b = piece.points[k + 1];
         const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y, l2 = dx * dx + dy * dy;
         const double t = l2 > 0 ? std::clamp(((static_cast<double>(q.x) - a.x) * dx + (static_cast<double>(q.y) - a.y) * dy) / l2, 0.0, 1.0) : 0;
-        const PathPoint p{static_cast<std::int32_t>(std::lround(a.x + t * dx)), static_cast<std::int32_t>(std::lround(a.y + t * dy)), a.z};
-        if (const double d = length(q, p); d < best) best = d, segment = k, at = p;
+        offer(k, {static_cast<std::int32_t>(std::lround(a.x + t * dx)), static_cast<std::int32_t>(std::lround(a.y + t * dy)), a.z}, false);
     }
-    return best;
+    return found;
+}
+
+// The place `ahead` (0.1 µm) farther along a closed ring than a start on it.
+void advance(const std::vector<PathPoint>& ring, double ahead, Start& start) {
+    const std::size_t n = ring.size() - 1;
+    for (std::size_t passed = 0; passed <= n; ++passed) {
+        const PathPoint& b = ring[start.segment + 1];
+        const double left = length(start.at, b);
+        if (left >= ahead && left > 0) {
+            const double t = ahead / left;
+            start.at = {static_cast<std::int32_t>(std::lround(start.at.x + t * (static_cast<double>(b.x) - start.at.x))),
+                        static_cast<std::int32_t>(std::lround(start.at.y + t * (static_cast<double>(b.y) - start.at.y))), b.z};
+            return;
+        }
+        ahead -= left;
+        start.at = b;
+        start.segment = (start.segment + 1) % n;
+    }
 }
 
 // A closed ring that starts and ends at a point of one of its segments.
@@ -201,50 +240,156 @@ void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_
     }
 }
 
-double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z) {
-    const double r = tool.diameter / 2, step = std::min(kStepShare, tool.stepover) * tool.diameter;
-    const Rect rect{cut.low(0, r + 2) * kUnitsPerMm, cut.low(1, r + 2) * kUnitsPerMm, cut.high(0, r + 2) * kUnitsPerMm,
-                    cut.high(1, r + 2) * kUnitsPerMm};
-    const std::int32_t z = to_units(tip_z);
-    std::vector<std::vector<Piece>> rings;
-    for (Loops region = simplify(forbidden);;) {
-        std::vector<Piece> pieces;
-        for (std::size_t l = 0; l < region.size(); ++l) append_pieces(region.loop(l), z, rect, pieces);
-        if (pieces.empty()) break;
-        rings.push_back(std::move(pieces));
+namespace {
+
+struct RingPlan {
+    std::vector<Piece> pieces;
+    std::vector<Region> regions;
+};
+
+// Rings around the forbidden region, one step after the other, and which part of the free area each of them bounds.
+RingPlan plan_rings(const LayerCut& cut, double r, double step, const Loops& forbidden, std::int32_t z, const std::array<double, 4>& stands) {
+    RingPlan plan;
+    Bound bound;
+    for (std::size_t k = 0; k < 4; ++k) bound.stock[k] = stands[k] * kUnitsPerMm;
+    bound.reach = (r + kBeside) * kUnitsPerMm;
+    const double far = r + 2;
+    bound.travel = {cut.low(0, far) * kUnitsPerMm, cut.low(1, far) * kUnitsPerMm, cut.high(0, far) * kUnitsPerMm, cut.high(1, far) * kUnitsPerMm};
+    auto rectangle = [](double x0, double y0, double x1, double y1) {
+        Loops loops;
+        loops.points = {{to_units(x0), to_units(y0)}, {to_units(x1), to_units(y0)}, {to_units(x1), to_units(y1)}, {to_units(x0), to_units(y1)}};
+        loops.close_loop();
+        return loops;
+    };
+    const Loops useful = intersect(offset(rectangle(stands[0], stands[1], stands[2], stands[3]), r + kBeside, kRingTolerance),
+                                   rectangle(cut.low(0, far), cut.low(1, far), cut.high(0, far), cut.high(1, far)));
+    Loops nearer_free;
+    std::vector<std::size_t> nearer_region;  // by loop of nearer_free; SIZE_MAX for holes
+    std::size_t ring = 0;
+    for (Loops region = simplify(forbidden);; ++ring) {
+        Loops free = subtract(useful, region);
+        if (free.empty()) break;
+        std::vector<std::size_t> region_of(free.size(), SIZE_MAX);
+        const std::size_t first_piece = plan.pieces.size();
+        for (const bool holes : {false, true})
+            for (std::size_t l = 0; l < free.size(); ++l) {
+                if ((signed_area(free.loop(l)) < 0) != holes) continue;
+                if (!holes) {
+                    region_of[l] = plan.regions.size();
+                    plan.regions.push_back({ring, SIZE_MAX, 0, {}, 0});
+                } else if (free.parents[l] < 0) {
+                    continue;
+                }
+                const std::size_t of = holes ? region_of[static_cast<std::size_t>(free.parents[l])] : region_of[l];
+                if (of != SIZE_MAX) append_pieces(free.loop(l), z, bound, of, plan.pieces);
+            }
+        for (std::size_t p = first_piece; p < plan.pieces.size(); ++p) plan.regions[plan.pieces[p].region].pieces.push_back(p);
+        // Which nearer region holds each of these: by a point off the bound's edge, which both may share.
+        for (std::size_t l = 0; ring > 0 && l < free.size(); ++l) {
+            if (region_of[l] == SIZE_MAX) continue;
+            Region& inner = plan.regions[region_of[l]];
+            if (inner.pieces.empty()) continue;
+            const PathPoint& p = plan.pieces[inner.pieces.front()].points[plan.pieces[inner.pieces.front()].points.size() / 2];
+            double least = 1e300;
+            for (std::size_t m = 0; m < nearer_free.size(); ++m) {
+                if (nearer_region[m] == SIZE_MAX) continue;
+                Loops one;
+                one.points.assign(nearer_free.loop(m).begin(), nearer_free.loop(m).end());
+                one.close_loop();
+                if (const double size = area(one); size < least && winding(one, {p.x, p.y}) > 0) least = size, inner.around = nearer_region[m];
+            }
+            if (inner.around != SIZE_MAX) ++plan.regions[inner.around].waits_for;
+        }
+        if (plan.pieces.size() == first_piece) break;
+        nearer_free = std::move(free);
+        nearer_region = std::move(region_of);
         region = offset(region, step, kRingTolerance);
         cut.context.throw_if_cancelled();
     }
-    for (std::size_t k = rings.size(); k-- > 0;) {
-        std::vector<Piece>& pieces = rings[k];
-        for (std::size_t n = 0; n < pieces.size(); ++n) {
-            Piece* next = nullptr;
-            double way = 0;
-            std::size_t segment = 0;
-            PathPoint at;
-            for (Piece& piece : pieces) {
-                if (piece.done) continue;
-                std::size_t s = 0;
-                PathPoint p;
-                const double d = nearest(piece, path.at(), s, p);
-                if (!next || d < way) next = &piece, way = d, segment = s, at = p;
-            }
-            next->done = true;
-            if (next->closed) next->points = started_at(next->points, segment, at);
-            const PathPoint& start = next->points.front();
-            // From ring to ring the straight way of one step is free: it runs from a point a step away from the inner region to
-            // the nearest point of that region.
-            const bool along = path.is_down() && path.z() == z && next->closed && way <= 1.02 * step * kUnitsPerMm;
-            if (along) {
-                path.cut({start.x, start.y}, z);
-                for (const PathPoint& p : next->points) path.cut({p.x, p.y}, z);
-                continue;
-            }
-            path.follow(next->points);
+    for (Region& region : plan.regions) region.left = region.pieces.size();
+    return plan;
+}
+
+// Rectangles from the stock's edge inwards, in one spiral with the stock on its right, as far as they surround the forbidden region
+// and what is within it: what still stands is one piece then. Returns what stands: smallest x and y, largest x and y, mm.
+std::array<double, 4> cut_frames(PathBuilder& path, const LayerCut& cut, double r, double step, const Loops& forbidden, std::int32_t z) {
+    std::array<double, 4> stands{cut.layer.stock_min[0], cut.layer.stock_min[1], cut.layer.stock_max[0], cut.layer.stock_max[1]};
+    const double out = r + kBeside;
+    for (int axis = 0; axis < 2; ++axis)  // without room beside the stock there is no way in
+        if (cut.low(axis, out) > cut.layer.stock_min[axis] - out || cut.high(axis, out) < cut.layer.stock_max[axis] + out) return stands;
+    std::array<double, 4> keep{1e300, 1e300, -1e300, -1e300};
+    for (const Point2 p : forbidden.points)
+        keep = {std::min(keep[0], to_mm(p.x)), std::min(keep[1], to_mm(p.y)), std::max(keep[2], to_mm(p.x)), std::max(keep[3], to_mm(p.y))};
+    double south = stands[1] - out;
+    for (bool first = true;; first = false) {
+        const std::array<double, 4> ring{stands[0] + step - r, stands[1] + step - r, stands[2] - step + r, stands[3] - step + r};
+        if (ring[0] > keep[0] || ring[1] > keep[1] || ring[2] < keep[2] || ring[3] < keep[3]) break;
+        const Point2 begin{to_units(ring[0]), to_units(south)};
+        if (first) path.go_above(begin), path.sink(z);
+        else path.cut(begin, z);
+        path.cut({to_units(ring[0]), to_units(ring[3])}, z);
+        path.cut({to_units(ring[2]), to_units(ring[3])}, z);
+        path.cut({to_units(ring[2]), to_units(ring[1])}, z);
+        path.cut({to_units(ring[0]), to_units(ring[1])}, z);
+        south = ring[1];
+        stands = {stands[0] + step, stands[1] + step, stands[2] - step, stands[3] - step};
+    }
+    return stands;
+}
+
+}  // namespace
+
+double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z) {
+    const double r = tool.diameter / 2, step = std::min(kStepShare, tool.stepover) * tool.diameter, step_units = step * kUnitsPerMm;
+    const std::int32_t z = to_units(tip_z);
+    if (forbidden.empty()) return 0;
+    const std::array<double, 4> stands = cut_frames(path, cut, r, step, forbidden, z);
+    RingPlan plan = plan_rings(cut, r, step, forbidden, z, stands);
+    std::vector<std::size_t> ready;  // pieces that wait for nothing
+    auto release = [&](auto&& self, std::size_t region) -> void {
+        Region& of = plan.regions[region];
+        if (of.waits_for > 0) return;
+        if (of.left > 0) {
+            ready.insert(ready.end(), of.pieces.begin(), of.pieces.end());
+        } else if (of.around != SIZE_MAX) {
+            --plan.regions[of.around].waits_for;
+            self(self, of.around);
+        }
+    };
+    // Regions without a region within them; the others follow from these.
+    std::vector<std::size_t> farthest;
+    for (std::size_t k = 0; k < plan.regions.size(); ++k)
+        if (plan.regions[k].waits_for == 0) farthest.push_back(k);
+    for (const std::size_t k : farthest) release(release, k);
+    std::size_t ring = 0;  // that the tool is on, while it is down; none yet
+    while (!ready.empty()) {
+        std::size_t next = SIZE_MAX;
+        Start start;
+        for (std::size_t k = 0; k < ready.size(); ++k)
+            if (nearer(plan.pieces[ready[k]], path.at(), !cut.job.cutting.climb, start)) next = k;
+        Piece& piece = plan.pieces[ready[next]];
+        ready.erase(ready.begin() + static_cast<std::ptrdiff_t>(next));
+        const std::size_t on = plan.regions[piece.region].ring;
+        // From ring to ring straight: a place `ring` steps from the forbidden region has that much room on all sides. Slantwise,
+        // so that the cutter slides into the next ring, where there is room for the longer way too.
+        const bool along = path.is_down() && path.z() == z && piece.closed && start.way <= 1.02 * step_units &&
+                           start.way <= 1.02 * static_cast<double>(ring) * step_units;
+        if (along && static_cast<double>(ring) * step_units > std::hypot(start.way, kSlide * step_units) + 0.05 * step_units)
+            advance(piece.points, kSlide * step_units, start);
+        if (piece.closed) piece.points = started_at(piece.points, start.segment, start.at);
+        else if (start.reversed) std::reverse(piece.points.begin(), piece.points.end());
+        if (along)
+            for (const PathPoint& p : piece.points) path.cut({p.x, p.y}, z);
+        else path.follow(piece.points);
+        ring = on;
+        if (--plan.regions[piece.region].left == 0 && plan.regions[piece.region].around != SIZE_MAX) {
+            const std::size_t around = plan.regions[piece.region].around;
+            --plan.regions[around].waits_for;
+            release(release, around);
         }
     }
     path.retract();
-    return step;
+    return plan.pieces.empty() ? 0 : step;
 }
 
 }  // namespace slabwright

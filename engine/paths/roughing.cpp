@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/paths/engagement.h"
 #include "engine/paths/layer_cut.h"
 #include "engine/paths/rings.h"
 #include "kernels/cutting/cusp.h"
@@ -49,7 +50,8 @@ std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool) {
 
 Operation rough_layer(const LayerCut& cut) {
     const Tool& tool = tool_of_kind(cut.job, ToolKind::flat);
-    Operation op = cut.operation(OperationKind::rough, "zigzag levels", tool);
+    const bool contour = cut.job.cutting.rough_pattern == RoughPattern::contour;
+    Operation op = cut.operation(OperationKind::rough, contour ? "contour-parallel levels" : "zigzag levels", tool);
     const double r = tool.diameter / 2, clearance = cut.layer.z_top + cut.job.machine.clearance;
     const Cutter cutter{Cutter::Profile::flat, r + cut.job.cutting.wall_allowance};
     const std::vector<RoughLevel> levels = rough_levels(cut, tool);
@@ -60,7 +62,6 @@ Operation rough_layer(const LayerCut& cut) {
     // Lines from edge to edge of the stock, evenly spaced.
     const double depth = cut.layer.stock_max[1] - cut.layer.stock_min[1];
     const int gaps = std::max(1, static_cast<int>(std::ceil(depth / (tool.stepover * tool.diameter) - 1e-9)));
-    op.stepover = depth / gaps;
     std::vector<std::int32_t> lines;
     for (int k = 0; k <= gaps; ++k) lines.push_back(to_units(cut.layer.stock_min[1] + depth * k / gaps));
     // Contours of the border may be coarser than a finish pass: what their chords miss must stay well inside the allowance.
@@ -88,12 +89,16 @@ Operation rough_layer(const LayerCut& cut) {
     double above = cut.layer.z_top;
     for (std::size_t i = 0; i < levels.size(); ++i) {
         op.stepdown = std::max(op.stepdown, above - levels[i].tip);
-        if (i + 1 == levels.size() && (flask || cuts[i].border.size() > 0)) {
+        if (i + 1 == levels.size() || contour) {
             Loops forbidden = forbidden_region(cuts[i].border);
             if (flask) forbidden = unite(forbidden, beyond_room(cut, r, room));
-            op.stepover = std::max(op.stepover, clear_from_afar(path, cut, tool, forbidden, levels[i].tip));
-            break;
+            if (const double step = clear_from_afar(path, cut, tool, forbidden, levels[i].tip); step > 0) {
+                op.stepover = std::max(op.stepover, step);
+                above = levels[i].tip;
+                continue;
+            }
         }
+        op.stepover = std::max(op.stepover, depth / gaps);
         zigzag(path, cut, tool, lines, cuts[i].free, levels[i].tip, [&](std::span<const std::int32_t> at) {
             return beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::y, at), Axis::y, at);
         });
@@ -142,6 +147,10 @@ Operation rough_layer(const LayerCut& cut) {
         above = levels[i].tip;
     }
     path.finish();
+    if (cut.job.cutting.max_engagement < 1 && op.stepdown > 0) {
+        EngagedStock stock(cut.layer.stock_min, cut.layer.stock_max, std::min(cut.stock_top, cut.layer.z_top), r);
+        cap_engagement(op.moves, stock, {cut.job.cutting.max_engagement, tool.diameter, op.stepdown});
+    }
     return op;
 }
 
