@@ -130,6 +130,59 @@ TEST(Links, StockIsEnteredOnARamp) {
     EXPECT_EQ(bench.operation.moves.back().z, to_units(12));
 }
 
+TEST(Links, AHelixLeadsIntoStockOnTheFreeSideOnly) {
+    // On the left of this run there is room, on the right stands the box.
+    Bench bench;
+    PathBuilder path = bench.builder();
+    path.follow(line(-6, -5, -6, 25, 8));
+    double left = 1e9, right = -1e9, turned = 0;
+    std::size_t entry = 0;
+    for (std::size_t k = 1; k < bench.operation.moves.size(); ++k) {
+        const Move &a = bench.operation.moves[k - 1], &b = bench.operation.moves[k];
+        if (b.feed == 0 || (a.x == b.x && a.y == b.y)) continue;
+        left = std::min(left, to_mm(b.x)), right = std::max(right, to_mm(b.x));
+        turned += b.x != a.x ? std::hypot(to_mm(b.x) - to_mm(a.x), to_mm(b.y) - to_mm(a.y)) : 0;
+        if (b.z > to_units(8)) {
+            ++entry;
+            EXPECT_LE(bench.part.drop(to_mm(b.x), to_mm(b.y)).tip_z, 8);
+            EXPECT_LE(to_mm(std::int64_t{a.z} - b.z), std::tan(bench.job.cutting.ramp_deg * std::numbers::pi / 180) *
+                                                              std::hypot(to_mm(b.x) - to_mm(a.x), to_mm(b.y) - to_mm(a.y)) +
+                                                          1e-3);
+        }
+    }
+    EXPECT_GT(entry, 24U) << "no helix";
+    EXPECT_NEAR(left, -6 - 2 * 0.9 * 5, 0.01);
+    EXPECT_NEAR(right, -6, 1e-3);
+    EXPECT_GT(turned, 2 * std::numbers::pi * 0.9 * 5 * 0.9);
+    EXPECT_TRUE(bench.cut.no_way_in.empty());
+}
+
+TEST(Links, ARunWithoutRoomIsLeftByAToolThatDoesNotPlunge) {
+    for (const bool plunges : {false, true}) {
+        Bench bench;
+        bench.tool.plunges = plunges;
+        // A room no wider than the cutter's middle may move: no circle, and a run of half a millimetre is no ramp.
+        Surroundings around = bench.cut.around(bench.tool, &bench.part);
+        Loops room;
+        room.points = {{to_units(-20.5), to_units(-20.5)}, {to_units(-19), to_units(-20.5)}, {to_units(-19), to_units(-19)}, {to_units(-20.5), to_units(-19)}};
+        room.close_loop();
+        around.room = std::make_shared<const Loops>(room);
+        PathBuilder path(bench.operation, bench.tool, 3000, kClearance, kLink);
+        path.know(around);
+        path.follow(line(-20, -20, -19.5, -20, 10));
+        double lowest = 1e9;
+        for (const Move& m : bench.operation.moves) lowest = std::min(lowest, to_mm(m.z));
+        if (plunges) {
+            EXPECT_EQ(lowest, 10);
+            EXPECT_TRUE(bench.cut.no_way_in.empty());
+        } else {
+            EXPECT_GE(lowest, kTop - 0.3);
+            ASSERT_EQ(bench.cut.no_way_in.size(), 1U);
+            EXPECT_EQ(bench.cut.no_way_in[0][2], 10);
+        }
+    }
+}
+
 TEST(Leads, AreTangentFreeAndOverlapClosedRuns) {
     Bench bench;
     bench.clear(5);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/paths/path_builder.h"
 #include "engine/planner.h"
 #include "io/slabwright.h"
 #include "kernels/errors.h"
@@ -110,6 +111,49 @@ TEST(Planner, RapidsTakeNoStockAndMovesStayAboveTheirFloor) {
         }
     }
     EXPECT_GT(low, 10U) << "no rapid makes use of what has been cleared";
+}
+
+// Straight down no tool that does not plunge meets more than a scrape with its middle. The stock is exact at its points; both ways
+// of roughing.
+TEST(Planner, OnlyToolsThatPlungeGoStraightDownIntoStock) {
+    for (const RoughPattern pattern : {RoughPattern::contour, RoughPattern::zigzag}) {
+        Context context;
+        const Mesh mesh = weld(context, pump_cover());
+        Job job;
+        job.cutting.rough_pattern = pattern;
+        const Plan plan = make_plan(context, mesh, {}, job);
+        CellGrid grid{plan.stock_min[0], plan.stock_min[1], 0.5, 0, 0};
+        grid.nx = static_cast<int>((plan.stock_max[0] - plan.stock_min[0]) / grid.cell) + 1;
+        grid.ny = static_cast<int>((plan.stock_max[1] - plan.stock_min[1]) / grid.cell) + 1;
+        Stock stock(grid);
+        std::size_t down = 0, sloping = 0;
+        for (const Layer& layer : plan.layers) {
+            stock.add_slab(layer.z_bottom, layer.slab_thickness);
+            for (const Operation& op : layer.operations) {
+                const Tool& tool = *std::find_if(plan.job.tools.begin(), plan.job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+                const CutterEnd end{tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0};
+                const CutterEnd middle{CutterEnd::Form::flat, PathBuilder::kMiddle * tool.diameter / 2, 0};
+                for (std::size_t k = 1; k < op.moves.size(); ++k) {
+                    const Move &a = op.moves[k - 1], &b = op.moves[k];
+                    const std::array<double, 3> from{to_mm(a.x), to_mm(a.y), to_mm(a.z)}, to{to_mm(b.x), to_mm(b.y), to_mm(b.z)};
+                    const bool vertical = a.x == b.x && a.y == b.y && b.z < a.z;
+                    if (vertical && !tool.plunges) {
+                        ++down;
+                        EXPECT_LE(stock.cut(middle, from, to).deepest, PathBuilder::kScrape + 1e-3) << op.purpose << " move " << k;
+                    }
+                    sloping += op.kind == OperationKind::rough && !vertical && b.feed > 0 && b.z < a.z;
+                    if (b.is_arc()) {
+                        const ArcShape arc = arc_shape(a, b);
+                        stock.cut(end, LevelArc{arc.x, arc.y, to[2], arc.radius, arc.start, arc.sweep});
+                    } else {
+                        stock.cut(end, from, to);
+                    }
+                }
+            }
+        }
+        EXPECT_GT(down, 10U);
+        EXPECT_GT(sloping, 10U) << "no pocket was entered on a helix or a ramp";
+    }
 }
 
 // What links cost: the cuts of one operation lie near each other, and the cutter stays down or lifts just over what stands.

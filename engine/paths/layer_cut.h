@@ -46,6 +46,7 @@ struct LayerCut {
     [[nodiscard]] Surroundings around(const Tool& tool, const DropIndex* part) const;
     Standing* standing = nullptr;  ///< what stands after the operations so far; null: not known
     mutable std::vector<std::pair<Cutter, std::unique_ptr<DropIndex>>> made_drops{};
+    mutable std::vector<std::array<double, 3>> no_way_in{};  ///< where runs were left out (Surroundings)
 };
 
 /// Longest chord between exact cutter locations that stays within 0.65 of the gouge tolerance (see level_contours), in

@@ -86,6 +86,7 @@ Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
     Surroundings around{standing, part, cutter};
     around.chord = safe_chord_mm(cutter.radius, job.tolerances.gouge);
     around.ramp_deg = job.cutting.ramp_deg;
+    around.no_way_in = &no_way_in;
     around.lowest_rapid = layer.z_bottom + PathBuilder::kStop;
     if (!layer.opening.empty()) around.room = std::make_shared<const Loops>(flask_room(*this, cutter.radius));
     return around;
@@ -196,6 +197,11 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         take(cut_rest(cut, stock, flat, {OperationKind::corner, "corners", limit, false}));
         take(cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", limit, false}));
     }
+    if (!cut.no_way_in.empty())
+        result.diagnostics.push_back({Severity::note, "entry.no_room",
+                                      fmt::format("layer {}: {} cut{} left to a tool that plunges: no room for a helix or a ramp", layer.index,
+                                                  cut.no_way_in.size(), cut.no_way_in.size() == 1 ? "" : "s"),
+                                      cut.no_way_in.front()});
     report_loose(cut, result);
     // Last, so that everything before has straight moves only to think of.
     const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};

@@ -8,7 +8,14 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kMiddle = 0.75;  // of the cutter's radius: what counts as head-on
+constexpr double kBallMiddle = 0.75;                    // of a ball's radius: what counts as head-on
+constexpr std::array kHelixRadii{0.9, 0.65, 0.45};      // of the cutter's radius: under it, so that no post is left in the middle
+constexpr int kHelixChords = 24;                        // a turn, at least
+
+// The middle of a cutter: what stands there is entered head-on.
+Cutter middle(const Cutter& cutter) {
+    return {cutter.profile, (cutter.profile == Cutter::Profile::ball ? kBallMiddle : PathBuilder::kMiddle) * cutter.radius};
+}
 
 }  // namespace
 
@@ -18,7 +25,8 @@ PathBuilder::PathBuilder(Operation& operation, const Tool& tool, double feed, do
       plunge_feed_(static_cast<std::uint32_t>(std::lround(tool.plunge_feed))),
       sink_feed_(static_cast<std::uint32_t>(std::lround(tool.max_feed))),
       clearance_(to_units(clearance_z)),
-      link_(to_units(link_z)) {
+      link_(to_units(link_z)),
+      plunges_(tool.plunges) {
     operation_.clearance_z = clearance_z;
 }
 
@@ -79,7 +87,9 @@ double PathBuilder::standing_middle(Point2 at) {
     if (around_.standing == nullptr) return to_mm(link_);
     learn();
     const std::array<double, 2> p{to_mm(at.x), to_mm(at.y)};
-    return around_.standing->free_tip({around_.cutter.profile, kMiddle * around_.cutter.radius}, p, p);
+    // Of a flat end every cell counts that its middle may touch; the walls beside the cutter are farther off.
+    const Cutter inner = middle(around_.cutter);
+    return inner.profile == Cutter::Profile::flat ? around_.standing->top(inner.radius, p, p) : around_.standing->free_tip(inner, p, p);
 }
 
 void PathBuilder::go_above(Point2 p) {
@@ -134,45 +144,97 @@ void PathBuilder::descend(const PathPoint& to) {
 }
 
 // From above the start of a run down to it. A slice along a wall is no plunge: only what stands under the middle of the
-// cutter asks for a ramp, to and fro over the run's beginning, every point of it raised by what is still to go down.
-void PathBuilder::enter(std::span<const PathPoint> run) {
+// cutter asks for a helix or a ramp. Says whether there was a way in.
+bool PathBuilder::enter(std::span<const PathPoint> run) {
     const PathPoint& first = run.front();
     descend(first);
-    if (to_mm(z_ - first.z) > kPlunge && standing_middle({first.x, first.y}) > to_mm(first.z) + kPlunge) {
-        const Cutter middle{around_.cutter.profile, kMiddle * around_.cutter.radius};
-        const double longest = 4 * around_.cutter.radius * kUnitsPerMm;
-        double length = 0, height = standing_middle({first.x, first.y}) - to_mm(first.z);
-        std::vector<PathPoint> stretch{first};
-        for (std::size_t k = 1; k < run.size() && length < longest; ++k) {
-            const PathPoint& p = run[k - 1];
-            PathPoint q = run[k];
-            const double way = std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
-            if (length + way > longest) {
-                const double t = (longest - length) / way;
-                q = {p.x + static_cast<std::int32_t>(t * (static_cast<double>(q.x) - p.x)),
-                     p.y + static_cast<std::int32_t>(t * (static_cast<double>(q.y) - p.y)), std::max(p.z, q.z)};
-            }
-            length += std::min(way, longest - length);
-            height =
-                std::max(height, around_.standing->free_tip(middle, {to_mm(p.x), to_mm(p.y)}, {to_mm(q.x), to_mm(q.y)}) - to_mm(std::min(p.z, q.z)));
-            stretch.push_back(q);
+    const double most = plunges_ ? kPlunge : kScrape;
+    if (to_mm(z_ - first.z) > most && standing_middle({first.x, first.y}) > to_mm(first.z) + most && !enter_on_helix(run) && !enter_on_ramp(run) &&
+        !plunges_)
+        return false;
+    plunge(first.z);
+    return true;
+}
+
+// Around a circle on the left of the run, where it is free, that ends in the run's direction. The part lies on the right of a
+// run that climbs, so the circle's room is looked for on the other side. Whole turns, none steeper than the ramp.
+bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
+    if (around_.part == nullptr || around_.cutter.profile != Cutter::Profile::flat) return false;
+    const PathPoint& first = run.front();
+    double ux = 0, uy = 0;
+    for (std::size_t k = 1; k < run.size() && ux == 0 && uy == 0; ++k) {
+        if (run[k].z != first.z) return false;
+        ux = static_cast<double>(run[k].x) - first.x, uy = static_cast<double>(run[k].y) - first.y;
+    }
+    const double length = std::hypot(ux, uy);
+    if (length == 0) return false;
+    ux /= length, uy /= length;
+    for (const double share : kHelixRadii) {
+        const double radius = share * around_.cutter.radius, cx = to_mm(first.x) - radius * uy, cy = to_mm(first.y) + radius * ux;
+        const int chords = std::max(kHelixChords, static_cast<int>(std::ceil(2 * std::numbers::pi * radius / around_.chord)));
+        std::vector<std::array<double, 2>> circle;
+        bool free = true;
+        for (int k = 0; k <= chords && free; ++k) {
+            // The first place lies at the angle of the run's right side, seen from the centre.
+            const double turn = 2 * std::numbers::pi * (k % chords) / chords, c = std::cos(turn), s = std::sin(turn);
+            circle.push_back({cx + radius * (uy * c + ux * s), cy + radius * (-ux * c + uy * s)});
+            free = k == 0 || k == chords ||
+                   (around_.part->drop(circle.back()[0], circle.back()[1]).tip_z <= to_mm(first.z) &&
+                    has_room({to_units(circle.back()[0]), to_units(circle.back()[1])}));
         }
-        const double drop = (height + 0.1) * kUnitsPerMm, slope = std::tan(around_.ramp_deg * std::numbers::pi / 180);
-        const double legs = length > kUnitsPerMm ? 2 * std::ceil(drop / (2 * length * slope)) : 0;
-        if (legs > 0 && legs < 1000) {
-            sink(first.z + static_cast<std::int32_t>(drop));
-            double done = 0;
-            for (int leg = 0; leg < static_cast<int>(legs); ++leg) {
-                if (leg > 0) std::reverse(stretch.begin(), stretch.end());
-                for (std::size_t k = 1; k < stretch.size(); ++k) {
-                    const PathPoint &p = stretch[k - 1], &q = stretch[k];
-                    done += std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
-                    cut({q.x, q.y}, q.z + static_cast<std::int32_t>(std::ceil(std::max(0.0, drop * (1 - done / (length * legs))))));
-                }
-            }
+        if (!free) continue;
+        double top = standing_middle({first.x, first.y});
+        for (int k = 0; k < chords; ++k)
+            top = std::max(top, around_.standing->free_tip(around_.cutter, circle[static_cast<std::size_t>(k)], circle[static_cast<std::size_t>(k) + 1]));
+        const double drop = (top + 0.1 - to_mm(first.z)) * kUnitsPerMm;
+        const double turns = std::ceil(drop / (2 * std::numbers::pi * radius * kUnitsPerMm * std::tan(around_.ramp_deg * std::numbers::pi / 180)));
+        if (turns > 100) return false;
+        sink(first.z + static_cast<std::int32_t>(drop));
+        const int places = static_cast<int>(turns) * chords;
+        for (int k = 1; k <= places; ++k) {
+            const std::array<double, 2>& p = circle[static_cast<std::size_t>(k % chords)];
+            const Point2 at = k % chords == 0 ? Point2{first.x, first.y} : Point2{to_units(p[0]), to_units(p[1])};
+            cut(at, first.z + static_cast<std::int32_t>(std::ceil(drop * (1 - static_cast<double>(k) / places))));
+        }
+        return true;
+    }
+    return false;
+}
+
+// To and fro over the run's beginning, every point of it raised by what is still to go down.
+bool PathBuilder::enter_on_ramp(std::span<const PathPoint> run) {
+    const PathPoint& first = run.front();
+    const double longest = 4 * around_.cutter.radius * kUnitsPerMm;
+    double length = 0, height = standing_middle({first.x, first.y}) - to_mm(first.z);
+    std::vector<PathPoint> stretch{first};
+    for (std::size_t k = 1; k < run.size() && length < longest; ++k) {
+        const PathPoint& p = run[k - 1];
+        PathPoint q = run[k];
+        const double way = std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
+        if (length + way > longest) {
+            const double t = (longest - length) / way;
+            q = {p.x + static_cast<std::int32_t>(t * (static_cast<double>(q.x) - p.x)),
+                 p.y + static_cast<std::int32_t>(t * (static_cast<double>(q.y) - p.y)), std::max(p.z, q.z)};
+        }
+        length += std::min(way, longest - length);
+        height = std::max(height, around_.standing->free_tip(middle(around_.cutter), {to_mm(p.x), to_mm(p.y)}, {to_mm(q.x), to_mm(q.y)}) -
+                                      to_mm(std::min(p.z, q.z)));
+        stretch.push_back(q);
+    }
+    const double drop = (height + 0.1) * kUnitsPerMm, slope = std::tan(around_.ramp_deg * std::numbers::pi / 180);
+    const double legs = length > kUnitsPerMm ? 2 * std::ceil(drop / (2 * length * slope)) : 0;
+    if (legs <= 0 || legs >= 1000) return false;
+    sink(first.z + static_cast<std::int32_t>(drop));
+    double done = 0;
+    for (int leg = 0; leg < static_cast<int>(legs); ++leg) {
+        if (leg > 0) std::reverse(stretch.begin(), stretch.end());
+        for (std::size_t k = 1; k < stretch.size(); ++k) {
+            const PathPoint &p = stretch[k - 1], &q = stretch[k];
+            done += std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
+            cut({q.x, q.y}, q.z + static_cast<std::int32_t>(std::ceil(std::max(0.0, drop * (1 - done / (length * legs))))));
         }
     }
-    plunge(first.z);
+    return true;
 }
 
 void PathBuilder::follow(std::span<const PathPoint> run) {
@@ -189,7 +251,10 @@ void PathBuilder::follow(std::span<const PathPoint> run) {
         } else {
             go_above(first);
         }
-        enter(run);
+        if (!enter(run)) {
+            if (around_.no_way_in != nullptr) around_.no_way_in->push_back({to_mm(first.x), to_mm(first.y), to_mm(run.front().z)});
+            return;
+        }
     }
     for (const PathPoint& p : run.subspan(1)) cut({p.x, p.y}, p.z);
 }

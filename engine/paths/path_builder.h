@@ -20,6 +20,8 @@ struct Surroundings {
     double ramp_deg = 5;                  ///< entry into stock
     std::shared_ptr<const Loops> room{};  ///< where the cutter's middle may be beside a flask; none: anywhere
     double lowest_rapid = -1e9;           ///< mm: rapids go no deeper
+    /// Gets where a run begins that was left out: neither helix nor ramp has room, and the tool does not cut straight down.
+    std::vector<std::array<double, 3>>* no_way_in = nullptr;
 };
 
 /// A point of a path, 0.1 µm.
@@ -42,7 +44,9 @@ public:
     void go_above(Point2 at);
     /// From where the tool is to the first point of a run, then along it. Straight at the height of the higher end where that
     /// way is free of the part and of standing stock; else above what stands. What stands at the run's start is entered on a
-    /// ramp along the run, to and fro; up to kPlunge of it straight down.
+    /// helix that ends along the run, on its left, where the part leaves room for one; else on a ramp along the run, to and fro;
+    /// up to kPlunge of it straight down, or kScrape by a tool that does not plunge. Where a run is too short for a ramp, a tool
+    /// that plunges does; for others the run is left out (Surroundings::no_way_in).
     /// Every point of the run must be free, and so must be what lies straight above it (as of a drop or a level contour).
     void follow(std::span<const PathPoint> run);
     /// Straight down (or up) by plunge feed to z.
@@ -68,7 +72,9 @@ public:
 
     static constexpr double kOver = 1.0;         ///< mm of air under a rapid that goes across
     static constexpr double kStop = 0.5;         ///< mm of air where a rapid or fast feed goes down
-    static constexpr double kPlunge = 0.5;       ///< mm of stock that an end mill may enter straight down
+    static constexpr double kPlunge = 0.5;       ///< mm of stock that a tool that plunges enters straight down rather than on a ramp
+    static constexpr double kScrape = 0.2;       ///< mm of stock that the middle of any other may meet on its way down
+    static constexpr double kMiddle = 0.6;       ///< of a flat end mill's radius: what it does not enter straight down
     static constexpr double kBite = 0.1;         ///< mm that a tool may meet where it stays down
     static constexpr double kLongestWay = 40.0;  ///< mm that it stays down; above, lifting is quicker
 
@@ -78,7 +84,9 @@ private:
     [[nodiscard]] bool straight_is_free(Point2 to, std::int32_t z);
     void descend(const PathPoint& to);
     void land(std::int32_t z);
-    void enter(std::span<const PathPoint> run);
+    [[nodiscard]] bool enter(std::span<const PathPoint> run);
+    [[nodiscard]] bool enter_on_helix(std::span<const PathPoint> run);
+    [[nodiscard]] bool enter_on_ramp(std::span<const PathPoint> run);
     Operation& operation_;
     Surroundings around_;
     std::size_t learnt_ = 0;          // moves that have been cut into what stands
@@ -86,7 +94,7 @@ private:
     std::uint32_t feed_, plunge_feed_, sink_feed_;
     std::int32_t clearance_, link_;
     std::int32_t x_ = 0, y_ = 0, z_ = 0;
-    bool started_ = false, down_ = false;
+    bool started_ = false, down_ = false, plunges_ = false;
 };
 
 /// Leaves out points of a polyline that lie within `tolerance` (0.1 µm units) of the chord between kept ones

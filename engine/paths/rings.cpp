@@ -214,12 +214,12 @@ Fibres beside_flask(const LayerCut& cut, const Loops& room, Fibres forbidden, Ax
 }
 
 void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_t above, std::int32_t z, double ramp_deg) {
-    path.sink(above);
     double around = 0;
     for (std::size_t k = 1; k < ring.size(); ++k) around += length(ring[k - 1], ring[k]);
     const double drop = static_cast<double>(above) - z;
-    if (around < 1 || drop <= 0) {
-        path.plunge(z);
+    if (around < 1) return;
+    path.sink(above);
+    if (drop <= 0) {
         for (const PathPoint& p : ring) path.cut({p.x, p.y}, z);
         return;
     }

@@ -1,0 +1,130 @@
+// The feed that follows from what a roughing cutter meets: straight passes, slots, corners, and the bound that the cap promises.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <random>
+
+#include "engine/paths/engagement.h"
+
+using namespace slabwright;
+
+namespace {
+
+constexpr double kTop = 19, kDepth = 3, kDiameter = 12;
+constexpr std::uint32_t kFeed = 6000;
+const EngagementCap kCap{0.7, kDiameter, kDepth};
+
+Move to(double x, double y, double z, std::uint32_t feed = kFeed) { return {to_units(x), to_units(y), to_units(z), feed}; }
+EngagedStock slab() { return {{0, 0}, {100, 80}, kTop, kDiameter / 2}; }
+
+std::uint32_t slowest(const std::vector<Move>& moves) {
+    std::uint32_t least = UINT32_MAX;
+    for (const Move& m : moves)
+        if (m.feed > 0) least = std::min(least, m.feed);
+    return least;
+}
+
+}  // namespace
+
+TEST(Engagement, VolumeIsThatOfTheSlot) {
+    EngagedStock stock = slab();
+    const double taken = stock.cut({20, 40, kTop - kDepth}, {80, 40, kTop - kDepth});
+    const double exact = kDepth * (60 * kDiameter + std::numbers::pi * kDiameter * kDiameter / 4);
+    EXPECT_NEAR(taken, exact, 0.01 * exact);
+    EXPECT_EQ(stock.cut({20, 40, kTop - kDepth}, {80, 40, kTop - kDepth}), 0) << "it is gone";
+}
+
+TEST(Engagement, ASlotIsSlowedAndAHalfPassIsNot) {
+    const double z = kTop - kDepth;
+    EngagedStock stock = slab();
+    std::vector<Move> slot{to(-10, 40, z, 0), to(110, 40, z)};
+    EXPECT_GT(cap_engagement(slot, stock, kCap), 90);
+    // In the middle of the slab the whole breadth is met: 0.7 of the feed, rounded down to a twentieth, and what cells add to a breadth.
+    EXPECT_GE(slowest(slot), 0.6 * kFeed);
+    EXPECT_LE(slowest(slot), 0.7 * kFeed);
+    EXPECT_EQ(slot[1].feed, kFeed) << "outside the slab";
+    EXPECT_EQ(slot.back().x, to_units(110));
+    EXPECT_EQ(slot.back().feed, kFeed) << "outside the slab";
+    // Beside the slot, half of the cutter in stock: as fast as it was.
+    std::vector<Move> half{to(-10, 46, z, 0), to(110, 46, z)};
+    const std::vector<Move> before = half;
+    EXPECT_EQ(cap_engagement(half, stock, kCap), 0);
+    EXPECT_EQ(half, before);
+    // A slot half as deep as the cap is meant for is no heavier than half a breadth.
+    std::vector<Move> shallow{to(-10, 10, kTop - kDepth / 2, 0), to(110, 10, kTop - kDepth / 2)};
+    EXPECT_EQ(cap_engagement(shallow, stock, kCap), 0);
+}
+
+TEST(Engagement, ACornerIsSlowedWhereTheCutterTurnsIntoIt) {
+    const double z = kTop - kDepth;
+    EngagedStock stock = slab();
+    // A pass of 0.45 of the diameter along the south and the east of a pocket that has been cleared to within that of its walls.
+    stock.cut({10, 30, z}, {60, 30, z});
+    stock.cut({60, 30, z}, {60, 70, z});
+    for (double x = 10; x < 60; x += 5) stock.cut({x, 30, z}, {x, 70, z});
+    const double step = 0.45 * kDiameter;
+    std::vector<Move> pass{to(10, 30, z), to(10, 30 - step, z), to(60 + step, 30 - step, z), to(60 + step, 70, z)};
+    stock.cut({10, 30 - step, z}, {10, 30 - step, z});
+    cap_engagement(pass, stock, kCap);
+    double slowed = 0, last_slow_x = 0;
+    for (std::size_t k = 2; k < pass.size(); ++k)
+        if (pass[k].feed < kFeed) {
+            slowed += std::hypot(to_mm(pass[k].x) - to_mm(pass[k - 1].x), to_mm(pass[k].y) - to_mm(pass[k - 1].y));
+            last_slow_x = to_mm(pass[k].x);
+        }
+    EXPECT_GT(slowed, 1);
+    EXPECT_LT(slowed, 2 * kDiameter) << "only near the corner";
+    EXPECT_NEAR(last_slow_x, 60 + step, kDiameter);
+}
+
+// Whatever the way: neither its shape nor its volume changes, and no stretch takes more in a minute than the cap allows.
+TEST(Engagement, NoStretchCutsFasterThanTheCapAllows) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> ux(-8, 108), uy(-8, 88), uz(kTop - kDepth, kTop + 1);
+    for (int round = 0; round < 20; ++round) {
+        std::vector<Move> way{to(ux(random), uy(random), kTop + 5, 0)};
+        for (int k = 0; k < 30; ++k) {
+            if (k % 7 == 0) way.push_back({to_units(ux(random)), to_units(uy(random)), to_units(kTop + 5), 0});
+            way.push_back(to(ux(random), uy(random), uz(random)));
+        }
+        std::vector<Move> capped = way;
+        EngagedStock stock = slab();
+        const double slowed = cap_engagement(capped, stock, kCap);
+        // The ways are the same: every corner is still there, and what lies between is on the straight line.
+        std::size_t next = 0;
+        double slow = 0;
+        EngagedStock again = slab(), whole = slab();
+        double taken = 0, exact = 0;
+        for (std::size_t k = 0; k < capped.size(); ++k) {
+            const Move& m = capped[k];
+            ASSERT_LT(next, way.size());
+            const bool corner = m.x == way[next].x && m.y == way[next].y && m.z == way[next].z;
+            if (k > 0 && m.feed > 0) {
+                const Move& from = capped[k - 1];
+                const std::array<double, 3> a{to_mm(from.x), to_mm(from.y), to_mm(from.z)}, b{to_mm(m.x), to_mm(m.y), to_mm(m.z)};
+                const double run = std::hypot(b[0] - a[0], b[1] - a[1]), volume = again.cut(a, b);
+                taken += volume;
+                if (m.feed < kFeed) slow += run;
+                // Windows are a quarter of a radius; a stretch of one feed is one or more whole windows, or a move's end.
+                if (run > kDiameter) {
+                    EXPECT_LE(volume / run * m.feed, 1.25 * kCap.share * kDiameter * kDepth * kFeed) << "move " << k;
+                }
+            }
+            if (corner) {
+                EXPECT_EQ(m.feed == 0, way[next].feed == 0);
+                if (next > 0 && way[next].feed > 0) {
+                    const Move &p = way[next - 1], &q = way[next];
+                    exact += whole.cut({to_mm(p.x), to_mm(p.y), to_mm(p.z)}, {to_mm(q.x), to_mm(q.y), to_mm(q.z)});
+                }
+                ++next;
+            }
+        }
+        EXPECT_EQ(next, way.size());
+        EXPECT_NEAR(slow, slowed, 1e-3);
+        EXPECT_NEAR(taken, exact, 1e-3 * exact + 1);
+    }
+}
