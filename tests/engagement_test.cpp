@@ -7,6 +7,7 @@
 #include <random>
 
 #include "engine/paths/engagement.h"
+#include "kernels/stock/stock.h"
 
 using namespace slabwright;
 
@@ -34,6 +35,28 @@ TEST(Engagement, VolumeIsThatOfTheSlot) {
     const double exact = kDepth * (60 * kDiameter + std::numbers::pi * kDiameter * kDiameter / 4);
     EXPECT_NEAR(taken, exact, 0.01 * exact);
     EXPECT_EQ(stock.cut({20, 40, kTop - kDepth}, {80, 40, kTop - kDepth}), 0) << "it is gone";
+}
+
+// Against the sweep that the simulator uses, over chains of level and sloping moves.
+TEST(Engagement, TakesWhatTheExactSweepTakes) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> ux(-8, 108), uy(-8, 88), uz(kTop - 9, kTop + 1), share(0, 1);
+    EngagedStock stock = slab();
+    const double cell = kDiameter / 2 / 12;  // as the header says
+    Stock exact({cell / 2, cell / 2, cell, static_cast<int>(std::lround(100 / cell)), static_cast<int>(std::lround(80 / cell))});
+    exact.add_slab(0, kTop);
+    std::array<double, 3> at{ux(random), uy(random), kTop};
+    for (int k = 0; k < 400; ++k) {
+        if (share(random) < 0.1) at = {ux(random), uy(random), uz(random)};
+        const double near = share(random) < 0.5 ? 0.05 : 1;  // short ways and long ones
+        const std::array<double, 3> to{at[0] + near * (ux(random) - at[0]), at[1] + near * (uy(random) - at[1]),
+                                       share(random) < 0.7 ? at[2] : uz(random)};
+        const double removed = exact.cut({CutterEnd::Form::flat, kDiameter / 2, 0}, at, to).removed * cell * cell;
+        ASSERT_NEAR(stock.cut(at, to), removed, 1e-3 * removed + 0.01) << "move " << k;
+        at = to;
+    }
 }
 
 TEST(Engagement, ASlotIsSlowedAndAHalfPassIsNot) {

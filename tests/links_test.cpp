@@ -145,9 +145,9 @@ TEST(Links, AHelixLeadsIntoStockOnTheFreeSideOnly) {
         if (b.z > to_units(8)) {
             ++entry;
             EXPECT_LE(bench.part.drop(to_mm(b.x), to_mm(b.y)).tip_z, 8);
-            EXPECT_LE(to_mm(std::int64_t{a.z} - b.z), std::tan(bench.job.cutting.ramp_deg * std::numbers::pi / 180) *
-                                                              std::hypot(to_mm(b.x) - to_mm(a.x), to_mm(b.y) - to_mm(a.y)) +
-                                                          1e-3);
+            EXPECT_LE(
+                to_mm(std::int64_t{a.z} - b.z),
+                std::tan(bench.job.cutting.ramp_deg * std::numbers::pi / 180) * std::hypot(to_mm(b.x) - to_mm(a.x), to_mm(b.y) - to_mm(a.y)) + 1e-3);
         }
     }
     EXPECT_GT(entry, 24U) << "no helix";
@@ -164,7 +164,8 @@ TEST(Links, ARunWithoutRoomIsLeftByAToolThatDoesNotPlunge) {
         // A room no wider than the cutter's middle may move: no circle, and a run of half a millimetre is no ramp.
         Surroundings around = bench.cut.around(bench.tool, &bench.part);
         Loops room;
-        room.points = {{to_units(-20.5), to_units(-20.5)}, {to_units(-19), to_units(-20.5)}, {to_units(-19), to_units(-19)}, {to_units(-20.5), to_units(-19)}};
+        room.points = {
+            {to_units(-20.5), to_units(-20.5)}, {to_units(-19), to_units(-20.5)}, {to_units(-19), to_units(-19)}, {to_units(-20.5), to_units(-19)}};
         room.close_loop();
         around.room = std::make_shared<const Loops>(room);
         PathBuilder path(bench.operation, bench.tool, 3000, kClearance, kLink);

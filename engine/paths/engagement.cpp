@@ -30,7 +30,63 @@ EngagedStock::EngagedStock(std::array<double, 2> min, std::array<double, 2> max,
     height_.assign(grid_.count(), 0.0F);
 }
 
+// At one height only the cells between where the cutter is and where it gets need a look: under it nothing stands any more.
+double EngagedStock::cut_level(const std::array<double, 3>& from, const std::array<double, 3>& to) {
+    const double R = end_.radius, z = from[2] - top_;
+    const bool been = from == last_;
+    double dx = to[0] - from[0], dy = to[1] - from[1];
+    const double run = std::hypot(dx, dy);
+    if (run > 1e-9) dx /= run, dy /= run;
+    const int j0 = std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (std::min(from[1], to[1]) - R - grid_.y0) / grid_.cell))));
+    const int j1 =
+        std::min(grid_.ny - 1, static_cast<int>(std::floor(std::min<double>(grid_.ny, (std::max(from[1], to[1]) + R - grid_.y0) / grid_.cell))));
+    double sum = 0;
+    auto take = [&](int j, double low, double high) {
+        const double first = std::ceil((low - grid_.x0) / grid_.cell), last = std::floor((high - grid_.x0) / grid_.cell);
+        float* const row = height_.data() + grid_.index(0, j);
+        for (int i = static_cast<int>(std::clamp(first, 0.0, static_cast<double>(grid_.nx))); i <= std::min<double>(last, grid_.nx - 1); ++i)
+            if (static_cast<double>(row[i]) > z) {
+                sum += static_cast<double>(row[i]) - z;
+                row[i] = static_cast<float>(z);
+            }
+    };
+    for (int j = j0; j <= j1; ++j) {
+        // The capsule's span on this row: where the row meets either disc, or the strip between them.
+        const double y = grid_.y(j);
+        double low = 1e300, high = -1e300;
+        for (const auto* p : {&from, &to}) {
+            const double w2 = R * R - (y - (*p)[1]) * (y - (*p)[1]);
+            if (w2 < 0) continue;
+            const double w = std::sqrt(w2);
+            low = std::min(low, (*p)[0] - w), high = std::max(high, (*p)[0] + w);
+        }
+        if (run > 1e-9)
+            for (const double side : {-R, R}) {
+                const double ax = from[0] - side * dy, ay = from[1] + side * dx, bx = to[0] - side * dy, by = to[1] + side * dx;
+                if ((ay <= y) == (by <= y)) continue;
+                const double x = ax + (y - ay) / (by - ay) * (bx - ax);
+                low = std::min(low, x), high = std::max(high, x);
+            }
+        if (low > high) continue;
+        const double w2 = R * R - (y - from[1]) * (y - from[1]);
+        if (!been || w2 < 0) {
+            take(j, low, high);
+            continue;
+        }
+        const double w = std::sqrt(w2);
+        take(j, low, from[0] - w);
+        take(j, from[0] + w, high);
+    }
+    return sum * grid_.cell * grid_.cell;
+}
+
 double EngagedStock::cut(const std::array<double, 3>& from, const std::array<double, 3>& to) {
+    if (from[2] == to[2]) {
+        const double volume = cut_level(from, to);
+        last_ = to;
+        return volume;
+    }
+    last_ = to;
     double sum = 0;
     sweep_above(
         grid_, end_, {from[0], from[1], from[2] - top_}, {to[0], to[1], to[2] - top_}, [&](std::size_t c) { return static_cast<double>(height_[c]); },

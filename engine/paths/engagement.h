@@ -21,17 +21,19 @@ public:
     static constexpr double kMostCells = 4e6;  ///< 16 MB
 
 private:
+    double cut_level(const std::array<double, 3>& from, const std::array<double, 3>& to);
     CellGrid grid_;
     CutterEnd end_;
     double top_;
-    std::vector<float> height_;  // under the top
+    std::vector<float> height_;                        // under the top
+    std::array<double, 3> last_{1e300, 1e300, 1e300};  // where the cutter is since the last cut
 };
 
 /// What a roughing cutter may meet at the feed that its moves have.
 struct EngagementCap {
-    double share = 0.7;     ///< of its diameter; 1: a slot
-    double diameter = 0;    ///< mm
-    double stepdown = 0;    ///< mm, over which the share is meant
+    double share = 0.7;   ///< of its diameter; 1: a slot
+    double diameter = 0;  ///< mm
+    double stepdown = 0;  ///< mm, over which the share is meant
 };
 
 /// Lowers the feed of moves that meet more stock than the cap allows, and parts longer moves where that changes. Measured from the

@@ -127,10 +127,12 @@ float LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 if (q.feed == 0) continue;
                 const double py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
                 if (std::max(py, qy) < y0 || std::min(py, qy) > y1 || std::min(pz, qz) >= top) continue;
-                sweep(part, end, {to_mm(p.x), py, pz}, {to_mm(q.x), qy, qz}, [&](std::size_t c, double z) {
-                    const auto left = static_cast<float>(std::max(0.0, z - z_bottom_));
-                    if (left < height[c]) most[band] = std::max(most[band], height[c] - left), height[c] = left;
-                });
+                sweep_above(
+                    part, end, {to_mm(p.x), py, pz}, {to_mm(q.x), qy, qz}, [&](std::size_t c) { return height[c] + z_bottom_; },
+                    [&](std::size_t c, double z) {
+                        const auto left = static_cast<float>(std::max(0.0, z - z_bottom_));
+                        if (left < height[c]) most[band] = std::max(most[band], height[c] - left), height[c] = left;
+                    });
             }
         }
     });

@@ -8,9 +8,9 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kBallMiddle = 0.75;                    // of a ball's radius: what counts as head-on
-constexpr std::array kHelixRadii{0.9, 0.65, 0.45};      // of the cutter's radius: under it, so that no post is left in the middle
-constexpr int kHelixChords = 24;                        // a turn, at least
+constexpr double kBallMiddle = 0.75;                // of a ball's radius: what counts as head-on
+constexpr std::array kHelixRadii{0.9, 0.65, 0.45};  // of the cutter's radius: under it, so that no post is left in the middle
+constexpr int kHelixChords = 24;                    // a turn, at least
 
 // The middle of a cutter: what stands there is entered head-on.
 Cutter middle(const Cutter& cutter) {
@@ -185,7 +185,8 @@ bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
         if (!free) continue;
         double top = standing_middle({first.x, first.y});
         for (int k = 0; k < chords; ++k)
-            top = std::max(top, around_.standing->free_tip(around_.cutter, circle[static_cast<std::size_t>(k)], circle[static_cast<std::size_t>(k) + 1]));
+            top = std::max(top,
+                           around_.standing->free_tip(around_.cutter, circle[static_cast<std::size_t>(k)], circle[static_cast<std::size_t>(k) + 1]));
         const double drop = (top + 0.1 - to_mm(first.z)) * kUnitsPerMm;
         const double turns = std::ceil(drop / (2 * std::numbers::pi * radius * kUnitsPerMm * std::tan(around_.ramp_deg * std::numbers::pi / 180)));
         if (turns > 100) return false;

@@ -54,7 +54,8 @@ void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bo
     const std::size_t n = loop.size();
     auto on_edge = [&](std::size_t k) {
         const Point2 &a = loop[k % n], &b = loop[(k + 1) % n];
-        return bound.on_edge(a.x, a.y) && bound.on_edge(b.x, b.y) && bound.on_edge(0.5 * (a.x + static_cast<double>(b.x)), 0.5 * (a.y + static_cast<double>(b.y)));
+        return bound.on_edge(a.x, a.y) && bound.on_edge(b.x, b.y) &&
+               bound.on_edge(0.5 * (a.x + static_cast<double>(b.x)), 0.5 * (a.y + static_cast<double>(b.y)));
     };
     auto point = [&](std::size_t k) { return PathPoint{loop[k % n].x, loop[k % n].y, z}; };
     auto take = [&](std::vector<PathPoint>& points, bool closed) {
@@ -339,7 +340,7 @@ std::array<double, 4> cut_frames(PathBuilder& path, const LayerCut& cut, double 
 
 }  // namespace
 
-double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z) {
+double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, bool hold) {
     const double r = tool.diameter / 2, step = std::min(kStepShare, tool.stepover) * tool.diameter, step_units = step * kUnitsPerMm;
     const std::int32_t z = to_units(tip_z);
     if (forbidden.empty()) return 0;
@@ -365,8 +366,12 @@ double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool,
     while (!ready.empty()) {
         std::size_t next = SIZE_MAX;
         Start start;
+        std::size_t far = 0;
+        for (const std::size_t k : ready) far = std::max(far, plan.regions[plan.pieces[k].region].ring);
         for (std::size_t k = 0; k < ready.size(); ++k)
-            if (nearer(plan.pieces[ready[k]], path.at(), !cut.job.cutting.climb, start)) next = k;
+            if ((!hold || plan.regions[plan.pieces[ready[k]].region].ring == far) &&
+                nearer(plan.pieces[ready[k]], path.at(), !cut.job.cutting.climb, start))
+                next = k;
         Piece& piece = plan.pieces[ready[next]];
         ready.erase(ready.begin() + static_cast<std::ptrdiff_t>(next));
         const std::size_t on = plan.regions[piece.region].ring;

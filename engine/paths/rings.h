@@ -25,13 +25,16 @@ namespace slabwright {
 /// along the ring itself; the stretch of the ramp is cut again. Heights in 0.1 µm.
 void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_t above, std::int32_t z, double ramp_deg);
 
-/// Clears everything between `forbidden` and the edge of the stock at one height, in rings around the forbidden region from
-/// the farthest to its border: the pieces that hang over a cavity below, or over the edge of the stack, go from the middle or from the free
-/// edge inwards. What still stands hangs on what stays: from each of its points the shortest way to the forbidden region runs
-/// through standing stock. Neighbouring rings are at most 0.45 of the tool's diameter apart.
+/// Clears everything between `forbidden` and the edge of the stock at one height: first in rectangles from the stock's edge as far
+/// as these surround the forbidden region, then in rings around that region from the farthest to its border. The forbidden region
+/// is on the right of every ring (but see Cutting::climb), so the cutter climbs. A ring is cut once all rings within its part of the free
+/// area are; of those whose turn it is the nearest comes next, and from ring to next ring the cutter stays down. With `hold`, all
+/// rings of one distance are cut before any nearer one: the pieces that hang over a cavity below, or over the edge of the stack, go from the
+/// middle or from the free edge inwards, and what still stands hangs on what stays, for from each of its points the shortest way
+/// to the forbidden region runs through standing stock. Neighbouring rings are at most 0.45 of the tool's diameter apart.
 /// @param forbidden of the tool's middle, outer loops counter-clockwise; the flask's included
 /// @param tip_z mm
-/// @return the largest distance of two rings, mm
-double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z);
+/// @return the largest distance of two rings, mm; 0 when the forbidden region is nowhere near the stock, and nothing was cut
+double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, bool hold);
 
 }  // namespace slabwright

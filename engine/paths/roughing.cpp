@@ -1,6 +1,7 @@
-// Roughing: level by level from the top, zigzag inside what the shadow leaves free, then once along its border. A level
-// lies on every up-facing flat (plus allowance) and on the layer's bottom; between them the stepdowns of section 5. The
+// Roughing: level by level from the top, in rings around what the shadow forbids or in zigzags and then once along its border. A
+// level lies on every up-facing flat (plus allowance) and on the layer's bottom; between them the stepdowns of section 5. The
 // last level cuts the slab through where nothing lies under it, so it goes in rings that leave what hangs over held to the end.
+// Where the cutter meets more of its breadth than the job allows, the feed is lowered (engagement.h).
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -92,7 +93,7 @@ Operation rough_layer(const LayerCut& cut) {
         if (i + 1 == levels.size() || contour) {
             Loops forbidden = forbidden_region(cuts[i].border);
             if (flask) forbidden = unite(forbidden, beyond_room(cut, r, room));
-            if (const double step = clear_from_afar(path, cut, tool, forbidden, levels[i].tip); step > 0) {
+            if (const double step = clear_from_afar(path, cut, tool, forbidden, levels[i].tip, i + 1 == levels.size()); step > 0) {
                 op.stepover = std::max(op.stepover, step);
                 above = levels[i].tip;
                 continue;
