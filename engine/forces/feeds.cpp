@@ -167,6 +167,7 @@ void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Di
         };
         std::vector<Seen> seen;
         slab.run(op, tool, [&](const CutStretch& s) {
+            if (seen.size() % 1024 == 0) context.throw_if_cancelled();
             Seen now;
             now.first = s.first, now.last = s.last, now.cuts = s.cuts();
             if (now.cuts) now.cut = class_of(s, tool);
