@@ -183,7 +183,8 @@ void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Di
             std::map<std::pair<CutClass, std::uint32_t>, std::uint32_t> chosen;
             // The fastest step that both limits bear; the slowest that is allowed, where none does.
             const auto choose = [&](const Seen& s, std::uint32_t planned) -> std::uint32_t {
-                const double most = roughs(op.kind) ? planned : fastest;
+                // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
+                const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
                 if (!s.cuts) return static_cast<std::uint32_t>(most);
                 const auto [it, fresh] = chosen.try_emplace({s.cut, planned}, planned);
                 if (!fresh) return it->second;

@@ -25,7 +25,7 @@ inline constexpr int kFeedSteps = 16;
 /// set to the fastest of kFeedSteps steps at which
 ///   * the cutter bends by no more than the operation's limit, but not under an eighth of what was planned, and
 ///   * the thickest chip is no thicker than planned: that of a slot at the planned feed, the finish feed or the tool's.
-/// A faster feed is taken only where it lasts for at least 20 mm; roughing and facing are never made faster than planned. Drills are left alone.
+/// A faster feed is taken only where it lasts for at least 20 mm; roughing, facing and entries at the plunge feed are never made faster than planned. Drills are left alone.
 /// @param diagnostics gets, per operation, "feed.lowered" (where and how far), and "cut.deflection" where it bends too far at the slowest
 /// @throws Error(usage, "forces.spindle") when an operation mills with its spindle at rest; Error(usage, "forces.segment"); Error(cancelled)
 void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Diagnostic>& diagnostics);
