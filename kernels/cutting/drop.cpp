@@ -117,9 +117,12 @@ DropIndex::DropIndex(Context& context, const LayerSolid& solid, const Cutter& cu
             const SolidFacet& f = solid.facets[i];
             const auto [xl, xh] = std::minmax({f.p[0][0], f.p[1][0], f.p[2][0]});
             const auto [yl, yh] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
-            bounds_[i] = {std::nextafter(static_cast<float>(xl), -inf), std::nextafter(static_cast<float>(xh), inf),
-                          std::nextafter(static_cast<float>(yl), -inf), std::nextafter(static_cast<float>(yh), inf),
-                          std::nextafter(static_cast<float>(f.z_max), inf), static_cast<std::uint16_t>(column(xl)),
+            bounds_[i] = {std::nextafter(static_cast<float>(xl), -inf),
+                          std::nextafter(static_cast<float>(xh), inf),
+                          std::nextafter(static_cast<float>(yl), -inf),
+                          std::nextafter(static_cast<float>(yh), inf),
+                          std::nextafter(static_cast<float>(f.z_max), inf),
+                          static_cast<std::uint16_t>(column(xl)),
                           static_cast<std::uint16_t>(row(yl))};
         }
     });
