@@ -47,7 +47,7 @@ private:
 };
 
 /// An operation from which no cell of the stock loses more than this, mm, has nothing to do.
-inline constexpr float kEmpty = 2e-3F;
+inline constexpr float kEmpty = 0.01F;
 
 /// Cells that resolve what passes of the finest cutter leave: a quarter of their distance, coarser where the layer would
 /// take more than kStockCells of them.
