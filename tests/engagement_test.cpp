@@ -27,6 +27,11 @@ std::uint32_t slowest(const std::vector<Move>& moves) {
     return least;
 }
 
+Context& context() {
+    static Context shared;
+    return shared;
+}
+
 }  // namespace
 
 TEST(Engagement, VolumeIsThatOfTheSlot) {
@@ -63,7 +68,7 @@ TEST(Engagement, ASlotIsSlowedAndAHalfPassIsNot) {
     const double z = kTop - kDepth;
     EngagedStock stock = slab();
     std::vector<Move> slot{to(-10, 40, z, 0), to(110, 40, z)};
-    EXPECT_GT(cap_engagement(slot, stock, kCap), 90);
+    EXPECT_GT(cap_engagement(context(), slot, stock, kCap), 90);
     // In the middle of the slab the whole breadth is met: 0.7 of the feed, rounded down to a twentieth, and what cells add to a breadth.
     EXPECT_GE(slowest(slot), 0.6 * kFeed);
     EXPECT_LE(slowest(slot), 0.7 * kFeed);
@@ -73,11 +78,11 @@ TEST(Engagement, ASlotIsSlowedAndAHalfPassIsNot) {
     // Beside the slot, half of the cutter in stock: as fast as it was.
     std::vector<Move> half{to(-10, 46, z, 0), to(110, 46, z)};
     const std::vector<Move> before = half;
-    EXPECT_EQ(cap_engagement(half, stock, kCap), 0);
+    EXPECT_EQ(cap_engagement(context(), half, stock, kCap), 0);
     EXPECT_EQ(half, before);
     // A slot half as deep as the cap is meant for is no heavier than half a breadth.
     std::vector<Move> shallow{to(-10, 10, kTop - kDepth / 2, 0), to(110, 10, kTop - kDepth / 2)};
-    EXPECT_EQ(cap_engagement(shallow, stock, kCap), 0);
+    EXPECT_EQ(cap_engagement(context(), shallow, stock, kCap), 0);
 }
 
 TEST(Engagement, ACornerIsSlowedWhereTheCutterTurnsIntoIt) {
@@ -90,7 +95,7 @@ TEST(Engagement, ACornerIsSlowedWhereTheCutterTurnsIntoIt) {
     const double step = 0.45 * kDiameter;
     std::vector<Move> pass{to(10, 30, z), to(10, 30 - step, z), to(60 + step, 30 - step, z), to(60 + step, 70, z)};
     stock.cut({10, 30 - step, z}, {10, 30 - step, z});
-    cap_engagement(pass, stock, kCap);
+    cap_engagement(context(), pass, stock, kCap);
     double slowed = 0, last_slow_x = 0;
     for (std::size_t k = 2; k < pass.size(); ++k)
         if (pass[k].feed < kFeed) {
@@ -116,7 +121,7 @@ TEST(Engagement, NoStretchCutsFasterThanTheCapAllows) {
         }
         std::vector<Move> capped = way;
         EngagedStock stock = slab();
-        const double slowed = cap_engagement(capped, stock, kCap);
+        const double slowed = cap_engagement(context(), capped, stock, kCap);
         // The ways are the same: every corner is still there, and what lies between is on the straight line.
         std::size_t next = 0;
         double slow = 0;

@@ -97,7 +97,7 @@ double EngagedStock::cut(const std::array<double, 3>& from, const std::array<dou
     return sum * grid_.cell * grid_.cell;
 }
 
-double cap_engagement(std::vector<Move>& moves, EngagedStock& stock, const EngagementCap& cap) {
+double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& stock, const EngagementCap& cap) {
     if (moves.size() < 2) return 0;
     const double window = cap.diameter / 8, slot = cap.diameter * cap.stepdown;
     std::vector<Stretch> way;
@@ -129,6 +129,7 @@ double cap_engagement(std::vector<Move>& moves, EngagedStock& stock, const Engag
             const std::array<double, 3> to =
                 k == parts ? b : std::array<double, 3>{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
             way.push_back({i, to, run / parts, kFeeds});
+            if (way.size() % 256 == 0) context.throw_if_cancelled();
             volume += stock.cut(from, to);
             length += run / parts;
             if (length >= window - 1e-9) close();

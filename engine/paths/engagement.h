@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/plan.h"
+#include "kernels/parallel/context.h"
 #include "kernels/stock/sweep.h"
 
 namespace slabwright {
@@ -43,6 +44,6 @@ struct EngagementCap {
 /// where F is the move's own feed; so the volume cut in a minute nowhere exceeds what a pass of that share has at F. Rounded down to
 /// a twentieth of F. Two such places less than half a radius apart are joined by one. Rapids and vertical moves keep their feed.
 /// Moves are straight. Returns the way (mm) on which the feed was lowered.
-double cap_engagement(std::vector<Move>& moves, EngagedStock& stock, const EngagementCap& cap);
+double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& stock, const EngagementCap& cap);
 
 }  // namespace slabwright

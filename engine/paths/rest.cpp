@@ -325,12 +325,14 @@ private:
     // Coarse lines before fine ones: what a place no longer lowers after those before it is not visited.
     void keep_what_lowers() {
         before_ = stock_.heights();
-        for (Line& line : lines_)
+        for (Line& line : lines_) {
+            cut_.context.throw_if_cancelled();
             for (Place& p : line.places) {
                 if (!p.useful || !lowers(to_mm(p.x), to_mm(p.y), p.tip)) continue;
                 p.cut = true;
                 stock_.cut_at(end_, to_mm(p.x), to_mm(p.y), p.tip);
             }
+        }
     }
 
     // Straight up is always free, and so is a level chord of safe length at the height of the higher rest.

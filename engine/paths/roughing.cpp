@@ -150,7 +150,7 @@ Operation rough_layer(const LayerCut& cut) {
     path.finish();
     if (cut.job.cutting.max_engagement < 1 && op.stepdown > 0) {
         EngagedStock stock(cut.layer.stock_min, cut.layer.stock_max, std::min(cut.stock_top, cut.layer.z_top), r);
-        cap_engagement(op.moves, stock, {cut.job.cutting.max_engagement, tool.diameter, op.stepdown});
+        cap_engagement(cut.context, op.moves, stock, {cut.job.cutting.max_engagement, tool.diameter, op.stepdown});
     }
     return op;
 }
