@@ -191,7 +191,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             if (op.kind != OperationKind::face) stock.cut(cut, op, flat);
         take(cut_rest(cut, stock, ball, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
         finish([&](Operation& op) {
-            if (stock.cut(cut, op, ball) <= kEmpty) op.moves.clear();
+            if (stock.cut(cut, op, ball).few()) op.moves.clear();
         });
         const double limit = cut.job.tolerances.cusp + 0.02;
         take(cut_rest(cut, stock, flat, {OperationKind::corner, "corners", limit, false}));

@@ -103,9 +103,9 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
     }
 }
 
-float LayerStock::cut(const LayerCut& cut, const Operation& operation, const Tool& tool) {
+Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Tool& tool) {
     const std::vector<Move>& moves = operation.moves;
-    if (moves.size() < 2) return 0;
+    if (moves.size() < 2) return {};
     const CutterEnd end = cutter_end(tool);
     const double r = end.radius, top = cut.layer.z_top;
     std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock);
@@ -114,12 +114,13 @@ float LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         if (i % kBlock == 0 && i > 0) boxes[i / kBlock].add(moves[i - 1]);
     }
     const int bands = (grid_.ny + kBand - 1) / kBand;
-    std::vector<float> most(static_cast<std::size_t>(bands), 0);
+    std::vector<Taken> taken(static_cast<std::size_t>(bands));
     parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
         const int first = static_cast<int>(band) * kBand, rows = std::min(kBand, grid_.ny - first);
         const CellGrid part{grid_.x0, grid_.y(first), grid_.cell, grid_.nx, rows};
         const double y0 = part.y0 - r, y1 = part.y(rows - 1) + r;
         float* height = height_.data() + grid_.index(0, first);
+        const std::vector<float> before(height, height + part.count());
         for (std::size_t b = 0; b < boxes.size(); ++b) {
             if (boxes[b].y1 < y0 || boxes[b].y0 > y1 || boxes[b].z0 >= top) continue;
             for (std::size_t i = std::max<std::size_t>(1, b * kBlock); i < std::min(moves.size(), (b + 1) * kBlock); ++i) {
@@ -131,12 +132,18 @@ float LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                     part, end, {to_mm(p.x), py, pz}, {to_mm(q.x), qy, qz}, [&](std::size_t c) { return height[c] + z_bottom_; },
                     [&](std::size_t c, double z) {
                         const auto left = static_cast<float>(std::max(0.0, z - z_bottom_));
-                        if (left < height[c]) most[band] = std::max(most[band], height[c] - left), height[c] = left;
+                        if (left < height[c]) height[c] = left;
                     });
             }
         }
+        for (std::size_t c = 0; c < before.size(); ++c) {
+            taken[band].most = std::max(taken[band].most, before[c] - height[c]);
+            taken[band].cells += before[c] - height[c] > kEmpty;
+        }
     });
-    return *std::max_element(most.begin(), most.end());
+    Taken all;
+    for (const Taken& t : taken) all.most = std::max(all.most, t.most), all.cells += t.cells;
+    return all;
 }
 
 void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) {

@@ -9,6 +9,18 @@
 
 namespace slabwright {
 
+/// mm: less than this off a cell is nothing done.
+inline constexpr float kEmpty = 0.01F;
+
+/// What an operation took off a stock. A cell's centre that lies on a wall to within rounding may stand in one stock and not in another,
+/// so a few cells alone are no reason to go there.
+struct Taken {
+    float most = 0;         ///< mm that one cell lost
+    std::size_t cells = 0;  ///< that lost more than kEmpty
+    [[nodiscard]] bool nothing() const { return cells < 4 && most < 0.4F; }
+    [[nodiscard]] bool few() const { return cells < 4; }
+};
+
 /// Heights over a grid of cells, mm above the layer's bottom; each stands for its cell's centre, where it is exact (kernels/stock/sweep).
 /// Only what lies within the layer is kept: cuts below its bottom clear nothing that is left to do.
 class LayerStock {
@@ -17,8 +29,7 @@ public:
     LayerStock(const LayerCut& cut, double cell);
 
     /// Takes away what the operation's feed moves meet, all of them straight (arcs are fitted when a layer is planned). Rows in parallel.
-    /// @return the most that a cell lost, mm
-    float cut(const LayerCut& cut, const Operation& operation, const Tool& tool);
+    Taken cut(const LayerCut& cut, const Operation& operation, const Tool& tool);
     /// Takes away what one place of a cutter covers.
     void cut_at(const CutterEnd& end, double x, double y, double tip_z);
 
@@ -45,9 +56,6 @@ private:
     std::vector<float> height_, surface_;
     std::vector<std::uint8_t> nz_;
 };
-
-/// An operation from which no cell of the stock loses more than this, mm, has nothing to do.
-inline constexpr float kEmpty = 0.01F;
 
 /// Cells that resolve what passes of the finest cutter leave: a quarter of their distance, coarser where the layer would
 /// take more than kStockCells of them.

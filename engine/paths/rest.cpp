@@ -118,8 +118,8 @@ public:
         op.stepdown = pass_.in_steps ? tool_.stepdown_max : 0;
         emit(op, runs);
         stock_.restore(std::move(before_));
-        const float most = stock_.cut(cut_, op, tool_);
-        if (most <= kEmpty) op.moves.clear();
+        const Taken taken = stock_.cut(cut_, op, tool_);
+        if (taken.nothing()) op.moves.clear();
         return op;
     }
 
