@@ -273,8 +273,8 @@ Json silhouette(const std::vector<Section>& sections, bool along_y) {
 /// What no budget changes.
 struct Figures {
     Json data;
-    std::vector<std::vector<PathPoint>> paths;  ///< by program
-    Json replay;                                ///< the stock's cells, left-over maps
+    std::vector<std::vector<ReplayPoint>> paths;  ///< by program
+    Json replay;                                  ///< the stock's cells, left-over maps
 };
 
 double stock_cell(const SimulationInput& input) {
@@ -485,7 +485,7 @@ Json model_json(Context& context, MeshView mesh, const StandingPart& part, const
 }
 
 /// All paths within a number of points: the tolerance is doubled until they fit, then the longest are left out.
-Json paths_json(std::vector<std::vector<PathPoint>> paths, const PlanFolder& folder, std::size_t most) {
+Json paths_json(std::vector<std::vector<ReplayPoint>> paths, const PlanFolder& folder, std::size_t most) {
     const auto count = [&] {
         std::size_t points = 0;
         for (const auto& path : paths) points += path.size();
@@ -505,7 +505,7 @@ Json paths_json(std::vector<std::vector<PathPoint>> paths, const PlanFolder& fol
     }
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
     for (const auto& path : paths)
-        for (const PathPoint& p : path) {
+        for (const ReplayPoint& p : path) {
             const double at[3] = {p.x, p.y, p.z};
             for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], at[k]), high[k] = std::max(high[k], at[k]);
         }
@@ -519,7 +519,7 @@ Json paths_json(std::vector<std::vector<PathPoint>> paths, const PlanFolder& fol
         // x, y, z as shares of the box; time as a share of the program's, its lowest bit says rapid.
         std::string bytes;
         const double seconds = paths[i].empty() ? 0 : paths[i].back().seconds;
-        for (const PathPoint& p : paths[i]) {
+        for (const ReplayPoint& p : paths[i]) {
             const double at[3] = {p.x, p.y, p.z};
             for (std::size_t k = 0; k < 3; ++k)
                 append_little_endian(bytes, static_cast<std::uint16_t>(std::round((at[k] - low[k]) / std::max(1e-9, high[k] - low[k]) * 65535)));

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kRun = 1024;
 
-double distance_from_line(const PathPoint& p, const PathPoint& a, const PathPoint& b) {
+double distance_from_line(const ReplayPoint& p, const ReplayPoint& a, const ReplayPoint& b) {
     const double ux = b.x - a.x, uy = b.y - a.y, uz = b.z - a.z, wx = p.x - a.x, wy = p.y - a.y, wz = p.z - a.z;
     const double uu = ux * ux + uy * uy + uz * uz;
     const double t = uu > 0 ? std::clamp((wx * ux + wy * uy + wz * uz) / uu, 0.0, 1.0) : 0;
@@ -19,13 +19,13 @@ double distance_from_line(const PathPoint& p, const PathPoint& a, const PathPoin
 
 }  // namespace
 
-std::vector<PathPoint> path_of(const Program& program, double rapid_feed) {
-    std::vector<PathPoint> path;
+std::vector<ReplayPoint> path_of(const Program& program, double rapid_feed) {
+    std::vector<ReplayPoint> path;
     for (const ProgramStep& s : program.steps) {
         if (!s.known()) continue;
-        PathPoint p{s.x, s.y, s.z, 0, s.rapid(), true};
+        ReplayPoint p{s.x, s.y, s.z, 0, s.rapid(), true};
         if (!path.empty()) {
-            const PathPoint& from = path.back();
+            const ReplayPoint& from = path.back();
             const double way = std::hypot(p.x - from.x, p.y - from.y, p.z - from.z);
             if (way == 0) continue;
             p.seconds = from.seconds + way / (s.rapid() ? rapid_feed : s.feed) * 60;
@@ -35,9 +35,9 @@ std::vector<PathPoint> path_of(const Program& program, double rapid_feed) {
     return path;
 }
 
-void thin(std::vector<PathPoint>& path, double tolerance_mm) {
+void thin(std::vector<ReplayPoint>& path, double tolerance_mm) {
     if (path.size() < 3) return;
-    for (PathPoint& p : path) p.kept = false;
+    for (ReplayPoint& p : path) p.kept = false;
     path.front().kept = path.back().kept = true;
     std::vector<std::pair<std::size_t, std::size_t>> open;
     for (std::size_t begin = 0; begin + 1 < path.size();) {
@@ -59,7 +59,7 @@ void thin(std::vector<PathPoint>& path, double tolerance_mm) {
         }
         begin = end;
     }
-    std::erase_if(path, [](const PathPoint& p) { return !p.kept; });
+    std::erase_if(path, [](const ReplayPoint& p) { return !p.kept; });
 }
 
 }  // namespace slabwright

@@ -8,7 +8,7 @@
 namespace slabwright {
 
 /// The tool's tip when a motion ends.
-struct PathPoint {
+struct ReplayPoint {
     double x = 0, y = 0, z = 0;  ///< mm, frame pattern-base
     double seconds = 0;          ///< since the first, by way over feed
     bool rapid = false;          ///< how it came here
@@ -16,10 +16,10 @@ struct PathPoint {
 };
 
 /// The known places of a program. @param rapid_feed mm/min of G0
-[[nodiscard]] std::vector<PathPoint> path_of(const Program& program, double rapid_feed);
+[[nodiscard]] std::vector<ReplayPoint> path_of(const Program& program, double rapid_feed);
 
 /// Leaves out points so that each left-out one lies within `tolerance_mm` of the straight line that replaces it (Douglas and Peucker,
 /// in 3D, over runs of feed or of rapid motions; a run is cut after 1024 points, so time grows no faster than their number).
-void thin(std::vector<PathPoint>& path, double tolerance_mm);
+void thin(std::vector<ReplayPoint>& path, double tolerance_mm);
 
 }  // namespace slabwright

@@ -62,8 +62,8 @@ TEST(ThinnedPath, EveryPointLeftOutLiesNearTheWayThatReplacesIt) {
             at.feed = i % 400 < 380 ? 1000 : 0;
             program.steps.push_back(at);
         }
-        const std::vector<PathPoint> whole = path_of(program, 12000);
-        std::vector<PathPoint> thinned = whole;
+        const std::vector<ReplayPoint> whole = path_of(program, 12000);
+        std::vector<ReplayPoint> thinned = whole;
         const double tolerance = 0.05;
         thin(thinned, tolerance);
         EXPECT_LT(thinned.size(), whole.size() / 2);
@@ -72,7 +72,7 @@ TEST(ThinnedPath, EveryPointLeftOutLiesNearTheWayThatReplacesIt) {
         std::size_t next = 1;
         for (std::size_t k = 1; k + 1 < whole.size(); ++k) {
             while (thinned[next].seconds < whole[k].seconds) ++next;
-            const PathPoint &a = thinned[next - 1], &b = thinned[next], &p = whole[k];
+            const ReplayPoint &a = thinned[next - 1], &b = thinned[next], &p = whole[k];
             EXPECT_EQ(b.rapid, p.rapid) << k;
             const double ux = b.x - a.x, uy = b.y - a.y, uz = b.z - a.z, uu = ux * ux + uy * uy + uz * uz;
             const double t = std::clamp(((p.x - a.x) * ux + (p.y - a.y) * uy + (p.z - a.z) * uz) / uu, 0.0, 1.0);
