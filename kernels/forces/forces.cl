@@ -1,7 +1,10 @@
 R"CL(
 // One work item: one segment over one pitch, eight instants at a time (forces.h states the model, turn.h the pieces).
-// Flat ends and shanks by the closed form, balls by Gauss's rule in q = sin(kappa/2). Sines by polynomials: the angles that
-// are needed lie within half a turn, and a device's own sin() is often scalar. The polynomials are good to 4e-6.
+// A tooth all of whose edge is engaged gives forces that are trigonometric polynomials of its angle, whose coefficients are
+// integrals over the edge and the same at every instant: eight lanes take the eight nodes of Gauss's rule once for the segment. A
+// tooth that enters or leaves is integrated at every instant: flat ends and shanks by the closed form, balls by Gauss's rule in
+// q = sin(kappa/2). Sines by polynomials: the angles that are needed lie within half a turn, and a device's own sin() is often
+// scalar. The polynomials are good to 4e-6.
 #pragma OPENCL FP_CONTRACT OFF
 
 typedef struct {
@@ -32,6 +35,61 @@ float total(float8 v) {
     return b.x + b.y;
 }
 
+// With phi the angle of the tooth at the middle of its engaged heights, d how far a height lags behind that middle, and the edge
+// integrated with sin(kappa) = sk, cos(kappa) = ck:
+//     Fx = -v0 - b sin(phi) - a cos(phi) - c sin(2 phi) + d cos(2 phi),   Fy = q0 + a sin(phi) - b cos(phi) - d sin(2 phi) - c cos(2 phi),
+//     Fz = w0 + w1 sin(phi) - w2 cos(phi),   torque / radius = t0 + t1 sin(phi) - t2 cos(phi).
+typedef struct {
+    float a, b, c, d, v0, q0, w0, w1, w2, t0, t1, t2;
+} Tooth;
+
+Tooth engaged_tooth(const Segment s) {
+    Tooth t = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    const float middle = 0.5f * (s.low + s.high);
+    float from = s.low;
+    if (s.ball > 0 && s.low < s.radius) {
+        const float8 nodes = (float8)(-0.96028986f, -0.79666648f, -0.52553241f, -0.18343464f, 0.18343464f, 0.52553241f, 0.79666648f, 0.96028986f);
+        const float8 weights = (float8)(0.10122854f, 0.22238103f, 0.31370665f, 0.36268378f, 0.36268378f, 0.31370665f, 0.22238103f, 0.10122854f);
+        from = SMALLER(s.high, s.radius);
+        const float qa = sqrt(0.5f * s.low / s.radius), qb = sqrt(0.5f * from / s.radius), half_q = 0.5f * (qb - qa);
+        const float8 q = 0.5f * (qa + qb) + half_q * nodes, q2 = q * q, root = sqrt(1.0f - q2);
+        const float8 db = 2.0f * s.radius * half_q * weights / root, sk = 2.0f * q * root, ck = 1.0f - 2.0f * q2;
+        const float8 d = s.lag * (2.0f * s.radius * q2 - middle), d2 = d * d, sd = d * SINC(d2), cd = COSINE(d2), ss = 2.0f * sd * cd,
+                     cc = 1.0f - 2.0f * sd * sd;
+        const float8 te = s.te * db, tc = 0.5f * s.tc * sk * db, re = (s.re * sk + s.ae * ck) * db, rc = 0.5f * (s.rc * sk + s.ac * ck) * sk * db;
+        const float8 ac = (s.ac * sk - s.rc * ck) * sk * db, torque = s.tc * sk * sk * db;
+        t.a = total(te * cd - re * sd);
+        t.b = total(te * sd + re * cd);
+        t.c = total(tc * cc - rc * ss);
+        t.d = total(tc * ss + rc * cc);
+        t.v0 = total(rc);
+        t.q0 = total(tc);
+        t.w0 = total((s.ae * sk - s.re * ck) * db);
+        t.w1 = total(ac * cd);
+        t.w2 = total(ac * sd);
+        t.t0 = total(te * sk);
+        t.t1 = total(torque * cd);
+        t.t2 = total(torque * sd);
+    }
+    if (s.high > from) {
+        const float edge = s.high - from, half_lag = 0.5f * s.lag * edge, h2 = half_lag * half_lag, one = edge * SINC(h2), two = one * COSINE(h2);
+        const float d = 0.5f * s.lag * (from - s.low), d2 = d * d, sd = d * SINC(d2), cd = COSINE(d2), ss = 2.0f * sd * cd, cc = 1.0f - 2.0f * sd * sd;
+        t.a += one * (s.te * cd - s.re * sd);
+        t.b += one * (s.te * sd + s.re * cd);
+        t.c += 0.5f * two * (s.tc * cc - s.rc * ss);
+        t.d += 0.5f * two * (s.tc * ss + s.rc * cc);
+        t.v0 += 0.5f * edge * s.rc;
+        t.q0 += 0.5f * edge * s.tc;
+        t.w0 += edge * s.ae;
+        t.w1 += one * s.ac * cd;
+        t.w2 += one * s.ac * sd;
+        t.t0 += edge * s.te;
+        t.t1 += one * s.tc * cd;
+        t.t2 += one * s.tc * sd;
+    }
+    return t;
+}
+
 __kernel void forces(__global const Segment* segments, __global float* out, const uint count) {
     const size_t id = get_global_id(0);
     if (id >= count) return;
@@ -39,7 +97,10 @@ __kernel void forces(__global const Segment* segments, __global float* out, cons
     const float8 lane = (float8)(0, 1, 2, 3, 4, 5, 6, 7);
     float8 peak_x = 0, peak_y = 0, peak_z = 0, peak_plane = 0, peak_all = 0, peak_torque = 0;
     float8 mean_plane = 0;
-    const float inverse_lag = s.lag > 0 ? 1.0f / s.lag : 0.0f;
+    const float inverse_lag = s.lag > 0 ? 1.0f / s.lag : 0.0f, middle_lag = 0.5f * s.lag * (s.low + s.high) + 1.57079633f;
+    // Without a piece in which the whole edge is engaged its coefficients are never used.
+    Tooth whole = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    if (s.lag * (s.high - s.low) < s.exit - s.entry) whole = engaged_tooth(s);
     for (int p = 0; p < s.pieces; ++p) {
         const float first = s.piece[p].x, length = s.piece[p].y, step = length / (s.piece[p].w - 1.0f);
         const int teeth = (int)s.piece[p].z, blocks = (int)s.piece[p].w / 8;
@@ -49,16 +110,24 @@ __kernel void forces(__global const Segment* segments, __global float* out, cons
             for (int m = 0; m < teeth; ++m) {
                 const float begin = first + (float)m * s.pitch, middle = begin + 0.5f * length;
                 const float8 u = begin + index * step;
+                const int enters = s.lag > 0 && middle - s.lag * s.high < s.entry, leaves = s.lag > 0 && middle - s.lag * s.low > s.exit;
+                if (!enters && !leaves) {
+                    const float8 a = u - middle_lag, a2 = a * a, s1 = COSINE(a2), c1 = -a * SINC(a2), s2 = 2.0f * s1 * c1,
+                                 c2 = 1.0f - 2.0f * s1 * s1;
+                    x -= whole.v0 + whole.b * s1 + whole.a * c1 + whole.c * s2 - whole.d * c2;
+                    y += whole.q0 + whole.a * s1 - whole.b * c1 - whole.d * s2 - whole.c * c2;
+                    z += whole.w0 + whole.w1 * s1 - whole.w2 * c1;
+                    torque += whole.t0 + whole.t1 * s1 - whole.t2 * c1;
+                    continue;
+                }
                 float8 zl = s.low, zh = s.high;
-                if (s.lag > 0) {
-                    if (middle - s.lag * s.high < s.entry) {
-                        zh = (u - s.entry) * inverse_lag;
-                        zh = SMALLER(LARGER(zh, (float8)s.low), (float8)s.high);
-                    }
-                    if (middle - s.lag * s.low > s.exit) {
-                        zl = (u - s.exit) * inverse_lag;
-                        zl = SMALLER(LARGER(zl, (float8)s.low), (float8)s.high);
-                    }
+                if (enters) {
+                    zh = (u - s.entry) * inverse_lag;
+                    zh = SMALLER(LARGER(zh, (float8)s.low), (float8)s.high);
+                }
+                if (leaves) {
+                    zl = (u - s.exit) * inverse_lag;
+                    zl = SMALLER(LARGER(zl, (float8)s.low), (float8)s.high);
                 }
                 zh = LARGER(zh, zl);
                 if (s.ball > 0 && s.low < s.radius) {

@@ -81,29 +81,19 @@ SegmentForces double_forces(const CutSegment& s, double accuracy) {
     return s.profile == CutterProfile::flat ? closed_form_forces(s, accuracy) : reference_forces(s, accuracy);
 }
 
-void pack(const CutSegment& s, std::size_t index, double angle, Packed& out) {
+/// A segment as the device takes it; the means, which need no device, go to `means`, so that the turn is cut into pieces once.
+void pack(const CutSegment& s, std::size_t index, double angle, Packed& out, SegmentForces& means) {
     forces::check_segment(s, index);
     const forces::Turn t = forces::make_turn(s);
+    means = {};
+    if (t.count > 0) forces::set_means(s, t, means);
     auto f = [](double x) { return static_cast<float>(x); };
     const double c = s.chip_load_mm;
     const ForceCoefficients& k = s.coefficients;
-    out = {f(s.radius_mm),
-           f(t.lag_per_mm),
-           f(t.entry),
-           f(t.exit),
-           f(t.low),
-           f(t.high),
-           f(t.pitch),
-           s.profile == CutterProfile::ball ? 1.0f : 0.0f,
-           f(k.ktc * c),
-           f(k.krc * c),
-           f(k.kac * c),
-           f(k.kte),
-           f(k.kre),
-           f(k.kae),
-           t.count,
-           0,
-           {}};
+    out.radius = f(s.radius_mm), out.lag = f(t.lag_per_mm), out.entry = f(t.entry), out.exit = f(t.exit);
+    out.low = f(t.low), out.high = f(t.high), out.pitch = f(t.pitch), out.ball = s.profile == CutterProfile::ball ? 1.0f : 0.0f;
+    out.tc = f(k.ktc * c), out.rc = f(k.krc * c), out.ac = f(k.kac * c), out.te = f(k.kte), out.re = f(k.kre), out.ae = f(k.kae);
+    out.pieces = t.count, out.padding = 0;
     for (int p = 0; p < t.count; ++p) {
         const forces::Turn::Piece& piece = t.pieces[static_cast<std::size_t>(p)];
         const forces::Teeth teeth = forces::teeth_in(t, piece);
@@ -115,12 +105,9 @@ void pack(const CutSegment& s, std::size_t index, double angle, Packed& out) {
     }
 }
 
-void unpack(const float* o, const CutSegment& s, SegmentForces& f) {
-    f = {};
+void set_peaks(const float* o, const CutSegment& s, SegmentForces& f) {
     f.peak_x_n = o[0], f.peak_y_n = o[1], f.peak_z_n = o[2], f.peak_in_plane_n = o[3], f.peak_resultant_n = o[4], f.peak_torque_nmm = o[5];
     f.mean_in_plane_n = o[6];
-    const forces::Turn turn = forces::make_turn(s);
-    if (turn.count > 0) forces::set_means(s, turn, f);
     f.peak_power_w = f.peak_torque_nmm * forces::watts_per_nmm(s.spindle_rpm);
 }
 
@@ -216,7 +203,7 @@ public:
             slot.packed.resize(slot.count);
             slot.results.resize(slot.count * kOut);
             parallel_for(context, slot.count, 1024, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t i = begin; i < end; ++i) pack(segments[at + i], at + i, angle, slot.packed[i]);
+                for (std::size_t i = begin; i < end; ++i) pack(segments[at + i], at + i, angle, slot.packed[i], out[at + i]);
             });
             enqueue(slot);
         }
@@ -256,7 +243,7 @@ private:
         slot.done.reset();
         if (rc != CL_SUCCESS) throw device_error("the force kernel fails", rc, name_);
         parallel_for(context, slot.count, 4096, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) unpack(slot.results.data() + i * kOut, segments[slot.at + i], out[slot.at + i]);
+            for (std::size_t i = begin; i < end; ++i) set_peaks(slot.results.data() + i * kOut, segments[slot.at + i], out[slot.at + i]);
         });
     }
 
