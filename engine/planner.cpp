@@ -195,8 +195,8 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     // A gap in the mesh shows as an open chain; sections at every boundary and feature would miss one in between, so the
     // loader has refused all open edges but those in the base plane already. What is left here is proof by section.
     context.begin_phase("paths", 0.25, 0.92, plan.layers.size());
-    const Tool& finish = tool_of_kind(job, ToolKind::ball);
-    const double overrun = finish.diameter / 2;
+    const LayerTools tools = fixed_tools(job);
+    const double overrun = tools.finish.diameter / 2;
     const double board = job.machine.base_board_cut >= 0 ? std::min(job.machine.base_board_cut, job.machine.base_board_thickness)
                                                          : std::min(overrun, job.machine.base_board_thickness);
     // What the layers in work hold at once: their facets with an index of them, and the moves of all layers, of which a
@@ -230,6 +230,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
         work.stock_min = plan.stock_min;
         work.stock_max = plan.stock_max;
         work.index = layer.index;
+        work.tools = tools;
         if (plan.flask) work.opening = plan.flask->inner[i];
         for (const Feature& f : plan.features) {
             if (f.type != FeatureType::up_flat || f.area < job.cutting.min_flat_area || f.z_low >= layer.z_top) continue;

@@ -8,7 +8,7 @@
 namespace slabwright {
 
 Operation finish_floors(const LayerCut& cut) {
-    const Tool& tool = tool_of_kind(cut.job, ToolKind::flat);
+    const Tool& tool = cut.layer.tools.rough;
     Operation op = cut.operation(OperationKind::finish, "floors", tool);
     const double r = tool.diameter / 2;
     const Cutter cutter{Cutter::Profile::flat, r};

@@ -185,17 +185,26 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     } else {
         // What stands now decides the rest: waste where the roughing cutter does not fit before the ball finishes, and after it
         // the corners that the ball leaves, by the flat end mill, and what is left of the cusps' limit anywhere.
-        const Tool &ball = tool_of_kind(cut.job, ToolKind::ball), &flat = tool_of_kind(cut.job, ToolKind::flat);
-        LayerStock stock(cut, stock_cell(cut.job, layer.stock_max[0] - layer.stock_min[0], layer.stock_max[1] - layer.stock_min[1]));
+        const LayerTools& tools = layer.tools;
+        LayerStock stock(cut, stock_cell(cut));
         for (const Operation& op : result.operations)
-            if (op.kind != OperationKind::face) stock.cut(cut, op, flat);
-        take(cut_rest(cut, stock, ball, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
+            if (op.kind != OperationKind::face) stock.cut(cut, op, tools.rough);
+        for (const Tool& semi : tools.semi_rough)
+            take(cut_rest(cut, stock, semi, {OperationKind::semi_rough, "waste beside the roughing cutter", 1.0, true}));
+        take(cut_rest(cut, stock, tools.finish, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
         finish([&](Operation& op) {
-            if (stock.cut(cut, op, ball).few()) op.moves.clear();
+            if (stock.cut(cut, op, tools.finish).few()) op.moves.clear();
         });
         const double limit = cut.job.tolerances.cusp + 0.02;
-        take(cut_rest(cut, stock, flat, {OperationKind::corner, "corners", limit, false}));
-        take(cut_rest(cut, stock, ball, {OperationKind::finish, "what is left", limit, false}));
+        // A smaller flat reaches every corner that the roughing cutter reaches, so where one follows it cuts them all.
+        const bool smaller = std::any_of(tools.rest.begin(), tools.rest.end(), [](const Tool& t) { return t.kind == ToolKind::flat; });
+        if (!smaller) take(cut_rest(cut, stock, tools.rough, {OperationKind::corner, "corners", limit, false}));
+        take(cut_rest(cut, stock, tools.finish, {OperationKind::finish, "what is left", limit, false}));
+        for (const Tool& tool : tools.rest) {
+            take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste in narrow places", 1.0, true}));
+            if (tool.kind == ToolKind::flat) take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
+            else take(cut_rest(cut, stock, tool, {OperationKind::finish, "what is left in narrow places", limit, false}));
+        }
     }
     if (!cut.no_way_in.empty())
         result.diagnostics.push_back({Severity::note, "entry.no_room",

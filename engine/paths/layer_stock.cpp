@@ -24,9 +24,12 @@ struct Box {
 
 }  // namespace
 
-double stock_cell(const Job& job, double width, double depth) {
-    const double r = tool_of_kind(job, ToolKind::ball).diameter / 2;
-    return std::clamp(std::max(std::sqrt(2 * r * job.tolerances.cusp) / 2, std::sqrt(width * depth / kStockCells)), 0.05, 1.0);
+double stock_cell(const LayerCut& cut) {
+    double finest = cut.layer.tools.finish.diameter;
+    for (const Tool& tool : cut.layer.tools.rest)
+        if (tool.kind == ToolKind::ball) finest = std::min(finest, tool.diameter);
+    const double width = cut.layer.stock_max[0] - cut.layer.stock_min[0], depth = cut.layer.stock_max[1] - cut.layer.stock_min[1];
+    return std::clamp(std::max(std::sqrt(2 * (finest / 2) * cut.job.tolerances.cusp) / 2, std::sqrt(width * depth / kStockCells)), 0.05, 1.0);
 }
 
 CutterEnd cutter_end(const Tool& tool) { return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0}; }

@@ -57,10 +57,10 @@ private:
     std::vector<std::uint8_t> nz_;
 };
 
-/// Cells that resolve what passes of the finest cutter leave: a quarter of their distance, coarser where the layer would
+/// Cells that resolve what passes of the layer's finest ball leave: a quarter of their distance, coarser where the layer would
 /// take more than kStockCells of them.
 inline constexpr double kStockCells = 24e6;
-[[nodiscard]] double stock_cell(const Job& job, double width, double depth);
+[[nodiscard]] double stock_cell(const LayerCut& cut);
 
 [[nodiscard]] CutterEnd cutter_end(const Tool& tool);
 

@@ -192,7 +192,7 @@ double vertical_nz(const LayerCut& cut) { return std::cos(cut.job.cutting.vertic
 }  // namespace
 
 Operation finish_walls(const LayerCut& cut) {
-    const Tool& tool = tool_of_kind(cut.job, ToolKind::flat);
+    const Tool& tool = cut.layer.tools.rough;
     Operation op = cut.operation(OperationKind::finish, "vertical walls", tool);
     const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut);
     double low = 1e300, high = -1e300;  // of the vertical facets
@@ -241,7 +241,7 @@ Operation finish_walls(const LayerCut& cut) {
 }
 
 Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
-    const Tool& tool = tool_of_kind(cut.job, ToolKind::ball);
+    const Tool& tool = cut.layer.tools.finish;
     Operation op = cut.operation(OperationKind::finish, "level contours", tool);
     const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut), degree = std::numbers::pi / 180;
     const FinishSlopes slopes = finish_slopes(cut.job.cutting);
@@ -296,7 +296,7 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     std::unique_ptr<DropIndex> flat;
     double flat_r = 0;
     if (any_vertical) {
-        flat_r = tool_of_kind(cut.job, ToolKind::flat).diameter / 2;
+        flat_r = cut.layer.tools.rough.diameter / 2;
         flat = std::make_unique<DropIndex>(cut.context, cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
     }
     std::vector<std::vector<Run>> runs(tips.size());

@@ -65,7 +65,7 @@ struct Place {
 }  // namespace
 
 Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
-    const Tool& tool = tool_of_kind(cut.job, ToolKind::ball);
+    const Tool& tool = cut.layer.tools.finish;
     Operation op = cut.operation(OperationKind::finish, "projected offsets", tool);
     const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, cusp = cut.job.tolerances.cusp;
     const FinishSlopes slopes = finish_slopes(cut.job.cutting);
@@ -127,7 +127,7 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
     }
 
     const DropIndex ball(cut.context, cut.solid, {Cutter::Profile::ball, r});
-    const DropIndex flat(cut.context, cut.solid, {Cutter::Profile::flat, tool_of_kind(cut.job, ToolKind::flat).diameter / 2 - 0.02});
+    const DropIndex flat(cut.context, cut.solid, {Cutter::Profile::flat, cut.layer.tools.rough.diameter / 2 - 0.02});
     const double chord = safe_chord_mm(r, gouge);
     auto floor_done = [&](double z) {
         return std::any_of(cut.floors.begin(), cut.floors.end(), [&](double floor) { return z <= floor + 1e-6 && z >= floor - kSameFloor; });

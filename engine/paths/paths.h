@@ -1,7 +1,8 @@
-// The tool paths of one layer (SHAPING, FINISH; method.md sections 5 and 11), with the fixed tool set.
+// The tool paths of one layer (SHAPING, FINISH; method.md sections 5 and 11), with the tools that were chosen for it.
 #pragma once
 
 #include "engine/plan.h"
+#include "engine/tools/tools.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 
@@ -15,6 +16,7 @@ struct LayerJob {
     double floor_below = 0;                          ///< the lowest z that a tip may reach: z_bottom less what may be cut under it
     std::array<double, 2> stock_min{}, stock_max{};  ///< mm
     int index = 0;
+    LayerTools tools;
     Loops opening;                      ///< of the flask in this layer; empty: no flask
     std::vector<const Feature*> flats;  ///< up-facing flats of at least cutting.min_flat_area strictly between z_bottom and z_top
     std::vector<const Feature*> feet;   ///< up-facing flats on which walls of this layer may stand: `flats` and those just below
@@ -25,7 +27,7 @@ struct LayerResult {
     std::vector<Diagnostic> diagnostics;
 };
 
-/// Face, rough, floors, walls, levels and raster of one layer. Operations that would remove nothing are left out.
+/// Face, rough, floors, walls, levels and raster of one layer, and what these leave. Operations that would remove nothing are left out.
 [[nodiscard]] LayerResult plan_layer_paths(Context& context, const LayerJob& layer);
 
 }  // namespace slabwright

@@ -14,7 +14,7 @@
 namespace slabwright {
 
 Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
-    const Tool& tool = tool_of_kind(cut.job, ToolKind::ball);
+    const Tool& tool = cut.layer.tools.finish;
     Operation op = cut.operation(OperationKind::finish, "projected raster", tool);
     const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, cusp = cut.job.tolerances.cusp;
     const FinishSlopes slopes = finish_slopes(cut.job.cutting);
@@ -66,7 +66,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                                {}});
 
     const DropIndex& ball = cut.drops({Cutter::Profile::ball, r});
-    const double flat_r = tool_of_kind(cut.job, ToolKind::flat).diameter / 2;
+    const double flat_r = cut.layer.tools.rough.diameter / 2;
     const DropIndex flat(cut.context, cut.solid, {Cutter::Profile::flat, flat_r - 0.02});
     const double chord = safe_chord_mm(r, gouge);
     // Samples stand on multiples of one step, so that those of neighbouring lines are neighbours.

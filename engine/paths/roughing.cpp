@@ -50,7 +50,7 @@ std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool) {
 }  // namespace
 
 Operation rough_layer(const LayerCut& cut) {
-    const Tool& tool = tool_of_kind(cut.job, ToolKind::flat);
+    const Tool& tool = cut.layer.tools.rough;
     const bool contour = cut.job.cutting.rough_pattern == RoughPattern::contour;
     Operation op = cut.operation(OperationKind::rough, contour ? "contour-parallel levels" : "zigzag levels", tool);
     const double r = tool.diameter / 2, clearance = cut.layer.z_top + cut.job.machine.clearance;

@@ -1,0 +1,27 @@
+// The cutters of one layer and how deep they cut (LUO 5.5.3): which of the job's library does what.
+#pragma once
+
+#include <vector>
+
+#include "engine/job.h"
+
+namespace slabwright {
+
+/// The tools of one layer. Each is a copy of the library's, with the stepdown that this layer allows it as stepdown_max.
+struct LayerTools {
+    Tool rough;                    ///< flat: roughing, then floors, walls and the corners that the finish tool leaves
+    std::vector<Tool> semi_rough;  ///< flat, none or one: level by level where the roughing cutter did not fit
+    Tool finish;                   ///< ball: slopes, and waste between walls before them
+    std::vector<Tool> rest;        ///< flats and balls in falling size: only where something is left that they reach
+};
+
+/// The fixed set: the first flat and the first ball end mill of the job, LUO's 1/2 and 1/4 in where the library has them; for what
+/// these leave, the smaller tools of the library.
+/// @throws Error(usage, "job.tool") when the library has no flat or no ball
+[[nodiscard]] LayerTools fixed_tools(const Job& job);
+
+/// What follows a finish tool and a roughing tool (mm across) so that nothing is left which a tool of the library reaches: the
+/// smallest flat and the smallest ball of the library, where they are smaller.
+[[nodiscard]] std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter);
+
+}  // namespace slabwright
