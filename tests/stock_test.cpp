@@ -135,6 +135,59 @@ TEST(Sweep, LeavesOutWhatStandsLower) {
     }
 }
 
+// A chain of motions that share their ends leaves what they leave one by one, and asks far fewer cells.
+TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-1, 11), uz(-3, 3), ur(0.4, 4), turn(-3, 3);
+    const CellGrid grid{0.1, 0.2, 0.11, 90, 80};
+    std::size_t asked_alone = 0, asked_chained = 0;
+    for (int trial = 0; trial < 120; ++trial) {
+        const CutterEnd end{static_cast<CutterEnd::Form>(trial % 3), ur(random), 0.6};
+        std::vector<std::array<double, 3>> way{{u(random), u(random), uz(random)}};
+        double angle = turn(random);
+        for (int k = 0; k < 40; ++k) {
+            std::array<double, 3> next = way.back();
+            const double length = trial % 4 == 0 ? ur(random) : 0.3;
+            angle += k % 9 == 0 ? turn(random) : turn(random) / 20;
+            if (k % 13 == 5) angle += std::numbers::pi;
+            const bool along = k % 11 != 3;  // otherwise straight up or down, or nowhere at all
+            if (along) next[0] += length * std::cos(angle), next[1] += length * std::sin(angle);
+            if (k % 22 != 3 && (trial % 2 == 0 || k % 7 == 2)) next[2] += 0.1 * turn(random);
+            way.push_back(next);
+        }
+        std::vector<double> alone(grid.count(), 1), chained(grid.count(), 1);
+        for (std::size_t k = 1; k < way.size(); ++k) {
+            auto into = [&](std::vector<double>& height, std::size_t& asked) {
+                return std::pair{[&height, &asked](std::size_t c) { return ++asked, height[c]; },
+                                 [&height](std::size_t c, double z) { height[c] = std::min(height[c], z); }};
+            };
+            const auto [stands, take] = into(alone, asked_alone);
+            sweep_above(grid, end, way[k - 1], way[k], stands, take);
+            ChainedSweep chain;
+            if (k > 1) chain.before = &way[k - 2];
+            if (k + 1 < way.size()) chain.after = &way[k + 1];
+            const auto [stands_chained, take_chained] = into(chained, asked_chained);
+            sweep_above(grid, end, way[k - 1], way[k], stands_chained, take_chained, chain);
+        }
+        for (std::size_t c = 0; c < grid.count(); ++c) {
+            // At the cutter's very rim rounding decides whether it covers a centre.
+            if (std::abs(alone[c] - chained[c]) <= 1e-9) continue;
+            double nearest = 1e300;
+            const double x = grid.x(static_cast<int>(c) % grid.nx), y = grid.y(static_cast<int>(c) / grid.nx);
+            for (std::size_t k = 1; k < way.size(); ++k) {
+                const double dx = way[k][0] - way[k - 1][0], dy = way[k][1] - way[k - 1][1], l2 = dx * dx + dy * dy;
+                const double t = l2 > 0 ? std::clamp(((x - way[k - 1][0]) * dx + (y - way[k - 1][1]) * dy) / l2, 0.0, 1.0) : 0.0;
+                nearest = std::min(nearest, std::abs(std::hypot(x - way[k - 1][0] - t * dx, y - way[k - 1][1] - t * dy) - end.radius));
+            }
+            EXPECT_LE(nearest, 1e-9) << "trial " << trial << ", form " << static_cast<int>(end.form) << ", cell " << c << ": " << alone[c] << " and "
+                                     << chained[c];
+        }
+    }
+    EXPECT_LT(4 * asked_chained, 3 * asked_alone);
+}
+
 // Level passes of a ball on a plane at α leave L = R − √(R² − (SD / (2 sin α))²) (method.md section 5).
 TEST(Stock, CuspOfLevelPassesOnAPlane) {
     const double R = 3.175, alpha = 50 * std::numbers::pi / 180, cusp = 0.1;

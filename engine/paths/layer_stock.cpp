@@ -22,6 +22,8 @@ struct Box {
     }
 };
 
+std::array<double, 3> place(const Move& m) { return {to_mm(m.x), to_mm(m.y), to_mm(m.z)}; }
+
 }  // namespace
 
 double stock_cell(const LayerCut& cut) {
@@ -131,12 +133,17 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 if (q.feed == 0) continue;
                 const double py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
                 if (std::max(py, qy) < y0 || std::min(py, qy) > y1 || std::min(pz, qz) >= top) continue;
+                std::array<double, 3> previous{}, next{};
+                ChainedSweep chain;
+                if (p.feed != 0 && i > 1) previous = place(moves[i - 2]), chain.before = &previous;
+                if (i + 1 < moves.size() && moves[i + 1].feed != 0) next = place(moves[i + 1]), chain.after = &next;
                 sweep_above(
                     part, end, {to_mm(p.x), py, pz}, {to_mm(q.x), qy, qz}, [&](std::size_t c) { return height[c] + z_bottom_; },
                     [&](std::size_t c, double z) {
                         const auto left = static_cast<float>(std::max(0.0, z - z_bottom_));
                         if (left < height[c]) height[c] = left;
-                    });
+                    },
+                    chain);
             }
         }
         for (std::size_t c = 0; c < before.size(); ++c) {

@@ -380,7 +380,17 @@ private:
                 while (arc < arcs.size() && arcs[arc].end <= i) ++arc;
                 const bool in_arc = arc < arcs.size() && arcs[arc].begin <= i, cut_before = in_arc && arc < cut_arcs;
                 if (box.meets(grid, radius + kArcError, top) && !cut_before) {
-                    const CutEffect e = in_arc ? stock.cut(p.end, arcs[arc].arc, deep) : stock.cut(p.end, from, to, deep);
+                    // A straight feed motion shares its ends with those beside it; what a rapid takes is all told of the rapid.
+                    const auto chained = [&](std::size_t k) {  // whether motion k, next to this one, is a straight feed motion too
+                        if (b.rapid() || k == 0 || k >= steps.size() || !steps[k - 1].known() || !steps[k].known() || steps[k].rapid()) return false;
+                        const bool last_arc = arc > 0 && arcs[arc - 1].end > k, next_arc = arc < arcs.size() && arcs[arc].begin <= k;
+                        return !last_arc && !next_arc;
+                    };
+                    Point3 before{}, after{};
+                    ChainedSweep chain;
+                    if (!in_arc && chained(i - 1)) before = {steps[i - 2].x, steps[i - 2].y, steps[i - 2].z}, chain.before = &before;
+                    if (!in_arc && chained(i + 1)) after = {steps[i + 1].x, steps[i + 1].y, steps[i + 1].z}, chain.after = &after;
+                    const CutEffect e = in_arc ? stock.cut(p.end, arcs[arc].arc, deep) : stock.cut(p.end, from, to, deep, chain);
                     if (in_arc) cut_arcs = arc + 1;
                     if (e.removed > 0) {
                         any = true;

@@ -47,8 +47,9 @@ CutEffect Stock::take(double deep, Sweep&& sweep) {
     return effect;
 }
 
-CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep) {
-    return take(deep, [&](auto&& standing, auto&& fn) { sweep_above(grid_, end, from, to, standing, fn); });
+CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep,
+                     const ChainedSweep& chain) {
+    return take(deep, [&](auto&& standing, auto&& fn) { sweep_above(grid_, end, from, to, standing, fn, chain); });
 }
 
 CutEffect Stock::cut(const CutterEnd& end, const LevelArc& arc, double deep) {

@@ -28,8 +28,10 @@ public:
     /// Bonds a slab of `thickness` mm with its bottom at z_bottom, at or above what was added before.
     void add_slab(double z_bottom, double thickness);
 
-    /// Takes away what the cutter meets on its way. Cells that lose more than `deep` mm are counted.
-    CutEffect cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep = 1e300);
+    /// Takes away what the cutter meets on its way. Cells that lose more than `deep` mm are counted. @param chain as for sweep_above: what
+    /// another motion of the chain gets as low or lower is left to that one
+    CutEffect cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep = 1e300,
+                  const ChainedSweep& chain = {});
     /// The same along a level arc.
     CutEffect cut(const CutterEnd& end, const LevelArc& arc, double deep = 1e300);
 

@@ -38,88 +38,147 @@ struct LevelArc {
     double start = 0, turn = 0;
 };
 
+/// What else of a chain of straight motions is swept, so that no cell is asked twice about the place where two of them meet.
+struct ChainedSweep {
+    const std::array<double, 3>* before = nullptr;  ///< where the motion into `from` began, if that has been swept, or will be
+    const std::array<double, 3>* after = nullptr;   ///< where the motion out of `to` ends, if that is swept too
+};
+
+/// A straight motion as sweep_above sees it: its direction in the plane, its length there and its slope.
+struct StraightWay {
+    double x, y, z;  ///< of the begin; of the lower end, if it runs straight up or down
+    double dx = 1, dy = 0, run = 0, slope = 0;
+    double ball_lead;  ///< m / √(1 + m²): the share of √(R² − q²) by which the ball's lowest place precedes the foot of a centre
+
+    StraightWay(const std::array<double, 3>& from, const std::array<double, 3>& to) : x(from[0]), y(from[1]), z(from[2]) {
+        dx = to[0] - x, dy = to[1] - y;
+        const double length = std::sqrt(dx * dx + dy * dy);
+        if (length > 1e-9) dx /= length, dy /= length, run = length, slope = (to[2] - z) / length;
+        else dx = 1, dy = 0, z = std::min(z, to[2]);
+        ball_lead = slope / std::sqrt(1 + slope * slope);
+    }
+    /// Whether a chain may share its ends: a ball on a slope, or a level disc. (All others cover all of their way by themselves.)
+    [[nodiscard]] bool shares_ends(const CutterEnd& end) const {
+        return run > 0 && (end.form == CutterEnd::Form::ball || (end.form == CutterEnd::Form::flat && slope == 0));
+    }
+};
+
+/// Narrows [low, high] to where value + step·x lies within [least, most], a hair more.
+inline void narrow(double value, double step, double least, double most, double& low, double& high) {
+    constexpr double hair = 1e-7;
+    if (std::abs(step) < 1e-9) {
+        if (value < least - hair || value > most + hair) high = -1e300;
+        return;
+    }
+    double a = (least - hair - value) / step, b = (most + hair - value) / step;
+    if (a > b) std::swap(a, b);
+    low = std::max(low, a), high = std::min(high, b);
+}
+
 /// Calls fn(cell index, z) for every cell whose centre the cutter covers while its tip goes straight from `from` to `to`, unless
 /// standing(cell index) ≤ z: what stands lower than the cutter gets is left out, mostly before anything costly is computed.
 /// With s the way along the motion in the plane, s0 the foot of the centre on it, q its distance from it and m the way's slope, the
 /// height over the centre at s is z + m·s + end(√(q² + (s − s0)²)): convex in s, so its least value lies where the derivative
 /// vanishes, moved into [0, L] and to where the cutter covers the centre at all. The result is exact, not sampled.
+///
+/// In a chain (all of whose motions are given to this function with their neighbours, and none is left out that a cell needs) a cell
+/// whose least value over this motion lies at its end is left to the motion after, and one whose least lies at its begin is
+/// asked only if the motion before has its least there too: of both motions one gets as low or lower. All of a chain together call fn
+/// with the same least value for every cell as without, but go to most cells once instead of 2R / L times.
 template <class Standing, class Fn>
 void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, Standing&& standing,
-                 Fn&& fn) {
+                 Fn&& fn, const ChainedSweep& chain = {}) {
+    using Form = CutterEnd::Form;
+    constexpr double hair = 1e-9;
     const double R = end.radius, R2 = R * R;
-    double dx = to[0] - from[0], dy = to[1] - from[1];
-    const double length = std::sqrt(dx * dx + dy * dy);
-    double z = from[2], slope = 0;
-    if (length > 1e-9) dx /= length, dy /= length, slope = (to[2] - from[2]) / length;
-    else dx = 1, dy = 0, z = std::min(from[2], to[2]);
-    const double run = length > 1e-9 ? length : 0, lowest = std::min(from[2], to[2]);
+    const StraightWay way(from, to);
+    const double dx = way.dx, dy = way.dy, run = way.run, slope = way.slope, z = way.z, lowest = std::min(from[2], to[2]);
+    const bool shares = way.shares_ends(end), level_ball = slope == 0 && end.form == Form::ball;
+    const double cone_lead = end.slope > std::abs(slope) ? slope / std::sqrt(end.slope * end.slope - slope * slope) : 0;
+    // In a chain: is the begin's place asked, and is the end's?
+    const bool own_end = !shares || chain.after == nullptr, own_begin = !shares || chain.before == nullptr;
+    const StraightWay before(own_begin ? from : *chain.before, from);
+    const bool wedge = !own_begin && before.shares_ends(end);
+    // The least place on the way, before it is moved into it, lies within [s0 − R·lead, s0] or the other way round.
+    const double lead = end.form == Form::ball ? way.ball_lead : 0;
+    const double s0_least = own_begin ? -R : std::min(0.0, R * lead), s0_most = own_end ? run + R : run + std::max(0.0, R * lead);
     const double y_low = std::min(from[1], to[1]) - R, y_high = std::max(from[1], to[1]) + R;
     const int j0 = std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - grid.y0) / grid.cell))));
     const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high - grid.y0) / grid.cell))));
-    const double ball_lead = slope / std::sqrt(1 + slope * slope);
-    const double cone_lead = end.slope > std::abs(slope) ? slope / std::sqrt(end.slope * end.slope - slope * slope) : 0;
-    const bool level_ball = slope == 0 && end.form == CutterEnd::Form::ball;
+    const double x_low = std::min(from[0], to[0]) - R, x_high = std::max(from[0], to[0]) + R;
     for (int j = j0; j <= j1; ++j) {
-        const double y = grid.y(j);
-        // The capsule's span on this row: where the row meets either disc, or the strip between them.
-        double low = 1e300, high = -1e300;
-        for (const auto& p : {from, to}) {
-            const double w2 = R2 - (y - p[1]) * (y - p[1]);
-            if (w2 < 0) continue;
-            const double w = std::sqrt(w2);
-            low = std::min(low, p[0] - w), high = std::max(high, p[0] + w);
-        }
-        if (run > 0) {
-            for (const double side : {-R, R}) {  // the strip's long edges
-                const double ax = from[0] - side * dy, ay = from[1] + side * dx, by = to[1] + side * dx, bx = to[0] - side * dy;
-                if ((ay <= y) == (by <= y)) continue;
-                const double x = ax + (y - ay) / (by - ay) * (bx - ax);
-                low = std::min(low, x), high = std::max(high, x);
-            }
-        }
-        if (low > high) continue;
-        const int i0 = std::max(0, static_cast<int>(std::floor(std::clamp((low - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
-        const int i1 = std::min(grid.nx - 1, static_cast<int>(std::ceil(std::clamp((high - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
+        const double py = grid.y(j) - from[1];
         const std::size_t row = grid.index(0, j);
-        for (int i = i0; i <= i1; ++i) {
-            const std::size_t cell = row + static_cast<std::size_t>(i);
-            const double stands = standing(cell);
-            if (stands <= lowest) continue;
-            const double px = grid.x(i) - from[0], py = y - from[1];
-            const double s0 = px * dx + py * dy, q2 = std::max(0.0, px * px + py * py - s0 * s0);
-            const double w2 = R2 - q2;
-            if (w2 < 0) continue;
-            if (level_ball) {
-                const double over = s0 - std::clamp(s0, 0.0, run), h2 = w2 - over * over;
-                // R − √(R² − d²) is at least d² / 2R.
-                if (h2 < 0 || stands <= z + (R2 - h2) / (2 * R)) continue;
-                const double height = z + R - std::sqrt(h2);
+        auto cells = [&](double low, double high, auto&& each) {
+            if (!(low <= high)) return;
+            const int i0 = std::max(0, static_cast<int>(std::ceil(std::clamp((low - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
+            const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor(std::clamp((high - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
+            for (int i = i0; i <= i1; ++i) each(row + static_cast<std::size_t>(i), grid.x(i) - from[0]);
+        };
+        {
+            double low = x_low - from[0], high = x_high - from[0];
+            narrow(py * dy, dx, s0_least, s0_most, low, high);
+            narrow(py * dx, -dy, -R, R, low, high);
+            cells(low + from[0], high + from[0], [&](std::size_t cell, double px) {
+                const double stands = standing(cell);
+                if (stands <= lowest) return;
+                const double s0 = px * dx + py * dy, q2 = std::max(0.0, px * px + py * py - s0 * s0), w2 = R2 - q2;
+                if (w2 < 0) return;
+                if (level_ball) {
+                    if ((s0 > run && !own_end) || (s0 < 0 && !own_begin)) return;
+                    const double over = s0 - std::clamp(s0, 0.0, run), h2 = w2 - over * over;
+                    // R − √(R² − d²) is at least d² / 2R.
+                    if (h2 < 0 || stands <= z + (R2 - h2) / (2 * R)) return;
+                    const double height = z + R - std::sqrt(h2);
+                    if (stands > height) fn(cell, height);
+                    return;
+                }
+                const double w = std::sqrt(w2);
+                const double s_low = std::max(0.0, s0 - w), s_high = std::min(run, s0 + w);
+                if (s_low > s_high) return;
+                double s = s0, height = 0;
+                switch (end.form) {
+                    case Form::flat:
+                        if ((s0 > run && !own_end) || (s0 < 0 && !own_begin)) return;
+                        s = slope >= 0 ? s_low : s_high;
+                        break;
+                    case Form::ball: {
+                        s = s0 - w * lead;
+                        if ((s > run && !own_end) || (s < 0 && !own_begin)) return;
+                        s = std::clamp(s, s_low, s_high);
+                        height = R - std::sqrt(std::max(0.0, w2 - (s - s0) * (s - s0)));
+                        break;
+                    }
+                    case Form::cone: {
+                        if (end.slope > std::abs(slope)) s = std::clamp(s0 - std::sqrt(q2) * cone_lead, s_low, s_high);
+                        else s = slope >= 0 ? s_low : s_high;
+                        height = end.slope * std::sqrt(q2 + (s - s0) * (s - s0));
+                        break;
+                    }
+                }
+                height += z + slope * s;
                 if (stands > height) fn(cell, height);
-                continue;
-            }
-            const double w = std::sqrt(w2);
-            const double s_low = std::max(0.0, s0 - w), s_high = std::min(run, s0 + w);
-            if (s_low > s_high) continue;
-            double s = s0, height = 0;
-            switch (end.form) {
-                case CutterEnd::Form::flat:
-                    s = slope >= 0 ? s_low : s_high;
-                    break;
-                case CutterEnd::Form::ball: {
-                    s = std::clamp(s0 - w * ball_lead, s_low, s_high);
-                    height = R - std::sqrt(std::max(0.0, w2 - (s - s0) * (s - s0)));
-                    break;
-                }
-                case CutterEnd::Form::cone: {
-                    if (end.slope > std::abs(slope)) s = std::clamp(s0 - std::sqrt(q2) * cone_lead, s_low, s_high);
-                    else s = slope >= 0 ? s_low : s_high;
-                    height = end.slope * std::sqrt(q2 + (s - s0) * (s - s0));
-                    break;
-                }
-            }
-            height += z + slope * s;
-            if (stands > height) fn(cell, height);
+            });
         }
+        if (!wedge || py * py > R2) continue;
+        // Around the begin, where neither motion has its least within: beyond the end of the one before and before the begin of this.
+        const double w_row = std::sqrt(R2 - py * py), before_lead = end.form == Form::ball ? before.ball_lead : 0;
+        double low = -w_row, high = w_row;
+        narrow(py * dy, dx, -2 * R, std::max(0.0, R * lead), low, high);
+        narrow(py * before.dy, before.dx, std::min(0.0, R * before_lead), 2 * R, low, high);
+        cells(low + from[0], high + from[0], [&](std::size_t cell, double px) {
+            const double stands = standing(cell);
+            if (stands <= from[2]) return;
+            const double d2 = px * px + py * py;
+            if (d2 > R2) return;
+            auto foot = [&](const StraightWay& of, double of_lead) {
+                const double s0 = px * of.dx + py * of.dy;
+                return of_lead == 0 ? s0 : s0 - std::sqrt(std::max(0.0, R2 - d2 + s0 * s0)) * of_lead;
+            };
+            if (foot(way, lead) > hair || foot(before, before_lead) < -hair) return;
+            const double height = end.form == Form::ball ? from[2] + R - std::sqrt(R2 - d2) : from[2];
+            if (stands > height) fn(cell, height);
+        });
     }
 }
 
