@@ -22,8 +22,6 @@ struct Box {
     }
 };
 
-std::array<double, 3> place(const Move& m) { return {to_mm(m.x), to_mm(m.y), to_mm(m.z)}; }
-
 }  // namespace
 
 double stock_cell(const LayerCut& cut) {
@@ -113,6 +111,7 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
     if (moves.size() < 2) return {};
     const CutterEnd end = cutter_end(tool);
     const double r = end.radius, top = cut.layer.z_top;
+    auto over_bottom = [&](const Move& m) { return std::array<double, 3>{to_mm(m.x), to_mm(m.y), to_mm(m.z) - z_bottom_}; };
     std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock);
     for (std::size_t i = 0; i < moves.size(); ++i) {
         boxes[i / kBlock].add(moves[i]);
@@ -135,12 +134,12 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 if (std::max(py, qy) < y0 || std::min(py, qy) > y1 || std::min(pz, qz) >= top) continue;
                 std::array<double, 3> previous{}, next{};
                 ChainedSweep chain;
-                if (p.feed != 0 && i > 1) previous = place(moves[i - 2]), chain.before = &previous;
-                if (i + 1 < moves.size() && moves[i + 1].feed != 0) next = place(moves[i + 1]), chain.after = &next;
+                if (p.feed != 0 && i > 1) previous = over_bottom(moves[i - 2]), chain.before = &previous;
+                if (i + 1 < moves.size() && moves[i + 1].feed != 0) next = over_bottom(moves[i + 1]), chain.after = &next;
                 sweep_above(
-                    part, end, {to_mm(p.x), py, pz}, {to_mm(q.x), qy, qz}, [&](std::size_t c) { return height[c] + z_bottom_; },
+                    part, end, over_bottom(p), over_bottom(q), [&](std::size_t c) { return static_cast<double>(height[c]); },
                     [&](std::size_t c, double z) {
-                        const auto left = static_cast<float>(std::max(0.0, z - z_bottom_));
+                        const auto left = static_cast<float>(std::max(0.0, z));
                         if (left < height[c]) height[c] = left;
                     },
                     chain);

@@ -38,6 +38,9 @@ struct LevelArc {
     double start = 0, turn = 0;
 };
 
+/// Heights of a ball's tip side over n centres in a row: h[k] = a + b·k − c·√(r² − (q + k·dq)²), mm. @pre (q + k·dq)² ≤ r²
+void ball_row(double a, double b, double c, double r2, double q, double dq, int n, double* h);
+
 /// What else of a chain of straight motions is swept, so that no cell is asked twice about the place where two of them meet.
 struct ChainedSweep {
     const std::array<double, 3>* before = nullptr;  ///< where the motion into `from` began, if that has been swept, or will be
@@ -63,9 +66,15 @@ struct StraightWay {
     }
 };
 
-/// Narrows [low, high] to where value + step·x lies within [least, most], a hair more.
+inline constexpr int kSweptTogether = 32;  ///< cells of a row
+
+/// Narrows [low, high] to where value + step·x lies within [least, most], a hair more; to nothing where that is empty.
 inline void narrow(double value, double step, double least, double most, double& low, double& high) {
     constexpr double hair = 1e-7;
+    if (least > most) {
+        high = -1e300;
+        return;
+    }
     if (std::abs(step) < 1e-9) {
         if (value < least - hair || value > most + hair) high = -1e300;
         return;
@@ -99,6 +108,11 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
     const bool own_end = !shares || chain.after == nullptr, own_begin = !shares || chain.before == nullptr;
     const StraightWay before(own_begin ? from : *chain.before, from);
     const bool wedge = !own_begin && before.shares_ends(end);
+    // Within the way a ball's least height is linear along it and a circle's across it, and a level disc's is its own: many cells of a row
+    // are done at once.
+    constexpr double wide = 1e-6;
+    const bool rows = shares && run > 4 * grid.cell;
+    const double steep = std::sqrt(1 + slope * slope);
     // The least place on the way, before it is moved into it, lies within [s0 − R·lead, s0] or the other way round.
     const double lead = end.form == Form::ball ? way.ball_lead : 0;
     const double s0_least = own_begin ? -R : std::min(0.0, R * lead), s0_most = own_end ? run + R : run + std::max(0.0, R * lead);
@@ -109,17 +123,20 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
     for (int j = j0; j <= j1; ++j) {
         const double py = grid.y(j) - from[1];
         const std::size_t row = grid.index(0, j);
-        auto cells = [&](double low, double high, auto&& each) {
-            if (!(low <= high)) return;
-            const int i0 = std::max(0, static_cast<int>(std::ceil(std::clamp((low - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
-            const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor(std::clamp((high - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
+        auto first_cell = [&](double low) {
+            return std::max(0, static_cast<int>(std::ceil(std::clamp((low + from[0] - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
+        };
+        auto last_cell = [&](double high) {
+            return std::min(grid.nx - 1, static_cast<int>(std::floor(std::clamp((high + from[0] - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
+        };
+        auto cells = [&](int i0, int i1, auto&& each) {
             for (int i = i0; i <= i1; ++i) each(row + static_cast<std::size_t>(i), grid.x(i) - from[0]);
         };
         {
             double low = x_low - from[0], high = x_high - from[0];
             narrow(py * dy, dx, s0_least, s0_most, low, high);
             narrow(py * dx, -dy, -R, R, low, high);
-            cells(low + from[0], high + from[0], [&](std::size_t cell, double px) {
+            auto one = [&](std::size_t cell, double px) {
                 const double stands = standing(cell);
                 if (stands <= lowest) return;
                 const double s0 = px * dx + py * dy, q2 = std::max(0.0, px * px + py * py - s0 * s0), w2 = R2 - q2;
@@ -158,7 +175,36 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
                 }
                 height += z + slope * s;
                 if (stands > height) fn(cell, height);
-            });
+            };
+            if (low <= high) {
+                const int i0 = first_cell(low), i1 = last_cell(high);
+                int k0 = i1 + 1, k1 = i1;  // the cells whose least lies within the way for certain
+                if (rows) {
+                    narrow(py * dy, dx, std::max(0.0, R * lead) + wide, run + std::min(0.0, R * lead) - wide, low, high);
+                    narrow(py * dx, -dy, wide - R, R - wide, low, high);
+                    if (low <= high) k0 = std::clamp(first_cell(low), i0, i1 + 1), k1 = std::clamp(last_cell(high), k0 - 1, i1);
+                }
+                cells(i0, k0 - 1, one);
+                for (int k = k0; k <= k1; k += kSweptTogether) {
+                    const int n = std::min(kSweptTogether, k1 + 1 - k);
+                    const std::size_t first = row + static_cast<std::size_t>(k);
+                    unsigned over = 0;
+                    for (int i = 0; i < n; ++i) over |= static_cast<unsigned>(standing(first + static_cast<std::size_t>(i)) > lowest);
+                    if (over == 0) continue;
+                    if (end.form == Form::flat) {
+                        for (int i = 0; i < n; ++i)
+                            if (standing(first + static_cast<std::size_t>(i)) > lowest) fn(first + static_cast<std::size_t>(i), lowest);
+                        continue;
+                    }
+                    const double px = grid.x(k) - from[0];
+                    std::array<double, kSweptTogether> h;
+                    ball_row(z + R + slope * (px * dx + py * dy), slope * dx * grid.cell, steep, R2, py * dx - px * dy, -dy * grid.cell, n, h.data());
+                    for (int i = 0; i < n; ++i)
+                        if (standing(first + static_cast<std::size_t>(i)) > h[static_cast<std::size_t>(i)])
+                            fn(first + static_cast<std::size_t>(i), h[static_cast<std::size_t>(i)]);
+                }
+                cells(k1 + 1, i1, one);
+            }
         }
         if (!wedge || py * py > R2) continue;
         // Around the begin, where neither motion has its least within: beyond the end of the one before and before the begin of this.
@@ -166,7 +212,8 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
         double low = -w_row, high = w_row;
         narrow(py * dy, dx, -2 * R, std::max(0.0, R * lead), low, high);
         narrow(py * before.dy, before.dx, std::min(0.0, R * before_lead), 2 * R, low, high);
-        cells(low + from[0], high + from[0], [&](std::size_t cell, double px) {
+        if (!(low <= high)) continue;
+        cells(first_cell(low), last_cell(high), [&](std::size_t cell, double px) {
             const double stands = standing(cell);
             if (stands <= from[2]) return;
             const double d2 = px * px + py * py;
