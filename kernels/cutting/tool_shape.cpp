@@ -1,0 +1,119 @@
+#include "kernels/cutting/tool_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+void check_tool_shape(const ToolShape& tool) {
+    auto require = [](bool good, const char* what) {
+        if (!good) throw Error(ErrorKind::usage, "tool.shape", what, "tool shape", "correct the tool's measures");
+    };
+    for (const double length :
+         {tool.radius, tool.corner_radius, tool.taper_rad, tool.flute_length, tool.shank_radius, tool.stickout, tool.holder_radius})
+        require(std::isfinite(length) && length >= 0, "a measure of the tool is negative or not finite");
+    require(tool.radius > 0, "the tool has no radius");
+    double top_of_rounding = 0;
+    switch (tool.profile) {
+        case ToolShape::Profile::flat:
+            break;
+        case ToolShape::Profile::ball:
+            top_of_rounding = tool.radius;
+            break;
+        case ToolShape::Profile::bull_nose:
+            require(tool.corner_radius <= tool.radius, "the corner is larger than the cutter");
+            top_of_rounding = tool.corner_radius;
+            break;
+        case ToolShape::Profile::tapered_ball:
+            require(tool.corner_radius > 0 && tool.corner_radius <= tool.radius, "the ball at the tip is not smaller than the cutter");
+            require(tool.taper_rad > 0 && tool.taper_rad < std::numbers::pi / 2, "the taper is not between 0 and 90 degrees");
+            top_of_rounding = tool.corner_radius * (1 - std::sin(tool.taper_rad));
+            break;
+    }
+    require(tool.flute_length == 0 || tool.flute_length >= top_of_rounding, "the flutes end below the top of the tip's rounding");
+}
+
+double Envelope::height(double distance) const {
+    if (distance > radius) return std::numeric_limits<double>::infinity();
+    const double x = distance - core;
+    if (x <= 0) return low;
+    if (x <= rounding * cos_taper) return low + rounding - std::sqrt(std::max(0.0, rounding * rounding - x * x));
+    if (sin_taper <= 0) return low + rounding;
+    return low + rounding * (1 - sin_taper) + (x - rounding * cos_taper) * cos_taper / sin_taper;
+}
+
+double Envelope::slope(double distance) const {
+    const double x = distance - core;
+    if (x <= 0) return 0;
+    if (x < rounding * cos_taper) return x / std::sqrt(rounding * rounding - x * x);
+    return sin_taper > 0 ? cos_taper / sin_taper : std::numeric_limits<double>::infinity();
+}
+
+// Depth is the distance from the surface: the rounding shrinks, and once it is used up the disc does. Where a flank stands on a disc,
+// its offset meets the raised floor nearer to the axis.
+Envelope Envelope::eroded(double depth) const {
+    Envelope e = *this;
+    e.low += depth;
+    e.radius -= depth;
+    if (depth <= rounding) {
+        e.rounding -= depth;
+    } else {
+        e.rounding = 0;
+        e.core -= (depth - rounding) * (1 - sin_taper) / cos_taper;
+        if (e.core < 0) {
+            // The offset flanks meet over the axis, above the floor.
+            if (sin_taper > 0) e.low += -e.core * cos_taper / sin_taper;
+            else e.radius = -1;
+            e.core = 0;
+        }
+    }
+    return e;
+}
+
+std::vector<Envelope> envelopes(const ToolShape& tool) {
+    check_tool_shape(tool);
+    Envelope cutter;
+    cutter.radius = tool.radius;
+    switch (tool.profile) {
+        case ToolShape::Profile::flat:
+            cutter.core = tool.radius;
+            break;
+        case ToolShape::Profile::ball:
+            cutter.rounding = tool.radius;
+            break;
+        case ToolShape::Profile::bull_nose:
+            cutter.core = tool.radius - tool.corner_radius;
+            cutter.rounding = tool.corner_radius;
+            break;
+        case ToolShape::Profile::tapered_ball: {
+            cutter.rounding = tool.corner_radius;
+            cutter.sin_taper = std::sin(tool.taper_rad);
+            cutter.cos_taper = std::cos(tool.taper_rad);
+            if (tool.flute_length > 0) {
+                // The flank ends with the flutes, if it is not as wide as the cutter before.
+                const double above = tool.flute_length - cutter.rounding * (1 - cutter.sin_taper);
+                cutter.radius = std::min(cutter.radius, cutter.rounding * cutter.cos_taper + above * cutter.sin_taper / cutter.cos_taper);
+            }
+            break;
+        }
+    }
+    std::vector<Envelope> parts{cutter};
+    auto above = [&](double from, double radius) {
+        if (from > 0 && radius > parts.back().radius) {
+            Envelope disc;
+            disc.low = from;
+            disc.core = disc.radius = radius;
+            parts.push_back(disc);
+        }
+    };
+    above(tool.flute_length, tool.shank_radius);
+    above(tool.stickout, tool.holder_radius);
+    return parts;
+}
+
+}  // namespace slabwright

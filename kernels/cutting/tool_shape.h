@@ -1,0 +1,49 @@
+// The whole tool as it turns: cutter, shank and holder, for questions of what it reaches.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace slabwright {
+
+/// An end mill about a vertical axis; its position is that of its tip.
+struct ToolShape {
+    enum class Profile : std::uint8_t {
+        flat,         ///< a cylinder with a level floor
+        ball,         ///< half a ball under a cylinder
+        bull_nose,    ///< a cylinder whose floor is rounded off with corner_radius
+        tapered_ball  ///< a ball of corner_radius at the tip under a cone that widens to radius
+    } profile = Profile::flat;
+    double radius = 0;         ///< mm, the cutter's largest
+    double corner_radius = 0;  ///< mm, see the profiles
+    double taper_rad = 0;      ///< between the axis and the flank of a tapered ball
+    double flute_length = 0;   ///< mm, from the tip to where the shank begins; 0: the flutes have no end
+    double shank_radius = 0;   ///< mm
+    double stickout = 0;       ///< mm, from the tip to the holder's nose; 0: there is no holder
+    double holder_radius = 0;  ///< mm
+};
+
+/// @throws Error(usage, "tool.shape") for a length that is negative or not finite, a radius of 0, a corner larger than the cutter, a
+///         taper outside (0°, 90°), or flutes that end below the top of the tip's rounding
+void check_tool_shape(const ToolShape& tool);
+
+/// The under side of a part of a tool: a level disc of radius `core`, a rounding of radius `rounding`, then the flank, at a slope or
+/// upright, out to `radius`. What lies above it belongs to the tool. Convex: height() is, as a function of the distance.
+struct Envelope {
+    double low = 0;  ///< mm, the disc's height over the tip
+    double core = 0, rounding = 0;
+    double sin_taper = 0, cos_taper = 1;
+    double radius = 0;
+
+    /// Height of the under side over the tip at a distance from the axis, mm; infinite beyond `radius`.
+    [[nodiscard]] double height(double distance) const;
+    /// Its derivative by the distance.
+    [[nodiscard]] double slope(double distance) const;
+    /// What is deeper in the tool than `depth`, mm: that part's under side. Its radius is negative when nothing is.
+    [[nodiscard]] Envelope eroded(double depth) const;
+};
+
+/// The cutter's under side first, then those of shank and holder where they stand out over what is below them.
+[[nodiscard]] std::vector<Envelope> envelopes(const ToolShape& tool);
+
+}  // namespace slabwright
