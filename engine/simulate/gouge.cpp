@@ -34,6 +34,7 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
         context, n - 1, 512, GougeReport{},
         [&](std::size_t begin, std::size_t end) {
             GougeReport r;
+            StandingPart::Column last;
             // Once a chunk has a depth, only deeper ones can change its maximum; but every gouge is to be counted, so what is
             // beyond the tolerance is always looked for.
             auto floor = [&](const GougePlace& place) { return std::max(options.ignore, std::min(place.depth, options.tolerance)); };
@@ -47,8 +48,8 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 ++r.motions;
                 r.length_mm += std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
                 if (std::min(a[2], b[2]) >= z_top) continue;
-                const Penetration p = tool.kind == ToolKind::ball ? part.ball(z_top, a, b, radius, floor(r.cutter))
-                                                                  : part.cylinder(z_top, a, b, radius, floor(r.cutter));
+                const Penetration p = tool.kind == ToolKind::ball ? part.ball(z_top, a, b, radius, floor(r.cutter), &last)
+                                                                  : part.cylinder(z_top, a, b, radius, floor(r.cutter), &last);
                 keep(r.cutter, p, to.line);
                 r.gouges += p.found && p.depth > options.tolerance;
                 bool touched = false;

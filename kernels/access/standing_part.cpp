@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t kFan = 4;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kHair = 1e-9;  // mm: rounding of a bound
 
 struct P2 {
     double x, y;
@@ -353,6 +354,48 @@ double xy_distance2(const std::array<Vec3f, 3>& v, double x, double y) {
     const double dx = std::max({0.0, x0 - x, x - x1}), dy = std::max({0.0, y0 - y, y - y1});
     return dx * dx + dy * dy;
 }
+/// A straight motion seen from above. Boxes and facets are measured in the frame of its direction, where their extents bound their distance.
+class WayInPlan {
+public:
+    WayInPlan(const Point3& a, const Point3& b) : ax_(a[0]), ay_(a[1]) {
+        const double dx = b[0] - a[0], dy = b[1] - a[1];
+        length_ = std::sqrt(dx * dx + dy * dy);
+        if (length_ > 0) ux_ = dx / length_, uy_ = dy / length_;
+    }
+    /// Square of a lower bound of the distance to a box, and never more than a hair above it by rounding.
+    template <class NodeT>
+    [[nodiscard]] double distance2(const NodeT& n) const {
+        const double hx = 0.5 * (static_cast<double>(n.x1) - n.x0), hy = 0.5 * (static_cast<double>(n.y1) - n.y0);
+        const double cx = 0.5 * (static_cast<double>(n.x1) + n.x0) - ax_, cy = 0.5 * (static_cast<double>(n.y1) + n.y0) - ay_;
+        const double along = cx * ux_ + cy * uy_, across = cy * ux_ - cx * uy_;
+        const double h_along = std::abs(ux_) * hx + std::abs(uy_) * hy, h_across = std::abs(uy_) * hx + std::abs(ux_) * hy;
+        return gaps2(along - h_along, along + h_along, across - h_across, across + h_across);
+    }
+    [[nodiscard]] double distance2(const std::array<Vec3f, 3>& v) const {
+        double along0 = kInfinity, along1 = -kInfinity, across0 = kInfinity, across1 = -kInfinity;
+        for (const Vec3f& p : v) {
+            const double x = p.x - ax_, y = p.y - ay_, along = x * ux_ + y * uy_, across = y * ux_ - x * uy_;
+            along0 = std::min(along0, along), along1 = std::max(along1, along);
+            across0 = std::min(across0, across), across1 = std::max(across1, across);
+        }
+        return gaps2(along0, along1, across0, across1);
+    }
+
+private:
+    [[nodiscard]] double gaps2(double along0, double along1, double across0, double across1) const {
+        const double l = std::max({0.0, along0 - length_, -along1}), c = std::max({0.0, across0, -across1});
+        return l * l + c * c;
+    }
+    double ax_, ay_, ux_ = 1, uy_ = 0, length_ = 0;
+};
+
+/// Whether there is part at a place's column, asked once for the end of one motion and the begin of the next.
+bool covered_once(const StandingPart& part, const Point3& tip, double z, StandingPart::Column* last) {
+    if (last == nullptr) return part.covered(tip[0], tip[1], z);
+    if (!(last->known && last->x == tip[0] && last->y == tip[1] && last->z == z)) *last = {tip[0], tip[1], z, part.covered(tip[0], tip[1], z), true};
+    return last->covered;
+}
+
 }  // namespace
 
 /// Visits the facets of nodes with squared(box) < limit(), the nearer of siblings first, so that the limit falls early. Ties
@@ -386,7 +429,7 @@ void StandingPart::walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit)
     }
 }
 
-Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least, Column* last) const {
     const double top = z_top - kSheet;
     Penetration result{at_least, from, false};
     auto found = [&](double depth, const Point3& tip) {
@@ -395,12 +438,12 @@ Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& t
     if (std::min(from[2], to[2]) >= top - at_least) return {0, from, false};
     const Point3 span = sub(to, from);
     const double length = std::sqrt(dot(span, span));
-    const int pieces = std::max(1, static_cast<int>(std::ceil(length / kPiece)));
+    const int pieces = std::max(1, static_cast<int>(std::ceil(std::max(length / kSpan, std::abs(span[2]) / kRise))));
     // Under the cap, the section of the part by the layer's top, the depth is that of the ball's centre below it. On a piece it is greatest
     // at an end or where the axis crosses the cap's outline, and the outline is an edge of facets cut at the top.
     auto under_cap = [&](const Point3& tip) {
         const double depth = radius - std::max(0.0, tip[2] + radius - top);
-        if (depth > result.depth && covered(tip[0], tip[1], top)) found(depth, tip);
+        if (depth > result.depth && covered_once(*this, tip, top, last)) found(depth, tip);
     };
     under_cap(from);
     Point3 a = from;
@@ -408,24 +451,21 @@ Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& t
         const Point3 b = i + 1 == pieces ? to : between(from, to, static_cast<double>(i + 1) / pieces);
         under_cap(b);
         if (std::min(a[2], b[2]) < top - result.depth) {
-            const Point3 ca{a[0], a[1], a[2] + radius}, cb{b[0], b[1], b[2] + radius}, mid = between(ca, cb, 0.5);
-            const double half = length / pieces / 2 + 1e-9;
-            walk(
-                [&](const Node& n) {
-                    const double z = std::min<double>(n.z1, top), reach = radius - result.depth + half;
-                    if (n.z0 >= top) return false;
-                    const double dxy = xy_distance(n, mid[0], mid[1]), dz = std::max(0.0, mid[2] - z);
-                    return dxy * dxy + dz * dz < reach * reach;
-                },
-                [&](const Facet& f) {
-                    const double dz = std::max(0.0, mid[2] - std::min<double>(top, std::max({f.v[0].z, f.v[1].z, f.v[2].z})));
-                    const double reach = radius - result.depth + half;
-                    if (xy_distance2(f.v, mid[0], mid[1]) + dz * dz >= reach * reach) return;
-                    below(f.v, top, [&](const Triangle& t) {
-                        const Closest c = piece_distance(ca, cb, t, radius - result.depth);
-                        if (radius - c.d > result.depth) found(radius - c.d, between(a, b, c.t));
-                    });
-                });
+            const Point3 ca{a[0], a[1], a[2] + radius}, cb{b[0], b[1], b[2] + radius};
+            const double centre = std::min(ca[2], cb[2]);  // the lowest
+            const WayInPlan way(a, b);
+            auto near = [&](const auto& at, double highest) {
+                const double dz = std::max(0.0, centre - std::min(highest, top)), reach = radius - result.depth + kHair;
+                return way.distance2(at) + dz * dz < reach * reach;
+            };
+            walk([&](const Node& n) { return n.z0 < top && near(n, n.z1); },
+                 [&](const Facet& f) {
+                     if (!near(f.v, std::max({f.v[0].z, f.v[1].z, f.v[2].z}))) return;
+                     below(f.v, top, [&](const Triangle& t) {
+                         const Closest c = piece_distance(ca, cb, t, radius - result.depth);
+                         if (radius - c.d > result.depth) found(radius - c.d, between(a, b, c.t));
+                     });
+                 });
         }
         a = b;
     }
@@ -433,7 +473,7 @@ Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& t
     return result;
 }
 
-Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least, Column* last) const {
     const double top = z_top - kSheet;
     Penetration result{at_least, from, false};
     auto found = [&](double depth, const Point3& tip) {
@@ -442,10 +482,10 @@ Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point
     if (radius <= at_least || std::min(from[2], to[2]) >= top - at_least) return {0, from, false};
     const Point3 span = sub(to, from);
     const double length = std::sqrt(dot(span, span));
-    const int pieces = std::max(1, static_cast<int>(std::ceil(length / kPiece)));
+    const int pieces = std::max(1, static_cast<int>(std::ceil(length / (from[2] == to[2] ? kSpan : kPiece))));
     auto under_cap = [&](const Point3& tip) {
         const double depth = std::min(radius, top - tip[2]);
-        if (depth > result.depth && covered(tip[0], tip[1], top)) found(depth, tip);
+        if (depth > result.depth && covered_once(*this, tip, top, last)) found(depth, tip);
     };
     under_cap(from);
     Point3 a = from;
@@ -454,29 +494,26 @@ Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point
         under_cap(b);
         const double lowest = std::min(a[2], b[2]);
         if (lowest < top - result.depth) {
-            const Point3 mid = between(a, b, 0.5);
-            const double half = std::hypot(b[0] - a[0], b[1] - a[1]) / 2 + 1e-9;
-            walk(
-                [&](const Node& n) {
-                    if (n.z0 >= top || std::min<double>(n.z1, top) - lowest <= result.depth) return false;
-                    return xy_distance(n, mid[0], mid[1]) < radius - result.depth + half;
-                },
-                [&](const Facet& f) {
-                    const double reach = radius - result.depth + half;
-                    if (std::min<double>(std::max({f.v[0].z, f.v[1].z, f.v[2].z}), top) - lowest <= result.depth) return;
-                    if (xy_distance2(f.v, mid[0], mid[1]) >= reach * reach) return;
-                    Polygon poly;
-                    poly.n = 3;
-                    int under = 0;
-                    for (int k = 0; k < 3; ++k) {
-                        poly.p[k] = to_point(f.v[k]);
-                        under += f.v[k].z < top;
-                    }
-                    if (under == 0) return;
-                    if (under < 3) poly = clip_z(poly, top, false);
-                    const Deepest d = piece_depth(a, b, poly, radius, result.depth);
-                    if (d.depth > result.depth) found(d.depth, between(a, b, d.t));
-                });
+            const WayInPlan way(a, b);
+            auto near = [&](const auto& at, double highest) {
+                const double reach = radius - result.depth + kHair;
+                return std::min(highest, top) - lowest > result.depth && way.distance2(at) < reach * reach;
+            };
+            walk([&](const Node& n) { return n.z0 < top && near(n, n.z1); },
+                 [&](const Facet& f) {
+                     if (!near(f.v, std::max({f.v[0].z, f.v[1].z, f.v[2].z}))) return;
+                     Polygon poly;
+                     poly.n = 3;
+                     int under = 0;
+                     for (int k = 0; k < 3; ++k) {
+                         poly.p[k] = to_point(f.v[k]);
+                         under += f.v[k].z < top;
+                     }
+                     if (under == 0) return;
+                     if (under < 3) poly = clip_z(poly, top, false);
+                     const Deepest d = piece_depth(a, b, poly, radius, result.depth);
+                     if (d.depth > result.depth) found(d.depth, between(a, b, d.t));
+                 });
         }
         a = b;
     }

@@ -31,20 +31,29 @@ public:
     /// Material thinner than this under a layer's top is not counted: a facet that lies in the top plane to within
     /// rounding of float32 and of the plan's text belongs to the next layer. All depths may be short by this, mm.
     static constexpr double kSheet = 0.001;
-    /// Longest piece of a motion that is treated at once, mm; the result does not depend on it.
-    static constexpr double kPiece = 0.5;
+    /// A motion is treated in pieces, mm: their length, what they may rise, and the length of a cylinder's that goes up or down. The result
+    /// depends on none of them.
+    static constexpr double kSpan = 8, kRise = 1, kPiece = 0.5;
     /// Error of a depth by numerical minimisation, mm.
     static constexpr double kNumericalError = 1e-7;
+
+    /// The last place in plan that was asked for part above it: motions that follow one another share theirs.
+    struct Column {
+        double x = 0, y = 0, z = 0;
+        bool covered = false, known = false;
+    };
 
     /// Largest depth, over a straight motion of the tip, of part in a ball end mill: a ball of `radius` whose lowest point
     /// is the tip, and the shank of the same radius above its centre. Depth of a point in the cutter is its distance
     /// from the cutter's surface, so a wall that is cut too deep by d counts d, whatever its slope.
     /// @param at_least only depths above this are looked for (0 or more), mm
-    [[nodiscard]] Penetration ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
+    /// @param last saves time over motions that follow one another; may be null
+    [[nodiscard]] Penetration ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least, Column* last = nullptr) const;
 
     /// The same for an upright cylinder that begins at the tip and has no upper end (flat end mill, face mill, shank,
     /// holder): depth of a point is the lesser of its distances from the wall and from the floor of the cylinder.
-    [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
+    [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least,
+                                       Column* last = nullptr) const;
 
     /// Whether there is part just under the plane z at (x, y).
     [[nodiscard]] bool covered(double x, double y, double z) const;
