@@ -343,10 +343,6 @@ double xy_distance2(const NodeT& n, double x, double y) {
     const double dx = std::max({0.0, n.x0 - x, x - n.x1}), dy = std::max({0.0, n.y0 - y, y - n.y1});
     return dx * dx + dy * dy;
 }
-template <class NodeT>
-double xy_distance(const NodeT& n, double x, double y) {
-    return std::sqrt(xy_distance2(n, x, y));
-}
 /// Square of a lower bound of the distance between (x, y) and a facet.
 double xy_distance2(const std::array<Vec3f, 3>& v, double x, double y) {
     const double x0 = std::min({v[0].x, v[1].x, v[2].x}), x1 = std::max({v[0].x, v[1].x, v[2].x});
