@@ -448,8 +448,12 @@ TEST(Simulate, FlaskMustStay) {
         block.input.layers[0].flask.close_loop();
     }
     const SimulationReport r = block.run();
-    ASSERT_NE(find(r, "gouge.flask"), nullptr) << codes(r);
-    EXPECT_NEAR(find(r, "gouge.flask")->size, 10, 1e-4);
+    // The roughing cutter runs out over the flask's whole height: its radius deep in the wall, and all of the stock there.
+    double wall = 0, stock = 0;
+    for (const Violation& v : r.violations)
+        if (v.code == "gouge.flask") (v.file.empty() ? stock : wall) = v.size;
+    EXPECT_NEAR(wall, 5, 1e-4) << codes(r);
+    EXPECT_NEAR(stock, 10, 1e-4) << codes(r);
 }
 
 TEST(Simulate, SlabsThatCannotHoldThePart) {

@@ -84,6 +84,26 @@ struct TileResult {
     Extreme flask;
 };
 
+/// The walls of a layer's flask and of the one below it, into which a cutter dips at a joint. Walls alone: what is cut far inside
+/// the flask shows in the stock.
+Mesh flask_walls(const std::vector<SimulatedLayer>& layers, std::size_t layer) {
+    Mesh walls;
+    for (std::size_t l = layer > 0 ? layer - 1 : 0; l <= layer; ++l) {
+        const auto low = static_cast<float>(layers[l].z_bottom), high = static_cast<float>(layers[l].z_top);
+        for (std::size_t k = 0; k < layers[l].flask.size(); ++k) {
+            const auto loop = layers[l].flask.loop(k);
+            for (std::size_t i = 0; i < loop.size(); ++i) {
+                const auto first = static_cast<std::uint32_t>(walls.vertices.size());
+                for (const Point2 p : {loop[i], loop[(i + 1) % loop.size()]})
+                    for (const float z : {low, high}) walls.vertices.push_back({static_cast<float>(to_mm(p.x)), static_cast<float>(to_mm(p.y)), z});
+                walls.facets.push_back({first, first + 2, first + 3});
+                walls.facets.push_back({first, first + 3, first + 1});
+            }
+        }
+    }
+    return walls;
+}
+
 void raise(Extreme& a, double size, const Point3& where) {
     if (size > a.size) a = {size, where};
 }
@@ -218,6 +238,8 @@ private:
     /// All that needs no stock: the exact check, the spindle, the machine's travel, the time.
     void check_motions(SimulationReport& report) {
         report.programs.resize(input_.programs.size());
+        std::optional<StandingPart> walls;  // of the flask, for one layer after the other
+        int walled = -1;
         for (std::size_t i = 0; i < input_.programs.size(); ++i) {
             const Program& program = input_.programs[i];
             ProgramFindings& f = report.programs[i];
@@ -250,6 +272,11 @@ private:
             }
             if (z1 >= box.z0) travel("z", z1 - box.z0, m.travel_z);
             if (prepared_[i].tool) f.gouge = check_gouge(context_, part_, layer.z_top, *prepared_[i].tool, program, {options_.gouge, 1e-5});
+            if (prepared_[i].tool && !layer.flask.empty()) {
+                if (walled != program.layer) walls.emplace(context_, flask_walls(input_.layers, static_cast<std::size_t>(program.layer)).view());
+                walled = program.layer;
+                f.flask = check_gouge(context_, *walls, layer.z_top, *prepared_[i].tool, program, {options_.gouge, 1e-5}).cutter;
+            }
             report.gouge_max = std::max(report.gouge_max, f.gouge.cutter.depth);
             report.seconds += f.seconds;
             report.cutting_mm += f.cutting_mm;
@@ -561,6 +588,11 @@ private:
                         fmt::format("the cutter goes {:.4f} mm into the part ({} motions over {:.4f} mm)", f.gouge.cutter.depth, f.gouge.gouges,
                                     options_.gouge),
                         &p, f.gouge.cutter.line, f.gouge.cutter.tip, f.gouge.cutter.depth);
+        });
+        each([&](const Program& p, const ProgramFindings& f, std::size_t) {
+            if (f.flask.depth > options_.gouge)
+                violate(report, "gouge.flask", fmt::format("the cutter goes {:.4f} mm into the flask", f.flask.depth), &p, f.flask.line, f.flask.tip,
+                        f.flask.depth);
         });
         each([&](const Program& p, const ProgramFindings& f, std::size_t) {
             if (f.gouge.shank.depth > options_.gouge)

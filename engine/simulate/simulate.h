@@ -108,6 +108,7 @@ struct ProgramFindings {
     Extreme deepest;  ///< most height that one motion took, where over a tenth of the cutter's disc it took more than planned
     std::uint32_t deepest_line = 0;
     Extreme shank, holder;  ///< standing stock that they run into
+    GougePlace flask;       ///< how deep it goes into the flask's walls, by the exact check
     std::uint32_t shank_line = 0, holder_line = 0;
     double lowest = 0;     ///< z of the lowest point cut; the layer's top if none
     double stock_top = 0;  ///< z of the highest stock when the program starts
