@@ -191,6 +191,11 @@ void validate(const Job& job) {
     require("cutting.holder_clearance", k.holder_clearance, 0, 1000);
     require("cutting.finish_feed", k.finish_feed, 1, 1e6);
 
+    const ToolSelection& select = job.selection;
+    require("selection.threshold", select.threshold, 0, 1);
+    require("selection.overlap_weight", select.overlap_weight, 0, 100);
+    require("selection.voxel", select.voxel, 0.05, 5);
+
     const FlaskShape& f = job.flask;
     require("flask.gap", f.gap, 0, 10000);
     require("flask.wall", f.wall, 0, 10000, Ends::open_low);

@@ -25,6 +25,12 @@ enum class Projection : std::uint8_t { raster, offset };
 enum class Engagement : std::uint8_t { simulated, nominal };
 /// How roughing clears a level: in rings offset again and again from what stays, or on parallel lines to and fro.
 enum class RoughPattern : std::uint8_t { contour, zigzag };
+/// Whether tools are chosen layer by layer (LUO 5.5), or every layer is cut with the fixed set.
+enum class SelectionMode : std::uint8_t { select, fixed };
+/// How much of a layer a tool reaches: by area in 3D, or by length on sections as printed (LUO 5.5.1).
+enum class AccessRule : std::uint8_t { exact, printed };
+/// The L from which the roughing stepdown follows (LUO 5.5.3.3): the finish tool's radius, tolerances.rough_cusp, or the smaller.
+enum class RoughLimit : std::uint8_t { smaller, finish_radius, cusp };
 enum class ToolKind : std::uint8_t { flat, ball, face, drill };
 
 inline constexpr double kInch = 25.4;
@@ -135,6 +141,18 @@ struct Cutting {
     bool arcs = true;                               ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
 };
 
+/// Choosing tools for a layer (engine/tools/select). With one flat and one ball end mill in the library there is nothing to choose.
+struct ToolSelection {
+    SelectionMode mode = SelectionMode::select;
+    AccessRule accessibility = AccessRule::exact;
+    double threshold = 0.975;   ///< AR that a finish tool must have (LUO 5.6)
+    double overlap_weight = 2;  ///< W of the printed AR
+    RoughLimit rough_limit = RoughLimit::smaller;
+    bool semi_rough = true;
+    bool compare = true;  ///< plan each layer with the fixed set as well, and keep what is faster
+    double voxel = 0.25;  ///< mm, for AS
+};
+
 /// A frame of the slab that stays around the pattern in every layer (engine/flask).
 struct FlaskShape {
     bool enabled = false;
@@ -153,6 +171,7 @@ struct Job {
     Tolerances tolerances;
     LayerPlanning layers;
     Cutting cutting;
+    ToolSelection selection;
     FlaskShape flask;
     /// The fixed set: face mill, 1/2 in flat end mill, 1/4 in ball end mill (LUO's comparison set).
     std::vector<Tool> tools{

@@ -71,12 +71,44 @@ struct Operation {
     std::optional<std::array<double, 3>> peak_at;  ///< mm, where the cut of peak_force_n ends; none where it is the nominal cut's
 };
 
+/// A tool that was looked at for one purpose of a layer (LUO 5.5.3).
+struct ToolCandidate {
+    std::string purpose;  ///< "finish", "rough" or "semi_rough"
+    int tool = 0;         ///< Tool::number
+    bool chosen = false;
+    std::optional<double> accessibility;   ///< AR, 0 … 1; none where it was not asked for
+    std::optional<double> semi_rough_mm2;  ///< AS
+    std::optional<double> stepdown;        ///< mm
+    std::optional<double> minutes;         ///< by LUO's formulas, of all operations that this choice changes
+    std::string reason;                    ///< why it was chosen or not, in words
+};
+
+/// A set of tools that a layer was planned with.
+struct ToolSet {
+    std::string name;        ///< "selected" or "fixed"
+    std::vector<int> tools;  ///< numbers, in the order of their first cut
+    double minutes = 0;      ///< of its programs, tool changes within the layer included
+    bool chosen = false;
+};
+
+/// How the tools of a layer were chosen.
+struct LayerSelection {
+    double least_slope_deg = 90;         ///< smallest α of its steep facets
+    bool vertical = false;               ///< every wall is upright: one flat end mill cuts all
+    double finish_stepdown = 0;          ///< mm, of the finish tool at the least slope and the cusp; 0 where it has no slopes to finish
+    double finish_stepdown_printed = 0;  ///< by print's rule (LUO table 5.1)
+    double rough_stepdown = 0;           ///< mm, LUO eq. 6 at the least slope, before any tool's range; 0: without limit
+    std::vector<ToolCandidate> candidates;
+    std::vector<ToolSet> sets;
+};
+
 struct Layer {
     int index = 0;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
     std::string reason;  ///< why z_top lies where it lies, in words
     std::vector<Operation> operations;
-    double glue_area_mm2 = 0;  ///< under this layer's slab
+    std::optional<LayerSelection> selection;  ///< none where there was nothing to select
+    double glue_area_mm2 = 0;                 ///< under this layer's slab
     std::array<double, 2> glue_centroid{0, 0};
     double press_force_n = 0;
     Loops glue;  ///< where glue goes

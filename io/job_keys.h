@@ -24,6 +24,10 @@ inline constexpr Word<CoefficientTransform> kTransformWords[] = {{"printed", Coe
 inline constexpr Word<RoughPattern> kRoughWords[] = {{"contour", RoughPattern::contour}, {"zigzag", RoughPattern::zigzag}};
 inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}};
 inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated}, {"nominal", Engagement::nominal}};
+inline constexpr Word<SelectionMode> kSelectionWords[] = {{"select", SelectionMode::select}, {"fixed", SelectionMode::fixed}};
+inline constexpr Word<AccessRule> kAccessWords[] = {{"exact", AccessRule::exact}, {"printed", AccessRule::printed}};
+inline constexpr Word<RoughLimit> kRoughLimitWords[] = {
+    {"smaller", RoughLimit::smaller}, {"finish_radius", RoughLimit::finish_radius}, {"cusp", RoughLimit::cusp}};
 inline constexpr Word<ToolKind> kToolWords[] = {
     {"flat", ToolKind::flat}, {"ball", ToolKind::ball}, {"face", ToolKind::face}, {"drill", ToolKind::drill}};
 
@@ -166,6 +170,17 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("adapt_feed", job.cutting.adapt_feed,
               "feeds lowered where the cutter would bend too far, raised where the chip is thin; needs simulated engagement");
     visit.key("arcs", job.cutting.arcs, "arcs (G2, G3) where a path turns evenly; false: straight moves only");
+
+    visit.table("selection", "which tools of the library cut a layer (LUO 5.5); nothing to select with one flat and one ball");
+    visit.word("mode", job.selection.mode, kSelectionWords, "select: layer by layer; fixed: 1/2 in flat and 1/4 in ball, or the first of each");
+    visit.word("accessibility", job.selection.accessibility, kAccessWords, "exact: by area in 3D; printed: by length on sections (LUO 5.5.1)");
+    visit.key("threshold", job.selection.threshold, "share of a layer that its finish tool must reach (AR)");
+    visit.key("overlap_weight", job.selection.overlap_weight, "W, weight of walls too near each other, of the printed AR");
+    visit.word("rough_limit", job.selection.rough_limit, kRoughLimitWords,
+               "L of the roughing stepdown (LUO 5.5.3.3): finish_radius, cusp (tolerances.rough_cusp), or the smaller");
+    visit.key("semi_rough", job.selection.semi_rough, "a semi-roughing tool where it saves time");
+    visit.key("compare", job.selection.compare, "plan every layer with the fixed set too, and keep what is faster");
+    visit.key("voxel", job.selection.voxel, "mm, on which the semi-roughing area AS is measured");
 
     visit.table("flask", "a frame of every slab that stays around the pattern, to carry it while it is cut and as moulding box");
     visit.key("enabled", job.flask.enabled, "leave a flask");

@@ -95,6 +95,49 @@ void put_operation(JsonText& json, const Operation& operation) {
     json.end();
 }
 
+void put_selection(JsonText& json, const std::optional<LayerSelection>& selection) {
+    if (!selection) {
+        json.null();
+        return;
+    }
+    auto put = [&](const char* key, const std::optional<double>& value, int decimals) {
+        json.key(key);
+        if (value) json.rounded(*value, decimals);
+        else json.null();
+    };
+    json.begin_object();
+    json.key("least_slope_deg").rounded(selection->least_slope_deg, kLength);
+    json.key("vertical").boolean(selection->vertical);
+    json.key("finish_stepdown").rounded(selection->finish_stepdown, kLength);
+    json.key("finish_stepdown_printed").rounded(selection->finish_stepdown_printed, kLength);
+    json.key("rough_stepdown").rounded(selection->rough_stepdown, kLength);
+    json.key("candidates").begin_array();
+    for (const ToolCandidate& candidate : selection->candidates) {
+        json.begin_object(Shape::line);
+        json.key("purpose").string(candidate.purpose);
+        json.key("tool").integer(candidate.tool);
+        json.key("chosen").boolean(candidate.chosen);
+        put("accessibility", candidate.accessibility, kDeflection);
+        put("semi_rough_mm2", candidate.semi_rough_mm2, kArea);
+        put("stepdown", candidate.stepdown, kLength);
+        put("minutes", candidate.minutes, kMinutes);
+        json.key("reason").string(candidate.reason);
+        json.end();
+    }
+    json.end().key("sets").begin_array();
+    for (const ToolSet& set : selection->sets) {
+        json.begin_object(Shape::line);
+        json.key("name").string(set.name);
+        json.key("tools").begin_array();
+        for (const int tool : set.tools) json.integer(tool);
+        json.end();
+        json.key("minutes").rounded(set.minutes, kMinutes);
+        json.key("chosen").boolean(set.chosen);
+        json.end();
+    }
+    json.end().end();
+}
+
 void put_layer(JsonText& json, const Layer& layer) {
     json.begin_object();
     json.key("index").integer(layer.index);
@@ -102,6 +145,8 @@ void put_layer(JsonText& json, const Layer& layer) {
     json.key("z_top").exact(layer.z_top);
     json.key("slab_thickness").exact(layer.slab_thickness);
     json.key("reason").string(layer.reason);
+    json.key("selection");
+    put_selection(json, layer.selection);
     json.key("glue_area_mm2").rounded(layer.glue_area_mm2, kArea);
     json.key("glue_centroid").begin_array(Shape::line).rounded(layer.glue_centroid[0], kLength).rounded(layer.glue_centroid[1], kLength).end();
     json.key("press_force_n").rounded(layer.press_force_n, kForce);

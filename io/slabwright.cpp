@@ -12,6 +12,7 @@
 #include <new>
 
 #include "engine/planner.h"
+#include "engine/tools/tools.h"
 #include "io/gcode_writer.h"
 #include "io/inspect_json.h"
 #include "io/job_toml.h"
@@ -77,8 +78,14 @@ Job read_job(const std::string& path) {
     return guarded([&] { return parse_job(read_text(path), path); });
 }
 
-std::string default_job_toml() {
-    return guarded([] { return job_toml(Job{}); });
+std::string default_job_toml(std::string_view library) {
+    return guarded([&] {
+        Job job;
+        if (library == "luo") job.tools = luo_library();
+        else if (library != "default")
+            throw Error(ErrorKind::usage, "job.library", "there is no tool library of that name", std::string(library), "default or luo");
+        return job_toml(job);
+    });
 }
 
 Plan plan(Context& context, const std::string& stl_path, const Job& job) {

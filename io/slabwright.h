@@ -10,6 +10,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/job.h"
@@ -26,8 +27,8 @@ namespace slabwright {
 /// Reads a job file (TOML). @throws Error(usage) with file, line and the nearest known key
 [[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path);
 
-/// All keys with their defaults and comments, as a job file.
-[[nodiscard]] SLABWRIGHT_API std::string default_job_toml();
+/// All keys with their defaults and comments, as a job file. @param library "default", or "luo" for the tools of LUO table 5.4
+[[nodiscard]] SLABWRIGHT_API std::string default_job_toml(std::string_view library = "default");
 
 /// Reads the STL and plans the build. @throws Error(input | no_plan | cancelled | usage)
 [[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const std::string& stl_path, const Job& job);

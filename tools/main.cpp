@@ -34,7 +34,7 @@ extern "C" void on_signal(int signal) {
 }
 
 struct Options {
-    std::string stl, out, maps, job_file, units, strategy, finder;
+    std::string stl, out, maps, job_file, units, strategy, finder, library;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10;
     bool allow_undercut = false, no_verify = false, json = false, quiet = false, defaults = false, weld_given = false, no_3d = false;
@@ -376,6 +376,8 @@ int main(int argc, char** argv) {
 
     CLI::App* job_command = app.add_subcommand("job", "job files");
     job_command->add_flag("--defaults", options.defaults, "print every key with its default and a comment")->required();
+    job_command->add_option("--library", options.library, "with these tools: default, or luo (Luo table 5.4)")
+        ->check(CLI::IsMember({"default", "luo"}));
     job_command->add_flag("--json", options.json, "errors as JSON on stderr");
 
     // An error of the command line comes before its options are known, so --json is looked for by hand.
@@ -392,7 +394,7 @@ int main(int argc, char** argv) {
         else if (*report_command) run_report(options);
         else if (*inspect_command) run_inspect(options);
         else if (*slice_command) run_slice(options);
-        else print(default_job_toml());
+        else print(default_job_toml(options.library.empty() ? "default" : options.library));
         return 0;
     } catch (const Error& error) {
         return complain(error, options.json);

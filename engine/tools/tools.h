@@ -20,6 +20,10 @@ struct LayerTools {
 /// @throws Error(usage, "job.tool") when the library has no flat or no ball
 [[nodiscard]] LayerTools fixed_tools(const Job& job);
 
+/// The library of LUO table 5.4: flat and ball end mills of 1/8, 1/4, 1/2, 3/4 and 1 in with their stepdowns, numbers 2 … 6 and 12 … 16,
+/// and the default face mill. Their flutes reach through a 19 mm slab; what LUO does not give is ours.
+[[nodiscard]] std::vector<Tool> luo_library();
+
 /// What follows a finish tool and a roughing tool (mm across) so that nothing is left which a tool of the library reaches: the
 /// smallest flat and the smallest ball of the library, where they are smaller.
 [[nodiscard]] std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter);

@@ -5,11 +5,14 @@
 //   layer 2, .75 to 1.50   an H drafted by 3°, an island drafted by 2°, a vertical boss. The H has four concave corners of radius .15
 //                          to .19: the .25 in tool fits them, the .50 in does not, and the notches are .60 to .68 wide: the .50 in
 //                          tool can rough them, the .75 in cannot.
-//   layer 3, 1.50 to 2.00  a C drafted by 3°, with two such corners, and a blind slot from 1.70 up, .18 to .21 wide: only the .125 in
-//                          tool enters. Where the slot begins, LUO table 6.3 changes from .25 to .125.
+//   layer 3, 1.50 to 2.00  a C drafted by 3°, with two such corners, and a blind slot from 1.70 up, .238 to .269 wide: a .25 in tool does
+//                          not come to its floor, so AR asks for the .125 in, as LUO table 6.3 has it from 1.70 on. Its upper part is
+//                          wider than two swaths of .125, and narrower than a .25 in flat with .3 mm kept off either wall, so only
+//                          the .125 in flat end mill roughs it with AS = 0. As a semi-roughing tool it keeps that allowance too, so its
+//                          swaths do meet in the slot: then the .50 in may rough, and for it and no wider one the C is open (.72).
 //
-// LUO 5.6 also finds that only the .125 in flat end mill roughs layer 3 with AS = 0, which no slot of one width can give together with
-// that table: what lies outside a swath of .125 from either wall is wide enough for a .25 in tool.
+// LUO 5.6 says for layer 2 that no larger tool has AS = 0 with the .50 in after it. By the definition of 5.5.2 one has: what is farther than
+// .50 from a wall lets a wider tool in. With the time of one more tool change LUO's own comparison of times (5.5.3.4) rejects it.
 #include <array>
 
 #include "tests/data/sweep.h"
@@ -31,18 +34,18 @@ Outline inches(std::vector<Corner> corners) {
 std::vector<Facet> luo_tool_sample() {
     const double z1 = 0.75 * kInch, z2 = 1.5 * kInch, z3 = 2.0 * kInch, slot_floor = 1.7 * kInch;
     const Outline plate = inches({{0, 0, 0.5}, {8.75, 0, 0.5}, {8.75, 6.5, 0.5}, {0, 6.5, 0.5}});
-    const Outline letter_h = inches({{0.5, 0.5, 0.5},
-                                     {5.5, 0.5, 0.5},
+    const Outline letter_h = inches({{0.3, 0.3, 0.5},
+                                     {5.5, 0.3, 0.5},
                                      {5.5, 2.95, 0.5},
                                      {3.9, 2.95, 0.15},
                                      {3.9, 3.55, 0.15},
                                      {5.5, 3.55, 0.5},
-                                     {5.5, 6, 0.5},
-                                     {0.5, 6, 0.5},
-                                     {0.5, 3.55, 0.5},
-                                     {2.1, 3.55, 0.15},
-                                     {2.1, 2.95, 0.15},
-                                     {0.5, 2.95, 0.5}});
+                                     {5.5, 6.2, 0.5},
+                                     {0.3, 6.2, 0.5},
+                                     {0.3, 3.55, 0.5},
+                                     {1.9, 3.55, 0.15},
+                                     {1.9, 2.95, 0.15},
+                                     {0.3, 2.95, 0.5}});
     const Outline letter_c = inches({{2.3, 0.9, 0.3},
                                      {5.1, 0.9, 0.3},
                                      {5.1, 2.89, 0.3},
@@ -53,7 +56,7 @@ std::vector<Facet> luo_tool_sample() {
                                      {2.3, 5.6, 0.3}});
     const Outline island = stadium(7.4 * kInch, 1.4 * kInch, 7.4 * kInch, 2.8 * kInch, 0.8 * kInch, kChord);
     const Outline boss = circle(7.4 * kInch, 5.0 * kInch, 0.8 * kInch, kChord);
-    const double slot_rim = 0.09 * kInch + (drafted_pocket(z3, slot_floor, 3, 0, kChord).back().offset) * -1;
+    const double slot_rim = 0.119 * kInch + (drafted_pocket(z3, slot_floor, 3, 0, kChord).back().offset) * -1;
     const Outline slot = stadium(3.2 * kInch, 4.6 * kInch, 4.2 * kInch, 4.6 * kInch, slot_rim, kChord);
 
     std::vector<Facet> facets;

@@ -1,0 +1,112 @@
+// LUO 5.6: the tools of the sample part, layer by layer. Print's drawing is lost; the part is built from what the text says of it (see
+// tests/data/luo_tool_sample.cpp), so that what LUO chooses follows from LUO's rules.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+#include "engine/planner.h"
+#include "engine/tools/select.h"
+#include "kernels/cutting/cusp.h"
+#include "kernels/mesh/mesh.h"
+#include "kernels/mesh/weld.h"
+#include "tests/data/models.h"
+
+namespace slabwright {
+namespace {
+
+Job luo_job() {
+    Job job;
+    job.tools = luo_library();
+    job.tolerances.cusp = 0.002 * kInch;  // from which .0445 in follows
+    job.tolerances.rough_cusp = 0.01 * kInch;
+    job.slabs.thicknesses = {0.75 * kInch};
+    job.slabs.length = 10 * kInch;  // "0.75 inch thick 10 × 8 inch MDF"
+    job.slabs.width = 8 * kInch;
+    job.slabs.facing_allowance = 0;
+    job.selection.compare = false;
+    return job;
+}
+
+// Where AR comes from: print's own tables 5.5 and 5.6.
+enum class Source { tables };
+
+class LuoTools : public testing::TestWithParam<Source> {
+protected:
+    Context context;
+    Mesh mesh = weld(context, luo_tool_sample());
+    Job job = luo_job();
+    std::vector<Feature> features = find_features(context, mesh.view(), feature_options(job)).features;
+
+    // AR of LUO's tables; all tools have 100 % in the first layer.
+    [[nodiscard]] static ReachRatio tables(double z_bottom_in) {
+        return [z_bottom_in](const Tool& tool) {
+            const double d = tool.diameter / kInch;
+            if (z_bottom_in == 0) return 1.0;
+            if (z_bottom_in < 1) return d > 0.9 ? 0.8829 : d > 0.6 ? 0.9618 : d > 0.4 ? 0.9700 : 0.9782;
+            return d > 0.9 ? 0.9212 : d > 0.6 ? 0.9536 : d > 0.4 ? 0.9617 : d > 0.2 ? 0.9699 : 0.9958;
+        };
+    }
+
+    ToolChoice choose(double z_bottom_in, double z_top_in) {
+        LayerJob layer;
+        layer.mesh = mesh.view();
+        layer.job = &job;
+        layer.z_bottom = z_bottom_in * kInch;
+        layer.z_top = z_top_in * kInch;
+        layer.slab_thickness = 0.75 * kInch;
+        const Box3 box = bounds(mesh.view());
+        const double dx = (job.slabs.length - (box.max.x - box.min.x)) / 2, dy = (job.slabs.width - (box.max.y - box.min.y)) / 2;
+        layer.stock_min = {box.min.x - dx, box.min.y - dy};
+        layer.stock_max = {box.max.x + dx, box.max.y + dy};
+        for (const Feature& f : features)
+            if (f.type == FeatureType::up_flat && f.z_low > layer.z_bottom && f.z_low < layer.z_top) layer.flats.push_back(&f);
+        ToolChoice choice = select_tools(context, layer, tables(z_bottom_in));
+        for (const ToolCandidate& c : choice.record.candidates)
+            std::printf("%-10s %-4s T%-2d AR %.4f AS %6.1f mm2 stepdown %.4f in %6.2f min: %s\n", c.purpose.c_str(), c.chosen ? "yes" : "no", c.tool,
+                        c.accessibility.value_or(NAN), c.semi_rough_mm2.value_or(NAN), c.stepdown.value_or(NAN) / kInch, c.minutes.value_or(NAN),
+                        c.reason.c_str());
+        return choice;
+    }
+};
+
+TEST_P(LuoTools, FirstLayerOneFlatEndMill) {
+    const ToolChoice choice = choose(0, 0.75);
+    EXPECT_TRUE(choice.record.vertical);
+    EXPECT_NEAR(choice.tools.rough.diameter, 1.0 * kInch, 1e-9);
+    EXPECT_NEAR(choice.tools.rough.stepdown_max, 0.25 * kInch, 1e-9);
+    EXPECT_TRUE(choice.tools.semi_rough.empty());
+    EXPECT_EQ(choice.record.candidates.size(), 1U) << "the largest reaches everything";
+    EXPECT_GT(choice.record.candidates[0].accessibility.value_or(0), 0.999);
+}
+
+TEST_P(LuoTools, SecondLayer) {
+    const ToolChoice choice = choose(0.75, 1.5);
+    EXPECT_FALSE(choice.record.vertical);
+    EXPECT_NEAR(choice.record.least_slope_deg, 87, 0.02);
+    EXPECT_NEAR(choice.tools.finish.diameter, 0.25 * kInch, 1e-9);
+    EXPECT_NEAR(choice.tools.rough.diameter, 0.5 * kInch, 1e-9);
+    EXPECT_NEAR(choice.tools.rough.stepdown_max, 0.15 * kInch, 1e-9);
+    EXPECT_TRUE(choice.tools.semi_rough.empty());
+    EXPECT_NEAR(choice.record.finish_stepdown_printed, 0.0445 * kInch, 0.0001 * kInch);
+    EXPECT_NEAR(choice.record.finish_stepdown, 0.0639 * kInch, 0.0005 * kInch) << "the same cusp, by the true limit";
+    EXPECT_NEAR(choice.record.rough_stepdown, 0.191 * kInch, 0.001 * kInch);
+}
+
+TEST_P(LuoTools, ThirdLayer) {
+    const ToolChoice choice = choose(1.5, 2.0);
+    EXPECT_NEAR(choice.record.least_slope_deg, 87, 0.02);
+    EXPECT_NEAR(choice.tools.finish.diameter, 0.125 * kInch, 1e-9);
+    ASSERT_EQ(choice.tools.semi_rough.size(), 1U);
+    EXPECT_NEAR(choice.tools.semi_rough[0].diameter, 0.125 * kInch, 1e-9);
+    EXPECT_NEAR(choice.tools.semi_rough[0].stepdown_max, 0.0625 * kInch, 1e-9);
+    EXPECT_NEAR(choice.tools.rough.diameter, 0.5 * kInch, 1e-9);
+    EXPECT_NEAR(choice.tools.rough.stepdown_max, 0.15 * kInch, 1e-9);
+    EXPECT_NEAR(choice.record.rough_stepdown, 0.191 * kInch, 0.001 * kInch);
+}
+
+INSTANTIATE_TEST_SUITE_P(Accessibility, LuoTools, testing::Values(Source::tables),
+                         [](const auto& source) { return source.param == Source::tables ? "tables" : ""; });
+
+}  // namespace
+}  // namespace slabwright
