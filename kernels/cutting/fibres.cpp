@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/cutting/fibre_rows.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -12,126 +13,29 @@ namespace slabwright {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t kBlock = 64;  // lines that share one pass over their facets
-constexpr double kMergeGap = 1e-6;  // mm; gaps this small are rounding between neighbouring elements
+constexpr std::size_t kBlock = kLinesTogether;  // lines that share one pass over their facets
+constexpr double kMergeGap = 1e-6;              // mm; gaps this small are rounding between neighbouring elements
 
-// The hull of an element's pieces. Facet ⊕ ball is convex, so all its pieces together are one interval.
-struct Hull {
-    double low = kInfinity, high = -kInfinity;
-    float nz_low = 0, nz_high = 0;
-    void add(double a, double b, double nz_a, double nz_b) {
-        if (!(a < b)) return;
-        if (a < low) {
-            low = a;
-            nz_low = static_cast<float>(nz_a);
-        }
-        if (b > high) {
-            high = b;
-            nz_high = static_cast<float>(nz_b);
-        }
-    }
-};
-
-// A segment and the ball around each of its points, met by a line in direction U at heights that do not change: all that
-// does not depend on the line's other coordinate is computed once.
+// A segment met by lines in direction U at height zc.
 template <int U, int V>
-class Capsule {
-public:
-    Capsule(const Vec3d& a, const Vec3d& b, double radius, double zc)
-        : a_(a), b_(b), du_(b[U] - a[U]), dv_(b[V] - a[V]), dz_(b[2] - a[2]), wza_(zc - a[2]), wzb_(zc - b[2]), r2_(radius * radius), r_(radius) {
-        length2_ = du_ * du_ + dv_ * dv_ + dz_ * dz_;
-    }
+CapsuleTerms capsule(const Vec3d& a, const Vec3d& b, double radius, double zc, double nz = -2) {
+    return {a[U], a[V], zc - a[2], b[U], b[V], zc - b[2], radius, nz};
+}
 
-    /// nz < −1 in `fixed_nz` asks for the contact's own.
-    void meet(double v, Hull& hull, double fixed_nz = -2) const {
-        ball(a_[U], v - a_[V], wza_, hull, fixed_nz);
-        ball(b_[U], v - b_[V], wzb_, hull, fixed_nz);
-        if (length2_ <= 0) return;
-        // With w = c − a and u = c_U − a_U: |w|² − (w·d)²/|d|² < r² and 0 ≤ w·d ≤ |d|².
-        const double wv = v - a_[V], s = dv_ * wv + dz_ * wza_;
-        const double qa = 1 - du_ * du_ / length2_, qb = du_ * s / length2_, qc = wv * wv + wza_ * wza_ - s * s / length2_ - r2_;
-        double low, high;
-        if (qa < 1e-12) {
-            if (qc >= 0) return;
-            low = -kInfinity;
-            high = kInfinity;
-        } else {
-            const double discriminant = qb * qb - qa * qc;
-            if (discriminant <= 0) return;
-            const double root = std::sqrt(discriminant);
-            low = (qb - root) / qa;
-            high = (qb + root) / qa;
-        }
-        if (du_ != 0) {
-            double t0 = -s / du_, t1 = (length2_ - s) / du_;
-            if (t0 > t1) std::swap(t0, t1);
-            low = std::max(low, t0);
-            high = std::min(high, t1);
-        } else if (s < 0 || s > length2_) return;
-        if (!(low < high)) return;
-        auto nz = [&](double u) { return fixed_nz > -1.5 ? fixed_nz : (wza_ - dz_ * (du_ * u + s) / length2_) / r_; };
-        hull.add(a_[U] + low, a_[U] + high, nz(low), nz(high));
-    }
-
-private:
-    void ball(double centre, double wv, double wz, Hull& hull, double fixed_nz) const {
-        const double h2 = r2_ - wv * wv - wz * wz;
-        if (h2 <= 0) return;
-        const double h = std::sqrt(h2), nz = fixed_nz > -1.5 ? fixed_nz : wz / r_;
-        hull.add(centre - h, centre + h, nz, nz);
-    }
-    const Vec3d &a_, &b_;
-    double du_, dv_, dz_, wza_, wzb_, r2_, r_, length2_;
-};
-
-// The points within `radius` of a facet's plane that project into the facet.
 template <int U, int V>
-class Prism {
-public:
-    Prism(const SolidFacet& f, double radius, double zc) : f_(f), r_(radius) {
-        const Vec3d& n = f.normal;
-        flat_ = n[0] == 0 && n[1] == 0 && n[2] == 0;
-        if (flat_) return;
-        for (int k = 0; k < 3; ++k) {
-            const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
-            const Vec3d e{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-            const Vec3d m{n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0]};  // inward
-            u_[k] = m[U];
-            v_[k] = m[V];
-            c_[k] = m[2] * (zc - a[2]) - m[U] * a[U] - m[V] * a[V];
-        }
-        c_[3] = n[2] * (zc - f.p[0][2]) - n[U] * f.p[0][U] - n[V] * f.p[0][V];
+PrismTerms prism(const SolidFacet& f, double radius, double zc) {
+    const Vec3d& n = f.normal;
+    PrismTerms t{n[U], n[V], n[2], n[2] * (zc - f.p[0][2]) - n[U] * f.p[0][U] - n[V] * f.p[0][V], radius, {}, {}, {}};
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
+        const Vec3d e{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+        const Vec3d m{n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0]};  // inward
+        t.edge_u[k] = m[U];
+        t.edge_v[k] = m[V];
+        t.edge_c[k] = m[2] * (zc - a[2]) - m[U] * a[U] - m[V] * a[V];
     }
-
-    void meet(double v, Hull& hull) const {
-        if (flat_) return;
-        const Vec3d& n = f_.normal;
-        const double k = n[V] * v + c_[3];  // signed distance is n_U·u + k
-        double low = -kInfinity, high = kInfinity;
-        if (std::abs(n[U]) < 1e-12) {
-            if (std::abs(k) >= r_) return;
-        } else {
-            low = (-r_ - k) / n[U];
-            high = (r_ - k) / n[U];
-            if (low > high) std::swap(low, high);
-        }
-        for (int i = 0; i < 3; ++i) {
-            const double c = v_[i] * v + c_[i];  // inside where u_·u + c ≥ 0
-            if (u_[i] > 0) low = std::max(low, -c / u_[i]);
-            else if (u_[i] < 0) high = std::min(high, -c / u_[i]);
-            else if (c < 0) return;
-        }
-        if (!(low < high)) return;
-        hull.add(low, high, (n[U] * low + k) / r_ * n[2], (n[U] * high + k) / r_ * n[2]);
-    }
-
-private:
-    const SolidFacet& f_;
-    double r_;
-    bool flat_ = false;
-    std::array<double, 3> u_{}, v_{};
-    std::array<double, 4> c_{};
-};
+    return t;
+}
 
 // The part of a facet above z, seen from above, as a convex polygon at height z.
 int part_above(const SolidFacet& f, double z, std::array<Vec3d, 4>& out) {
@@ -236,32 +140,41 @@ Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& insi
     parallel_each(context, blocks, [&](std::size_t block) {
         const std::size_t begin = block * kBlock, end = std::min(lines.size(), begin + kBlock);
         std::array<std::vector<Forbidden>, kBlock> found;
-        std::array<Hull, kBlock> hulls;
+        HullRows hulls;
+        std::array<double, kBlock> at{};
+        for (std::size_t l = begin; l < end; ++l) at[l - begin] = to_mm(lines[l]);
         for (std::uint32_t m = counts[block]; m < counts[block + 1]; ++m) {
             const SolidFacet& f = solid.facets[members[m]];
             const auto crossed = range(f);
-            const std::size_t first = std::max(crossed.first, begin), last = std::min(crossed.second, end);
-            for (std::size_t l = first; l < last; ++l) hulls[l - begin] = Hull{};
-            auto each_line = [&](auto&& element, auto... fixed) {
-                for (std::size_t l = first; l < last; ++l) element.meet(to_mm(lines[l]), hulls[l - begin], fixed...);
-            };
+            const std::size_t first = std::max(crossed.first, begin), last = std::min(crossed.second, end), skip = first - begin;
+            const int n = static_cast<int>(last - first);
+            double *const low = hulls.low.data() + skip, *const high = hulls.high.data() + skip;
+            double *const nz_low = hulls.nz_low.data() + skip, *const nz_high = hulls.nz_high.data() + skip;
+            std::fill(low, low + n, kInfinity);
+            std::fill(high, high + n, -kInfinity);
+            auto meet_prism = [&](const PrismTerms& p) { prism_rows(p, at.data() + skip, n, low, high, nz_low, nz_high); };
+            auto meet_capsule = [&](const CapsuleTerms& c) { capsule_rows(c, at.data() + skip, n, low, high, nz_low, nz_high); };
             if (ball && f.z_max > zc - r && f.z_min <= zc) {
-                each_line(Prism<U, V>(f, r, zc));
+                if (f.normal != Vec3d{0, 0, 0}) meet_prism(prism<U, V>(f, r, zc));
                 for (int k = 0; k < 3; ++k)
-                    if (f.edges >> k & 1) each_line(Capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r, zc));
+                    if (f.edges >> k & 1) meet_capsule(capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r, zc));
             }
             if (f.z_max > zc) {
                 if (f.nz < 0) {
                     std::array<Vec3d, 4> polygon;
-                    const int n = part_above(f, zc, polygon);
-                    for (int k = 0; k < n; ++k) each_line(Capsule<U, V>(polygon[k], polygon[(k + 1) % n], r, zc), static_cast<double>(f.nz));
+                    const int corners = part_above(f, zc, polygon);
+                    for (int k = 0; k < corners; ++k) meet_capsule(capsule<U, V>(polygon[k], polygon[(k + 1) % corners], r, zc, f.nz));
                 } else if (!ball) {
                     std::array<Vec3d, 2> cut;
-                    if (cut_segment(f, zc, cut)) each_line(Capsule<U, V>(cut[0], cut[1], r, zc), static_cast<double>(f.nz));
+                    if (cut_segment(f, zc, cut)) meet_capsule(capsule<U, V>(cut[0], cut[1], r, zc, f.nz));
                 }
             }
             for (std::size_t l = first; l < last; ++l) {
-                const Hull& h = hulls[l - begin];
+                const struct {
+                    double low, high;
+                    float nz_low, nz_high;
+                } h{hulls.low[l - begin], hulls.high[l - begin], static_cast<float>(hulls.nz_low[l - begin]),
+                    static_cast<float>(hulls.nz_high[l - begin])};
                 if (!(h.low < h.high)) continue;
                 // Neighbouring facets mostly follow one another, so most intervals only stretch the one before.
                 std::vector<Forbidden>& on_line = found[l - begin];
