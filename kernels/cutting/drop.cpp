@@ -205,19 +205,28 @@ Rest DropIndex::drop(double x, double y) const {
     const std::size_t r0 = clamp((y - r - y0_) / cell_, rows_), r1 = clamp((y + r - y0_) / cell_, rows_);
     Best best;
     const bool ball = cutter_.profile == Cutter::Profile::ball;
-    for (std::size_t row = r0; row <= r1; ++row)
-        for (std::size_t column = c0; column <= c1; ++column) {
-            for (std::uint32_t k = starts_[row * columns_ + column]; k < starts_[row * columns_ + column + 1]; ++k) {
-                const Bounds& b = bounds_[members_[k]];
-                if (b.z_max <= best.tip_z) break;
-                // Listed in several cells of this window it is looked at in the first of them; and only if it is near.
-                if (column != std::max<std::size_t>(c0, b.column) || row != std::max<std::size_t>(r0, b.row)) continue;
-                if (x + r < b.x_low || x - r > b.x_high || y + r < b.y_low || y - r > b.y_high) continue;
-                const SolidFacet& f = solid_.facets[members_[k]];
-                if (ball) drop_ball(f, r, x, y, best);
-                else drop_flat(f, r, x, y, best);
-            }
+    // At a distance d from the axis a ball's surface is at least d² / 2R above its tip, so what stands there lifts the tip by that much less.
+    // The cell under the axis comes first: what it gives leaves out most of the others.
+    const double bend = ball ? 1 / (2 * r) : 0;
+    const std::size_t c_mid = clamp((x - x0_) / cell_, columns_), r_mid = clamp((y - y0_) / cell_, rows_);
+    auto visit = [&](std::size_t row, std::size_t column, bool middle) {
+        const std::uint32_t *first = members_.data() + starts_[row * columns_ + column],
+                            *last = members_.data() + starts_[row * columns_ + column + 1];
+        for (; first != last; ++first) {
+            const Bounds& b = bounds_[*first];
+            if (b.z_max <= best.tip_z) break;
+            // Listed in several cells of this window it is looked at in the first of them.
+            if (!middle && (column != std::max<std::size_t>(c0, b.column) || row != std::max<std::size_t>(r0, b.row))) continue;
+            const double dx = std::max({0.0, b.x_low - x, x - b.x_high}), dy = std::max({0.0, b.y_low - y, y - b.y_high}), d2 = dx * dx + dy * dy;
+            if (d2 > r * r || b.z_max - d2 * bend <= best.tip_z) continue;
+            const SolidFacet& f = solid_.facets[*first];
+            if (ball) drop_ball(f, r, x, y, best);
+            else drop_flat(f, r, x, y, best);
         }
+    };
+    visit(r_mid, c_mid, true);
+    for (std::size_t row = r0; row <= r1; ++row)
+        for (std::size_t column = c0; column <= c1; ++column) visit(row, column, false);
     rest.tip_z = best.tip_z;
     rest.nx = static_cast<float>(best.nx);
     rest.ny = static_cast<float>(best.ny);
