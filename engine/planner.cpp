@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -16,6 +17,8 @@
 #include "engine/schedule/motion_time.h"
 #include "engine/schedule/op_forces.h"
 #include "engine/schedule/schedule.h"
+#include "engine/tools/reach_ratio.h"
+#include "engine/tools/select.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
@@ -97,6 +100,35 @@ void check_travel(const Plan& plan) {
                         fmt::format("the {} program of layer {} leaves the machine's travel in {} by {:.1f} mm", op.purpose, layer.index, axis, over),
                         fmt::format("layer {}", layer.index), "use a smaller margin, a larger machine, or turn the pattern");
         }
+}
+
+// A layer as one set of tools makes it, with the forces of its programs and the feeds that they allow.
+struct Trial {
+    Layer layer;
+    std::vector<Diagnostic> diagnostics;
+    double minutes = 0;  // of its programs and the changes of tool between them
+};
+
+Trial plan_layer(Context& context, const Plan& plan, const Layer& layer, const LayerJob& work) {
+    Trial trial{layer, {}, 0};
+    LayerResult result = plan_layer_paths(context, work);
+    trial.layer.operations = std::move(result.operations);
+    trial.diagnostics = std::move(result.diagnostics);
+    if (plan.job.cutting.engagement == Engagement::simulated) rate_layer(context, trial.layer, plan, trial.diagnostics);
+    const Operation* before = nullptr;
+    for (const Operation& op : trial.layer.operations) {
+        trial.minutes += motion_time(op.moves, plan.job.machine).minutes + plan.job.machine.spindle_dwell_s / 60;
+        if (before && before->tool != op.tool) trial.minutes += plan.job.machine.tool_change_s / 60;
+        before = &op;
+    }
+    return trial;
+}
+
+std::vector<int> tools_in_order(const Layer& layer) {
+    std::vector<int> tools;
+    for (const Operation& op : layer.operations)
+        if (std::find(tools.begin(), tools.end(), op.tool) == tools.end()) tools.push_back(op.tool);
+    return tools;
 }
 
 }  // namespace
@@ -195,8 +227,15 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     // A gap in the mesh shows as an open chain; sections at every boundary and feature would miss one in between, so the
     // loader has refused all open edges but those in the base plane already. What is left here is proof by section.
     context.begin_phase("paths", 0.25, 0.92, plan.layers.size());
-    const LayerTools tools = fixed_tools(job);
-    const double overrun = tools.finish.diameter / 2;
+    const LayerTools fixed = fixed_tools(job);
+    double overrun = fixed.finish.diameter / 2;
+    const bool selecting = selects_tools(job);
+    std::optional<AccessScene> scene;
+    if (selecting) {
+        for (const Tool& tool : job.tools)
+            if (tool.kind == ToolKind::ball) overrun = std::max(overrun, tool.diameter / 2);
+        if (job.selection.accessibility == AccessRule::exact) scene.emplace(context, view);
+    }
     const double board = job.machine.base_board_cut >= 0 ? std::min(job.machine.base_board_cut, job.machine.base_board_thickness)
                                                          : std::min(overrun, job.machine.base_board_thickness);
     // What the layers in work hold at once: their facets with an index of them, and the moves of all layers, of which a
@@ -217,7 +256,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     const std::uint64_t standing = Standing::bytes(plan.stock_min, plan.stock_max) * std::min<std::uint64_t>(reach.size(), context.threads());
     const MemoryCharge path_memory(context, held * (sizeof(SolidFacet) + 16) + static_cast<std::uint64_t>(3 * plane) * (sizeof(Move) + 64) + standing,
                                    "the paths");
-    std::vector<LayerResult> results(plan.layers.size());
+    std::vector<std::vector<Diagnostic>> found_in(plan.layers.size());
     parallel_each(context, plan.layers.size(), [&](std::size_t i) {
         const Layer& layer = plan.layers[i];
         LayerJob work;
@@ -226,32 +265,47 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
         work.z_bottom = layer.z_bottom;
         work.z_top = layer.z_top;
         work.slab_thickness = layer.slab_thickness;
-        work.floor_below = layer.z_bottom - (i == 0 ? board : overrun);
         work.stock_min = plan.stock_min;
         work.stock_max = plan.stock_max;
         work.index = layer.index;
-        work.tools = tools;
         if (plan.flask) work.opening = plan.flask->inner[i];
         for (const Feature& f : plan.features) {
             if (f.type != FeatureType::up_flat || f.area < job.cutting.min_flat_area || f.z_low >= layer.z_top) continue;
             if (f.z_low > layer.z_bottom) work.flats.push_back(&f);
-            if (f.z_low > work.floor_below) work.feet.push_back(&f);
         }
-        results[i] = plan_layer_paths(context, work);
+        work.floor_below = layer.z_bottom - (i == 0 ? board : overrun);
+        std::vector<std::pair<std::string, LayerTools>> sets;
+        std::optional<LayerSelection> selection;
+        if (selecting) {
+            ToolChoice choice = select_tools(context, work, reach_ratio(context, work, scene ? &*scene : nullptr));
+            sets.emplace_back("selected", std::move(choice.tools));
+            selection = std::move(choice.record);
+        }
+        if (!selecting || job.selection.compare) sets.emplace_back("fixed", fixed);
+        std::optional<Trial> best;
+        std::size_t chosen = 0;
+        for (std::size_t s = 0; s < sets.size(); ++s) {
+            work.tools = sets[s].second;
+            const double below = work.tools.finish.diameter / 2;
+            work.floor_below = layer.z_bottom - (i > 0 ? below : job.machine.base_board_cut >= 0 ? board : std::min(below, board));
+            work.feet.clear();
+            for (const Feature& f : plan.features)
+                if (f.type == FeatureType::up_flat && f.area >= job.cutting.min_flat_area && f.z_low < layer.z_top && f.z_low > work.floor_below)
+                    work.feet.push_back(&f);
+            Trial trial = plan_layer(context, plan, layer, work);
+            if (selection) selection->sets.push_back({sets[s].first, tools_in_order(trial.layer), trial.minutes, false});
+            if (!best || trial.minutes < best->minutes) best = std::move(trial), chosen = s;
+        }
+        if (selection) selection->sets[chosen].chosen = true;
+        plan.layers[i] = std::move(best->layer);
+        plan.layers[i].selection = std::move(selection);
+        found_in[i] = std::move(best->diagnostics);
         context.advance();
     });
     std::size_t operations = 0;
-    for (std::size_t i = 0; i < results.size(); ++i) {
-        plan.layers[i].operations = std::move(results[i].operations);
-        operations += plan.layers[i].operations.size();
-    }
-    // Forces, and the feeds that they allow, of the finished programs in the order in which they run.
-    std::vector<std::vector<Diagnostic>> forces(results.size());
-    if (job.cutting.engagement == Engagement::simulated)
-        parallel_each(context, plan.layers.size(), [&](std::size_t i) { rate_layer(context, plan.layers[i], plan, forces[i]); });
-    for (std::size_t i = 0; i < results.size(); ++i) {
-        plan.diagnostics.insert(plan.diagnostics.end(), results[i].diagnostics.begin(), results[i].diagnostics.end());
-        plan.diagnostics.insert(plan.diagnostics.end(), forces[i].begin(), forces[i].end());
+    for (const Layer& layer : plan.layers) operations += layer.operations.size();
+    for (std::size_t i = 0; i < found_in.size(); ++i) {
+        plan.diagnostics.insert(plan.diagnostics.end(), found_in[i].begin(), found_in[i].end());
         for (Operation& op : plan.layers[i].operations) {
             const MotionTime time = motion_time(op.moves, job.machine);
             op.cutting_mm = time.cutting_mm;

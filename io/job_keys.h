@@ -25,7 +25,8 @@ inline constexpr Word<RoughPattern> kRoughWords[] = {{"contour", RoughPattern::c
 inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}};
 inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated}, {"nominal", Engagement::nominal}};
 inline constexpr Word<SelectionMode> kSelectionWords[] = {{"select", SelectionMode::select}, {"fixed", SelectionMode::fixed}};
-inline constexpr Word<AccessRule> kAccessWords[] = {{"exact", AccessRule::exact}, {"printed", AccessRule::printed}};
+inline constexpr Word<AccessRule> kAccessWords[] = {
+    {"sections", AccessRule::sections}, {"exact", AccessRule::exact}, {"printed", AccessRule::printed}};
 inline constexpr Word<RoughLimit> kRoughLimitWords[] = {
     {"smaller", RoughLimit::smaller}, {"finish_radius", RoughLimit::finish_radius}, {"cusp", RoughLimit::cusp}};
 inline constexpr Word<ToolKind> kToolWords[] = {
@@ -173,7 +174,8 @@ void visit_job_keys(JobLike& job, Visit& visit) {
 
     visit.table("selection", "which tools of the library cut a layer (LUO 5.5); nothing to select with one flat and one ball");
     visit.word("mode", job.selection.mode, kSelectionWords, "select: layer by layer; fixed: 1/2 in flat and 1/4 in ball, or the first of each");
-    visit.word("accessibility", job.selection.accessibility, kAccessWords, "exact: by area in 3D; printed: by length on sections (LUO 5.5.1)");
+    visit.word("accessibility", job.selection.accessibility, kAccessWords,
+               "sections: by the length of sections that is touched; exact: by area in 3D, slow; printed: as LUO 5.5.1");
     visit.key("threshold", job.selection.threshold, "share of a layer that its finish tool must reach (AR)");
     visit.key("overlap_weight", job.selection.overlap_weight, "W, weight of walls too near each other, of the printed AR");
     visit.word("rough_limit", job.selection.rough_limit, kRoughLimitWords,

@@ -55,6 +55,17 @@ TEST(Voxels, ASlotStaysWhereTheCutterIsTooWide) {
     EXPECT_FALSE(left.nothing(0.25));
 }
 
+TEST(Voxels, WhatADiscTouches) {
+    Context context;
+    LayerVoxels slot = pocket(context, 8, 0.25);
+    constexpr double outside = 2 * (100 + 60), inside = 2 * (8 + 40);
+    EXPECT_NEAR(slot.reached_share(context, 4.5, 4), outside / (outside + inside), 0.01);
+    // A disc that lies in a corner touches either wall at r from it; nearer than half a voxel it lies from r − √(r·voxel) on.
+    const double r = 3, apart = r - std::sqrt(r * 0.25);
+    EXPECT_NEAR(slot.reached_share(context, r, 4), (outside + inside - 8 * apart) / (outside + inside), 0.01);
+    EXPECT_GT(slot.reached_share(context, 0.3, 4), 0.99);
+}
+
 TEST(Voxels, CornersOfASquarePocket) {
     Context context;
     for (const double r : {3.0, 6.35, 12.7}) {

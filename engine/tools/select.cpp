@@ -16,6 +16,7 @@ namespace slabwright {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kSectionStep = 1;    // mm between the sections on which reach is measured
 constexpr double kFinestStep = 0.05;  // mm to which halving brings a stepdown
 
 std::vector<Tool> falling(const Job& job, ToolKind kind) {
@@ -84,11 +85,11 @@ public:
         LayerSelection& record = choice_.record;
         record.least_slope_deg = slopes.least / kDegree;
         record.vertical = slopes.vertical;
+        measure();
         if (slopes.vertical) {
             choose_one_flat();
         } else {
             choose_finish(slopes.least);
-            measure();
             choose_rough(slopes.least);
         }
         LayerTools& tools = choice_.tools;
@@ -106,7 +107,9 @@ private:
     const Tool& first_that_reaches(const std::vector<Tool>& tools, const char* purpose, const std::function<double(const Tool&)>& stepdown) {
         const double threshold = job_.selection.threshold;
         for (const Tool& tool : tools) {
-            const double ar = ratio_(tool);
+            const double ar =
+                ratio_ ? ratio_(tool)
+                       : voxels_->reached_share(context_, tool.diameter / 2, std::max(1, static_cast<int>(kSectionStep / job_.selection.voxel)));
             ToolCandidate& candidate = note(purpose, tool);
             candidate.accessibility = ar;
             candidate.stepdown = stepdown(tool);

@@ -23,9 +23,10 @@ struct ToolChoice {
 /// where a still larger flat then saves time, its change of tool counted. Then the smaller tools for what all these leave.
 /// Where print only looks at one semi-roughing tool after another, one is all that is chosen here.
 /// @param layer all but its tools and floor_below
-/// @param ratio asked for balls, from the largest down, and in an upright layer for flats
+/// @param ratio asked for balls, from the largest down, and in an upright layer for flats; none: the share of the sections' length that a
+///        disc of the tool's radius touches (LayerVoxels::reached_share)
 /// @throws Error(usage, "job.tool") when the library lacks a flat or a ball; Error(no_plan, "memory.limit"), Error(cancelled)
-[[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio);
+[[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio = {});
 
 /// Heights of the roughing levels, descending: even steps of at most `stepdown` down to every floor and to the layer's bottom.
 [[nodiscard]] std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors, double stepdown);

@@ -220,6 +220,27 @@ const CellRows& LayerVoxels::reached(Context& context, int slice, double radius,
     return reached_.emplace(key, grown(context, places, radius / box_.voxel + 0.5, nx)).first->second;
 }
 
+double LayerVoxels::reached_share(Context& context, double radius, int every) {
+    std::int64_t all = 0, touched = 0;
+    std::vector<std::array<std::int32_t, 2>> beside;
+    for (int k = every / 2; k < box_.nz; k += every) {
+        const CellRows& kept = kept_[static_cast<std::size_t>(k)];
+        const CellRows with_edge = grown(context, kept, 1, box_.nx + 2 * border_);
+        const CellRows reach = reached(context, k, radius, 0);
+        reached_.erase({k, {radius, 0.0}});
+        for (std::size_t j = static_cast<std::size_t>(border_); j < static_cast<std::size_t>(border_ + box_.ny); ++j)
+            for (const auto& s : with_edge.row(j)) {
+                beside.clear();
+                append_rest(kept.row(j), std::max(s[0], border_), std::min(s[1], border_ + box_.nx - 1), beside);
+                for (const auto& edge : beside) {
+                    all += edge[1] - edge[0] + 1;
+                    for (const auto& r : reach.row(j)) touched += std::max(0, std::min(edge[1], r[1]) - std::max(edge[0], r[0]) + 1);
+                }
+            }
+    }
+    return all > 0 ? static_cast<double>(touched) / static_cast<double>(all) : 1;
+}
+
 RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double swath) {
     // Of all levels at or under a slice the highest one clears most of it: what is kept grows downwards.
     std::vector<int> level(static_cast<std::size_t>(box_.nz), -1);  // by slice: the slice of its level's tip

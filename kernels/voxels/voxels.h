@@ -71,6 +71,10 @@ public:
     /// above it. A gap must be up to half a voxel wider than the cutter to let it in.
     [[nodiscard]] RoughLeft left(Context& context, const Roughing& roughing, double swath);
 
+    /// The share of the walls' length, over every `every`-th slice, that a disc of this radius touches without entering what is kept; 1
+    /// where there are none. To within half a voxel.
+    [[nodiscard]] double reached_share(Context& context, double radius, int every);
+
     /// mm², of all the stock that is not kept at a tip height (an A_i of t_r = Σ A_i / (2R·f)).
     [[nodiscard]] double area_to_clear(double tip) const;
 

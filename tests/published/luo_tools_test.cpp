@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "engine/planner.h"
+#include "engine/tools/reach_ratio.h"
 #include "engine/tools/select.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/mesh/mesh.h"
@@ -25,11 +26,12 @@ Job luo_job() {
     job.slabs.width = 8 * kInch;
     job.slabs.facing_allowance = 0;
     job.selection.compare = false;
+    job.selection.accessibility = AccessRule::printed;
     return job;
 }
 
-// Where AR comes from: print's own tables 5.5 and 5.6.
-enum class Source { tables };
+// Where AR comes from: print's own tables 5.5 and 5.6, or their rule applied to this part.
+enum class Source { tables, printed };
 
 class LuoTools : public testing::TestWithParam<Source> {
 protected:
@@ -61,7 +63,7 @@ protected:
         layer.stock_max = {box.max.x + dx, box.max.y + dy};
         for (const Feature& f : features)
             if (f.type == FeatureType::up_flat && f.z_low > layer.z_bottom && f.z_low < layer.z_top) layer.flats.push_back(&f);
-        ToolChoice choice = select_tools(context, layer, tables(z_bottom_in));
+        ToolChoice choice = select_tools(context, layer, GetParam() == Source::tables ? tables(z_bottom_in) : reach_ratio(context, layer, nullptr));
         for (const ToolCandidate& c : choice.record.candidates)
             std::printf("%-10s %-4s T%-2d AR %.4f AS %6.1f mm2 stepdown %.4f in %6.2f min: %s\n", c.purpose.c_str(), c.chosen ? "yes" : "no", c.tool,
                         c.accessibility.value_or(NAN), c.semi_rough_mm2.value_or(NAN), c.stepdown.value_or(NAN) / kInch, c.minutes.value_or(NAN),
@@ -105,8 +107,8 @@ TEST_P(LuoTools, ThirdLayer) {
     EXPECT_NEAR(choice.record.rough_stepdown, 0.191 * kInch, 0.001 * kInch);
 }
 
-INSTANTIATE_TEST_SUITE_P(Accessibility, LuoTools, testing::Values(Source::tables),
-                         [](const auto& source) { return source.param == Source::tables ? "tables" : ""; });
+INSTANTIATE_TEST_SUITE_P(Accessibility, LuoTools, testing::Values(Source::tables, Source::printed),
+                         [](const auto& source) { return source.param == Source::printed ? "printed" : "tables"; });
 
 }  // namespace
 }  // namespace slabwright

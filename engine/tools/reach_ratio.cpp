@@ -1,0 +1,46 @@
+#include "engine/tools/reach_ratio.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/access/printed_accessibility.h"
+
+namespace slabwright {
+
+namespace {
+
+ToolShape shape_of(const Tool& tool) {
+    ToolShape shape;
+    shape.profile = tool.kind == ToolKind::ball ? ToolShape::Profile::ball : ToolShape::Profile::flat;
+    shape.radius = tool.diameter / 2;
+    shape.flute_length = tool.flute_length;
+    shape.shank_radius = tool.shank_diameter / 2;
+    shape.stickout = tool.stickout;
+    shape.holder_radius = tool.holder_diameter / 2;
+    return shape;
+}
+
+}  // namespace
+
+ReachRatio reach_ratio(Context& context, const LayerJob& layer, const AccessScene* scene) {
+    if (layer.job->selection.accessibility == AccessRule::sections) return {};
+    return [&context, &layer, scene](const Tool& tool) {
+        const Job& job = *layer.job;
+        if (job.selection.accessibility == AccessRule::printed)
+            return printed_accessibility(context, layer.mesh, layer.z_bottom, layer.z_top, tool.diameter / 2, job.selection.overlap_weight).ratio();
+        auto ratio = [&](const Tool& t) {
+            AccessOptions options;
+            // What finish passes may leave is no reason to call a place out of reach.
+            options.tolerance = job.tolerances.cusp;
+            options.lowest_tip = layer.floor_below;
+            return scene->accessible(context, layer.z_bottom, layer.z_top, shape_of(t), options).ratio();
+        };
+        double share = ratio(tool);
+        if (tool.kind == ToolKind::ball && share < job.selection.threshold)
+            for (const Tool& twin : job.tools)
+                if (twin.kind == ToolKind::flat && std::abs(twin.diameter - tool.diameter) < 1e-3) share = std::max(share, ratio(twin));
+        return share;
+    };
+}
+
+}  // namespace slabwright
