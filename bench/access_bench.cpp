@@ -1,0 +1,204 @@
+// How many questions a second accessibility asks of Embree (nearest surface within the cutter, height over its axis), all of its own work
+// counted, and how many Embree answers at best: the same places, in the same order, with float arithmetic and nothing around it.
+#include <benchmark/benchmark.h>
+
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "kernels/access/accessibility.h"
+#include "kernels/access/triangle.h"
+#include "kernels/mesh/weld.h"
+#include "tests/data/models.h"
+
+namespace {
+
+using namespace slabwright;
+
+constexpr double kRadius = 3.175, kLow = 2, kHigh = 18, kInset = 0.02;
+
+struct Place {
+    Vec3f centre;
+    std::uint64_t code;
+};
+
+/// A pattern of 290 mm, and the places of a ball in contact at the points that accessibility tests on it.
+struct Model {
+    Mesh mesh;
+    std::vector<Place> places;
+};
+
+Model make_model(std::uint64_t facets) {
+    Context context;
+    std::vector<Facet> corners;
+    metre_pattern({.size_mm = 290, .height_mm = 29, .facets = facets}, [&](const Facet& f) { corners.push_back(f); });
+    Model model;
+    model.mesh = weld(context, corners);
+    for (const Index3& f : model.mesh.facets) {
+        Point3 t[3];
+        for (int k = 0; k < 3; ++k) t[k] = {model.mesh.vertices[f[k]].x, model.mesh.vertices[f[k]].y, model.mesh.vertices[f[k]].z};
+        const auto [low, high] = std::minmax({t[0][2], t[1][2], t[2][2]});
+        if (low < kLow || high > kHigh) continue;
+        const double ux = t[1][0] - t[0][0], uy = t[1][1] - t[0][1], uz = t[1][2] - t[0][2];
+        const double vx = t[2][0] - t[0][0], vy = t[2][1] - t[0][1], vz = t[2][2] - t[0][2];
+        double n[3] = {uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx};
+        const double l = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        if (!(l > 0) || n[2] < 0) continue;
+        auto cell = [](double v) { return static_cast<std::uint32_t>(std::clamp(v / 400 + 0.5, 0.0, 1.0) * ((1 << 21) - 1)); };
+        const std::uint64_t code =
+            morton(cell((t[0][0] + t[1][0] + t[2][0]) / 3), cell((t[0][1] + t[1][1] + t[2][1]) / 3), cell((t[0][2] + t[1][2] + t[2][2]) / 3));
+        for (int i = 0; i < 4; ++i) {
+            double w[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3};
+            if (i > 0) {
+                for (double& v : w) v = kInset / 2;
+                w[i - 1] = 1 - kInset;
+            }
+            float p[3];
+            for (int c = 0; c < 3; ++c) p[c] = static_cast<float>(w[0] * t[0][c] + w[1] * t[1][c] + w[2] * t[2][c] + (kRadius + 0.01) * n[c] / l);
+            model.places.push_back({{p[0], p[1], p[2]}, code});
+        }
+    }
+    std::stable_sort(model.places.begin(), model.places.end(), [](const Place& a, const Place& b) { return a.code < b.code; });
+    if (model.places.empty()) {
+        std::fprintf(stderr, "access_bench: the pattern has no facets in the layer\n");
+        std::exit(1);
+    }
+    return model;
+}
+
+const Model& model(std::uint64_t facets) {
+    static std::map<std::uint64_t, Model> made;
+    const auto it = made.find(facets);
+    return it != made.end() ? it->second : made.emplace(facets, make_model(facets)).first->second;
+}
+
+struct Closest {
+    const Mesh* mesh;
+    Vec3f p;
+    float squared;
+};
+
+/// The nearest point of a triangle by regions, as Embree's own tutorial computes it.
+bool closest(RTCPointQueryFunctionArguments* args) {
+    auto& state = *static_cast<Closest*>(args->userPtr);
+    const Index3& f = state.mesh->facets[args->primID];
+    auto sub = [](Vec3f a, Vec3f b) { return Vec3f{a.x - b.x, a.y - b.y, a.z - b.z}; };
+    auto dot = [](Vec3f a, Vec3f b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
+    const Vec3f a = state.mesh->vertices[f[0]], b = state.mesh->vertices[f[1]], c = state.mesh->vertices[f[2]];
+    const Vec3f ab = sub(b, a), ac = sub(c, a), ap = sub(state.p, a), bp = sub(state.p, b), cp = sub(state.p, c);
+    const float d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
+    float v = 0, w = 0;
+    const float vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
+    if (d1 <= 0 && d2 <= 0) v = w = 0;
+    else if (d3 >= 0 && d4 <= d3) v = 1;
+    else if (vc <= 0 && d1 >= 0 && d3 <= 0) v = d1 / (d1 - d3);
+    else if (d6 >= 0 && d5 <= d6) w = 1;
+    else if (vb <= 0 && d2 >= 0 && d6 <= 0) w = d2 / (d2 - d6);
+    else if (va <= 0 && d4 >= d3 && d5 >= d6) w = (d4 - d3) / ((d4 - d3) + (d5 - d6)), v = 1 - w;
+    else v = vb / (va + vb + vc), w = vc / (va + vb + vc);
+    const Vec3f q{ap.x - v * ab.x - w * ac.x, ap.y - v * ab.y - w * ac.y, ap.z - v * ab.z - w * ac.z};
+    const float d = dot(q, q);
+    if (d >= state.squared) return false;
+    state.squared = d;
+    args->query->radius = std::sqrt(d);
+    return true;
+}
+
+/// Arguments: facets. One thread.
+void bare_embree(benchmark::State& state) {
+    const Model& m = model(static_cast<std::uint64_t>(state.range(0)));
+    RTCDevice device = rtcNewDevice(nullptr);
+    RTCScene scene = rtcNewScene(device);
+    rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    std::copy(
+        m.mesh.vertices.begin(), m.mesh.vertices.end(),
+        static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), m.mesh.vertices.size())));
+    std::copy(
+        m.mesh.facets.begin(), m.mesh.facets.end(),
+        static_cast<Index3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Index3), m.mesh.facets.size())));
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(scene);
+    std::uint64_t met = 0;
+    for (auto _ : state) {
+        met = 0;
+        for (const Place& place : m.places) {
+            const auto radius = static_cast<float>(kRadius - 0.01);
+            Closest nearest{&m.mesh, place.centre, radius * radius};
+            RTCPointQuery query{place.centre.x, place.centre.y, place.centre.z, 0, radius};
+            RTCPointQueryContext stack;
+            rtcInitPointQueryContext(&stack);
+            rtcPointQuery(scene, &query, &stack, &closest, &nearest);
+            met += nearest.squared < radius * radius;
+            RTCRayHit ray{};
+            ray.ray.org_x = place.centre.x, ray.ray.org_y = place.centre.y, ray.ray.org_z = static_cast<float>(kHigh);
+            ray.ray.dir_z = -1;
+            ray.ray.tfar = std::numeric_limits<float>::infinity();
+            ray.ray.mask = 0xFFFFFFFFu;
+            ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+#if defined(RTC_VERSION_MAJOR) && RTC_VERSION_MAJOR >= 4
+            rtcIntersect1(scene, &ray);
+#else
+            RTCIntersectContext context;
+            rtcInitIntersectContext(&context);
+            rtcIntersect1(scene, &context, &ray);
+#endif
+            met += ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+        }
+        benchmark::DoNotOptimize(met);
+    }
+    rtcReleaseScene(scene);
+    rtcReleaseDevice(device);
+    state.counters["asked"] = static_cast<double>(2 * m.places.size());
+    state.counters["asked/s"] = benchmark::Counter(static_cast<double>(2 * m.places.size()), benchmark::Counter::kIsIterationInvariantRate);
+}
+
+/// Arguments: facets, threads, profile (0 flat, 1 ball, 2 bull nose). Without refinement on borders, so that points are those of the facets.
+void accessibility(benchmark::State& state) {
+    const Model& m = model(static_cast<std::uint64_t>(state.range(0)));
+    Context context({.threads = static_cast<int>(state.range(1))});
+    const AccessScene scene(context, m.mesh.view());
+    ToolShape tool{.profile = static_cast<ToolShape::Profile>(state.range(2)), .radius = kRadius, .corner_radius = 1};
+    AccessOptions options;
+    options.spacing = 1000;
+    options.accuracy = 1;
+    Accessibility result;
+    for (auto _ : state) {
+        result = scene.accessible(context, kLow, kHigh, tool, options);
+        if (!(result.area > 0)) {
+            std::fprintf(stderr, "access_bench: nothing is to be machined\n");
+            std::exit(1);
+        }
+    }
+    const double asked = static_cast<double>(result.queries + result.rays);
+    state.counters["AR"] = result.ratio();
+    state.counters["points/s"] = benchmark::Counter(static_cast<double>(result.points), benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["asked/point"] = asked / static_cast<double>(result.points);
+    state.counters["asked/s"] = benchmark::Counter(asked, benchmark::Counter::kIsIterationInvariantRate);
+}
+
+}  // namespace
+
+BENCHMARK(bare_embree)->Arg(100'000)->Arg(1'000'000)->Unit(benchmark::kMillisecond);
+BENCHMARK(accessibility)
+    ->ArgNames({"facets", "threads", "profile"})
+    ->Args({100'000, 1, 1})
+    ->Args({1'000'000, 1, 1})
+    ->Args({1'000'000, 2, 1})
+    ->Args({1'000'000, 1, 0})
+    ->Args({1'000'000, 1, 2})
+    ->Unit(benchmark::kMillisecond);
+
+BENCHMARK_MAIN();
