@@ -14,6 +14,7 @@
 #include <cstdlib>
 #include <limits>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "kernels/access/accessibility.h"
@@ -32,18 +33,57 @@ struct Place {
     std::uint64_t code;
 };
 
-/// A pattern of 290 mm, and the places of a ball in contact at the points that accessibility tests on it.
+/// A mesh, and the places of a ball in contact at the points that accessibility tests on it.
 struct Model {
     Mesh mesh;
     std::vector<Place> places;
 };
 
-Model make_model(std::uint64_t facets) {
+/// A closed relief of about `facets` facets, 290 mm wide: waves that the ball reaches everywhere.
+Mesh make_relief(Context& context, std::uint64_t facets) {
+    const auto n = static_cast<std::uint32_t>(std::sqrt(static_cast<double>(facets) / 2));
+    const std::uint32_t row = n + 1, foot = row * row;
+    Mesh mesh;
+    for (std::uint32_t j = 0; j < row; ++j)
+        for (std::uint32_t i = 0; i < row; ++i) {
+            const double x = 290.0 * i / n, y = 290.0 * j / n;
+            mesh.vertices.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(10 + 5 * std::sin(x / 17) * std::cos(y / 19))});
+        }
+    for (std::uint32_t j = 0; j < n; ++j)
+        for (std::uint32_t i = 0; i < n; ++i) {
+            const std::uint32_t a = j * row + i, b = a + 1, c = b + row, d = a + row;
+            mesh.facets.push_back({a, b, c});
+            mesh.facets.push_back({a, c, d});
+        }
+    // The sides stand on the border's shadow on the ground, and the bottom is a fan about its middle.
+    std::vector<std::uint32_t> border;
+    for (std::uint32_t i = 0; i < n; ++i) border.push_back(i);
+    for (std::uint32_t i = 0; i < n; ++i) border.push_back(i * row + n);
+    for (std::uint32_t i = n; i > 0; --i) border.push_back(n * row + i);
+    for (std::uint32_t i = n; i > 0; --i) border.push_back(i * row);
+    for (const std::uint32_t v : border) mesh.vertices.push_back({mesh.vertices[v].x, mesh.vertices[v].y, 0});
+    const auto middle = static_cast<std::uint32_t>(mesh.vertices.size()), count = static_cast<std::uint32_t>(border.size());
+    mesh.vertices.push_back({145, 145, 0});
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const std::uint32_t k = (i + 1) % count, a = foot + i, b = foot + k;
+        mesh.facets.push_back({a, b, border[k]});
+        mesh.facets.push_back({a, border[k], border[i]});
+        mesh.facets.push_back({a, middle, b});
+    }
+    pair_edges(context, mesh);
+    return mesh;
+}
+
+Model make_model(std::uint64_t facets, bool relief) {
     Context context;
-    std::vector<Facet> corners;
-    metre_pattern({.size_mm = 290, .height_mm = 29, .facets = facets}, [&](const Facet& f) { corners.push_back(f); });
     Model model;
-    model.mesh = weld(context, corners);
+    if (relief) {
+        model.mesh = make_relief(context, facets);
+    } else {
+        std::vector<Facet> corners;
+        metre_pattern({.size_mm = 290, .height_mm = 29, .facets = facets}, [&](const Facet& f) { corners.push_back(f); });
+        model.mesh = weld(context, corners);
+    }
     for (const Index3& f : model.mesh.facets) {
         Point3 t[3];
         for (int k = 0; k < 3; ++k) t[k] = {model.mesh.vertices[f[k]].x, model.mesh.vertices[f[k]].y, model.mesh.vertices[f[k]].z};
@@ -76,10 +116,11 @@ Model make_model(std::uint64_t facets) {
     return model;
 }
 
-const Model& model(std::uint64_t facets) {
-    static std::map<std::uint64_t, Model> made;
-    const auto it = made.find(facets);
-    return it != made.end() ? it->second : made.emplace(facets, make_model(facets)).first->second;
+const Model& model(std::int64_t facets, std::int64_t relief) {
+    static std::map<std::pair<std::int64_t, std::int64_t>, Model> made;
+    const std::pair key(facets, relief);
+    const auto it = made.find(key);
+    return it != made.end() ? it->second : made.emplace(key, make_model(static_cast<std::uint64_t>(facets), relief != 0)).first->second;
 }
 
 struct Closest {
@@ -114,9 +155,9 @@ bool closest(RTCPointQueryFunctionArguments* args) {
     return true;
 }
 
-/// Arguments: facets. One thread.
+/// Arguments: facets, and whether of the relief or of the pattern. One thread.
 void bare_embree(benchmark::State& state) {
-    const Model& m = model(static_cast<std::uint64_t>(state.range(0)));
+    const Model& m = model(state.range(0), state.range(1));
     RTCDevice device = rtcNewDevice(nullptr);
     RTCScene scene = rtcNewScene(device);
     rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
@@ -165,12 +206,12 @@ void bare_embree(benchmark::State& state) {
     state.counters["asked/s"] = benchmark::Counter(static_cast<double>(2 * m.places.size()), benchmark::Counter::kIsIterationInvariantRate);
 }
 
-/// Arguments: facets, threads, profile (0 flat, 1 ball, 2 bull nose). Without refinement on borders, so that points are those of the facets.
+/// Arguments: facets, relief, threads, profile (0 flat, 1 ball, 2 bull nose). Without refinement on borders, so that points are those of the facets.
 void accessibility(benchmark::State& state) {
-    const Model& m = model(static_cast<std::uint64_t>(state.range(0)));
-    Context context({.threads = static_cast<int>(state.range(1))});
+    const Model& m = model(state.range(0), state.range(1));
+    Context context({.threads = static_cast<int>(state.range(2))});
     const AccessScene scene(context, m.mesh.view());
-    ToolShape tool{.profile = static_cast<ToolShape::Profile>(state.range(2)), .radius = kRadius, .corner_radius = 1};
+    ToolShape tool{.profile = static_cast<ToolShape::Profile>(state.range(3)), .radius = kRadius, .corner_radius = 1};
     AccessOptions options;
     options.spacing = 1000;
     options.accuracy = 1;
@@ -191,14 +232,14 @@ void accessibility(benchmark::State& state) {
 
 }  // namespace
 
-BENCHMARK(bare_embree)->Arg(100'000)->Arg(1'000'000)->Unit(benchmark::kMillisecond);
+BENCHMARK(bare_embree)->ArgNames({"facets", "relief"})->Args({200'000, 1})->Args({200'000, 0})->Unit(benchmark::kMillisecond);
 BENCHMARK(accessibility)
-    ->ArgNames({"facets", "threads", "profile"})
-    ->Args({100'000, 1, 1})
-    ->Args({1'000'000, 1, 1})
-    ->Args({1'000'000, 2, 1})
-    ->Args({1'000'000, 1, 0})
-    ->Args({1'000'000, 1, 2})
+    ->ArgNames({"facets", "relief", "threads", "profile"})
+    ->Args({200'000, 1, 1, 1})
+    ->Args({200'000, 0, 1, 1})
+    ->Args({200'000, 1, 1, 0})
+    ->Args({200'000, 1, 1, 2})
+    ->Args({200'000, 1, 2, 1})
     ->Unit(benchmark::kMillisecond);
 
 BENCHMARK_MAIN();

@@ -217,6 +217,10 @@ struct Depth {
 // belongs to the tool wherever the tool goes, so the depth in that ball is a lower bound.
 Depth depth_of(const Point3& q, const Places& at, const Envelope& e) {
     const double dx = q[0] - at.x, dy = q[1] - at.y, d = std::sqrt(dx * dx + dy * dy), z = q[2] - at.tip - e.low - e.rounding;
+    if (e.core == 0 && e.sin_taper == 0) {  // a ball under its own cylinder: no more than the distance from its axis or centre
+        const double fall = std::min(0.0, z), far = std::sqrt(d * d + fall * fall);
+        return far > 0 ? Depth{e.rounding - far, {dx / far, dy / far, fall / far}, far} : Depth{e.rounding, {}, 0};
+    }
     const double ex = d > 0 ? dx / d : 1, ey = d > 0 ? dy / d : 0;
     auto depth = [&](double mm, double out, double rise, double bend) { return Depth{mm, {out * ex, out * ey, rise}, bend}; };
     const double beyond = d - e.core, off = beyond * e.cos_taper - z * e.sin_taper, up_flank = beyond * e.sin_taper + z * e.cos_taper;
@@ -256,6 +260,7 @@ bool rules_out(const Depth& depth, const Places& at) {
 /// Whether two obstacles on different sides of the tool leave no room between them: the deeper of two depths is at least any
 /// weighted mean of them, and the weights may let their changes cancel.
 bool rule_out(const Proof& a, const Proof& b, double tolerance) {
+    if (std::max(a.floor, b.floor) <= tolerance) return false;
     auto mean = [&](double w) {
         return w * a.floor + (1 - w) * b.floor - std::abs(w * a.by_l + (1 - w) * b.by_l) - std::abs(w * a.by_s + (1 - w) * b.by_s) > tolerance;
     };
@@ -297,26 +302,30 @@ struct Probe {
     /// @returns whether it came nearer
     bool look(std::uint32_t f) {
         const Triangle facet = scene->triangle(f);
+        const double high = std::max({facet[0][2], facet[1][2], facet[2][2]});
+        if (high <= top) return look(facet);
         if (std::min({facet[0][2], facet[1][2], facet[2][2]}) >= top) return false;
         const Below parts = below(facet, top);
         bool nearer = false;
-        for (int i = 0; i < parts.n; ++i) {
-            const Triangle& t = parts.t[i];
-            Point3 q;
-            if (ball && !hanging) {
-                const double d2 = squared_distance(centre, t, q);
-                if (d2 >= nearest2) continue;
-                nearest2 = d2;
-                nearer = true;
-            } else if (level) {
-                const double reach = fine.radius;
-                if (!(nearest_over({at->x, at->y, at->tip + fine.low}, t, q) < reach)) continue;
-            } else {
-                if (!pokes(t, at->x, at->y, at->tip, fine, q)) continue;
-            }
-            take(q);
-        }
+        for (int i = 0; i < parts.n; ++i) nearer = look(parts.t[i]) || nearer;
         return nearer;
+    }
+    bool look(const Triangle& t) {
+        Point3 q;
+        if (ball && !hanging) {
+            const double d2 = squared_distance(centre, t, q);
+            if (d2 >= nearest2) return false;
+            nearest2 = d2;
+            take(q);
+            return true;
+        }
+        if (level) {
+            if (!(nearest_over({at->x, at->y, at->tip + fine.low}, t, q) < fine.radius)) return false;
+        } else {
+            if (!pokes(t, at->x, at->y, at->tip, fine, q)) return false;
+        }
+        take(q);
+        return false;
     }
 };
 
@@ -515,7 +524,9 @@ private:
             }
             if (probe.ruled_out) return Verdict::ruled_out;
             if (probe.found) {
-                if (part == 0 && at.spread > 0 && remembered_rule_out(at)) return Verdict::ruled_out;
+                if (part == 0 && at.spread > 0)
+                    for (std::size_t i = 0; i < probe.count; ++i)
+                        if (paired_rule_out(probe.obstacles[i].depth, at)) return Verdict::ruled_out;
                 free = false;
                 continue;
             }
@@ -529,11 +540,9 @@ private:
             }
             if (std::min(e.radius, highest - at.tip - e.low) <= tolerance) continue;
             const Point3 over{at.x, at.y, highest};
-            if (rules_out(depth_of(over, at, e), at)) return Verdict::ruled_out;
-            if (part == 0 && at.spread > 0) {
-                remember(over);
-                if (remembered_rule_out(at)) return Verdict::ruled_out;
-            }
+            const Depth buried = depth_of(over, at, e);
+            if (part == 0 && at.spread > 0) remember(over);
+            if (rules_out(buried, at) || (part == 0 && paired_rule_out(buried, at))) return Verdict::ruled_out;
             free = false;
         }
         return free ? Verdict::free : Verdict::too_deep;
@@ -567,29 +576,37 @@ private:
         obstacles_.insert(obstacles_.begin(), obstacle);
     }
 
-    /// By obstacles met before, alone or in pairs.
+    /// By obstacles met before, alone or in pairs. Keeps what they prove for the ones that are yet to be met here.
     bool remembered_rule_out(const Places& at) {
-        std::array<Proof, kObstacles> proofs;
-        std::size_t n = 0;
+        proven_ = 0;
         for (std::size_t i = 0; i < obstacles_.size(); ++i) {
             const Depth depth = depth_of(obstacles_[i], at, q_.tool[0]);
-            if (depth.mm <= q_.options.tolerance - at.spread) continue;
+            if (depth.mm <= at.tolerance - at.spread) continue;
             if (rules_out(depth, at)) {
                 std::rotate(obstacles_.begin(), obstacles_.begin() + static_cast<std::ptrdiff_t>(i),
                             obstacles_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
                 return true;
             }
-            proofs[n++] = proof_of(depth, at);
+            proofs_[proven_++] = proof_of(depth, at);
         }
-        for (std::size_t i = 0; i < n; ++i)
-            if (proofs[i].floor > q_.options.tolerance)  // of a mean over the tolerance one at least is over it
-                for (std::size_t k = 0; k < n; ++k)
-                    if (rule_out(proofs[i], proofs[k], q_.options.tolerance)) return true;
+        for (std::size_t i = 1; i < proven_; ++i)
+            for (std::size_t k = 0; k < i; ++k)
+                if (rule_out(proofs_[i], proofs_[k], at.tolerance)) return true;
+        return false;
+    }
+    /// By an obstacle met just now and one of the others.
+    bool paired_rule_out(const Depth& depth, const Places& at) {
+        const Proof proof = proof_of(depth, at);
+        for (std::size_t k = 0; k < proven_; ++k)
+            if (rule_out(proof, proofs_[k], at.tolerance)) return true;
+        if (proven_ < proofs_.size()) proofs_[proven_++] = proof;
         return false;
     }
 
     const Question& q_;
     std::vector<Point3> obstacles_;
+    std::array<Proof, 2 * kObstacles> proofs_;  ///< of the obstacles known, about the patch in hand
+    std::size_t proven_ = 0;
     std::vector<Patch> stack_;
     double l_ = -1, phi_ = 0;  ///< where the last point was found
 };

@@ -30,7 +30,10 @@ bool edge_pokes(const Point3& p, const Point3& q, const Envelope& e, Point3& at)
         at = {p[0] + t * dx, p[1] + t * dy, z(t)};
         return true;
     };
-    auto distance = [&](double t) { return std::min(e.radius, std::hypot(p[0] + t * dx, p[1] + t * dy)); };
+    auto distance = [&](double t) {
+        const double x = p[0] + t * dx, y = p[1] + t * dy;
+        return std::min(e.radius, std::sqrt(x * x + y * y));
+    };
     // Height over the under side, and its derivative along the edge.
     auto over = [&](double t) { return z(t) - e.height(distance(t)); };
     auto rise = [&](double t) {
@@ -79,7 +82,7 @@ bool pokes(const Triangle& triangle, double x, double y, double tip_z, const Env
     const double vx = t[2][0] - t[0][0], vy = t[2][1] - t[0][1], vz = t[2][2] - t[0][2];
     const double nz = ux * vy - uy * vx;
     if (nz != 0) {
-        const double gx = -(uy * vz - uz * vy) / nz, gy = -(uz * vx - ux * vz) / nz, steep = std::hypot(gx, gy);
+        const double gx = -(uy * vz - uz * vy) / nz, gy = -(uz * vx - ux * vz) / nz, steep = std::sqrt(gx * gx + gy * gy);
         double px = 0, py = 0, d = 0;
         if (steep > 0) {
             const double sine = steep / std::sqrt(1 + steep * steep);
