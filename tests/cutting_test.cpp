@@ -7,6 +7,8 @@
 
 #include "kernels/cutting/drop.h"
 #include "kernels/cutting/level_contours.h"
+#include "kernels/mesh/weld.h"
+#include "tests/mesh_shapes.h"
 #include "tests/support/height_field.h"
 
 namespace slabwright {
@@ -162,6 +164,28 @@ TEST_P(Cutting, DropRestsOnThePart) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Random, Cutting, testing::Combine(testing::Range(1, 7), testing::Values(Cutter::Profile::ball, Cutter::Profile::flat)));
+
+// A flange whose underside float32 puts a hair under the layer's top is no part of the layer: neither are its facets there, nor may its
+// section be, or the contours around it would run off the grid.
+TEST(Fibres, AFlangeThatBeginsAtTheTopIsNoneOfTheLayer) {
+    Context context;
+    shapes::Facets facets = shapes::box({10, 10, 0}, {20, 20, 10});
+    for (const auto& f : shapes::box({-30, -30, 9.9996F}, {60, 60, 15})) facets.push_back(f);
+    const Mesh mesh = weld(context, facets);
+    const LayerSolid solid = layer_solid(context, mesh.view(), 0, 10);
+    const Cutter cutter{Cutter::Profile::ball, 3.0};
+    for (const double tip : {4.0, 6.9999, 7.5, 9.5}) {
+        const Plane plane = inside_plane(solid, cutter, tip);
+        const Contours contours =
+            level_contours(context, solid, slice(context, mesh.view(), {&plane, 1})[0].loops, cutter, tip, fibre_grid(solid, cutter, 2500));
+        ASSERT_EQ(contours.size(), 1U) << tip;
+        const double reach = 3 - std::max(0.0, tip - 7), half = std::sqrt(9 - (3 - reach) * (3 - reach));
+        for (const Point2 p : contours.points) {
+            EXPECT_GE(to_mm(p.x), 10 - half - 0.01);
+            EXPECT_LE(to_mm(p.x), 20 + half + 0.01);
+        }
+    }
+}
 
 TEST(Fibres, SameBytesOnAnyNumberOfThreads) {
     std::vector<Contours> results;

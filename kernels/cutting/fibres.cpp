@@ -243,15 +243,16 @@ Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& insi
 
 Plane inside_plane(const LayerSolid& solid, const Cutter& cutter, double tip_z) {
     const double z = cutter.profile == Cutter::Profile::ball ? tip_z + cutter.radius : tip_z;
-    // Above the layer's top only a ball's cap still matters: over the top's inside it is forbidden as long as it dips below.
-    if (z < solid.z_top) return {z, Side::above};
-    return {solid.z_top, Side::below};
+    // Above the solid's upper end only a ball's cap still matters: over the end's inside it is forbidden as long as it dips below.
+    const double end = solid.z_top - kTopSheet;
+    if (z < end) return {z, Side::above};
+    return {end, Side::below};
 }
 
 Fibres fibres(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z, Axis axis,
               std::span<const std::int32_t> lines) {
     const Loops none;
-    const Loops& region = tip_z < solid.z_top ? inside : none;  // a tip above the top stands clear of everything
+    const Loops& region = tip_z < solid.z_top - kTopSheet ? inside : none;  // a tip above the upper end stands clear of everything
     return axis == Axis::x ? fibres_along<0, 1>(context, solid, region, cutter, tip_z, lines)
                            : fibres_along<1, 0>(context, solid, region, cutter, tip_z, lines);
 }

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 
+#include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -108,6 +110,15 @@ Contours level_contours(Context& context, const LayerSolid& solid, const Loops& 
     const std::size_t columns = grid.x.size(), rows = grid.y.size();
     std::vector<std::vector<NodeRange>> node_rows(rows);
     for (std::size_t j = 0; j < rows; ++j) node_rows[j] = forbidden_nodes(along_x.line(j), grid.x);
+
+    // The border is followed from cell to cell, so it has to close within the grid.
+    for (std::size_t j = 0; j < rows; ++j) {
+        const std::vector<NodeRange>& r = node_rows[j];
+        if (!r.empty() && (j == 0 || j + 1 == rows || r.front().first == 0 || r.back().last == columns))
+            throw Error(ErrorKind::no_plan, "contours.open", "what a cutter must keep out of reaches past the layer's facets",
+                        "y " + std::to_string(grid.y[j] / 10000) + " mm, tip " + std::to_string(static_cast<long>(tip_z)) + " mm",
+                        "check the mesh with slabwright inspect, and report this");
+    }
 
     Lines on_rows, on_columns;
     for (std::size_t j = 0; j < rows; ++j) {
