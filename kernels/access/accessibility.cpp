@@ -366,9 +366,9 @@ struct Question {
 };
 
 Question ask(const Scene& scene, double z_low, double z_high, const ToolShape& tool, const AccessOptions& options) {
-    if (!(options.tolerance > 0) || !(options.spacing > 0) || !(options.accuracy > 0) || !std::isfinite(options.tolerance) ||
+    if (!(options.tolerance > 0) || !(options.spacing >= 0) || !(options.accuracy > 0) || !std::isfinite(options.tolerance) ||
         !std::isfinite(options.spacing))
-        throw Error(ErrorKind::usage, "access.options", "tolerance, spacing and accuracy of accessibility must be over 0");
+        throw Error(ErrorKind::usage, "access.options", "tolerance and accuracy of accessibility must be over 0, its spacing not under");
     Question q;
     q.scene = &scene;
     q.top = z_high - kTopSheet;
@@ -639,6 +639,10 @@ double halve(const Triangle& t, Triangle& a, Triangle& b) {
     return std::sqrt(length);
 }
 
+double longest_edge(const Triangle& t) {
+    return std::sqrt(std::max({squared_distance(t[0], t[1]), squared_distance(t[1], t[2]), squared_distance(t[2], t[0])}));
+}
+
 template <class F>
 void split_to(const Triangle& t, double edge, F&& f) {
     Triangle a, b;
@@ -661,14 +665,14 @@ struct Item {
     Point3 normal{};
 };
 
-/// What is to be machined: pieces no longer than some spacings, in the order of a space-filling curve, and their facets.
+/// What is to be machined: facets cut to the layer, in the order of a space-filling curve, and their facets.
 struct Work {
     std::vector<Item> items;
     std::vector<Piece> pieces;
     double undercut = 0;  ///< of facets that face down
 };
 
-Work collect(Context& context, const Scene& scene, double low, double high, double longest) {
+Work collect(Context& context, const Scene& scene, double low, double high) {
     struct Part {
         std::vector<Item> items;
         std::vector<Piece> pieces;
@@ -711,11 +715,10 @@ Work collect(Context& context, const Scene& scene, double low, double high, doub
             const auto item = static_cast<std::uint32_t>(part.items.size());
             bool any = false;
             for (int i = 0; i < count; ++i)
-                if (area_of(pieces[i]) > 0)
-                    split_to(pieces[i], longest, [&](const Triangle& piece) {
-                        part.pieces.push_back({piece, item});
-                        any = true;
-                    });
+                if (area_of(pieces[i]) > 0) {
+                    part.pieces.push_back({pieces[i], item});
+                    any = true;
+                }
             if (any) part.items.push_back({static_cast<std::uint32_t>(f), normal});
         }
     });
@@ -753,32 +756,46 @@ Work collect(Context& context, const Scene& scene, double low, double high, doub
     return work;
 }
 
+/// Of points that are tested together.
+struct Tally {
+    int points = 0, reached = 0, undercut = 0;
+    [[nodiscard]] bool agree() const { return reached == points || undercut == points || (reached == 0 && undercut == 0); }
+    [[nodiscard]] Areas share(double area) const {
+        const double each = area / points;
+        return {each * (points - undercut), each * reached, each * undercut};
+    }
+};
+
+void add_point(Tally& tally, Searcher& searcher, const Question& q, const Point3& p, const Point3& n) {
+    ++tally.points;
+    if (q.overhangs) {
+        ++searcher.counts.rays;
+        const double off = q.options.tolerance;
+        if (q.scene->overhung({p[0] + off * n[0], p[1] + off * n[1], p[2] + off * n[2]}, q.top)) {
+            ++tally.undercut;
+            return;
+        }
+    }
+    if (searcher.reaches(p, n)) ++tally.reached;
+}
+
+Point3 mixed(const Triangle& t, double a, double b, double c) {
+    Point3 p;
+    for (int k = 0; k < 3; ++k) p[k] = a * t[0][k] + b * t[1][k] + c * t[2][k];
+    return p;
+}
+Point3 middle_of(const Triangle& t) { return mixed(t, 1.0 / 3, 1.0 / 3, 1.0 / 3); }
+
 /// Tests a piece at its middle and just within its corners.
 Areas measure(Searcher& searcher, const Question& q, const Piece& piece, const Point3& n, bool& agree) {
-    int reached = 0, undercut = 0;
-    constexpr int points = 4;
-    for (int i = 0; i < points; ++i) {
-        double w[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3};
-        if (i > 0) {
-            for (double& v : w) v = kInset / 2;
-            w[i - 1] = 1 - kInset;
-        }
-        Point3 p{};
-        for (int c = 0; c < 3; ++c)
-            for (int k = 0; k < 3; ++k) p[k] += w[c] * piece.t[c][k];
-        if (q.overhangs) {
-            ++searcher.counts.rays;
-            const double off = q.options.tolerance;
-            if (q.scene->overhung({p[0] + off * n[0], p[1] + off * n[1], p[2] + off * n[2]}, q.top)) {
-                ++undercut;
-                continue;
-            }
-        }
-        if (searcher.reaches(p, n)) ++reached;
-    }
-    const double area = area_of(piece.t);
-    agree = reached == points || undercut == points || (reached == 0 && undercut == 0);
-    return {area * (points - undercut) / points, area * reached / points, area * undercut / points};
+    Tally tally;
+    add_point(tally, searcher, q, middle_of(piece.t), n);
+    constexpr double rest = kInset / 2;
+    add_point(tally, searcher, q, mixed(piece.t, 1 - kInset, rest, rest), n);
+    add_point(tally, searcher, q, mixed(piece.t, rest, 1 - kInset, rest), n);
+    add_point(tally, searcher, q, mixed(piece.t, rest, rest, 1 - kInset), n);
+    agree = tally.agree();
+    return tally.share(area_of(piece.t));
 }
 
 }  // namespace
@@ -821,7 +838,16 @@ bool AccessScene::reaches(double z_high, const Point3& point, const Point3& norm
 Accessibility AccessScene::accessible(Context& context, double z_low, double z_high, const ToolShape& tool, const AccessOptions& options) const {
     const Question question = ask(*impl_, z_low, z_high, tool, options);
     constexpr double tasks_per_edge = 16;  // pieces of a large facet that are handed out as one, by length
-    const Work work = collect(context, *impl_, z_low + kTopSheet, z_high - kTopSheet, options.spacing * tasks_per_edge);
+    Work work = collect(context, *impl_, z_low + kTopSheet, z_high - kTopSheet);
+    double surface = 0;
+    for (const Piece& piece : work.pieces) surface += area_of(piece.t);
+    const double spacing = options.spacing > 0 ? options.spacing : std::max(1.0, std::sqrt(surface) / 50);
+    {
+        std::vector<Piece> tasks;
+        for (const Piece& piece : work.pieces)
+            split_to(piece.t, spacing * tasks_per_edge, [&](const Triangle& t) { tasks.push_back({t, piece.item}); });
+        work.pieces.swap(tasks);
+    }
     std::vector<Areas> of_item(work.items.size());
     Counts counts;
 
@@ -829,41 +855,71 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
     struct Outcome {
         std::vector<std::pair<std::uint32_t, Areas>> decided;  // by item
         std::vector<Piece> border;
-        std::vector<Areas> shares;  // of the border's pieces
+        std::vector<Areas> shares;     // of the border's pieces
+        double mixed = 0, mixed2 = 0;  // areas of small pieces that were tested together and disagree, and their squares
         Counts counts;
     };
+    const double small = options.shares ? 0 : spacing * spacing / 2;
     auto run = [&](const std::vector<Piece>& pieces, double edge, bool whole) {
         std::vector<Outcome> outcomes((pieces.size() + kPiecesAtOnce - 1) / kPiecesAtOnce);
         parallel_for(context, pieces.size(), kPiecesAtOnce, [&](std::size_t begin, std::size_t end) {
             Outcome& outcome = outcomes[begin / kPiecesAtOnce];
             Searcher searcher(question);
+            auto decide = [&](std::uint32_t item, const Areas& areas) {
+                if (!outcome.decided.empty() && outcome.decided.back().first == item) outcome.decided.back().second.add(areas);
+                else outcome.decided.emplace_back(item, areas);
+            };
+            auto one = [&](const Piece& piece) {
+                if (context.cancelled()) return;
+                bool agree = false;
+                const Areas areas = measure(searcher, question, piece, work.items[piece.item].normal, agree);
+                if (agree) {
+                    decide(piece.item, areas);
+                } else {
+                    outcome.border.push_back(piece);
+                    outcome.shares.push_back(areas);
+                }
+            };
+            // Small pieces that follow one another are near to each other; four of them stand for all.
+            std::size_t first = begin;
+            double gathered = 0;
+            auto together = [&](std::size_t last) {
+                if (first < last && gathered > 0) {
+                    Tally tally;
+                    const std::size_t count = last - first, points = std::min<std::size_t>(4, count);
+                    for (std::size_t k = 0; k < points; ++k) {
+                        const Piece& piece = pieces[first + (2 * k + 1) * count / (2 * points)];
+                        add_point(tally, searcher, question, middle_of(piece.t), work.items[piece.item].normal);
+                    }
+                    decide(pieces[first].item, tally.share(gathered));
+                    if (!tally.agree()) outcome.mixed += gathered, outcome.mixed2 += gathered * gathered;
+                }
+                gathered = 0;
+            };
             for (std::size_t i = begin; i < end; ++i) {
                 if (context.cancelled()) return;
-                auto one = [&](const Triangle& t) {
-                    if (context.cancelled()) return;
-                    const Piece piece{t, pieces[i].item};
-                    bool agree = false;
-                    const Areas areas = measure(searcher, question, piece, work.items[piece.item].normal, agree);
-                    if (agree) {
-                        if (!outcome.decided.empty() && outcome.decided.back().first == piece.item) outcome.decided.back().second.add(areas);
-                        else outcome.decided.emplace_back(piece.item, areas);
-                    } else {
-                        outcome.border.push_back(piece);
-                        outcome.shares.push_back(areas);
-                    }
-                };
-                if (whole) {
-                    split_to(pieces[i].t, edge, one);
-                } else {
+                const Piece& piece = pieces[i];
+                if (!whole) {
                     Triangle half[2], quarter[2];
-                    halve(pieces[i].t, half[0], half[1]);
+                    halve(piece.t, half[0], half[1]);
                     for (const Triangle& h : half) {
                         halve(h, quarter[0], quarter[1]);
-                        one(quarter[0]);
-                        one(quarter[1]);
+                        one({quarter[0], piece.item});
+                        one({quarter[1], piece.item});
                     }
+                    continue;
                 }
+                const double area = area_of(piece.t);
+                if (area < small && longest_edge(piece.t) <= edge) {
+                    if (gathered == 0) first = i;
+                    gathered += area;
+                    if (gathered >= small) together(i + 1);
+                    continue;
+                }
+                together(i);
+                split_to(piece.t, edge, [&](const Triangle& t) { one({t, piece.item}); });
             }
+            together(end);
             outcome.counts = searcher.counts;
         });
         context.throw_if_cancelled();
@@ -873,29 +929,36 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
     std::vector<Piece> border = work.pieces;
     std::vector<Areas> shares;
     double total = 0;
-    double on_border = 0;
+    double on_border = 0, disagreeing = 0, disagreeing2 = 0;
     for (int level = 0; level < kMostLevels && !border.empty(); ++level) {
-        std::vector<Outcome> outcomes = run(border, options.spacing, level == 0);
+        std::vector<Outcome> outcomes = run(border, spacing, level == 0);
         border.clear();
         shares.clear();
         on_border = 0;
+        double squares = 0;
         for (Outcome& outcome : outcomes) {
             for (const auto& [item, areas] : outcome.decided) {
                 of_item[item].add(areas);
                 total += areas.all;
             }
-            for (const Areas& areas : outcome.shares) on_border += areas.all + areas.undercut;
+            for (const Areas& areas : outcome.shares) {
+                const double area = areas.all + areas.undercut;
+                on_border += area;
+                squares += area * area;
+            }
             border.insert(border.end(), outcome.border.begin(), outcome.border.end());
             shares.insert(shares.end(), outcome.shares.begin(), outcome.shares.end());
+            disagreeing += outcome.mixed;
+            disagreeing2 += outcome.mixed2;
             counts.add(outcome.counts);
         }
-        if (on_border <= options.accuracy * (total + on_border)) break;
+        if (std::sqrt(squares + disagreeing2) / 2 <= options.accuracy * (total + on_border) || squares <= disagreeing2) break;
     }
     for (std::size_t i = 0; i < border.size(); ++i) of_item[border[i].item].add(shares[i]);
 
     Accessibility result;
     result.undercut = work.undercut;
-    result.uncertain = on_border;
+    result.uncertain = on_border + disagreeing;
     if (options.shares) result.share.assign(impl_->mesh.size(), -1.0f);
     for (std::size_t i = 0; i < of_item.size(); ++i) {
         const Areas& a = of_item[i];

@@ -21,9 +21,13 @@ namespace slabwright {
 
 struct AccessOptions {
     double tolerance = 0.01;  ///< mm, over 0; see above
-    double spacing = 2;       ///< mm: facets are tested in pieces no longer than this, at four points each
-    /// Pieces whose points disagree are halved until what is left of them is at most this share of the area; it goes into `uncertain`.
-    double accuracy = 0.02;
+    /// mm: facets are tested in pieces no longer than this, at four points each. Unless `shares` are asked for, pieces that are smaller than
+    /// half of its square are tested together with their neighbours, at four of their middles, so the work does not grow with the facets.
+    /// 0: a fiftieth of the square's side that is as large as the surface to be machined, 1 mm at least.
+    double spacing = 0;
+    /// Pieces whose points disagree are halved until the likely error of AR is at most this: each is wrong by half of its area, up or down, and
+    /// none knows of the others. What is left of them goes into `uncertain`.
+    double accuracy = 0.002;
     double lowest_tip = -std::numeric_limits<double>::infinity();  ///< mm: no tip goes lower (base board, flask)
     bool shares = false;                                           ///< fill Accessibility::share
 };
@@ -38,7 +42,7 @@ struct Accessibility {
     std::uint64_t points = 0, queries = 0, rays = 0;  ///< tested, and asked of Embree
     std::uint64_t undecided = 0;                      ///< points given up after 20000 places, counted as not reached
 
-    /// AR; 1 where nothing is to be machined. Its error is at most uncertain/area, unless a spot smaller than the spacing is missed.
+    /// AR; 1 where nothing is to be machined. Its error is at most uncertain/area, and likely some `accuracy`, unless a spot smaller than the spacing is missed.
     [[nodiscard]] double ratio() const { return area > 0 ? reached / area : 1; }
 };
 

@@ -29,7 +29,7 @@ using P3 = std::array<double, 3>;
 
 // What of a triangle lies between two heights.
 double area_between(const std::array<P3, 3>& t, double area, double low, double high) {
-    const auto [z0, z1] = std::minmax({t[0][2], t[1][2], t[2][2]});
+    const double z0 = std::min({t[0][2], t[1][2], t[2][2]}), z1 = std::max({t[0][2], t[1][2], t[2][2]});
     if (z0 >= low && z1 <= high) return area;
     // The share below a height is quadratic on either side of the middle corner.
     const double middle = t[0][2] + t[1][2] + t[2][2] - z0 - z1;
