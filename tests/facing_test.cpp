@@ -21,7 +21,7 @@ TEST(Facing, EveryCellOfAnyStockComesDownToTheTop) {
             layer.z_top = 10;
             layer.slab_thickness = 19;
             layer.stock_max = {width, depth};
-            const LayerCut cut{context, layer, job, LayerSolid{}, 19.0, {}, {}, 0.1};
+            const LayerCut cut{context, layer, job, LayerSolid{}, 19.0, {}, {}};
             const Operation op = face_layer(cut);
             ASSERT_FALSE(op.moves.empty());
             Stock stock({0.25, 0.25, 0.5, static_cast<int>(width / 0.5), static_cast<int>(depth / 0.5)});

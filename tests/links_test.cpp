@@ -34,7 +34,7 @@ struct Bench {
     Bench()
         : mesh(box(context)),
           layer(),
-          cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, {}, 0.1, nullptr, {}},
+          cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, {}, nullptr, {}},
           part(context, cut.solid, {Cutter::Profile::flat, 5}) {
         tool.diameter = 10;
         layer.mesh = mesh.view();

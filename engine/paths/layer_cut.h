@@ -9,6 +9,7 @@
 #include "engine/paths/paths.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/cutting/level_contours.h"
+#include "kernels/features/alpha_map.h"
 
 namespace slabwright {
 
@@ -27,7 +28,7 @@ struct LayerCut {
     [[nodiscard]] double high(int axis, double beyond) const;
     /// Smallest slope (radians from level) of the facets to be machined between z0 and z1 that are at least `steepest_flat`
     /// steep; π/2 where there are none.
-    [[nodiscard]] double least_slope(double z0, double z1, double at_least) const;
+    [[nodiscard]] double least_slope(double z0, double z1, double at_least) const { return alpha.least(z0, z1, at_least); }
     /// Sections of the mesh for the tip heights of a cutter, in their order.
     [[nodiscard]] std::vector<Section> insides(const Cutter& cutter, std::span<const double> tip_z) const;
     /// The contour of every level, levels in parallel.
@@ -37,8 +38,7 @@ struct LayerCut {
     /// Heights of the floors that the flat end mill finishes, descending: the highest vertex of each flat, for the facets of
     /// a flat may differ in their last bits. Flats within kSameFloor are one.
     std::vector<double> floors;
-    std::vector<std::vector<double>> slopes;  ///< by z bin: the slopes of its facets, ascending, thinned
-    double slope_bin = 0.1;                   ///< mm
+    AlphaMap alpha;  ///< from floor_below to the layer's top
 
     /// Drops of a cutter; made at the first call and kept. Call it from the layer's own thread only.
     [[nodiscard]] const DropIndex& drops(const Cutter& cutter) const;

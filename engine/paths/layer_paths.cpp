@@ -48,18 +48,6 @@ double LayerCut::high(int axis, double beyond) const {
     return std::min(layer.stock_max[axis] + beyond, 0.5 * (layer.stock_min[axis] + layer.stock_max[axis] + travel));
 }
 
-double LayerCut::least_slope(double z0, double z1, double at_least) const {
-    double least = std::numbers::pi / 2;
-    if (slopes.empty()) return least;
-    auto bin = [&](double z) { return std::clamp<long>(static_cast<long>((z - solid.z_low) / slope_bin), 0, static_cast<long>(slopes.size()) - 1); };
-    for (long b = bin(z0); b <= bin(z1); ++b) {
-        const auto& s = slopes[static_cast<std::size_t>(b)];
-        const auto it = std::lower_bound(s.begin(), s.end(), at_least);
-        if (it != s.end()) least = std::min(least, *it);
-    }
-    return least;
-}
-
 std::vector<Section> LayerCut::insides(const Cutter& cutter, std::span<const double> tip_z) const {
     std::vector<Plane> planes;
     for (const double z : tip_z) planes.push_back(inside_plane(solid, cutter, z));
@@ -129,27 +117,15 @@ void report_loose(const LayerCut& cut, LayerResult& result) {
 }  // namespace
 
 LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
-    LayerCut cut{
-        context, layer,   *layer.job, layer_solid(context, layer.mesh, layer.floor_below, layer.z_top), layer.z_bottom + layer.slab_thickness, {}, {},
-        0.1,     nullptr, {}};
-    // Slopes by height, rounded down to a tenth of a degree so that a bin holds few of them. Overhangs and level floors
-    // are not machined by slope.
-    cut.slopes.resize(static_cast<std::size_t>((layer.z_top - layer.floor_below) / cut.slope_bin) + 1);
-    constexpr double tenth = std::numbers::pi / 1800;
-    std::vector<std::vector<char>> seen(cut.slopes.size(), std::vector<char>(901, 0));
-    for (const SolidFacet& f : cut.solid.facets) {
-        if (f.normal[2] < 0 || f.normal[2] > 0.999999 || (f.normal[0] == 0 && f.normal[1] == 0)) continue;
-        const double alpha = std::acos(std::min(1.0, f.normal[2]));
-        const auto step = static_cast<std::size_t>(alpha / tenth);
-        auto bin = [&](double z) {
-            return std::clamp<long>(static_cast<long>((z - cut.solid.z_low) / cut.slope_bin), 0, static_cast<long>(cut.slopes.size()) - 1);
-        };
-        for (long b = bin(f.z_min); b <= bin(f.z_max); ++b) seen[static_cast<std::size_t>(b)][std::min<std::size_t>(900, step)] = 1;
-    }
-    for (std::size_t b = 0; b < seen.size(); ++b)
-        for (std::size_t s = 0; s < seen[b].size(); ++s)
-            if (seen[b][s]) cut.slopes[b].push_back(static_cast<double>(s) * tenth);
-
+    LayerCut cut{context,
+                 layer,
+                 *layer.job,
+                 layer_solid(context, layer.mesh, layer.floor_below, layer.z_top),
+                 layer.z_bottom + layer.slab_thickness,
+                 {},
+                 alpha_map(context, layer.mesh, layer.floor_below, layer.z_top),
+                 nullptr,
+                 {}};
     for (const Feature* flat : layer.flats) {
         double z = flat->z_low;
         for (const std::uint32_t f : flat->facets)
