@@ -214,6 +214,7 @@ void accessibility(benchmark::State& state) {
     ToolShape tool{.profile = static_cast<ToolShape::Profile>(state.range(3)), .radius = kRadius, .corner_radius = 1};
     AccessOptions options;
     options.spacing = 1000;
+    options.shares = true;  // every facet by itself
     options.accuracy = 1;
     Accessibility result;
     for (auto _ : state) {
