@@ -278,7 +278,10 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
         std::optional<LayerSelection> selection;
         if (selecting) {
             ToolChoice choice = select_tools(context, work, reach_ratio(context, work, scene ? &*scene : nullptr));
-            sets.emplace_back("selected", std::move(choice.tools));
+            // One narrow place may have decided for the whole layer: the next wider finish tool, with smaller ones in that place only.
+            if (const auto wider = next_wider_ball(job, choice.tools.finish); wider && job.selection.compare && !choice.record.vertical)
+                sets.emplace_back("wider", select_tools(context, work, {}, wider).tools);
+            sets.emplace(sets.begin(), "selected", std::move(choice.tools));
             selection = std::move(choice.record);
         }
         if (!selecting || job.selection.compare) sets.emplace_back("fixed", fixed);

@@ -167,6 +167,14 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             if (op.kind != OperationKind::face) stock.cut(cut, op, tools.rough);
         for (const Tool& semi : tools.semi_rough)
             take(cut_rest(cut, stock, semi, {OperationKind::semi_rough, "waste beside the roughing cutter", 1.0, true}));
+        // A tool between others is worth its change where much is left for it.
+        constexpr double kWasteWorthAChange = 1000, kCornersWorthAChange = 150;  // mm²
+        auto last_of_kind = [&](const Tool& tool) {
+            return std::none_of(&tool + 1, tools.rest.data() + tools.rest.size(), [&](const Tool& t) { return t.kind == tool.kind; });
+        };
+        for (const Tool& tool : tools.rest)
+            if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() && stock.area_over(1.0) > kWasteWorthAChange)
+                take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste beside the roughing cutter", 1.0, true}));
         take(cut_rest(cut, stock, tools.finish, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
         finish([&](Operation& op) {
             if (stock.cut(cut, op, tools.finish).few()) op.moves.clear();
@@ -177,6 +185,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         if (!smaller) take(cut_rest(cut, stock, tools.rough, {OperationKind::corner, "corners", limit, false}));
         take(cut_rest(cut, stock, tools.finish, {OperationKind::finish, "what is left", limit, false}));
         for (const Tool& tool : tools.rest) {
+            if (!last_of_kind(tool) && stock.area_over(limit) < kCornersWorthAChange) continue;
             take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste in narrow places", 1.0, true}));
             if (tool.kind == ToolKind::flat) take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
             else take(cut_rest(cut, stock, tool, {OperationKind::finish, "what is left in narrow places", limit, false}));

@@ -155,6 +155,12 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
     return all;
 }
 
+double LayerStock::area_over(double limit) const {
+    std::size_t cells = 0;
+    for (std::size_t c = 0; c < height_.size(); ++c) cells += left(c) > limit;
+    return static_cast<double>(cells) * grid_.cell * grid_.cell;
+}
+
 void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) {
     sweep(grid_, end, {x, y, tip_z}, {x, y, tip_z},
           [&](std::size_t c, double z) { height_[c] = std::min(height_[c], static_cast<float>(std::max(0.0, z - z_bottom_))); });

@@ -47,6 +47,9 @@ public:
     /// What is left over in a cell, mm along the normal of the facet below.
     [[nodiscard]] float left(std::size_t cell) const { return (height_[cell] - surface_[cell]) * nz(cell); }
 
+    /// mm² on which more than `limit` (mm along the normal) is left over.
+    [[nodiscard]] double area_over(double limit) const;
+
     /// Bytes of a stock of this many cells.
     [[nodiscard]] static std::uint64_t bytes(std::size_t cells) { return cells * 9; }
 

@@ -22,7 +22,6 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     // Steeper than step_nz the cusp is kept by the level contours, where both cut everything.
     const double keep_nz = std::cos(slopes.projection_to), step_nz = std::cos(slopes.projection_keep) - 1e-9;
     const bool uniform = cut.job.cutting.uniform_steps, steeper = slopes.projection_keep < slopes.projection_to;
-    constexpr double level_nz = 0.999999;
 
     std::vector<SolidFacet> shallow;
     for (const SolidFacet& f : cut.solid.facets)
@@ -77,6 +76,19 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         return false;
     };
 
+    // The rim of the layer's flat top, where the facets end (kTopSheet), is made by the walls under it.
+    const double top = cut.layer.z_top - 1.5 * kTopSheet;
+
+    // Whether the flat end mill finishes a floor's place: from right over it, or with its rim from beside a wall.
+    auto flat_covers = [&](double x, double y, double z) {
+        if (flat.drop(x, y).tip_z <= z + 1e-3) return true;
+        for (int k = 0; k < 8; ++k) {
+            const double turn = k * std::numbers::pi / 4, beside = 0.95 * flat_r;
+            if (flat.drop(x + beside * std::cos(turn), y + beside * std::sin(turn)).tip_z <= z + 1e-3) return true;
+        }
+        return false;
+    };
+
     // A place of the ball on the surface: tip and contact.
     struct Sample {
         std::int32_t x = 0, z = 0;  // 0.1 µm
@@ -94,9 +106,9 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         s.steep = steeper && rest.nz < step_nz;
         s.contact = {x - r * rest.nx, y - r * rest.ny, rest.contact_z(r)};
         const double contact = s.contact[2];
-        s.wanted = rest.nz >= keep_nz && !rest.on_cap && contact >= cut.layer.z_bottom - 0.02 && contact < cut.layer.z_top - 1e-6 &&
-                   rest.tip_z >= cut.layer.floor_below;
-        if (s.wanted && rest.nz > level_nz && floor_done(contact) && flat.drop(x, y).tip_z <= contact + 1e-3) s.wanted = false;
+        s.wanted = rest.nz >= keep_nz && !rest.on_cap && contact >= cut.layer.z_bottom - 0.02 && contact < top && rest.tip_z >= cut.layer.floor_below;
+        // Nor is the rim of a finished floor worth a visit: floor and wall make it.
+        if (s.wanted && floor_done(contact) && flat_covers(s.contact[0], s.contact[1], contact)) s.wanted = false;
         s.tip = rest.tip_z;
         s.reachable = s.tip >= cut.layer.floor_below && !rest.on_cap;
         if (s.reachable) s.z = to_units(s.tip) + 1;

@@ -69,11 +69,12 @@ double perimeter(const Loops& loops) {
 
 class Chooser {
 public:
-    Chooser(Context& context, const LayerJob& layer, const ReachRatio& ratio)
+    Chooser(Context& context, const LayerJob& layer, const ReachRatio& ratio, const std::optional<Tool>& finish)
         : context_(context),
           layer_(layer),
           job_(*layer.job),
           ratio_(ratio),
+          finish_(finish),
           flats_(falling(job_, ToolKind::flat)),
           balls_(falling(job_, ToolKind::ball)) {
         for (const Feature* flat : layer.flats) floors_.push_back(flat->z_low);
@@ -141,7 +142,7 @@ private:
         auto stepdown = [&](const Tool& ball) {
             return std::min(ball_level_stepdown(ball.diameter / 2, least, job_.tolerances.cusp), ball.stepdown_max);
         };
-        choice_.tools.finish = first_that_reaches(balls_, "finish", stepdown);
+        choice_.tools.finish = finish_ ? *finish_ : first_that_reaches(balls_, "finish", stepdown);
         const double r = choice_.tools.finish.diameter / 2;
         choice_.record.finish_stepdown = stepdown(choice_.tools.finish);
         choice_.record.finish_stepdown_printed = ball_level_stepdown_printed(r, least, job_.tolerances.cusp);
@@ -317,6 +318,7 @@ private:
     const LayerJob& layer_;
     const Job& job_;
     const ReachRatio& ratio_;
+    const std::optional<Tool>& finish_;
     std::vector<Tool> flats_, balls_;
     std::vector<double> floors_;
     std::optional<LayerVoxels> voxels_;
@@ -330,7 +332,16 @@ bool selects_tools(const Job& job) {
     return job.selection.mode == SelectionMode::select && (falling(job, ToolKind::flat).size() > 1 || falling(job, ToolKind::ball).size() > 1);
 }
 
-ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio) { return Chooser(context, layer, ratio).run(); }
+std::optional<Tool> next_wider_ball(const Job& job, const Tool& finish) {
+    std::optional<Tool> wider;
+    for (const Tool& ball : falling(job, ToolKind::ball))
+        if (ball.diameter > finish.diameter + 1e-9) wider = ball;
+    return wider;
+}
+
+ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio, const std::optional<Tool>& finish) {
+    return Chooser(context, layer, ratio, finish).run();
+}
 
 std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors, double stepdown) {
     std::vector<double> fixed(floors.begin(), floors.end());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "engine/paths/paths.h"
 
@@ -15,6 +16,9 @@ struct ToolChoice {
     LayerSelection record;
 };
 
+/// The next larger ball of the library than a finish tool; none for the largest.
+[[nodiscard]] std::optional<Tool> next_wider_ball(const Job& job, const Tool& finish);
+
 /// Whether the job's library leaves anything to choose: two flats or two balls, and not the fixed set by order.
 [[nodiscard]] bool selects_tools(const Job& job);
 
@@ -25,8 +29,9 @@ struct ToolChoice {
 /// @param layer all but its tools and floor_below
 /// @param ratio asked for balls, from the largest down, and in an upright layer for flats; none: the share of the sections' length that a
 ///        disc of the tool's radius touches (LayerVoxels::reached_share)
+/// @param finish taken as finish tool whatever it reaches: what it leaves is for the smaller ones where it lies
 /// @throws Error(usage, "job.tool") when the library lacks a flat or a ball; Error(no_plan, "memory.limit"), Error(cancelled)
-[[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio = {});
+[[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio = {}, const std::optional<Tool>& finish = {});
 
 /// Heights of the roughing levels, descending: even steps of at most `stepdown` down to every floor and to the layer's bottom.
 [[nodiscard]] std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors, double stepdown);

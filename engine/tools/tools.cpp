@@ -7,13 +7,6 @@ namespace slabwright {
 
 namespace {
 
-const Tool* smallest(const Job& job, ToolKind kind) {
-    const Tool* found = nullptr;
-    for (const Tool& tool : job.tools)
-        if (tool.kind == kind && (!found || tool.diameter < found->diameter)) found = &tool;
-    return found;
-}
-
 // The tool of a kind that is as wide as LUO's fixed set has it, else the first of its kind.
 const Tool& fixed_tool(const Job& job, ToolKind kind, double diameter) {
     for (const Tool& tool : job.tools)
@@ -25,11 +18,14 @@ const Tool& fixed_tool(const Job& job, ToolKind kind, double diameter) {
 
 std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter) {
     // What a flat reaches at a corner a smaller one reaches too, and so it is with balls: the smallest of either kind leave no more
-    // than all together. Those between would save a few passes and cost a change of tool each.
+    // than all together.
     std::vector<Tool> rest;
-    if (const Tool* flat = smallest(job, ToolKind::flat); flat && flat->diameter < rough_diameter - 1e-9) rest.push_back(*flat);
-    if (const Tool* ball = smallest(job, ToolKind::ball); ball && ball->diameter < finish_diameter - 1e-9) rest.push_back(*ball);
-    std::stable_sort(rest.begin(), rest.end(), [](const Tool& a, const Tool& b) { return a.diameter > b.diameter; });
+    for (const Tool& tool : job.tools)
+        if ((tool.kind == ToolKind::flat && tool.diameter < rough_diameter - 1e-9) ||
+            (tool.kind == ToolKind::ball && tool.diameter < finish_diameter - 1e-9))
+            rest.push_back(tool);
+    std::stable_sort(rest.begin(), rest.end(),
+                     [](const Tool& a, const Tool& b) { return a.diameter != b.diameter ? a.diameter > b.diameter : a.kind < b.kind; });
     return rest;
 }
 

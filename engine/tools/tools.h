@@ -24,8 +24,9 @@ struct LayerTools {
 /// and the default face mill. Their flutes reach through a 19 mm slab; what LUO does not give is ours.
 [[nodiscard]] std::vector<Tool> luo_library();
 
-/// What follows a finish tool and a roughing tool (mm across) so that nothing is left which a tool of the library reaches: the
-/// smallest flat and the smallest ball of the library, where they are smaller.
+/// What follows a finish tool and a roughing tool (mm across) so that nothing is left which a tool of the library reaches: the smaller
+/// flats and balls of the library, in falling size. Only the smallest of either kind is sure to be used: those before it are where much is
+/// left.
 [[nodiscard]] std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter);
 
 }  // namespace slabwright

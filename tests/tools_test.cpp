@@ -1,0 +1,95 @@
+// Which tools a layer gets: the fixed set, what follows it, and the choice between it and others.
+#include "engine/tools/tools.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/planner.h"
+#include "engine/tools/select.h"
+#include "kernels/errors.h"
+#include "tests/support/height_field.h"
+
+namespace slabwright {
+namespace {
+
+TEST(Tools, TheDefaultLibraryLeavesNothingToChoose) {
+    const Job job;
+    EXPECT_FALSE(selects_tools(job));
+    const LayerTools tools = fixed_tools(job);
+    EXPECT_EQ(tools.rough.number, 2);
+    EXPECT_EQ(tools.finish.number, 3);
+    EXPECT_TRUE(tools.semi_rough.empty());
+    EXPECT_TRUE(tools.rest.empty());
+    Job without = job;
+    without.tools.pop_back();
+    EXPECT_THROW((void)fixed_tools(without), Error);
+}
+
+TEST(Tools, LuosLibrary) {
+    Job job;
+    job.tools = luo_library();
+    EXPECT_NO_THROW(validate(job));
+    EXPECT_GE(max_layer_thickness(job), 18.5) << "all of them reach through a 19 mm slab";
+    EXPECT_TRUE(selects_tools(job));
+    job.selection.mode = SelectionMode::fixed;
+    EXPECT_FALSE(selects_tools(job));
+    const LayerTools tools = fixed_tools(job);
+    EXPECT_DOUBLE_EQ(tools.rough.diameter, 12.7) << "LUO's fixed set, wherever it stands in the library";
+    EXPECT_DOUBLE_EQ(tools.finish.diameter, 6.35);
+    ASSERT_EQ(tools.rest.size(), 3U);
+    EXPECT_EQ(tools.rest[0].kind, ToolKind::flat);
+    EXPECT_DOUBLE_EQ(tools.rest[0].diameter, 6.35);
+    EXPECT_DOUBLE_EQ(tools.rest[1].diameter, 3.175);
+    EXPECT_EQ(tools.rest[1].kind, ToolKind::flat) << "a flat goes before a ball of its size";
+    EXPECT_EQ(tools.rest[2].kind, ToolKind::ball);
+    EXPECT_EQ(next_wider_ball(job, tools.finish)->diameter, 12.7);
+    EXPECT_FALSE(next_wider_ball(job, luo_library().back()).has_value());
+}
+
+TEST(Tools, LevelsAreEvenDownToEveryFloor) {
+    const std::vector<double> floors{4, 9.5, 30};
+    EXPECT_EQ(even_levels(12, 0, floors, 2), (std::vector<double>{10.75, 9.5, 9.5 - 5.5 / 3, 9.5 - 11.0 / 3, 4, 2, 0}));
+    EXPECT_EQ(even_levels(12, 0, {}, 20), (std::vector<double>{0}));
+    for (const double step : {0.3, 1.0, 3.7}) {
+        double z = 12;
+        for (const double tip : even_levels(12, 0, floors, step)) {
+            EXPECT_LE(z - tip, step + 1e-9);
+            z = tip;
+        }
+        EXPECT_EQ(z, 0);
+    }
+}
+
+TEST(Tools, ALayerIsNeverSlowerThanWithTheFixedSet) {
+    Context context;
+    // A block with a pocket of 24 mm, and a channel of 4 mm that only the 1/8 in tools enter.
+    const Mesh mesh = test::height_field(context, 40, 2, [](double x, double y) {
+        if (std::abs(x) < 13 && std::abs(y) < 13) return 6.0;
+        return std::abs(y - 25) < 3 && std::abs(x) < 25 ? 8.0 : 14.0;
+    });
+    Job job;
+    job.tools = luo_library();
+    job.slabs.thicknesses = {15};
+    const Plan chosen = make_plan(context, mesh, {}, job);
+    job.selection.mode = SelectionMode::fixed;
+    const Plan fixed = make_plan(context, mesh, {}, job);
+    auto minutes = [](const Plan& plan) { return plan.totals.cutting_minutes + plan.totals.tool_change_minutes; };
+    EXPECT_LE(minutes(chosen), minutes(fixed) + 1e-6);
+    for (const Layer& layer : chosen.layers) {
+        ASSERT_TRUE(layer.selection.has_value());
+        const std::vector<ToolSet>& sets = layer.selection->sets;
+        ASSERT_GE(sets.size(), 2U);
+        EXPECT_EQ(sets.front().name, "selected");
+        EXPECT_EQ(sets.back().name, "fixed");
+        EXPECT_EQ(std::count_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.chosen; }), 1);
+        const auto taken = std::find_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.chosen; });
+        for (const ToolSet& other : sets) EXPECT_LE(taken->minutes, other.minutes);
+        for (const ToolCandidate& c : layer.selection->candidates) EXPECT_FALSE(c.reason.empty());
+    }
+    for (const Layer& layer : fixed.layers) EXPECT_FALSE(layer.selection.has_value());
+}
+
+}  // namespace
+}  // namespace slabwright
