@@ -51,6 +51,7 @@ void validate_tool(const Tool& tool, std::size_t position) {
         refuse(key("stepdown_max"), fmt::format("{} is {}, less than stepdown_min {}", key("stepdown_max"), tool.stepdown_max, tool.stepdown_min),
                "swap the two");
     require(key("stepover"), tool.stepover, 0, 1, Ends::open_low);
+    require(key("strength_mpa"), tool.strength_mpa, 0, 1e5);
 }
 
 }  // namespace

@@ -54,6 +54,7 @@ struct Tool {
     double stepdown_min = 0, stepdown_max = 0;  ///< LUO table 5.4
     double stepover = 0.5;                      ///< share of the diameter, for clearing
     bool plunges = false;                       ///< cuts straight down into stock (plunges_by_default)
+    double strength_mpa = 0;                    ///< the cutter's own in bending, as its maker states it; 0: not checked
 };
 
 struct Material {
@@ -139,6 +140,7 @@ struct Cutting {
     bool uniform_steps = false;  ///< one stepdown and one step-over a layer, for its worst slope, and nothing cut again (SHAPING 3, to compare)
     Engagement engagement = Engagement::simulated;  ///< from which the forces are computed
     bool adapt_feed = true;                         ///< feeds by chip load and deflection (engine/forces/feeds.h), where engagement is simulated
+    bool adapt_stepdown = true;                     ///< deep cuts in several passes where no feed will do (engine/forces/feeds.h), likewise
     bool arcs = true;                               ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
 };
 

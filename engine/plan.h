@@ -69,6 +69,7 @@ struct Operation {
     double peak_force_n = 0, deflection_mm = 0;    ///< the largest of all its cuts
     double wall_error_mm = 0;                      ///< the most that the cutter, bending, leaves on a wall or takes from it
     std::optional<std::array<double, 3>> peak_at;  ///< mm, where the cut of peak_force_n ends; none where it is the nominal cut's
+    std::optional<std::uint32_t> peak_move;        ///< and by which move it is made
 };
 
 /// A tool that was looked at for one purpose of a layer (LUO 5.5.3).

@@ -107,14 +107,16 @@ struct Trial {
     Layer layer;
     std::vector<Diagnostic> diagnostics;
     double minutes = 0;  // of its programs and the changes of tool between them
+    LayerCuts cuts{};    // of its programs, for their peaks
 };
 
-Trial plan_layer(Context& context, const Plan& plan, const Layer& layer, const LayerJob& work) {
+// @param overhang of the layer's slab; null: it lies on the board
+Trial plan_layer(Context& context, const Plan& plan, const Layer& layer, const LayerJob& work, const OverhangMap* overhang) {
     Trial trial{layer, {}, 0};
     LayerResult result = plan_layer_paths(context, work);
     trial.layer.operations = std::move(result.operations);
     trial.diagnostics = std::move(result.diagnostics);
-    if (plan.job.cutting.engagement == Engagement::simulated) rate_layer(context, trial.layer, plan, trial.diagnostics);
+    if (plan.job.cutting.engagement == Engagement::simulated) trial.cuts = adapt_layer(context, trial.layer, plan, overhang, trial.diagnostics);
     const Operation* before = nullptr;
     for (const Operation& op : trial.layer.operations) {
         trial.minutes += motion_time(op.moves, plan.job.machine).minutes + plan.job.machine.spindle_dwell_s / 60;
@@ -256,6 +258,14 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     const std::uint64_t standing = Standing::bytes(plan.stock_min, plan.stock_max) * std::min<std::uint64_t>(reach.size(), context.threads());
     const MemoryCharge path_memory(context, held * (sizeof(SolidFacet) + 16) + static_cast<std::uint64_t>(3 * plane) * (sizeof(Move) + 64) + standing,
                                    "the paths");
+    // A slab lies on the flask below as on the pattern, and is glued to what of it stays in this layer.
+    std::vector<Plane> joints;
+    for (const Layer& layer : plan.layers) joints.push_back({layer.z_bottom, layer.index == 1 ? Side::above : Side::below});
+    std::vector<Section> sections = slice(context, view, joints, {job.tolerances.gap});
+    std::vector<Loops> carried;
+    for (std::size_t i = 0; i < plan.layers.size(); ++i)
+        carried.push_back(plan.flask ? unite(sections[i].loops, flask_frame(*plan.flask, i)) : std::move(sections[i].loops));
+    std::vector<LayerCuts> cuts(plan.layers.size());
     std::vector<std::vector<Diagnostic>> found_in(plan.layers.size());
     parallel_each(context, plan.layers.size(), [&](std::size_t i) {
         const Layer& layer = plan.layers[i];
@@ -285,6 +295,9 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
             selection = std::move(choice.record);
         }
         if (!selecting || job.selection.compare) sets.emplace_back("fixed", fixed);
+        std::optional<OverhangMap> overhang;
+        const Loops* const regions[] = {&carried[i]};
+        if (i > 0) overhang = overhang_map(regions, plan.stock_min, plan.stock_max);
         std::optional<Trial> best;
         std::size_t chosen = 0;
         for (std::size_t s = 0; s < sets.size(); ++s) {
@@ -295,7 +308,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
             for (const Feature& f : plan.features)
                 if (f.type == FeatureType::up_flat && f.area >= job.cutting.min_flat_area && f.z_low < layer.z_top && f.z_low > work.floor_below)
                     work.feet.push_back(&f);
-            Trial trial = plan_layer(context, plan, layer, work);
+            Trial trial = plan_layer(context, plan, layer, work, overhang ? &*overhang : nullptr);
             if (selection) selection->sets.push_back({sets[s].first, tools_in_order(trial.layer), trial.minutes, false});
             if (!best || trial.minutes < best->minutes) best = std::move(trial), chosen = s;
         }
@@ -303,8 +316,13 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
         plan.layers[i] = std::move(best->layer);
         plan.layers[i].selection = std::move(selection);
         found_in[i] = std::move(best->diagnostics);
+        cuts[i] = std::move(best->cuts);
         context.advance();
     });
+    if (job.cutting.engagement == Engagement::simulated) {
+        const std::vector<std::vector<Diagnostic>> rated = rate_layers(context, plan, cuts);
+        for (std::size_t i = 0; i < rated.size(); ++i) found_in[i].insert(found_in[i].end(), rated[i].begin(), rated[i].end());
+    }
     std::size_t operations = 0;
     for (const Layer& layer : plan.layers) operations += layer.operations.size();
     for (std::size_t i = 0; i < found_in.size(); ++i) {
@@ -331,14 +349,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     check_travel(plan);
 
     context.begin_phase("schedule", 0.92, 0.95);
-    std::vector<Plane> joints;
-    for (const Layer& layer : plan.layers) joints.push_back({layer.z_bottom, layer.index == 1 ? Side::above : Side::below});
-    const std::vector<Section> sections = slice(context, view, joints, {job.tolerances.gap});
-    for (std::size_t i = 0; i < plan.layers.size(); ++i) {
-        // A slab lies on the flask below as on the pattern, and is glued to what of it stays in this layer.
-        const Loops below = plan.flask ? unite(sections[i].loops, flask_frame(*plan.flask, i)) : sections[i].loops;
-        bond_layer(plan.layers[i], below, plan, plan.diagnostics);
-    }
+    for (std::size_t i = 0; i < plan.layers.size(); ++i) bond_layer(plan.layers[i], carried[i], plan, plan.diagnostics);
     schedule(plan);
     if (plan.totals.stack_mass_kg > job.machine.build_mass_kg)
         throw refuse("fit.mass",

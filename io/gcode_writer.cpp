@@ -121,7 +121,10 @@ std::string comment_text(std::string_view text) {
     return out;
 }
 
-void write_program(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink) {
+namespace {
+
+// As write_program; stops before the first line after move `until`, with a piece that ends there.
+void write_until(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink, std::size_t until) {
     const std::vector<Tool>& tools = plan.job.tools;
     const auto tool = std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == operation.tool; });
     require_safe(layer, operation, tool == tools.end() ? nullptr : &*tool);
@@ -152,14 +155,34 @@ void write_program(const Plan& plan, const Layer& layer, const Operation& operat
     if (moves[1].feed != 0 || moves[1].z != clearance) motion.move(moves[0]);
     for (std::size_t i = 1; i + 1 < moves.size(); ++i) {
         motion.move(moves[i]);
-        if (text.size() >= kPiece) {
+        if (text.size() >= kPiece || i == until) {
             sink(text);
             text.clear();
+            if (i == until) return;
         }
     }
     motion.rapid_z(clearance);
     text += "M5\nM2\n";
     sink(text);
+}
+
+}  // namespace
+
+void write_program(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink) {
+    write_until(plan, layer, operation, sink, operation.moves.size());
+}
+
+std::size_t program_line(const Plan& plan, const Layer& layer, const Operation& operation, std::size_t move) {
+    if (move == 0 || move + 1 >= operation.moves.size()) return 0;
+    const auto lines = [&](std::size_t until) {
+        std::size_t count = 0;
+        write_until(
+            plan, layer, operation, [&](std::string_view piece) { count += static_cast<std::size_t>(std::count(piece.begin(), piece.end(), '\n')); },
+            until);
+        return count;
+    };
+    const std::size_t line = lines(move);
+    return move == 1 || lines(move - 1) < line ? line : 0;
 }
 
 std::string program_text(const Plan& plan, const Layer& layer, const Operation& operation) {

@@ -1,6 +1,7 @@
 // RS-274 out: one program per operation (method.md section 11), judged by LinuxCNC's interpreter in the tests.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -23,6 +24,9 @@ void write_program(const Plan& plan, const Layer& layer, const Operation& operat
 
 /// The same text as one string.
 [[nodiscard]] std::string program_text(const Plan& plan, const Layer& layer, const Operation& operation);
+
+/// The line (from 1) of that text which makes the operation's move `move`; 0 when the text has no line of its own for it.
+[[nodiscard]] std::size_t program_line(const Plan& plan, const Layer& layer, const Operation& operation, std::size_t move);
 
 /// Makes a text fit for a G-code comment: ASCII, no parentheses, one line, at most 200 characters (LinuxCNC reads lines of 255).
 [[nodiscard]] std::string comment_text(std::string_view text);

@@ -66,6 +66,7 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.required();
     visit.key("stepdown_max", tool.stepdown_max, "mm (LUO table 5.4)");
     visit.key("stepover", tool.stepover, "share of the diameter, for clearing");
+    visit.key("strength_mpa", tool.strength_mpa, "MPa, the cutter's own in bending, as its maker states it; 0: not checked");
     visit.key("plunges", tool.plunges, "cuts straight down into stock; when left out: true for ball and drill, false for flat and face");
 }
 
@@ -170,6 +171,8 @@ void visit_job_keys(JobLike& job, Visit& visit) {
                "what forces are computed from: simulated, what stands when a move cuts; nominal, an operation's largest steps");
     visit.key("adapt_feed", job.cutting.adapt_feed,
               "feeds lowered where the cutter would bend too far, raised where the chip is thin; needs simulated engagement");
+    visit.key("adapt_stepdown", job.cutting.adapt_stepdown,
+              "deep cuts in several passes where no feed keeps cutter and wood within their limits; needs simulated engagement");
     visit.key("arcs", job.cutting.arcs, "arcs (G2, G3) where a path turns evenly; false: straight moves only");
 
     visit.table("selection", "which tools of the library cut a layer (LUO 5.5); nothing to select with one flat and one ball");

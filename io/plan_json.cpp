@@ -1,7 +1,10 @@
 #include "io/plan_json.h"
 
+#include <algorithm>
 #include <numbers>
 
+#include "engine/forces/feeds.h"
+#include "io/gcode_writer.h"
 #include "io/job_keys.h"
 
 namespace slabwright {
@@ -45,7 +48,7 @@ struct JobPrinter {
     }
 };
 
-void put_tool(JsonText& json, const Tool& tool) {
+void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
     json.begin_object(Shape::line);
     json.key("number").integer(tool.number);
     json.key("kind").string(word_of(kToolWords, tool.kind));
@@ -62,6 +65,15 @@ void put_tool(JsonText& json, const Tool& tool) {
     json.key("stepdown").begin_array().exact(tool.stepdown_min).exact(tool.stepdown_max).end();
     json.key("stepover").exact(tool.stepover);
     json.key("plunges").boolean(tool.plunges);
+    json.key("strength_mpa").exact(tool.strength_mpa);
+    double allowed = 0;
+    for (const Layer& layer : plan.layers)
+        for (const Operation& operation : layer.operations)
+            if (const double length = operation.tool == tool.number ? allowed_length(operation, tool, plan.job) : 0; length > 0)
+                allowed = allowed > 0 ? std::min(allowed, length) : length;
+    json.key("allowed_length");
+    if (allowed > 0) json.rounded(allowed, kLength);
+    else json.null();
     json.end();
 }
 
@@ -75,7 +87,7 @@ void put_place(JsonText& json, const std::optional<std::array<double, 3>>& place
     json.end();
 }
 
-void put_operation(JsonText& json, const Operation& operation) {
+void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const Operation& operation) {
     json.begin_object(Shape::line);
     json.key("kind").string(name(operation.kind));
     json.key("purpose").string(operation.purpose);
@@ -92,6 +104,10 @@ void put_operation(JsonText& json, const Operation& operation) {
     json.key("wall_error_mm").rounded(operation.wall_error_mm, kDeflection);
     json.key("peak_at");
     put_place(json, operation.peak_at);
+    json.key("peak_line");
+    if (const std::size_t line = operation.peak_move ? program_line(plan, layer, operation, *operation.peak_move) : 0; line > 0)
+        json.integer(static_cast<std::int64_t>(line));
+    else json.null();
     json.end();
 }
 
@@ -138,7 +154,7 @@ void put_selection(JsonText& json, const std::optional<LayerSelection>& selectio
     json.end().end();
 }
 
-void put_layer(JsonText& json, const Layer& layer) {
+void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     json.begin_object();
     json.key("index").integer(layer.index);
     json.key("z_bottom").exact(layer.z_bottom);
@@ -151,7 +167,7 @@ void put_layer(JsonText& json, const Layer& layer) {
     json.key("glue_centroid").begin_array(Shape::line).rounded(layer.glue_centroid[0], kLength).rounded(layer.glue_centroid[1], kLength).end();
     json.key("press_force_n").rounded(layer.press_force_n, kForce);
     json.key("operations").begin_array();
-    for (const Operation& operation : layer.operations) put_operation(json, operation);
+    for (const Operation& operation : layer.operations) put_operation(json, plan, layer, operation);
     json.end().end();
 }
 
@@ -267,12 +283,12 @@ std::string plan_json(const Plan& plan) {
     json.key("flask");
     put_flask(json, plan);
     json.key("tools").begin_array();
-    for (const Tool& tool : plan.job.tools) put_tool(json, tool);
+    for (const Tool& tool : plan.job.tools) put_tool(json, plan, tool);
     json.end();
     json.key("features");
     put_features(json, plan.features);
     json.key("layers").begin_array();
-    for (const Layer& layer : plan.layers) put_layer(json, layer);
+    for (const Layer& layer : plan.layers) put_layer(json, plan, layer);
     json.end();
     json.key("totals");
     put_totals(json, plan.totals);

@@ -14,6 +14,7 @@
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
 #include "kernels/forces/forces.h"
+#include "kernels/forces/hardest.h"
 
 // PoCL never frees its compiler.
 extern "C" const char* __lsan_default_suppressions();
@@ -372,6 +373,39 @@ TEST(ForceSolver, UnknownDeviceIsAnError) {
         EXPECT_EQ(e.code(), "forces.device");
         EXPECT_FALSE(e.remedy().empty());
     }
+}
+
+// What a device screens and what the double model finds alone are the same cuts, also where many are nearly as hard.
+TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
+    const unsigned seed = std::random_device{}();
+    std::printf("seed %u\n", seed);
+    std::mt19937_64 random(seed);
+    std::vector<CutSegment> cuts;
+    std::vector<std::size_t> starts{0};
+    for (int g = 0; g < 40; ++g) {
+        const CutSegment like = random_cut(random, g % 2 ? CutterProfile::ball : CutterProfile::flat);
+        const std::size_t n = random() % 300;
+        for (std::size_t i = 0; i < n; ++i) {
+            cuts.push_back(g % 3 ? like : random_cut(random, g % 2 ? CutterProfile::ball : CutterProfile::flat));
+            if (g % 3) cuts.back().chip_load_mm *= 1 - drawn(random, 0, 1e-4);
+            if (g % 3 == 2 && i % 2) cuts.back() = cuts[starts.back()];
+        }
+        starts.push_back(cuts.size());
+    }
+    Context context;
+    const HardestSearch with = hardest_cuts(context, cuts, starts, "auto", 0), without = hardest_cuts(context, cuts, starts, "reference");
+    std::printf("device: %s\n", with.device.c_str());
+    EXPECT_TRUE(without.device.empty());
+    ASSERT_EQ(with.groups.size(), starts.size() - 1);
+    EXPECT_EQ(with.groups, without.groups);
+    for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
+        double most = 0;
+        for (std::size_t i = starts[g]; i < starts[g + 1]; ++i) most = std::max(most, reference_forces(cuts[i]).peak_y_n);
+        if (starts[g] == starts[g + 1]) EXPECT_EQ(with.groups[g].across, kNoCut);
+        else EXPECT_NEAR(reference_forces(cuts[with.groups[g].across]).peak_y_n, most, 1e-9 * most);
+    }
+    // Too few to be worth a device.
+    EXPECT_TRUE(hardest_cuts(context, cuts, starts).device.empty());
 }
 
 TEST(PeakForce, IsThatOfTheClosedFormOrTheReference) {

@@ -34,7 +34,7 @@ extern "C" void on_signal(int signal) {
 }
 
 struct Options {
-    std::string stl, out, maps, job_file, units, strategy, finder, library;
+    std::string stl, out, maps, job_file, units, strategy, finder, device, library;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10;
     bool allow_undercut = false, no_verify = false, json = false, quiet = false, defaults = false, weld_given = false, no_3d = false;
@@ -210,6 +210,7 @@ void with_context(const Options& options, Body&& body) {
     ProgressBar bar;
     Context::Options settings;
     settings.threads = options.threads;
+    settings.device = options.device;
     settings.memory_bytes = static_cast<std::uint64_t>(options.memory_gib * (1u << 30));
     if (!options.quiet && !options.json && isatty(STDERR_FILENO) != 0) settings.progress = [&](const Progress& progress) { bar.show(progress); };
     Context context(std::move(settings));
@@ -310,6 +311,8 @@ void add_limits(CLI::App& command, Options& options) {
     command.add_option("--threads", options.threads, "threads to use; all that the machine has if not given")->check(CLI::Range(1, 1024));
     command.add_option("--memory", options.memory_gib, "GiB of memory that may be used; 60 % of the machine's if not given")
         ->check(CLI::Range(0.001, 1e6));
+    command.add_option("--device", options.device,
+                       "OpenCL device for cutting forces: auto (the fastest that passes a test), reference (none), or a part of its name");
     command.add_flag("--json", options.json, "errors as JSON on stderr, results as JSON on stdout");
     command.add_flag("--quiet", options.quiet, "no progress bar, nothing on stdout");
 }

@@ -2,26 +2,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "engine/forces/cuts.h"
+#include "engine/forces/split_cuts.h"
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
+#include "kernels/forces/hardest.h"
 
 namespace slabwright {
 
 namespace {
 
-constexpr double kLeastDepth = 0.01;   // mm: shallower cuts are taken as this deep
-constexpr double kDepthSteps = 8;      // to a doubling
-constexpr double kWidthSteps = 24;     // of the diameter
-constexpr double kAccuracy = 0.01;     // of peaks, as a share: far finer than the classes are
-constexpr double kLeastShare = 0.125;  // of the planned feed: slower, a cutter rubs
-constexpr double kLeastRun = 20;       // mm that a faster feed must last
+constexpr double kLeastDepth = 0.01;      // mm: shallower cuts are taken as this deep
+constexpr double kAccuracy = 0.01;        // of peaks that feeds are chosen by, as a share: far finer than the classes are
+constexpr double kLeastShare = 0.125;     // of the planned feed: slower, a cutter rubs
+constexpr double kLeastRun = 20;          // mm that a faster feed must last
+constexpr int kMostPasses = 4;            // into which a cut is divided at once
+constexpr int kMostRounds = 3;            // of dividing
+constexpr double kStatedAccuracy = 1e-5;  // of the peaks that a plan states
+
+/// Classes to a doubling of the depth, of the diameter, and of the radius.
+struct ClassSteps {
+    int depth, width, low;
+};
+constexpr ClassSteps kCoarse{8, 24, 16};   // by which feeds are chosen
+constexpr ClassSteps kFine{64, 240, 128};  // by which forces are stated: within 1 % of the cut's own
 
 /// A cut's class: what its forces depend on but the feed.
 struct CutClass {
@@ -30,62 +42,72 @@ struct CutClass {
     friend auto operator<=>(const CutClass&, const CutClass&) = default;
 };
 
-double depth_of(int depth) { return kLeastDepth * std::exp2(depth / kDepthSteps); }
+double depth_of(int depth, ClassSteps steps) { return kLeastDepth * std::exp2(static_cast<double>(depth) / steps.depth); }
 
-CutClass class_of(const CutStretch& s, const Tool& tool) {
+CutClass class_of(const CutStretch& s, const Tool& tool, ClassSteps steps) {
     CutClass c;
-    if (tool.kind == ToolKind::ball) c.low = static_cast<std::int16_t>(std::floor(std::min(s.low, tool.diameter / 2) / (tool.diameter / 2) * 16));
-    const double low = c.low * tool.diameter / 32, depth = std::clamp(s.high - low, kLeastDepth, 30 * tool.diameter);
-    c.depth = static_cast<std::int16_t>(std::ceil(std::log2(depth / kLeastDepth) * kDepthSteps - 1e-9));
+    const double r = tool.diameter / 2;
+    if (tool.kind == ToolKind::ball) c.low = static_cast<std::int16_t>(std::floor(std::min(s.low, r) / r * steps.low));
+    const double low = c.low * r / steps.low, depth = std::clamp(s.high - low, kLeastDepth, 30 * tool.diameter);
+    c.depth = static_cast<std::int16_t>(std::ceil(std::log2(depth / kLeastDepth) * steps.depth - 1e-9));
     // The class is deeper than the cut; its width is that of the same cross-section.
     const double width = s.width * (s.high - s.low) / (s.high - low);
-    c.width = static_cast<std::int16_t>(std::clamp(std::ceil(width / tool.diameter * kWidthSteps - 1e-9), 1.0, kWidthSteps));
+    c.width = static_cast<std::int16_t>(std::clamp(std::ceil(width / tool.diameter * steps.width - 1e-9), 1.0, static_cast<double>(steps.width)));
     c.left = s.left;
     return c;
 }
 
-CutSegment segment_of(const CutClass& c, const CutSegment& idle, const Tool& tool, double feed) {
+CutSegment segment_of(const CutClass& c, const CutSegment& idle, const Tool& tool, double feed, ClassSteps steps) {
     CutSegment cut = idle;
     const double r = tool.diameter / 2;
-    cut.low_mm = c.low * r / 16;
-    cut.high_mm = cut.low_mm + depth_of(c.depth);
+    cut.low_mm = c.low * r / steps.low;
+    cut.high_mm = cut.low_mm + depth_of(c.depth, steps);
     const bool cap = cut.profile == CutterProfile::ball && cut.high_mm < r;
     const double circle = cap ? std::sqrt(cut.high_mm * (2 * r - cut.high_mm)) : r;
-    cut.arc = engagement_arc(circle, c.width * tool.diameter / kWidthSteps, c.left ? MillingSense::up : MillingSense::down);
+    cut.arc = engagement_arc(circle, c.width * tool.diameter / steps.width, c.left ? MillingSense::up : MillingSense::down);
     cut.chip_load_mm = feed / (cut.spindle_rpm * tool.flutes);
     return cut;
 }
 
-/// What a cut does to the tool.
+/// What a cut does to the tool, and to the wood that carries it.
 struct Bent {
-    double force_n = 0, tip_mm = 0, wall_mm = 0;
+    double wall_mm = 0;
+    double stress_mpa = 0;             ///< of the cutter, in bending at the holder
+    double x_n = 0, y_n = 0, z_n = 0;  ///< peaks
 };
 
 class BentCutter {
 public:
-    BentCutter(const Job& job, const Operation& operation, const Tool& tool) : tool_(tool), idle_(idle_cut(job, tool)) {
+    BentCutter(const Job& job, const Operation& operation, const Tool& tool) : job_(job), tool_(tool), idle_(idle_cut(job, tool)) {
         idle_.spindle_rpm = operation.spindle_rpm;
     }
+    [[nodiscard]] const CutSegment& idle() const { return idle_; }
 
     const Bent& at(const CutClass& c, double feed) {
         const auto [it, fresh] = known_.try_emplace({c, feed});
         if (fresh) {
-            const CutSegment cut = segment_of(c, idle_, tool_, feed);
+            const CutSegment cut = segment_of(c, idle_, tool_, feed, kCoarse);
             const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut, kAccuracy) : reference_forces(cut, kAccuracy);
-            it->second = {f.peak_resultant_n, cutter_deflection(f.peak_in_plane_n, tool_.stickout, tool_.diameter),
-                          cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter)};
+            it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter),
+                          cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter), f.peak_x_n, f.peak_y_n, f.peak_z_n};
         }
         return it->second;
     }
 
+    /// How thick the wood must be that carries a cut at this height above the joint, so far from what carries the wood, mm.
+    [[nodiscard]] double needed_wood(const Bent& b, double height, double overhang) const {
+        return least_overhang_thickness({b.x_n, b.y_n, b.z_n, overhang, height, tool_.diameter / 2, job_.material.strength_mpa}).least_mm;
+    }
+
     /// The thickest chip, as a share of the feed per tooth.
     [[nodiscard]] double thickest_chip(const CutClass& c) const {
-        const EngagementArc arc = segment_of(c, idle_, tool_, 1).arc;
+        const EngagementArc arc = segment_of(c, idle_, tool_, 1, kCoarse).arc;
         const double middle = std::clamp(std::numbers::pi / 2, arc.entry_rad, arc.exit_rad);
         return std::max(1e-3, std::sin(middle));
     }
 
 private:
+    const Job& job_;
     const Tool& tool_;
     CutSegment idle_;
     std::map<std::pair<CutClass, double>, Bent> known_;
@@ -128,10 +150,88 @@ void set_feeds(Operation& op, std::vector<std::uint32_t> wanted, const std::vect
         if (level[k]) op.moves[k].feed = wanted[k];
 }
 
+/// A stretch of an operation's way, as far as its feed and its forces depend on it.
+struct Seen {
+    CutClass coarse, fine;
+    std::uint32_t first = 0, last = 0;
+    bool cuts = false;
+    float depth = 0;               ///< over the tip, mm
+    float height = 0;              ///< of the cut's middle above the joint, mm
+    float wood = 0, overhang = 0;  ///< what carries the cut, and how far from what carries it; 0 where nothing hangs over
+    std::array<float, 3> at{};
+    [[nodiscard]] std::array<double, 3> place() const { return {at[0], at[1], at[2]}; }
+};
+
+std::vector<Seen> run_through(Context& context, StandingSlab& slab, const Operation& op, const Tool& tool, const Layer& layer,
+                              const OverhangMap* overhang, double setback) {
+    std::vector<Seen> seen;
+    slab.run(op, tool, [&](const CutStretch& s) {
+        if (seen.size() % 1024 == 0) context.throw_if_cancelled();
+        Seen now;
+        now.first = s.first, now.last = s.last, now.cuts = s.cuts();
+        for (std::size_t i = 0; i < 3; ++i) now.at[i] = static_cast<float>(s.at[i]);
+        if (now.cuts) {
+            now.coarse = class_of(s, tool, kCoarse), now.fine = class_of(s, tool, kFine);
+            now.depth = static_cast<float>(s.high);
+            now.height = static_cast<float>(std::max(0.0, s.at[2] - layer.z_bottom + (s.low + s.high) / 2));
+            // Roughing is carried by the slab that stands, floors by what stays under them. Thinner than the least step it is no slab but
+            // a sliver that tears off; and what a ball or a wall's finishing has under its tip is not what carries it.
+            const bool floor = op.kind == OperationKind::finish && tool.kind == ToolKind::flat && op.stepdown == 0;
+            const double under = s.at[2] - layer.z_bottom, wood = roughs(op.kind) ? under + s.high : floor ? under : 0;
+            const double beyond = overhang && wood >= (floor ? kLeastDepth : tool.stepdown_min) ? overhang->at(s.at[0], s.at[1]) : 0;
+            if (beyond > 0) now.wood = static_cast<float>(wood), now.overhang = static_cast<float>(beyond + setback);
+        }
+        seen.push_back(now);
+    });
+    return seen;
+}
+
+/// By how much a cut passes what it may do: its wall error, the cutter's stress and the wood's, the largest as a share of its limit.
+struct Load {
+    double cutter = 0, wood = 0;
+    [[nodiscard]] double worst() const { return std::max(cutter, wood); }
+};
+
+/// Runs of stretches that no feed makes light enough and that several passes would.
+std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, int round, const std::function<Load(const Seen&)>& load) {
+    std::vector<DeepRun> runs;
+    for (const Seen& s : seen) {
+        if (!s.cuts) continue;
+        const Load l = load(s);
+        // Wood that is cut through at once carries itself: less of it would carry less.
+        const bool helps = l.cutter > 1 || (l.wood > 1 && s.wood > 1.5 * s.depth);
+        if (!(l.worst() > 1) || !helps || s.depth < 4 * kLeastDepth) continue;
+        const int passes = std::clamp(static_cast<int>(std::ceil(l.worst())) + round, 2, kMostPasses);
+        if (!runs.empty() && s.first <= runs.back().last + 1) {
+            DeepRun& run = runs.back();
+            run.last = std::max(run.last, s.last), run.depth_mm = std::max(run.depth_mm, static_cast<double>(s.depth)),
+            run.passes = std::max(run.passes, passes);
+        } else {
+            runs.push_back({s.first, s.last, s.depth, passes});
+        }
+    }
+    // A run goes by feed and in the plane from end to end.
+    std::erase_if(runs, [&](const DeepRun& run) {
+        for (std::uint32_t k = run.first; k <= run.last; ++k)
+            if (k == 0 || op.moves[k].feed == 0) return true;
+        return false;
+    });
+    return runs;
+}
+
+double way_of(const Operation& op, std::uint32_t first, std::uint32_t last) {
+    double way = 0;
+    for (std::uint32_t k = first; k <= last; ++k) {
+        const Move &a = op.moves[k - 1], &b = op.moves[k];
+        way += b.is_arc() ? arc_shape(a, b).length() : std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z));
+    }
+    return way;
+}
+
 }  // namespace
 
 CutSegment cut_of(const CutStretch& stretch, const Tool& tool, const Job& job, double feed) {
-    return segment_of(class_of(stretch, tool), idle_cut(job, tool), tool, feed);
+    return segment_of(class_of(stretch, tool, kFine), idle_cut(job, tool), tool, feed, kFine);
 }
 
 double bending_limit(const Operation& operation, const Job& job) {
@@ -146,67 +246,109 @@ double bending_limit(const Operation& operation, const Job& job) {
     }
 }
 
-void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Diagnostic>& diagnostics) {
+LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const OverhangMap* overhang, std::vector<Diagnostic>& diagnostics) {
     const Job& job = plan.job;
     StandingSlab slab(plan.stock_min, plan.stock_max, layer.z_bottom, layer.z_bottom + layer.slab_thickness,
                       StandingSlab::cell_for(job, plan.stock_min, plan.stock_max));
-    const MemoryCharge memory(context, slab.bytes(), "the stock that forces are computed from");
+    const MemoryCharge memory(context, 2 * slab.bytes(), "the stock that forces are computed from");
+    LayerCuts result;
     for (Operation& op : layer.operations) {
         context.throw_if_cancelled();
         op.peak_force_n = op.deflection_mm = op.wall_error_mm = 0;
         op.peak_at.reset();
+        op.peak_move.reset();
+        result.starts.push_back(result.cuts.size());
         const Tool& tool = *std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
         if (tool.kind == ToolKind::drill) continue;
         if (!(op.spindle_rpm > 0))
             throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest", op.purpose, "give the tool a speed");
-        struct Seen {
-            CutClass cut;
-            std::uint32_t first = 0, last = 0;
-            bool cuts = false;
-            std::array<float, 3> at{};
-        };
-        std::vector<Seen> seen;
-        slab.run(op, tool, [&](const CutStretch& s) {
-            if (seen.size() % 1024 == 0) context.throw_if_cancelled();
-            Seen now;
-            now.first = s.first, now.last = s.last, now.cuts = s.cuts();
-            if (now.cuts) now.cut = class_of(s, tool);
-            for (std::size_t i = 0; i < 3; ++i) now.at[i] = static_cast<float>(s.at[i]);
-            seen.push_back(now);
-        });
         BentCutter cutting(job, op, tool);
         const double limit = bending_limit(op, job);
-        const auto place = [](const Seen& s) { return std::array<double, 3>{s.at[0], s.at[1], s.at[2]}; };
+        const auto load = [&](const Seen& s, double feed) {
+            const Bent& bent = cutting.at(s.coarse, feed);
+            Load l{bent.wall_mm / limit, 0};
+            if (tool.strength_mpa > 0) l.cutter = std::max(l.cutter, bent.stress_mpa / tool.strength_mpa);
+            if (s.overhang > 0) l.wood = cutting.needed_wood(bent, s.height, s.overhang) / s.wood;
+            return l;
+        };
+
+        const auto fastest = static_cast<std::uint32_t>(std::floor(std::min(tool.max_feed, job.machine.max_feed)));
+        // The fastest step that all limits bear. Where none does: the slowest that is allowed, when it is the cutter that bears too
+        // much; as planned, when it is the wood.
+        const auto slow_enough = [&](const Seen& s, std::uint32_t planned, double chip) {
+            // What is planned is a step too, so that a cut that needs no other feed keeps its own.
+            std::vector<std::uint32_t> steps{planned};
+            for (int k = 1; k <= kFeedSteps; ++k) steps.push_back(fastest * static_cast<std::uint32_t>(k) / kFeedSteps);
+            std::sort(steps.begin(), steps.end(), std::greater<>());
+            std::uint32_t slowest = planned, for_cutter = 0;
+            for (const std::uint32_t step : steps) {
+                if (step > chip || step < 1) continue;
+                if (step < kLeastShare * planned) break;
+                const Load l = load(s, step);
+                if (l.worst() <= 1) return step;
+                if (l.cutter <= 1 && for_cutter == 0) for_cutter = step;
+                slowest = step;
+            }
+            return for_cutter > 0 ? for_cutter : slowest;
+        };
+        std::map<std::pair<CutClass, std::uint32_t>, std::uint32_t> chosen;
+        const auto choose = [&](const Seen& s, std::uint32_t planned) -> std::uint32_t {
+            // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
+            const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
+            if (!s.cuts) return static_cast<std::uint32_t>(most);
+            const auto thin = [&] { return std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.coarse))); };
+            if (s.overhang > 0) return slow_enough(s, planned, thin());
+            const auto [it, fresh] = chosen.try_emplace({s.coarse, planned}, planned);
+            if (fresh) it->second = slow_enough(s, planned, thin());
+            return it->second;
+        };
+
+        std::vector<Seen> seen;
+        std::vector<std::uint32_t> feeds;  // of each stretch
+        std::size_t divided = 0;
+        double divided_way = 0, deepest = 0;
+        int passes = 0;
+        std::optional<std::array<double, 3>> divided_at;
+        const StandingSlab before = slab;
+        for (int round = 0;; ++round) {
+            seen = run_through(context, slab, op, tool, layer, overhang, job.bonding.edge_setback);
+            feeds.clear();
+            for (const Seen& s : seen) {
+                const std::uint32_t planned = op.moves[s.last].feed;
+                feeds.push_back(job.cutting.adapt_feed ? choose(s, planned) : planned);
+            }
+            if (!job.cutting.adapt_stepdown || round == kMostRounds) break;
+            const std::vector<DeepRun> runs =
+                deep_runs(seen, op, round, [&](const Seen& s) { return load(s, feeds[static_cast<std::size_t>(&s - seen.data())]); });
+            if (runs.empty()) break;
+            for (const DeepRun& run : runs) {
+                ++divided;
+                divided_way += way_of(op, run.first, run.last);
+                if (run.depth_mm > deepest) {
+                    deepest = run.depth_mm, passes = run.passes;
+                    const Move& end = op.moves[run.last];
+                    divided_at = {to_mm(end.x), to_mm(end.y), to_mm(end.z)};
+                }
+            }
+            op.moves = split_runs(op.moves, runs, static_cast<std::uint32_t>(std::max(1.0, std::min(tool.plunge_feed, job.machine.max_feed))));
+            slab = before;
+        }
+        if (divided > 0)
+            diagnostics.push_back(
+                {Severity::note, "stepdown.lowered",
+                 fmt::format("layer {}, {}: {} cut{} of {:.0f} mm in all {} taken in several passes, the deepest of {:.2f} mm in {}, where "
+                             "cutter or wood would bear too much at any feed",
+                             layer.index, op.purpose, divided, divided == 1 ? "" : "s", divided_way, divided == 1 ? "is" : "are", deepest, passes),
+                 divided_at});
 
         if (job.cutting.adapt_feed) {
-            const auto fastest = static_cast<std::uint32_t>(std::floor(std::min(tool.max_feed, job.machine.max_feed)));
-            std::map<std::pair<CutClass, std::uint32_t>, std::uint32_t> chosen;
-            // The fastest step that both limits bear; the slowest that is allowed, where none does.
-            const auto choose = [&](const Seen& s, std::uint32_t planned) -> std::uint32_t {
-                // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
-                const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
-                if (!s.cuts) return static_cast<std::uint32_t>(most);
-                const auto [it, fresh] = chosen.try_emplace({s.cut, planned}, planned);
-                if (!fresh) return it->second;
-                const double chip = std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.cut)));
-                // What is planned is a step too, so that a cut that needs no other feed keeps its own.
-                std::vector<std::uint32_t> steps{planned};
-                for (int k = 1; k <= kFeedSteps; ++k) steps.push_back(fastest * static_cast<std::uint32_t>(k) / kFeedSteps);
-                std::sort(steps.begin(), steps.end(), std::greater<>());
-                for (const std::uint32_t step : steps) {
-                    if (step > chip || step < 1) continue;
-                    if (step < kLeastShare * planned) break;
-                    it->second = step;
-                    if (cutting.at(s.cut, step).wall_mm <= limit) break;
-                }
-                return it->second;
-            };
             std::vector<std::uint32_t> wanted(op.moves.size(), 0);
             std::vector<char> level(op.moves.size(), 0);
             double lowest_share = 1, way = 0;
             const Seen* worst = nullptr;
-            for (const Seen& s : seen) {
-                const std::uint32_t planned = op.moves[s.last].feed, feed = choose(s, planned);
+            for (std::size_t i = 0; i < seen.size(); ++i) {
+                const Seen& s = seen[i];
+                const std::uint32_t planned = op.moves[s.last].feed, feed = feeds[i];
                 for (std::uint32_t k = s.first; k <= s.last; ++k) {
                     wanted[k] = wanted[k] == 0 ? feed : std::min(wanted[k], feed);
                     level[k] = 1;
@@ -219,32 +361,113 @@ void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Di
             if (worst)
                 diagnostics.push_back(
                     {Severity::note, "feed.lowered",
-                     fmt::format(
-                         "layer {}, {}: the feed is lowered in {:.1f} % of the way, to {:.0f} % of what was planned where the cutter would bend most",
-                         layer.index, op.purpose, 100 * way / static_cast<double>(seen.size()), 100 * lowest_share),
-                     place(*worst)});
+                     fmt::format("layer {}, {}: the feed is lowered in {:.1f} % of the way, to {:.0f} % of what was planned where cutter "
+                                 "or wood would bear most",
+                                 layer.index, op.purpose, 100 * way / static_cast<double>(seen.size()), 100 * lowest_share),
+                     worst->place()});
             set_feeds(op, std::move(wanted), level);
         }
 
-        const Seen *hardest = nullptr, *furthest = nullptr;
+        // Every cut that differs, with the place where it is met first; and where the wood would break.
+        std::map<std::pair<CutClass, std::uint32_t>, bool> listed;
+        const Seen* breaks = nullptr;
+        double most = 1, needed = 0;
+        std::size_t broken = 0;
         for (const Seen& s : seen) {
             if (!s.cuts) continue;
             std::uint32_t feed = 0;
             for (std::uint32_t k = s.first; k <= s.last; ++k) feed = std::max(feed, op.moves[k].feed);
-            const Bent& bent = cutting.at(s.cut, feed);
-            if (bent.force_n > op.peak_force_n) op.peak_force_n = bent.force_n, hardest = &s;
-            if (bent.wall_mm > op.wall_error_mm) op.wall_error_mm = bent.wall_mm, furthest = &s;
-            op.deflection_mm = std::max(op.deflection_mm, bent.tip_mm);
+            if (s.overhang > 0)
+                if (const double wood = load(s, feed).wood; wood > 1) {
+                    ++broken;
+                    if (wood > most) most = wood, breaks = &s, needed = wood * s.wood;
+                }
+            if (!listed.try_emplace({s.fine, feed}, true).second) continue;
+            result.cuts.push_back(segment_of(s.fine, cutting.idle(), tool, feed, kFine));
+            result.places.push_back(s.at);
+            result.moves.push_back(s.last);
         }
-        if (hardest) op.peak_at = place(*hardest);
-        if (op.wall_error_mm > limit)
+        if (breaks)
             diagnostics.push_back(
-                {Severity::warning, "cut.deflection",
-                 fmt::format("layer {}, {}: the cutter may bend by {:.4f} mm, more than the {:.4f} mm allowed; use a shorter or thicker tool "
-                             "or a smaller stepdown",
-                             layer.index, op.purpose, op.wall_error_mm, limit),
-                 place(*furthest)});
+                {Severity::warning, "cut.overhang",
+                 fmt::format("layer {}, {}: {:.2f} mm of wood hang over by {:.1f} mm where they are cut, and would need {:.2f} mm to hold "
+                             "({} such place{}); a flask would carry them",
+                             layer.index, op.purpose, breaks->wood, breaks->overhang, needed, broken, broken == 1 ? "" : "s"),
+                 breaks->place()});
     }
+    result.starts.push_back(result.cuts.size());
+    return result;
+}
+
+std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, std::span<const LayerCuts> layers) {
+    const Job& job = plan.job;
+    std::vector<CutSegment> cuts;
+    std::vector<std::size_t> starts;
+    for (const LayerCuts& layer : layers) {
+        for (std::size_t i = 0; i + 1 < layer.starts.size(); ++i) starts.push_back(cuts.size() + layer.starts[i]);
+        cuts.insert(cuts.end(), layer.cuts.begin(), layer.cuts.end());
+    }
+    starts.push_back(cuts.size());
+    const MemoryCharge memory(context, cuts.size() * (sizeof(CutSegment) + sizeof(SegmentForces)), "the cuts of a plan");
+    const HardestSearch hardest = hardest_cuts(context, cuts, starts, context.device());
+    std::vector<std::vector<Diagnostic>> found(layers.size());
+    if (!hardest.note.empty())
+        plan.diagnostics.push_back({Severity::note,
+                                    "forces.no_device",
+                                    fmt::format("the forces of {} cuts were computed without an OpenCL device: {}", cuts.size(), hardest.note),
+                                    {}});
+    std::size_t group = 0, base = 0;
+    for (std::size_t l = 0; l < layers.size(); ++l) {
+        for (Operation& op : plan.layers[l].operations) {
+            const HardestCuts& h = hardest.groups[group++];
+            if (h.resultant == kNoCut) continue;
+            const Tool& tool = *std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+            const auto exact = [&](std::size_t i) {
+                return cuts[i].profile == CutterProfile::flat ? closed_form_forces(cuts[i], kStatedAccuracy)
+                                                              : reference_forces(cuts[i], kStatedAccuracy);
+            };
+            const auto place = [&](std::size_t i) {
+                const auto& at = layers[l].places[i - base];
+                return std::array<double, 3>{at[0], at[1], at[2]};
+            };
+            const double in_plane = exact(h.in_plane).peak_in_plane_n;
+            op.peak_force_n = exact(h.resultant).peak_resultant_n;
+            op.peak_at = place(h.resultant);
+            op.peak_move = layers[l].moves[h.resultant - base];
+            op.deflection_mm = cutter_deflection(in_plane, tool.stickout, tool.diameter);
+            op.wall_error_mm = cutter_deflection(exact(h.across).peak_y_n, tool.stickout, tool.diameter);
+            const int index = plan.layers[l].index;
+            if (const double limit = bending_limit(op, job); op.wall_error_mm > limit)
+                found[l].push_back(
+                    {Severity::warning, "cut.deflection",
+                     fmt::format("layer {}, {}: the cutter may bend by {:.4f} mm, more than the {:.4f} mm allowed; use a shorter or thicker "
+                                 "tool or a smaller stepdown",
+                                 index, op.purpose, op.wall_error_mm, limit),
+                     place(h.across)});
+            if (const double stress = cutter_stress(in_plane, tool.stickout, tool.diameter); tool.strength_mpa > 0 && stress > tool.strength_mpa)
+                found[l].push_back({Severity::warning, "cut.strength",
+                                    fmt::format("layer {}, {}: the cutter would bear {:.0f} MPa in bending, more than its {:.0f} MPa", index,
+                                                op.purpose, stress, tool.strength_mpa),
+                                    place(h.in_plane)});
+        }
+        base += layers[l].cuts.size();
+    }
+    return found;
+}
+
+void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Diagnostic>& diagnostics) {
+    const LayerCuts cuts = adapt_layer(context, layer, plan, nullptr, diagnostics);
+    Plan one;
+    one.job = plan.job;
+    one.layers.push_back(std::move(layer));
+    const auto found = rate_layers(context, one, {&cuts, 1});
+    layer = std::move(one.layers[0]);
+    diagnostics.insert(diagnostics.end(), found[0].begin(), found[0].end());
+}
+
+double allowed_length(const Operation& operation, const Tool& tool, const Job& job) {
+    if (!(operation.wall_error_mm > 0)) return 0;
+    return tool.stickout * std::cbrt(bending_limit(operation, job) / operation.wall_error_mm);
 }
 
 }  // namespace slabwright

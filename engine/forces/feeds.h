@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include "engine/forces/min_material.h"
 #include "engine/forces/op_cuts.h"
 #include "engine/plan.h"
 #include "kernels/forces/forces.h"
@@ -10,8 +11,9 @@
 
 namespace slabwright {
 
-/// The cut of a stretch at this feed (mm/min). Depth and width are rounded up to classes (8 to a doubling of the depth, a 24th of the diameter), so that a layer of any length has some hundreds of different cuts. A ball that engages no higher than its radius is as wide as
-/// its circle there.
+/// The cut of a stretch at this feed (mm/min). Depth and width are rounded up to classes (64 to a doubling of the depth, a 240th of the diameter),
+/// so that a layer of any length has some thousands of different cuts. A ball that engages no higher than its radius is as wide as its
+/// circle there.
 [[nodiscard]] CutSegment cut_of(const CutStretch& stretch, const Tool& tool, const Job& job, double feed);
 
 /// What an operation may bend its cutter, normal to the way, mm: roughing as much as it leaves for finishing, finishing the cusp, facing what facing takes off.
@@ -20,14 +22,43 @@ namespace slabwright {
 /// Feeds come in this many steps of the fastest that tool and machine allow.
 inline constexpr int kFeedSteps = 16;
 
-/// Runs a layer's operations, in their order, through a standing slab and sets of each peak_force_n (resultant), deflection_mm (of the tip, in the
-/// plane), wall_error_mm (normal to the way) and peak_at, from the closed form or the double reference. Where the job adapts feeds, every move's feed is first
-/// set to the fastest of kFeedSteps steps at which
-///   * the cutter bends by no more than the operation's limit, but not under an eighth of what was planned, and
-///   * the thickest chip is no thicker than planned: that of a slot at the planned feed, the finish feed or the tool's.
-/// A faster feed is taken only where it lasts for at least 20 mm; roughing, facing and entries at the plunge feed are never made faster than planned. Drills are left alone.
-/// @param diagnostics gets, per operation, "feed.lowered" (where and how far), and "cut.deflection" where it bends too far at the slowest
+/// The different cuts of a layer's operations, in the order in which they are met first.
+struct LayerCuts {
+    std::vector<CutSegment> cuts;
+    std::vector<std::array<float, 3>> places;  ///< mm, where each is met first
+    std::vector<std::uint32_t> moves;          ///< and by which move
+    std::vector<std::size_t> starts;           ///< of each operation's, and their end
+};
+
+/// Runs a layer's operations, in their order, through a standing slab. Three things are looked at for every stretch: what the bending cutter leaves on
+/// a wall against the operation's limit, the cutter's stress against its strength where the job states one, and, where the slab hangs
+/// over, the wood against what the cut needs (section 9): roughing is carried by what stands, floors by what stays under them.
+///   * Where the job adapts feeds, every move gets the fastest of kFeedSteps steps at which all three hold, but not under an eighth of what was planned,
+///     and at which the thickest chip is no thicker than planned: that of a slot at the planned feed, the finish feed or the tool's. A faster feed is
+///     taken only where it lasts for at least 20 mm; roughing, facing and entries at the plunge feed are never made faster than planned.
+///     Where it is the wood that holds at no feed, the planned one stays: slower, it would break as well.
+///   * Where the job adapts stepdowns, what holds at no feed is cut in several passes (split_cuts.h), but for wood that is cut through at once.
+/// Drills are left alone.
+/// @param overhang    how far each place lies from what carries this slab; null: nothing hangs over
+/// @param diagnostics gets, per operation, "stepdown.lowered" (how many, how long, the deepest), "feed.lowered" (where and how far), and
+///                    "cut.overhang" where the wood would break all the same
 /// @throws Error(usage, "forces.spindle") when an operation mills with its spindle at rest; Error(usage, "forces.segment"); Error(cancelled)
+[[nodiscard]] LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const OverhangMap* overhang,
+                                    std::vector<Diagnostic>& diagnostics);
+
+/// Sets of every operation peak_force_n (resultant), deflection_mm (of the tip, in the plane), wall_error_mm (normal to the way), peak_at and
+/// peak_move, from the closed form or the double reference; many cuts are screened on the context's device (hardest.h), and the plan says so when there
+/// was none.
+/// @param layers as adapt_layer gave them, one for each layer of the plan
+/// @returns for each layer "cut.deflection" and "cut.strength", per operation, where a limit is passed all the same
+/// @throws Error(usage, "forces.segment"), Error(usage, "forces.device"), Error(cancelled)
+[[nodiscard]] std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, std::span<const LayerCuts> layers);
+
+/// adapt_layer and rate_layers of one layer over nothing that hangs over.
 void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Diagnostic>& diagnostics);
+
+/// The longest that the operation's tool might be, mm from holder to tip: where it would bend by the operation's limit (LUO eq. 11); 0
+/// where it bends nowhere.
+[[nodiscard]] double allowed_length(const Operation& operation, const Tool& tool, const Job& job);
 
 }  // namespace slabwright

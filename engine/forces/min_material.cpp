@@ -64,11 +64,22 @@ void distances(std::vector<double>& f, std::vector<double>& scratch, std::vector
     }
 }
 
-// The largest distance of a cell of the stock from a cell that one of the regions covers, mm; the stock's diagonal where none is.
-double farthest(std::span<const Loops* const> regions, const std::array<double, 2>& low, const std::array<double, 2>& high) {
+}  // namespace
+
+double OverhangMap::at(double x, double y) const {
+    const int i = std::clamp(static_cast<int>(std::floor((x - low[0]) / cell)), 0, nx - 1),
+              j = std::clamp(static_cast<int>(std::floor((y - low[1]) / cell)), 0, ny - 1);
+    return mm[static_cast<std::size_t>(j) * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i)];
+}
+
+double OverhangMap::largest() const { return *std::max_element(mm.begin(), mm.end()); }
+
+OverhangMap overhang_map(std::span<const Loops* const> regions, const std::array<double, 2>& low, const std::array<double, 2>& high) {
+    OverhangMap map;
     const double cell = std::max(high[0] - low[0], high[1] - low[1]) / kCells;
     const int nx = std::max(1, static_cast<int>(std::ceil((high[0] - low[0]) / cell))),
               ny = std::max(1, static_cast<int>(std::ceil((high[1] - low[1]) / cell)));
+    map.low = low, map.cell = cell, map.nx = nx, map.ny = ny;
     std::vector<std::vector<double>> rows(static_cast<std::size_t>(ny), std::vector<double>(static_cast<std::size_t>(nx), 1e18));
     std::vector<double> scratch, bounds, column(static_cast<std::size_t>(ny));
     std::vector<int> roots;
@@ -81,17 +92,16 @@ double farthest(std::span<const Loops* const> regions, const std::array<double, 
                     row[static_cast<std::size_t>(i)] = 0;
         distances(row, scratch, roots, bounds);
     }
-    double largest = 0;
+    map.mm.resize(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny));
     for (std::size_t i = 0; i < static_cast<std::size_t>(nx); ++i) {
         for (std::size_t j = 0; j < rows.size(); ++j) column[j] = rows[j][i];
         distances(column, scratch, roots, bounds);
-        largest = std::max(largest, *std::max_element(column.begin(), column.end()));
+        for (std::size_t j = 0; j < rows.size(); ++j)
+            map.mm[j * static_cast<std::size_t>(nx) + i] =
+                static_cast<float>(column[j] >= 1e18 ? std::hypot(high[0] - low[0], high[1] - low[1]) : std::sqrt(column[j]) * cell);
     }
-    // Half a cell's diagonal at the slab's edge and as much at the section's.
-    return largest >= 1e18 ? std::hypot(high[0] - low[0], high[1] - low[1]) : (std::sqrt(largest) + std::numbers::sqrt2) * cell;
+    return map;
 }
-
-}  // namespace
 
 double least_material(const Job& job, double overhang_mm) {
     double least = 0;
@@ -145,7 +155,10 @@ SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {
     result.overhangs.resize(heights.size());
     parallel_each(context, heights.size(), [&](std::size_t i) {
         const std::array<const Loops*, 2> regions{&sections[i].loops, &frame};
-        result.overhangs[i] = farthest(regions, plan.stock_min, plan.stock_max) + slope * heights[i] + plan.job.bonding.edge_setback;
+        // Half a cell's diagonal at the slab's edge and as much at the section's.
+        const OverhangMap map = overhang_map(regions, plan.stock_min, plan.stock_max);
+        const double most = std::hypot(plan.stock_max[0] - plan.stock_min[0], plan.stock_max[1] - plan.stock_min[1]);
+        result.overhangs[i] = std::min(map.largest() + std::numbers::sqrt2 * map.cell, most) + slope * heights[i] + plan.job.bonding.edge_setback;
     });
     return result;
 }

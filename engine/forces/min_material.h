@@ -1,7 +1,9 @@
 // How thick the wood above a layer boundary must be to bear being cut where its slab hangs over (LUO 6.3; method.md section 9).
 #pragma once
 
+#include <array>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "engine/plan.h"
@@ -15,6 +17,21 @@ namespace slabwright {
 /// middle of that depth above the joint. In LUO 6.5.2 (2 in, 3 mm deep) that is .124 in.
 /// @throws Error(usage, "forces.segment") for a tool or material that the force model does not take
 [[nodiscard]] double least_material(const Job& job, double overhang_mm);
+
+/// How far each place of the stock lies from what carries it, on a grid of 1/256 of the stock's longer side.
+struct OverhangMap {
+    std::array<double, 2> low{};
+    double cell = 1;
+    int nx = 0, ny = 0;
+    std::vector<float> mm;  ///< row by row; 0 over a region, the stock's diagonal everywhere when there is none
+    /// At a place, by the cell that it lies in or, outside of the stock, the nearest one.
+    [[nodiscard]] double at(double x, double y) const;
+    [[nodiscard]] double largest() const;
+};
+
+/// @param carried the regions that carry, by cells whose middle they hold
+[[nodiscard]] OverhangMap overhang_map(std::span<const Loops* const> carried, const std::array<double, 2>& stock_min,
+                                       const std::array<double, 2>& stock_max);
 
 /// How far, in mm, the slab that is glued at height z reaches past what carries it there: the largest distance of any place of the
 /// stock's rectangle from the section just below z, or from the flask where there is one, and the glue's setback on top of it.

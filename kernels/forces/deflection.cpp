@@ -37,6 +37,13 @@ double cutter_deflection(double force, double length, double diameter) {
     return force * length * length * length / stiffness(diameter);
 }
 
+double cutter_stress(double force, double length, double diameter) {
+    if (!(diameter > 0 && force >= 0 && length >= 0))
+        throw Error(ErrorKind::usage, "forces.tool", "a cutter needs a positive diameter, and no negative force or length");
+    const double d = kFluteDiameterShare * diameter;
+    return force * length / (std::numbers::pi * d * d * d / 32);
+}
+
 double allowed_tool_length(double force, double deflection, double diameter) {
     if (!(diameter > 0 && force >= 0 && deflection >= 0))
         throw Error(ErrorKind::usage, "forces.tool", "a cutter needs a positive diameter, and no negative force or deflection");

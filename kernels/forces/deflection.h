@@ -33,6 +33,10 @@ inline constexpr double kFluteDiameterShare = 0.8;  ///< a fluted cylinder bends
 /// @throws Error(usage, "forces.tool") unless the diameter is positive and force and length are not negative
 [[nodiscard]] double cutter_deflection(double force_n, double length_mm, double diameter_mm);
 
+/// σ = F·L / W, W = π(0.8 d)³/32: the bending stress of such a cutter at the holder.
+/// @throws Error(usage, "forces.tool") as cutter_deflection
+[[nodiscard]] double cutter_stress(double force_n, double length_mm, double diameter_mm);
+
 /// L = ∛(3EJδ / F): the longest such cutter that bends by no more than `deflection_mm` (LUO eq. 11); infinite at no force.
 /// @throws Error(usage, "forces.tool")
 [[nodiscard]] double allowed_tool_length(double force_n, double deflection_mm, double diameter_mm);

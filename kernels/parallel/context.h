@@ -29,6 +29,7 @@ public:
         int threads = 0;                 ///< 0: all that the machine offers
         std::uint64_t memory_bytes = 0;  ///< limit for charged memory; 0: 60 % of the machine's
         ProgressSink progress = {};
+        std::string device = {};  ///< OpenCL device for what pays there: "" or "auto", "reference" (none), or part of a device's name
     };
 
     Context();
@@ -38,6 +39,8 @@ public:
     Context& operator=(const Context&) = delete;
 
     [[nodiscard]] int threads() const noexcept;
+    /// As the options named it; it changes how fast an answer comes, never the answer.
+    [[nodiscard]] const std::string& device() const noexcept;
 
     /// Asks every kernel that runs on this context to stop. May be called from any thread or a signal handler.
     void cancel() noexcept { cancelled_.store(true, std::memory_order_relaxed); }

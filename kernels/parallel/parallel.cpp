@@ -31,6 +31,7 @@ struct Context::Impl {
     {
     }
     int threads;
+    std::string device;
 #if !defined(SLABWRIGHT_STD_THREADS)
     tbb::task_arena arena;
 #endif
@@ -48,6 +49,7 @@ Context::Context() : Context(Options{}) {}
 Context::Context(Options options)
     : impl_(std::make_unique<Impl>(options.threads > 0 ? options.threads : machine_threads())), memory_limit_(options.memory_bytes) {
     impl_->sink = std::move(options.progress);
+    impl_->device = std::move(options.device);
     if (memory_limit_ == 0) {
         struct sysinfo info {};
         if (sysinfo(&info) == 0) memory_limit_ = static_cast<std::uint64_t>(0.6 * static_cast<double>(info.totalram) * info.mem_unit);
@@ -58,6 +60,7 @@ Context::Context(Options options)
 Context::~Context() = default;
 
 int Context::threads() const noexcept { return impl_->threads; }
+const std::string& Context::device() const noexcept { return impl_->device; }
 
 void Context::throw_if_cancelled() const {
     if (cancelled()) throw Error(ErrorKind::cancelled, "cancelled", "cancelled on request; nothing was written");

@@ -1,0 +1,27 @@
+// Cuts that are too deep for their cutter, taken in several passes.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/plan.h"
+
+namespace slabwright {
+
+/// A run of feed moves that is to be cut in several passes.
+struct DeepRun {
+    std::uint32_t first = 0, last = 0;  ///< moves, both included; all by feed
+    double depth_mm = 0;                ///< engaged height over the tip where it is deepest
+    int passes = 2;                     ///< at least 2
+    friend bool operator==(const DeepRun&, const DeepRun&) = default;
+};
+
+/// The moves with `passes` − 1 more passes before each run: the same way, raised by equal shares of the depth, highest first; after each the
+/// cutter goes back on the raised way, where it has just cut, and down where it stood before the run. A cutter that
+/// may be somewhere may be anywhere straight above it, so nothing else need be known of part, flask and holder, and what stands
+/// after the run is what would have stood. Vertical ways go at `plunge_feed`, mm/min, backward ways at the run's own feeds.
+/// @param runs ascending, apart from each other, none with move 0
+[[nodiscard]] std::vector<Move> split_runs(const std::vector<Move>& moves, std::span<const DeepRun> runs, std::uint32_t plunge_feed);
+
+}  // namespace slabwright

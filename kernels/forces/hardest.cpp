@@ -1,0 +1,75 @@
+#include "kernels/forces/hardest.h"
+
+#include <algorithm>
+
+#include "kernels/forces/turn.h"
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+// Of the double model, measured on one thread at 2.6 GHz (bench/RESULTS.md); only the decision whether to start a device hangs on them.
+constexpr double kSecondsFlat = 8e-6, kSecondsBall = 55e-6;
+// Twice what the self-test allows a device, as a share of the cut's own peak resultant.
+constexpr double kScreen = 2e-4;
+
+SegmentForces in_double(const CutSegment& cut) {
+    return cut.profile == CutterProfile::flat ? closed_form_forces(cut, kForceAccuracy) : reference_forces(cut, kForceAccuracy);
+}
+
+constexpr double SegmentForces::*kAsked[] = {&SegmentForces::peak_resultant_n, &SegmentForces::peak_in_plane_n, &SegmentForces::peak_y_n};
+
+}  // namespace
+
+HardestSearch hardest_cuts(Context& context, std::span<const CutSegment> cuts, std::span<const std::size_t> starts, const std::string& device,
+                           double worth_seconds) {
+    HardestSearch search;
+    double seconds = 0;
+    for (std::size_t i = 0; i < cuts.size(); ++i) {
+        forces::check_segment(cuts[i], i);
+        seconds += cuts[i].profile == CutterProfile::ball ? kSecondsBall : kSecondsFlat;
+    }
+    std::vector<SegmentForces> found(cuts.size());
+    // Cuts whose double forces are needed: all, or those that a device could not rule out.
+    std::vector<std::uint32_t> doubtful;
+    const auto all = [&] {
+        for (std::size_t i = 0; i < cuts.size(); ++i) doubtful.push_back(static_cast<std::uint32_t>(i));
+    };
+    if (seconds < worth_seconds || device == "reference") {
+        all();
+    } else {
+        ForceSolver solver(context, device);
+        search.device = solver.device();
+        search.note = solver.on_device() ? "" : solver.note();
+        if (!solver.on_device()) {
+            all();
+        } else {
+            solver.solve(context, cuts, found);
+            for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
+                double surely[3] = {0, 0, 0};
+                for (std::size_t i = starts[g]; i < starts[g + 1]; ++i)
+                    for (int q = 0; q < 3; ++q) surely[q] = std::max(surely[q], found[i].*kAsked[q] - kScreen * found[i].peak_resultant_n);
+                for (std::size_t i = starts[g]; i < starts[g + 1]; ++i) {
+                    bool may = false;
+                    for (int q = 0; q < 3; ++q) may |= found[i].*kAsked[q] + kScreen * found[i].peak_resultant_n >= surely[q];
+                    if (may) doubtful.push_back(static_cast<std::uint32_t>(i));
+                }
+            }
+        }
+    }
+    parallel_for(context, doubtful.size(), 64, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) found[doubtful[k]] = in_double(cuts[doubtful[k]]);
+    });
+    std::size_t next = 0;
+    for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
+        std::size_t best[3] = {kNoCut, kNoCut, kNoCut};
+        for (; next < doubtful.size() && doubtful[next] < starts[g + 1]; ++next)
+            for (int q = 0; q < 3; ++q)
+                if (best[q] == kNoCut || found[doubtful[next]].*kAsked[q] > found[best[q]].*kAsked[q]) best[q] = doubtful[next];
+        search.groups.push_back({best[0], best[1], best[2]});
+    }
+    return search;
+}
+
+}  // namespace slabwright
