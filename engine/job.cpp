@@ -56,9 +56,8 @@ void validate_tool(const Tool& tool, std::size_t position) {
 
 }  // namespace
 
-double max_layer_thickness(const Job& job) {
-    double thickness = job.slabs.thicknesses.empty() ? 0 : *std::max_element(job.slabs.thicknesses.begin(), job.slabs.thicknesses.end());
-    thickness -= job.slabs.facing_allowance;
+double max_bonded_layer_thickness(const Job& job) {
+    double thickness = 1e6;
     for (const Tool& tool : job.tools) {
         // A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the bottom.
         if (tool.kind != ToolKind::flat && tool.kind != ToolKind::ball) continue;
@@ -69,6 +68,11 @@ double max_layer_thickness(const Job& job) {
         thickness = std::min(thickness, tool.flute_length - overrun - job.cutting.holder_clearance);
     }
     return thickness;
+}
+
+double max_layer_thickness(const Job& job) {
+    const double slab = job.slabs.thicknesses.empty() ? 0 : *std::max_element(job.slabs.thicknesses.begin(), job.slabs.thicknesses.end());
+    return std::min(slab - job.slabs.facing_allowance, max_bonded_layer_thickness(job));
 }
 
 double least_flask_gap(const Job& job) {

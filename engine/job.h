@@ -14,7 +14,8 @@
 namespace slabwright {
 
 enum class LengthUnit : std::uint8_t { mm, inch };
-enum class LayerStrategy : std::uint8_t { printed, optimal };
+/// Boundaries as printed (LUO 4.2.5), by the dynamic program, or, slabs bonded to any thickness, those with which the whole build takes least.
+enum class LayerStrategy : std::uint8_t { printed, optimal, combined };
 enum class Frame : std::uint8_t { pattern_base, layer_top };
 /// Which slopes level contours finish and which projected paths do (SHAPING 5): each its own side of the steep limit, one of
 /// them everything, or both everything, each in the steps that it needs at the limit.
@@ -189,6 +190,9 @@ struct Job {
 /// The tallest layer this job can cut (LTmax, method.md section 4): the thickest slab less the facing allowance, and for
 /// every tool its flutes less overrun and holder clearance.
 [[nodiscard]] double max_layer_thickness(const Job& job);
+
+/// The same where slabs may be bonded into one: the slabs' thickness is no limit then, but the flutes are.
+[[nodiscard]] double max_bonded_layer_thickness(const Job& job);
 
 /// The narrowest flask.gap in which every flat and ball end mill of the job passes between pattern and flask: the widest
 /// cutter, what roughing leaves on the pattern's walls, and room for leads.

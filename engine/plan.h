@@ -106,6 +106,7 @@ struct LayerSelection {
 struct Layer {
     int index = 0;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
+    int slabs = 1;       ///< bonded into one, slab_thickness in all
     std::string reason;  ///< why z_top lies where it lies, in words
     std::vector<Operation> operations;
     std::optional<LayerSelection> selection;  ///< none where there was nothing to select

@@ -11,7 +11,9 @@
 #include "engine/flask/flask.h"
 #include "engine/forces/feeds.h"
 #include "engine/forces/min_material.h"
+#include "engine/layers/combined.h"
 #include "engine/layers/layers.h"
+#include "engine/layers/tool_map.h"
 #include "engine/paths/paths.h"
 #include "engine/paths/standing.h"
 #include "engine/schedule/motion_time.h"
@@ -133,45 +135,26 @@ std::vector<int> tools_in_order(const Layer& layer) {
     return tools;
 }
 
-}  // namespace
+// How many slabs of the stock make a layer's thickness; one where it is in stock, or no stock is named.
+int slabs_of(const Job& job, double thickness) {
+    double thickest = 0;
+    for (const double t : job.slabs.thicknesses) thickest = std::max(thickest, t);
+    return thickest > 0 ? std::max(1, static_cast<int>(std::lround(thickness / thickest))) : 1;
+}
 
-Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const Job& job) {
-    validate(job);
-    Plan plan;
-    plan.input = input;
-    plan.totals.part_volume_mm3 = input.volume_mm3;
-    plan.job = job;
-    if (mesh.facets.empty()) throw refuse("input.empty", "there is nothing to make: the mesh has no facets", input.file, "export the pattern again");
+/// A part [from, to] of the request's progress.
+struct ProgressShare {
+    double from = 0, to = 1;
+    [[nodiscard]] double at(double part) const { return from + part * (to - from); }
+};
+
+// From layers on. `ground` is a plan with its stock and features.
+Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const LayerRequest& request, const LayerPlacement& placement,
+                 ProgressShare share) {
+    Plan plan = ground;
+    const Job& job = plan.job;
     const MeshView view = mesh.view();
-    const Box3 box = bounds(view);
-    const double height = box.max.z;
-    place_stock(plan, box);
-
-    const MemoryCharge mesh_memory(context, mesh.vertices.size() * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3), "the mesh");
-    context.begin_phase("features", 0.10, 0.20);
     const FeatureOptions options = feature_options(job);
-    FeatureSet found = find_features(context, view, options);
-    plan.features = std::move(found.features);
-    for (const FinderDisagreement& d : found.disagreements)
-        plan.diagnostics.push_back({Severity::note, "features.finders_disagree",
-                                    fmt::format("only the {} finder sees a {} at {:.3f} mm", name(d.found_by), name(d.type), d.z),
-                                    std::array{d.x, d.y, d.z}});
-
-    context.begin_phase("layers", 0.20, 0.25);
-    LayerRequest request;
-    request.height = height;
-    request.max_layer = max_layer_thickness(job);
-    request.min_layer = job.layers.min_layer;
-    request.min_material = job.material.min_thickness;
-    if (job.material.min_thickness == 0) request.min_material_at = min_material(context, view, plan);
-    request.alpha = job.layers.alpha;
-    request.beta = job.layers.beta;
-    request.slab_thicknesses = job.slabs.thicknesses;
-    request.facing_allowance = job.slabs.facing_allowance;
-    request.saddles_constrain = job.layers.saddles_constrain;
-    request.features = plan.features;
-    request.section_area = SectionAreas(context, view);
-    LayerPlacement placement = job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request);
     plan.diagnostics.insert(plan.diagnostics.end(), placement.diagnostics.begin(), placement.diagnostics.end());
     if (request.min_material_at) {
         double most = 0, where = 0;
@@ -193,6 +176,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
         layer.z_bottom = tops.empty() ? 0 : tops.back();
         layer.z_top = b.z;
         layer.slab_thickness = b.slab_thickness;
+        layer.slabs = slabs_of(job, b.slab_thickness);
         layer.reason = b.reason;
         tops.push_back(b.z);
         plan.layers.push_back(std::move(layer));
@@ -228,7 +212,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
 
     // A gap in the mesh shows as an open chain; sections at every boundary and feature would miss one in between, so the
     // loader has refused all open edges but those in the base plane already. What is left here is proof by section.
-    context.begin_phase("paths", 0.25, 0.92, plan.layers.size());
+    context.begin_phase("paths", share.at(0), share.at(0.95), plan.layers.size());
     const LayerTools fixed = fixed_tools(job);
     double overrun = fixed.finish.diameter / 2;
     const bool selecting = selects_tools(job);
@@ -345,10 +329,10 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
                      {}});
         }
     }
-    if (operations == 0) throw refuse("plan.empty", "nothing would be cut", input.file, "check the units and the slabs");
+    if (operations == 0) throw refuse("plan.empty", "nothing would be cut", plan.input.file, "check the units and the slabs");
     check_travel(plan);
 
-    context.begin_phase("schedule", 0.92, 0.95);
+    context.begin_phase("schedule", share.at(0.95), share.at(1));
     for (std::size_t i = 0; i < plan.layers.size(); ++i) bond_layer(plan.layers[i], carried[i], plan, plan.diagnostics);
     schedule(plan);
     if (plan.totals.stack_mass_kg > job.machine.build_mass_kg)
@@ -357,6 +341,116 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
                                  plan.totals.stack_mass_kg - job.machine.build_mass_kg),
                      {}, "split the pattern or use a smaller margin");
     return plan;
+}
+
+/// A placement that `combined` tries.
+struct TriedLayers {
+    const char* name;
+    double max_layer = 0;  ///< what the placement kept to
+    LayerPlacement placement;
+};
+
+bool same_tops(const LayerPlacement& a, const LayerPlacement& b) {
+    return std::equal(a.boundaries.begin(), a.boundaries.end(), b.boundaries.begin(), b.boundaries.end(),
+                      [](const Boundary& x, const Boundary& y) { return std::abs(x.z - y.z) < kSameHeight; });
+}
+
+// Slabs bonded to any thickness let layers be as tall as the tools reach: with one tool everywhere, and with those of the tool map. Beside
+// them stand what the other strategies give, so that none of these is ever faster.
+std::vector<TriedLayers> combined_layers(Context& context, MeshView view, const Plan& ground, const LayerRequest& request) {
+    std::vector<TriedLayers> tried;
+    tried.push_back({"optimal", request.max_layer, place_layers_optimal(request)});
+    const LayerCost& usual = tried[0].placement.cost;
+    const auto add = [&](const char* name, double max_layer, LayerPlacement placement, bool any) {
+        // A layer that breaks more features than it needs to is no gain, however fast it is made.
+        if (!any && (placement.cost.broken_type2 > usual.broken_type2 || placement.cost.broken_type1 > usual.broken_type1 ||
+                     placement.cost.thin_layers > usual.thin_layers))
+            return;
+        for (const TriedLayers& t : tried)
+            if (same_tops(t.placement, placement)) return;
+        tried.push_back({name, max_layer, std::move(placement)});
+    };
+    add("printed", request.max_layer, place_layers_printed(request), true);
+    LayerRequest bonded = request;
+    bonded.max_layer = max_bonded_layer_thickness(ground.job);
+    add("bonded slabs", bonded.max_layer, place_layers_optimal(bonded), false);
+    const ToolMap map = tool_map(context, view, ground.job, ground.features);
+    const std::vector<ToolSlice> layers = join_slices(map.slices, map.allowed_mm, request.min_layer);
+    add("layers by tools", bonded.max_layer, place_layers_by_tools(bonded, layers, map.allowed_mm), false);
+    return tried;
+}
+
+// Every placement planned whole; the one that is built in the least time stays.
+Plan fastest_plan(Context& context, const Mesh& mesh, const Plan& ground, const LayerRequest& request, std::vector<TriedLayers> tried,
+                  ProgressShare share) {
+    std::optional<Plan> best;
+    std::optional<Error> refused;
+    std::string words;
+    const char* name = "";
+    for (std::size_t i = 0; i < tried.size(); ++i) {
+        const double step = 1.0 / static_cast<double>(tried.size()), at = static_cast<double>(i) * step;
+        LayerRequest asked = request;
+        asked.max_layer = tried[i].max_layer;
+        try {
+            Plan plan = plan_layers(context, mesh, ground, asked, tried[i].placement, {share.at(at), share.at(at + step)});
+            words += fmt::format("{}{} {:.1f} min", words.empty() ? "" : ", ", tried[i].name, plan.totals.build_minutes);
+            if (!best || plan.totals.build_minutes < best->totals.build_minutes) best = std::move(plan), name = tried[i].name;
+        } catch (const Error& e) {
+            if (e.kind() != ErrorKind::no_plan || e.code().starts_with("memory")) throw;
+            words += fmt::format("{}{} refused ({})", words.empty() ? "" : ", ", tried[i].name, e.code());
+            if (!refused) refused = e;
+        }
+    }
+    if (!best) throw *refused;
+    best->diagnostics.push_back({Severity::note,
+                                 "layers.combined",
+                                 fmt::format("of {} placement{} {} is built fastest: {}", tried.size(), tried.size() == 1 ? "" : "s", name, words),
+                                 {}});
+    return std::move(*best);
+}
+
+}  // namespace
+
+Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const Job& job) {
+    validate(job);
+    Plan plan;
+    plan.input = input;
+    plan.totals.part_volume_mm3 = input.volume_mm3;
+    plan.job = job;
+    if (mesh.facets.empty()) throw refuse("input.empty", "there is nothing to make: the mesh has no facets", input.file, "export the pattern again");
+    const MeshView view = mesh.view();
+    const Box3 box = bounds(view);
+    const double height = box.max.z;
+    place_stock(plan, box);
+
+    const MemoryCharge mesh_memory(context, mesh.vertices.size() * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3), "the mesh");
+    context.begin_phase("features", 0.10, 0.20);
+    const FeatureOptions options = feature_options(job);
+    FeatureSet found = find_features(context, view, options);
+    plan.features = std::move(found.features);
+    for (const FinderDisagreement& d : found.disagreements)
+        plan.diagnostics.push_back({Severity::note, "features.finders_disagree",
+                                    fmt::format("only the {} finder sees a {} at {:.3f} mm", name(d.found_by), name(d.type), d.z),
+                                    std::array{d.x, d.y, d.z}});
+
+    context.begin_phase("layers", 0.20, 0.25);
+    LayerRequest request;
+    request.height = height;
+    request.max_layer = max_layer_thickness(job);
+    request.min_layer = job.layers.min_layer;
+    request.min_material = job.material.min_thickness;
+    if (job.material.min_thickness == 0) request.min_material_at = min_material(context, view, plan);
+    request.alpha = job.layers.alpha;
+    request.beta = job.layers.beta;
+    request.slab_thicknesses = job.slabs.thicknesses;
+    request.facing_allowance = job.slabs.facing_allowance;
+    request.saddles_constrain = job.layers.saddles_constrain;
+    request.features = plan.features;
+    request.section_area = SectionAreas(context, view);
+    if (job.layers.strategy == LayerStrategy::combined)
+        return fastest_plan(context, mesh, plan, request, combined_layers(context, view, plan, request), {0.25, 0.95});
+    return plan_layers(context, mesh, plan, request,
+                       job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request), {0.25, 0.95});
 }
 
 }  // namespace slabwright

@@ -14,7 +14,8 @@ struct Word {
 };
 
 inline constexpr Word<LengthUnit> kUnitWords[] = {{"mm", LengthUnit::mm}, {"in", LengthUnit::inch}};
-inline constexpr Word<LayerStrategy> kStrategyWords[] = {{"printed", LayerStrategy::printed}, {"optimal", LayerStrategy::optimal}};
+inline constexpr Word<LayerStrategy> kStrategyWords[] = {
+    {"printed", LayerStrategy::printed}, {"optimal", LayerStrategy::optimal}, {"combined", LayerStrategy::combined}};
 inline constexpr Word<Finder> kFinderWords[] = {{"halving", Finder::halving}, {"exact", Finder::exact}, {"both", Finder::both}};
 inline constexpr Word<FinishStrategy> kFinishWords[] = {
     {"split", FinishStrategy::split}, {"levels", FinishStrategy::levels}, {"projection", FinishStrategy::projection}, {"both", FinishStrategy::both}};
@@ -135,7 +136,8 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("weld", job.tolerances.weld, "mm: vertices this near are merged, and reported; 0: only equal ones");
 
     visit.table("layers", "where layers end");
-    visit.word("strategy", job.layers.strategy, kStrategyWords, "optimal or printed (LUO 4.2.5)");
+    visit.word("strategy", job.layers.strategy, kStrategyWords,
+               "optimal, printed (LUO 4.2.5), or combined: slabs bonded to any thickness, whatever is built fastest (LUO 6.4.2)");
     visit.word("finder", job.layers.finder, kFinderWords, "of features: exact, halving or both");
     visit.key("min_layer", job.layers.min_layer, "mm: thinner layers are reported");
     visit.key("alpha", job.layers.alpha, "per inch, in Q = alpha DT + beta A (LUO 4.2.4)");

@@ -160,6 +160,7 @@ void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     json.key("z_bottom").exact(layer.z_bottom);
     json.key("z_top").exact(layer.z_top);
     json.key("slab_thickness").exact(layer.slab_thickness);
+    json.key("slabs").integer(layer.slabs);
     json.key("reason").string(layer.reason);
     json.key("selection");
     put_selection(json, layer.selection);

@@ -345,7 +345,8 @@ int main(int argc, char** argv) {
     plan_command->add_option("STL", options.stl, "the pattern")->required();
     plan_command->add_option("-o,--out", options.out, "folder for the plan; a plan in it is replaced")->required();
     add_common(*plan_command, options);
-    plan_command->add_option("--strategy", options.strategy, "of layer placement: optimal or printed")->check(CLI::IsMember({"optimal", "printed"}));
+    plan_command->add_option("--strategy", options.strategy, "of layer placement: optimal, printed or combined")
+        ->check(CLI::IsMember({"optimal", "printed", "combined"}));
     plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")->check(CLI::IsMember({"exact", "halving", "both"}));
     plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
 

@@ -264,30 +264,40 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest", op.purpose, "give the tool a speed");
         BentCutter cutting(job, op, tool);
         const double limit = bending_limit(op, job);
-        const auto load = [&](const Seen& s, double feed) {
-            const Bent& bent = cutting.at(s.coarse, feed);
+        const auto load_of = [&](const Seen& s, const Bent& bent) {
             Load l{bent.wall_mm / limit, 0};
             if (tool.strength_mpa > 0) l.cutter = std::max(l.cutter, bent.stress_mpa / tool.strength_mpa);
             if (s.overhang > 0) l.wood = cutting.needed_wood(bent, s.height, s.overhang) / s.wood;
             return l;
         };
+        const auto load = [&](const Seen& s, double feed) { return load_of(s, cutting.at(s.coarse, feed)); };
 
         const auto fastest = static_cast<std::uint32_t>(std::floor(std::min(tool.max_feed, job.machine.max_feed)));
         // The fastest step that all limits bear. Where none does: the slowest that is allowed, when it is the cutter that bears too
         // much; as planned, when it is the wood.
+        // The steps of a class, fastest first, are the same wherever it is met; with what they bear, where that was asked.
+        struct FeedStep {
+            std::uint32_t feed = 0;
+            const Bent* bent = nullptr;
+        };
+        std::map<std::pair<CutClass, std::uint32_t>, std::vector<FeedStep>> steps_of;
         const auto slow_enough = [&](const Seen& s, std::uint32_t planned, double chip) {
-            // What is planned is a step too, so that a cut that needs no other feed keeps its own.
-            std::vector<std::uint32_t> steps{planned};
-            for (int k = 1; k <= kFeedSteps; ++k) steps.push_back(fastest * static_cast<std::uint32_t>(k) / kFeedSteps);
-            std::sort(steps.begin(), steps.end(), std::greater<>());
+            const auto [it, fresh] = steps_of.try_emplace({s.coarse, planned});
+            std::vector<FeedStep>& steps = it->second;
+            if (fresh) {
+                // What is planned is a step too, so that a cut that needs no other feed keeps its own.
+                steps.push_back({planned, nullptr});
+                for (int k = 1; k <= kFeedSteps; ++k) steps.push_back({fastest * static_cast<std::uint32_t>(k) / kFeedSteps, nullptr});
+                std::erase_if(steps, [&](const FeedStep& f) { return f.feed > chip || f.feed < 1 || f.feed < kLeastShare * planned; });
+                std::sort(steps.begin(), steps.end(), [](const FeedStep& x, const FeedStep& y) { return x.feed > y.feed; });
+            }
             std::uint32_t slowest = planned, for_cutter = 0;
-            for (const std::uint32_t step : steps) {
-                if (step > chip || step < 1) continue;
-                if (step < kLeastShare * planned) break;
-                const Load l = load(s, step);
-                if (l.worst() <= 1) return step;
-                if (l.cutter <= 1 && for_cutter == 0) for_cutter = step;
-                slowest = step;
+            for (FeedStep& step : steps) {
+                if (!step.bent) step.bent = &cutting.at(s.coarse, step.feed);
+                const Load l = load_of(s, *step.bent);
+                if (l.worst() <= 1) return step.feed;
+                if (l.cutter <= 1 && for_cutter == 0) for_cutter = step.feed;
+                slowest = step.feed;
             }
             return for_cutter > 0 ? for_cutter : slowest;
         };

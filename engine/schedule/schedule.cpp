@@ -222,23 +222,31 @@ void schedule(Plan& plan) {
         ++totals.layers;
         totals.stock_volume_mm3 += stock_x * stock_y * layer.slab_thickness;
 
-        // Fetching the slab and clamping it only needs the handler; it may go on while the layer below is being milled.
-        SequenceStep& take = add(layer.index, "take_slab", handler_free == 0 ? std::vector<int>{} : std::vector<int>{handler_free}, third);
-        take.numbers = {{"thickness_mm", layer.slab_thickness}, {"length_mm", stock_x}, {"width_mm", stock_y}};
-        take.words = {{"material", job.material.name}};
-        const int taken = take.id;
-        const int clamped = add(layer.index, "clamp", {taken}, third).id;
-        SequenceStep& glue = add(layer.index, "glue", {stack_ready}, job.bonding.glue_s_per_m2 * layer.glue_area_mm2 * 1e-6);
-        glue.numbers = {{"area_mm2", layer.glue_area_mm2}, {"setback_mm", job.bonding.edge_setback}};
-        glue.words = {{"glue", job.bonding.glue}};
-        const int glued = glue.id;
-        SequenceStep& place = add(layer.index, "place", {clamped, glued}, third);
-        place.numbers = {{"x_mm", plan.stock_min[0]}, {"y_mm", plan.stock_min[1]}, {"z_bottom_mm", layer.z_bottom}};
-        handler_free = place.id;
-        SequenceStep& press = add(layer.index, "press", {handler_free}, job.bonding.press_time_s);
-        press.numbers = {{"force_n", layer.press_force_n}, {"time_s", job.bonding.press_time_s}};
-        const int pressed = press.id;
-        totals.bonding_minutes += (job.bonding.handling_s + job.bonding.glue_s_per_m2 * layer.glue_area_mm2 * 1e-6 + job.bonding.press_time_s) / 60;
+        // A layer of several slabs: each is bonded to the one below before any is cut. Between two whole slabs glue goes everywhere, so
+        // that no piece of the waste above a joint comes loose.
+        const double slab = layer.slab_thickness / layer.slabs, whole = stock_x * stock_y;
+        int pressed = 0;
+        for (int k = 0; k < layer.slabs; ++k) {
+            const double area = k == 0 ? layer.glue_area_mm2 : whole;
+            // Fetching the slab and clamping it only needs the handler; it may go on while the layer below is being milled.
+            SequenceStep& take = add(layer.index, "take_slab", handler_free == 0 ? std::vector<int>{} : std::vector<int>{handler_free}, third);
+            take.numbers = {{"thickness_mm", slab}, {"length_mm", stock_x}, {"width_mm", stock_y}};
+            take.words = {{"material", job.material.name}};
+            const int taken = take.id;
+            const int clamped = add(layer.index, "clamp", {taken}, third).id;
+            SequenceStep& glue = add(layer.index, "glue", {k == 0 ? stack_ready : pressed}, job.bonding.glue_s_per_m2 * area * 1e-6);
+            glue.numbers = {{"area_mm2", area}, {"setback_mm", k == 0 ? job.bonding.edge_setback : 0}};
+            glue.words = {{"glue", job.bonding.glue}};
+            const int glued = glue.id;
+            SequenceStep& place = add(layer.index, "place", {clamped, glued}, third);
+            place.numbers = {{"x_mm", plan.stock_min[0]}, {"y_mm", plan.stock_min[1]}, {"z_bottom_mm", layer.z_bottom + k * slab}};
+            handler_free = place.id;
+            SequenceStep& press = add(layer.index, "press", {handler_free}, job.bonding.press_time_s);
+            // Every press goes through the joint under the layer.
+            press.numbers = {{"force_n", layer.press_force_n}, {"time_s", job.bonding.press_time_s}};
+            pressed = press.id;
+            totals.bonding_minutes += (job.bonding.handling_s + job.bonding.glue_s_per_m2 * area * 1e-6 + job.bonding.press_time_s) / 60;
+        }
 
         // The table's height is that of its surface under the plane from which the programs count z, so it is fixed in the
         // frame pattern-base and sinks layer by layer in layer-top.

@@ -1,4 +1,4 @@
-// The forces, thicknesses and lengths of LUO 6.5 (tables 6.2 and 6.3 and the 10 minutes saved belong to layers), published, computed, and why they differ where they do. Run it to see the table.
+// The forces, thicknesses and lengths of LUO 6.5 (table 6.3 and the 10 minutes saved: luo_combined_test), published, computed, and why they differ where they do. Run it to see the table.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,6 +32,44 @@ CutSegment slot(double helix, CoefficientTransform transform) {
     s.spindle_rpm = 4000;
     s.coefficients = resolve_coefficients(kDippon, kPi / 6, transform);
     return s;
+}
+
+OverhangCut specimen(double fx, double fy, double fz) {
+    OverhangCut c;
+    c.force_x_n = fx, c.force_y_n = fy, c.force_z_n = fz;
+    c.overhang_mm = 2 * kInch;
+    c.cut_height_mm = 0.06 * kInch;
+    c.width_mm = 0.5 * kInch;
+    c.strength_mpa = 27;
+    return c;
+}
+
+// What 6.5.1 to 6.5.3 set down as given: what of it the model takes, and as what.
+TEST(LuoForces, Given) {
+    const CutSegment s = slot(kPi / 6, CoefficientTransform::printed);
+    const OverhangCut c = specimen(0, 0, 0);
+    std::printf("LUO 6.5, given                     published       used   why they differ\n");
+    row("rake angle, degrees", "15", std::nan(""), "not used: it is in the orthogonal data already");
+    row("helix angle, degrees", 30, s.helix_rad * 180 / kPi, "");
+    row("spindle speed, 1/min", 4000, s.spindle_rpm, "for power only");
+    row("cutting depth a, mm", 3, s.high_mm, "");
+    row("feed per tooth c, mm", 0.635, s.chip_load_mm, "");
+    row("Ktc, N/mm2 (Dippon)", 8.8575, kDippon.ktc, "");
+    row("Kte, N/mm", 1.1268, kDippon.kte, "");
+    row("Kfc, N/mm2", 0.6188, kDippon.kfc, "");
+    row("Kfe, N/mm", 2.4948, kDippon.kfe, "");
+    row("flutes", 2, s.flutes, "");
+    row("cutter diameter, in", "-", 2 * s.radius_mm / kInch, "print does not say; 1/2 in is the set's roughing tool");
+    row("specimen: strength, MPa", 27, c.strength_mpa, "");
+    row("  depth of cut d, in", 0.12, s.high_mm / kInch, "the forces are those of 3 mm, .118 in");
+    row("  overhang b, in", 2, c.overhang_mm / kInch, "");
+    row("  width R, in", 0.5, c.width_mm / kInch, "");
+    row("  cutting height a, in", 0.06, c.cut_height_mm / kInch, "half of the depth");
+    row("E, GPa", 200, kToolModulusMpa / 1000, "");
+    row("allowed deflection, in", 0.002, 0.002, "print gives no unit; its lengths are in inches");
+    row("table 6.2, diameters, in", "5", 5, ".125 to 1: the library of table 5.4, see luo_combined_test");
+    EXPECT_EQ(kToolModulusMpa, 200e3);
+    EXPECT_EQ(c.cut_height_mm, 0.06 * kInch);
 }
 
 TEST(LuoForces, Coefficients) {
@@ -93,16 +131,6 @@ TEST(LuoForces, PeakForces) {
         EXPECT_NEAR(a.peak_y_n, b.peak_y_n, 1e-9);
         EXPECT_NEAR(a.peak_z_n, b.peak_z_n, 1e-9);
     }
-}
-
-OverhangCut specimen(double fx, double fy, double fz) {
-    OverhangCut c;
-    c.force_x_n = fx, c.force_y_n = fy, c.force_z_n = fz;
-    c.overhang_mm = 2 * kInch;
-    c.cut_height_mm = 0.06 * kInch;
-    c.width_mm = 0.5 * kInch;
-    c.strength_mpa = 27;
-    return c;
 }
 
 // The cut of 6.5.1 on a specimen that overhangs by 2 in: all six of .12 in broke, five of six of .13 in held.
