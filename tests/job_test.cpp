@@ -89,7 +89,7 @@ TEST(Job, EveryKeyRoundTrips) {
     EXPECT_EQ(job_toml(read), text);
     EXPECT_EQ(read.machine.name, job.machine.name);
     EXPECT_EQ(read.slabs.thicknesses, job.slabs.thicknesses);
-    EXPECT_EQ(read.layers.strategy, LayerStrategy::printed);
+    EXPECT_EQ(read.layers.strategy, LayerStrategy::combined);
     EXPECT_EQ(read.cutting.finish_feed, job.cutting.finish_feed);
     EXPECT_EQ(read.tools[2].stickout, job.tools[2].stickout);
     EXPECT_EQ(read.tools[0].kind, ToolKind::drill);

@@ -1,4 +1,4 @@
-// The forces, thicknesses and lengths of LUO 6.5 (table 6.3 and the 10 minutes saved: luo_combined_test), published, computed, and why they differ where they do. Run it to see the table.
+// The forces, thicknesses and lengths of LUO 6.5 (table 6.3: combined_test; the 10 minutes saved come without the times they are of), published, computed, and why they differ where they do. Run it to see the table.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -67,7 +67,7 @@ TEST(LuoForces, Given) {
     row("  cutting height a, in", 0.06, c.cut_height_mm / kInch, "half of the depth");
     row("E, GPa", 200, kToolModulusMpa / 1000, "");
     row("allowed deflection, in", 0.002, 0.002, "print gives no unit; its lengths are in inches");
-    row("table 6.2, diameters, in", "5", 5, ".125 to 1: the library of table 5.4, see luo_combined_test");
+    row("table 6.2, diameters, in", "5", 5, ".125 to 1: the library of table 5.4");
     EXPECT_EQ(kToolModulusMpa, 200e3);
     EXPECT_EQ(c.cut_height_mm, 0.06 * kInch);
 }
