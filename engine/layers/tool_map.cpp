@@ -5,9 +5,11 @@
 #include <numbers>
 
 #include "engine/forces/cuts.h"
-#include "kernels/access/printed_accessibility.h"
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
+#include "kernels/parallel/parallel.h"
+#include "kernels/polygons/loops.h"
+#include "kernels/slicing/slicing.h"
 
 namespace slabwright {
 
@@ -15,6 +17,32 @@ namespace {
 
 constexpr double kThinnestSlice = 1.27;  // mm, LUO's .05 in
 constexpr double kSlices = 64;
+constexpr double kTouch = 0.05;  // mm: a wall so near to what the tool leaves is reached
+constexpr double kSample = 0.5;  // mm, along walls
+
+// The share of a section's border that a disc of this radius reaches from outside: what it leaves standing is the section closed by it,
+// and a place is reached where that has its border too.
+double reached_share(const Loops& section, double radius) {
+    constexpr double tolerance = kTouch / 25;
+    const Loops left = offset(offset(section, radius, tolerance), -radius - kTouch, tolerance);
+    double all = 0, inside = 0;
+    for (std::size_t l = 0; l < section.size(); ++l) {
+        const auto loop = section.loop(l);
+        for (std::size_t i = 0; i < loop.size(); ++i) {
+            const Point2 a = loop[i], b = loop[i + 1 < loop.size() ? i + 1 : 0];
+            const double length = std::hypot(to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y));
+            const int parts = std::max(1, static_cast<int>(std::ceil(length / kSample)));
+            all += length;
+            for (int k = 0; k < parts; ++k) {
+                const double t = (k + 0.5) / parts;
+                const Point2 p{static_cast<std::int32_t>(std::lround(a.x + t * (double{1} * b.x - a.x))),
+                               static_cast<std::int32_t>(std::lround(a.y + t * (double{1} * b.y - a.y)))};
+                if (winding(left, p) != 0) inside += length / parts;
+            }
+        }
+    }
+    return all > 0 ? 1 - inside / all : 1;
+}
 
 }  // namespace
 
@@ -49,18 +77,15 @@ ToolMap tool_map(Context& context, MeshView mesh, const Job& job, const std::vec
     heights.erase(std::unique(heights.begin(), heights.end(), [](double a, double b) { return b - a < 0.1; }), heights.end());
     if (height - heights.back() > 0) heights.back() = height;  // the last of near ones stays the pattern's height
 
-    for (std::size_t i = 0; i + 1 < heights.size(); ++i) {
-        std::size_t chosen = 0;
-        for (std::size_t t = map.tools.size(); t-- > 1;) {
-            context.throw_if_cancelled();
-            if (printed_accessibility(context, mesh, heights[i], heights[i + 1], map.tools[t].diameter / 2, job.selection.overlap_weight, 1).ratio() <
-                job.selection.threshold)
-                continue;
-            chosen = t;
-            break;
-        }
-        map.slices.push_back({heights[i], heights[i + 1], chosen});
-    }
+    std::vector<Plane> planes;
+    for (std::size_t i = 0; i + 1 < heights.size(); ++i) planes.push_back({(heights[i] + heights[i + 1]) / 2, Side::above});
+    const std::vector<Section> sections = slice(context, mesh, planes, {job.tolerances.gap});
+    map.slices.resize(planes.size());
+    parallel_each(context, planes.size(), [&](std::size_t i) {
+        std::size_t chosen = map.tools.size() - 1;
+        while (chosen > 0 && reached_share(sections[i].loops, map.tools[chosen].diameter / 2) < job.selection.threshold) --chosen;
+        map.slices[i] = {heights[i], heights[i + 1], chosen};
+    });
     return map;
 }
 

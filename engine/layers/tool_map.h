@@ -21,7 +21,7 @@ struct ToolMap {
 [[nodiscard]] double allowed_layer(const Job& job, const Tool& tool);
 
 /// For slices of 1/64 of the height, at least 1.27 mm, cut at the flats' heights too: the largest ball end mill that reaches the job's share
-/// (selection.threshold) of the section in the slice's middle, by length as printed (LUO 5.5.1), else the smallest.
+/// (selection.threshold) of the border of the section in the slice's middle, else the smallest.
 /// @throws Error(usage, "job.tool") when the job has no ball end mill; Error(cancelled)
 [[nodiscard]] ToolMap tool_map(Context& context, MeshView mesh, const Job& job, const std::vector<Feature>& features);
 
