@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -384,7 +385,7 @@ std::vector<TriedLayers> combined_layers(Context& context, MeshView view, const 
 Plan fastest_plan(Context& context, const Mesh& mesh, const Plan& ground, const LayerRequest& request, std::vector<TriedLayers> tried,
                   ProgressShare share) {
     std::optional<Plan> best;
-    std::optional<Error> refused;
+    std::exception_ptr refused;  // the first
     std::string words;
     const char* name = "";
     for (std::size_t i = 0; i < tried.size(); ++i) {
@@ -398,10 +399,10 @@ Plan fastest_plan(Context& context, const Mesh& mesh, const Plan& ground, const 
         } catch (const Error& e) {
             if (e.kind() != ErrorKind::no_plan || e.code().starts_with("memory")) throw;
             words += fmt::format("{}{} refused ({})", words.empty() ? "" : ", ", tried[i].name, e.code());
-            if (!refused) refused = e;
+            if (!refused) refused = std::current_exception();
         }
     }
-    if (!best) throw *refused;
+    if (!best) std::rethrow_exception(refused);
     best->diagnostics.push_back({Severity::note,
                                  "layers.combined",
                                  fmt::format("of {} placement{} {} is built fastest: {}", tried.size(), tried.size() == 1 ? "" : "s", name, words),

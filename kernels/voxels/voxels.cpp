@@ -17,6 +17,9 @@ namespace slabwright {
 
 namespace {
 
+// An index that was reckoned in integers, none of them below zero.
+std::size_t slot(int index) { return static_cast<std::size_t>(index); }
+
 using MaskTree = openvdb::tree::Tree4<openvdb::ValueMask, 5, 4, 3>::Type;
 using Leaf = MaskTree::LeafNodeType;
 // Slices run along the tree's x and cells of a row along its z: in a leaf, a slice is one word and a row of it one byte.
@@ -94,7 +97,7 @@ CellRows grown(Context& context, const CellRows& rows, double radius_cells, int 
         for (int dy = -reach; dy <= reach; ++dy) {
             if (j + dy < 0 || j + dy >= n) continue;
             const int w = width[static_cast<std::size_t>(std::abs(dy))];
-            for (const auto& s : rows.row(static_cast<std::size_t>(j + dy))) {
+            for (const auto& s : rows.row(slot(j + dy))) {
                 ++change[static_cast<std::size_t>(std::max(0, s[0] - w))];
                 --change[static_cast<std::size_t>(std::min(nx, s[1] + w + 1))];
                 any = true;
@@ -202,8 +205,7 @@ double LayerVoxels::area_to_clear(double tip) const {
     const CellRows& kept = kept_[static_cast<std::size_t>(slice_at(tip))];
     std::int64_t cells = static_cast<std::int64_t>(box_.nx) * box_.ny;
     for (int j = 0; j < box_.ny; ++j)
-        for (const auto& s : kept.row(static_cast<std::size_t>(j + border_)))
-            cells -= std::max(0, std::min(s[1], border_ + box_.nx - 1) - std::max(s[0], border_) + 1);
+        for (const auto& s : kept.row(slot(j + border_))) cells -= std::max(0, std::min(s[1], border_ + box_.nx - 1) - std::max(s[0], border_) + 1);
     return static_cast<double>(cells) * box_.voxel * box_.voxel;
 }
 
@@ -228,7 +230,7 @@ double LayerVoxels::reached_share(Context& context, double radius, int every) {
         const CellRows with_edge = grown(context, kept, 1, box_.nx + 2 * border_);
         const CellRows reach = reached(context, k, radius, 0);
         reached_.erase({k, {radius, 0.0}});
-        for (std::size_t j = static_cast<std::size_t>(border_); j < static_cast<std::size_t>(border_ + box_.ny); ++j)
+        for (std::size_t j = static_cast<std::size_t>(border_); j < slot(border_ + box_.ny); ++j)
             for (const auto& s : with_edge.row(j)) {
                 beside.clear();
                 append_rest(kept.row(j), std::max(s[0], border_), std::min(s[1], border_ + box_.nx - 1), beside);
@@ -272,7 +274,7 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
             const int j0 = static_cast<int>(p) % strips * kLeaf, k0 = static_cast<int>(p) / strips * kLeaf;
             for (int k = k0; k < std::min(k0 + kLeaf, box_.nz); ++k)
                 for (int j = j0; j < std::min(j0 + kLeaf, box_.ny); ++j) {
-                    const auto row = static_cast<std::size_t>(j + border_);
+                    const auto row = slot(j + border_);
                     const int at = level[static_cast<std::size_t>(k)];
                     both.clear(), rest.clear();
                     append_union(kept_[static_cast<std::size_t>(k)].row(row), at < 0 ? Spans{} : gone.at(at).row(row), both);
@@ -302,7 +304,7 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
     std::vector<std::uint64_t> voxels(static_cast<std::size_t>(box_.nz), 0), outside(voxels);
     for (Leaf* leaf : leaves)
         for (int k = 0; k < kLeaf && leaf->origin().x() + k < box_.nz; ++k)
-            voxels[static_cast<std::size_t>(leaf->origin().x() + k)] += static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
+            voxels[slot(leaf->origin().x() + k)] += static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
     result.sparse_bytes = tree.memUsage();
 
     const double reach = swath / box_.voxel + 0.5;
@@ -334,7 +336,7 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
     });
     for (Leaf* leaf : leaves)
         for (int k = 0; k < kLeaf && leaf->origin().x() + k < box_.nz; ++k)
-            outside[static_cast<std::size_t>(leaf->origin().x() + k)] += static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
+            outside[slot(leaf->origin().x() + k)] += static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
 
     const double cell = box_.voxel * box_.voxel;
     int worst = 0;
