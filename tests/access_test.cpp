@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <random>
 
 #include "kernels/access/closest_point.h"
 #include "kernels/access/standing_part.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -143,8 +143,7 @@ TEST(StandingPart, AgreesWithBruteForceOnARelief) {
     Context context;
     const Mesh m = relief(12, bumpy);
     const StandingPart part(context, m.view());
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-2, 14), uz(1, 9), d(-0.7, 0.7), ur(0.3, 3);
     const double step = 0.025;
@@ -250,8 +249,7 @@ TEST(ClosestPoint, AgreesWithBruteForce) {
     Context context;
     const Mesh m = relief(12, bumpy);
     const ClosestPoint closest(context, m.view());
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-3, 15), uz(-2, 12);
     const auto points = surface_points(m, 1e9, 0.05);

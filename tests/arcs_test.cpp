@@ -14,6 +14,7 @@
 #include "io/tool_table.h"
 #include "kernels/errors.h"
 #include "tests/support/rs274.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
@@ -99,8 +100,7 @@ std::vector<Move> random_path(std::mt19937& random, int kind, double sag) {
 }
 
 TEST(Arcs, StayWithinTheToleranceBothWays) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     const double tolerance = 0.0018;
     int arcs = 0;
@@ -244,8 +244,7 @@ std::vector<Move> program_moves(std::mt19937& random) {
 }
 
 TEST(Arcs, TheInterpreterAcceptsThem) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     for (int round = 0; round < 10; ++round) {
         std::vector<Move> moves = program_moves(random);
@@ -275,8 +274,7 @@ TEST(Arcs, TheInterpreterAcceptsThem) {
 }
 
 TEST(Arcs, TheReaderSeesThePath) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     const std::vector<Move> path = program_moves(random);
     std::vector<Move> moves = path;

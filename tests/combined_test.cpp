@@ -10,6 +10,7 @@
 #include "engine/planner.h"
 #include "kernels/errors.h"
 #include "tests/support/height_field.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
@@ -54,8 +55,7 @@ TEST(JoinSlices, ThinLayersJoinTheNearestTool) {
 // Over random maps: the layers fill the same heights, no tool is larger than the slice allows nor longer than it may be, and a layer
 // thinner than the least is the only one or a part of one that its tool's length cut.
 TEST(JoinSlices, RandomMaps) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> thickness(0.2, 4), length(5, 60);
     for (int trial = 0; trial < 300; ++trial) {

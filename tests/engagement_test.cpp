@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <random>
 
 #include "engine/paths/engagement.h"
 #include "kernels/stock/stock.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -44,8 +44,7 @@ TEST(Engagement, VolumeIsThatOfTheSlot) {
 
 // Against the sweep that the simulator uses, over chains of level and sloping moves.
 TEST(Engagement, TakesWhatTheExactSweepTakes) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> ux(-8, 108), uy(-8, 88), uz(kTop - 9, kTop + 1), share(0, 1);
     EngagedStock stock = slab();
@@ -109,8 +108,7 @@ TEST(Engagement, ACornerIsSlowedWhereTheCutterTurnsIntoIt) {
 
 // Whatever the way: neither its shape nor its volume changes, and no stretch takes more in a minute than the cap allows.
 TEST(Engagement, NoStretchCutsFasterThanTheCapAllows) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> ux(-8, 108), uy(-8, 88), uz(kTop - kDepth, kTop + 1);
     for (int round = 0; round < 20; ++round) {

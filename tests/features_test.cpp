@@ -19,6 +19,7 @@
 #include "kernels/features/section_areas.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/slicing/slicing.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
@@ -162,7 +163,7 @@ TEST(Features, PeaksNearAFlatAreDroppedAndFarOnesStay) {
 // Brute force: components of equal height by flooding the grid's own edges, then the heights around them. A rim vertex has
 // the wall's foot among its neighbours, so the rim bears no valleys.
 TEST(Features, ExactScanAgreesWithBruteForceOnRandomFields) {
-    const unsigned seed = std::random_device{}();
+    const unsigned seed = test::seed();
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     for (int round = 0; round < 40; ++round) {
@@ -247,7 +248,7 @@ TEST(Features, SaddleBetweenTwoPeaks) {
 
 TEST(Features, HalvingFindsWhatStandsAloneWithinItsResolution) {
     // Pyramids and pits far apart, at heights that no coarse plane meets.
-    const unsigned seed = std::random_device{}();
+    const unsigned seed = test::seed();
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     Field h(32, std::vector<float>(32, 20.0f));
@@ -460,7 +461,7 @@ TEST(Undercuts, TopsMustAscend) {
 // Brute force: a solid of random overlapping boxes on a grid of millimetres. In a layer, the cells without solid that have
 // solid straight above them within the layer stay; the deepest run of such cells under a flat is its depth.
 TEST(Undercuts, AgreesWithCellsOnRandomBoxes) {
-    const unsigned seed = std::random_device{}();
+    const unsigned seed = test::seed();
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     constexpr int n = 10;

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <random>
 #include <set>
@@ -14,6 +13,7 @@
 #include "engine/forces/split_cuts.h"
 #include "engine/planner.h"
 #include "tests/support/height_field.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
@@ -84,8 +84,7 @@ TEST(OpCuts, SlotThenHalfThenAir) {
 
 // Volumes add up: what the stretches tell is what is gone, for any path that does not end in the wood.
 TEST(OpCuts, StretchesHoldWhatWasTakenAway) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> x(8, 112), y(8, 72), z(6, 17);
     Plan plan = plate();
@@ -181,8 +180,7 @@ TEST(Feeds, ThinChipsAndAirGoFasterAndThickOnesDoNot) {
 // Over random programs: no feed over tool and machine, few different ones, rapids and plunges as they were, the limit kept
 // wherever the feed is above the floor, and the same bytes on any number of threads.
 TEST(Feeds, RandomPrograms) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> x(-5, 125), y(-5, 85), z(4, 18), stickout(35, 120);
     for (int trial = 0; trial < 12; ++trial) {

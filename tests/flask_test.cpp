@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -18,6 +17,7 @@
 #include "kernels/slicing/silhouette.h"
 #include "tests/data/models.h"
 #include "tests/support/height_field.h"
+#include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -49,8 +49,7 @@ double distance_to(const Loops& region, Point2 p) {
 
 // Against every facet's projection, point by point: tetrahedra at random, which overhang, overlap and leave holes.
 TEST(Silhouette, IsWhatTheFacetsCover) {
-    const std::uint32_t seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const std::uint32_t seed = test::seed();
     std::mt19937 random(seed);
     auto at = [&] { return static_cast<float>(static_cast<int>(random() % 4000)) / 64.0F; };
     for (int round = 0; round < 20; ++round) {

@@ -15,6 +15,7 @@
 #include "kernels/forces/deflection.h"
 #include "kernels/forces/forces.h"
 #include "kernels/forces/hardest.h"
+#include "tests/support/seed.h"
 
 // PoCL never frees its compiler.
 extern "C" const char* __lsan_default_suppressions();
@@ -377,8 +378,7 @@ TEST(ForceSolver, UnknownDeviceIsAnError) {
 
 // What a device screens and what the double model finds alone are the same cuts, also where many are nearly as hard.
 TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937_64 random(seed);
     std::vector<CutSegment> cuts;
     std::vector<std::size_t> starts{0};

@@ -13,6 +13,7 @@
 #include "io/tool_table.h"
 #include "kernels/errors.h"
 #include "tests/support/rs274.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 using slabwright::support::CanonMotion;
@@ -103,8 +104,7 @@ TEST(Gcode, LayerTopCountsFromTheLayersTop) {
 }
 
 TEST(Gcode, InterpreterMovesWhereTheEngineSaid) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     for (int round = 0; round < 20; ++round) {
         const Frame frame = round % 2 == 0 ? Frame::pattern_base : Frame::layer_top;

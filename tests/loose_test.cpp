@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <queue>
 #include <random>
 
@@ -13,6 +12,7 @@
 #include "kernels/mesh/weld.h"
 #include "kernels/stock/sweep.h"
 #include "tests/data/sweep.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
@@ -88,8 +88,7 @@ TEST(Loose, WhatIsGluedBelowIsHeld) {
 
 // Every piece that is cut off, found by filling from what holds, move after move.
 TEST(Loose, AgreesWithFillingAfterEveryMove) {
-    const std::uint32_t seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const std::uint32_t seed = test::seed();
     std::mt19937 random(seed);
     auto at = [&] { return static_cast<double>(random() % 401) / 10; };
     std::size_t seen = 0;

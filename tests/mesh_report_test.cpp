@@ -11,17 +11,12 @@
 
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
 
 using shapes::Facets;
-
-std::uint64_t fresh_seed() {
-    const std::uint64_t seed = std::random_device{}();
-    std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
-    return seed;
-}
 
 MeshReport report_of(const Facets& facets, int threads = 2) {
     Context context({.threads = threads});
@@ -130,7 +125,7 @@ TEST(MeshReport, DuplicateFacets) {
 }
 
 TEST(MeshReport, CountsEqualBruteForceOnRandomSoup) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     for (int round = 0; round < 300; ++round) {
         // Few points, so that facets share edges in every way.
         const std::uint64_t grid = 2 + random() % 3;
@@ -214,7 +209,7 @@ TEST(MeshReport, InsideOutBodiesCavitiesAndIslands) {
 }
 
 TEST(MeshReport, InvertedBodiesOfRandomNestsEqualTheKnownNesting) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     for (int round = 0; round < 200; ++round) {
         struct Body {
             Vec3f low, high;
@@ -263,7 +258,7 @@ TEST(MeshReport, VolumeOfATorusFarFromTheOrigin) {
 }
 
 TEST(MeshReport, SameOnAnyNumberOfThreads) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     Facets facets = shapes::torus(300);
     shapes::append(facets, shapes::flipped(shapes::torus(100, 300, 50)));  // a cavity
     for (int i = 0; i < 500; ++i) {

@@ -14,17 +14,12 @@
 
 #include "kernels/errors.h"
 #include "tests/mesh_shapes.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
 
 using shapes::Facets;
-
-std::uint64_t fresh_seed() {
-    const std::uint64_t seed = std::random_device{}();
-    std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
-    return seed;
-}
 
 /// Vertices by first use, in the simplest way.
 Mesh weld_slowly(const Facets& facets) {
@@ -113,7 +108,7 @@ TEST(MeshWeld, NegativeZeroIsZeroAndTheNextFloatIsNot) {
 }
 
 TEST(MeshWeld, EqualsBruteForceOnRandomSoup) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     for (const std::size_t n : {1u, 10u, 1000u, 70000u}) {
         for (const int grid : {2, 12, 60, 1 << 20}) {
             Facets facets(n);
@@ -143,7 +138,7 @@ TEST(MeshWeld, EqualsBruteForceOnRandomSoup) {
 
 TEST(MeshWeld, LargeClosedMeshInAnyFacetOrder) {
     Facets facets = shapes::torus(500);
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     for (const bool shuffled : {false, true}) {
         if (shuffled) std::shuffle(facets.begin(), facets.end(), random);
         Mesh first;
@@ -261,7 +256,7 @@ Rotation random_rotation(std::mt19937_64& random) {
 TEST(MeshWeld, AroundAnEdgeTheSolidLiesBetweenPartners) {
     // Wedges of solid around a common edge, facets in random order: a facet's partner at the edge is the other side of
     // its own wedge.
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     for (int round = 0; round < 2000; ++round) {
         const std::size_t wedges = 2 + random() % 5;
         std::vector<double> angles(2 * wedges);
@@ -301,7 +296,7 @@ TEST(MeshWeld, AroundAnEdgeTheSolidLiesBetweenPartners) {
 TEST(MeshWeld, RandomVoxelSolidsPairWithinTheirVoxelAcrossSharedEdges) {
     // Boundaries of random voxel sets are full of edges with four facets. There the solid is a quarter on either side:
     // partners are faces of one voxel. Everything is turned, so that coordinates are rounded.
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     constexpr int n = 6;
     for (int round = 0; round < 60; ++round) {
         const Rotation turn = random_rotation(random);
@@ -374,7 +369,7 @@ TEST(MeshWeld, FacetsWithEqualCornersKeepTheMeshClosed) {
 }
 
 TEST(MeshWeldWithin, EqualsBruteForceClusters) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     for (int round = 0; round < 200; ++round) {
         const double tolerance = std::pow(10.0, std::uniform_real_distribution(-3.0, 0.0)(random));
         const double size = tolerance * std::uniform_real_distribution(2.0, 12.0)(random);

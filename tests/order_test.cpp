@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <random>
 #include <tuple>
 #include <vector>
 
 #include "engine/paths/order.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -22,8 +22,7 @@ std::int64_t way(Point2 a, Point2 b) {
 }  // namespace
 
 TEST(NearestRuns, AgreesWithBruteForce) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     for (const std::int32_t size : {6, 1000, 11'600'000}) {  // the first has many ties
         std::uniform_int_distribution<std::int32_t> u(-size, size);

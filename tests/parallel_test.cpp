@@ -16,17 +16,12 @@
 #include <vector>
 
 #include "kernels/errors.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
 
 constexpr int kThreads[] = {1, 2, 4};
-
-std::uint64_t fresh_seed() {
-    const std::uint64_t seed = std::random_device{}();
-    std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
-    return seed;
-}
 
 TEST(Parallel, ForVisitsEveryIndexOnceInChunksOfTheGrain) {
     for (const int threads : kThreads) {
@@ -82,7 +77,7 @@ TEST(Parallel, ReduceJoinsFromLeftToRight) {
 }
 
 TEST(Parallel, SumsOfDoublesHaveTheSameBitsOnAnyNumberOfThreads) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     std::vector<double> values(300007);
     for (double& value : values) value = std::uniform_real_distribution(-1e6, 1e6)(random);
     std::vector<double> sums;
@@ -101,7 +96,7 @@ TEST(Parallel, SumsOfDoublesHaveTheSameBitsOnAnyNumberOfThreads) {
 }
 
 TEST(Parallel, SortEqualsStdSort) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     struct Item {
         std::uint32_t key, id;
         bool operator==(const Item&) const = default;
@@ -132,7 +127,7 @@ TEST(Parallel, SortEqualsStdSort) {
 }
 
 TEST(Parallel, TheExceptionOfTheLowestChunkArrives) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     for (const int threads : kThreads) {
         Context context({.threads = threads});
         for (int round = 0; round < 30; ++round) {

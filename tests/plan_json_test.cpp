@@ -28,6 +28,7 @@
 #include "kernels/errors.h"
 #include "tests/support/comma_locale.h"
 #include "tests/support/files.h"
+#include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
@@ -122,8 +123,7 @@ Plan hand_made() {
 }  // namespace
 
 TEST(JsonText, NumbersHaveNoExponentAndReadBack) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937_64 random(seed);
     const std::regex plain("-?(0|[1-9][0-9]*)(\\.[0-9]{0,2}[1-9])?");
     for (int i = 0; i < 20000; ++i) {

@@ -9,6 +9,7 @@
 
 #include "engine/simulate/reach.h"
 #include "kernels/mesh/mesh.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -86,8 +87,7 @@ double best_margin(const StandingPart& part, const Tool& t, const Point3& p, dou
 }  // namespace
 
 TEST(Reach, AgreesWithTryingAllPlaces) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
     constexpr double spacing = 0.12, z_top = 6;

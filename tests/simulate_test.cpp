@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <random>
 #include <string>
@@ -11,6 +10,7 @@
 #include "engine/simulate/simulate.h"
 #include "io/gcode_reader.h"
 #include "kernels/errors.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -364,8 +364,7 @@ TEST(Simulate, InnerCornersLeaveARoundThatIsExcused) {
 // The stock measured at its cells can show no deeper gouge than the exact check of all motions, but for the sheet under a layer's top
 // and the stock's float.
 TEST(Simulate, NoCellIsGougedDeeperThanTheExactCheckSays) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
     int gouged = 0;

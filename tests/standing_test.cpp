@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <random>
 
 #include "engine/paths/standing.h"
 #include "kernels/stock/stock.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -20,8 +20,7 @@ double cell_bound(const Standing& standing, double x, double y) { return standin
 }  // namespace
 
 TEST(Standing, IsNeverBelowTheExactStockAnywhere) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     const std::array<double, 2> min{-3.3, 1.7}, max{27.4, 24.9};
     std::uniform_real_distribution<double> ux(min[0] - 3, max[0] + 3), uy(min[1] - 3, max[1] + 3), uz(2, 20), ur(0.4, 7), step(-2, 2);

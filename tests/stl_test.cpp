@@ -20,18 +20,13 @@
 #include "io/sha256.h"
 #include "kernels/errors.h"
 #include "tests/mesh_shapes.h"
+#include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
 namespace {
 
 using shapes::Facets;
-
-std::uint64_t fresh_seed() {
-    const std::uint64_t seed = std::random_device{}();
-    std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
-    return seed;
-}
 
 /// A folder of its own for each test.
 class Stl : public ::testing::Test {
@@ -469,7 +464,7 @@ TEST_F(Stl, RequireSolidAcceptsAnOpenBaseCavitiesAndBlemishes) {
 
 TEST_F(Stl, TheWeldThatIsNamedCloses) {
     // Every corner is moved a little on its own: nothing meets bit for bit.
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     for (const double crack : {2e-7, 2e-6, 2e-5}) {  // of the diagonal
         Facets facets = shapes::torus(24, 30, 10);
         for (auto& facet : facets)
@@ -562,7 +557,7 @@ void survive(const std::string& path) {
 }
 
 TEST_F(Stl, DamagedFilesAreRefusedOrRead) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     Facets facets = shapes::box({0, 0, 0}, {10, 10, 10});
     shapes::append(facets, shapes::box({10, 10, 0}, {20, 20, 10}));
     const std::string originals[] = {binary(facets), binary(facets, "solid"), ascii(facets), ascii(facets, {.line = "\r\n", .upper = true})};
@@ -622,7 +617,7 @@ TEST(Sha256, KnownVectors) {
 }
 
 TEST(Sha256, PiecesAndProcessorsDoNotMatter) {
-    std::mt19937_64 random(fresh_seed());
+    std::mt19937_64 random(test::seed());
     for (int round = 0; round < 300; ++round) {
         std::vector<std::byte> bytes(random() % 1000);
         for (std::byte& b : bytes) b = static_cast<std::byte>(random());

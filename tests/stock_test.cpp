@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <random>
 #include <vector>
 
 #include "kernels/stock/stock.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -21,8 +21,7 @@ double end_height(const CutterEnd& end, double r) {
 }  // namespace
 
 TEST(Sweep, AgreesWithBruteForce) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-1, 11), uz(-3, 3), ur(0.4, 4);
     const CellGrid grid{0.1, 0.2, 0.31, 30, 28};
@@ -63,8 +62,7 @@ TEST(Sweep, AgreesWithBruteForce) {
 
 // An arc cuts what many chords of it cut, and whatever stands lower than the cutter gets may be left out.
 TEST(Sweep, ArcsAgreeWithChords) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-2, 12), ur(0.4, 4), ua(-2 * std::numbers::pi, 2 * std::numbers::pi);
     const CellGrid grid{0.1, 0.2, 0.31, 30, 28};
@@ -111,8 +109,7 @@ TEST(Sweep, ArcsAgreeWithChords) {
 
 // Cells that stand lower than the cutter gets are left out, all others are the same.
 TEST(Sweep, LeavesOutWhatStandsLower) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-1, 11), uz(-3, 3), ur(0.4, 4);
     const CellGrid grid{0.1, 0.2, 0.31, 30, 28};
@@ -137,8 +134,7 @@ TEST(Sweep, LeavesOutWhatStandsLower) {
 
 // A chain of motions that share their ends leaves what they leave one by one, and asks far fewer cells.
 TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-1, 11), uz(-3, 3), ur(0.4, 4), turn(-3, 3);
     const CellGrid grid{0.1, 0.2, 0.11, 90, 80};

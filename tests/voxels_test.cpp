@@ -1,10 +1,10 @@
 // AS on voxels (LUO 5.5.2; method.md section 7): closed forms of slots and corners, and brute force over every cell.
 #include "kernels/voxels/voxels.h"
+#include "tests/support/seed.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <numbers>
 #include <random>
@@ -114,8 +114,7 @@ struct Scene {
 };
 
 TEST(Voxels, EveryCellAsByBruteForce) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     for (unsigned round = 0; round < 6; ++round) {
         Context context;
         const Scene scene(seed + round);
@@ -173,8 +172,7 @@ TEST(Voxels, EveryCellAsByBruteForce) {
 }
 
 TEST(Voxels, ASNeverRisesAsTheToolShrinks) {
-    const unsigned seed = std::random_device{}();
-    std::printf("seed %u\n", seed);
+    const unsigned seed = test::seed();
     for (unsigned round = 0; round < 20; ++round) {
         Context context;
         const Scene scene(seed + round);
