@@ -1,6 +1,7 @@
 // What stands before a cutter, and the feeds and forces that follow from it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -337,6 +338,34 @@ TEST(Feeds, WoodThatHangsOverTooFarIsReported) {
     EXPECT_EQ(codes(0), std::vector<std::string>{"cut.overhang"});
     EXPECT_GT(least_material(plan.job, 100), 3.0);  // as the layer planner has it
     EXPECT_TRUE(codes(10).empty());                 // ten millimetres under the cut carry it
+}
+
+// Wood is cut in several passes where they save it, and only there: farther out, where it breaks all the same, the way stays as it was.
+TEST(Feeds, PassesForWoodThatTheySave) {
+    Plan plan = plate();
+    plan.job.cutting.adapt_feed = false;
+    OverhangMap map;
+    map.low = {0, 0}, map.cell = 1, map.nx = 120, map.ny = 80;
+    const Operation slot = line(plan, OperationKind::rough, 2, {at(-10, 40, 30, 0), at(-10, 40, 4, 0), at(130, 40, 4, 9000), at(130, 40, 30, 0)});
+    Context context;
+    int saved = 0, lost = 0, held = 0;
+    for (int beyond = 0; beyond <= 400; beyond += 10) {
+        map.mm.assign(120 * 80, static_cast<float>(beyond));
+        plan.layers[0].z_top = plan.layers[0].slab_thickness = 12;
+        plan.layers[0].operations = {slot};
+        std::vector<Diagnostic> diagnostics;
+        (void)adapt_layer(context, plan.layers[0], plan, &map, diagnostics);
+        const auto has = [&](const char* code) {
+            return std::any_of(diagnostics.begin(), diagnostics.end(), [&](const Diagnostic& d) { return d.code == code; });
+        };
+        const bool split = plan.layers[0].operations[0].moves.size() > slot.moves.size();
+        EXPECT_EQ(split, has("stepdown.lowered")) << beyond;
+        EXPECT_FALSE(split && has("cut.overhang")) << beyond;
+        (split ? saved : has("cut.overhang") ? lost : held) += 1;
+    }
+    EXPECT_GT(held, 0);
+    EXPECT_GT(saved, 0);
+    EXPECT_GT(lost, 0);
 }
 
 // In a whole plan: the paths stay as they are, the build takes no longer, and nominal engagement leaves feeds and places alone.

@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -22,6 +23,7 @@ namespace {
 
 constexpr double kLeastDepth = 0.01;      // mm: shallower cuts are taken as this deep
 constexpr double kAccuracy = 0.01;        // of peaks that feeds are chosen by, as a share: far finer than the classes are
+constexpr double kClassSlack = 0.9;       // a coarse class that bears less than this share of a limit stands for all its cuts
 constexpr double kLeastShare = 0.125;     // of the planned feed: slower, a cutter rubs
 constexpr double kLeastRun = 20;          // mm that a faster feed must last
 constexpr int kMostPasses = 4;            // into which a cut is divided at once
@@ -57,6 +59,12 @@ CutClass class_of(const CutStretch& s, const Tool& tool, ClassSteps steps) {
     return c;
 }
 
+/// One of so many passes of it.
+CutClass shallower(CutClass c, int passes) {
+    c.depth = static_cast<std::int16_t>(std::max(0.0, c.depth - std::floor(kCoarse.depth * std::log2(passes))));
+    return c;
+}
+
 CutSegment segment_of(const CutClass& c, const CutSegment& idle, const Tool& tool, double feed, ClassSteps steps) {
     CutSegment cut = idle;
     const double r = tool.diameter / 2;
@@ -83,16 +91,9 @@ public:
     }
     [[nodiscard]] const CutSegment& idle() const { return idle_; }
 
-    const Bent& at(const CutClass& c, double feed) {
-        const auto [it, fresh] = known_.try_emplace({c, feed});
-        if (fresh) {
-            const CutSegment cut = segment_of(c, idle_, tool_, feed, kCoarse);
-            const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut, kAccuracy) : reference_forces(cut, kAccuracy);
-            it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter),
-                          cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter), f.peak_x_n, f.peak_y_n, f.peak_z_n};
-        }
-        return it->second;
-    }
+    const Bent& at(const CutClass& c, double feed) { return find(known_, c, feed, kCoarse, kAccuracy); }
+    /// Of a fine class, as the plan will state it.
+    const Bent& stated(const CutClass& c, double feed) { return find(stated_, c, feed, kFine, kStatedAccuracy); }
 
     /// How thick the wood must be that carries a cut at this height above the joint, so far from what carries the wood, mm.
     [[nodiscard]] double needed_wood(const Bent& b, double height, double overhang) const {
@@ -107,10 +108,23 @@ public:
     }
 
 private:
+    using Known = std::map<std::pair<CutClass, double>, Bent>;
+
+    const Bent& find(Known& known, const CutClass& c, double feed, ClassSteps steps, double accuracy) {
+        const auto [it, fresh] = known.try_emplace({c, feed});
+        if (fresh) {
+            const CutSegment cut = segment_of(c, idle_, tool_, feed, steps);
+            const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut, accuracy) : reference_forces(cut, accuracy);
+            it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter),
+                          cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter), f.peak_x_n, f.peak_y_n, f.peak_z_n};
+        }
+        return it->second;
+    }
+
     const Job& job_;
     const Tool& tool_;
     CutSegment idle_;
-    std::map<std::pair<CutClass, double>, Bent> known_;
+    Known known_, stated_;
 };
 
 bool roughs(OperationKind kind) { return kind == OperationKind::rough || kind == OperationKind::face; }
@@ -192,16 +206,33 @@ struct Load {
     [[nodiscard]] double worst() const { return std::max(cutter, wood); }
 };
 
+/// In how many passes the wood holds, from `least` on; 0 where it holds in none.
+int passes_for_wood(const Seen& s, int least, const std::function<Load(const Seen&, int)>& load) {
+    if (s.depth >= 4 * kLeastDepth)
+        for (int n = std::max(2, least); n <= kMostPasses; ++n)
+            if (load(s, n).wood <= 1) return n;
+    return 0;
+}
+
 /// Runs of stretches that no feed makes light enough and that several passes would.
-std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, int round, const std::function<Load(const Seen&)>& load) {
+/// @param load what a stretch bears in so many passes, in the lowest of them, which the least wood carries
+std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, double diameter, int round,
+                               const std::function<Load(const Seen&, int)>& load) {
+    // Wood that no passes save, as over a wide cavity, is not worth their time: neither where it breaks nor, on levels above, where it will.
+    const auto column = [&](const Seen& s) {
+        return std::pair{static_cast<int>(std::floor(s.at[0] / diameter)), static_cast<int>(std::floor(s.at[1] / diameter))};
+    };
+    std::set<std::pair<int, int>> lost;
+    for (const Seen& s : seen)
+        if (s.overhang > 0 && load(s, 1).wood > 1 && passes_for_wood(s, 2, load) == 0) lost.insert(column(s));
     std::vector<DeepRun> runs;
     for (const Seen& s : seen) {
-        if (!s.cuts) continue;
-        const Load l = load(s);
-        // Wood that is cut through at once carries itself: less of it would carry less.
-        const bool helps = l.cutter > 1 || (l.wood > 1 && s.wood > 1.5 * s.depth);
-        if (!(l.worst() > 1) || !helps || s.depth < 4 * kLeastDepth) continue;
-        const int passes = std::clamp(static_cast<int>(std::ceil(l.worst())) + round, 2, kMostPasses);
+        if (!s.cuts || s.depth < 4 * kLeastDepth) continue;
+        const Load whole = load(s, 1);
+        int passes = 0;
+        if (whole.cutter > 1) passes = std::clamp(static_cast<int>(std::ceil(whole.cutter)) + round, 2, kMostPasses);
+        if (whole.wood > 1 && !lost.contains(column(s))) passes = std::max(passes, passes_for_wood(s, passes, load));
+        if (passes == 0) continue;
         if (!runs.empty() && s.first <= runs.back().last + 1) {
             DeepRun& run = runs.back();
             run.last = std::max(run.last, s.last), run.depth_mm = std::max(run.depth_mm, static_cast<double>(s.depth)),
@@ -264,13 +295,23 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest", op.purpose, "give the tool a speed");
         BentCutter cutting(job, op, tool);
         const double limit = bending_limit(op, job);
+        const auto cutter_share = [&](const Bent& bent) {
+            const double wall = bent.wall_mm / limit;
+            return tool.strength_mpa > 0 ? std::max(wall, bent.stress_mpa / tool.strength_mpa) : wall;
+        };
         const auto load_of = [&](const Seen& s, const Bent& bent) {
-            Load l{bent.wall_mm / limit, 0};
-            if (tool.strength_mpa > 0) l.cutter = std::max(l.cutter, bent.stress_mpa / tool.strength_mpa);
+            Load l{cutter_share(bent), 0};
             if (s.overhang > 0) l.wood = cutting.needed_wood(bent, s.height, s.overhang) / s.wood;
             return l;
         };
-        const auto load = [&](const Seen& s, double feed) { return load_of(s, cutting.at(s.coarse, feed)); };
+        const auto load = [&](const Seen& s, double feed, int passes = 1) {
+            if (passes == 1) return load_of(s, cutting.at(s.coarse, feed));
+            Seen lowest = s;
+            const float off = s.depth * static_cast<float>(passes - 1) / static_cast<float>(passes);
+            lowest.coarse = shallower(s.coarse, passes);
+            lowest.wood -= off, lowest.height = std::max(0.F, lowest.height - off / 2);
+            return load_of(lowest, cutting.at(lowest.coarse, feed));
+        };
 
         const auto fastest = static_cast<std::uint32_t>(std::floor(std::min(tool.max_feed, job.machine.max_feed)));
         // The fastest step that all limits bear. Where none does: the slowest that is allowed, when it is the cutter that bears too
@@ -301,16 +342,27 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             }
             return for_cutter > 0 ? for_cutter : slowest;
         };
+        // A coarse class may bear a little less than a cut of it does: near the limit, what the plan will state decides.
+        const auto as_stated = [&](const Seen& s, std::uint32_t planned, std::uint32_t feed) {
+            const double bears = cutter_share(cutting.at(s.coarse, feed));
+            if (bears < kClassSlack || bears > 1) return feed;
+            for (const FeedStep& step : steps_of.at({s.coarse, planned})) {
+                if (step.feed > feed) continue;
+                feed = step.feed;
+                if (cutter_share(cutting.stated(s.fine, feed)) <= 1) break;
+            }
+            return feed;
+        };
         std::map<std::pair<CutClass, std::uint32_t>, std::uint32_t> chosen;
         const auto choose = [&](const Seen& s, std::uint32_t planned) -> std::uint32_t {
             // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
             const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
             if (!s.cuts) return static_cast<std::uint32_t>(most);
             const auto thin = [&] { return std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.coarse))); };
-            if (s.overhang > 0) return slow_enough(s, planned, thin());
+            if (s.overhang > 0) return as_stated(s, planned, slow_enough(s, planned, thin()));
             const auto [it, fresh] = chosen.try_emplace({s.coarse, planned}, planned);
             if (fresh) it->second = slow_enough(s, planned, thin());
-            return it->second;
+            return as_stated(s, planned, it->second);
         };
 
         std::vector<Seen> seen;
@@ -328,8 +380,8 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                 feeds.push_back(job.cutting.adapt_feed ? choose(s, planned) : planned);
             }
             if (!job.cutting.adapt_stepdown || round == kMostRounds) break;
-            const std::vector<DeepRun> runs =
-                deep_runs(seen, op, round, [&](const Seen& s) { return load(s, feeds[static_cast<std::size_t>(&s - seen.data())]); });
+            const std::vector<DeepRun> runs = deep_runs(
+                seen, op, tool.diameter, round, [&](const Seen& s, int n) { return load(s, feeds[static_cast<std::size_t>(&s - seen.data())], n); });
             if (runs.empty()) break;
             for (const DeepRun& run : runs) {
                 ++divided;

@@ -37,7 +37,8 @@ struct LayerCuts {
 ///     and at which the thickest chip is no thicker than planned: that of a slot at the planned feed, the finish feed or the tool's. A faster feed is
 ///     taken only where it lasts for at least 20 mm; roughing, facing and entries at the plunge feed are never made faster than planned.
 ///     Where it is the wood that holds at no feed, the planned one stays: slower, it would break as well.
-///   * Where the job adapts stepdowns, what holds at no feed is cut in several passes (split_cuts.h), but for wood that is cut through at once.
+///   * Where the job adapts stepdowns, what holds at no feed is cut in several passes (split_cuts.h); for wood only where the lowest of them then holds, and where none of the operation's cuts
+///     breaks it all the same.
 /// Drills are left alone.
 /// @param overhang    how far each place lies from what carries this slab; null: nothing hangs over
 /// @param diagnostics gets, per operation, "stepdown.lowered" (how many, how long, the deepest), "feed.lowered" (where and how far), and
