@@ -187,6 +187,13 @@ void cut_levels(PathBuilder& path, const LayerCut& cut, const Tool& tool, const 
     }
 }
 
+// Whether a ball that touches a wall this far over the layer's bottom, and none below, leaves more than the cusp where the wall
+// reaches the bottom: the pass under it is needed then, though its contact lies in the layer below, on the wall that is there already.
+bool leaves_foot(double r, double nz, double above_bottom, double cusp) {
+    const double along = above_bottom / std::sqrt(1 - nz * nz);
+    return along > 0 && (along >= r || r - std::sqrt(r * r - along * along) > cusp);
+}
+
 double vertical_nz(const LayerCut& cut) { return std::cos(cut.job.cutting.vertical_deg * std::numbers::pi / 180); }
 
 }  // namespace
@@ -307,7 +314,10 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             std::vector<char> wanted(n, 0);
             for (std::size_t k = 0; k < n; ++k) {
                 const double nz = std::max(0.0F, level.nz[first + k]), contact = tips[i] + r * (1 - nz);
-                if (nz > std::cos(split) || contact < cut.layer.z_bottom - 0.05 || contact > cut.layer.z_top + 1e-6) continue;
+                if (nz > std::cos(split) || contact > cut.layer.z_top + 1e-6) continue;
+                if (contact < cut.layer.z_bottom - 0.05 &&
+                    (i == 0 || i >= regular || !leaves_foot(r, nz, tips[i - 1] + r * (1 - nz) - cut.layer.z_bottom, cut.job.tolerances.cusp)))
+                    continue;
                 if (i >= regular && nz < foot_nz) continue;
                 wanted[k] = 1;
                 if (!flat || nz > vertical) continue;

@@ -232,8 +232,10 @@ private:
         for (std::int32_t k = low; k <= high; ++k)
             if (to_mm(k * spacing_) >= y_low && to_mm(k * spacing_) <= y_high) even.push_back({k * spacing_, {}});
         const double x_low = cut_.low(0, r_), x_high = cut_.high(0, r_);
+        // A place that helps may lie between the last line that covers a target and the next, which is looked at only where both have places.
+        const double covers = pass_.in_steps ? r_ : r_ + to_mm(spacing_);
         parallel_each(cut_.context, even.size(), [&](std::size_t l) {
-            for (const auto& span : targets_.around(to_mm(even[l].y), r_, x_low, x_high)) {
+            for (const auto& span : targets_.around(to_mm(even[l].y), covers, x_low, x_high)) {
                 const std::int32_t from = (span[0] >= 0 ? span[0] / step_ : -((-span[0] + step_ - 1) / step_)), to = span[1] / step_ + 1;
                 for (std::int32_t k = from; k <= to; ++k) {
                     if (!even[l].places.empty() && k * step_ <= even[l].places.back().x) continue;
