@@ -159,6 +159,12 @@ VerifyResult verdict(const Verification& found) {
     return result;
 }
 
+void check_cell(double cell_mm) {
+    if (cell_mm != 0 && !(cell_mm >= 0.01 && cell_mm <= 10))
+        throw Error(ErrorKind::usage, "verify.cell", fmt::format("a stock cannot be simulated with points every {} mm", cell_mm), "--cell",
+                    "give 0.01 to 10, or none");
+}
+
 }  // namespace
 
 void write(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path) {
@@ -171,12 +177,14 @@ void write(Context& context, const Plan& plan, const std::string& directory, con
     });
 }
 
-VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path) {
+VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path, double cell_mm) {
     return guarded([&] {
+        check_cell(cell_mm);
         OutputFolder out(directory);
         fill(context, plan, out);
         VerifyOptions options;
         options.stl = stl_path;
+        options.cell = cell_mm;
         context.share_progress(0.5, 1);
         VerifyResult result = verdict(verify_folder(context, out.path("").string(), options));
         if (reports_are_built()) write_report(context, out.path("").string(), {stl_path});
@@ -190,10 +198,12 @@ void report(Context& context, const std::string& directory, const std::string& s
     guarded([&] { write_report(context, directory, {stl_path, three_d, size_limit_mb}); });
 }
 
-VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path, const std::string& maps_directory) {
+VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path, const std::string& maps_directory, double cell_mm) {
     return guarded([&] {
+        check_cell(cell_mm);
         VerifyOptions options;
         options.stl = stl_path;
+        options.cell = cell_mm;
         options.maps_directory = maps_directory;
         return verdict(verify_folder(context, directory, options));
     });

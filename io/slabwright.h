@@ -58,18 +58,21 @@ struct VerifyResult {
 
 /// Writes as write() does, and verifies what it wrote before it takes its place: `directory` then holds verify.json too, also when the
 /// programs do not make the part. Cancelled or refused, it is as it was before.
-/// @param stl_path the pattern that was planned
+/// @param stl_path the pattern that was planned. @param cell_mm as verify's
 /// @throws Error as write() and verify()
 [[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
-                                                         const std::string& stl_path);
+                                                         const std::string& stl_path, double cell_mm = 0);
 
 /// Simulates the programs in `directory` against the pattern, from the folder's text alone, and writes verify.json into it.
 /// @param stl_path the pattern; "" looks for the file that plan.json names: in the folder, beside it, where the caller stands
 /// @param maps_directory where a picture of each layer is written, layer_01.ppm and so on: what is left over, missed, unreachable or
 ///        gouged; "": none
-/// @throws Error(verification) when the folder cannot be understood, Error(input) when the STL is missing or another one
+/// @param cell_mm between the points of the simulated stock, 0.01 to 10; 0: as fine as the plan's cusp asks for. The check of every move
+///        for gouges needs no cells and is as exact with any
+/// @throws Error(verification) when the folder cannot be understood, Error(input) when the STL is missing or another one, Error(usage)
+///         on another cell
 [[nodiscard]] SLABWRIGHT_API VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path = {},
-                                                 const std::string& maps_directory = {});
+                                                 const std::string& maps_directory = {}, double cell_mm = 0);
 
 /// Mesh report, features and undercuts of a file as JSON (schema slabwright.inspect/1).
 [[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const std::string& stl_path, const Job& job);

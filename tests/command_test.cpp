@@ -112,6 +112,8 @@ TEST(Command, WrongUseExitsTwoWithOneLine) {
                                                          {"plan", stl, "-o", out, "--finder", "luck"},
                                                          {"plan", stl, "-o", out, "--weld", "-1"},
                                                          {"plan", stl, "-o", out, "--wled", "1"},
+                                                         {"plan", stl, "-o", out, "--cell", "0"},
+                                                         {"verify", out, "--cell", "20"},
                                                          {"plan", stl, "-o", out, "--job", folder / "missing.toml"},
                                                          {"plan", stl, "-o", out, "--job", folder.path.string()},
                                                          {"plan", stl, "-o", out, "--job", folder / "bad.toml"},
@@ -346,4 +348,7 @@ TEST(Command, SummaryTellsWhatToLoad) {
     EXPECT_EQ(quiet.out + quiet.err, "");
     const CommandResult as_json = slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out", "--json"});
     EXPECT_EQ(json::parse(as_json.out)["layers"], 3);
+    const CommandResult coarse = slabwright_command({"verify", folder / "out", "--stl", kData + "half-sphere.stl", "--cell", "0.5"});
+    EXPECT_EQ(coarse.exit, 0) << coarse.out << coarse.err;
+    EXPECT_NE(coarse.out.find("simulated at 0.500 mm"), std::string::npos) << coarse.out;
 }

@@ -36,7 +36,7 @@ extern "C" void on_signal(int signal) {
 struct Options {
     std::string stl, out, maps, job_file, units, strategy, finder, device, library;
     int threads = 0;
-    double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10;
+    double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, no_verify = false, json = false, quiet = false, defaults = false, weld_given = false, no_3d = false;
 };
 
@@ -244,7 +244,7 @@ bool run_plan(const Options& options) {
             write(context, result, options.out, options.stl);
             return options.json ? summary_json(result, options.out, nullptr) : summary(result, options.out);
         }
-        const VerifyResult found = write_verified(context, result, options.out, options.stl);
+        const VerifyResult found = write_verified(context, result, options.out, options.stl, options.cell);
         passed = found.passed;
         return options.json ? summary_json(result, options.out, &found) : summary(result, options.out) + verdict(found, options.out);
     });
@@ -272,7 +272,7 @@ std::string refresh_report(Context& context, const Options& options) {
 bool run_verify(const Options& options) {
     bool passed = false;
     with_context(options, [&](Context& context) {
-        const VerifyResult result = verify(context, options.out, options.stl, options.maps);
+        const VerifyResult result = verify(context, options.out, options.stl, options.maps, options.cell);
         passed = result.passed;
         return verdict(result, options.out) + refresh_report(context, options);
     });
@@ -355,6 +355,9 @@ int main(int argc, char** argv) {
     CLI::App* verify_command = app.add_subcommand("verify", "simulate the programs of a plan against the pattern");
     verify_command->add_option("OUT", options.out, "folder of the plan")->required();
     verify_command->add_option("--stl", options.stl, "the pattern; the file that plan.json names, if not given");
+    for (CLI::App* command : {plan_command, verify_command})
+        command->add_option("--cell", options.cell, "mm between the points of the simulated stock; as fine as the cusp asks for if not given")
+            ->check(CLI::Range(0.01, 10.0));
     verify_command->add_option("--maps", options.maps, "folder for a picture of each layer: left over, missed, unreachable, gouged");
     add_limits(*verify_command, options);
 
