@@ -68,7 +68,7 @@ struct VerifyResult {
 /// @param maps_directory where a picture of each layer is written, layer_01.ppm and so on: what is left over, missed, unreachable or
 ///        gouged; "": none
 /// @param cell_mm between the points of the simulated stock, 0.01 to 10; 0: as fine as the plan's cusp asks for. The check of every move
-///        for gouges needs no cells and is as exact with any
+///        for gouges needs no cells and is as exact with any; with coarser ones than that an operation that takes nothing is not told
 /// @throws Error(verification) when the folder cannot be understood, Error(input) when the STL is missing or another one, Error(usage)
 ///         on another cell
 [[nodiscard]] SLABWRIGHT_API VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path = {},

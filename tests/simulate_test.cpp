@@ -269,6 +269,8 @@ TEST(Simulate, EmptyOperationTravelAndUnknownStart) {
     SimulationReport r = twice.run();
     EXPECT_EQ(codes(r), "operation.empty");
     EXPECT_EQ(r.violations[0].file, "L1_01b");
+    twice.options.cell = 0.5;  // points so far apart may miss what an operation takes
+    EXPECT_EQ(codes(twice.run()), "");
 
     Block small;
     small.input.machine.travel_x = 100;  // the face mill's way is 110 mm

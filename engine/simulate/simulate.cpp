@@ -625,7 +625,10 @@ private:
                         f.deepest_line, f.deepest.where, f.deepest.size - p.planned_stepdown);
         });
         each([&](const Program& p, const ProgramFindings&, std::size_t i) {
-            if (prepared_[i].tool && taken_[i] <= 1e-3) violate(report, "operation.empty", "removes nothing", &p, 0, {}, 0);
+            // Coarser points than the tolerance asks for may miss all that an operation takes.
+            const bool seen = cell_ <= 1.25 * simulation_cell(input_.tools, options_.cusp) ||
+                              std::none_of(p.steps.begin(), p.steps.end(), [](const ProgramStep& step) { return !step.rapid(); });
+            if (prepared_[i].tool && taken_[i] <= 1e-3 && seen) violate(report, "operation.empty", "removes nothing", &p, 0, {}, 0);
         });
         if (options_.board_cut >= 0 && report.board_cut > options_.board_cut + kStanding)
             violate(report, "board.too_deep",
