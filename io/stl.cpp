@@ -97,10 +97,11 @@ std::string hash_file(Context& context, std::string_view bytes) {
 
 // ---------------------------------------------------------------------------------------------------- what is common
 
-/// Facets in millimetres, set on z = 0, and where they lay before.
+/// Facets, to be set on z = 0 in millimetres, and where they lie in the file.
 struct Corners {
-    RawArray<std::array<Vec3f, 3>> facets;
-    std::array<double, 3> min{}, max{};  ///< mm, as in the file
+    FacetRecords facets;                   ///< of the mapped file, or of what a text said
+    RawArray<std::array<Vec3f, 3>> spelt;  ///< the corners of a text
+    std::array<double, 3> min{}, max{};    ///< mm, as in the file
 };
 
 struct Extent {
@@ -123,7 +124,7 @@ struct Extent {
     }
 };
 
-/// The one rounding a coordinate suffers: scaled and lowered in double, then to float32.
+/// The one rounding a coordinate suffers: scaled and lowered in double, then to float32 (as FacetRecords do with binary ones).
 Vec3f place_corner(const std::array<double, 3>& p, double mm_per_unit, double lowest_mm) {
     return {static_cast<float>(p[0] * mm_per_unit), static_cast<float>(p[1] * mm_per_unit), static_cast<float>(p[2] * mm_per_unit - lowest_mm)};
 }
@@ -193,12 +194,7 @@ Corners read_binary(Context& context, std::string_view bytes, std::size_t count,
     }
     Corners corners;
     set_box(corners, scan.extent, mm_per_unit);
-    corners.facets = RawArray<std::array<Vec3f, 3>>(count);
-    parallel_for(context, count, grain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t f = begin; f < end; ++f)
-            for (std::size_t c = 0; c < 3; ++c)
-                corners.facets[f][c] = place_corner(binary_corner(facets + kFacetBytes * f, c), mm_per_unit, corners.min[2]);
-    });
+    corners.facets = {facets + 12, count, kFacetBytes, mm_per_unit, corners.min[2]};
     return corners;
 }
 
@@ -402,16 +398,17 @@ Corners read_ascii(Context& context, std::string_view text, std::size_t begin, d
 
     Corners corners;
     set_box(corners, extent, mm_per_unit);
-    corners.facets = RawArray<std::array<Vec3f, 3>>(count);
+    corners.spelt = RawArray<std::array<Vec3f, 3>>(count);
     parallel_each(context, pieces.size(), [&](std::size_t i) {
         std::size_t f = firsts[i];
         for (const std::array<double, 9>& facet : pieces[i].facets) {
             for (std::size_t c = 0; c < 3; ++c)
-                corners.facets[f][c] = place_corner({facet[3 * c], facet[3 * c + 1], facet[3 * c + 2]}, mm_per_unit, corners.min[2]);
+                corners.spelt[f][c] = place_corner({facet[3 * c], facet[3 * c + 1], facet[3 * c + 2]}, mm_per_unit, corners.min[2]);
             ++f;
         }
         pieces[i].facets = {};
     });
+    corners.facets = {reinterpret_cast<const char*>(corners.spelt.data()), count};
     return corners;
 }
 
@@ -526,7 +523,30 @@ void set_on_base(Mesh& mesh) {
     for (Vec3f& v : mesh.vertices) v.z = static_cast<float>(static_cast<double>(v.z) - lowest);
 }
 
+/// Decodes and welds the bytes of a file; sets the input's count and box.
+Mesh load_mesh(Context& context, std::string_view bytes, double mm_per_unit, const std::string& path, InputInfo& input,
+               std::vector<std::uint32_t>* odd) {
+    // 30 bytes a facet for the mesh; a text has fewer facets than its length could hold in binary.
+    const MemoryCharge charge(context, bytes.size() / kFacetBytes * 30, "reading " + path);
+    const Corners corners = read_facets(context, bytes, mm_per_unit, path);
+    const MemoryCharge spelt(context, corners.spelt.size() * sizeof(corners.spelt[0]), "the corners of " + path);
+    context.advance();
+    input.triangles = corners.facets.count;
+    input.min = corners.min;
+    input.max = corners.max;
+    return weld_records(context, corners.facets, odd);
+}
+
 }  // namespace
+
+Mesh read_mesh(Context& context, const std::string& path, LengthUnit units) {
+    context.begin_phase("read STL", 0.0, 0.05, 2);
+    const MappedFile file(path);
+    InputInfo ignored;
+    Mesh mesh = load_mesh(context, file.bytes(), units == LengthUnit::inch ? kInch : 1.0, path, ignored, nullptr);
+    context.advance();
+    return mesh;
+}
 
 StlMesh read_stl(Context& context, const std::string& path, const StlOptions& options) {
     context.begin_phase("read STL", 0.0, 0.05, 4);
@@ -534,19 +554,14 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
     const double mm_per_unit = options.units == LengthUnit::inch ? kInch : 1.0;
     StlMesh stl;
     stl.input.file = std::filesystem::path(path).filename().string();
+    std::vector<std::uint32_t> odd;
+    bool odd_known = true;
     // The digest is one long chain, so it takes one thread while the others decode and weld.
     parallel_each(context, 2, [&](std::size_t task) {
         if (task == 0) {
             stl.input.sha256 = hash_file(context, file.bytes());
         } else {
-            // 36 bytes a facet for its corners and 24 for the mesh; a text has fewer facets than its length could hold in binary.
-            const MemoryCharge charge(context, file.bytes().size() / kFacetBytes * 60, "reading " + path);
-            Corners corners = read_facets(context, file.bytes(), mm_per_unit, path);
-            context.advance();
-            stl.input.triangles = corners.facets.size();
-            stl.input.min = corners.min;
-            stl.input.max = corners.max;
-            stl.mesh = weld(context, std::as_const(corners.facets).span());
+            stl.mesh = load_mesh(context, file.bytes(), mm_per_unit, path, stl.input, &odd);
             context.advance();
         }
     });
@@ -554,6 +569,7 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
     if (options.weld_mm != 0) {
         ToleranceWeld welded = weld_within(context, stl.mesh.view(), options.weld_mm);
         stl.mesh = std::move(welded.mesh);
+        odd_known = false;
         if (stl.mesh.facets.empty())
             refuse("no_facets", fmt::format("no facet is left after welding within {:g} mm", options.weld_mm), path, "weld within less");
         set_on_base(stl.mesh);
@@ -563,7 +579,7 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
                                    std::nullopt});
     }
     context.advance();
-    stl.report = report_mesh(context, stl.mesh.view());
+    stl.report = report_mesh(context, stl.mesh.view(), odd_known ? &odd : nullptr);
     stl.input.volume_mm3 = stl.report.volume_mm3;
     context.advance();
     describe_report(stl.mesh, stl.report, stl.diagnostics);

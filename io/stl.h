@@ -31,6 +31,9 @@ struct StlMesh {
 /// degenerate, each with its count and the centre of its first facet.
 [[nodiscard]] StlMesh read_stl(Context& context, const std::string& path, const StlOptions& options = {});
 
+/// Only the mesh of read_stl(), without digest, report and weld within a tolerance. @throws as read_stl()
+[[nodiscard]] Mesh read_mesh(Context& context, const std::string& path, LengthUnit units = LengthUnit::mm);
+
 /// Whether a planner may use this mesh: closed (but for open edges in the base plane), consistently oriented, not inside
 /// out. @throws Error(input) with the count, the first facet and its place, and the remedy (for open edges: the
 /// --weld tolerance that closes them all, found by trying, when there is one). Codes: stl.open, misoriented, inverted

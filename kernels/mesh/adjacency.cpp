@@ -97,21 +97,50 @@ void pair_around_edge(Mesh& mesh, std::span<const EdgeUse> uses) {
     }
 }
 
+/// Whether something about a fan needs a closer look than its adjacency gives: an edge that is not shared by just two facets which run
+/// along it in opposite directions; two facets that share two edges, as duplicates do; or so many uses that this is not asked.
+bool is_odd(std::span<const EdgeUse> fan) {
+    if (fan.size() > kPlainFan || fan.size() % 2 != 0) return true;
+    for (std::size_t i = 0; i < fan.size(); i += 2) {
+        if (fan[i].high != fan[i + 1].high || fan[i].reversed() == fan[i + 1].reversed()) return true;
+        if (i > 0 && fan[i].high == fan[i - 1].high) return true;
+        const std::uint32_t a = fan[i].facet(), b = fan[i + 1].facet();
+        for (std::size_t j = 0; j < i; j += 2)
+            if (fan[j].facet() == a && fan[j + 1].facet() == b) return true;
+    }
+    return false;
+}
+
 }  // namespace
 
-void pair_edges(Context& context, Mesh& mesh) {
-    mesh.neighbours.assign(mesh.facets.size(), Index3{kNoFacet, kNoFacet, kNoFacet});
-    struct Nothing {};
-    reduce_edges(
-        context, mesh.facets, mesh.vertices.size(), Nothing{},
-        [&](Nothing&, std::span<const EdgeUse> uses) {
-            if (uses.size() == 2) {
-                if (uses[0].reversed() != uses[1].reversed()) link(mesh, uses[0], uses[1]);
-            } else if (uses.size() > 2) {
-                pair_around_edge(mesh, uses);
-            }
+void pair_edges(Context& context, Mesh& mesh, std::vector<std::uint32_t>* odd) {
+    EdgeScratch scratch;
+    pair_edges(context, mesh, scratch, odd);
+}
+
+void pair_edges(Context& context, Mesh& mesh, EdgeScratch& scratch, std::vector<std::uint32_t>* odd) {
+    mesh.neighbours.resize(mesh.facets.size());
+    parallel_for(context, mesh.neighbours.size(), std::size_t{1} << 16, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t f = begin; f < end; ++f) mesh.neighbours[f] = {kNoFacet, kNoFacet, kNoFacet};
+    });
+    using Vertices = std::vector<std::uint32_t>;
+    Vertices found = reduce_fans(
+        context, mesh.facets, mesh.vertices.size(), scratch, Vertices{}, [](std::uint32_t) { return true; },
+        [&](Vertices& part, std::span<const EdgeUse> fan) {
+            if (odd != nullptr && is_odd(fan)) part.push_back(fan[0].low);
+            each_edge(fan, [&](std::span<const EdgeUse> uses) {
+                if (uses.size() == 2) {
+                    if (uses[0].reversed() != uses[1].reversed()) link(mesh, uses[0], uses[1]);
+                } else if (uses.size() > 2) {
+                    pair_around_edge(mesh, uses);
+                }
+            });
         },
-        [](Nothing, Nothing) { return Nothing{}; });
+        [](Vertices a, const Vertices& b) {
+            a.insert(a.end(), b.begin(), b.end());
+            return a;
+        });
+    if (odd != nullptr) *odd = std::move(found);
 }
 
 }  // namespace slabwright

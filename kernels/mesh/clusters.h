@@ -2,7 +2,9 @@
 // member. Both give the same result whatever the order of the calls, hence on any number of threads.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -36,35 +38,49 @@ inline void join_clusters(std::span<std::uint32_t> parent, std::uint32_t a, std:
     }
 }
 
-/// On entry first[i] is the lowest index of i's class (first[i] == i for the first of a class); on exit it is the number
-/// of the class, counted by first index. on_first(i, number) is called once per class, in parallel. Returns the count.
-template <class OnFirst>
-std::uint32_t number_by_first(Context& context, std::span<std::uint32_t> first, OnFirst&& on_first) {
-    constexpr std::size_t grain = std::size_t{1} << 16;
-    const std::size_t n = first.size(), chunks = (n + grain - 1) / grain;
-    std::vector<std::uint32_t> base(chunks + 1, 0);
-    std::vector<std::uint8_t> is_first(n);
-    parallel_for(context, n, grain, [&](std::size_t begin, std::size_t end) {
+/// Elements that number_by_first() numbers in one go.
+inline constexpr std::size_t kNumberingChunk = 61440;
+
+/// On entry first[i] is the lowest index of i's class (first[i] == i for the first of a class), or any lower one of the class in the
+/// same chunk of kNumberingChunk; on exit it is the number
+/// of the class, counted by first index. on_count(count) is called before any on_first(i, number), which is called once per
+/// class, in parallel. Returns the count. Scratch: 12 bits an element.
+template <class OnCount, class OnFirst>
+std::uint32_t number_by_first(Context& context, std::span<std::uint32_t> first, OnCount&& on_count, OnFirst&& on_first) {
+    // The number of a class is how many firsts lie before its own. A bit for each first, and their count before each 64 of
+    // them, are small enough for the cache, so that firsts far away are looked up quickly.
+    const std::size_t n = first.size(), words = (n + 63) / 64;
+    constexpr std::size_t grain = kNumberingChunk / 64;  // words
+    const std::size_t chunks = (words + grain - 1) / grain;
+    std::vector<std::uint64_t> is_first(words);
+    std::vector<std::uint32_t> before(words), base(chunks + 1, 0);
+    parallel_for(context, words, grain, [&](std::size_t begin, std::size_t end) {
         std::uint32_t count = 0;
-        for (std::size_t i = begin; i < end; ++i) {
-            is_first[i] = first[i] == i;
-            count += is_first[i];
+        for (std::size_t w = begin; w < end; ++w) {
+            std::uint64_t bits = 0;
+            const std::size_t last = std::min(n, 64 * w + 64);
+            for (std::size_t i = 64 * w; i < last; ++i) bits |= std::uint64_t{first[i] == i} << (i & 63);
+            is_first[w] = bits;
+            before[w] = count;
+            count += static_cast<std::uint32_t>(std::popcount(bits));
         }
         base[begin / grain + 1] = count;
     });
     for (std::size_t c = 0; c < chunks; ++c) base[c + 1] += base[c];
-    // First every class gets its number in the place of its first member; the others still point there and copy it after.
-    parallel_for(context, n, grain, [&](std::size_t begin, std::size_t end) {
-        std::uint32_t number = base[begin / grain];
-        for (std::size_t i = begin; i < end; ++i) {
-            if (!is_first[i]) continue;
-            on_first(i, number);
-            first[i] = number++;
+    on_count(base[chunks]);
+    parallel_for(context, words, grain, [&](std::size_t begin, std::size_t end) {
+        auto number_of = [&](std::uint32_t i) {
+            const std::uint64_t lower = is_first[i >> 6] & ((std::uint64_t{1} << (i & 63)) - 1);
+            return base[(i >> 6) / grain] + before[i >> 6] + static_cast<std::uint32_t>(std::popcount(lower));
+        };
+        const std::size_t last = std::min(n, 64 * end);
+        for (std::size_t i = 64 * begin; i < last; ++i) {
+            // In the same chunk and before i, that member has its number already, and it stands where the index stood.
+            const std::uint32_t mine = first[i];
+            const std::uint32_t number = mine >= 64 * begin && mine != i ? first[mine] : number_of(mine);
+            if (mine == i) on_first(i, number);
+            first[i] = number;
         }
-    });
-    parallel_for(context, n, grain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
-            if (!is_first[i]) first[i] = first[first[i]];
     });
     return base[chunks];
 }

@@ -1,9 +1,10 @@
-// Every edge of a mesh with all the facets that use it. The work behind adjacency and report.
+// Every edge of a mesh with all the facets that use it, fan by fan. The work behind adjacency and report.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -29,22 +30,55 @@ struct EdgeUse {
 /// The largest mesh whose edge uses and corners can be numbered in 32 bits.
 inline constexpr std::size_t kMaxFacets = 0xFFFFFFFFu / 6;
 
-/// Calls on_edge(T& part, uses) once for every edge; `uses` holds all uses of the edge, by ascending facet. Edges of no
-/// length (both ends the same vertex) are left out. The parts, one per block of vertices, are joined in order.
-/// Scratch: 36 bytes a facet, charged.
+/// Fans of more uses are sorted by other means, and not searched for what is odd about them.
+inline constexpr std::size_t kPlainFan = 24;
+
+/// Sorts the uses of one block, whose low vertices are [origin, origin + width), and hands out fan after fan (see reduce_fans).
+template <class OnFan>
+void sort_fans(std::span<const EdgeUse> uses, std::uint32_t origin, std::size_t width, OnFan&& on_fan) {
+    auto key = [](const EdgeUse& use) { return std::uint64_t{use.high} << 32 | use.code; };
+    std::vector<std::uint32_t> place(width + 1, 0);
+    for (const EdgeUse& use : uses) ++place[use.low - origin + 1];
+    for (std::size_t v = 0; v < width; ++v) place[v + 1] += place[v];
+    RawArray<EdgeUse> sorted(uses.size());
+    for (const EdgeUse& use : uses) sorted[place[use.low - origin]++] = use;
+    for (std::size_t begin = 0, end = 0; begin < sorted.size(); begin = end) {
+        while (end < sorted.size() && sorted[end].low == sorted[begin].low) ++end;
+        if (end - begin <= kPlainFan) {
+            for (std::size_t i = begin + 1; i < end; ++i) {
+                const EdgeUse use = sorted[i];
+                std::size_t j = i;
+                for (; j > begin && key(use) < key(sorted[j - 1]); --j) sorted[j] = sorted[j - 1];
+                sorted[j] = use;
+            }
+        } else {
+            std::sort(sorted.data() + begin, sorted.data() + end, [&](const EdgeUse& a, const EdgeUse& b) { return key(a) < key(b); });
+        }
+        on_fan(std::span<const EdgeUse>(sorted.data() + begin, end - begin));
+    }
+}
+
+/// Memory that one step after the other may use, so that the system clears its pages only once.
+using EdgeScratch = RawArray<std::byte>;
+
+/// Calls on_fan(T& part, uses) once for every vertex v that wanted(v) says, with all uses of edges whose lower end is v, sorted by
+/// the upper end and then by facet; vertices without any are left out, and so are edges of no length (both ends the same vertex). The
+/// parts, one per block of vertices, are joined in order. Scratch: 20 bytes a facet on an ordinary mesh, 36 at most; charged where
+/// `scratch` is too small.
 /// @throws Error(input, "mesh.too_large") over kMaxFacets
-template <class T, class OnEdge, class Join>
-T reduce_edges(Context& context, std::span<const Index3> facets, std::size_t vertex_count, T identity, OnEdge&& on_edge, Join&& join) {
+template <class T, class Wanted, class OnFan, class Join>
+T reduce_fans(Context& context, std::span<const Index3> facets, std::size_t vertex_count, EdgeScratch& scratch, T identity, Wanted&& wanted,
+              OnFan&& on_fan, Join&& join) {
     if (facets.size() > kMaxFacets)
         throw Error(ErrorKind::input, "mesh.too_large", "a mesh may have " + std::to_string(kMaxFacets) + " facets at most",
                     std::to_string(facets.size()) + " facets", "reduce the mesh or split the pattern");
     if (facets.empty()) return identity;
     // Uses are brought together in two steps: first by block of low vertices, then inside each block, which fits the
     // cache, by low vertex and by (high, facet). Vertices are numbered by first use, so a block is a piece of surface.
-    const std::size_t uses_wanted = std::size_t{1} << 14, most_blocks = 1024;
-    const std::size_t wanted = std::clamp<std::size_t>(3 * facets.size() / uses_wanted, 1, most_blocks);
+    const std::size_t uses_wanted = std::size_t{1} << 14, most_blocks = 2048;
+    const std::size_t blocks_wanted = std::clamp<std::size_t>(3 * facets.size() / uses_wanted, 1, most_blocks);
     unsigned shift = 0;
-    while ((vertex_count >> shift) + 1 > wanted && shift < 32) ++shift;
+    while ((vertex_count >> shift) + 1 > blocks_wanted && shift < 32) ++shift;
     const std::size_t blocks = (vertex_count >> shift) + 1;
     const std::size_t grain = std::max<std::size_t>(std::size_t{1} << 14, (facets.size() + 63) / 64);
     const std::size_t chunks = (facets.size() + grain - 1) / grain;
@@ -54,9 +88,9 @@ T reduce_edges(Context& context, std::span<const Index3> facets, std::size_t ver
             const Index3 v = facets[f];
             for (std::uint32_t k = 0; k < 3; ++k) {
                 const std::uint32_t a = v[k], b = v[k == 2 ? 0 : k + 1];
-                if (a == b) continue;
-                const std::uint32_t reversed = a > b ? 1u : 0u;
-                take(EdgeUse{std::min(a, b), std::max(a, b), 2 * (3 * static_cast<std::uint32_t>(f) + k) + reversed});
+                const std::uint32_t low = std::min(a, b);
+                if (a == b || !wanted(low)) continue;
+                take(EdgeUse{low, std::max(a, b), 2 * (3 * static_cast<std::uint32_t>(f) + k) + (a > b ? 1u : 0u)});
             }
         }
     };
@@ -66,52 +100,65 @@ T reduce_edges(Context& context, std::span<const Index3> facets, std::size_t ver
         std::uint32_t* count = &next[begin / grain * blocks];
         each_use(begin, end, [&](EdgeUse use) { ++count[use.low >> shift]; });
     });
-    std::vector<std::uint32_t> starts(blocks + 1);
-    std::uint32_t total = 0;
+    // To bound memory, about half of the uses are dealt at a time.
+    std::vector<std::uint32_t> sizes(blocks, 0);
+    std::uint64_t total = 0, largest = 0;
     for (std::size_t block = 0; block < blocks; ++block) {
-        starts[block] = total;
-        for (std::size_t chunk = 0; chunk < chunks; ++chunk) total += std::exchange(next[chunk * blocks + block], total);
+        for (std::size_t chunk = 0; chunk < chunks; ++chunk) sizes[block] += next[chunk * blocks + block];
+        total += sizes[block];
+        largest = std::max<std::uint64_t>(largest, sizes[block]);
     }
-    starts[blocks] = total;
-    const MemoryCharge charge(context, std::uint64_t{total} * sizeof(EdgeUse), "the edges of the mesh");
-    RawArray<EdgeUse> uses(total);
-    parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
-        std::uint32_t* place = &next[begin / grain * blocks];
-        each_use(begin, end, [&](EdgeUse use) { uses[place[use.low >> shift]++] = use; });
-    });
+    const std::uint64_t room = std::min(total, std::max(total / 2 + 1, largest) + largest);
+    std::optional<MemoryCharge> charge;
+    if (scratch.size() < room * sizeof(EdgeUse)) {
+        charge.emplace(context, room * sizeof(EdgeUse), "the edges of the mesh");
+        scratch = {};
+        scratch = EdgeScratch(room * sizeof(EdgeUse));
+    }
+    EdgeUse* const uses = reinterpret_cast<EdgeUse*>(scratch.data());
 
-    auto by_high = [](const EdgeUse& a, const EdgeUse& b) { return a.high != b.high ? a.high < b.high : a.code < b.code; };
-    return parallel_reduce(
-        context, blocks, 1, identity,
-        [&](std::size_t block, std::size_t) {
-            T part = identity;
-            const std::span<const EdgeUse> mine = uses.span().subspan(starts[block], starts[block + 1] - starts[block]);
-            const std::uint32_t origin = static_cast<std::uint32_t>(block << shift);
-            std::vector<std::uint32_t> place((std::size_t{1} << shift) + 1, 0);
-            for (const EdgeUse& use : mine) ++place[use.low - origin + 1];
-            for (std::size_t v = 0; v + 1 < place.size(); ++v) place[v + 1] += place[v];
-            RawArray<EdgeUse> sorted(mine.size());
-            for (const EdgeUse& use : mine) sorted[place[use.low - origin]++] = use;
-            for (std::size_t begin = 0, end = 0; begin < sorted.size(); begin = end) {
-                while (end < sorted.size() && sorted[end].low == sorted[begin].low) ++end;
-                if (end - begin <= 24) {
-                    for (std::size_t i = begin + 1; i < end; ++i) {
-                        const EdgeUse use = sorted[i];
-                        std::size_t j = i;
-                        for (; j > begin && by_high(use, sorted[j - 1]); --j) sorted[j] = sorted[j - 1];
-                        sorted[j] = use;
-                    }
-                } else {
-                    std::sort(sorted.data() + begin, sorted.data() + end, by_high);
-                }
-                for (std::size_t i = begin, j = begin; i < end; i = j) {
-                    while (j < end && sorted[j].high == sorted[i].high) ++j;
-                    on_edge(part, std::span<const EdgeUse>(sorted.data() + i, j - i));
-                }
-            }
-            return part;
-        },
-        join);
+    T all = identity;
+    std::vector<std::uint32_t> starts;
+    for (std::size_t first = 0, last = 0; first < blocks; first = last) {
+        starts.assign(1, 0);
+        while (last < blocks && starts.back() + std::uint64_t{sizes[last]} <= room) {
+            std::uint32_t at = starts.back();
+            for (std::size_t chunk = 0; chunk < chunks; ++chunk) at += std::exchange(next[chunk * blocks + last], at);
+            starts.push_back(at);
+            ++last;
+        }
+        if (starts.back() == 0) continue;
+        parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
+            std::uint32_t* place = &next[begin / grain * blocks];
+            each_use(begin, end, [&](EdgeUse use) {
+                const std::size_t block = use.low >> shift;
+                if (block - first < last - first) uses[place[block]++] = use;
+            });
+        });
+        all = join(std::move(all), parallel_reduce(
+                                       context, last - first, 1, identity,
+                                       [&](std::size_t i, std::size_t) {
+                                           T part = identity;
+                                           const std::span<const EdgeUse> mine(uses + starts[i], starts[i + 1] - starts[i]);
+                                           sort_fans(mine, static_cast<std::uint32_t>((first + i) << shift), std::size_t{1} << shift,
+                                                     [&](std::span<const EdgeUse> fan) { on_fan(part, fan); });
+                                           return part;
+                                       },
+                                       join));
+    }
+    return all;
+}
+
+/// As the public function, with scratch memory that is at hand.
+void pair_edges(Context& context, Mesh& mesh, EdgeScratch& scratch, std::vector<std::uint32_t>* odd);
+
+/// Calls on_edge(uses) for every edge of a fan, with all its uses by ascending facet.
+template <class OnEdge>
+void each_edge(std::span<const EdgeUse> fan, OnEdge&& on_edge) {
+    for (std::size_t i = 0, j = 0; i < fan.size(); i = j) {
+        while (j < fan.size() && fan[j].high == fan[i].high) ++j;
+        on_edge(fan.subspan(i, j - i));
+    }
 }
 
 }  // namespace slabwright

@@ -5,7 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
+
+#include "kernels/mesh/bulk_memory.h"
 
 namespace slabwright {
 
@@ -35,10 +36,11 @@ struct Box3 {
     Vec3f min, max;
 };
 
+/// Note that resize() leaves new elements indeterminate.
 struct Mesh {
-    std::vector<Vec3f> vertices;
-    std::vector<Index3> facets;
-    std::vector<Index3> neighbours;
+    BulkVector<Vec3f> vertices;
+    BulkVector<Index3> facets;
+    BulkVector<Index3> neighbours;
 
     [[nodiscard]] MeshView view() const noexcept { return {vertices, facets, neighbours}; }
 };

@@ -1,11 +1,11 @@
-// Large scratch arrays whose elements are all written before they are read: std::vector would first fill them with
-// zeros on one thread, which costs as much as the parallel work that follows.
+// Large scratch arrays whose elements are all written before they are read.
 #pragma once
 
 #include <cstddef>
-#include <new>
 #include <span>
 #include <type_traits>
+
+#include "kernels/mesh/bulk_memory.h"
 
 namespace slabwright {
 
@@ -16,11 +16,11 @@ class RawArray {
 
 public:
     RawArray() = default;
-    explicit RawArray(std::size_t size) : data_(static_cast<T*>(::operator new(size * sizeof(T)))), size_(size) {}
+    explicit RawArray(std::size_t size) : data_(size == 0 ? nullptr : static_cast<T*>(take_bulk(size * sizeof(T)))), size_(size) {}
     RawArray(RawArray&& other) noexcept : data_(other.data_), size_(other.size_) { other.data_ = nullptr, other.size_ = 0; }
     RawArray& operator=(RawArray&& other) noexcept {
         if (this != &other) {
-            ::operator delete(data_);
+            release();
             data_ = other.data_, size_ = other.size_;
             other.data_ = nullptr, other.size_ = 0;
         }
@@ -28,7 +28,7 @@ public:
     }
     RawArray(const RawArray&) = delete;
     RawArray& operator=(const RawArray&) = delete;
-    ~RawArray() { ::operator delete(data_); }
+    ~RawArray() { release(); }
 
     [[nodiscard]] T* data() noexcept { return data_; }
     [[nodiscard]] const T* data() const noexcept { return data_; }
@@ -39,6 +39,9 @@ public:
     [[nodiscard]] std::span<const T> span() const noexcept { return {data_, size_}; }
 
 private:
+    void release() noexcept {
+        if (data_ != nullptr) release_bulk(data_, size_ * sizeof(T));
+    }
     T* data_ = nullptr;
     std::size_t size_ = 0;
 };

@@ -103,6 +103,17 @@ struct Sums {
     std::vector<std::uint32_t> open;  ///< components seen with an edge that has no partner
 };
 
+Box3 merged(const Box3& a, const Box3& b) {
+    return {{std::min(a.min.x, b.min.x), std::min(a.min.y, b.min.y), std::min(a.min.z, b.min.z)},
+            {std::max(a.max.x, b.max.x), std::max(a.max.y, b.max.y), std::max(a.max.z, b.max.z)}};
+}
+
+Box3 bounds(Context& context, MeshView mesh) {
+    if (mesh.facets.empty()) return {};
+    auto part = [&](std::size_t begin, std::size_t end) { return bounds(MeshView{mesh.vertices, mesh.facets.subspan(begin, end - begin), {}}); };
+    return parallel_reduce(context, mesh.size(), kGrain, part(0, 1), part, merged);
+}
+
 /// A point of a component of which it is asked how much material of the other components surrounds it.
 struct Query {
     Point p;
@@ -124,6 +135,7 @@ int crossing(const Point& a, const Point& b, const Point& q) {
 /// Winding number of all other components around each query, counted along a ray to +z: material that lies above ends
 /// with a facet facing up. An opening in the base plane does not matter to that ray.
 std::vector<int> material_around(Context& context, MeshView mesh, std::span<const std::uint32_t> component_of, const std::vector<Query>& queries) {
+    if (queries.empty()) return {};
     std::vector<std::size_t> by_x(queries.size());
     for (std::size_t i = 0; i < by_x.size(); ++i) by_x[i] = i;
     std::sort(by_x.begin(), by_x.end(),
@@ -157,11 +169,11 @@ std::vector<int> material_around(Context& context, MeshView mesh, std::span<cons
 
 }  // namespace
 
-MeshReport report_mesh(Context& context, MeshView mesh) {
+MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::uint32_t>* odd) {
     MeshReport report;
     report.facets = mesh.size();
     report.vertices = mesh.vertices.size();
-    report.box = bounds(mesh);
+    report.box = bounds(context, mesh);
     const float base = report.box.min.z;
     const std::size_t n = mesh.size();
 
@@ -175,9 +187,19 @@ MeshReport report_mesh(Context& context, MeshView mesh) {
             for (const std::uint32_t g : mesh.neighbours[f])
                 if (g != kNoFacet && g < f) join_clusters(component, static_cast<std::uint32_t>(f), g);
     });
-    const EdgeFindings edges = reduce_edges(
-        context, mesh.facets, mesh.vertices.size(), EdgeFindings{},
-        [&](EdgeFindings& found, std::span<const EdgeUse> uses) { inspect_edge(mesh, base, uses, component, found); }, join);
+    EdgeFindings edges;
+    if (odd == nullptr || !odd->empty()) {
+        std::vector<bool> asked(odd == nullptr ? 0 : mesh.vertices.size(), false);
+        if (odd != nullptr)
+            for (const std::uint32_t v : *odd) asked[v] = true;
+        EdgeScratch scratch;
+        edges = reduce_fans(
+            context, mesh.facets, mesh.vertices.size(), scratch, EdgeFindings{}, [&](std::uint32_t v) { return asked.empty() || asked[v]; },
+            [&](EdgeFindings& found, std::span<const EdgeUse> fan) {
+                each_edge(fan, [&](std::span<const EdgeUse> uses) { inspect_edge(mesh, base, uses, component, found); });
+            },
+            join);
+    }
     report.open_edges = edges.open;
     report.open_edges_off_base = edges.open_off_base;
     report.non_manifold_edges = edges.non_manifold;
@@ -192,7 +214,8 @@ MeshReport report_mesh(Context& context, MeshView mesh) {
         });
         report.component_of = std::move(roots);
     }
-    report.components = number_by_first(context, report.component_of, [](std::size_t, std::uint32_t) {});
+    report.components = number_by_first(
+        context, report.component_of, [](std::uint32_t) {}, [](std::size_t, std::uint32_t) {});
 
     // Volume is summed from tetrahedra to the middle of the base: exact for a mesh that is open in its base plane only,
     // and without loss of digits for a mesh far from the origin.

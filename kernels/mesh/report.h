@@ -35,6 +35,8 @@ struct MeshReport {
 };
 
 /// Reports on a mesh whose adjacency is filled. Deterministic.
-[[nodiscard]] MeshReport report_mesh(Context& context, MeshView mesh);
+/// @param odd vertices that weld() or pair_edges() named on this very mesh: only edges with their lower end there are searched for
+///        faults; without it all are
+[[nodiscard]] MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::uint32_t>* odd = nullptr);
 
 }  // namespace slabwright

@@ -34,93 +34,162 @@ std::uint64_t hash_of(const Key& key) {
     return h ^ h >> 32;
 }
 
+/// Facets that are searched for equal corners among themselves before all others. Their table fits the cache.
+constexpr std::size_t kBlockFacets = 4096;
+static_assert(kNumberingChunk % (3 * kBlockFacets) == 0);
+
+constexpr std::uint16_t kFree = 0xFFFF;
+
+/// Finds equal corners within a block of facets.
+class BlockTable {
+public:
+    BlockTable() : table_(kSlots) { keys_.reserve(3 * kBlockFacets); }
+    /// slots[c] becomes the first corner of the block that has the same point as c. @return how many points are different
+    std::size_t find_firsts(const FacetRecords& facets, std::size_t begin, std::size_t end, std::span<std::uint32_t> slots) {
+        std::fill(table_.begin(), table_.end(), kFree);
+        keys_.clear();
+        for (std::size_t f = begin; f < end; ++f) {
+            for (std::size_t k = 0; k < 3; ++k) {
+                const Key key = key_of(facets.corner(f, k), 3 * f + k);
+                std::size_t slot = hash_of(key) % kSlots;
+                while (table_[slot] != kFree && !same_point(keys_[table_[slot]], key)) slot = (slot + 1) % kSlots;
+                if (table_[slot] == kFree) {
+                    table_[slot] = static_cast<std::uint16_t>(keys_.size());
+                    keys_.push_back(key);
+                }
+                slots[key.corner] = keys_[table_[slot]].corner;
+            }
+        }
+        return keys_.size();
+    }
+    /// The different points that were found.
+    [[nodiscard]] std::span<const Key> firsts() const { return keys_; }
+
+private:
+    static constexpr std::size_t kSlots = std::size_t{1} << 15;
+    std::vector<std::uint16_t> table_;
+    std::vector<Key> keys_;
+};
+
+/// Whether facets that follow each other share corners, so that it pays to look there first: asked of a few blocks of the file.
+bool neighbours_follow(const FacetRecords& facets) {
+    const std::size_t blocks = (facets.count + kBlockFacets - 1) / kBlockFacets, step = (blocks + 7) / 8;
+    BlockTable table;
+    std::vector<std::uint32_t> slots(3 * kBlockFacets);
+    std::size_t corners = 0, different = 0;
+    for (std::size_t block = 0; block < blocks; block += step) {
+        FacetRecords some = facets;
+        some.data += block * kBlockFacets * facets.stride_bytes;
+        some.count = std::min(kBlockFacets, facets.count - block * kBlockFacets);
+        corners += 3 * some.count;
+        different += table.find_firsts(some, 0, some.count, slots);
+    }
+    return 4 * different < 3 * corners;
+}
+
 }  // namespace
 
-Mesh weld(Context& context, std::span<const std::array<Vec3f, 3>> corners) {
-    if (corners.size() > kMaxFacets)
+Mesh weld(Context& context, std::span<const std::array<Vec3f, 3>> corners, std::vector<std::uint32_t>* odd) {
+    return weld_records(context, FacetRecords{reinterpret_cast<const char*>(corners.data()), corners.size()}, odd);
+}
+
+Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std::uint32_t>* odd) {
+    if (odd != nullptr) odd->clear();
+    if (facets.count > kMaxFacets)
         throw Error(ErrorKind::input, "mesh.too_large", "a mesh may have " + std::to_string(kMaxFacets) + " facets at most",
-                    std::to_string(corners.size()) + " facets", "reduce the mesh or split the pattern");
+                    std::to_string(facets.count) + " facets", "reduce the mesh or split the pattern");
     Mesh mesh;
-    if (corners.empty()) return mesh;
-    const std::size_t n = 3 * corners.size();
-    mesh.facets.resize(corners.size());
-    // One flat view of all corner slots; while welding, slot c holds the first corner that has the same point.
+    if (facets.count == 0) return mesh;
+    const std::size_t n = 3 * facets.count;
+    mesh.facets.resize(facets.count);
+    // One flat view of all corner slots; while welding, slot c holds the first corner that has the same point, or one before c in
+    // its block that leads there.
     const std::span<std::uint32_t> slots(mesh.facets.front().data(), n);
 
-    // Corners are dealt by hash into parts small enough for a hash table in the cache; shuffled facets cost no more than
-    // ordered ones. Dealing keeps the order of corners, so the first of a part is the first in the file. To bound memory,
-    // only a quarter of the parts is filled at a time.
-    const std::size_t corners_a_part = std::size_t{1} << 14, most_parts = 4096;
+    // Corners are dealt by hash into parts small enough for a hash table in the cache; shuffled facets cost little more than ordered
+    // ones. Dealing keeps the order of corners, so the first of a part is the first in the file. Where facets that follow each other
+    // share corners, only the first of its block is dealt for each point, which leaves a fifth of them.
+    const std::size_t corners_a_part = std::size_t{1} << 14, most_parts = 2048;
     const std::size_t parts = std::min(std::bit_ceil((n + corners_a_part - 1) / corners_a_part), most_parts);
-    const std::size_t rounds = parts >= 64 ? 4 : 1, parts_a_round = parts / rounds;
     const unsigned part_bits = static_cast<unsigned>(std::countr_zero(parts));
-    auto part_of = [&](std::uint64_t hash) { return part_bits == 0 ? std::size_t{0} : static_cast<std::size_t>(hash >> (64 - part_bits)); };
-    auto corner_key = [&](std::size_t c) { return key_of(corners[c / 3][c % 3], c); };
+    auto part_of = [&](const Key& key) { return part_bits == 0 ? std::size_t{0} : static_cast<std::size_t>(hash_of(key) >> (64 - part_bits)); };
+    const bool blockwise = neighbours_follow(facets);
 
-    const std::size_t grain = std::max<std::size_t>(std::size_t{1} << 16, (n + 63) / 64);
-    const std::size_t chunks = (n + grain - 1) / grain;
+    const std::size_t blocks = (facets.count + kBlockFacets - 1) / kBlockFacets;
+    const std::size_t grain = kBlockFacets * std::max<std::size_t>(8, (blocks + 63) / 64);
+    const std::size_t chunks = (facets.count + grain - 1) / grain;
     std::vector<std::uint32_t> next(chunks * parts, 0);
-    parallel_for(context, n, grain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, facets.count, grain, [&](std::size_t begin, std::size_t end) {
         std::uint32_t* count = &next[begin / grain * parts];
-        for (std::size_t c = begin; c < end; ++c) ++count[part_of(hash_of(corner_key(c)))];
-    });
-    std::vector<std::uint32_t> starts(parts + 1);  // within the part's round
-    std::size_t largest_round = 0;
-    for (std::size_t round = 0; round < rounds; ++round) {
-        std::uint32_t total = 0;
-        for (std::size_t part = round * parts_a_round; part < (round + 1) * parts_a_round; ++part) {
-            starts[part] = total;
-            for (std::size_t chunk = 0; chunk < chunks; ++chunk) total += std::exchange(next[chunk * parts + part], total);
+        if (blockwise) {
+            BlockTable table;
+            for (std::size_t f = begin; f < end; f += kBlockFacets) {
+                table.find_firsts(facets, f, std::min(end, f + kBlockFacets), slots);
+                for (const Key& key : table.firsts()) ++count[part_of(key)];
+            }
+            return;
         }
-        largest_round = std::max<std::size_t>(largest_round, total);
+        for (std::size_t f = begin; f < end; ++f)
+            for (std::size_t k = 0; k < 3; ++k) ++count[part_of(key_of(facets.corner(f, k), 3 * f + k))];
+    });
+    std::vector<std::uint32_t> sizes(parts, 0);
+    std::uint64_t total = 0, largest = 0;
+    for (std::size_t part = 0; part < parts; ++part) {
+        for (std::size_t chunk = 0; chunk < chunks; ++chunk) sizes[part] += next[chunk * parts + part];
+        total += sizes[part];
+        largest = std::max<std::uint64_t>(largest, sizes[part]);
     }
+    // To bound memory, no more than about half of all corners are dealt at a time.
+    const std::uint64_t room = std::min(total, std::max<std::uint64_t>(n / 2 + 1, largest) + largest);
     {
-        const MemoryCharge charge(context, largest_round * sizeof(Key), "welding the facets");
-        RawArray<Key> keys(largest_round);
-        for (std::size_t round = 0; round < rounds; ++round) {
-            const std::size_t first_part = round * parts_a_round;
-            parallel_for(context, n, grain, [&](std::size_t begin, std::size_t end) {
+        const MemoryCharge charge(context, room * sizeof(Key), "welding the facets");
+        EdgeScratch scratch(room * sizeof(Key));
+        Key* const keys = reinterpret_cast<Key*>(scratch.data());
+        std::vector<std::uint32_t> starts;
+        for (std::size_t first = 0, last = 0; first < parts; first = last) {
+            starts.assign(1, 0);
+            while (last < parts && starts.back() + std::uint64_t{sizes[last]} <= room) {
+                std::uint32_t at = starts.back();
+                for (std::size_t chunk = 0; chunk < chunks; ++chunk) at += std::exchange(next[chunk * parts + last], at);
+                starts.push_back(at);
+                ++last;
+            }
+            parallel_for(context, facets.count, grain, [&](std::size_t begin, std::size_t end) {
                 std::uint32_t* place = &next[begin / grain * parts];
-                for (std::size_t c = begin; c < end; ++c) {
-                    const Key key = corner_key(c);
-                    const std::size_t part = part_of(hash_of(key));
-                    if (part - first_part < parts_a_round) keys[place[part]++] = key;
+                for (std::size_t f = begin; f < end; ++f) {
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        const std::size_t c = 3 * f + k;
+                        if (blockwise && slots[c] != c) continue;
+                        const Key key = key_of(facets.corner(f, k), c);
+                        const std::size_t part = part_of(key);
+                        if (part - first < last - first) keys[place[part]++] = key;
+                    }
                 }
             });
-            // After dealing, the last chunk's place is the end of the part.
-            const std::uint32_t* ends = &next[(chunks - 1) * parts];
-            parallel_for(context, parts_a_round, 4, [&](std::size_t begin, std::size_t end) {
+            parallel_for(context, last - first, 4, [&](std::size_t begin, std::size_t end) {
                 constexpr std::uint32_t empty = 0xFFFFFFFFu;
                 std::vector<std::uint32_t> table;
-                for (std::size_t part = first_part + begin; part < first_part + end; ++part) {
-                    const std::span<const Key> mine = std::as_const(keys).span().subspan(starts[part], ends[part] - starts[part]);
+                for (std::size_t i = begin; i < end; ++i) {
+                    const std::span<const Key> mine(keys + starts[i], starts[i + 1] - starts[i]);
                     const std::size_t mask = std::bit_ceil(2 * mine.size() + 1) - 1;
                     table.assign(mask + 1, empty);
-                    for (std::uint32_t i = 0; i < mine.size(); ++i) {
-                        std::size_t slot = hash_of(mine[i]) & mask;
-                        while (table[slot] != empty && !same_point(mine[table[slot]], mine[i])) slot = (slot + 1) & mask;
-                        if (table[slot] == empty) table[slot] = i;
-                        slots[mine[i].corner] = mine[table[slot]].corner;
+                    for (std::uint32_t j = 0; j < mine.size(); ++j) {
+                        std::size_t slot = hash_of(mine[j]) & mask;
+                        while (table[slot] != empty && !same_point(mine[table[slot]], mine[j])) slot = (slot + 1) & mask;
+                        if (table[slot] == empty) table[slot] = j;
+                        slots[mine[j].corner] = mine[table[slot]].corner;
                     }
                 }
             });
         }
+        number_by_first(
+            context, slots, [&](std::uint32_t count) { mesh.vertices.resize(count); },
+            [&](std::size_t c, std::uint32_t number) {
+                const Vec3f p = facets.corner(c / 3, c % 3);
+                mesh.vertices[number] = {p.x + 0.0f, p.y + 0.0f, p.z + 0.0f};
+            });
+        pair_edges(context, mesh, scratch, odd);
     }
-    // Firsts are counted before the vertices are allocated.
-    const std::uint64_t vertex_count = parallel_reduce(
-        context, n, grain, std::uint64_t{0},
-        [&](std::size_t begin, std::size_t end) {
-            std::uint64_t count = 0;
-            for (std::size_t c = begin; c < end; ++c) count += slots[c] == c;
-            return count;
-        },
-        [](std::uint64_t a, std::uint64_t b) { return a + b; });
-    mesh.vertices.resize(vertex_count);
-    number_by_first(context, slots, [&](std::size_t c, std::uint32_t number) {
-        const Vec3f p = corners[c / 3][c % 3];
-        mesh.vertices[number] = {p.x + 0.0f, p.y + 0.0f, p.z + 0.0f};
-    });
-    pair_edges(context, mesh);
     return mesh;
 }
 

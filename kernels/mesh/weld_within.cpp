@@ -90,7 +90,7 @@ ToleranceWeld weld_within(Context& context, MeshView mesh, double tolerance_mm) 
         [](std::uint64_t a, std::uint64_t b) { return a + b; });
 
     // Facets that kept three different corners stay, in their order.
-    std::vector<Index3>& facets = result.mesh.facets;
+    BulkVector<Index3>& facets = result.mesh.facets;
     facets.reserve(mesh.size());
     for (std::size_t f = 0; f < mesh.size(); ++f) {
         if (f % grain == 0) context.throw_if_cancelled();

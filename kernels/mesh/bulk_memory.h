@@ -1,0 +1,39 @@
+// Memory for arrays of millions of elements. Two things about it cost as much as the work on the arrays: that std::vector fills them
+// with zeros on one thread, and that the system hands them out in pages of 4 KiB, each with a trap of its own. Both are avoided here.
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "kernels/export.h"
+
+namespace slabwright {
+
+/// `bytes` of indeterminate content, aligned for any element; blocks of several MiB lie on huge pages where the system has them.
+/// @throws std::bad_alloc
+[[nodiscard]] SLABWRIGHT_API void* take_bulk(std::size_t bytes);
+/// `bytes` as they were asked for.
+SLABWRIGHT_API void release_bulk(void* data, std::size_t bytes) noexcept;
+
+/// Elements that are made without arguments keep indeterminate values: whoever sizes the array writes all of it.
+template <class T>
+struct BulkAllocator {
+    using value_type = T;
+    BulkAllocator() = default;
+    template <class U>
+    BulkAllocator(const BulkAllocator<U>&) noexcept {}  // NOLINT(google-explicit-constructor): allocators convert
+    [[nodiscard]] T* allocate(std::size_t n) { return static_cast<T*>(take_bulk(n * sizeof(T))); }
+    void deallocate(T* data, std::size_t n) noexcept { release_bulk(data, n * sizeof(T)); }
+    template <class U, class... Arguments>
+    void construct(U* place, Arguments&&... arguments) {
+        if constexpr (sizeof...(Arguments) > 0) ::new (static_cast<void*>(place)) U(std::forward<Arguments>(arguments)...);
+    }
+    friend bool operator==(const BulkAllocator&, const BulkAllocator&) noexcept { return true; }
+};
+
+/// T is a plain aggregate. resize() leaves the new elements indeterminate.
+template <class T>
+using BulkVector = std::vector<T, BulkAllocator<T>>;
+
+}  // namespace slabwright
