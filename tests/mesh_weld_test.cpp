@@ -10,6 +10,7 @@
 #include <map>
 #include <random>
 #include <set>
+#include <string>
 #include <tuple>
 
 #include "kernels/errors.h"
@@ -133,6 +134,41 @@ TEST(MeshWeld, EqualsBruteForceOnRandomSoup) {
             }
             check_pairs(first);
         }
+    }
+}
+
+TEST(MeshWeld, RecordsAreScaledLoweredAndNotAligned) {
+    // As in a binary STL: 50 bytes a facet, its corners behind the normal; inches, lowest at -2.
+    const Facets box = shapes::box({1, 1, -2}, {2, 3, 4});
+    std::string bytes(1, 'x');
+    for (const auto& corners : box) {
+        bytes.append(12, 'n');
+        bytes.append(reinterpret_cast<const char*>(corners.data()), sizeof corners);
+        bytes.append(2, 'a');
+    }
+    Facets expected = box;
+    for (auto& corners : expected)
+        for (Vec3f& p : corners)
+            p = {static_cast<float>(25.4 * double(p.x)), static_cast<float>(25.4 * double(p.y)), static_cast<float>(25.4 * double(p.z) + 50.8)};
+    Context context({.threads = 2});
+    const Mesh mesh = weld_records(context, {bytes.data() + 1 + 12, box.size(), 50, 25.4, -50.8});
+    ASSERT_EQ(mesh.vertices.size(), 8u);
+    ASSERT_TRUE(same_bytes(mesh, weld(context, expected)));
+    EXPECT_EQ(mesh.vertices[mesh.facets[0][0]].z, expected[0][0].z);
+}
+
+TEST(MeshWeld, MemoryStaysUnderEightyBytesAFacet) {
+    // Ordered and shuffled, the charge for scratch and the mesh itself together; a limit that is too small is refused.
+    Facets facets = shapes::torus(300);
+    std::mt19937_64 random(test::seed());
+    for (const bool shuffled : {false, true}) {
+        if (shuffled) std::shuffle(facets.begin(), facets.end(), random);
+        const std::uint64_t mesh_bytes = 30 * facets.size();
+        Context enough({.threads = 2, .memory_bytes = 80 * facets.size() - mesh_bytes});
+        EXPECT_EQ(weld(enough, facets).vertices.size(), 90000u);
+        Context small({.threads = 2, .memory_bytes = 4 * facets.size()});
+        EXPECT_THROW(static_cast<void>(weld(small, facets)), Error);
+        EXPECT_EQ(small.memory_charged(), 0u);
     }
 }
 

@@ -4,11 +4,13 @@
 // runs from the down edge to the up edge, and the facet across the up edge continues it: no search, no comparing of
 // coordinates. On closed adjacency this is a permutation of the crossed facets, and its cycles are the loops.
 //
-// Each vertex is ranked among the sorted thresholds, each facet is thereby crossed by one run of planes, and two passes (count,
-// scatter) give every plane the ascending list of its facets. Planes are then walked independently.
+// Each vertex is ranked among the sorted thresholds, each facet is thereby crossed by one run of planes. Those that any plane crosses
+// are listed with their runs, so that a few planes of a large mesh cost little more than one look at it, and two passes over that list
+// (count, scatter) give every plane the ascending list of its facets. Planes are then walked independently.
 #include "kernels/slicing/slicing.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -20,6 +22,7 @@
 #include <utility>
 
 #include "kernels/errors.h"
+#include "kernels/mesh/bulk_memory.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -79,9 +82,9 @@ private:
     double low_ = 0, per_mm_ = 0, last_ = 0;
 };
 
-/// Planes [first, last) of the sorted request that cross a facet.
+/// A facet, and the planes [first, last) of the sorted request that cross it.
 struct Run {
-    std::uint32_t first = 0, last = 0;
+    std::uint32_t facet = 0, first = 0, last = 0;
 };
 
 /// By the corners above the plane (bit i for corner i): the edge along which the facet rises through it, and the edge along
@@ -335,8 +338,7 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
     for (std::size_t i = 0; i < planes.size(); ++i) sections[i].plane = planes[i];
     if (planes.empty() || mesh.facets.empty()) return sections;
     const std::size_t facets = mesh.facets.size(), vertices = mesh.vertices.size();
-    const std::uint64_t listed = std::min<std::uint64_t>(std::max(kBatchCrossings, facets), std::uint64_t{facets} * planes.size());
-    const MemoryCharge charge(context, vertices * sizeof(std::uint32_t) + facets * sizeof(Run) + listed * sizeof(std::uint32_t), "slicing");
+    const MemoryCharge ranks_charge(context, vertices * sizeof(std::uint32_t) + facets / 8, "slicing");
 
     std::vector<std::uint32_t> order(planes.size());
     std::iota(order.begin(), order.end(), 0u);
@@ -349,7 +351,7 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
 
     // A vertex is above the first rank[v] planes of the order, and below the others.
     const Ranking ranking(limits);
-    std::vector<std::uint32_t> rank(vertices);
+    BulkVector<std::uint32_t> rank(vertices);
     parallel_for(context, vertices, kVertexGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
             const Vec3f& p = mesh.vertices[v];
@@ -360,21 +362,47 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
             rank[v] = ranking(p.z);
         }
     });
-    std::vector<Run> runs(facets);
-    parallel_for(context, facets, kFacetGrain, [&](std::size_t begin, std::size_t end) {
+    // First which facets are crossed, and by how many planes in all, a bit for each facet; then their runs, in a list just as long.
+    const std::size_t grain = std::max(kFacetGrain, (facets + kMaxChunks - 1) / kMaxChunks / 64 * 64 + 64), chunks = (facets + grain - 1) / grain;
+    std::vector<std::uint64_t> is_crossed((facets + 63) / 64, 0);
+    std::vector<std::uint64_t> chunk_crossings(chunks, 0);
+    std::vector<std::size_t> chunk_runs(chunks + 1, 0);
+    auto run_of = [&](std::size_t f) {
+        const Index3& facet = mesh.facets[f];
+        const auto [low, high] = std::minmax({rank[facet[0]], rank[facet[1]], rank[facet[2]]});
+        return Run{static_cast<std::uint32_t>(f), low, high};
+    };
+    parallel_for(context, facets, grain, [&](std::size_t begin, std::size_t end) {
+        std::uint64_t crossings = 0;
+        std::size_t count = 0;
         for (std::size_t f = begin; f < end; ++f) {
             const Index3& facet = mesh.facets[f];
             if (facet[0] >= vertices || facet[1] >= vertices || facet[2] >= vertices) {
                 throw Error(ErrorKind::input, "slice.index", "a facet names a vertex that does not exist", "facet " + std::to_string(f));
             }
-            const auto [low, high] = std::minmax({rank[facet[0]], rank[facet[1]], rank[facet[2]]});
-            runs[f] = {low, high};
+            const Run run = run_of(f);
+            crossings += run.last - run.first;
+            count += run.first != run.last;
+            is_crossed[f >> 6] |= std::uint64_t{run.first != run.last} << (f & 63);
         }
+        chunk_crossings[begin / grain] = crossings;
+        chunk_runs[begin / grain + 1] = count;
     });
+    std::partial_sum(chunk_runs.begin(), chunk_runs.end(), chunk_runs.begin());
+    const std::uint64_t crossings = std::accumulate(chunk_crossings.begin(), chunk_crossings.end(), std::uint64_t{0});
+    const std::uint64_t listed = std::min<std::uint64_t>(std::max<std::uint64_t>(kBatchCrossings, chunk_runs.back()), crossings);
+    const MemoryCharge charge(context, chunk_runs.back() * sizeof(Run) + listed * sizeof(std::uint32_t), "slicing");
+    BulkVector<Run> runs(chunk_runs.back());
+    parallel_for(context, chunks, 1, [&](std::size_t chunk, std::size_t) {
+        std::size_t at = chunk_runs[chunk];
+        for (std::size_t word = chunk * grain / 64; word < std::min(is_crossed.size(), (chunk + 1) * grain / 64); ++word)
+            for (std::uint64_t bits = is_crossed[word]; bits != 0; bits &= bits - 1)
+                runs[at++] = run_of(64 * word + static_cast<std::size_t>(std::countr_zero(bits)));
+    });
+    rank = {};
 
-    const std::size_t grain = std::max(kFacetGrain, (facets + kMaxChunks - 1) / kMaxChunks), chunks = (facets + grain - 1) / grain;
     ScratchPool pool(facets);
-    std::vector<std::uint32_t> crossed;
+    BulkVector<std::uint32_t> crossed;
     for (std::size_t window = 0; window < order.size(); window += kBatchPlanes) {
         const std::size_t window_planes = std::min(kBatchPlanes, order.size() - window);
         // slots[chunk * stride + p]: first how many facets of the chunk plane window + p crosses, then where they go.
@@ -383,10 +411,10 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
         auto clip = [&](const Run& run, std::size_t first, std::size_t last) {
             return std::pair(std::max<std::size_t>(run.first, first), std::min<std::size_t>(run.last, last));
         };
-        parallel_for(context, facets, grain, [&](std::size_t begin, std::size_t end) {
-            std::uint64_t* count = slots.data() + begin / grain * stride;
-            for (std::size_t f = begin; f < end; ++f) {
-                const auto [first, last] = clip(runs[f], window, window + window_planes);
+        parallel_for(context, chunks, 1, [&](std::size_t chunk, std::size_t) {
+            std::uint64_t* count = slots.data() + chunk * stride;
+            for (std::size_t i = chunk_runs[chunk]; i < chunk_runs[chunk + 1]; ++i) {
+                const auto [first, last] = clip(runs[i], window, window + window_planes);
                 if (first >= last) continue;
                 ++count[first - window];
                 --count[last - window];  // wraps below zero, and back when summed
@@ -407,11 +435,11 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
                 for (std::size_t c = 0; c < chunks; ++c) at += std::exchange(slots[c * stride + p], at);
             }
             crossed.resize(room);
-            parallel_for(context, facets, grain, [&](std::size_t begin, std::size_t end) {
-                std::uint64_t* slot = slots.data() + begin / grain * stride;
-                for (std::size_t f = begin; f < end; ++f) {
-                    const auto [low, high] = clip(runs[f], window + first, window + last);
-                    for (std::size_t p = low; p < high; ++p) crossed[slot[p - window]++] = static_cast<std::uint32_t>(f);
+            parallel_for(context, chunks, 1, [&](std::size_t chunk, std::size_t) {
+                std::uint64_t* slot = slots.data() + chunk * stride;
+                for (std::size_t r = chunk_runs[chunk]; r < chunk_runs[chunk + 1]; ++r) {
+                    const auto [low, high] = clip(runs[r], window + first, window + last);
+                    for (std::size_t p = low; p < high; ++p) crossed[slot[p - window]++] = runs[r].facet;
                 }
             });
             parallel_for(context, last - first, kPlaneGrain, [&](std::size_t begin, std::size_t end) {
@@ -419,7 +447,8 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
                 for (std::size_t i = begin; i < end; ++i) {
                     context.throw_if_cancelled();
                     const std::size_t p = window + first + i;
-                    cut(mesh, limits[p], std::span(crossed).subspan(starts[i], starts[i + 1] - starts[i]), options, *scratch, sections[order[p]]);
+                    cut(mesh, limits[p], std::span<const std::uint32_t>(crossed).subspan(starts[i], starts[i + 1] - starts[i]), options, *scratch,
+                        sections[order[p]]);
                 }
                 pool.give(std::move(scratch));
             });

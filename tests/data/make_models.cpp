@@ -1,9 +1,10 @@
 // Writes the project's models as binary STL:
 //     make_models all DIRECTORY
-//     make_models metre OUT.stl [--facets N] [--size MM] [--height MM] [--seed S]
+//     make_models metre OUT.stl [--facets N] [--size MM] [--height MM] [--seed S] [--shuffled]
 #include <CLI/CLI.hpp>
 #include <fstream>
 #include <iostream>
+#include <random>
 
 #include "tests/data/luo_layer_sample.h"
 #include "tests/data/models.h"
@@ -24,14 +25,23 @@ void write_all(const std::string& directory) {
     write_file(directory + "/pump-cover.stl", stl_bytes("pump-cover", pump_cover()));
 }
 
-void write_metre(const std::string& path, const MetrePattern& pattern) {
+void write_metre(const std::string& path, const MetrePattern& pattern, bool shuffled) {
     std::ofstream file(path, std::ios::binary);
     const std::string head = stl_head("metre", metre_pattern_facets(pattern));
     file.write(head.data(), static_cast<std::streamsize>(head.size()));
-    metre_pattern(pattern, [&](const Facet& facet) {
-        const auto record = stl_facet(facet);
-        file.write(record.data(), record.size());
-    });
+    if (shuffled) {
+        std::vector<std::array<char, 50>> records;
+        records.reserve(metre_pattern_facets(pattern));
+        metre_pattern(pattern, [&](const Facet& facet) { records.push_back(stl_facet(facet)); });
+        std::mt19937_64 random(pattern.seed);
+        for (std::size_t i = records.size(); i > 1; --i) std::swap(records[i - 1], records[random() % i]);
+        file.write(records.front().data(), static_cast<std::streamsize>(records.size() * sizeof records[0]));
+    } else {
+        metre_pattern(pattern, [&](const Facet& facet) {
+            const auto record = stl_facet(facet);
+            file.write(record.data(), record.size());
+        });
+    }
     if (!file.flush()) throw std::runtime_error(path + ": cannot be written");
     std::cout << path << ": " << metre_pattern_facets(pattern) << " facets\n";
 }
@@ -44,6 +54,7 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     std::string out;
     MetrePattern pattern;
+    bool shuffled = false;
     CLI::App* all = app.add_subcommand("all", "the four models of tests/data");
     all->add_option("directory", out)->required();
     CLI::App* metre = app.add_subcommand("metre", "a pattern of any size and number of facets");
@@ -52,10 +63,11 @@ int main(int argc, char** argv) {
     metre->add_option("--size", pattern.size_mm, "side of the square, mm");
     metre->add_option("--height", pattern.height_mm, "mm");
     metre->add_option("--seed", pattern.seed, "chooses the features");
+    metre->add_flag("--shuffled", shuffled, "facets in random order");
     try {
         app.parse(argc, argv);
         if (*all) write_all(out);
-        if (*metre) write_metre(out, pattern);
+        if (*metre) write_metre(out, pattern, shuffled);
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? 0 : 2;
     } catch (const std::exception& error) {
