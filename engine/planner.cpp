@@ -26,11 +26,15 @@
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
 #include "kernels/parallel/parallel.h"
+#include "kernels/parallel/progress_part.h"
 #include "kernels/slicing/slicing.h"
 
 namespace slabwright {
 
 namespace {
+
+constexpr double kSlabShare = 0.05;      // of a slab's area, against the surface cut in it: what a layer's work is estimated by
+constexpr double kSelectionShare = 0.3;  // of a layer's work, where its tools are chosen
 
 Error refuse(const char* code, std::string message, std::string place, std::string remedy) {
     return Error(ErrorKind::no_plan, code, std::move(message), std::move(place), std::move(remedy));
@@ -149,6 +153,41 @@ struct ProgressShare {
     [[nodiscard]] double at(double part) const { return from + part * (to - from); }
 };
 
+/// What of the pattern a layer's work meets.
+struct LayerShare {
+    std::uint64_t facets = 0;  ///< within reach of its cutters
+    double area_mm2 = 0;       ///< of the surface that is cut in it
+};
+
+// @param layers ascending; @param overrun how far below its bottom a layer's cutters may reach, mm
+std::vector<LayerShare> shares_of_layers(Context& context, MeshView mesh, std::span<const Layer> layers, double overrun) {
+    return parallel_reduce(
+        context, mesh.facets.size(), std::size_t{1} << 16, std::vector<LayerShare>(layers.size()),
+        [&](std::size_t begin, std::size_t end) {
+            std::vector<LayerShare> shares(layers.size());
+            for (std::size_t f = begin; f < end; ++f) {
+                const Vec3f &a = mesh.vertices[mesh.facets[f][0]], &b = mesh.vertices[mesh.facets[f][1]], &c = mesh.vertices[mesh.facets[f][2]];
+                const double low = std::min({a.z, b.z, c.z}), high = std::max({a.z, b.z, c.z});
+                const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z, vx = double{c.x} - a.x, vy = double{c.y} - a.y,
+                             vz = double{c.z} - a.z;
+                const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+                const double area = nz < 0 ? 0 : std::sqrt(nx * nx + ny * ny + nz * nz) / 2;
+                auto layer = std::partition_point(layers.begin(), layers.end(), [&](const Layer& l) { return l.z_top <= low; });
+                for (; layer != layers.end() && layer->z_bottom - overrun < high; ++layer) {
+                    LayerShare& share = shares[static_cast<std::size_t>(layer - layers.begin())];
+                    ++share.facets;
+                    const double within = std::min(high, layer->z_top) - std::max(low, layer->z_bottom);
+                    if (within >= 0) share.area_mm2 += high > low ? area * within / (high - low) : area;
+                }
+            }
+            return shares;
+        },
+        [](std::vector<LayerShare> a, const std::vector<LayerShare>& b) {
+            for (std::size_t i = 0; i < a.size(); ++i) a[i].facets += b[i].facets, a[i].area_mm2 += b[i].area_mm2;
+            return a;
+        });
+}
+
 // From layers on. `ground` is a plan with its stock and features.
 Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const LayerRequest& request, const LayerPlacement& placement,
                  ProgressShare share) {
@@ -213,7 +252,6 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
 
     // A gap in the mesh shows as an open chain; sections at every boundary and feature would miss one in between, so the
     // loader has refused all open edges but those in the base plane already. What is left here is proof by section.
-    context.begin_phase("paths", share.at(0), share.at(0.95), plan.layers.size());
     const LayerTools fixed = fixed_tools(job);
     double overrun = fixed.finish.diameter / 2;
     const bool selecting = selects_tools(job);
@@ -227,15 +265,9 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
                                                          : std::min(overrun, job.machine.base_board_thickness);
     // What the layers in work hold at once: their facets with an index of them, and the moves of all layers, of which a
     // raster over the whole stock has about three a square millimetre.
+    const std::vector<LayerShare> shares = shares_of_layers(context, view, plan.layers, overrun);
     std::vector<std::uint64_t> reach;
-    for (const Layer& layer : plan.layers) {
-        std::uint64_t count = 0;
-        for (const Index3& f : mesh.facets) {
-            const auto [low, high] = std::minmax({mesh.vertices[f[0]].z, mesh.vertices[f[1]].z, mesh.vertices[f[2]].z});
-            count += low < layer.z_top && high > layer.z_bottom - overrun;
-        }
-        reach.push_back(count);
-    }
+    for (const LayerShare& s : shares) reach.push_back(s.facets);
     std::sort(reach.begin(), reach.end(), std::greater<>());
     const std::uint64_t held =
         std::accumulate(reach.begin(), reach.begin() + std::min<std::ptrdiff_t>(std::ssize(reach), context.threads()), std::uint64_t{0});
@@ -250,10 +282,15 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
     std::vector<Loops> carried;
     for (std::size_t i = 0; i < plan.layers.size(); ++i)
         carried.push_back(plan.flask ? unite(sections[i].loops, flask_frame(*plan.flask, i)) : std::move(sections[i].loops));
+    // A layer's work grows with the surface that is cut in it, and with the slab that is faced and roughed.
+    std::vector<std::uint64_t> steps;
+    for (const LayerShare& s : shares) steps.push_back(static_cast<std::uint64_t>(std::ceil(s.area_mm2 + kSlabShare * plane)));
+    context.begin_phase("paths", share.at(0), share.at(0.98), std::accumulate(steps.begin(), steps.end(), std::uint64_t{0}));
     std::vector<LayerCuts> cuts(plan.layers.size());
     std::vector<std::vector<Diagnostic>> found_in(plan.layers.size());
     parallel_each(context, plan.layers.size(), [&](std::size_t i) {
         const Layer& layer = plan.layers[i];
+        ProgressPart progress(context, steps[i]);
         LayerJob work;
         work.mesh = view;
         work.job = &plan.job;
@@ -280,6 +317,8 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
             selection = std::move(choice.record);
         }
         if (!selecting || job.selection.compare) sets.emplace_back("fixed", fixed);
+        const double chosen_at = selecting ? kSelectionShare : 0;
+        progress.reach(chosen_at);
         std::optional<OverhangMap> overhang;
         const Loops* const regions[] = {&carried[i]};
         if (i > 0) overhang = overhang_map(regions, plan.stock_min, plan.stock_max);
@@ -293,7 +332,11 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
             for (const Feature& f : plan.features)
                 if (f.type == FeatureType::up_flat && f.area >= job.cutting.min_flat_area && f.z_low < layer.z_top && f.z_low > work.floor_below)
                     work.feet.push_back(&f);
+            const double step = (1 - chosen_at) / static_cast<double>(sets.size()), at = chosen_at + step * static_cast<double>(s);
+            ProgressPart part(progress, at, at + step);
+            work.progress = &part;
             Trial trial = plan_layer(context, plan, layer, work, overhang ? &*overhang : nullptr);
+            part.reach(1);
             if (selection) selection->sets.push_back({sets[s].first, tools_in_order(trial.layer), trial.minutes, false});
             if (!best || trial.minutes < best->minutes) best = std::move(trial), chosen = s;
         }
@@ -302,7 +345,7 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
         plan.layers[i].selection = std::move(selection);
         found_in[i] = std::move(best->diagnostics);
         cuts[i] = std::move(best->cuts);
-        context.advance();
+        progress.reach(1);
     });
     if (job.cutting.engagement == Engagement::simulated) {
         const std::vector<std::vector<Diagnostic>> rated = rate_layers(context, plan, cuts);
@@ -333,7 +376,7 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
     if (operations == 0) throw refuse("plan.empty", "nothing would be cut", plan.input.file, "check the units and the slabs");
     check_travel(plan);
 
-    context.begin_phase("schedule", share.at(0.95), share.at(1));
+    context.begin_phase("schedule", share.at(0.98), share.at(1));
     for (std::size_t i = 0; i < plan.layers.size(); ++i) bond_layer(plan.layers[i], carried[i], plan, plan.diagnostics);
     schedule(plan);
     if (plan.totals.stack_mass_kg > job.machine.build_mass_kg)
@@ -425,7 +468,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     place_stock(plan, box);
 
     const MemoryCharge mesh_memory(context, mesh.vertices.size() * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3), "the mesh");
-    context.begin_phase("features", 0.10, 0.20);
+    context.begin_phase("features", 0.02, 0.03);
     const FeatureOptions options = feature_options(job);
     FeatureSet found = find_features(context, view, options);
     plan.features = std::move(found.features);
@@ -434,7 +477,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
                                     fmt::format("only the {} finder sees a {} at {:.3f} mm", name(d.found_by), name(d.type), d.z),
                                     std::array{d.x, d.y, d.z}});
 
-    context.begin_phase("layers", 0.20, 0.25);
+    context.begin_phase("layers", 0.03, 0.04);
     LayerRequest request;
     request.height = height;
     request.max_layer = max_layer_thickness(job);
@@ -449,9 +492,9 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     request.features = plan.features;
     request.section_area = SectionAreas(context, view);
     if (job.layers.strategy == LayerStrategy::combined)
-        return fastest_plan(context, mesh, plan, request, combined_layers(context, view, plan, request), {0.25, 0.95});
+        return fastest_plan(context, mesh, plan, request, combined_layers(context, view, plan, request), {0.04, 0.98});
     return plan_layers(context, mesh, plan, request,
-                       job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request), {0.25, 0.95});
+                       job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request), {0.04, 0.98});
 }
 
 }  // namespace slabwright

@@ -121,7 +121,7 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out) {
     std::vector<PlannedProgram> programs;
     for (const Layer& layer : plan.layers)
         for (const Operation& operation : layer.operations) programs.push_back({&layer, &operation});
-    context.begin_phase("writing", 0.95, 1.0, programs.size() + 1);
+    context.begin_phase("writing", 0.98, 1.0, programs.size() + 1);
     std::filesystem::create_directory(out.path("nc"));
     const auto write_whole = [&](const char* name, const std::string& text) {
         OutputFile file(out.path(name));
@@ -185,8 +185,9 @@ VerifyResult write_verified(Context& context, const Plan& plan, const std::strin
         VerifyOptions options;
         options.stl = stl_path;
         options.cell = cell_mm;
-        context.share_progress(0.5, 1);
+        context.share_progress(kPlanningShare, kVerifyingShare);
         VerifyResult result = verdict(verify_folder(context, out.path("").string(), options));
+        context.share_progress(kVerifyingShare, 1);
         if (reports_are_built()) write_report(context, out.path("").string(), {stl_path});
         context.throw_if_cancelled();
         out.commit();

@@ -47,6 +47,10 @@ SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string&
 SLABWRIGHT_API void report(Context& context, const std::string& directory, const std::string& stl_path = {}, bool three_d = true,
                            double size_limit_mb = 10);
 
+/// Of the time that plan() and write_verified() take together, usually: planning is done at the first, verifying at the second. A caller
+/// that shows progress begins with `context.share_progress(0, kPlanningShare)`; write_verified() goes on from there.
+inline constexpr double kPlanningShare = 0.62, kVerifyingShare = 0.93;
+
 /// What the simulation of a folder's programs found.
 struct VerifyResult {
     bool passed = false;

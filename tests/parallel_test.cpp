@@ -1,6 +1,7 @@
 // kernels/parallel: the same results as serial code on any number of threads, and the promises on errors, cancel,
 // memory and progress.
 #include "kernels/parallel/parallel.h"
+#include "kernels/parallel/progress_part.h"
 
 #include <gtest/gtest.h>
 
@@ -236,6 +237,29 @@ TEST(Parallel, ProgressNeverFallsAndStaysInItsPhase) {
         EXPECT_EQ(phases.back(), "two");
         EXPECT_DOUBLE_EQ(fractions.back(), 1.0);
     }
+}
+
+TEST(Parallel, PartsOfAPhaseTellAllTheirStepsOnce) {
+    std::vector<double> fractions;
+    Context context({.threads = 2, .progress = [&](const Progress& progress) { fractions.push_back(progress.fraction); }});
+    context.begin_phase("work", 0.0, 1.0, 300);
+    {
+        ProgressPart whole(context, 100), first(whole, 0, 0.4), second(whole, 0.4, 1);
+        first.reach(0.5);
+        EXPECT_NEAR(fractions.back(), 20 / 300.0, 1e-12);
+        first.reach(1);
+        EXPECT_NEAR(fractions.back(), 40 / 300.0, 1e-12);
+        second.reach(0.1);
+        first.reach(0.7);  // has been told
+        EXPECT_NEAR(fractions.back(), 46 / 300.0, 1e-12);
+        second.reach(7);
+        EXPECT_NEAR(fractions.back(), 100 / 300.0, 1e-12);
+    }
+    parallel_each(context, 2, [&](std::size_t) {
+        ProgressPart part(context, 100);
+        for (int i = 0; i <= 1000; ++i) part.reach(i / 1000.0);
+    });
+    EXPECT_DOUBLE_EQ(fractions.back(), 1.0);
 }
 
 TEST(Parallel, ThreadsAreAsAskedFor) {

@@ -192,6 +192,30 @@ TEST(Planner, NoProgramTouchesTheOwnModels) {
 }
 
 // Totals know the wood: half a sphere of 50 mm, whose vertices lie on the sphere.
+// Whoever waits sees it move: within the layers too, from the beginning of planning to the end of the report.
+TEST(Planner, ProgressIsToldAllTheWay) {
+    std::vector<std::pair<std::string, double>> told;
+    Context context({.progress = [&](const Progress& p) { told.emplace_back(p.phase, p.fraction); }});
+    context.share_progress(0, kPlanningShare);
+    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+    const Plan result = plan(context, stl, Job{});
+    ASSERT_FALSE(told.empty());
+    EXPECT_LE(told.back().second, kPlanningShare + 1e-9);
+    const support::TemporaryFolder folder;
+    (void)write_verified(context, result, folder / "out", stl);
+    double before = 0, widest = 0;
+    std::size_t in_paths = 0;
+    for (const auto& [phase, fraction] : told) {
+        EXPECT_GE(fraction, before);
+        widest = std::max(widest, fraction - before);
+        in_paths += phase == "paths";
+        before = fraction;
+    }
+    EXPECT_DOUBLE_EQ(before, 1);
+    EXPECT_GT(in_paths, 5 * result.layers.size());
+    EXPECT_LT(widest, 0.2);
+}
+
 TEST(Planner, TotalsHoldThePartsVolume) {
     Context context;
     const Plan result = plan(context, SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl", Job{});

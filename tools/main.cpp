@@ -238,7 +238,7 @@ bool run_plan(const Options& options) {
     require_replaceable(options.out);  // before an hour of planning, not after it
     bool passed = true;
     with_context(options, [&](Context& context) {
-        if (!options.no_verify) context.share_progress(0, 0.5);
+        if (!options.no_verify) context.share_progress(0, kPlanningShare);
         const Plan result = plan(context, options.stl, job);
         if (options.no_verify) {
             write(context, result, options.out, options.stl);

@@ -138,6 +138,9 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     // What stands once the slab has been faced; every operation after that cuts its moves into it.
     Standing standing(layer.stock_min, layer.stock_max, std::min(cut.stock_top, layer.z_top));
     cut.standing = &standing;
+    const auto reached = [&](double share) {
+        if (layer.progress) layer.progress->reach(kPathsShare * share);
+    };
 
     LayerResult result;
     auto take = [&](Operation&& operation) {
@@ -145,15 +148,21 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         context.throw_if_cancelled();
     };
     take(face_layer(cut));
+    reached(0.01);
     take(rough_layer(cut));
+    reached(0.16);
     take(finish_floors(cut));
     take(finish_walls(cut));
+    reached(0.18);
     auto finish = [&](auto&& done) {
-        for (Operation op :
-             {finish_levels(cut, result.diagnostics),
-              cut.job.cutting.projection == Projection::offset ? finish_offsets(cut, result.diagnostics) : finish_raster(cut, result.diagnostics)}) {
-            done(op);
-            take(std::move(op));
+        Operation levels = finish_levels(cut, result.diagnostics);
+        reached(0.65);
+        Operation projected =
+            cut.job.cutting.projection == Projection::offset ? finish_offsets(cut, result.diagnostics) : finish_raster(cut, result.diagnostics);
+        reached(0.86);
+        for (Operation* op : {&levels, &projected}) {
+            done(*op);
+            take(std::move(*op));
         }
     };
     if (cut.job.cutting.uniform_steps) {
@@ -176,6 +185,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() && stock.area_over(1.0) > kWasteWorthAChange)
                 take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste beside the roughing cutter", 1.0, true}));
         take(cut_rest(cut, stock, tools.finish, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
+        reached(0.34);
         finish([&](Operation& op) {
             if (stock.cut(cut, op, tools.finish).few()) op.moves.clear();
         });
@@ -184,6 +194,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         const bool smaller = std::any_of(tools.rest.begin(), tools.rest.end(), [](const Tool& t) { return t.kind == ToolKind::flat; });
         if (!smaller) take(cut_rest(cut, stock, tools.rough, {OperationKind::corner, "corners", limit, false}));
         take(cut_rest(cut, stock, tools.finish, {OperationKind::finish, "what is left", limit, false}));
+        reached(0.97);
         for (const Tool& tool : tools.rest) {
             if (!last_of_kind(tool) && stock.area_over(limit) < kCornersWorthAChange) continue;
             take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste in narrow places", 1.0, true}));
@@ -196,10 +207,12 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
                                       fmt::format("layer {}: {} cut{} left to a tool that plunges: no room for a helix or a ramp", layer.index,
                                                   cut.no_way_in.size(), cut.no_way_in.size() == 1 ? "" : "s"),
                                       cut.no_way_in.front()});
+    reached(0.98);
     report_loose(cut, result);
     // Last, so that everything before has straight moves only to think of.
     const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};
     for (Operation& op : result.operations) fit_arcs(op.moves, fit);
+    reached(1);
     return result;
 }
 

@@ -5,8 +5,12 @@
 #include "engine/tools/tools.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
+#include "kernels/parallel/progress_part.h"
 
 namespace slabwright {
+
+/// Of a layer's time, its paths; the forces that follow take the rest.
+inline constexpr double kPathsShare = 0.92;
 
 /// A layer's work is a value in and a value out.
 struct LayerJob {
@@ -19,6 +23,7 @@ struct LayerJob {
     LayerTools tools;
     Loops opening;                      ///< of the flask in this layer; empty: no flask
     std::vector<const Feature*> flats;  ///< up-facing flats of at least cutting.min_flat_area strictly between z_bottom and z_top
+    ProgressPart* progress = nullptr;   ///< told how far the paths are, up to kPathsShare; the rest is the caller's
     std::vector<const Feature*> feet;   ///< up-facing flats on which walls of this layer may stand: `flats` and those just below
 };
 

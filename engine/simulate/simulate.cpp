@@ -128,7 +128,7 @@ public:
         place_flasks();
         check_stack(report);
         prepare(report);
-        context_.begin_phase("checking moves", 0.1, 0.4, input_.programs.size());
+        context_.begin_phase("checking moves", 0.02, 0.35, input_.programs.size());
         check_motions(report);
         cut(report);
         judge(report);
@@ -303,7 +303,7 @@ private:
                 l.kinds.assign(l.map.size(), CellKind::beside);
             }
         std::vector<TileResult> results(tiles);
-        context_.begin_phase("cutting stock", 0.4, 1.0, tiles);
+        context_.begin_phase("cutting stock", 0.35, 1.0, tiles);
         parallel_each(context_, tiles, [&](std::size_t t) {
             const int i0 = static_cast<int>(t % static_cast<std::size_t>(tx)) * kTileCells,
                       j0 = static_cast<int>(t / static_cast<std::size_t>(tx)) * kTileCells;
