@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -135,6 +136,23 @@ Measures right_angled(double area, double length, std::vector<double> convex, st
     return {area, length};
 }
 
+/// Any outline with its corners {x, y, radius} rounded, counter-clockwise: at a corner that turns by φ the rounding takes (tan φ/2 − φ/2)·r²
+/// off the area, or adds it where φ is negative, and shortens the outline by 2·|tan φ/2 − φ/2|·r.
+Measures rounded(const std::vector<std::array<double, 3>>& corners) {
+    Measures m;
+    const std::size_t n = corners.size();
+    for (std::size_t i = 0; i < n; ++i) {
+        const auto &a = corners[(i + n - 1) % n], &b = corners[i], &c = corners[(i + 1) % n];
+        const double ux = b[0] - a[0], uy = b[1] - a[1], vx = c[0] - b[0], vy = c[1] - b[1];
+        m.area += (b[0] * c[1] - c[0] * b[1]) / 2;
+        m.length += std::hypot(vx, vy);
+        const double half = std::atan2(ux * vy - uy * vx, ux * vx + uy * vy) / 2, less = std::tan(half) - half;
+        m.area -= less * b[2] * b[2];
+        m.length -= 2 * std::abs(less) * b[2];
+    }
+    return m;
+}
+
 TEST(Models, LuoLayerSampleIsClosedAndOverhangsOnlyAtItsFlat) {
     const std::vector<Facet> facets = luo_layer_sample();
     expect_pattern(facets, {1.2 * kInch});
@@ -163,10 +181,18 @@ TEST(Models, LuoToolSampleHasTheVolumeOfItsDrawing) {
     const Measures letter_c = right_angled(2.8 * 4.7 - 1.7 * .72, 2 * (2.8 + 4.7) + 2 * 1.7, {.3, .3, .3, .3, .3, .3}, {.15, .15});
     const Measures island{1.4 * 1.6 + kPi * .8 * .8, 2 * 1.4 + 2 * kPi * .8};
     const Measures boss{kPi * .8 * .8, 2 * kPi * .8};
-    // The slot widens upwards from its floor, .238 in wide: the same formula with an outward draft.
-    const Measures slot{1.0 * .238 + kPi * .119 * .119, 2 * 1.0 + 2 * kPi * .119};
+    // The slot from its rim downwards: .238 in wide on its floor, and .170 at the narrow end.
+    const double widened = .3 * std::tan(3 * kPi / 180), wide = .119 + widened, narrow = .085 + widened;
+    const Measures slot = rounded({{2.75, -wide, wide},
+                                   {3.85, -wide, .15},
+                                   {4.0, -narrow, .15},
+                                   {4.62, -narrow, narrow},
+                                   {4.62, narrow, narrow},
+                                   {4.0, narrow, .15},
+                                   {3.85, wide, .15},
+                                   {2.75, wide, wide}});
     const double exact = plate.drafted_volume(.75, 0) + letter_h.drafted_volume(.75, 3) + island.drafted_volume(1.25, 2) +
-                         boss.drafted_volume(.75, 0) + letter_c.drafted_volume(.5, 3) - slot.drafted_volume(.3, -3);
+                         boss.drafted_volume(.75, 0) + letter_c.drafted_volume(.5, 3) - slot.drafted_volume(.3, 3);
     EXPECT_NEAR(volume(facets) / (kInch * kInch * kInch), exact, 1e-3 * exact);
     expect_committed("luo-tool-sample", facets);
 }
@@ -228,8 +254,8 @@ TEST(Models, LuoToolSampleForcesTheToolsOfThePaper) {
         EXPECT_LT(share(z, .5), threshold) << z;
         EXPECT_GT(share(z, .25), threshold) << z;
     }
-    // At the foot of the slot only .125 in enters.
-    for (const double z : {1.71, 1.75}) {
+    // From the foot of the slot to its rim .125 in is the largest, by the narrow end alone higher up.
+    for (const double z : {1.71, 1.75, 1.81, 1.85, 1.95, 1.999}) {
         EXPECT_LT(share(z, .25), threshold) << z;
         EXPECT_GT(share(z, .125), threshold) << z;
     }

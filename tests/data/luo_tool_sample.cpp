@@ -5,8 +5,9 @@
 //   layer 2, .75 to 1.50   an H drafted by 3°, an island drafted by 2°, a vertical boss. The H has four concave corners of radius .15
 //                          to .19: the .25 in tool fits them, the .50 in does not, and the notches are .60 to .68 wide: the .50 in
 //                          tool can rough them, the .75 in cannot.
-//   layer 3, 1.50 to 2.00  a C drafted by 3°, with two such corners, and a blind slot from 1.70 up, .238 to .269 wide: a .25 in tool does
-//                          not come to its floor, so AR asks for the .125 in, as LUO table 6.3 has it from 1.70 on. Its upper part is
+//   layer 3, 1.50 to 2.00  a C drafted by 3°, with two such corners, and a blind slot from 1.70 up, so that .125 in is the largest finish tool at
+//                          every height from there to the top, as LUO table 6.3 has it, and .25 in below. The slot is narrow at one end, .170 to
+//                          .201 wide: no .25 in tool enters. At the other it is .238 to .269 wide: there its upper part is
 //                          wider than two swaths of .125, and narrower than a .25 in flat with .3 mm kept off either wall, so only
 //                          the .125 in flat end mill roughs it with AS = 0. As a semi-roughing tool it keeps that allowance too, so its
 //                          swaths do meet in the slot: then the .50 in may rough, and for it and no wider one the C is open (.72).
@@ -56,8 +57,16 @@ std::vector<Facet> luo_tool_sample() {
                                      {2.3, 5.6, 0.3}});
     const Outline island = stadium(7.4 * kInch, 1.4 * kInch, 7.4 * kInch, 2.8 * kInch, 0.8 * kInch, kChord);
     const Outline boss = circle(7.4 * kInch, 5.0 * kInch, 0.8 * kInch, kChord);
-    const double slot_rim = 0.119 * kInch + (drafted_pocket(z3, slot_floor, 3, 0, kChord).back().offset) * -1;
-    const Outline slot = stadium(3.2 * kInch, 4.6 * kInch, 4.2 * kInch, 4.6 * kInch, slot_rim, kChord);
+    const double widened = drafted_pocket(z3, slot_floor, 3, 0, kChord).back().offset * -1 / kInch;  // on either side, from floor to rim
+    const double wide = 0.119 + widened, narrow = 0.085 + widened;
+    const Outline slot = inches({{2.75, 4.6 - wide, wide},
+                                 {3.85, 4.6 - wide, 0.15},
+                                 {4.0, 4.6 - narrow, 0.15},
+                                 {4.62, 4.6 - narrow, narrow},
+                                 {4.62, 4.6 + narrow, narrow},
+                                 {4.0, 4.6 + narrow, 0.15},
+                                 {3.85, 4.6 + wide, 0.15},
+                                 {2.75, 4.6 + wide, wide}});
 
     std::vector<Facet> facets;
     const Profile plate_wall{{0, 0}, {0, z1}};
