@@ -54,20 +54,40 @@ void validate_tool(const Tool& tool, std::size_t position) {
     require(key("strength_mpa"), tool.strength_mpa, 0, 1e5);
 }
 
+// A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the bottom.
+bool reaches_down(const Tool& tool) { return tool.kind == ToolKind::flat || tool.kind == ToolKind::ball; }
+
 }  // namespace
+
+double max_layer_of(const Job& job, const Tool& tool) {
+    // To touch a wall of slope a at the layer's bottom, a ball's tip passes it by R(1 - cos a); walls steeper than
+    // the vertical limit go to the flat end mill, which stops at the bottom.
+    const double steepest = job.cutting.vertical_deg * std::numbers::pi / 180;
+    const double overrun = tool.kind == ToolKind::ball ? tool.diameter / 2 * (1 - std::cos(steepest)) : 0.0;
+    return tool.flute_length - overrun - job.cutting.holder_clearance;
+}
 
 double max_bonded_layer_thickness(const Job& job) {
     double thickness = 1e6;
-    for (const Tool& tool : job.tools) {
-        // A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the bottom.
-        if (tool.kind != ToolKind::flat && tool.kind != ToolKind::ball) continue;
-        // To touch a wall of slope a at the layer's bottom, a ball's tip passes it by R(1 - cos a); walls steeper than
-        // the vertical limit go to the flat end mill, which stops at the bottom.
-        const double steepest = job.cutting.vertical_deg * std::numbers::pi / 180;
-        const double overrun = tool.kind == ToolKind::ball ? tool.diameter / 2 * (1 - std::cos(steepest)) : 0.0;
-        thickness = std::min(thickness, tool.flute_length - overrun - job.cutting.holder_clearance);
-    }
+    for (const Tool& tool : job.tools)
+        if (reaches_down(tool)) thickness = std::min(thickness, max_layer_of(job, tool));
     return thickness;
+}
+
+double max_layer_of_longest(const Job& job) {
+    double flat = 0, ball = 0;
+    for (const Tool& tool : job.tools) {
+        if (tool.kind == ToolKind::flat) flat = std::max(flat, max_layer_of(job, tool));
+        if (tool.kind == ToolKind::ball) ball = std::max(ball, max_layer_of(job, tool));
+    }
+    return std::min(flat, ball);
+}
+
+Job with_tools_for(const Job& job, double height) {
+    Job fitted = job;
+    constexpr double same = 1e-3;  // mm; layers keep to their limits within less
+    std::erase_if(fitted.tools, [&](const Tool& tool) { return reaches_down(tool) && max_layer_of(job, tool) < height - same; });
+    return fitted;
 }
 
 double max_layer_thickness(const Job& job) {

@@ -194,6 +194,15 @@ struct Job {
 /// The same where slabs may be bonded into one: the slabs' thickness is no limit then, but the flutes are.
 [[nodiscard]] double max_bonded_layer_thickness(const Job& job);
 
+/// The tallest layer that one flat or ball end mill makes: its flutes less overrun and holder clearance.
+[[nodiscard]] double max_layer_of(const Job& job, const Tool& tool);
+
+/// The tallest layer for which the job has a flat and a ball end mill that make it, whatever its others do.
+[[nodiscard]] double max_layer_of_longest(const Job& job);
+
+/// The job without those flat and ball end mills that do not make a layer of this height.
+[[nodiscard]] Job with_tools_for(const Job& job, double height);
+
 /// The narrowest flask.gap in which every flat and ball end mill of the job passes between pattern and flask: the widest
 /// cutter, what roughing leaves on the pattern's walls, and room for leads.
 [[nodiscard]] double least_flask_gap(const Job& job);

@@ -12,9 +12,8 @@
 #include "engine/flask/flask.h"
 #include "engine/forces/feeds.h"
 #include "engine/forces/min_material.h"
-#include "engine/layers/combined.h"
+#include "engine/layers/candidates.h"
 #include "engine/layers/layers.h"
-#include "engine/layers/tool_map.h"
 #include "engine/paths/paths.h"
 #include "engine/paths/standing.h"
 #include "engine/schedule/motion_time.h"
@@ -291,9 +290,11 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
     parallel_each(context, plan.layers.size(), [&](std::size_t i) {
         const Layer& layer = plan.layers[i];
         ProgressPart progress(context, steps[i]);
+        // A layer may be taller than the shortest tools make; the others make it then.
+        const Job fitted = with_tools_for(plan.job, layer.z_top - layer.z_bottom);
         LayerJob work;
         work.mesh = view;
-        work.job = &plan.job;
+        work.job = &fitted;
         work.z_bottom = layer.z_bottom;
         work.z_top = layer.z_top;
         work.slab_thickness = layer.slab_thickness;
@@ -311,12 +312,12 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
         if (selecting) {
             ToolChoice choice = select_tools(context, work, reach_ratio(context, work, scene ? &*scene : nullptr));
             // One narrow place may have decided for the whole layer: the next wider finish tool, with smaller ones in that place only.
-            if (const auto wider = next_wider_ball(job, choice.tools.finish); wider && job.selection.compare && !choice.record.vertical)
+            if (const auto wider = next_wider_ball(fitted, choice.tools.finish); wider && job.selection.compare && !choice.record.vertical)
                 sets.emplace_back("wider", select_tools(context, work, {}, wider).tools);
             sets.emplace(sets.begin(), "selected", std::move(choice.tools));
             selection = std::move(choice.record);
         }
-        if (!selecting || job.selection.compare) sets.emplace_back("fixed", fixed);
+        if (!selecting || job.selection.compare) sets.emplace_back("fixed", fixed_tools(fitted));
         const double chosen_at = selecting ? kSelectionShare : 0;
         progress.reach(chosen_at);
         std::optional<OverhangMap> overhang;
@@ -387,50 +388,13 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
     return plan;
 }
 
-/// A placement that `combined` tries.
-struct TriedLayers {
-    const char* name;
-    double max_layer = 0;  ///< what the placement kept to
-    LayerPlacement placement;
-};
-
-bool same_tops(const LayerPlacement& a, const LayerPlacement& b) {
-    return std::equal(a.boundaries.begin(), a.boundaries.end(), b.boundaries.begin(), b.boundaries.end(),
-                      [](const Boundary& x, const Boundary& y) { return std::abs(x.z - y.z) < kSameHeight; });
-}
-
-// Slabs bonded to any thickness let layers be as tall as the tools reach: with one tool everywhere, and with those of the tool map. Beside
-// them stand what the other strategies give, so that none of these is ever faster.
-std::vector<TriedLayers> combined_layers(Context& context, MeshView view, const Plan& ground, const LayerRequest& request) {
-    std::vector<TriedLayers> tried;
-    tried.push_back({"optimal", request.max_layer, place_layers_optimal(request)});
-    const LayerCost& usual = tried[0].placement.cost;
-    const auto add = [&](const char* name, double max_layer, LayerPlacement placement, bool any) {
-        // A layer that breaks more features than it needs to is no gain, however fast it is made.
-        if (!any && (placement.cost.broken_type2 > usual.broken_type2 || placement.cost.broken_type1 > usual.broken_type1 ||
-                     placement.cost.thin_layers > usual.thin_layers))
-            return;
-        for (const TriedLayers& t : tried)
-            if (same_tops(t.placement, placement)) return;
-        tried.push_back({name, max_layer, std::move(placement)});
-    };
-    add("printed", request.max_layer, place_layers_printed(request), true);
-    LayerRequest bonded = request;
-    bonded.max_layer = max_bonded_layer_thickness(ground.job);
-    add("bonded slabs", bonded.max_layer, place_layers_optimal(bonded), false);
-    const ToolMap map = tool_map(context, view, ground.job, ground.features);
-    const std::vector<ToolSlice> layers = join_slices(map.slices, map.allowed_mm, request.min_layer);
-    add("layers by tools", bonded.max_layer, place_layers_by_tools(bonded, layers, map.allowed_mm), false);
-    return tried;
-}
-
 // Every placement planned whole; the one that is built in the least time stays.
-Plan fastest_plan(Context& context, const Mesh& mesh, const Plan& ground, const LayerRequest& request, std::vector<TriedLayers> tried,
+Plan fastest_plan(Context& context, const Mesh& mesh, const Plan& ground, const LayerRequest& request, const std::vector<LayerCandidate>& tried,
                   ProgressShare share) {
     std::optional<Plan> best;
     std::exception_ptr refused;  // the first
     std::string words;
-    const char* name = "";
+    std::string name;
     for (std::size_t i = 0; i < tried.size(); ++i) {
         const double step = 1.0 / static_cast<double>(tried.size()), at = static_cast<double>(i) * step;
         LayerRequest asked = request;
@@ -492,7 +456,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     request.features = plan.features;
     request.section_area = SectionAreas(context, view);
     if (job.layers.strategy == LayerStrategy::combined)
-        return fastest_plan(context, mesh, plan, request, combined_layers(context, view, plan, request), {0.04, 0.98});
+        return fastest_plan(context, mesh, plan, request, layer_candidates(context, view, job, request), {0.04, 0.98});
     return plan_layers(context, mesh, plan, request,
                        job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request), {0.04, 0.98});
 }

@@ -267,6 +267,24 @@ TEST(Job, TallestLayerIsTheLeastOfSlabAndTools) {
     EXPECT_DOUBLE_EQ(max_layer_thickness(job), 30) << "a face mill works on top only";
 }
 
+TEST(Job, ALayerTallerThanSomeToolsIsLeftToTheOthers) {
+    Job job;
+    job.tools.push_back(job.tools[1]), job.tools.back().number = 4, job.tools.back().flute_length = 45;  // a longer flat
+    EXPECT_DOUBLE_EQ(max_layer_of(job, job.tools[1]), 30);
+    EXPECT_DOUBLE_EQ(max_layer_of(job, job.tools[3]), 43);
+    EXPECT_DOUBLE_EQ(max_layer_of_longest(job), max_layer_of(job, job.tools[2])) << "no longer ball";
+    job.tools.push_back(job.tools[2]), job.tools.back().number = 5, job.tools.back().flute_length = 60;
+    EXPECT_DOUBLE_EQ(max_layer_of_longest(job), 43);
+    EXPECT_DOUBLE_EQ(max_bonded_layer_thickness(job), max_layer_of(job, job.tools[2])) << "every tool makes it";
+    EXPECT_EQ(with_tools_for(job, 20).tools.size(), 5U);
+    EXPECT_EQ(with_tools_for(job, max_layer_of(job, job.tools[2])).tools.size(), 5U) << "just tall enough";
+    const Job fitted = with_tools_for(job, 43);
+    ASSERT_EQ(fitted.tools.size(), 3U);
+    EXPECT_EQ(fitted.tools[0].kind, ToolKind::face) << "works on top";
+    EXPECT_EQ(fitted.tools[1].number, 4);
+    EXPECT_EQ(fitted.tools[2].number, 5);
+}
+
 TEST(Job, ToolOfKind) {
     Job job;
     EXPECT_EQ(tool_of_kind(job, ToolKind::face).number, 1);

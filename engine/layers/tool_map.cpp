@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "engine/forces/cuts.h"
 #include "kernels/errors.h"
@@ -50,10 +49,9 @@ double allowed_layer(const Job& job, const Tool& tool) {
     const double across = (tool.kind == ToolKind::ball ? reference_forces(hardest_cut(job, tool, tool.stepdown_max))
                                                        : closed_form_forces(hardest_cut(job, tool, tool.stepdown_max)))
                               .peak_y_n;
-    const double length = std::min(tool.flute_length, allowed_tool_length(across, job.tolerances.cusp, tool.diameter));
-    const double steepest = job.cutting.vertical_deg * std::numbers::pi / 180;
-    const double overrun = tool.kind == ToolKind::ball ? tool.diameter / 2 * (1 - std::cos(steepest)) : 0;
-    return std::max(job.layers.min_layer, length - overrun - job.cutting.holder_clearance);
+    Tool short_enough = tool;
+    short_enough.flute_length = std::min(tool.flute_length, allowed_tool_length(across, job.tolerances.cusp, tool.diameter));
+    return std::max(job.layers.min_layer, max_layer_of(job, short_enough));
 }
 
 ToolMap tool_map(Context& context, MeshView mesh, const Job& job, const std::vector<Feature>& features) {

@@ -11,7 +11,7 @@ Operation face_layer(const LayerCut& cut) {
     const Tool& tool = tool_of_kind(cut.job, ToolKind::face);
     Operation op = cut.operation(OperationKind::face, "face to the layer's top", tool);
     const double depth = cut.stock_top - cut.layer.z_top;
-    if (depth <= 0) return op;
+    if (to_units(depth) <= 0) return op;  // no more than the text says
     const double limit = std::min(cut.job.cutting.face_depth, tool.stepdown_max > 0 ? tool.stepdown_max : cut.job.cutting.face_depth);
     const int steps = std::max(1, static_cast<int>(std::ceil(depth / limit - 1e-9)));
     const double r = tool.diameter / 2, stepover = tool.stepover * tool.diameter;

@@ -172,8 +172,10 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         // the corners that the ball leaves, by the flat end mill, and what is left of the cusps' limit anywhere.
         const LayerTools& tools = layer.tools;
         LayerStock stock(cut, stock_cell(cut));
-        for (const Operation& op : result.operations)
-            if (op.kind != OperationKind::face) stock.cut(cut, op, tools.rough);
+        // A floor's cutter may have taken the whole wall beside it.
+        std::erase_if(result.operations, [&](const Operation& op) {
+            return op.kind != OperationKind::face && stock.cut(cut, op, tools.rough).nothing() && op.kind == OperationKind::finish;
+        });
         for (const Tool& semi : tools.semi_rough)
             take(cut_rest(cut, stock, semi, {OperationKind::semi_rough, "waste beside the roughing cutter", 1.0, true}));
         // A tool between others is worth its change where much is left for it.

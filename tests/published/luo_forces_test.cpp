@@ -1,4 +1,4 @@
-// The forces, thicknesses and lengths of LUO 6.5 (table 6.3: combined_test; the 10 minutes saved come without the times they are of), published, computed, and why they differ where they do. Run it to see the table.
+// The forces, thicknesses and lengths of LUO 6.5 (table 6.3: luo_combined_test; the 10 minutes saved come without the times they are of), published, computed, and why they differ where they do. Run it to see the table.
 #include <gtest/gtest.h>
 
 #include <algorithm>
