@@ -130,7 +130,7 @@ struct Measures {
 
 /// Outline of right angles, its corners rounded: each rounding takes (1 − π/4)·r² off a convex corner, adds it at a concave one, and
 /// shortens the outline by (2 − π/2)·r.
-Measures right_angled(double area, double length, std::vector<double> convex, std::vector<double> concave) {
+Measures right_angled(double area, double length, const std::vector<double>& convex, const std::vector<double>& concave) {
     for (const double r : convex) area -= (1 - kPi / 4) * r * r, length -= (2 - kPi / 2) * r;
     for (const double r : concave) area += (1 - kPi / 4) * r * r, length -= (2 - kPi / 2) * r;
     return {area, length};
