@@ -1,5 +1,5 @@
-// Memory for arrays of millions of elements. Two things about it cost as much as the work on the arrays: that std::vector fills them
-// with zeros on one thread, and that the system hands them out in pages of 4 KiB, each with a trap of its own. Both are avoided here.
+// Memory for arrays of millions of elements, which std::vector would first fill with zeros on one thread: that costs as much as the
+// parallel work that follows.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace slabwright {
 
-/// `bytes` of indeterminate content, aligned for any element; blocks of several MiB lie on huge pages where the system has them.
+/// `bytes` of indeterminate content, aligned for any element.
 /// @throws std::bad_alloc
 [[nodiscard]] SLABWRIGHT_API void* take_bulk(std::size_t bytes);
 /// `bytes` as they were asked for.
