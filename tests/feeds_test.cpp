@@ -340,6 +340,32 @@ TEST(Feeds, WoodThatHangsOverTooFarIsReported) {
     EXPECT_TRUE(codes(10).empty());                 // ten millimetres under the cut carry it
 }
 
+// What a pass leaves of a slab that is thinner than any step is no slab that could break, also under a tool whose range of steps begins at nothing.
+TEST(Feeds, SliversAreNoSlab) {
+    for (const double least : {0.0, 2.0}) {
+        Plan plan = plate();
+        plan.job.cutting.adapt_feed = plan.job.cutting.adapt_stepdown = false;
+        plan.job.tools[1].stepdown_min = least;
+        OverhangMap map;
+        map.low = {0, 0}, map.cell = 1, map.nx = 120, map.ny = 80, map.mm.assign(120 * 80, 100.0F);
+        Context context;
+        for (const double sliver : {0.0, 0.004, 0.3, 3.0}) {
+            const auto slot = [&](double z) {
+                return line(plan, OperationKind::rough, 2, {at(-10, 40, 30, 0), at(-10, 40, z, 0), at(130, 40, z, 9000), at(130, 40, 30, 0)});
+            };
+            plan.layers[0].operations = {slot(sliver), slot(-1)};
+            plan.layers[0].operations[1].purpose = "through";
+            std::vector<Diagnostic> diagnostics;
+            (void)adapt_layer(context, plan.layers[0], plan, &map, diagnostics);
+            const auto breaks = std::count_if(diagnostics.begin(), diagnostics.end(), [](const Diagnostic& d) {
+                return d.code == "cut.overhang" && d.message.find("through") != std::string::npos;
+            });
+            EXPECT_EQ(breaks, sliver > 2 ? 1 : 0) << sliver << " mm under a tool of at least " << least << " mm";
+            for (const Diagnostic& d : diagnostics) EXPECT_EQ(d.message.find("nan"), std::string::npos) << d.message;
+        }
+    }
+}
+
 // Wood is cut in several passes where they save it, and only there: farther out, where it breaks all the same, the way stays as it was.
 TEST(Feeds, PassesForWoodThatTheySave) {
     Plan plan = plate();
