@@ -26,6 +26,10 @@ enum class Projection : std::uint8_t { raster, offset };
 enum class Engagement : std::uint8_t { simulated, nominal };
 /// How roughing clears a level: in rings offset again and again from what stays, or on parallel lines to and fro.
 enum class RoughPattern : std::uint8_t { contour, zigzag };
+/// How what a cutter leaves is cleared before and after finishing: where it stands, on the lines of a raster; or on contours, the feet of
+/// steep walls too, and what level contours take by the way is left to them. By default contours where the library has more than
+/// one flat or one ball end mill.
+enum class RestPattern : std::uint8_t { by_library, raster, contour };
 /// Whether tools are chosen layer by layer (LUO 5.5), or every layer is cut with the fixed set.
 enum class SelectionMode : std::uint8_t { select, fixed };
 /// How much of a layer a tool reaches: by the length of its sections that a disc of the tool's radius touches; by area in 3D, shank and
@@ -132,6 +136,7 @@ struct Cutting {
     double face_depth = 4.0;                             ///< deepest face-milling step
     double ramp_deg = 5;                                 ///< entry into stock
     RoughPattern rough_pattern = RoughPattern::contour;
+    RestPattern rest_pattern = RestPattern::by_library;
     bool climb = true;            ///< contour roughing keeps the stock on its right everywhere; false: either way, where that is shorter
     double max_engagement = 0.7;  ///< share of the diameter that roughing meets at its full feed; 1: a slot
     double holder_clearance = 2.0;

@@ -86,7 +86,7 @@ struct ToolCandidate {
 
 /// A set of tools that a layer was planned with.
 struct ToolSet {
-    std::string name;        ///< "selected", "wider" (the next wider finish tool) or "fixed"
+    std::string name;        ///< "selected", "wider" (the next wider finish tool), "fixed" or "wider rough"
     std::vector<int> tools;  ///< numbers, in the order of their first cut
     double minutes = 0;      ///< of its programs, tool changes within the layer included
     bool chosen = false;

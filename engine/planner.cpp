@@ -325,7 +325,16 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
         if (i > 0) overhang = overhang_map(regions, plan.stock_min, plan.stock_max);
         std::optional<Trial> best;
         std::size_t chosen = 0;
-        for (std::size_t s = 0; s < sets.size(); ++s) {
+        bool widened = false;
+        LayerTools best_tools;
+        for (std::size_t s = 0;; ++s) {
+            if (s == sets.size()) {
+                // Of the sets planned so far the best, with a wider roughing cutter.
+                if (widened || !selection || !job.selection.compare || selection->vertical) break;
+                widened = true;
+                for (LayerTools& tools : with_wider_rough(context, work, best_tools)) sets.emplace_back("wider rough", std::move(tools));
+                if (s == sets.size()) break;
+            }
             work.tools = sets[s].second;
             const double below = work.tools.finish.diameter / 2;
             work.floor_below = layer.z_bottom - (i > 0 ? below : job.machine.base_board_cut >= 0 ? board : std::min(below, board));
@@ -339,7 +348,7 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
             Trial trial = plan_layer(context, plan, layer, work, overhang ? &*overhang : nullptr);
             part.reach(1);
             if (selection) selection->sets.push_back({sets[s].first, tools_in_order(trial.layer), trial.minutes, false});
-            if (!best || trial.minutes < best->minutes) best = std::move(trial), chosen = s;
+            if (!best || trial.minutes < best->minutes) best = std::move(trial), chosen = s, best_tools = sets[s].second;
         }
         if (selection) selection->sets[chosen].chosen = true;
         plan.layers[i] = std::move(best->layer);

@@ -23,6 +23,8 @@ inline constexpr Word<Projection> kProjectionWords[] = {{"raster", Projection::r
 inline constexpr Word<CoefficientTransform> kTransformWords[] = {{"printed", CoefficientTransform::printed},
                                                                  {"oblique", CoefficientTransform::oblique}};
 inline constexpr Word<RoughPattern> kRoughWords[] = {{"contour", RoughPattern::contour}, {"zigzag", RoughPattern::zigzag}};
+inline constexpr Word<RestPattern> kRestWords[] = {
+    {"by_library", RestPattern::by_library}, {"raster", RestPattern::raster}, {"contour", RestPattern::contour}};
 inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}};
 inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated}, {"nominal", Engagement::nominal}};
 inline constexpr Word<SelectionMode> kSelectionWords[] = {{"select", SelectionMode::select}, {"fixed", SelectionMode::fixed}};
@@ -159,6 +161,9 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("face_depth", job.cutting.face_depth, "mm, deepest step of the face mill");
     visit.key("ramp_deg", job.cutting.ramp_deg, "degrees, entry into stock: on a helix where there is room, else to and fro");
     visit.word("rough_pattern", job.cutting.rough_pattern, kRoughWords, "contour: rings around what stays; zigzag: parallel lines to and fro");
+    visit.word("rest_pattern", job.cutting.rest_pattern, kRestWords,
+               "what cutters leave: raster, on lines where it stands; contour, on rings, and along the feet of walls; by_library: contour where "
+               "there is more than one flat or one ball");
     visit.key("climb", job.cutting.climb, "contour roughing climbs everywhere; false: either way, where that is shorter");
     visit.key("max_engagement", job.cutting.max_engagement,
               "share of the diameter that roughing meets at full feed; slower in proportion where it meets more; 1: no limit");

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/paths/feet.h"
 #include "engine/paths/layer_cut.h"
 #include "engine/paths/order.h"
 
@@ -21,13 +22,10 @@ Operation finish_floors(const LayerCut& cut) {
     path.know(cut.around(tool, &part));
     op.stepover = tool.stepover * tool.diameter;
     for (std::size_t i = 0; i < heights.size(); ++i) {
-        std::vector<SolidFacet> facets;
+        const std::vector<SolidFacet> facets = floor_facets(cut, heights[i]);
         double y_low = 1e300, y_high = -1e300;
-        for (const SolidFacet& f : cut.solid.facets) {
-            if (f.z_min < heights[i] - kSameFloor || f.z_max > heights[i] || f.normal[2] < 0.9999) continue;
-            facets.push_back(f);
+        for (const SolidFacet& f : facets)
             for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
-        }
         if (facets.empty()) continue;
         y_low = std::max(y_low - 0.4 * r, cut.low(1, r));
         y_high = std::min(y_high + 0.4 * r, cut.high(1, r));
@@ -49,16 +47,7 @@ Operation finish_floors(const LayerCut& cut) {
         const std::int32_t pitch = safe_pitch(r, cut.job.tolerances.gouge), z = to_units(heights[i]);
         const FibreGrid grid = fibre_grid(cut.solid, cutter, pitch);
         const Contours border = level_contours(cut.context, cut.solid, inside[i].loops, cutter, heights[i], grid);
-        const Fibres near_x = covering(cut.context, facets, r, Axis::x, grid.y), near_y = covering(cut.context, facets, r, Axis::y, grid.x);
-        auto near_floor = [&](Point2 p) {
-            const bool on_row = p.y % pitch == 0;
-            const auto& fibres_near = on_row ? near_x : near_y;
-            const std::int32_t line = ((on_row ? p.y - grid.y[0] : p.x - grid.x[0])) / pitch;
-            const double along = to_mm(on_row ? p.x : p.y);
-            for (const Forbidden& f : fibres_near.line(static_cast<std::size_t>(line)))
-                if (f.low < along && along < f.high) return true;
-            return false;
-        };
+        const NearFloor near_floor(cut, facets, r, grid);
         std::vector<std::vector<PathPoint>> runs;
         for (std::size_t c = 0; c < border.size(); ++c) {
             const std::size_t first = border.starts[c], n = border.starts[c + 1] - first;
@@ -85,6 +74,11 @@ Operation finish_floors(const LayerCut& cut) {
             add_leads(path, cut, part, safe_chord_mm(r, cut.job.tolerances.gouge), runs[next.run]);
             path.follow(runs[next.run]);
         }
+        if (!clears_on_contours(cut.job)) continue;
+        std::vector<std::vector<LevelRun>> feet;
+        append_foot_runs(cut, tool, heights[i], grid, {}, feet);
+        if (!feet.empty()) op.stepdown = std::max(op.stepdown, foot_heights(cut, heights[i]).back());
+        cut_levels(path, cut, tool, part, feet, true);
     }
     path.finish();
     return op;

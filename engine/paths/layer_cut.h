@@ -71,6 +71,15 @@ struct FinishSlopes {
 };
 [[nodiscard]] FinishSlopes finish_slopes(const Cutting& cutting);
 
+/// A level of roughing, mm.
+struct RoughLevel {
+    double tip = 0;    ///< where the tip runs
+    double spare = 0;  ///< what must be spared lies above this height
+};
+/// The levels of a flat end mill, descending: one `floor` (mm) over every up-facing flat and one on the layer's bottom, and between them the
+/// stepdowns that the slopes and the tool allow.
+[[nodiscard]] std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, double floor);
+
 /// Clears a region given as free stretches on parallel lines along x, chained into zigzags, the nearest first; each chain is
 /// begun outside the stock where one of its ends lies there. `path` must know its surroundings, so that it ramps down elsewhere.
 /// @param line_y     0.1 µm, ascending

@@ -9,6 +9,7 @@
 #include "engine/paths/loose.h"
 #include "engine/paths/rest.h"
 #include "engine/paths/rings.h"
+#include "engine/paths/semi_rough.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -90,6 +91,10 @@ Operation LayerCut::operation(OperationKind kind, const char* purpose, const Too
 }
 
 namespace {
+
+// Of a ball's diameter, what its level contours sweep beside a wall: what it leaves at the far side of that on a floor, two tenths of its
+// radius, is no more than one cut.
+constexpr double kSwathShare = 0.5;
 
 // Whatever the order of the cuts was meant to do: what comes loose is found from sections and moves alone.
 void report_loose(const LayerCut& cut, LayerResult& result) {
@@ -176,8 +181,17 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         std::erase_if(result.operations, [&](const Operation& op) {
             return op.kind != OperationKind::face && stock.cut(cut, op, tools.rough).nothing() && op.kind == OperationKind::finish;
         });
-        for (const Tool& semi : tools.semi_rough)
-            take(cut_rest(cut, stock, semi, {OperationKind::semi_rough, "waste beside the roughing cutter", 1.0, true}));
+        const bool contours = clears_on_contours(cut.job);
+        constexpr double kWaste = 1.0;  // mm: what is thicker is cut in steps
+        const double finish_r = tools.finish.diameter / 2, finish_swath = kSwathShare * tools.finish.diameter;
+        auto semi_rough = [&](const Tool& tool, double swath) {
+            constexpr const char* purpose = "waste beside the roughing cutter";
+            if (contours) take(semi_rough_layer(cut, stock, tool, {purpose, kWaste, swath, cut.job.cutting.wall_allowance}));
+            else take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, purpose, kWaste, true}));
+        };
+        for (std::size_t s = 0; s < tools.semi_rough.size(); ++s)
+            semi_rough(tools.semi_rough[s],
+                       s + 1 < tools.semi_rough.size() ? tools.semi_rough[s + 1].diameter + cut.job.cutting.wall_allowance : finish_swath);
         // A tool between others is worth its change where much is left for it.
         constexpr double kWasteWorthAChange = 1000, kCornersWorthAChange = 150;  // mm²
         auto last_of_kind = [&](const Tool& tool) {
@@ -185,8 +199,10 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         };
         for (const Tool& tool : tools.rest)
             if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() && stock.area_over(1.0) > kWasteWorthAChange)
-                take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste beside the roughing cutter", 1.0, true}));
-        take(cut_rest(cut, stock, tools.finish, {OperationKind::semi_rough, "waste between walls", 1.0, true}));
+                semi_rough(tool, finish_swath);
+        RestPass between{OperationKind::semi_rough, "waste between walls", kWaste, true};
+        if (contours) between.swath = finish_r;
+        take(cut_rest(cut, stock, tools.finish, between));
         reached(0.34);
         finish([&](Operation& op) {
             if (stock.cut(cut, op, tools.finish).few()) op.moves.clear();
@@ -198,10 +214,22 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         take(cut_rest(cut, stock, tools.finish, {OperationKind::finish, "what is left", limit, false}));
         reached(0.97);
         for (const Tool& tool : tools.rest) {
-            if (!last_of_kind(tool) && stock.area_over(limit) < kCornersWorthAChange) continue;
-            take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste in narrow places", 1.0, true}));
+            const double left = stock.area_over(limit);
+            if (!last_of_kind(tool) && left < kCornersWorthAChange) continue;
+            // What a tool between others is for is only seen when it has cut; where that is little it has not.
+            std::optional<Standing> stood;
+            std::vector<float> heights;
+            const std::size_t operations = result.operations.size(), no_ways = cut.no_way_in.size();
+            if (contours && !last_of_kind(tool)) stood = standing, heights = stock.heights();
+            if (contours && tool.kind == ToolKind::flat) take(semi_rough_layer(cut, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
+            else take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste in narrow places", kWaste, true}));
             if (tool.kind == ToolKind::flat) take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
             else take(cut_rest(cut, stock, tool, {OperationKind::finish, "what is left in narrow places", limit, false}));
+            if (!stood || left - stock.area_over(limit) >= kCornersWorthAChange) continue;
+            standing = std::move(*stood);
+            stock.restore(std::move(heights));
+            result.operations.resize(operations);
+            cut.no_way_in.resize(no_ways);
         }
     }
     if (!cut.no_way_in.empty())

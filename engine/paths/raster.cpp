@@ -65,8 +65,15 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                                {}});
 
     const DropIndex& ball = cut.drops({Cutter::Profile::ball, r});
-    const double flat_r = cut.layer.tools.rough.diameter / 2;
-    const DropIndex flat(cut.context, cut.solid, {Cutter::Profile::flat, flat_r - 0.02});
+    // The flat end mills that have finished floors; semi-roughing does so on contours only.
+    std::vector<std::pair<double, std::unique_ptr<DropIndex>>> flats;
+    auto add_flat = [&](const Tool& one) {
+        const double flat_r = one.diameter / 2;
+        flats.emplace_back(flat_r, std::make_unique<DropIndex>(cut.context, cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02}));
+    };
+    add_flat(cut.layer.tools.rough);
+    if (clears_on_contours(cut.job))
+        for (const Tool& semi : cut.layer.tools.semi_rough) add_flat(semi);
     const double chord = safe_chord_mm(r, gouge);
     // Samples stand on multiples of one step, so that those of neighbouring lines are neighbours.
     const auto step = static_cast<std::int32_t>(0.75 * chord * kUnitsPerMm);
@@ -81,10 +88,12 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
 
     // Whether the flat end mill finishes a floor's place: from right over it, or with its rim from beside a wall.
     auto flat_covers = [&](double x, double y, double z) {
-        if (flat.drop(x, y).tip_z <= z + 1e-3) return true;
-        for (int k = 0; k < 8; ++k) {
-            const double turn = k * std::numbers::pi / 4, beside = 0.95 * flat_r;
-            if (flat.drop(x + beside * std::cos(turn), y + beside * std::sin(turn)).tip_z <= z + 1e-3) return true;
+        for (const auto& [flat_r, flat] : flats) {
+            if (flat->drop(x, y).tip_z <= z + 1e-3) return true;
+            for (int k = 0; k < 8; ++k) {
+                const double turn = k * std::numbers::pi / 4, beside = 0.95 * flat_r;
+                if (flat->drop(x + beside * std::cos(turn), y + beside * std::sin(turn)).tip_z <= z + 1e-3) return true;
+            }
         }
         return false;
     };

@@ -21,6 +21,7 @@ namespace {
 constexpr double kFinest = 0.04;  // mm between places where the rest jumps: a wall is met within this
 constexpr double kJump = 0.05;    // mm by which a flat end mill's tip may step between neighbouring places
 constexpr double kSettle = 0.01;  // mm by which a low point of a line lies under its neighbours
+constexpr float kRise = 0.5F;     // mm: a wall that is lower than what stands beside it by less is as high
 constexpr double kBridge = 3.0;   // mm between two useful stretches that are travelled along the surface
 
 // A place of the cutter on the surface.
@@ -41,13 +42,34 @@ using Spans = std::vector<std::array<std::int32_t, 2>>;  // 0.1 µm, ascending a
 // The cells worth a visit, row by row, and the stretches of a line from which a cutter covers some of them.
 class Targets {
 public:
-    Targets(const LayerStock& stock, double limit) : stock_(stock), rows_(static_cast<std::size_t>(stock.grid().ny)) {
+    /// @param probe a flat cutter as wide as the limit: where its rest is as high as what stands, that is within the limit of a wall beside it
+    Targets(const LayerStock& stock, const RestPass& pass, double steep, const DropIndex* probe)
+        : stock_(stock), rows_(static_cast<std::size_t>(stock.grid().ny)) {
         const CellGrid& grid = stock.grid();
         marked_.assign(grid.count(), 0);
+        // Places around a cell, the nearest first.
+        std::vector<std::array<int, 3>> around;
+        const int reach = static_cast<int>(pass.swath / grid.cell);
+        for (int dj = -reach; dj <= reach; ++dj)
+            for (int di = -reach; di <= reach; ++di)
+                if (di * di + dj * dj <= reach * reach) around.push_back({di * di + dj * dj, di, dj});
+        std::sort(around.begin(), around.end());
+        // Whether the nearest of the surface that is as high as what stands here rises steeply.
+        auto beside_wall = [&](int i, int j) {
+            const std::size_t here = grid.index(i, j);
+            for (const auto& [far, di, dj] : around) {
+                if (i + di < 0 || i + di >= grid.nx || j + dj < 0 || j + dj >= grid.ny) continue;
+                const std::size_t c = grid.index(i + di, j + dj);
+                const double rise = static_cast<double>(stock.surface(c)) - stock.surface(here);
+                if (stock.surface(c) >= stock.height(here) - kRise && rise > 0) return rise >= std::tan(steep) * std::sqrt(far) * grid.cell;
+            }
+            return false;
+        };
         for (int j = 0; j < grid.ny; ++j)
             for (int i = 0; i < grid.nx; ++i) {
                 const std::size_t c = grid.index(i, j);
-                if (stock.left(c) <= limit) continue;
+                if (stock.left(c) <= pass.limit || (reach > 0 && beside_wall(i, j))) continue;
+                if (probe && probe->drop(grid.x(i), grid.y(j)).tip_z >= stock.z_bottom() + stock.height(c) - 1e-3) continue;
                 marked_[c] = 1;
                 ++count_;
                 auto& row = rows_[static_cast<std::size_t>(j)];
@@ -100,7 +122,8 @@ public:
           ball_(tool.kind == ToolKind::ball),
           r_(tool.diameter / 2),
           end_(cutter_end(tool)),
-          targets_(stock, pass.limit),
+          targets_(stock, pass, finish_slopes(cut.job.cutting).levels_from,
+                   pass.in_steps || !clears_on_contours(cut.job) ? nullptr : &cut.drops({Cutter::Profile::flat, pass.limit})),
           chord_(safe_chord_mm(r_, cut.job.tolerances.gouge)),
           step_(static_cast<std::int32_t>(0.75 * chord_ * kUnitsPerMm)) {}
 

@@ -12,6 +12,7 @@ struct RestPass {
     const char* purpose = "";
     double limit = 0;       ///< mm along the normal: what stands higher over the finished surface is worth a visit
     bool in_steps = false;  ///< level by level from the top, no deeper at once than the tool's stepdown
+    double swath = 0;       ///< mm: what stands so near to a steep wall that rises as high is left to the level contours there
 };
 
 /// Cuts what is left over the limit wherever this tool can lower it, and takes it off the stock.

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "engine/paths/engagement.h"
+#include "engine/paths/feet.h"
 #include "engine/paths/layer_cut.h"
 #include "engine/paths/rings.h"
 #include "kernels/cutting/cusp.h"
@@ -16,16 +17,28 @@ namespace slabwright {
 
 namespace {
 
-struct RoughLevel {
-    double tip = 0;    // where the tip runs
-    double spare = 0;  // what must be spared lies above this height
-};
+// Whether a flat end mill comes down to a floor anywhere, by places a third of its radius apart.
+bool stands_on(const LayerCut& cut, const Tool& tool, double floor) {
+    const double r = tool.diameter / 2, step = r / 3;
+    const DropIndex& part = cut.drops({Cutter::Profile::flat, r});
+    for (const SolidFacet& f : floor_facets(cut, floor)) {
+        const auto [x0, x1] = std::minmax({f.p[0][0], f.p[1][0], f.p[2][0]});
+        const auto [y0, y1] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
+        // Also beside the facet, for most of a small one's cutter stands over others.
+        for (double y = std::floor(y0 / step) * step; y <= y1 + step; y += step)
+            for (double x = std::floor(x0 / step) * step; x <= x1 + step; x += step)
+                if (const Rest rest = part.drop(x, y); rest.tip_z <= floor + 1e-3 && rest.tip_z >= floor - kSameFloor) return true;
+    }
+    return false;
+}
 
-std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool) {
-    const double floor = cut.job.cutting.floor_allowance, bottom = cut.layer.z_bottom, top = cut.layer.z_top;
+}  // namespace
+
+std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, double floor) {
+    const double bottom = cut.layer.z_bottom, top = cut.layer.z_top;
     std::vector<RoughLevel> fixed;
     for (const double z : cut.floors)
-        if (z + floor < top) fixed.push_back({z + floor, z});
+        if (z + floor < top && (!clears_on_contours(cut.job) || stands_on(cut, tool, z))) fixed.push_back({z + floor, z});
     fixed.push_back({bottom, bottom});
     std::sort(fixed.begin(), fixed.end(), [](const RoughLevel& a, const RoughLevel& b) { return a.tip > b.tip; });
     std::vector<RoughLevel> levels;
@@ -47,15 +60,13 @@ std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool) {
     return levels;
 }
 
-}  // namespace
-
 Operation rough_layer(const LayerCut& cut) {
     const Tool& tool = cut.layer.tools.rough;
     const bool contour = cut.job.cutting.rough_pattern == RoughPattern::contour;
     Operation op = cut.operation(OperationKind::rough, contour ? "contour-parallel levels" : "zigzag levels", tool);
     const double r = tool.diameter / 2, clearance = cut.layer.z_top + cut.job.machine.clearance;
     const Cutter cutter{Cutter::Profile::flat, r + cut.job.cutting.wall_allowance};
-    const std::vector<RoughLevel> levels = rough_levels(cut, tool);
+    const std::vector<RoughLevel> levels = rough_levels(cut, tool, cut.job.cutting.floor_allowance);
     std::vector<double> spare;
     for (const RoughLevel& l : levels) spare.push_back(l.spare);
     const std::vector<Section> inside = cut.insides(cutter, spare);

@@ -98,6 +98,33 @@ public:
         return std::move(choice_);
     }
 
+    std::vector<LayerTools> wider_rough(const LayerTools& base) {
+        std::vector<LayerTools> sets;
+        measure();
+        const double height = layer_.z_top - layer_.z_bottom, swath = base.finish.diameter;
+        const double allowed = std::min(flat_level_stepdown(slopes_of(layer_).least, base.finish.diameter / 2), height);
+        for (Tool rough : flats_) {
+            if (rough.diameter < base.rough.diameter - 1e-9) break;
+            rough.stepdown_min = rough.stepdown_max = std::clamp(allowed, std::min(rough.stepdown_min, height), rough.stepdown_max);
+            constexpr double kDeeper = 1.2;  // times as deep: less hardly makes a level fewer
+            if (rough.diameter <= base.rough.diameter + 1e-9 && rough.stepdown_max < kDeeper * base.rough.stepdown_max) break;
+            LayerTools& tools = sets.emplace_back();
+            tools.finish = base.finish;
+            tools.rough = rough;
+            tools.rest = rest_tools(job_, rough.diameter, base.finish.diameter);
+            if (left(rough, rough.stepdown_max, swath).nothing(job_.selection.voxel)) continue;
+            for (Tool semi : flats_) {
+                if (semi.diameter >= rough.diameter - 1e-9) continue;
+                if (semi.diameter < base.finish.diameter / 2 - 1e-9) break;
+                semi.stepdown_max = std::clamp(allowed, std::min(semi.stepdown_min, height), semi.stepdown_max);
+                semi.stepdown_min = std::min(semi.stepdown_min, semi.stepdown_max);
+                tools.semi_rough = {semi};
+                if (left(semi, semi.stepdown_max, swath).nothing(job_.selection.voxel)) break;
+            }
+        }
+        return sets;
+    }
+
 private:
     ToolCandidate& note(const char* purpose, const Tool& tool) {
         choice_.record.candidates.push_back({purpose, tool.number, false, {}, {}, {}, {}, ""});
@@ -317,8 +344,8 @@ private:
     Context& context_;
     const LayerJob& layer_;
     const Job& job_;
-    const ReachRatio& ratio_;
-    const std::optional<Tool>& finish_;
+    const ReachRatio ratio_;
+    const std::optional<Tool> finish_;
     std::vector<Tool> flats_, balls_;
     std::vector<double> floors_;
     std::optional<LayerVoxels> voxels_;
@@ -341,6 +368,10 @@ std::optional<Tool> next_wider_ball(const Job& job, const Tool& finish) {
 
 ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio, const std::optional<Tool>& finish) {
     return Chooser(context, layer, ratio, finish).run();
+}
+
+std::vector<LayerTools> with_wider_rough(Context& context, const LayerJob& layer, const LayerTools& tools) {
+    return Chooser(context, layer, {}, {}).wider_rough(tools);
 }
 
 std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors, double stepdown) {

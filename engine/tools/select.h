@@ -33,6 +33,12 @@ struct ToolChoice {
 /// @throws Error(usage, "job.tool") when the library lacks a flat or a ball; Error(no_plan, "memory.limit"), Error(cancelled)
 [[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio = {}, const std::optional<Tool>& finish = {});
 
+/// Past print: sets with the same finish tool whose roughing cutter is wider, or as wide and goes deeper, the widest first; each as deep at once as the finish tool's
+/// radius allows at the least slope. What these leave outside the finish tool's swath is for the largest smaller flat that leaves nothing
+/// there; where none does, for the smallest one wider than the finish tool's half.
+/// @param layer as above
+[[nodiscard]] std::vector<LayerTools> with_wider_rough(Context& context, const LayerJob& layer, const LayerTools& tools);
+
 /// Heights of the roughing levels, descending: even steps of at most `stepdown` down to every floor and to the layer's bottom.
 [[nodiscard]] std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors, double stepdown);
 

@@ -16,6 +16,14 @@ const Tool& fixed_tool(const Job& job, ToolKind kind, double diameter) {
 
 }  // namespace
 
+bool clears_on_contours(const Job& job) {
+    if (job.cutting.rest_pattern != RestPattern::by_library) return job.cutting.rest_pattern == RestPattern::contour;
+    auto several = [&](ToolKind kind) {
+        return std::count_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.kind == kind; }) > 1;
+    };
+    return several(ToolKind::flat) || several(ToolKind::ball);
+}
+
 std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter) {
     // What a flat reaches at a corner a smaller one reaches too, and so it is with balls: the smallest of either kind leave no more
     // than all together.

@@ -20,6 +20,9 @@ struct LayerTools {
 /// @throws Error(usage, "job.tool") when the library has no flat or no ball
 [[nodiscard]] LayerTools fixed_tools(const Job& job);
 
+/// Whether what cutters leave is cleared on contours (Cutting::rest_pattern).
+[[nodiscard]] bool clears_on_contours(const Job& job);
+
 /// The library of LUO table 5.4: flat and ball end mills of 1/8, 1/4, 1/2, 3/4 and 1 in with their stepdowns, numbers 2 … 6 and 12 … 16,
 /// and the default face mill. Their flutes reach through a 19 mm slab; what LUO does not give is ours.
 [[nodiscard]] std::vector<Tool> luo_library();

@@ -1,0 +1,332 @@
+#include "engine/paths/semi_rough.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/paths/feet.h"
+#include "engine/paths/rings.h"
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kStepShare = 0.45;      // of the diameter, between rings
+constexpr double kRingTolerance = 0.02;  // mm, of every ring that keeps off the finished surface
+constexpr double kSample = 0.4;          // mm between places of a ring that are looked at
+constexpr double kSwathPitch = 0.3;      // mm: the swath's border need not be exact
+constexpr float kStands = 0.05F;         // mm over the tip: less is nothing to cut
+constexpr double kEdge = 0.05;           // mm: what only the cutter's very edge meets was cut on the ring before
+constexpr int kFewCells = 4;             // that a cutter must meet to be of use: one or two may be a matter of rounding
+constexpr int kTile = 16;                // cells
+constexpr int kMostRings = 4000;
+
+// Where the rows of a grid run inside a region (winding number over 0): first and last cell of each stretch.
+std::vector<std::vector<std::array<int, 2>>> rows_inside(const CellGrid& grid, const Loops& region) {
+    std::vector<std::vector<std::pair<double, int>>> crossings(static_cast<std::size_t>(grid.ny));
+    for (std::size_t l = 0; l < region.size(); ++l) {
+        const auto loop = region.loop(l);
+        for (std::size_t k = 0; k < loop.size(); ++k) {
+            Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
+            const int turn = a.y > b.y ? 1 : -1;  // downwards, the region is to the right
+            if (a.y > b.y) std::swap(a, b);
+            const double ax = to_mm(a.x), ay = to_mm(a.y), bx = to_mm(b.x), by = to_mm(b.y);
+            const int j0 = std::max(0, static_cast<int>(std::ceil((ay - grid.y0) / grid.cell)));
+            for (int j = j0; j < grid.ny && grid.y(j) < by; ++j)
+                crossings[static_cast<std::size_t>(j)].emplace_back(ax + (bx - ax) * (grid.y(j) - ay) / (by - ay), turn);
+        }
+    }
+    std::vector<std::vector<std::array<int, 2>>> rows(crossings.size());
+    for (std::size_t j = 0; j < rows.size(); ++j) {
+        std::sort(crossings[j].begin(), crossings[j].end());
+        int winding = 0;
+        double from = 0;
+        for (const auto& [x, turn] : crossings[j]) {
+            const int before = winding;
+            winding += turn;
+            if (before <= 0 && winding > 0) from = x;
+            if (before <= 0 || winding > 0) continue;
+            const int first = std::max(0, static_cast<int>(std::ceil((from - grid.x0) / grid.cell))),
+                      last = std::min(grid.nx - 1, static_cast<int>(std::floor((x - grid.x0) / grid.cell)));
+            if (first <= last) rows[j].push_back({first, last});
+        }
+    }
+    return rows;
+}
+
+// The cells of one level that are worth a visit.
+class LevelTargets {
+public:
+    /// @param tip    mm above the layer's bottom
+    /// @param floors mm; what stands on one of them is a target even within the swath, for no ball makes a floor
+    LevelTargets(const LayerStock& stock, double tip, double limit, const Loops& swath, std::span<const double> floors)
+        : stock_(stock),
+          tip_(static_cast<float>(tip)),
+          tiles_x_((stock.grid().nx + kTile - 1) / kTile),
+          marked_(stock.grid().count(), 0),
+          tiles_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>((stock.grid().ny + kTile - 1) / kTile), 0) {
+        const CellGrid& grid = stock.grid();
+        const auto covered = rows_inside(grid, swath);
+        auto on_floor = [&](std::size_t c) {
+            const double z = stock.z_bottom() + stock.surface(c);
+            return std::any_of(floors.begin(), floors.end(), [&](double f) { return z <= f + 1e-3 && z >= f - kSameFloor - 1e-3; });
+        };
+        for (int j = 0; j < grid.ny; ++j) {
+            const auto& spans = covered[static_cast<std::size_t>(j)];
+            auto span = spans.begin();
+            for (int i = 0; i < grid.nx; ++i) {
+                while (span != spans.end() && (*span)[1] < i) ++span;
+                const std::size_t c = grid.index(i, j);
+                if (span != spans.end() && (*span)[0] <= i && !on_floor(c)) continue;
+                if (stock.height(c) <= tip_ + kStands || stock.surface(c) > tip_ + kStands || stock.left(c) <= limit) continue;
+                marked_[c] = 1;
+                tiles_[tile(i, j)] = 1;
+                cells_.push_back({i, j});
+            }
+        }
+    }
+    [[nodiscard]] bool few() const { return cells_.size() < kFewCells; }
+    [[nodiscard]] const std::vector<std::array<int, 2>>& cells() const { return cells_; }
+
+    // Whether a cutter whose middle is here meets some that still stand.
+    [[nodiscard]] bool met(double x, double y, double radius) const {
+        const CellGrid& grid = stock_.grid();
+        const double r = std::max(radius - kEdge, radius / 2);
+        const int j0 = std::max(0, static_cast<int>(std::ceil((y - r - grid.y0) / grid.cell)));
+        const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + r - grid.y0) / grid.cell)));
+        const int i0 = std::max(0, static_cast<int>(std::ceil((x - r - grid.x0) / grid.cell)));
+        const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + r - grid.x0) / grid.cell)));
+        int found = 0;
+        for (int tj = j0 / kTile; tj <= j1 / kTile && j0 <= j1; ++tj)
+            for (int ti = i0 / kTile; ti <= i1 / kTile && i0 <= i1; ++ti) {
+                if (!tiles_[static_cast<std::size_t>(tj) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(ti)]) continue;
+                for (int j = std::max(j0, tj * kTile); j <= std::min(j1, tj * kTile + kTile - 1); ++j) {
+                    const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, r * r - dy * dy));
+                    const int first = std::max(ti * kTile, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
+                    const int last = std::min({ti * kTile + kTile - 1, grid.nx - 1, static_cast<int>(std::floor((x + w - grid.x0) / grid.cell))});
+                    for (int i = first; i <= last; ++i) {
+                        const std::size_t c = grid.index(i, j);
+                        if (marked_[c] && stock_.height(c) > tip_ + kStands && ++found >= kFewCells) return true;
+                    }
+                }
+            }
+        return false;
+    }
+
+private:
+    [[nodiscard]] std::size_t tile(int i, int j) const {
+        return static_cast<std::size_t>(j / kTile) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(i / kTile);
+    }
+    const LayerStock& stock_;
+    float tip_;
+    int tiles_x_;
+    std::vector<char> marked_, tiles_;
+    std::vector<std::array<int, 2>> cells_;
+};
+
+// A place of the cutter on a ring; corners of the ring, and places between them that are looked at.
+struct RingPlace {
+    PathPoint at;
+    bool corner = false, useful = false;
+};
+
+std::vector<RingPlace> places_of(std::span<const Point2> loop, std::int32_t z) {
+    std::vector<RingPlace> places;
+    for (std::size_t k = loop.size(); k-- > 0;) {  // backwards: what must stay on the right
+        const Point2 a = loop[(k + 1) % loop.size()], b = loop[k];
+        const double l = std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
+        const int parts = std::max(1, static_cast<int>(std::ceil(l / (kSample * kUnitsPerMm))));
+        for (int s = 1; s <= parts; ++s) {
+            const double t = static_cast<double>(s) / parts;
+            places.push_back({{static_cast<std::int32_t>(std::lround(a.x + t * (static_cast<double>(b.x) - a.x))),
+                               static_cast<std::int32_t>(std::lround(a.y + t * (static_cast<double>(b.y) - a.y))), z},
+                              s == parts,
+                              false});
+        }
+    }
+    return places;
+}
+
+class SemiRougher {
+public:
+    SemiRougher(const LayerCut& cut, LayerStock& stock, const Tool& tool, const SemiRoughPass& pass)
+        : cut_(cut), stock_(stock), tool_(tool), pass_(pass), r_(tool.diameter / 2) {}
+
+    Operation run() {
+        Operation op = cut_.operation(OperationKind::semi_rough, pass_.purpose, tool_);
+        if (stock_.area_over(pass_.limit) == 0) return op;
+        const std::vector<float> before = stock_.heights();
+        const std::vector<RoughLevel> levels = rough_levels(cut_, tool_, 0);
+        std::vector<double> tips;
+        for (const RoughLevel& l : levels) tips.push_back(l.tip);
+        std::vector<Loops> swath(tips.size());
+        if (pass_.swath > 0) {
+            const std::vector<Contours> walls = cut_.contours({Cutter::Profile::flat, pass_.swath}, tips, to_units(kSwathPitch));
+            for (std::size_t i = 0; i < tips.size(); ++i) swath[i] = forbidden_region(walls[i]);
+        }
+        const bool flask = !cut_.layer.opening.empty();
+        const Loops room = flask ? flask_room(cut_, r_ + pass_.allowance) : Loops{};
+        const Loops beyond = flask ? beyond_room(cut_, r_ + pass_.allowance, room) : Loops{};
+        const double gouge = cut_.job.tolerances.gouge;
+        const Tool& rough = cut_.layer.tools.rough;
+        const std::array<std::pair<const DropIndex*, double>, 1> wider{
+            std::pair{&cut_.drops({Cutter::Profile::flat, rough.diameter / 2}), rough.diameter / 2}};
+        std::vector<std::vector<LevelRun>> runs;
+        double above = cut_.layer.z_top;
+        for (std::size_t i = 0; i < tips.size(); ++i) {
+            cut_.context.throw_if_cancelled();
+            const LevelTargets targets(stock_, tips[i] - stock_.z_bottom(), pass_.limit, swath[i], cut_.floors);
+            const double depth = above - tips[i];
+            above = tips[i];
+            if (targets.few()) continue;
+            // A floor is finished with its level, so there the cutter goes up to the walls.
+            const bool floor = std::find(cut_.floors.begin(), cut_.floors.end(), tips[i]) != cut_.floors.end();
+            const double allowance = floor ? 0 : pass_.allowance;
+            const Cutter cutter{Cutter::Profile::flat, r_ + allowance};
+            const FibreGrid grid = fibre_grid(cut_.solid, cutter, safe_pitch(r_, allowance > 0 ? std::max(gouge, 0.2 * allowance) : gouge));
+            const std::array<double, 1> tip{tips[i]};
+            Loops border = forbidden_region(level_contours(cut_.context, cut_.solid, cut_.insides(cutter, tip).front().loops, cutter, tips[i], grid));
+            if (flask) border = unite(border, beyond);
+            const std::size_t first = runs.size();
+            cut_rings(targets, border, tips[i], allowance > 0, runs);
+            if (runs.size() == first) continue;
+            op.stepdown = std::max(op.stepdown, depth);
+            op.stepover = kStepShare * tool_.diameter;
+            if (floor) append_foot_runs(cut_, tool_, tips[i], grid, wider, runs);
+        }
+        emit(op, runs);
+        stock_.restore(before);
+        if (stock_.cut(cut_, op, tool_).nothing()) op.moves.clear();
+        return op;
+    }
+
+private:
+    // From the farthest ring whose cutter meets a target inwards; what a ring cuts the next need not.
+    void cut_rings(const LevelTargets& targets, const Loops& border, double tip, bool keeps_off, std::vector<std::vector<LevelRun>>& runs) {
+        const CellGrid& grid = stock_.grid();
+        const double step = kStepShare * tool_.diameter;
+        std::vector<Loops> rings{border};
+        const Loops thin = thinned(border);
+        std::vector<std::array<int, 2>> outside = targets.cells();
+        for (int k = 1; k < kMostRings; ++k) {
+            const auto inside = rows_inside(grid, rings.back());
+            std::erase_if(outside, [&](const std::array<int, 2>& c) {
+                const auto& row = inside[static_cast<std::size_t>(c[1])];
+                return std::any_of(row.begin(), row.end(), [&](const std::array<int, 2>& s) { return s[0] <= c[0] && c[0] <= s[1]; });
+            });
+            if (outside.empty()) break;
+            rings.push_back(offset(thin, k * step, kRingTolerance));
+        }
+        const std::int32_t z = to_units(tip) + 1;
+        const CutterEnd end = cutter_end(tool_);
+        for (std::size_t k = rings.size(); k-- > 0;) {
+            runs.emplace_back();
+            const double tolerance = k > 0 || keeps_off ? kRingTolerance * kUnitsPerMm : simplify_tolerance_units(cut_.job.tolerances.gouge);
+            for (std::size_t l = 0; l < rings[k].size(); ++l) {
+                std::vector<RingPlace> places = places_of(rings[k].loop(l), z);
+                for (RingPlace& p : places) p.useful = within_travel(p.at) && targets.met(to_mm(p.at.x), to_mm(p.at.y), r_);
+                append_useful(places, tolerance, runs.back());
+            }
+            for (const LevelRun& run : runs.back())
+                for (std::size_t p = 0; p < run.points.size(); ++p) {
+                    const PathPoint &a = run.points[p == 0 ? 0 : p - 1], &b = run.points[p];
+                    const double l = to_mm(1) * std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
+                    const int parts = std::max(1, static_cast<int>(std::ceil(l / kSample)));
+                    for (int s = 1; s <= parts; ++s) {
+                        const double t = static_cast<double>(s) / parts;
+                        stock_.cut_at(end, to_mm(a.x) + t * to_mm(std::int64_t{b.x} - a.x), to_mm(a.y) + t * to_mm(std::int64_t{b.y} - a.y),
+                                      to_mm(z));
+                    }
+                }
+        }
+    }
+
+    [[nodiscard]] static Loops thinned(const Loops& loops) {
+        Loops result;
+        for (std::size_t l = 0; l < loops.size(); ++l) {
+            std::vector<PathPoint> line;
+            for (const Point2 p : loops.loop(l)) line.push_back({p.x, p.y, 0});
+            line.push_back(line.front());
+            line = simplify(line, kRingTolerance * kUnitsPerMm);
+            line.pop_back();
+            if (line.size() < 3) continue;
+            for (const PathPoint& p : line) result.points.push_back({p.x, p.y});
+            result.close_loop();
+        }
+        return result;
+    }
+
+    [[nodiscard]] bool within_travel(const PathPoint& p) const {
+        return to_mm(p.x) >= cut_.low(0, r_ + 2) && to_mm(p.x) <= cut_.high(0, r_ + 2) && to_mm(p.y) >= cut_.low(1, r_ + 2) &&
+               to_mm(p.y) <= cut_.high(1, r_ + 2);
+    }
+
+    // Useful stretches with a place before and after them; short gaps are travelled along the ring, which is free.
+    void append_useful(std::vector<RingPlace>& places, double tolerance, std::vector<LevelRun>& out) const {
+        const std::size_t n = places.size();
+        std::vector<std::size_t> useful;
+        for (std::size_t k = 0; k < n; ++k)
+            if (places[k].useful) useful.push_back(k);
+        if (useful.empty()) return;
+        auto way = [&](std::size_t from, std::size_t to) {  // 0.1 µm along the ring; the whole ring where they are one
+            double sum = 0;
+            for (std::size_t k = from;;) {
+                const std::size_t next = (k + 1) % n;
+                sum += std::hypot(static_cast<double>(places[next].at.x) - places[k].at.x, static_cast<double>(places[next].at.y) - places[k].at.y);
+                if ((k = next) == to) return sum;
+            }
+        };
+        std::vector<std::size_t> ends;  // indices into `useful` after which a gap is too wide
+        for (std::size_t u = 0; u < useful.size(); ++u) {
+            const std::size_t next = useful[(u + 1) % useful.size()];
+            if ((useful[u] + 1) % n == next && useful.size() > 1) continue;
+            bool travels = true;
+            for (std::size_t k = (useful[u] + 1) % n; k != next && travels; k = (k + 1) % n) travels = within_travel(places[k].at);
+            if (!travels || way(useful[u], next) > 2 * r_ * kUnitsPerMm) ends.push_back(u);
+        }
+        auto append = [&](std::size_t from, std::size_t count, bool closed) {
+            LevelRun run;
+            run.closed = closed;
+            for (std::size_t k = 0; k < count; ++k) {
+                const RingPlace& p = places[(from + k) % n];
+                if (p.corner || k == 0 || k + 1 == count) run.points.push_back(p.at);
+            }
+            if (closed) run.points.push_back(run.points.front());
+            run.points = simplify(run.points, tolerance);
+            if (run.points.size() > (closed ? 2U : 1U)) out.push_back(std::move(run));
+        };
+        if (ends.empty()) return append(0, n, true);
+        for (std::size_t e = 0; e < ends.size(); ++e) {
+            const std::size_t first = useful[(ends[e == 0 ? ends.size() - 1 : e - 1] + 1) % useful.size()], last = useful[ends[e]];
+            std::size_t from = (first + n - 1) % n, count = (last + n - first) % n + 3;
+            if (!within_travel(places[from].at)) from = first, --count;
+            if (!within_travel(places[(last + 1) % n].at)) --count;
+            append(from, std::min(count, n), false);
+        }
+    }
+
+    void emit(Operation& op, std::vector<std::vector<LevelRun>>& runs) const {
+        // The first cut through a place is as wide as the cutter.
+        const double feed = std::min(tool_.max_feed, cut_.job.machine.max_feed) * cut_.job.cutting.max_engagement;
+        PathBuilder path(op, tool_, feed, cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
+        const DropIndex& part = cut_.drops({Cutter::Profile::flat, r_});
+        path.know(cut_.around(tool_, &part));
+        cut_levels(path, cut_, tool_, part, runs, false);
+        path.finish();
+    }
+
+    const LayerCut& cut_;
+    LayerStock& stock_;
+    const Tool& tool_;
+    const SemiRoughPass& pass_;
+    double r_;
+};
+
+}  // namespace
+
+Operation semi_rough_layer(const LayerCut& cut, LayerStock& stock, const Tool& tool, const SemiRoughPass& pass) {
+    return SemiRougher(cut, stock, tool, pass).run();
+}
+
+}  // namespace slabwright

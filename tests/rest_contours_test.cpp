@@ -1,0 +1,142 @@
+// What cutters leave, cleared on contours: a semi-roughing takes all that stands outside the finish tool's swath and no more than its tool
+// reaches, and a layer whose roughing cutter does not fit everywhere is faster and as well made as on a raster.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "engine/paths/semi_rough.h"
+#include "engine/planner.h"
+#include "engine/tools/select.h"
+#include "io/slabwright.h"
+#include "kernels/mesh/weld.h"
+#include "tests/data/models.h"
+#include "tests/support/height_field.h"
+#include "tests/support/temporary_folder.h"
+
+namespace slabwright {
+namespace {
+
+constexpr double kTop = 14;
+
+// A block with a notch of 18 mm that a 1 in cutter does not enter, open to +x.
+double notched_or_base(double x, double y) { return std::abs(y) < 9 && x > -12 ? 0.5 : kTop; }
+
+struct Notch {
+    Context context;
+    Job job;
+    Mesh mesh = test::height_field(context, 60, 1, notched_or_base);
+    LayerJob layer;
+    LayerCut cut;
+    Standing standing;
+
+    Notch()
+        : cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, alpha_map(context, mesh.view(), 0, kTop), nullptr, {}},
+          standing({-40, -40}, {40, 40}, kTop) {
+        job.tools = luo_library();
+        layer.mesh = mesh.view();
+        layer.job = &job;
+        layer.z_bottom = 0;
+        layer.z_top = layer.slab_thickness = kTop;
+        layer.stock_min = {-40, -40};
+        layer.stock_max = {40, 40};
+        layer.tools = fixed_tools(job);
+        cut.standing = &standing;
+    }
+    [[nodiscard]] Tool flat(double inches) const {
+        for (const Tool& t : job.tools)
+            if (t.kind == ToolKind::flat && std::abs(t.diameter - inches * kInch) < 1e-9) return t;
+        return {};
+    }
+};
+
+TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
+    for (const double swath : {0.0, 3.0, 6.0}) {
+        Notch n;
+        const Tool rough = n.flat(1), semi = n.flat(0.5);
+        n.layer.tools.rough = rough;
+        LayerStock stock(n.cut, 0.25);
+        const Operation roughing = rough_layer(n.cut);
+        stock.cut(n.cut, roughing, rough);
+        const LayerStock before = stock;
+        const Operation op = semi_rough_layer(n.cut, stock, semi, {"waste", 1.0, swath, 0.3});
+        ASSERT_FALSE(op.moves.empty());
+        EXPECT_LE(op.stepdown, semi.stepdown_max + 1e-9);
+        // Nothing of the part is entered.
+        const DropIndex part(n.context, n.cut.solid, {Cutter::Profile::flat, semi.diameter / 2});
+        for (std::size_t i = 1; i < op.moves.size(); ++i) {
+            const Move &a = op.moves[i - 1], &b = op.moves[i];
+            if (b.feed == 0) continue;
+            for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+                const double x = to_mm(a.x) + t * (to_mm(b.x) - to_mm(a.x)), y = to_mm(a.y) + t * (to_mm(b.y) - to_mm(a.y)),
+                             z = to_mm(a.z) + t * (to_mm(b.z) - to_mm(a.z));
+                ASSERT_GE(z, part.drop(x, y).tip_z - n.job.tolerances.gouge) << "swath " << swath << " at " << x << ' ' << y << ' ' << z;
+            }
+        }
+        // Of what stood on the notch's floor, the middle is gone; nothing stands that the cutter reaches outside the swath. Facets of the
+        // height field are 1 mm wide, so its walls lean over the cells beside them.
+        int stood = 0, left = 0;
+        for (int j = 0; j < stock.grid().ny; ++j)
+            for (int i = 0; i < stock.grid().nx; ++i) {
+                const std::size_t c = stock.grid().index(i, j);
+                const double x = stock.grid().x(i), y = stock.grid().y(j), wall = std::min(9.0 - std::abs(y), x + 12.0), clear = std::max(swath, 0.3);
+                // The corner's round is out of a flat end mill's reach.
+                const double r = semi.diameter / 2, in_x = x + 12, in_y = 9 - std::abs(y);
+                const bool in_corner = in_x < r + 1 && in_y < r + 1;
+                if (wall < clear + 1.3 || x > 28 || in_corner || before.left(c) <= 1) continue;
+                ++stood;
+                left += stock.left(c) > 1;
+            }
+        EXPECT_GT(stood, 500);
+        EXPECT_EQ(left, 0) << "swath " << swath;
+    }
+}
+
+TEST(RestContours, AWiderSwathLeavesLessToSemiRoughing) {
+    std::vector<double> length;
+    for (const double swath : {0.5, 2.0, 4.0, 8.5}) {
+        Notch n;
+        const Tool rough = n.flat(1), semi = n.flat(0.25);
+        n.layer.tools.rough = rough;
+        LayerStock stock(n.cut, 0.25);
+        stock.cut(n.cut, rough_layer(n.cut), rough);
+        double mm = 0;
+        const Operation op = semi_rough_layer(n.cut, stock, semi, {"waste", 1.0, swath, 0.3});
+        for (std::size_t i = 1; i < op.moves.size(); ++i)
+            if (op.moves[i].feed > 0)
+                mm += std::hypot(to_mm(op.moves[i].x) - to_mm(op.moves[i - 1].x), to_mm(op.moves[i].y) - to_mm(op.moves[i - 1].y));
+        length.push_back(mm);
+    }
+    EXPECT_TRUE(std::is_sorted(length.rbegin(), length.rend())) << length[0] << ' ' << length[1] << ' ' << length[2] << ' ' << length[3];
+    EXPECT_LT(length.back(), 0.5 * length.front());
+}
+
+// LUO's sample with print's two tools, and with all of them: contours are faster than the raster, and the part is made.
+TEST(RestContours, LuosSampleIsFasterOnContoursAndVerifies) {
+    Context context;
+    const Mesh mesh = weld(context, luo_tool_sample());
+    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/luo-tool-sample.stl";
+    for (const bool all : {false, true}) {
+        Job job;
+        if (all) job.tools = luo_library();
+        job.selection.mode = SelectionMode::fixed;
+        job.cutting.engagement = Engagement::nominal;
+        std::vector<double> minutes;
+        for (const RestPattern pattern : {RestPattern::raster, RestPattern::contour}) {
+            job.cutting.rest_pattern = pattern;
+            const Plan plan = make_plan(context, mesh, {}, job);
+            minutes.push_back(plan.totals.cutting_minutes + plan.totals.tool_change_minutes);
+        }
+        EXPECT_LT(minutes[1], 0.95 * minutes[0]) << "all tools: " << all;
+    }
+    Job job;
+    job.cutting.rest_pattern = RestPattern::contour;
+    const support::TemporaryFolder folder;
+    write(context, plan(context, stl, job), folder / "out");
+    const VerifyResult result = verify(context, folder / "out", stl);
+    EXPECT_TRUE(result.passed) << (result.violations.empty() ? "" : result.violations[0].message);
+}
+
+}  // namespace
+}  // namespace slabwright
