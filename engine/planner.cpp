@@ -325,12 +325,14 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
         if (i > 0) overhang = overhang_map(regions, plan.stock_min, plan.stock_max);
         std::optional<Trial> best;
         std::size_t chosen = 0;
+        const std::size_t first_sets = sets.size();
+        const bool may_widen = selection && job.selection.compare && !selection->vertical;
         bool widened = false;
         LayerTools best_tools;
         for (std::size_t s = 0;; ++s) {
             if (s == sets.size()) {
                 // Of the sets planned so far the best, with a wider roughing cutter.
-                if (widened || !selection || !job.selection.compare || selection->vertical) break;
+                if (widened || !may_widen) break;
                 widened = true;
                 for (LayerTools& tools : with_wider_rough(context, work, best_tools)) sets.emplace_back("wider rough", std::move(tools));
                 if (s == sets.size()) break;
@@ -342,7 +344,10 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
             for (const Feature& f : plan.features)
                 if (f.type == FeatureType::up_flat && f.area >= job.cutting.min_flat_area && f.z_low < layer.z_top && f.z_low > work.floor_below)
                     work.feet.push_back(&f);
-            const double step = (1 - chosen_at) / static_cast<double>(sets.size()), at = chosen_at + step * static_cast<double>(s);
+            // The sets of the choice, then those that are known once they are planned.
+            const double middle = may_widen ? 0.6 * chosen_at + 0.4 : 1, from = s < first_sets ? chosen_at : middle, to = s < first_sets ? middle : 1;
+            const std::size_t before = s < first_sets ? 0 : first_sets, count = s < first_sets ? first_sets : sets.size() - first_sets;
+            const double step = (to - from) / static_cast<double>(count), at = from + step * static_cast<double>(s - before);
             ProgressPart part(progress, at, at + step);
             work.progress = &part;
             Trial trial = plan_layer(context, plan, layer, work, overhang ? &*overhang : nullptr);

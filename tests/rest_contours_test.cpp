@@ -43,6 +43,7 @@ struct Notch {
         layer.stock_max = {40, 40};
         layer.tools = fixed_tools(job);
         cut.standing = &standing;
+        cut.floors = {0.5};
     }
     [[nodiscard]] Tool flat(double inches) const {
         for (const Tool& t : job.tools)
@@ -64,14 +65,15 @@ TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
         ASSERT_FALSE(op.moves.empty());
         EXPECT_LE(op.stepdown, semi.stepdown_max + 1e-9);
         // Nothing of the part is entered.
-        const DropIndex part(n.context, n.cut.solid, {Cutter::Profile::flat, semi.diameter / 2});
+        const double gouge = n.job.tolerances.gouge;
+        const DropIndex part(n.context, n.cut.solid, {Cutter::Profile::flat, semi.diameter / 2 - gouge});
         for (std::size_t i = 1; i < op.moves.size(); ++i) {
             const Move &a = op.moves[i - 1], &b = op.moves[i];
             if (b.feed == 0) continue;
             for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) {
                 const double x = to_mm(a.x) + t * (to_mm(b.x) - to_mm(a.x)), y = to_mm(a.y) + t * (to_mm(b.y) - to_mm(a.y)),
                              z = to_mm(a.z) + t * (to_mm(b.z) - to_mm(a.z));
-                ASSERT_GE(z, part.drop(x, y).tip_z - n.job.tolerances.gouge) << "swath " << swath << " at " << x << ' ' << y << ' ' << z;
+                ASSERT_GE(z, part.drop(x, y).tip_z - gouge) << "swath " << swath << " at " << x << ' ' << y << ' ' << z;
             }
         }
         // Of what stood on the notch's floor, the middle is gone; nothing stands that the cutter reaches outside the swath. Facets of the
@@ -97,6 +99,7 @@ TEST(RestContours, AWiderSwathLeavesLessToSemiRoughing) {
     std::vector<double> length;
     for (const double swath : {0.5, 2.0, 4.0, 8.5}) {
         Notch n;
+        n.cut.floors.clear();  // on a floor the swath leaves nothing to the ball
         const Tool rough = n.flat(1), semi = n.flat(0.25);
         n.layer.tools.rough = rough;
         LayerStock stock(n.cut, 0.25);
