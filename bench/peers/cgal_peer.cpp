@@ -19,6 +19,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 #include <iterator>
 #include <vector>
@@ -28,6 +29,8 @@ namespace {
 using Kernel = CGAL::Simple_cartesian<double>;
 using Point = Kernel::Point_3;
 using Surface = CGAL::Surface_mesh<Point>;
+
+double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -87,6 +90,7 @@ int main(int argc, char** argv) {
     CGAL::Polygon_mesh_slicer<Surface, Kernel> slicer(mesh, tree);
     std::printf("tree_s %.4f\n", seconds() - begin);
     begin = seconds();
+    const double processor = processor_seconds();
     std::size_t segments = 0, loops = 0;
     for (int i = 0; i < planes; ++i) {
         std::vector<std::vector<Point>> polylines;
@@ -96,6 +100,7 @@ int main(int argc, char** argv) {
         for (const auto& line : polylines) segments += line.size() - 1;
     }
     if (segments == 0) stop("the sections are empty");
-    std::printf("slice_s %.4f\nsegments %zu\nloops %zu\n", seconds() - begin, segments, loops);
+    std::printf("slice_s %.4f\nslice_processor_s %.4f\nsegments %zu\nloops %zu\n", seconds() - begin, processor_seconds() - processor, segments,
+                loops);
     return 0;
 }

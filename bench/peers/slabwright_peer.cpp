@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <vector>
 
 #include "io/stl.h"
@@ -13,6 +14,9 @@
 namespace {
 
 using namespace slabwright;
+
+/// Of all threads of this process.
+double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -26,8 +30,9 @@ void load_and_slice(const char* path, int planes, int threads) {
     std::vector<Plane> request;
     for (int i = 0; i < planes; ++i) request.push_back({box.min.z + (static_cast<double>(box.max.z) - box.min.z) * (i + 0.5) / planes, Side::above});
     begin = seconds();
+    const double processor = processor_seconds();
     const std::vector<Section> sections = slice(context, mesh.view(), request);
-    const double took = seconds() - begin;
+    const double took = seconds() - begin, processor_took = processor_seconds() - processor;
     std::size_t segments = 0, loops = 0;
     for (const Section& section : sections) {
         segments += section.loops.points.size();
@@ -35,7 +40,7 @@ void load_and_slice(const char* path, int planes, int threads) {
         if (section.open_chains.size() != 0) throw Error(ErrorKind::input, "peer.open", "the sections are not closed", path);
     }
     if (segments == 0) throw Error(ErrorKind::input, "peer.empty", "the sections are empty", path);
-    std::printf("slice_s %.4f\nsegments %zu\nloops %zu\n", took, segments, loops);
+    std::printf("slice_s %.4f\nslice_processor_s %.4f\nsegments %zu\nloops %zu\n", took, processor_took, segments, loops);
 }
 
 }  // namespace

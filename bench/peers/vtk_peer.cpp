@@ -1,4 +1,4 @@
-// VTK as a peer: reads a binary STL with its points merged, then cuts it by planes and joins the pieces into lines.
+// VTK as a peer: reads a binary STL and merges its points, then cuts it by planes and joins the pieces into lines.
 //     vtk_peer FILE.stl PLANES      (0 planes: only load)
 // Prints seconds and counts, a line each, as all peers do.
 #include <vtkCellArray.h>
@@ -7,13 +7,17 @@
 #include <vtkPlane.h>
 #include <vtkPolyData.h>
 #include <vtkSTLReader.h>
+#include <vtkStaticCleanPolyData.h>
 #include <vtkStripper.h>
 
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 
 namespace {
+
+double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -30,9 +34,13 @@ int main(int argc, char** argv) {
     double begin = seconds();
     vtkNew<vtkSTLReader> reader;
     reader->SetFileName(argv[1]);
-    reader->MergingOn();
-    reader->Update();
-    vtkPolyData* mesh = reader->GetOutput();
+    reader->MergingOff();  // what merges points after reading is many times faster than the reader itself
+    vtkNew<vtkStaticCleanPolyData> clean;
+    clean->SetInputConnection(reader->GetOutputPort());
+    clean->ToleranceIsAbsoluteOn();
+    clean->SetAbsoluteTolerance(0);
+    clean->Update();
+    vtkPolyData* mesh = clean->GetOutput();
     mesh->BuildLinks();  // which facets meet at a vertex: what VTK has for adjacency
     if (mesh->GetNumberOfCells() == 0) stop("the mesh is empty");
     std::printf("facets %lld\nvertices %lld\nload_s %.4f\n", static_cast<long long>(mesh->GetNumberOfCells()),
@@ -42,6 +50,7 @@ int main(int argc, char** argv) {
     double box[6];
     mesh->GetBounds(box);
     begin = seconds();
+    const double processor = processor_seconds();
     vtkNew<vtkPlane> plane;
     plane->SetNormal(0, 0, 1);
     plane->SetOrigin(0, 0, 0);
@@ -61,6 +70,7 @@ int main(int argc, char** argv) {
         segments += lines->GetNumberOfConnectivityIds() - lines->GetNumberOfCells();
     }
     if (segments == 0) stop("the sections are empty");
-    std::printf("slice_s %.4f\nsegments %lld\nloops %lld\n", seconds() - begin, segments, loops);
+    std::printf("slice_s %.4f\nslice_processor_s %.4f\nsegments %lld\nloops %lld\n", seconds() - begin, processor_seconds() - processor, segments,
+                loops);
     return 0;
 }
