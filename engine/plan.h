@@ -89,7 +89,9 @@ struct ToolSet {
     std::string name;        ///< "selected", "wider" (the next wider finish tool), "fixed" or "wider rough"
     std::vector<int> tools;  ///< numbers, in the order of their first cut
     double minutes = 0;      ///< of its programs, tool changes within the layer included
+    double left_mm2 = 0;     ///< of the layer's plan view, where more than the cusp's limit is left
     bool chosen = false;
+    std::string reason;  ///< why it was kept or not, in words
 };
 
 /// How the tools of a layer were chosen.

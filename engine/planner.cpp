@@ -113,22 +113,37 @@ struct Trial {
     Layer layer;
     std::vector<Diagnostic> diagnostics;
     double minutes = 0;  // of its programs and the changes of tool between them
-    LayerCuts cuts{};    // of its programs, for their peaks
+    double left_mm2 = 0;
+    bool whole = true;  // false: given up, its feeds were not adapted
+    LayerCuts cuts{};   // of its programs, for their peaks
 };
 
+double minutes_of(const Layer& layer, const Machine& machine) {
+    double minutes = 0;
+    const Operation* before = nullptr;
+    for (const Operation& op : layer.operations) {
+        minutes += motion_time(op.moves, machine).minutes + machine.spindle_dwell_s / 60;
+        if (before && before->tool != op.tool) minutes += machine.tool_change_s / 60;
+        before = &op;
+    }
+    return minutes;
+}
+
 // @param overhang of the layer's slab; null: it lies on the board
-Trial plan_layer(Context& context, const Plan& plan, const Layer& layer, const LayerJob& work, const OverhangMap* overhang) {
+// @param most     minutes: where the paths alone take longer at the feeds they are planned with, they are not followed any further
+Trial plan_layer(Context& context, const Plan& plan, const Layer& layer, const LayerJob& work, const OverhangMap* overhang, double most) {
     Trial trial{layer, {}, 0};
     LayerResult result = plan_layer_paths(context, work);
     trial.layer.operations = std::move(result.operations);
     trial.diagnostics = std::move(result.diagnostics);
-    if (plan.job.cutting.engagement == Engagement::simulated) trial.cuts = adapt_layer(context, trial.layer, plan, overhang, trial.diagnostics);
-    const Operation* before = nullptr;
-    for (const Operation& op : trial.layer.operations) {
-        trial.minutes += motion_time(op.moves, plan.job.machine).minutes + plan.job.machine.spindle_dwell_s / 60;
-        if (before && before->tool != op.tool) trial.minutes += plan.job.machine.tool_change_s / 60;
-        before = &op;
+    trial.left_mm2 = result.left_mm2;
+    trial.minutes = minutes_of(trial.layer, plan.job.machine);
+    if (trial.minutes > most) {
+        trial.whole = false;
+        return trial;
     }
+    if (plan.job.cutting.engagement == Engagement::simulated) trial.cuts = adapt_layer(context, trial.layer, plan, overhang, trial.diagnostics);
+    trial.minutes = minutes_of(trial.layer, plan.job.machine);
     return trial;
 }
 
@@ -317,7 +332,8 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
             sets.emplace(sets.begin(), "selected", std::move(choice.tools));
             selection = std::move(choice.record);
         }
-        if (!selecting || job.selection.compare) sets.emplace_back("fixed", fixed_tools(fitted));
+        // First, so that the others are measured by it.
+        if (!selecting || job.selection.compare) sets.emplace(sets.begin(), "fixed", fixed_tools(fitted));
         const double chosen_at = selecting ? kSelectionShare : 0;
         progress.reach(chosen_at);
         std::optional<OverhangMap> overhang;
@@ -350,12 +366,29 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
             const double step = (to - from) / static_cast<double>(count), at = from + step * static_cast<double>(s - before);
             ProgressPart part(progress, at, at + step);
             work.progress = &part;
-            Trial trial = plan_layer(context, plan, layer, work, overhang ? &*overhang : nullptr);
+            // Adapting feeds may make a plan faster, though never by so much.
+            constexpr double kHopeless = 1.5;
+            Trial trial = plan_layer(context, plan, layer, work, overhang ? &*overhang : nullptr, best ? kHopeless * best->minutes : 1e300);
             part.reach(1);
-            if (selection) selection->sets.push_back({sets[s].first, tools_in_order(trial.layer), trial.minutes, false});
-            if (!best || trial.minutes < best->minutes) best = std::move(trial), chosen = s, best_tools = sets[s].second;
+            // The first is the fixed set where sets are compared; none may leave more than that, but for what differently fine cells see.
+            constexpr double kMore = 1.1, kFew = 5;  // mm²
+            const bool leaves_more = s > 0 && trial.left_mm2 > kMore * selection->sets[0].left_mm2 + kFew;
+            if (selection) {
+                ToolSet& set =
+                    selection->sets.emplace_back(ToolSet{sets[s].first, tools_in_order(trial.layer), trial.minutes, trial.left_mm2, false, {}});
+                if (leaves_more)
+                    set.reason = fmt::format("leaves {:.1f} mm² over the limit, the first set {:.1f} mm²", set.left_mm2, selection->sets[0].left_mm2);
+                else if (!trial.whole) set.reason = fmt::format("its paths alone take {:.1f} min, against {:.1f} min", trial.minutes, best->minutes);
+            }
+            if (!best || (trial.whole && !leaves_more && trial.minutes < best->minutes))
+                best = std::move(trial), chosen = s, best_tools = sets[s].second;
         }
-        if (selection) selection->sets[chosen].chosen = true;
+        if (selection) {
+            selection->sets[chosen].chosen = true;
+            selection->sets[chosen].reason = sets.size() > 1 ? "takes the least time of those that leave no more" : "not compared";
+            for (ToolSet& set : selection->sets)
+                if (set.reason.empty()) set.reason = fmt::format("takes {:.1f} min longer", set.minutes - selection->sets[chosen].minutes);
+        }
         plan.layers[i] = std::move(best->layer);
         plan.layers[i].selection = std::move(selection);
         found_in[i] = std::move(best->diagnostics);

@@ -148,7 +148,9 @@ void put_selection(JsonText& json, const std::optional<LayerSelection>& selectio
         for (const int tool : set.tools) json.integer(tool);
         json.end();
         json.key("minutes").rounded(set.minutes, kMinutes);
+        json.key("left_mm2").rounded(set.left_mm2, kArea);
         json.key("chosen").boolean(set.chosen);
+        json.key("reason").string(set.reason);
         json.end();
     }
     json.end().end();

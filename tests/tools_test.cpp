@@ -81,11 +81,19 @@ TEST(Tools, ALayerIsNeverSlowerThanWithTheFixedSet) {
         ASSERT_TRUE(layer.selection.has_value());
         const std::vector<ToolSet>& sets = layer.selection->sets;
         ASSERT_GE(sets.size(), 2U);
-        EXPECT_EQ(sets.front().name, "selected");
+        EXPECT_EQ(sets.front().name, "fixed") << "the others are measured by it";
+        EXPECT_EQ(sets[1].name, "selected");
         EXPECT_EQ(std::count_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.name == "fixed"; }), 1);
         EXPECT_EQ(std::count_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.chosen; }), 1);
         const auto taken = std::find_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.chosen; });
-        for (const ToolSet& other : sets) EXPECT_LE(taken->minutes, other.minutes);
+        EXPECT_LE(taken->minutes, sets.front().minutes);
+        EXPECT_LE(taken->left_mm2, 1.1 * sets.front().left_mm2 + 5);
+        for (const ToolSet& other : sets) {
+            EXPECT_FALSE(other.reason.empty());
+            if (other.left_mm2 <= sets.front().left_mm2) {
+                EXPECT_LE(taken->minutes, other.minutes);
+            }
+        }
         for (const ToolCandidate& c : layer.selection->candidates) EXPECT_FALSE(c.reason.empty());
     }
     for (const Layer& layer : fixed.layers) EXPECT_FALSE(layer.selection.has_value());

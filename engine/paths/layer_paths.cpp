@@ -231,6 +231,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             result.operations.resize(operations);
             cut.no_way_in.resize(no_ways);
         }
+        result.left_mm2 = stock.area_over(limit);
     }
     if (!cut.no_way_in.empty())
         result.diagnostics.push_back({Severity::note, "entry.no_room",

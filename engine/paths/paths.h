@@ -30,6 +30,7 @@ struct LayerJob {
 struct LayerResult {
     std::vector<Operation> operations;  ///< in the order of execution
     std::vector<Diagnostic> diagnostics;
+    double left_mm2 = 0;  ///< plan view of what is left over the cusp's limit; 0 where it is not followed (Cutting::uniform_steps)
 };
 
 /// Face, rough, floors, walls, levels and raster of one layer, and what these leave. Operations that would remove nothing are left out.
