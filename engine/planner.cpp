@@ -366,7 +366,7 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
             const double step = (to - from) / static_cast<double>(count), at = from + step * static_cast<double>(s - before);
             ProgressPart part(progress, at, at + step);
             work.progress = &part;
-            // Adapting feeds may make a plan faster, though never by so much.
+            // Adapted feeds seldom make a plan faster by so much; a set that is given up for it is not proven slower.
             constexpr double kHopeless = 1.5;
             Trial trial = plan_layer(context, plan, layer, work, overhang ? &*overhang : nullptr, best ? kHopeless * best->minutes : 1e300);
             part.reach(1);
