@@ -1,0 +1,205 @@
+#include "engine/layer_plan.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "engine/forces/min_material.h"
+#include "engine/paths/paths.h"
+#include "engine/schedule/motion_time.h"
+#include "engine/tools/reach_ratio.h"
+#include "engine/tools/select.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kSelectionShare = 0.3;  // of a layer's work, where its tools are chosen
+constexpr double kFirstSetsShare = 0.4;  // of what then remains, the sets of the choice; those that they lead to take the rest
+
+// A layer as one set of tools makes it, with the forces of its programs and the feeds that they allow.
+struct Trial {
+    PlannedLayer planned;
+    double minutes = 0;  // of its programs and the changes of tool between them
+    double left_mm2 = 0;
+    bool whole = true;  // false: given up, its feeds were not adapted
+};
+
+double minutes_of(const Layer& layer, const Machine& machine) {
+    double minutes = 0;
+    const Operation* before = nullptr;
+    for (const Operation& op : layer.operations) {
+        minutes += motion_time(op.moves, machine).minutes + machine.spindle_dwell_s / 60;
+        if (before && before->tool != op.tool) minutes += machine.tool_change_s / 60;
+        before = &op;
+    }
+    return minutes;
+}
+
+std::vector<int> tools_in_order(const Layer& layer) {
+    std::vector<int> tools;
+    for (const Operation& op : layer.operations)
+        if (std::find(tools.begin(), tools.end(), op.tool) == tools.end()) tools.push_back(op.tool);
+    return tools;
+}
+
+class LayerPlanner {
+public:
+    LayerPlanner(Context& context, const LayerGround& ground, std::size_t index, ProgressPart& progress)
+        : context_(context),
+          ground_(ground),
+          layer_(ground.plan.layers[index]),
+          fitted_(with_tools_for(ground.plan.job, layer_.z_top - layer_.z_bottom)),
+          overrun_(overrun_of(ground.plan.job)),
+          progress_(progress) {
+        const Plan& plan = ground.plan;
+        work_.mesh = ground.mesh;
+        work_.job = &fitted_;
+        work_.z_bottom = layer_.z_bottom;
+        work_.z_top = layer_.z_top;
+        work_.slab_thickness = layer_.slab_thickness;
+        work_.stock_min = plan.stock_min;
+        work_.stock_max = plan.stock_max;
+        work_.index = layer_.index;
+        if (plan.flask) work_.opening = plan.flask->inner[index];
+        for (const Feature& f : plan.features)
+            if (f.type == FeatureType::up_flat && f.area >= fitted_.cutting.min_flat_area && f.z_low < layer_.z_top && f.z_low > layer_.z_bottom)
+                work_.flats.push_back(&f);
+        work_.floor_below = layer_.z_bottom - (ground.carried_by ? overrun_.below : overrun_.board);
+        if (ground.carried_by) overhang_ = overhang_map({&ground.carried_by, 1}, plan.stock_min, plan.stock_max);
+    }
+
+    PlannedLayer run() {
+        const bool selecting = selects_tools(ground_.plan.job), compare = fitted_.selection.compare;
+        // First, so that the others are measured by it.
+        if (!selecting || compare) sets_.push_back({"fixed", fixed_tools(fitted_)});
+        if (selecting) choose();
+        const bool may_widen = selecting && compare && !selection_->vertical;
+        const double chosen_at = selecting ? kSelectionShare : 0, middle = may_widen ? chosen_at + kFirstSetsShare * (1 - chosen_at) : 1;
+        progress_.reach(chosen_at);
+        try_sets(0, chosen_at, middle);
+        if (may_widen) {
+            // Of the sets planned so far the best, with a wider roughing cutter.
+            const std::size_t first = sets_.size();
+            for (LayerTools& tools : with_wider_rough(context_, work_, sets_[chosen_].tools)) sets_.push_back({"wider rough", std::move(tools)});
+            try_sets(first, middle, 1);
+        }
+        if (selection_) give_reasons();
+        best_->planned.layer.selection = std::move(selection_);
+        progress_.reach(1);
+        return std::move(best_->planned);
+    }
+
+private:
+    struct NamedSet {
+        std::string name;
+        LayerTools tools;
+    };
+
+    void choose() {
+        ToolChoice choice = select_tools(context_, work_, reach_ratio(context_, work_, ground_.scene));
+        std::optional<Tool> wider;
+        if (fitted_.selection.compare && !choice.record.vertical) wider = next_wider_ball(fitted_, choice.tools.finish);
+        sets_.push_back({"selected", std::move(choice.tools)});
+        selection_ = std::move(choice.record);
+        // One narrow place may have decided for the whole layer: the next wider finish tool, with smaller ones in that place only.
+        if (wider) sets_.push_back({"wider", select_tools(context_, work_, {}, wider).tools});
+    }
+
+    // Plans the sets from `first` on; their share of the progress is [from, to].
+    void try_sets(std::size_t first, double from, double to) {
+        const double step = (to - from) / static_cast<double>(std::max<std::size_t>(1, sets_.size() - first));
+        for (std::size_t s = first; s < sets_.size(); ++s) {
+            const double at = from + step * static_cast<double>(s - first);
+            ProgressPart part(progress_, at, at + step);
+            // Adapted feeds seldom make a plan faster by so much; a set that is given up for it is not proven slower.
+            constexpr double kHopeless = 1.5;
+            judge(s, plan_with(sets_[s].tools, best_ ? kHopeless * best_->minutes : 1e300, part));
+            part.reach(1);
+        }
+    }
+
+    // @param most minutes: where the paths alone take longer at the feeds they are planned with, they are not followed any further
+    Trial plan_with(const LayerTools& tools, double most, ProgressPart& part) {
+        const Job& job = ground_.plan.job;
+        work_.tools = tools;
+        work_.progress = &part;
+        const double below = tools.finish.diameter / 2;
+        const double board = job.machine.base_board_cut >= 0 ? overrun_.board : std::min(below, overrun_.board);
+        work_.floor_below = layer_.z_bottom - (ground_.carried_by ? below : board);
+        work_.feet.clear();
+        for (const Feature& f : ground_.plan.features)
+            if (f.type == FeatureType::up_flat && f.area >= job.cutting.min_flat_area && f.z_low < layer_.z_top && f.z_low > work_.floor_below)
+                work_.feet.push_back(&f);
+        LayerResult result = plan_layer_paths(context_, work_);
+        Trial trial;
+        Layer& layer = trial.planned.layer = layer_;
+        layer.operations = std::move(result.operations);
+        trial.planned.diagnostics = std::move(result.diagnostics);
+        trial.left_mm2 = result.left_mm2;
+        trial.minutes = minutes_of(layer, job.machine);
+        trial.whole = trial.minutes <= most;
+        if (!trial.whole || job.cutting.engagement != Engagement::simulated) return trial;
+        trial.planned.cuts = adapt_layer(context_, layer, ground_.plan, overhang_ ? &*overhang_ : nullptr, trial.planned.diagnostics);
+        trial.minutes = minutes_of(layer, job.machine);
+        return trial;
+    }
+
+    // Keeps the trial of set s where it is the best so far.
+    void judge(std::size_t s, Trial trial) {
+        // None may leave more than the first set, but for what differently fine cells see.
+        constexpr double kMore = 1.1, kFew = 5;  // mm²
+        if (s == 0) allowed_left_ = kMore * trial.left_mm2 + kFew;
+        const bool leaves_more = s > 0 && trial.left_mm2 > allowed_left_;
+        if (selection_) {
+            ToolSet& set =
+                selection_->sets.emplace_back(ToolSet{sets_[s].name, tools_in_order(trial.planned.layer), trial.minutes, trial.left_mm2, false, {}});
+            if (leaves_more)
+                set.reason = fmt::format("leaves {:.1f} mm² over the limit, the first set {:.1f} mm²", set.left_mm2, selection_->sets[0].left_mm2);
+            else if (!trial.whole) set.reason = fmt::format("its paths alone take {:.1f} min, against {:.1f} min", trial.minutes, best_->minutes);
+        }
+        if (!best_ || (trial.whole && !leaves_more && trial.minutes < best_->minutes)) best_ = std::move(trial), chosen_ = s;
+    }
+
+    void give_reasons() {
+        ToolSet& chosen = selection_->sets[chosen_];
+        chosen.chosen = true;
+        chosen.reason = sets_.size() > 1 ? "takes the least time of those that leave no more" : "not compared";
+        for (ToolSet& set : selection_->sets)
+            if (set.reason.empty()) set.reason = fmt::format("takes {:.1f} min longer", set.minutes - chosen.minutes);
+    }
+
+    Context& context_;
+    const LayerGround& ground_;
+    const Layer& layer_;
+    const Job fitted_;  // a layer may be taller than the shortest tools make; the others make it then
+    const Overrun overrun_;
+    ProgressPart& progress_;
+    LayerJob work_;
+    std::optional<OverhangMap> overhang_;
+    std::vector<NamedSet> sets_;
+    std::optional<LayerSelection> selection_;
+    std::optional<Trial> best_;
+    std::size_t chosen_ = 0;
+    double allowed_left_ = 0;  // mm²
+};
+
+}  // namespace
+
+Overrun overrun_of(const Job& job) {
+    Overrun overrun{fixed_tools(job).finish.diameter / 2, 0};
+    if (selects_tools(job))
+        for (const Tool& tool : job.tools)
+            if (tool.kind == ToolKind::ball) overrun.below = std::max(overrun.below, tool.diameter / 2);
+    const Machine& machine = job.machine;
+    overrun.board = std::min(machine.base_board_cut >= 0 ? machine.base_board_cut : overrun.below, machine.base_board_thickness);
+    return overrun;
+}
+
+PlannedLayer plan_layer(Context& context, const LayerGround& ground, std::size_t index, ProgressPart& progress) {
+    return LayerPlanner(context, ground, index, progress).run();
+}
+
+}  // namespace slabwright

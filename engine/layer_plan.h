@@ -1,0 +1,40 @@
+// One layer of a plan: its tools are chosen, its paths laid, its forces met by feeds.
+#pragma once
+
+#include "engine/forces/feeds.h"
+#include "engine/plan.h"
+#include "kernels/access/accessibility.h"
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+#include "kernels/parallel/progress_part.h"
+
+namespace slabwright {
+
+/// How far below a layer's bottom its cutters may reach, mm.
+struct Overrun {
+    double below = 0;  ///< into the layer below, whichever finish tool is chosen
+    double board = 0;  ///< into the base board, under the first layer
+};
+[[nodiscard]] Overrun overrun_of(const Job& job);
+
+/// What a layer's planning looks at besides the layer. All outlives it.
+struct LayerGround {
+    const Plan& plan;                    ///< its job, stock, features and flask; of its layers only the one that is planned
+    MeshView mesh;                       ///< the whole pattern, pattern-base
+    const AccessScene* scene = nullptr;  ///< of the mesh; needed where tools are chosen by the exact rule
+    const Loops* carried_by = nullptr;   ///< what stays of the slab below the layer's joint; null: it lies on the board
+};
+
+struct PlannedLayer {
+    Layer layer;
+    std::vector<Diagnostic> diagnostics;
+    LayerCuts cuts;  ///< of its programs, for their peaks; empty with the nominal engagement
+};
+
+/// Plans layer `index` (0 …) of the ground's plan, which has its z range and slab. Where the job selects tools, the sets worth a look are
+/// planned whole and compared: the first, the fixed set where the job compares, is the measure of what may be left over; of those that
+/// leave no more, the one that takes the least time is taken, changes of tool counted. What was compared is in Layer::selection.
+/// @throws Error(usage, "job.tool") when the library lacks a flat or a ball; Error(no_plan), Error(cancelled)
+[[nodiscard]] PlannedLayer plan_layer(Context& context, const LayerGround& ground, std::size_t index, ProgressPart& progress);
+
+}  // namespace slabwright
