@@ -17,6 +17,7 @@
 #include "kernels/access/triangle.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
+#include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -739,15 +740,11 @@ Work collect(Context& context, const Scene& scene, double low, double high) {
         std::uint32_t index;
     };
     std::vector<Key> keys(unsorted.size());
-    const Box3& box = scene.box;
-    const double extent = std::max(
-        {1e-6, static_cast<double>(box.max.x) - box.min.x, static_cast<double>(box.max.y) - box.min.y, static_cast<double>(box.max.z) - box.min.z});
+    const MortonGrid grid(scene.box);
     for (std::size_t i = 0; i < keys.size(); ++i) {
         const Triangle& t = unsorted[i].t;
-        auto cell = [&](int k, double from) {
-            return static_cast<std::uint32_t>(std::clamp(((t[0][k] + t[1][k] + t[2][k]) / 3 - from) / extent, 0.0, 1.0) * ((1 << 21) - 1));
-        };
-        keys[i] = {morton(cell(0, box.min.x), cell(1, box.min.y), cell(2, box.min.z)), static_cast<std::uint32_t>(i)};
+        auto middle = [&](int k) { return (t[0][k] + t[1][k] + t[2][k]) / 3; };
+        keys[i] = {grid.code(middle(0), middle(1), middle(2)), static_cast<std::uint32_t>(i)};
     }
     parallel_sort(context, keys.begin(), keys.end(),
                   [](const Key& a, const Key& b) { return a.code != b.code ? a.code < b.code : a.index < b.index; });

@@ -13,6 +13,7 @@
 
 #include "kernels/access/triangle.h"
 #include "kernels/errors.h"
+#include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -179,14 +180,8 @@ std::vector<ClosestHit> ClosestPoint::query(Context& context, std::span<const Po
         std::size_t index;
     };
     std::vector<Key> order(points.size());
-    const Box3& box = impl_->box;
-    const double extent = std::max(
-        {1e-6, static_cast<double>(box.max.x) - box.min.x, static_cast<double>(box.max.y) - box.min.y, static_cast<double>(box.max.z) - box.min.z});
-    auto cell = [&](double v, double low) {
-        return static_cast<std::uint32_t>(std::clamp((v - low) / extent, 0.0, 1.0) * static_cast<double>((1 << 21) - 1));
-    };
-    for (std::size_t i = 0; i < points.size(); ++i)
-        order[i] = {morton(cell(points[i][0], box.min.x), cell(points[i][1], box.min.y), cell(points[i][2], box.min.z)), i};
+    const MortonGrid grid(impl_->box);
+    for (std::size_t i = 0; i < points.size(); ++i) order[i] = {grid.code(points[i][0], points[i][1], points[i][2]), i};
     parallel_sort(context, order.begin(), order.end(),
                   [](const Key& a, const Key& b) { return a.code != b.code ? a.code < b.code : a.index < b.index; });
     parallel_for(context, points.size(), 256, [&](std::size_t begin, std::size_t end) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "kernels/access/triangle.h"
+#include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -261,9 +262,7 @@ Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& tri, double
 StandingPart::StandingPart(Context& context, MeshView mesh) {
     const std::size_t n = mesh.size();
     box_ = bounds(mesh);
-    const double ex = std::max(1e-6, static_cast<double>(box_.max.x) - box_.min.x), ey = std::max(1e-6, static_cast<double>(box_.max.y) - box_.min.y),
-                 ez = std::max(1e-6, static_cast<double>(box_.max.z) - box_.min.z);
-    const double extent = std::max({ex, ey, ez});
+    const MortonGrid grid(box_);
     struct Key {
         std::uint64_t code;
         std::uint32_t facet;
@@ -273,12 +272,8 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
         for (std::size_t i = begin; i < end; ++i) {
             const Index3& f = mesh.facets[i];
             const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
-            auto cell = [&](double sum, double low) {
-                return static_cast<std::uint32_t>(std::clamp((sum / 3 - low) / extent, 0.0, 1.0) * static_cast<double>((1 << 21) - 1));
-            };
-            keys[i] = {morton(cell(static_cast<double>(a.x) + b.x + c.x, box_.min.x), cell(static_cast<double>(a.y) + b.y + c.y, box_.min.y),
-                              cell(static_cast<double>(a.z) + b.z + c.z, box_.min.z)),
-                       static_cast<std::uint32_t>(i)};
+            auto middle = [](float u, float v, float w) { return (double{u} + v + w) / 3; };
+            keys[i] = {grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)), static_cast<std::uint32_t>(i)};
         }
     });
     parallel_sort(context, keys.begin(), keys.end(),

@@ -21,16 +21,6 @@ double side(const Vec3f& a, const Vec3f& b, double x, double y) {
     return swap ? -s : s;
 }
 
-std::uint64_t spread(std::uint32_t v) {  // 21 bits, two zeros between each
-    std::uint64_t x = v & 0x1FFFFF;
-    x = (x | x << 32) & 0x1F00000000FFFFull;
-    x = (x | x << 16) & 0x1F0000FF0000FFull;
-    x = (x | x << 8) & 0x100F00F00F00F00Full;
-    x = (x | x << 4) & 0x10C30C30C30C30C3ull;
-    x = (x | x << 2) & 0x1249249249249249ull;
-    return x;
-}
-
 }  // namespace
 
 Point3 closest_on_segment(const Point3& c, const Point3& a, const Point3& b) {
@@ -87,7 +77,5 @@ double facet_height(const std::array<Vec3f, 3>& f, double x, double y) {
     const double s = ((x - ax) * vy - (y - ay) * vx) / det, t = (ux * (y - ay) - uy * (x - ax)) / det;
     return std::clamp(az + s * uz + t * vz, low, high);
 }
-
-std::uint64_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t z) { return spread(x) | spread(y) << 1 | spread(z) << 2; }
 
 }  // namespace slabwright

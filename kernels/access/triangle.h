@@ -23,7 +23,4 @@ using Triangle = std::array<Point3, 3>;
 /// Height of a facet's plane over (x, y), kept within the facet's own range; its top when it is vertical.
 [[nodiscard]] double facet_height(const std::array<Vec3f, 3>& facet, double x, double y);
 
-/// Bits of three cell numbers (21 bits each) interleaved: near in space is mostly near in this order.
-[[nodiscard]] std::uint64_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t z);
-
 }  // namespace slabwright

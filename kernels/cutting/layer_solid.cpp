@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/slicing/slicing.h"
 
@@ -91,22 +92,52 @@ void append_facet(MeshView mesh, std::uint32_t f, double z_top, std::vector<Soli
 
 }  // namespace
 
+namespace {
+
+// The facets of the mesh that the layer's solid has a part of, in Morton order of their middles.
+std::vector<std::uint32_t> facets_between(Context& context, MeshView mesh, double z_low, double cut_off) {
+    constexpr std::size_t grain = std::size_t{1} << 16;
+    struct Key {
+        std::uint64_t code;
+        std::uint32_t facet;
+    };
+    const MortonGrid grid(bounds(mesh));
+    auto middle = [](float u, float v, float w) { return (double{u} + v + w) / 3; };
+    std::vector<std::vector<Key>> parts((mesh.size() + grain - 1) / grain);
+    parallel_for(context, mesh.size(), grain, [&](std::size_t begin, std::size_t end) {
+        std::vector<Key>& part = parts[begin / grain];
+        for (std::size_t f = begin; f < end; ++f) {
+            const Vec3f &a = mesh.vertices[mesh.facets[f][0]], &b = mesh.vertices[mesh.facets[f][1]], &c = mesh.vertices[mesh.facets[f][2]];
+            if (std::min({a.z, b.z, c.z}) >= cut_off || std::max({a.z, b.z, c.z}) < z_low) continue;  // a flat at the top itself belongs to the cap
+            part.push_back({grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)), static_cast<std::uint32_t>(f)});
+        }
+    });
+    std::vector<Key> keys;
+    for (std::vector<Key>& part : parts) {
+        keys.insert(keys.end(), part.begin(), part.end());
+        std::vector<Key>().swap(part);
+    }
+    parallel_sort(context, keys.begin(), keys.end(),
+                  [](const Key& a, const Key& b) { return a.code != b.code ? a.code < b.code : a.facet < b.facet; });
+    std::vector<std::uint32_t> facets(keys.size());
+    for (std::size_t i = 0; i < keys.size(); ++i) facets[i] = keys[i].facet;
+    return facets;
+}
+
+}  // namespace
+
 LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_top) {
     LayerSolid solid;
     solid.z_low = z_low;
     solid.z_top = z_top;
     const double cut_off = z_top - kTopSheet;  // the part is cut off here, facets and cap alike
+    const std::vector<std::uint32_t> facets = facets_between(context, mesh, z_low, cut_off);
     constexpr std::size_t grain = std::size_t{1} << 14;
-    std::vector<std::vector<SolidFacet>> parts((mesh.size() + grain - 1) / grain);
-    parallel_for(context, mesh.size(), grain, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::vector<SolidFacet>> parts((facets.size() + grain - 1) / grain);
+    parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
         std::vector<SolidFacet>& part = parts[begin / grain];
-        for (std::size_t f = begin; f < end; ++f) {
-            const Index3& facet = mesh.facets[f];
-            const double z0 = mesh.vertices[facet[0]].z, z1 = mesh.vertices[facet[1]].z, z2 = mesh.vertices[facet[2]].z;
-            const double low = std::min({z0, z1, z2}), high = std::max({z0, z1, z2});
-            if (low >= cut_off || high < z_low) continue;  // a flat at the top itself belongs to the cap
-            append_facet(mesh, static_cast<std::uint32_t>(f), cut_off, part);
-        }
+        part.reserve(end - begin);
+        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], cut_off, part);
     });
     std::size_t total = 0;
     for (const auto& part : parts) total += part.size();

@@ -25,7 +25,7 @@ struct SolidFacet {
 
 struct LayerSolid {
     double z_low = 0, z_top = 0;         ///< facets wholly below z_low are left out
-    std::vector<SolidFacet> facets;      ///< in the order of the mesh
+    std::vector<SolidFacet> facets;      ///< in Morton order of the mesh's facets: neighbours in space are near in memory
     Loops cap;                           ///< the section kTopSheet below z_top: the solid's flat upper end
     std::array<double, 2> min{}, max{};  ///< of the facets, in x and y
 };
