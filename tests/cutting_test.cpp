@@ -10,6 +10,7 @@
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/height_field.h"
+#include "tests/support/seed.h"
 
 namespace slabwright {
 namespace {
@@ -148,7 +149,7 @@ TEST_P(Cutting, DropRestsOnThePart) {
     const double z_top = seed % 3 == 0 ? 8.0 : 12.5;
     const LayerSolid solid = layer_solid(context, mesh.view(), -5, z_top);
     const Cutter cutter{profile, 2.0};
-    const DropIndex index(context, solid, cutter);
+    const DropIndex index(solid, cutter);
     std::mt19937 random(static_cast<std::uint32_t>(seed));
     for (int k = 0; k < 150; ++k) {
         const double x = static_cast<double>(random() % 26000) / 1000 - 13, y = static_cast<double>(random() % 26000) / 1000 - 13;
@@ -160,6 +161,98 @@ TEST_P(Cutting, DropRestsOnThePart) {
         EXPECT_GE(room(mesh, z_top - kTopSheet, cutter, x, y, rest.tip_z + 1e-6), -1e-6) << x << ' ' << y;
         EXPECT_LT(room(mesh, z_top - kTopSheet, cutter, x, y, rest.tip_z - 1.1e-3 - kTopSheet), 0)
             << x << ' ' << y << " could go lower than " << rest.tip_z;
+    }
+}
+
+// Many facets under one cutter, which the solid's tree must leave out or find: tiny ones, large ones beside them, upright walls and equal
+// heights, and all of it a metre away from the origin.
+TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
+    const auto [number, profile] = GetParam();
+    std::mt19937 random(test::seed() + static_cast<std::uint32_t>(number));
+    auto uniform = [&](double low, double high) { return low + (high - low) * (static_cast<double>(random()) / 4294967296.0); };
+    Context context;
+    Mesh mesh;
+    if (number % 2 == 0) {
+        const double a = uniform(0.2, 1.5), b = uniform(0.3, 2), rough = number == 2 ? 0.0 : 0.03, floor = number == 4 ? 2.5 : 0.5;
+        mesh = test::height_field(context, 64, 0.25, [&](double x, double y) {
+            return std::max(floor, 3 + 2 * std::sin(a * x + b * y) + std::cos(b * x) + uniform(-rough, rough));
+        });
+    } else {
+        shapes::Facets facets;
+        for (int j = 0; j < 8; ++j)
+            for (int i = 0; i < 8; ++i) {
+                const auto x = static_cast<float>(2 * i - 8), y = static_cast<float>(2 * j - 8), z = static_cast<float>(2 + random() % 3);
+                shapes::append(facets, shapes::box({x, y, 0}, {x + static_cast<float>(uniform(0.1, 1.9)), y + 1.25F, z}));
+            }
+        mesh = weld(context, facets);
+    }
+    const Vec3f away{number > 3 ? 1123.25F : -3.5F, number > 3 ? -877.5F : 2.25F, 0};
+    for (Vec3f& v : mesh.vertices) v.x += away.x, v.y += away.y;
+    const LayerSolid solid = layer_solid(context, mesh.view(), -20, 100);
+    for (const double r : {0.4, 3.0, 12.0}) {
+        const Cutter cutter{profile, r};
+        const DropIndex index(solid, cutter);
+        for (int k = 0; k < 40; ++k) {
+            // Some of the places lie right over edges and vertices.
+            const double x = away.x + (k % 4 ? uniform(-8 - r, 8 + r) : 0.25 * static_cast<double>(random() % 64) - 8),
+                         y = away.y + (k % 4 ? uniform(-8 - r, 8 + r) : 0.25 * static_cast<double>(random() % 64) - 8);
+            const Rest rest = index.drop(x, y);
+            if (rest.tip_z < -r) {
+                EXPECT_GE(room(mesh, 100, cutter, x, y, -r + 1e-6), 0) << x << ' ' << y;
+                continue;
+            }
+            EXPECT_GE(room(mesh, 100, cutter, x, y, rest.tip_z + 1e-6), -1e-6) << x << ' ' << y << " r " << r;
+            EXPECT_LT(room(mesh, 100, cutter, x, y, rest.tip_z - 1e-4), 0) << x << ' ' << y << " r " << r << " could go lower than " << rest.tip_z;
+        }
+    }
+}
+
+// Where two contacts are equally high, which one is given must not depend on the threads that made the tree.
+TEST(Drops, SameBytesOnAnyNumberOfThreads) {
+    std::vector<std::vector<float>> results;
+    for (const int threads : {1, 2, 4}) {
+        Context context({.threads = threads});
+        const Mesh mesh = test::random_height_field(context, 150, 0.5, 12, 0.5, 7);
+        const LayerSolid solid = layer_solid(context, mesh.view(), -5, 9);
+        const DropIndex index(solid, {Cutter::Profile::ball, 3.0});
+        std::vector<float>& result = results.emplace_back();
+        for (double y = -40; y <= 40; y += 1.25)
+            for (double x = -40; x <= 40; x += 0.25) {
+                const Rest rest = index.drop(x, y);
+                result.insert(result.end(), {static_cast<float>(rest.tip_z), rest.nx, rest.ny, rest.nz});
+            }
+    }
+    EXPECT_EQ(results[1], results[0]);
+    EXPECT_EQ(results[2], results[0]);
+}
+
+TEST(Drops, CapCellsKnowTheInsideAsWindingDoes) {
+    std::mt19937 random(test::seed());
+    for (int round = 0; round < 20; ++round) {
+        // Outer loops counter-clockwise and holes clockwise, some crossing each other, all on even coordinates; some have level edges.
+        Loops loops;
+        const int size = 1 << (10 + round), corners = 3 + static_cast<int>(random() % 40);
+        for (int l = 0; l < 6; ++l) {
+            const double cx = static_cast<double>(random() % 1000) / 1000 * size, cy = static_cast<double>(random() % 1000) / 1000 * size;
+            for (int k = 0; k < corners; ++k) {
+                const double turn = 2 * 3.141592653589793 * k / corners * (l % 3 == 2 ? -1 : 1),
+                             d = size * (0.2 + static_cast<double>(random() % 100) / 200);
+                Point2 p{2 * static_cast<std::int32_t>(cx + d * std::cos(turn)), 2 * static_cast<std::int32_t>(cy + d * std::sin(turn))};
+                if (k % 3 == 1) p.y = loops.points.back().y;
+                loops.points.push_back(p);
+            }
+            loops.close_loop();
+        }
+        const CapCells cells(loops);
+        int inside = 0;
+        for (int k = 0; k < 3000; ++k) {
+            const auto at = [&] { return static_cast<std::int32_t>(static_cast<double>(random() % 10000) / 10000 * 4 * size - size) | 1; };
+            const Point2 p{at(), at()};
+            const bool expected = winding(loops, p) > 0;
+            inside += expected;
+            ASSERT_EQ(cells.inside(to_mm(p.x), to_mm(p.y)), expected) << p.x << ' ' << p.y;
+        }
+        EXPECT_GT(inside, 100);
     }
 }
 

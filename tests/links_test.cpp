@@ -35,7 +35,7 @@ struct Bench {
         : mesh(box(context)),
           layer(),
           cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, {}, nullptr, {}},
-          part(context, cut.solid, {Cutter::Profile::flat, 5}) {
+          part(cut.solid, {Cutter::Profile::flat, 5}) {
         tool.diameter = 10;
         layer.mesh = mesh.view();
         layer.job = &job;

@@ -66,7 +66,7 @@ TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
         EXPECT_LE(op.stepdown, semi.stepdown_max + 1e-9);
         // Nothing of the part is entered.
         const double gouge = n.job.tolerances.gouge;
-        const DropIndex part(n.context, n.cut.solid, {Cutter::Profile::flat, semi.diameter / 2 - gouge});
+        const DropIndex part(n.cut.solid, {Cutter::Profile::flat, semi.diameter / 2 - gouge});
         for (std::size_t i = 1; i < op.moves.size(); ++i) {
             const Move &a = op.moves[i - 1], &b = op.moves[i];
             if (b.feed == 0) continue;

@@ -56,7 +56,7 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, const std::
                      r2 = end.radius * end.radius;
         parts.assign(count, {});
         sweep_above(
-            grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_}, [&](std::size_t c) { return height_[c]; },
+            grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_}, StandingHeights{height_.data(), 0},
             [&](std::size_t c, double z) {
                 const double stood = height_[c], left = std::max(0.0, z);
                 if (stood - left < kLeastTaken) return;

@@ -88,12 +88,11 @@ double EngagedStock::cut(const std::array<double, 3>& from, const std::array<dou
     }
     last_ = to;
     double sum = 0;
-    sweep_above(
-        grid_, end_, {from[0], from[1], from[2] - top_}, {to[0], to[1], to[2] - top_}, [&](std::size_t c) { return static_cast<double>(height_[c]); },
-        [&](std::size_t c, double z) {
-            sum += static_cast<double>(height_[c]) - z;
-            height_[c] = static_cast<float>(z);
-        });
+    sweep_above(grid_, end_, {from[0], from[1], from[2] - top_}, {to[0], to[1], to[2] - top_}, StandingHeights{height_.data(), 0},
+                [&](std::size_t c, double z) {
+                    sum += static_cast<double>(height_[c]) - z;
+                    height_[c] = static_cast<float>(z);
+                });
     return sum * grid_.cell * grid_.cell;
 }
 

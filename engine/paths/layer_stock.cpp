@@ -137,7 +137,7 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 if (p.feed != 0 && i > 1) previous = over_bottom(moves[i - 2]), chain.before = &previous;
                 if (i + 1 < moves.size() && moves[i + 1].feed != 0) next = over_bottom(moves[i + 1]), chain.after = &next;
                 sweep_above(
-                    part, end, over_bottom(p), over_bottom(q), [&](std::size_t c) { return static_cast<double>(height[c]); },
+                    part, end, over_bottom(p), over_bottom(q), StandingHeights{height, 0},
                     [&](std::size_t c, double z) {
                         const auto left = static_cast<float>(std::max(0.0, z));
                         if (left < height[c]) height[c] = left;

@@ -132,7 +132,7 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     double flat_r = 0;
     if (any_vertical) {
         flat_r = cut.layer.tools.rough.diameter / 2;
-        flat = std::make_unique<DropIndex>(cut.context, cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
+        flat = std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
     }
     std::vector<std::vector<LevelRun>> runs(tips.size());
     parallel_each(cut.context, tips.size(), [&](std::size_t i) {

@@ -126,8 +126,8 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
         outer = std::move(inner);
     }
 
-    const DropIndex ball(cut.context, cut.solid, {Cutter::Profile::ball, r});
-    const DropIndex flat(cut.context, cut.solid, {Cutter::Profile::flat, cut.layer.tools.rough.diameter / 2 - 0.02});
+    const DropIndex ball(cut.solid, {Cutter::Profile::ball, r});
+    const DropIndex flat(cut.solid, {Cutter::Profile::flat, cut.layer.tools.rough.diameter / 2 - 0.02});
     const double chord = safe_chord_mm(r, gouge);
     auto floor_done = [&](double z) {
         return std::any_of(cut.floors.begin(), cut.floors.end(), [&](double floor) { return z <= floor + 1e-6 && z >= floor - kSameFloor; });

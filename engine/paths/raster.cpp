@@ -69,7 +69,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     std::vector<std::pair<double, std::unique_ptr<DropIndex>>> flats;
     auto add_flat = [&](const Tool& one) {
         const double flat_r = one.diameter / 2;
-        flats.emplace_back(flat_r, std::make_unique<DropIndex>(cut.context, cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02}));
+        flats.emplace_back(flat_r, std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02}));
     };
     add_flat(cut.layer.tools.rough);
     if (clears_on_contours(cut.job))

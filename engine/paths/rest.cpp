@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -43,10 +44,9 @@ using Spans = std::vector<std::array<std::int32_t, 2>>;  // 0.1 µm, ascending a
 class Targets {
 public:
     /// @param probe a flat cutter as wide as the limit: where its rest is as high as what stands, that is within the limit of a wall beside it
-    Targets(const LayerStock& stock, const RestPass& pass, double steep, const DropIndex* probe)
+    Targets(Context& context, const LayerStock& stock, const RestPass& pass, double steep, const DropIndex* probe)
         : stock_(stock), rows_(static_cast<std::size_t>(stock.grid().ny)) {
         const CellGrid& grid = stock.grid();
-        marked_.assign(grid.count(), 0);
         // Places around a cell, the nearest first.
         std::vector<std::array<int, 3>> around;
         const int reach = static_cast<int>(pass.swath / grid.cell);
@@ -65,20 +65,34 @@ public:
             }
             return false;
         };
-        for (int j = 0; j < grid.ny; ++j)
-            for (int i = 0; i < grid.nx; ++i) {
-                const std::size_t c = grid.index(i, j);
-                if (stock.left(c) <= pass.limit || (reach > 0 && beside_wall(i, j))) continue;
-                if (probe && probe->drop(grid.x(i), grid.y(j)).tip_z >= stock.z_bottom() + stock.height(c) - 1e-3) continue;
-                marked_[c] = 1;
-                ++count_;
-                auto& row = rows_[static_cast<std::size_t>(j)];
-                if (!row.empty() && row.back()[1] + 1 == i) row.back()[1] = i;
-                else row.push_back({i, i});
-            }
+        constexpr std::size_t grain = 16;  // rows
+        count_ = parallel_reduce(
+            context, rows_.size(), grain, std::size_t{0},
+            [&](std::size_t begin, std::size_t end) {
+                std::size_t count = 0;
+                for (std::size_t r = begin; r < end; ++r)
+                    for (int i = 0, j = static_cast<int>(r); i < grid.nx; ++i) {
+                        const std::size_t c = grid.index(i, j);
+                        if (stock.left(c) <= pass.limit || (reach > 0 && beside_wall(i, j))) continue;
+                        if (probe && probe->drop(grid.x(i), grid.y(j)).tip_z >= stock.z_bottom() + stock.height(c) - 1e-3) continue;
+                        ++count;
+                        if (!rows_[r].empty() && rows_[r].back()[1] + 1 == i) rows_[r].back()[1] = i;
+                        else rows_[r].push_back({i, i});
+                    }
+                return count;
+            },
+            std::plus<>());
     }
     [[nodiscard]] std::size_t count() const { return count_; }
-    [[nodiscard]] bool marked(std::size_t cell) const { return marked_[cell] != 0; }
+    /// Calls fn(first, last) for the marked stretches of row j within [i0, i1], until one returns true; whether one did.
+    template <class Fn>
+    [[nodiscard]] bool any_in_row(int j, int i0, int i1, Fn&& fn) const {
+        const auto& row = rows_[static_cast<std::size_t>(j)];
+        auto it = std::lower_bound(row.begin(), row.end(), i0, [](const std::array<int, 2>& run, int i) { return run[1] < i; });
+        for (; it != row.end() && (*it)[0] <= i1; ++it)
+            if (fn(std::max(i0, (*it)[0]), std::min(i1, (*it)[1]))) return true;
+        return false;
+    }
     [[nodiscard]] std::array<int, 2> rows() const {
         int first = 0, last = stock_.grid().ny - 1;
         while (first <= last && rows_[static_cast<std::size_t>(first)].empty()) ++first;
@@ -107,7 +121,6 @@ public:
 
 private:
     const LayerStock& stock_;
-    std::vector<char> marked_;
     std::vector<std::vector<std::array<int, 2>>> rows_;
     std::size_t count_ = 0;
 };
@@ -122,7 +135,7 @@ public:
           ball_(tool.kind == ToolKind::ball),
           r_(tool.diameter / 2),
           end_(cutter_end(tool)),
-          targets_(stock, pass, finish_slopes(cut.job.cutting).levels_from,
+          targets_(cut.context, stock, pass, finish_slopes(cut.job.cutting).levels_from,
                    pass.in_steps || !clears_on_contours(cut.job) ? nullptr : &cut.drops({Cutter::Profile::flat, pass.limit})),
           chord_(safe_chord_mm(r_, cut.job.tolerances.gouge)),
           step_(static_cast<std::int32_t>(0.75 * chord_ * kUnitsPerMm)) {}
@@ -131,7 +144,7 @@ public:
         Operation op = cut_.operation(pass_.kind, pass_.purpose, tool_);
         if (targets_.count() == 0) return op;
         find_room();
-        index_ = std::make_unique<DropIndex>(cut_.context, cut_.solid, Cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_});
+        index_ = std::make_unique<DropIndex>(cut_.solid, Cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_});
         lay_lines();
         settle();
         keep_what_lowers();
@@ -163,17 +176,21 @@ private:
             const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, reach * reach - dy * dy));
             const int i0 = std::max(0, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
             const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + w - grid.x0) / grid.cell)));
-            for (int i = i0; i <= i1; ++i) {
-                const std::size_t c = grid.index(i, j);
-                if (!targets_.marked(c) || stock_.height(c) <= above) continue;
-                double z = above;
-                if (ball_) {
-                    const double from_axis = std::max(0.0, std::hypot(grid.x(i) - x, dy) - slack);
-                    z += r_ - std::sqrt(std::max(0.0, r_ * r_ - from_axis * from_axis));
+            const bool found = targets_.any_in_row(j, i0, i1, [&](int first, int last) {
+                for (int i = first; i <= last; ++i) {
+                    const std::size_t c = grid.index(i, j);
+                    if (stock_.height(c) <= above) continue;
+                    double z = above;
+                    if (ball_) {
+                        const double dx = grid.x(i) - x, from_axis = std::max(0.0, std::sqrt(dx * dx + dy * dy) - slack);
+                        z += r_ - std::sqrt(std::max(0.0, r_ * r_ - from_axis * from_axis));
+                    }
+                    z = std::max(z, static_cast<double>(stock_.surface(c)));
+                    if ((stock_.height(c) - z) * stock_.nz(c) > worth(c)) return true;
                 }
-                z = std::max(z, static_cast<double>(stock_.surface(c)));
-                if ((stock_.height(c) - z) * stock_.nz(c) > worth(c)) return true;
-            }
+                return false;
+            });
+            if (found) return true;
         }
         return false;
     }

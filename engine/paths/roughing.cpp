@@ -96,7 +96,7 @@ Operation rough_layer(const LayerCut& cut) {
     });
 
     PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance, cut.layer.z_top + 2);
-    const DropIndex part(cut.context, cut.solid, cutter);
+    const DropIndex part(cut.solid, cutter);
     path.know(cut.around(tool, &part));
     double above = cut.layer.z_top;
     for (std::size_t i = 0; i < levels.size(); ++i) {

@@ -1,10 +1,10 @@
 #include "kernels/cutting/drop.h"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
-#include "kernels/parallel/parallel.h"
+#include "kernels/errors.h"
 
 namespace slabwright {
 
@@ -100,133 +100,63 @@ void drop_flat(const SolidFacet& f, double r, double x, double y, Best& best) {
 
 }  // namespace
 
-DropIndex::DropIndex(Context& context, const LayerSolid& solid, const Cutter& cutter) : solid_(solid), cutter_(cutter) {
-    if (solid.facets.empty()) return;
-    const double width = solid.max[0] - solid.min[0], depth = solid.max[1] - solid.min[1];
-    cell_ = std::max({cutter.radius / 2, width / 1024, depth / 1024, 1e-3});
-    x0_ = solid.min[0];
-    y0_ = solid.min[1];
-    columns_ = static_cast<std::size_t>(width / cell_) + 1;
-    rows_ = static_cast<std::size_t>(depth / cell_) + 1;
-    auto column = [&](double x) { return std::min(columns_ - 1, static_cast<std::size_t>(std::max(0.0, (x - x0_) / cell_))); };
-    auto row = [&](double y) { return std::min(rows_ - 1, static_cast<std::size_t>(std::max(0.0, (y - y0_) / cell_))); };
-    bounds_.resize(solid.facets.size());
-    parallel_for(context, solid.facets.size(), std::size_t{1} << 14, [&](std::size_t begin, std::size_t end) {
-        constexpr float inf = std::numeric_limits<float>::infinity();
-        for (std::size_t i = begin; i < end; ++i) {
-            const SolidFacet& f = solid.facets[i];
-            const auto [xl, xh] = std::minmax({f.p[0][0], f.p[1][0], f.p[2][0]});
-            const auto [yl, yh] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
-            bounds_[i] = {std::nextafter(static_cast<float>(xl), -inf),
-                          std::nextafter(static_cast<float>(xh), inf),
-                          std::nextafter(static_cast<float>(yl), -inf),
-                          std::nextafter(static_cast<float>(yh), inf),
-                          std::nextafter(static_cast<float>(f.z_max), inf),
-                          static_cast<std::uint16_t>(column(xl)),
-                          static_cast<std::uint16_t>(row(yl))};
-        }
-    });
-    starts_.assign(columns_ * rows_ + 1, 0);
-    for (int pass = 0; pass < 2; ++pass) {
-        for (std::size_t i = 0; i < solid.facets.size(); ++i) {
-            const SolidFacet& f = solid.facets[i];
-            const auto [xl, xh] = std::minmax({f.p[0][0], f.p[1][0], f.p[2][0]});
-            const auto [yl, yh] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
-            for (std::size_t r = row(yl), r1 = row(yh); r <= r1; ++r)
-                for (std::size_t c = column(xl), c1 = column(xh); c <= c1; ++c) {
-                    std::uint32_t& slot = starts_[r * columns_ + c + (pass == 0 ? 1 : 0)];
-                    if (pass == 1) members_[slot] = static_cast<std::uint32_t>(i);
-                    ++slot;
-                }
-        }
-        if (pass == 0) {
-            for (std::size_t k = 1; k < starts_.size(); ++k) starts_[k] += starts_[k - 1];
-            members_.resize(starts_.back());
-        } else {
-            for (std::size_t k = starts_.size() - 1; k > 0; --k) starts_[k] = starts_[k - 1];
-            starts_[0] = 0;
-        }
-    }
-    // Highest first: a drop may stop at the first facet that lies below what it already rests on.
-    parallel_for(context, columns_ * rows_, 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k)
-            std::sort(members_.begin() + starts_[k], members_.begin() + starts_[k + 1], [&](std::uint32_t a, std::uint32_t b) {
-                const double za = solid.facets[a].z_max, zb = solid.facets[b].z_max;
-                return za != zb ? za > zb : a < b;
-            });
-    });
-    cap_starts_.assign(rows_ + 1, 0);
-    for (int pass = 0; pass < 2; ++pass) {
-        for (std::size_t l = 0; l < solid.cap.size(); ++l) {
-            const auto loop = solid.cap.loop(l);
-            for (std::size_t i = 0; i < loop.size(); ++i) {
-                const Point2 a = loop[i], b = loop[i + 1 == loop.size() ? 0 : i + 1];
-                if (a.y == b.y) continue;
-                for (std::size_t r = row(to_mm(std::min(a.y, b.y))), r1 = row(to_mm(std::max(a.y, b.y))); r <= r1; ++r) {
-                    std::uint32_t& slot = cap_starts_[r + (pass == 0 ? 1 : 0)];
-                    if (pass == 1) cap_segments_[slot] = {a, b};
-                    ++slot;
-                }
-            }
-        }
-        if (pass == 0) {
-            for (std::size_t k = 1; k < cap_starts_.size(); ++k) cap_starts_[k] += cap_starts_[k - 1];
-            cap_segments_.resize(cap_starts_.back());
-        } else {
-            for (std::size_t k = cap_starts_.size() - 1; k > 0; --k) cap_starts_[k] = cap_starts_[k - 1];
-            cap_starts_[0] = 0;
-        }
-    }
-}
-
-bool DropIndex::in_cap(double x, double y) const {
-    if (y < y0_ || y > y0_ + static_cast<double>(rows_) * cell_) return false;
-    const std::size_t row = std::min(rows_ - 1, static_cast<std::size_t>((y - y0_) / cell_));
-    const double ux = x * kUnitsPerMm, uy = y * kUnitsPerMm;
-    int winding = 0;
-    for (std::uint32_t k = cap_starts_[row]; k < cap_starts_[row + 1]; ++k) {
-        const CapSegment& s = cap_segments_[k];
-        if ((s.a.y <= uy) == (s.b.y <= uy)) continue;
-        const double at = s.a.x + (uy - s.a.y) / (static_cast<double>(s.b.y) - s.a.y) * (static_cast<double>(s.b.x) - s.a.x);
-        if (at > ux) winding += s.b.y > s.a.y ? 1 : -1;
-    }
-    return winding > 0;
+DropIndex::DropIndex(const LayerSolid& solid, const Cutter& cutter) : solid_(solid), cutter_(cutter) {
+    if (!(cutter.radius > 0 && cutter.radius <= FacetTree::kWidestCutter))
+        throw Error(ErrorKind::usage, "drop.radius", "a cutter's radius is not between 0 and 1 m", "cutter", "correct the tool's diameter");
+    const double unit = solid.tree.unit, r = cutter.radius;
+    probe_.radius = static_cast<float>(r / unit);
+    probe_.unit = static_cast<float>(unit);
+    probe_.inverse = static_cast<float>(1 / (2 * r));
+    // Float has 24 bits, and no term of a bound is much larger than these.
+    probe_.spare = static_cast<float>(5e-7 * (std::abs(solid.z_low) + std::abs(solid.z_top) + 4 * r) + 8 * unit);
 }
 
 Rest DropIndex::drop(double x, double y) const {
     Rest rest;
     rest.tip_z = -std::numeric_limits<double>::infinity();
-    if (columns_ == 0) return rest;
-    if (in_cap(x, y)) return {solid_.z_top, 0.0F, 0.0F, 1.0F, true};
+    const FacetTree& tree = solid_.tree;
+    if (tree.facets.empty()) return rest;
+    if (solid_.cap_cells.inside(x, y)) return {solid_.z_top, 0.0F, 0.0F, 1.0F, true};
     const double r = cutter_.radius;
-    if (x < solid_.min[0] - r || x > solid_.max[0] + r || y < solid_.min[1] - r || y > solid_.max[1] + r) return rest;
-    auto clamp = [](double v, std::size_t n) { return std::min(n - 1, static_cast<std::size_t>(std::max(0.0, v))); };
-    const std::size_t c0 = clamp((x - r - x0_) / cell_, columns_), c1 = clamp((x + r - x0_) / cell_, columns_);
-    const std::size_t r0 = clamp((y - r - y0_) / cell_, rows_), r1 = clamp((y + r - y0_) / cell_, rows_);
-    Best best;
+    if (!(x >= solid_.min[0] - r && x <= solid_.max[0] + r && y >= solid_.min[1] - r && y <= solid_.max[1] + r)) return rest;
+    DropProbe probe = probe_;
+    probe.x = tree.x_units(x), probe.y = tree.y_units(y);
     const bool ball = cutter_.profile == Cutter::Profile::ball;
-    // At a distance d from the axis a ball's surface is at least d² / 2R above its tip, so what stands there lifts the tip by that much less.
-    // The cell under the axis comes first: what it gives leaves out most of the others.
-    const double bend = ball ? 1 / (2 * r) : 0;
-    const std::size_t c_mid = clamp((x - x0_) / cell_, columns_), r_mid = clamp((y - y0_) / cell_, rows_);
-    auto visit = [&](std::size_t row, std::size_t column, bool middle) {
-        const std::uint32_t *first = members_.data() + starts_[row * columns_ + column],
-                            *last = members_.data() + starts_[row * columns_ + column + 1];
-        for (; first != last; ++first) {
-            const Bounds& b = bounds_[*first];
-            if (b.z_max <= best.tip_z) break;
-            // Listed in several cells of this window it is looked at in the first of them.
-            if (!middle && (column != std::max<std::size_t>(c0, b.column) || row != std::max<std::size_t>(r0, b.row))) continue;
-            const double dx = std::max({0.0, b.x_low - x, x - b.x_high}), dy = std::max({0.0, b.y_low - y, y - b.y_high}), d2 = dx * dx + dy * dy;
-            if (d2 > r * r || b.z_max - d2 * bend <= best.tip_z) continue;
-            const SolidFacet& f = solid_.facets[*first];
+    Best best;
+    struct Waiting {
+        float bound;
+        std::uint32_t level, node;
+    };
+    constexpr int most_levels = 12, k_all = FacetTree::kTogether;
+    std::array<Waiting, most_levels * k_all> waiting;  // the highest bound of each level last
+    std::size_t count = 0;
+    waiting[count++] = {std::numeric_limits<float>::infinity(), static_cast<std::uint32_t>(tree.starts.size() - 2), 0};
+    while (count > 0) {
+        const Waiting now = waiting[--count];
+        if (now.bound <= best.tip_z) continue;
+        alignas(64) std::array<float, k_all> bounds;
+        const FacetTree::Node& node = tree.nodes[tree.starts[now.level] + now.node];
+        if (ball) ball_bounds(node, probe, bounds.data());
+        else flat_bounds(node, probe, bounds.data());
+        // The children worth a look, ascending.
+        std::array<std::uint32_t, k_all> order;
+        std::size_t n = 0;
+        for (std::uint32_t k = 0; k < k_all; ++k) {
+            if (bounds[k] <= best.tip_z) continue;
+            std::size_t at = n++;
+            for (; at > 0 && bounds[order[at - 1]] > bounds[k]; --at) order[at] = order[at - 1];
+            order[at] = k;
+        }
+        if (now.level > 0) {
+            for (std::size_t i = 0; i < n; ++i) waiting[count++] = {bounds[order[i]], now.level - 1, k_all * now.node + order[i]};
+            continue;
+        }
+        while (n-- > 0 && bounds[order[n]] > best.tip_z) {
+            const SolidFacet& f = solid_.facets[tree.facets[std::size_t{k_all} * now.node + order[n]]];
             if (ball) drop_ball(f, r, x, y, best);
             else drop_flat(f, r, x, y, best);
         }
-    };
-    visit(r_mid, c_mid, true);
-    for (std::size_t row = r0; row <= r1; ++row)
-        for (std::size_t column = c0; column <= c1; ++column) visit(row, column, false);
+    }
     rest.tip_z = best.tip_z;
     rest.nx = static_cast<float>(best.nx);
     rest.ny = static_cast<float>(best.ny);

@@ -1,13 +1,8 @@
 // Dropping a ball onto the layer's solid: how low its tip may go over a point (the cutter-location surface).
 #pragma once
 
-#include <cstdint>
-#include <span>
-#include <vector>
-
 #include "kernels/cutting/cutter.h"
 #include "kernels/cutting/layer_solid.h"
-#include "kernels/parallel/context.h"
 
 namespace slabwright {
 
@@ -21,31 +16,19 @@ struct Rest {
     [[nodiscard]] double contact_z(double radius) const { return tip_z + radius * (1 - nz); }
 };
 
-/// An index of the layer's solid for drops of one cutter.
+/// A cutter to be dropped onto a layer's solid. A view: the solid must outlive it.
 class DropIndex {
 public:
-    DropIndex(Context& context, const LayerSolid& solid, const Cutter& cutter);
-    /// Exact over facets, edges and vertices (for a flat cutter over their shadow, tip on the highest of them).
+    /// @throws Error(usage, "drop.radius") for a radius that is not positive or over FacetTree::kWidestCutter
+    DropIndex(const LayerSolid& solid, const Cutter& cutter);
+    /// Exact over facets, edges and vertices (for a flat cutter over their shadow, tip on the highest of them). Of contacts that are equally
+    /// high the one is given that the solid's tree leads to first.
     [[nodiscard]] Rest drop(double x, double y) const;
 
 private:
-    [[nodiscard]] bool in_cap(double x, double y) const;
     const LayerSolid& solid_;
     Cutter cutter_;
-    double x0_ = 0, y0_ = 0, cell_ = 1;
-    std::size_t columns_ = 0, rows_ = 0;
-    // Of a facet what decides whether it needs a look: its box, a little wider, and the first cell that lists it.
-    struct Bounds {
-        float x_low, x_high, y_low, y_high, z_max;
-        std::uint16_t column, row;
-    };
-    std::vector<Bounds> bounds_;
-    std::vector<std::uint32_t> starts_, members_;  // facets by cell, highest first
-    std::vector<std::uint32_t> cap_starts_;        // cap segments by row of cells
-    struct CapSegment {
-        Point2 a, b;
-    };
-    std::vector<CapSegment> cap_segments_;
+    DropProbe probe_;
 };
 
 }  // namespace slabwright

@@ -148,14 +148,22 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     }
     const Plane top{cut_off, Side::below};
     solid.cap = std::move(slice(context, mesh, {&top, 1})[0].loops);
-    solid.min = {1e300, 1e300};
-    solid.max = {-1e300, -1e300};
-    for (const SolidFacet& f : solid.facets)
-        for (const Vec3d& p : f.p)
-            for (int k = 0; k < 2; ++k) {
-                solid.min[k] = std::min(solid.min[k], p[k]);
-                solid.max[k] = std::max(solid.max[k], p[k]);
-            }
+    solid.cap_cells = CapCells(solid.cap);
+    using Extent = std::array<double, 4>;  // least x, y; greatest x, y
+    const Extent extent = parallel_reduce(
+        context, solid.facets.size(), grain, Extent{1e300, 1e300, -1e300, -1e300},
+        [&](std::size_t begin, std::size_t end) {
+            Extent e{1e300, 1e300, -1e300, -1e300};
+            for (std::size_t i = begin; i < end; ++i)
+                for (const Vec3d& p : solid.facets[i].p) e = {std::min(e[0], p[0]), std::min(e[1], p[1]), std::max(e[2], p[0]), std::max(e[3], p[1])};
+            return e;
+        },
+        [](const Extent& a, const Extent& b) {
+            return Extent{std::min(a[0], b[0]), std::min(a[1], b[1]), std::max(a[2], b[2]), std::max(a[3], b[3])};
+        });
+    solid.min = {extent[0], extent[1]};
+    solid.max = {extent[2], extent[3]};
+    solid.tree = facet_tree(context, solid.facets, solid.min, solid.max);
     return solid;
 }
 

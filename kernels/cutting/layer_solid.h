@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "kernels/cutting/cap_cells.h"
+#include "kernels/cutting/facet_tree.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 #include "kernels/polygons/loops.h"
@@ -28,6 +30,8 @@ struct LayerSolid {
     std::vector<SolidFacet> facets;      ///< in Morton order of the mesh's facets: neighbours in space are near in memory
     Loops cap;                           ///< the section kTopSheet below z_top: the solid's flat upper end
     std::array<double, 2> min{}, max{};  ///< of the facets, in x and y
+    FacetTree tree;                      ///< of the facets, for drops
+    CapCells cap_cells;                  ///< of the cap
 };
 
 /// Material thinner than this under the layer's top is not counted, mm: a facet that lies in the top plane to within rounding belongs to

@@ -22,27 +22,26 @@ CutEffect Stock::take(double deep, Sweep&& sweep) {
     // The topmost slab's surface decides: a cutter that stays above it takes nothing there, nor of what lies below.
     const double bottom = slabs_.empty() ? 1e300 : slabs_.back().bottom;
     const float* const heights = slabs_.empty() ? board_.data() : slabs_.back().height.data();
-    sweep([&](std::size_t cell) { return bottom + heights[cell]; },
-          [&](std::size_t cell, double z) {
-              double lost = 0;
-              for (std::size_t k = slabs_.size(); k-- > 0;) {
-                  Slab& slab = slabs_[k];
-                  float& height = slab.height[cell];
-                  if (height > 0) {
-                      const auto left = static_cast<float>(std::max(0.0, z - slab.bottom));
-                      if (left < height) {
-                          taken(cell, slab.bottom + height, slab.bottom + left, lost);
-                          height = left;
-                      }
-                  }
-                  if (z >= slab.bottom) break;
-              }
-              effect.deep_cells += lost > deep;
-              if (-z > board_[cell]) {
-                  effect.lowest = std::min(effect.lowest, z);
-                  board_[cell] = static_cast<float>(-z);
-              }
-          });
+    sweep(StandingHeights{heights, bottom}, [&](std::size_t cell, double z) {
+        double lost = 0;
+        for (std::size_t k = slabs_.size(); k-- > 0;) {
+            Slab& slab = slabs_[k];
+            float& height = slab.height[cell];
+            if (height > 0) {
+                const auto left = static_cast<float>(std::max(0.0, z - slab.bottom));
+                if (left < height) {
+                    taken(cell, slab.bottom + height, slab.bottom + left, lost);
+                    height = left;
+                }
+            }
+            if (z >= slab.bottom) break;
+        }
+        effect.deep_cells += lost > deep;
+        if (-z > board_[cell]) {
+            effect.lowest = std::min(effect.lowest, z);
+            board_[cell] = static_cast<float>(-z);
+        }
+    });
     if (effect.deepest > 0) effect.where = {grid_.x(static_cast<int>(deepest_cell % nx)), grid_.y(static_cast<int>(deepest_cell / nx))};
     return effect;
 }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <type_traits>
 
 namespace slabwright {
 
@@ -41,6 +42,30 @@ struct LevelArc {
 /// Heights of a ball's tip side over n centres in a row: h[k] = a + b·k − c·√(r² − (q + k·dq)²), mm. @pre (q + k·dq)² ≤ r²
 void ball_row(double a, double b, double c, double r2, double q, double dq, int n, double* h);
 
+/// What stands in cells: heights over a level `bottom`, mm. Given as such to sweep_above, many cells are compared at once.
+struct StandingHeights {
+    const float* height = nullptr;
+    double bottom = 0;
+    double operator()(std::size_t cell) const { return bottom + height[cell]; }
+};
+
+/// A straight way of a ball or a level disc over cells of a row: see sweep_above. Lengths mm, relative to the way's begin.
+struct RowWay {
+    double dx = 1, dy = 0, run = 0, slope = 0, z = 0, radius = 0, lead = 0;
+    double s_least = 0, s_most = 0;  ///< where on the way the least height must lie for a cell to be asked
+    double lowest = 0;               ///< of the way's tips
+    bool ball = true;
+    double x0 = 0, cell = 1, from_x = 0;  ///< cell i has its centre at x0 + i·cell − from_x
+};
+/// Heights of the cutter over cells i0 … i0 + n − 1, whose centres lie py beside the begin; infinite where it does not cover the centre, the
+/// cell is not asked, or `stands` (unless null) over `bottom` is not higher. @returns whether any is finite
+bool row_heights(const RowWay& way, int i0, int n, double py, const float* stands, double bottom, double* h);
+
+/// Whether any of n heights over `bottom` is over a level.
+[[nodiscard]] bool any_over(const float* stands, double bottom, int n, double level);
+/// Makes those of n heights infinite over which nothing stands. @returns whether any is left
+bool keep_lower(const float* stands, double bottom, int n, double* h);
+
 /// What else of a chain of straight motions is swept, so that no cell is asked twice about the place where two of them meet.
 struct ChainedSweep {
     const std::array<double, 3>* before = nullptr;  ///< where the motion into `from` began, if that has been swept, or will be
@@ -66,7 +91,8 @@ struct StraightWay {
     }
 };
 
-inline constexpr int kSweptTogether = 32;  ///< cells of a row
+inline constexpr int kSweptTogether = 64;  ///< cells of a row
+inline constexpr double kUncovered = std::numeric_limits<double>::infinity();
 
 /// Narrows [low, high] to where value + step·x lies within [least, most], a hair more; to nothing where that is empty.
 inline void narrow(double value, double step, double least, double most, double& low, double& high) {
@@ -102,7 +128,7 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
     const double R = end.radius, R2 = R * R;
     const StraightWay way(from, to);
     const double dx = way.dx, dy = way.dy, run = way.run, slope = way.slope, z = way.z, lowest = std::min(from[2], to[2]);
-    const bool shares = way.shares_ends(end), level_ball = slope == 0 && end.form == Form::ball;
+    const bool shares = way.shares_ends(end);
     const double cone_lead = end.slope > std::abs(slope) ? slope / std::sqrt(end.slope * end.slope - slope * slope) : 0;
     // In a chain: is the begin's place asked, and is the end's?
     const bool own_end = !shares || chain.after == nullptr, own_begin = !shares || chain.before == nullptr;
@@ -116,6 +142,9 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
     // The least place on the way, before it is moved into it, lies within [s0 − R·lead, s0] or the other way round.
     const double lead = end.form == Form::ball ? way.ball_lead : 0;
     const double s0_least = own_begin ? -R : std::min(0.0, R * lead), s0_most = own_end ? run + R : run + std::max(0.0, R * lead);
+    const RowWay row_way{
+        dx,      dy,        run,    slope, z, R, lead, own_begin ? -kUncovered : 0.0, own_end ? kUncovered : run, lowest, end.form == Form::ball,
+        grid.x0, grid.cell, from[0]};
     const double y_low = std::min(from[1], to[1]) - R, y_high = std::max(from[1], to[1]) + R;
     const int j0 = std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - grid.y0) / grid.cell))));
     const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high - grid.y0) / grid.cell))));
@@ -141,40 +170,34 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
                 if (stands <= lowest) return;
                 const double s0 = px * dx + py * dy, q2 = std::max(0.0, px * px + py * py - s0 * s0), w2 = R2 - q2;
                 if (w2 < 0) return;
-                if (level_ball) {
-                    if ((s0 > run && !own_end) || (s0 < 0 && !own_begin)) return;
-                    const double over = s0 - std::clamp(s0, 0.0, run), h2 = w2 - over * over;
-                    // R − √(R² − d²) is at least d² / 2R.
-                    if (h2 < 0 || stands <= z + (R2 - h2) / (2 * R)) return;
-                    const double height = z + R - std::sqrt(h2);
-                    if (stands > height) fn(cell, height);
+                const double w = std::sqrt(w2), s_low = std::max(0.0, s0 - w), s_high = std::min(run, s0 + w);
+                if (s_low > s_high) return;
+                double s = slope >= 0 ? s_low : s_high;
+                if (end.slope > std::abs(slope)) s = std::clamp(s0 - std::sqrt(q2) * cone_lead, s_low, s_high);
+                const double height = end.slope * std::sqrt(q2 + (s - s0) * (s - s0)) + (z + slope * s);
+                if (stands > height) fn(cell, height);
+            };
+            auto together = [&](int i0, int i1) {
+                if (end.form == Form::cone) {
+                    cells(i0, i1, one);
                     return;
                 }
-                const double w = std::sqrt(w2);
-                const double s_low = std::max(0.0, s0 - w), s_high = std::min(run, s0 + w);
-                if (s_low > s_high) return;
-                double s = s0, height = 0;
-                switch (end.form) {
-                    case Form::flat:
-                        if ((s0 > run && !own_end) || (s0 < 0 && !own_begin)) return;
-                        s = slope >= 0 ? s_low : s_high;
-                        break;
-                    case Form::ball: {
-                        s = s0 - w * lead;
-                        if ((s > run && !own_end) || (s < 0 && !own_begin)) return;
-                        s = std::clamp(s, s_low, s_high);
-                        height = R - std::sqrt(std::max(0.0, w2 - (s - s0) * (s - s0)));
-                        break;
-                    }
-                    case Form::cone: {
-                        if (end.slope > std::abs(slope)) s = std::clamp(s0 - std::sqrt(q2) * cone_lead, s_low, s_high);
-                        else s = slope >= 0 ? s_low : s_high;
-                        height = end.slope * std::sqrt(q2 + (s - s0) * (s - s0));
-                        break;
+                std::array<double, kSweptTogether> h;
+                for (int k = i0; k <= i1; k += kSweptTogether) {
+                    const int n = std::min(kSweptTogether, i1 + 1 - k);
+                    const std::size_t first = row + static_cast<std::size_t>(k);
+                    if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>) {
+                        if (!row_heights(row_way, k, n, py, standing.height + first, standing.bottom, h.data())) continue;
+                        for (int i = 0; i < n; ++i)
+                            if (h[static_cast<std::size_t>(i)] < kUncovered) fn(first + static_cast<std::size_t>(i), h[static_cast<std::size_t>(i)]);
+                    } else {
+                        if (!row_heights(row_way, k, n, py, nullptr, 0, h.data())) continue;
+                        for (int i = 0; i < n; ++i)
+                            if (const double z_cell = h[static_cast<std::size_t>(i)];
+                                z_cell < kUncovered && standing(first + static_cast<std::size_t>(i)) > z_cell)
+                                fn(first + static_cast<std::size_t>(i), z_cell);
                     }
                 }
-                height += z + slope * s;
-                if (stands > height) fn(cell, height);
             };
             if (low <= high) {
                 const int i0 = first_cell(low), i1 = last_cell(high);
@@ -184,26 +207,35 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
                     narrow(py * dx, -dy, wide - R, R - wide, low, high);
                     if (low <= high) k0 = std::clamp(first_cell(low), i0, i1 + 1), k1 = std::clamp(last_cell(high), k0 - 1, i1);
                 }
-                cells(i0, k0 - 1, one);
+                together(i0, k0 - 1);
                 for (int k = k0; k <= k1; k += kSweptTogether) {
                     const int n = std::min(kSweptTogether, k1 + 1 - k);
                     const std::size_t first = row + static_cast<std::size_t>(k);
-                    unsigned over = 0;
-                    for (int i = 0; i < n; ++i) over |= static_cast<unsigned>(standing(first + static_cast<std::size_t>(i)) > lowest);
-                    if (over == 0) continue;
-                    if (end.form == Form::flat) {
-                        for (int i = 0; i < n; ++i)
-                            if (standing(first + static_cast<std::size_t>(i)) > lowest) fn(first + static_cast<std::size_t>(i), lowest);
-                        continue;
-                    }
-                    const double px = grid.x(k) - from[0];
                     std::array<double, kSweptTogether> h;
-                    ball_row(z + R + slope * (px * dx + py * dy), slope * dx * grid.cell, steep, R2, py * dx - px * dy, -dy * grid.cell, n, h.data());
-                    for (int i = 0; i < n; ++i)
-                        if (standing(first + static_cast<std::size_t>(i)) > h[static_cast<std::size_t>(i)])
-                            fn(first + static_cast<std::size_t>(i), h[static_cast<std::size_t>(i)]);
+                    const auto rest_of_row = [&] {
+                        if (end.form == Form::flat) {
+                            std::fill_n(h.begin(), n, lowest);
+                            return;
+                        }
+                        const double px = grid.x(k) - from[0];
+                        ball_row(z + R + slope * (px * dx + py * dy), slope * dx * grid.cell, steep, R2, py * dx - px * dy, -dy * grid.cell, n,
+                                 h.data());
+                    };
+                    if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>) {
+                        if (!any_over(standing.height + first, standing.bottom, n, lowest)) continue;
+                        rest_of_row();
+                        if (!keep_lower(standing.height + first, standing.bottom, n, h.data())) continue;
+                        for (int i = 0; i < n; ++i)
+                            if (const double z_cell = h[static_cast<std::size_t>(i)]; z_cell < kUncovered)
+                                fn(first + static_cast<std::size_t>(i), z_cell);
+                    } else {
+                        rest_of_row();
+                        for (int i = 0; i < n; ++i)
+                            if (const double z_cell = h[static_cast<std::size_t>(i)]; standing(first + static_cast<std::size_t>(i)) > z_cell)
+                                fn(first + static_cast<std::size_t>(i), z_cell);
+                    }
                 }
-                cells(k1 + 1, i1, one);
+                together(k1 + 1, i1);
             }
         }
         if (!wedge || py * py > R2) continue;
