@@ -182,6 +182,7 @@ void validate(const Job& job) {
     require("tolerances.cusp", t.cusp, 0, 10, Ends::open_low);
     require("tolerances.rough_cusp", t.rough_cusp, 0, 100, Ends::open_low);
     require("tolerances.chordal_deviation", t.chordal_deviation, 0, 10);
+    require("tolerances.simplify", t.simplify, 0, 0.5);
     require("tolerances.undercut", t.undercut, 0, 10000);
     require("tolerances.gap", t.gap, 0, 1000);
     require("tolerances.weld", t.weld, 0, 100);

@@ -64,9 +64,8 @@ public:
         work_.stock_max = plan.stock_max;
         work_.index = layer_.index;
         if (plan.flask) work_.opening = plan.flask->inner[index];
-        for (const Feature& f : plan.features)
-            if (f.type == FeatureType::up_flat && f.area >= fitted_.cutting.min_flat_area && f.z_low < layer_.z_top && f.z_low > layer_.z_bottom)
-                work_.flats.push_back(&f);
+        fitted_.tolerances.gouge -= ground.mesh_gap;
+        work_.flats = flats_between(layer_.z_bottom);
         work_.floor_below = layer_.z_bottom - (ground.carried_by ? overrun_.below : overrun_.board);
         if (ground.carried_by) overhang_ = overhang_map({&ground.carried_by, 1}, plan.stock_min, plan.stock_max);
     }
@@ -97,6 +96,19 @@ private:
         std::string name;
         LayerTools tools;
     };
+
+    // Flats between z and the layer's top.
+    [[nodiscard]] std::vector<Flat> flats_between(double z) const {
+        std::vector<Flat> flats;
+        for (const Feature& f : ground_.plan.features) {
+            if (f.type != FeatureType::up_flat || f.area < fitted_.cutting.min_flat_area || f.z_low >= layer_.z_top || f.z_low <= z) continue;
+            Flat& flat = flats.emplace_back(Flat{f.z_low, f.z_low});
+            for (const std::uint32_t facet : f.facets)
+                for (const std::uint32_t v : ground_.pattern.facets[facet])
+                    flat.highest = std::max(flat.highest, static_cast<double>(ground_.pattern.vertices[v].z));
+        }
+        return flats;
+    }
 
     void choose() {
         ToolChoice choice = select_tools(context_, work_, reach_ratio(context_, work_, ground_.scene));
@@ -129,10 +141,7 @@ private:
         const double below = tools.finish.diameter / 2;
         const double board = job.machine.base_board_cut >= 0 ? overrun_.board : std::min(below, overrun_.board);
         work_.floor_below = layer_.z_bottom - (ground_.carried_by ? below : board);
-        work_.feet.clear();
-        for (const Feature& f : ground_.plan.features)
-            if (f.type == FeatureType::up_flat && f.area >= job.cutting.min_flat_area && f.z_low < layer_.z_top && f.z_low > work_.floor_below)
-                work_.feet.push_back(&f);
+        work_.feet = flats_between(work_.floor_below);
         LayerResult result = plan_layer_paths(context_, work_);
         Trial trial;
         Layer& layer = trial.planned.layer = layer_;
@@ -174,7 +183,7 @@ private:
     Context& context_;
     const LayerGround& ground_;
     const Layer& layer_;
-    const Job fitted_;  // a layer may be taller than the shortest tools make; the others make it then
+    Job fitted_;  // a layer may be taller than the shortest tools make; the others make it then
     const Overrun overrun_;
     ProgressPart& progress_;
     LayerJob work_;

@@ -23,6 +23,7 @@
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
+#include "kernels/mesh/simplify.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/parallel/progress_part.h"
 #include "kernels/slicing/slicing.h"
@@ -32,6 +33,27 @@ namespace slabwright {
 namespace {
 
 constexpr double kSlabShare = 0.05;  // of a slab's area, against the surface cut in it: what a layer's work is estimated by
+
+// The pattern, and what the paths are laid on: fewer facets where a share of the gouge tolerance allows it.
+struct PathGround {
+    MeshView pattern, mesh;
+    double gap = 0;  // mm between them at most
+    std::optional<Mesh> lighter{};
+};
+
+PathGround ground_of(Context& context, Plan& plan, MeshView pattern) {
+    const Tolerances& tolerances = plan.job.tolerances;
+    PathGround ground{pattern, pattern};
+    if (tolerances.simplify <= 0) return ground;
+    ground.gap = tolerances.simplify * tolerances.gouge;
+    ground.mesh = ground.lighter.emplace(simplify(context, pattern, ground.gap)).view();
+    plan.diagnostics.push_back(
+        {Severity::note,
+         "paths.simplified",
+         fmt::format("the paths are laid on {} facets that lie within {:.4g} mm of the pattern's {}", ground.mesh.size(), ground.gap, pattern.size()),
+         {}});
+    return ground;
+}
 
 // How many slabs of the stock make a layer's thickness; one where it is in stock, or no stock is named.
 int slabs_of(const Job& job, double thickness) {
@@ -194,11 +216,11 @@ void rate(Plan& plan, const Layer& layer, Operation& op) {
 }
 
 // The programs of all layers, with their diagnostics.
-void cut_layers(Context& context, Plan& plan, MeshView mesh, const std::vector<Loops>& joints, ProgressShare share) {
+void cut_layers(Context& context, Plan& plan, const PathGround& ground, const std::vector<Loops>& joints, ProgressShare share) {
     const Job& job = plan.job;
     std::optional<AccessScene> scene;
-    if (selects_tools(job) && job.selection.accessibility == AccessRule::exact) scene.emplace(context, mesh);
-    const std::vector<LayerShare> shares = shares_of_layers(context, mesh, plan.layers, overrun_of(job).below);
+    if (selects_tools(job) && job.selection.accessibility == AccessRule::exact) scene.emplace(context, ground.mesh);
+    const std::vector<LayerShare> shares = shares_of_layers(context, ground.mesh, plan.layers, overrun_of(job).below);
     const MemoryCharge path_memory(context, bytes_of_paths(context, plan, shares), "the paths");
     // A layer's work grows with the surface that is cut in it, and with the slab that is faced and roughed.
     std::vector<std::uint64_t> steps;
@@ -208,7 +230,7 @@ void cut_layers(Context& context, Plan& plan, MeshView mesh, const std::vector<L
     parallel_each(context, plan.layers.size(), [&](std::size_t i) {
         ProgressPart progress(context, steps[i]);
         const Loops* const carried_by = i > 0 ? &joints[i] : nullptr;
-        planned[i] = plan_layer(context, {plan, mesh, scene ? &*scene : nullptr, carried_by}, i, progress);
+        planned[i] = plan_layer(context, {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr, carried_by}, i, progress);
     });
     std::vector<LayerCuts> cuts;
     for (std::size_t i = 0; i < planned.size(); ++i) {
@@ -226,18 +248,18 @@ void cut_layers(Context& context, Plan& plan, MeshView mesh, const std::vector<L
     check_travel(plan);
 }
 
-// From layers on. `ground` is a plan with its stock and features.
-Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const LayerRequest& request, const LayerPlacement& placement,
+// From layers on. `begun` is a plan with its stock and features.
+Plan plan_layers(Context& context, const PathGround& ground, const Plan& begun, const LayerRequest& request, const LayerPlacement& placement,
                  ProgressShare share) {
-    Plan plan = ground;
-    const MeshView view = mesh.view();
+    Plan plan = begun;
+    const MeshView view = ground.pattern;
     plan.diagnostics.insert(plan.diagnostics.end(), placement.diagnostics.begin(), placement.diagnostics.end());
     warn_of_overhang(plan, request, placement.boundaries);
     plan.layers = layers_between(plan.job, placement.boundaries);
     settle_undercuts(context, plan, view);
     if (plan.job.flask.enabled) plan.flask = place_flask(context, view, plan);
     const std::vector<Loops> joints = joints_of(context, plan, view);
-    cut_layers(context, plan, view, joints, share);
+    cut_layers(context, plan, ground, joints, share);
 
     context.begin_phase("schedule", share.at(0.98), share.at(1));
     for (std::size_t i = 0; i < plan.layers.size(); ++i) bond_layer(plan.layers[i], joints[i], plan, plan.diagnostics);
@@ -247,8 +269,8 @@ Plan plan_layers(Context& context, const Mesh& mesh, const Plan& ground, const L
 }
 
 // Every placement planned whole; the one that is built in the least time stays.
-Plan fastest_plan(Context& context, const Mesh& mesh, const Plan& ground, const LayerRequest& request, const std::vector<LayerCandidate>& tried,
-                  ProgressShare share) {
+Plan fastest_plan(Context& context, const PathGround& ground, const Plan& begun, const LayerRequest& request,
+                  const std::vector<LayerCandidate>& tried, ProgressShare share) {
     std::optional<Plan> best;
     std::exception_ptr refused;  // the first
     std::string words;
@@ -258,7 +280,7 @@ Plan fastest_plan(Context& context, const Mesh& mesh, const Plan& ground, const 
         LayerRequest asked = request;
         asked.max_layer = tried[i].max_layer;
         try {
-            Plan plan = plan_layers(context, mesh, ground, asked, tried[i].placement, {share.at(at), share.at(at + step)});
+            Plan plan = plan_layers(context, ground, begun, asked, tried[i].placement, {share.at(at), share.at(at + step)});
             words += fmt::format("{}{} {:.1f} min", words.empty() ? "" : ", ", tried[i].name, plan.totals.build_minutes);
             if (!best || plan.totals.build_minutes < best->totals.build_minutes) best = std::move(plan), name = tried[i].name;
         } catch (const Error& e) {
@@ -313,9 +335,10 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     request.saddles_constrain = job.layers.saddles_constrain;
     request.features = plan.features;
     request.section_area = SectionAreas(context, view);
+    const PathGround ground = ground_of(context, plan, view);
     if (job.layers.strategy == LayerStrategy::combined)
-        return fastest_plan(context, mesh, plan, request, layer_candidates(context, view, job, request), {0.04, 0.98});
-    return plan_layers(context, mesh, plan, request,
+        return fastest_plan(context, ground, plan, request, layer_candidates(context, view, job, request), {0.04, 0.98});
+    return plan_layers(context, ground, plan, request,
                        job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request), {0.04, 0.98});
 }
 

@@ -131,12 +131,8 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
                  alpha_map(context, layer.mesh, layer.floor_below, layer.z_top),
                  nullptr,
                  {}};
-    for (const Feature* flat : layer.flats) {
-        double z = flat->z_low;
-        for (const std::uint32_t f : flat->facets)
-            for (const std::uint32_t v : layer.mesh.facets[f]) z = std::max(z, static_cast<double>(layer.mesh.vertices[v].z));
-        if (z < layer.z_top) cut.floors.push_back(z);
-    }
+    for (const Flat& flat : layer.flats)
+        if (flat.highest < layer.z_top) cut.floors.push_back(flat.highest);
     std::sort(cut.floors.begin(), cut.floors.end(), std::greater<>());
     cut.floors.erase(std::unique(cut.floors.begin(), cut.floors.end(), [](double a, double b) { return a - b < kSameFloor; }), cut.floors.end());
 

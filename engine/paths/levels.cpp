@@ -111,9 +111,9 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     // The foot of a wall on a floor is a hollow: the ball turns from wall to floor within a small part of a step. Levels
     // close above every floor cut what lies there, and only that.
     const std::size_t regular = tips.size();
-    for (const Feature* flat : cut.layer.feet)
+    for (const Flat& flat : cut.layer.feet)
         for (double above = tool.stepdown_max / 4; above > 0.02; above /= 2)
-            if (flat->z_low + above < high && flat->z_low + above > lowest) tips.push_back(flat->z_low + above);
+            if (flat.z + above < high && flat.z + above > lowest) tips.push_back(flat.z + above);
     std::sort(tips.begin() + static_cast<std::ptrdiff_t>(regular), tips.end(), std::greater<>());
     tips.erase(std::unique(tips.begin() + static_cast<std::ptrdiff_t>(regular), tips.end()), tips.end());
     const double foot_nz = std::cos(80 * degree);

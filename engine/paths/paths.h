@@ -12,19 +12,24 @@ namespace slabwright {
 /// Of a layer's time, its paths; the forces that follow take the rest.
 inline constexpr double kPathsShare = 0.92;
 
+/// An up-facing flat of at least cutting.min_flat_area. Its facets may differ in their last bits.
+struct Flat {
+    double z = 0, highest = 0;  ///< mm: its height, and that of its highest vertex
+};
+
 /// A layer's work is a value in and a value out.
 struct LayerJob {
-    MeshView mesh;  ///< the whole pattern, pattern-base
+    MeshView mesh;  ///< the whole pattern, pattern-base, or a lighter one that lies as near to it as the job's `gouge` leaves room for
     const Job* job = nullptr;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
     double floor_below = 0;                          ///< the lowest z that a tip may reach: z_bottom less what may be cut under it
     std::array<double, 2> stock_min{}, stock_max{};  ///< mm
     int index = 0;
     LayerTools tools;
-    Loops opening;                      ///< of the flask in this layer; empty: no flask
-    std::vector<const Feature*> flats;  ///< up-facing flats of at least cutting.min_flat_area strictly between z_bottom and z_top
-    ProgressPart* progress = nullptr;   ///< told how far the paths are, up to kPathsShare; the rest is the caller's
-    std::vector<const Feature*> feet;   ///< up-facing flats on which walls of this layer may stand: `flats` and those just below
+    Loops opening;                     ///< of the flask in this layer; empty: no flask
+    std::vector<Flat> flats;           ///< strictly between z_bottom and z_top
+    ProgressPart* progress = nullptr;  ///< told how far the paths are, up to kPathsShare; the rest is the caller's
+    std::vector<Flat> feet;            ///< on which walls of this layer may stand: `flats` and those just below
 };
 
 struct LayerResult {

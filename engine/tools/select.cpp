@@ -77,7 +77,7 @@ public:
           finish_(finish),
           flats_(falling(job_, ToolKind::flat)),
           balls_(falling(job_, ToolKind::ball)) {
-        for (const Feature* flat : layer.flats) floors_.push_back(flat->z_low);
+        for (const Flat& flat : layer.flats) floors_.push_back(flat.z);
     }
 
     ToolChoice run() {

@@ -62,7 +62,7 @@ protected:
         layer.stock_min = {box.min.x - dx, box.min.y - dy};
         layer.stock_max = {box.max.x + dx, box.max.y + dy};
         for (const Feature& f : features)
-            if (f.type == FeatureType::up_flat && f.z_low > layer.z_bottom && f.z_low < layer.z_top) layer.flats.push_back(&f);
+            if (f.type == FeatureType::up_flat && f.z_low > layer.z_bottom && f.z_low < layer.z_top) layer.flats.push_back({f.z_low, f.z_low});
         ToolChoice choice = select_tools(context, layer, GetParam() == Source::tables ? tables(z_bottom_in) : reach_ratio(context, layer, nullptr));
         for (const ToolCandidate& c : choice.record.candidates)
             std::printf("%-10s %-4s T%-2d AR %.4f AS %6.1f mm2 stepdown %.4f in %6.2f min: %s\n", c.purpose.c_str(), c.chosen ? "yes" : "no", c.tool,

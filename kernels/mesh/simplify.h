@@ -1,0 +1,23 @@
+// Fewer facets for the same surface: what a finely facetted plane, wall or fillet has more of than a tolerance asks for.
+#pragma once
+
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// A mesh whose surface lies within `tolerance_mm` of the given one, and the given one within it of the result: a bound, not an estimate.
+/// Vertices are only taken away (each is drawn along an edge into a neighbour), none is moved, so planes stay the planes they are. A
+/// vertex goes where between the facets that were around it and those that follow the gap, measured along their mean normal at every
+/// place where edges of the one cross those of the other, and the gap already granted to those facets are within the tolerance, where no
+/// new facet turns by more than a degree from all of the old ones, gets flatter than it need be, or joins sheets that were apart. Open
+/// edges, and vertices around which the facets do not form one fan, stay.
+///
+/// Works in blocks of space, in parallel, twice over blocks that do not share borders; the result is the same on any number of threads,
+/// and its facets come in the order of the blocks. About 100 bytes a facet besides the meshes, charged.
+/// @param mesh with or without neighbours
+/// @returns a mesh with neighbours
+/// @throws Error(usage, "simplify.tolerance") unless the tolerance is positive and finite; Error(no_plan, "memory.limit"), Error(cancelled)
+[[nodiscard]] Mesh simplify(Context& context, MeshView mesh, double tolerance_mm);
+
+}  // namespace slabwright
