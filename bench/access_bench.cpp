@@ -19,6 +19,7 @@
 
 #include "kernels/access/accessibility.h"
 #include "kernels/access/triangle.h"
+#include "kernels/mesh/morton.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
 
@@ -84,6 +85,7 @@ Model make_model(std::uint64_t facets, bool relief) {
         metre_pattern({.size_mm = 290, .height_mm = 29, .facets = facets}, [&](const Facet& f) { corners.push_back(f); });
         model.mesh = weld(context, corners);
     }
+    const MortonGrid grid(bounds(model.mesh.view()));
     for (const Index3& f : model.mesh.facets) {
         Point3 t[3];
         for (int k = 0; k < 3; ++k) t[k] = {model.mesh.vertices[f[k]].x, model.mesh.vertices[f[k]].y, model.mesh.vertices[f[k]].z};
@@ -94,9 +96,8 @@ Model make_model(std::uint64_t facets, bool relief) {
         double n[3] = {uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx};
         const double l = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         if (!(l > 0) || n[2] < 0) continue;
-        auto cell = [](double v) { return static_cast<std::uint32_t>(std::clamp(v / 400 + 0.5, 0.0, 1.0) * ((1 << 21) - 1)); };
-        const std::uint64_t code =
-            morton(cell((t[0][0] + t[1][0] + t[2][0]) / 3), cell((t[0][1] + t[1][1] + t[2][1]) / 3), cell((t[0][2] + t[1][2] + t[2][2]) / 3));
+        auto middle = [&](int k) { return (t[0][k] + t[1][k] + t[2][k]) / 3; };
+        const std::uint64_t code = grid.code(middle(0), middle(1), middle(2));
         for (int i = 0; i < 4; ++i) {
             double w[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3};
             if (i > 0) {
