@@ -193,6 +193,56 @@ TEST(StandingPart, AgreesWithBruteForceOnARelief) {
     }
 }
 
+TEST(StandingPart, RowsOfMotionsAgreeWithOneAfterTheOther) {
+    Context context;
+    const Mesh m = relief(24, bumpy);
+    const StandingPart part(context, m.view());
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-2, 26), uz(2, 9), d(-1.2, 1.2), ur(0.3, 4), unit(0, 1);
+    std::size_t deep = 0, free = 0;
+    for (const double z_top : {100.0, 6.5})
+        for (int trial = 0; trial < 60; ++trial) {
+            // A chain with short steps, level and steep ones, standing ones, and now and then a jump.
+            std::vector<StandingPart::Motion> motions;
+            Point3 at{u(random), u(random), uz(random)};
+            for (int i = 0; i < 40; ++i) {
+                Point3 to = at;
+                const double kind = unit(random);
+                if (kind < 0.05) to = {u(random), u(random), uz(random)};
+                else if (kind < 0.1) to[2] += 4 * d(random);
+                else if (kind < 0.95) to = {at[0] + d(random), at[1] + d(random), kind < 0.5 ? at[2] : at[2] + 0.3 * d(random)};
+                motions.push_back({at, to});
+                at = kind < 0.9 ? to : Point3{u(random), u(random), uz(random)};
+            }
+            const double R = ur(random), tolerance = 0.2 + 3 * unit(random), ignore = trial % 2 == 0 ? 1e-5 : 0.0;
+            for (const auto form : {StandingPart::Form::ball, StandingPart::Form::cylinder}) {
+                double most = 0;
+                std::vector<double> depths;
+                for (const auto& [from, to] : motions) {
+                    const bool ball = form == StandingPart::Form::ball;
+                    const Penetration p = ball ? part.ball(z_top, from, to, R, ignore) : part.cylinder(z_top, from, to, R, ignore);
+                    depths.push_back(p.depth);
+                    most = std::max(most, p.depth);
+                }
+                const StandingPart::Found found = part.deepest(form, z_top, motions, R, ignore, tolerance);
+                EXPECT_NEAR(found.most.depth, most, 1e-6) << "seed " << seed << " trial " << trial;
+                EXPECT_EQ(found.most.found, most > 0);
+                if (most > 0) {
+                    EXPECT_NEAR(depths[found.motion], most, 1e-6);
+                }
+                for (std::size_t i = 0; i < motions.size(); ++i) {
+                    if (std::abs(depths[i] - tolerance) < 1e-6) continue;
+                    const bool listed = std::binary_search(found.beyond.begin(), found.beyond.end(), static_cast<std::uint32_t>(i));
+                    EXPECT_EQ(listed, depths[i] > tolerance) << "motion " << i << " depth " << depths[i];
+                    ++(listed ? deep : free);
+                }
+            }
+        }
+    EXPECT_GT(deep, 1000u);
+    EXPECT_GT(free, 1000u);
+}
+
 TEST(StandingPart, EnvelopeByPointsAndByGrid) {
     Context context;
     const Mesh m = relief(12, bumpy);

@@ -34,13 +34,8 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
         context, n - 1, 512, GougeReport{},
         [&](std::size_t begin, std::size_t end) {
             GougeReport r;
-            StandingPart::Column last;
-            // Once a chunk has a depth, only deeper ones can change its maximum; but every gouge is to be counted, so what is
-            // beyond the tolerance is always looked for.
-            auto floor = [&](const GougePlace& place) { return std::max(options.ignore, std::min(place.depth, options.tolerance)); };
-            auto keep = [](GougePlace& place, const Penetration& p, std::uint32_t line) {
-                if (p.found && p.depth > place.depth) place = {p.depth, line, p.tip};
-            };
+            std::vector<StandingPart::Motion> motions;
+            std::vector<std::uint32_t> lines;
             for (std::size_t i = begin; i < end; ++i) {
                 const ProgramStep &from = program.steps[i], &to = program.steps[i + 1];
                 if (!from.known() || !to.known()) continue;
@@ -48,21 +43,27 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 ++r.motions;
                 r.length_mm += std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
                 if (std::min(a[2], b[2]) >= z_top) continue;
-                const Penetration p = tool.kind == ToolKind::ball ? part.ball(z_top, a, b, radius, floor(r.cutter), &last)
-                                                                  : part.cylinder(z_top, a, b, radius, floor(r.cutter), &last);
-                keep(r.cutter, p, to.line);
-                r.gouges += p.found && p.depth > options.tolerance;
-                bool touched = false;
-                auto follow = [&](GougePlace& place, double thick, double above) {
-                    if (thick <= 0 || std::min(a[2], b[2]) + above >= z_top) return;
-                    const Penetration q = part.cylinder(z_top, {a[0], a[1], a[2] + above}, {b[0], b[1], b[2] + above}, thick, floor(place));
-                    keep(place, q, to.line);
-                    touched = touched || (q.found && q.depth > options.tolerance);
-                };
-                if (shank > radius) follow(r.shank, shank, tool.flute_length);
-                if (nose > radius) follow(r.holder, nose, tool.stickout);
-                r.contacts += touched;
+                motions.push_back({a, b});
+                lines.push_back(to.line);
             }
+            auto check = [&](StandingPart::Form form, double thick, GougePlace& place) {
+                StandingPart::Found found = part.deepest(form, z_top, motions, thick, options.ignore, options.tolerance);
+                if (found.most.found) place = {found.most.depth, lines[found.motion], found.most.tip};
+                return std::move(found.beyond);
+            };
+            r.gouges = check(tool.kind == ToolKind::ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter).size();
+            std::vector<std::uint32_t> touched;
+            double raised = 0;
+            auto follow = [&](GougePlace& place, double thick, double above) {
+                for (StandingPart::Motion& m : motions) m.from[2] += above - raised, m.to[2] += above - raised;
+                raised = above;
+                const auto beyond = check(StandingPart::Form::cylinder, thick, place);
+                touched.insert(touched.end(), beyond.begin(), beyond.end());
+            };
+            if (shank > radius) follow(r.shank, shank, tool.flute_length);
+            if (nose > radius) follow(r.holder, nose, tool.stickout);
+            std::sort(touched.begin(), touched.end());
+            r.contacts = static_cast<std::uint64_t>(std::unique(touched.begin(), touched.end()) - touched.begin());
             return r;
         },
         join);

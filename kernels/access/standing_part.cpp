@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/access/near_facets.h"
 #include "kernels/access/triangle.h"
 #include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
@@ -380,11 +381,106 @@ private:
     double ax_, ay_, ux_ = 1, uy_ = 0, length_ = 0;
 };
 
-/// Whether there is part at a place's column, asked once for the end of one motion and the begin of the next.
-bool covered_once(const StandingPart& part, const Point3& tip, double z, StandingPart::Column* last) {
-    if (last == nullptr) return part.covered(tip[0], tip[1], z);
-    if (!(last->known && last->x == tip[0] && last->y == tip[1] && last->z == z)) *last = {tip[0], tip[1], z, part.covered(tip[0], tip[1], z), true};
-    return last->covered;
+/// A cutter of one form with a layer's top.
+struct Cutter {
+    StandingPart::Form form;
+    double radius, top;
+
+    [[nodiscard]] bool ball() const { return form == StandingPart::Form::ball; }
+    /// What is asked of a motion is asked of so many pieces of it.
+    [[nodiscard]] int pieces(const Point3& from, const Point3& to) const {
+        const Point3 span = sub(to, from);
+        const double length = std::sqrt(dot(span, span));
+        const double count = ball() ? std::max(length / StandingPart::kSpan, std::abs(span[2]) / StandingPart::kRise)
+                                    : length / (from[2] == to[2] ? StandingPart::kSpan : StandingPart::kPiece);
+        return std::max(1, static_cast<int>(std::ceil(count)));
+    }
+    /// Depth with the tip under the cap, the section of the part by the layer's top: that of the ball's centre below it, or of the cylinder's
+    /// floor. On a piece it is greatest at an end or where the axis crosses the cap's outline, and the outline is an edge of facets cut
+    /// at the top.
+    [[nodiscard]] double under_cap(const Point3& tip) const {
+        return ball() ? radius - std::max(0.0, tip[2] + radius - top) : std::min(radius, top - tip[2]);
+    }
+};
+
+/// A piece of a motion.
+struct Piece {
+    Piece(const Point3& from, const Point3& to) : a(from), b(to), lowest(std::min(from[2], to[2])), way(from, to) {}
+    Point3 a, b;
+    double lowest;
+    WayInPlan way;
+};
+
+/// Whether a box or facet, whose highest point is given, can be deeper than `depth` in the cutter.
+template <class Shape>
+bool near(const Cutter& cutter, const Piece& piece, const Shape& shape, double highest, double depth) {
+    const double reach = cutter.radius - depth + kHair, z = std::min(highest, cutter.top);
+    if (!cutter.ball()) return z - piece.lowest > depth && piece.way.distance2(shape) < reach * reach;
+    const double dz = std::max(0.0, piece.lowest + cutter.radius - z);
+    return piece.way.distance2(shape) + dz * dz < reach * reach;
+}
+
+/// Whether a plane stands between a facet and what is deeper than `depth` in the cutter anywhere on a piece. Of all planes one is tried: across the
+/// line from the facet's middle to the ball's centre, or to the cylinder's axis, where that comes nearest. What is above the plane stays so upwards.
+bool parted(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& f, double depth) {
+    const double lift = cutter.ball() ? cutter.radius : 0;
+    const Point3 m{(static_cast<double>(f[0].x) + f[1].x + f[2].x) / 3, (static_cast<double>(f[0].y) + f[1].y + f[2].y) / 3,
+                   (static_cast<double>(f[0].z) + f[1].z + f[2].z) / 3 - lift};
+    const Point3 along = sub(piece.b, piece.a), from = sub(m, piece.a);
+    const double length2 = along[0] * along[0] + along[1] * along[1];
+    const double t = length2 > 0 ? std::clamp((from[0] * along[0] + from[1] * along[1]) / length2, 0.0, 1.0) : 0.5;
+    Point3 u{t * along[0] - from[0], t * along[1] - from[1], cutter.ball() ? std::max(0.0, t * along[2] - from[2]) : 0};
+    auto across = [&](const Vec3f& v) { return u[0] * (v.x - piece.a[0]) + u[1] * (v.y - piece.a[1]) + u[2] * (v.z - lift - piece.a[2]); };
+    const double gap = std::min(0.0, dot(u, along)) - std::max({across(f[0]), across(f[1]), across(f[2])}), reach = cutter.radius - depth + kHair;
+    return gap > 0 && gap * gap >= reach * reach * dot(u, u);
+}
+
+/// Raises the result by what one facet adds to it on one piece.
+void meet(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& facet, Penetration& result) {
+    if (parted(cutter, piece, facet, result.depth) || !near(cutter, piece, facet, std::max({facet[0].z, facet[1].z, facet[2].z}), result.depth))
+        return;
+    if (cutter.ball()) {
+        Point3 a = piece.a, b = piece.b;
+        a[2] += cutter.radius, b[2] += cutter.radius;
+        below(facet, cutter.top, [&](const Triangle& t) {
+            const Closest c = piece_distance(a, b, t, cutter.radius - result.depth);
+            if (cutter.radius - c.d > result.depth) result = {cutter.radius - c.d, between(piece.a, piece.b, c.t), true};
+        });
+        return;
+    }
+    Polygon poly;
+    poly.n = 3;
+    int under = 0;
+    for (int k = 0; k < 3; ++k) {
+        poly.p[k] = to_point(facet[k]);
+        under += facet[k].z < cutter.top;
+    }
+    if (under == 0) return;
+    if (under < 3) poly = clip_z(poly, cutter.top, false);
+    const Deepest d = piece_depth(piece.a, piece.b, poly, cutter.radius, result.depth);
+    if (d.depth > result.depth) result = {d.depth, between(piece.a, piece.b, d.t), true};
+}
+
+/// One motion. @param covered whether there is part just under the layer's top at a place @param look raises the result by what is near a piece
+template <class Covered, class Look>
+Penetration motion_depth(const Cutter& cutter, const Point3& from, const Point3& to, double at_least, Covered&& covered, Look&& look) {
+    if (cutter.radius <= at_least || std::min(from[2], to[2]) >= cutter.top - at_least) return {0, from, false};
+    Penetration result{at_least, from, false};
+    const int pieces = cutter.pieces(from, to);
+    auto under_cap = [&](const Point3& tip) {
+        const double depth = cutter.under_cap(tip);
+        if (depth > result.depth && covered(tip)) result = {depth, tip, true};
+    };
+    under_cap(from);
+    Point3 a = from;
+    for (int i = 0; i < pieces && result.depth < cutter.radius; ++i) {
+        const Point3 b = i + 1 == pieces ? to : between(from, to, static_cast<double>(i + 1) / pieces);
+        under_cap(b);
+        if (std::min(a[2], b[2]) < cutter.top - result.depth) look(Piece(a, b), result);
+        a = b;
+    }
+    if (!result.found) result.depth = 0;
+    return result;
 }
 
 }  // namespace
@@ -420,96 +516,181 @@ void StandingPart::walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit)
     }
 }
 
-Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least, Column* last) const {
-    const double top = z_top - kSheet;
-    Penetration result{at_least, from, false};
-    auto found = [&](double depth, const Point3& tip) {
-        if (depth > result.depth) result = {depth, tip, true};
-    };
-    if (std::min(from[2], to[2]) >= top - at_least) return {0, from, false};
-    const Point3 span = sub(to, from);
-    const double length = std::sqrt(dot(span, span));
-    const int pieces = std::max(1, static_cast<int>(std::ceil(std::max(length / kSpan, std::abs(span[2]) / kRise))));
-    // Under the cap, the section of the part by the layer's top, the depth is that of the ball's centre below it. On a piece it is greatest
-    // at an end or where the axis crosses the cap's outline, and the outline is an edge of facets cut at the top.
-    auto under_cap = [&](const Point3& tip) {
-        const double depth = radius - std::max(0.0, tip[2] + radius - top);
-        if (depth > result.depth && covered_once(*this, tip, top, last)) found(depth, tip);
-    };
-    under_cap(from);
-    Point3 a = from;
-    for (int i = 0; i < pieces && result.depth < radius; ++i) {
-        const Point3 b = i + 1 == pieces ? to : between(from, to, static_cast<double>(i + 1) / pieces);
-        under_cap(b);
-        if (std::min(a[2], b[2]) < top - result.depth) {
-            const Point3 ca{a[0], a[1], a[2] + radius}, cb{b[0], b[1], b[2] + radius};
-            const double centre = std::min(ca[2], cb[2]);  // the lowest
-            const WayInPlan way(a, b);
-            auto near = [&](const auto& at, double highest) {
-                const double dz = std::max(0.0, centre - std::min(highest, top)), reach = radius - result.depth + kHair;
-                return way.distance2(at) + dz * dz < reach * reach;
-            };
-            walk([&](const Node& n) { return n.z0 < top && near(n, n.z1); },
-                 [&](const Facet& f) {
-                     if (!near(f.v, std::max({f.v[0].z, f.v[1].z, f.v[2].z}))) return;
-                     below(f.v, top, [&](const Triangle& t) {
-                         const Closest c = piece_distance(ca, cb, t, radius - result.depth);
-                         if (radius - c.d > result.depth) found(radius - c.d, between(a, b, c.t));
-                     });
-                 });
-        }
-        a = b;
-    }
-    if (!result.found) result.depth = 0;
-    return result;
+Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+    return depth_of(Form::ball, z_top, from, to, radius, at_least);
 }
 
-Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least, Column* last) const {
-    const double top = z_top - kSheet;
-    Penetration result{at_least, from, false};
-    auto found = [&](double depth, const Point3& tip) {
-        if (depth > result.depth) result = {depth, tip, true};
-    };
-    if (radius <= at_least || std::min(from[2], to[2]) >= top - at_least) return {0, from, false};
-    const Point3 span = sub(to, from);
-    const double length = std::sqrt(dot(span, span));
-    const int pieces = std::max(1, static_cast<int>(std::ceil(length / (from[2] == to[2] ? kSpan : kPiece))));
-    auto under_cap = [&](const Point3& tip) {
-        const double depth = std::min(radius, top - tip[2]);
-        if (depth > result.depth && covered_once(*this, tip, top, last)) found(depth, tip);
-    };
-    under_cap(from);
-    Point3 a = from;
-    for (int i = 0; i < pieces && result.depth < radius; ++i) {
-        const Point3 b = i + 1 == pieces ? to : between(from, to, static_cast<double>(i + 1) / pieces);
-        under_cap(b);
-        const double lowest = std::min(a[2], b[2]);
-        if (lowest < top - result.depth) {
-            const WayInPlan way(a, b);
-            auto near = [&](const auto& at, double highest) {
-                const double reach = radius - result.depth + kHair;
-                return std::min(highest, top) - lowest > result.depth && way.distance2(at) < reach * reach;
-            };
-            walk([&](const Node& n) { return n.z0 < top && near(n, n.z1); },
-                 [&](const Facet& f) {
-                     if (!near(f.v, std::max({f.v[0].z, f.v[1].z, f.v[2].z}))) return;
-                     Polygon poly;
-                     poly.n = 3;
-                     int under = 0;
-                     for (int k = 0; k < 3; ++k) {
-                         poly.p[k] = to_point(f.v[k]);
-                         under += f.v[k].z < top;
-                     }
-                     if (under == 0) return;
-                     if (under < 3) poly = clip_z(poly, top, false);
-                     const Deepest d = piece_depth(a, b, poly, radius, result.depth);
-                     if (d.depth > result.depth) found(d.depth, between(a, b, d.t));
-                 });
-        }
-        a = b;
+Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+    return depth_of(Form::cylinder, z_top, from, to, radius, at_least);
+}
+
+Penetration StandingPart::depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+    const Cutter cutter{form, radius, z_top - kSheet};
+    return motion_depth(
+        cutter, from, to, at_least, [&](const Point3& tip) { return covered(tip[0], tip[1], cutter.top); },
+        [&](const Piece& piece, Penetration& result) {
+            walk([&](const Node& n) { return n.z0 < cutter.top && near(cutter, piece, n, n.z1, result.depth); },
+                 [&](const Facet& f) { meet(cutter, piece, f.v, result); });
+        });
+}
+
+/// What of the part motions within a box may meet: facets that can be deeper than `at_least` in the cutter, and those above the layer's top that
+/// cover one of its places.
+struct StandingPart::Vicinity {
+    static constexpr double kSide = 3;  // mm that a box is made long, unless one piece is longer
+
+    Cutter cutter{};
+    double at_least = 0;
+    Point3 low{}, high{};  // of the tip
+    bool empty = true, facets_known = false, covers_known = false;
+    std::vector<std::uint32_t> facets, covers;  // both in the order of the tree
+    NearFacets terms;                           // of the facets
+    NearBoxes boxes;                            // of the covers
+    std::vector<unsigned char> keep;
+
+    [[nodiscard]] bool holds(const Point3& p) const {
+        return !empty && p[0] >= low[0] && p[0] <= high[0] && p[1] >= low[1] && p[1] <= high[1] && p[2] >= low[2] && p[2] <= high[2];
     }
-    if (!result.found) result.depth = 0;
-    return result;
+    /// Whether the box can take a point and stay small. It does so then.
+    bool add(const Point3& p) {
+        Point3 l = low, h = high;
+        for (int k = 0; k < 3; ++k) {
+            l[k] = std::min(l[k], p[k]), h[k] = std::max(h[k], p[k]);
+            if (h[k] - l[k] > std::max(kSide, high[k] - low[k])) return false;
+        }
+        low = l, high = h;
+        return true;
+    }
+    /// A box around a piece of a motion and as much of what follows as makes no more than a small box.
+    void place(std::span<const Motion> motions, std::size_t motion, const Point3& a, const Point3& b, double floor) {
+        at_least = floor;
+        empty = facets_known = covers_known = false;
+        for (int k = 0; k < 3; ++k) low[k] = std::min(a[k], b[k]), high[k] = std::max(a[k], b[k]);
+        Point3 at = b;
+        for (std::size_t m = motion; m < motions.size(); ++m) {
+            const Motion& next = motions[m];
+            if (m > motion) {
+                if (std::min(next.from[2], next.to[2]) >= cutter.top - floor) continue;  // asks for nothing
+                if (!add(next.from)) return;
+                at = next.from;
+            }
+            const Point3 way = sub(next.to, at);
+            const double length = std::sqrt(dot(way, way));
+            if (length > kSide) {
+                add(between(at, next.to, kSide / length));
+                return;
+            }
+            if (!add(next.to)) return;
+        }
+    }
+};
+
+/// Finds the facets for a box.
+void StandingPart::gather(Vicinity& v) const {
+    const Cutter& cutter = v.cutter;
+    const double reach = cutter.radius - v.at_least + kHair, lowest = v.low[2] + (cutter.ball() ? cutter.radius : 0);
+    const Point3 middle = between(v.low, v.high, 0.5), half = sub(v.high, middle);
+    // The horizontal distance left to what is as high as z at most; negative where nothing so low can be met.
+    auto left = [&](double z) {
+        if (!cutter.ball()) return std::min(z, cutter.top) - lowest > v.at_least ? reach : -1.0;
+        const double dz = lowest - std::min(z, cutter.top);
+        return dz <= 0 ? reach : dz < reach ? std::sqrt(reach * reach - dz * dz) : -1.0;
+    };
+    auto gap2 = [&](double x0, double x1, double y0, double y1) {
+        const double dx = std::max({0.0, x0 - v.high[0], v.low[0] - x1}), dy = std::max({0.0, y0 - v.high[1], v.low[1] - y1});
+        return dx * dx + dy * dy;
+    };
+    v.facets.clear();
+    v.terms.clear();
+    walk(
+        [&](const Node& n) {
+            if (n.z0 >= cutter.top) return false;
+            const double d = left(n.z1);
+            return d >= 0 && gap2(n.x0, n.x1, n.y0, n.y1) < d * d;
+        },
+        [&](const Facet& f) {
+            const auto& [a, b, c] = f.v;
+            const double z = std::max({a.z, b.z, c.z}), d = left(z);
+            if (d < 0 || std::min({a.z, b.z, c.z}) >= cutter.top) return;
+            const double x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x}), y0 = std::min({a.y, b.y, c.y}),
+                         y1 = std::max({a.y, b.y, c.y});
+            if (gap2(x0, x1, y0, y1) >= d * d) return;
+            // The facet's plane with its normal upwards. What is above it by the reach stays that far from the facet wherever it goes upwards.
+            const Point3 p = to_point(a), e = sub(to_point(b), p), g = sub(to_point(c), p);
+            Point3 n{e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0]};
+            const double area = std::sqrt(dot(n, n)), scale = area > 1e-9 ? (n[2] < 0 ? -1 : 1) / area : 0;
+            for (double& x : n) x *= scale;
+            const double offset = scale != 0 ? -dot(n, p) : -kInfinity;
+            const double needs = cutter.ball() ? reach : reach * std::sqrt(n[0] * n[0] + n[1] * n[1]);
+            const double above = dot(n, middle) + offset + n[2] * (cutter.ball() ? cutter.radius : v.at_least) -
+                                 (std::abs(n[0]) * half[0] + std::abs(n[1]) * half[1] + std::abs(n[2]) * half[2]);
+            if (above >= needs + kHair) return;
+            const double cx = (x0 + x1) / 2, cy = (y0 + y1) / 2;
+            double r2 = 0;
+            for (const Vec3f& q : f.v) r2 = std::max(r2, (q.x - cx) * (q.x - cx) + (q.y - cy) * (q.y - cy));
+            const double far = std::sqrt(r2) + d + kHair;
+            v.facets.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
+            v.terms.add({n[0], n[1], n[2], offset, needs + kHair, cx, cy, far * far, std::min(z, cutter.top)});
+        });
+    v.facets_known = true;
+}
+
+/// Finds what covers a place of a box.
+void StandingPart::gather_covers(Vicinity& v) const {
+    const double top = v.cutter.top;
+    v.covers.clear();
+    v.boxes.clear();
+    walk([&](const Node& n) { return n.z1 >= top && n.x0 <= v.high[0] && v.low[0] <= n.x1 && n.y0 <= v.high[1] && v.low[1] <= n.y1; },
+         [&](const Facet& f) {
+             const auto& [a, b, c] = f.v;
+             if (a.z < top && b.z < top && c.z < top) return;
+             const float x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x}), y0 = std::min({a.y, b.y, c.y}),
+                         y1 = std::max({a.y, b.y, c.y});
+             if (x0 > v.high[0] || v.low[0] > x1 || y0 > v.high[1] || v.low[1] > y1) return;
+             v.covers.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
+             v.boxes.add({x0, x1, y0, y1});
+         });
+    v.covers_known = true;
+}
+
+StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore,
+                                          double tolerance) const {
+    Found found;
+    Vicinity v;
+    v.cutter = {form, radius, z_top - kSheet};
+    const Cutter& cutter = v.cutter;
+    Point3 last{};  // the end of one motion is mostly the begin of the next
+    bool last_known = false, last_covered = false;
+    for (std::size_t m = 0; m < motions.size(); ++m) {
+        // Only what is deeper than all before can change the maximum; but every motion beyond the tolerance is to be found.
+        const double floor = std::max(ignore, std::min(found.most.depth, tolerance));
+        auto covered_at = [&](const Point3& tip) {
+            if (last_known && last == tip) return last_covered;
+            if (!v.holds(tip)) v.place(motions, m, tip, tip, floor);
+            if (!v.covers_known) gather_covers(v);
+            int winding = 0;
+            v.boxes.around(tip[0], tip[1], v.keep);
+            for_each_kept(v.keep, [&](std::size_t k) {
+                const Facet& f = facets_[v.covers[k]];
+                const int w = facet_winding(f.v, tip[0], tip[1]);
+                if (w != 0 && facet_height(f.v, tip[0], tip[1]) >= cutter.top) winding += w;
+            });
+            last = tip, last_known = true;
+            return last_covered = winding > 0;
+        };
+        auto look = [&](const Piece& piece, Penetration& result) {
+            if (!v.holds(piece.a) || !v.holds(piece.b)) v.place(motions, m, piece.a, piece.b, floor);
+            if (!v.facets_known) gather(v);
+            const double up = cutter.ball() ? cutter.radius : result.depth, high = piece.lowest + (cutter.ball() ? cutter.radius : 0);
+            const double deepest = cutter.ball() ? high - (radius - result.depth + kHair) : high + result.depth;
+            v.terms.near({{piece.a[0], piece.a[1], piece.a[2] + up}, {piece.b[0], piece.b[1], piece.b[2] + up}, deepest}, v.keep);
+            for_each_kept(v.keep, [&](std::size_t k) { meet(cutter, piece, facets_[v.facets[k]].v, result); });
+        };
+        const Penetration p = motion_depth(cutter, motions[m].from, motions[m].to, floor, covered_at, look);
+        if (p.found && p.depth > found.most.depth) found.most = p, found.motion = m;
+        if (p.found && p.depth > tolerance) found.beyond.push_back(static_cast<std::uint32_t>(m));
+    }
+    return found;
 }
 
 bool StandingPart::covered(double x, double y, double z) const {

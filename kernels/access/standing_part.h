@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "kernels/mesh/mesh.h"
@@ -37,23 +38,30 @@ public:
     /// Error of a depth by numerical minimisation, mm.
     static constexpr double kNumericalError = 1e-7;
 
-    /// The last place in plan that was asked for part above it: motions that follow one another share theirs.
-    struct Column {
-        double x = 0, y = 0, z = 0;
-        bool covered = false, known = false;
-    };
-
     /// Largest depth, over a straight motion of the tip, of part in a ball end mill: a ball of `radius` whose lowest point
     /// is the tip, and the shank of the same radius above its centre. Depth of a point in the cutter is its distance
     /// from the cutter's surface, so a wall that is cut too deep by d counts d, whatever its slope.
     /// @param at_least only depths above this are looked for (0 or more), mm
-    /// @param last saves time over motions that follow one another; may be null
-    [[nodiscard]] Penetration ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least, Column* last = nullptr) const;
+    [[nodiscard]] Penetration ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
 
     /// The same for an upright cylinder that begins at the tip and has no upper end (flat end mill, face mill, shank,
     /// holder): depth of a point is the lesser of its distances from the wall and from the floor of the cylinder.
-    [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least,
-                                       Column* last = nullptr) const;
+    [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
+
+    enum class Form : char { ball, cylinder };
+    struct Motion {
+        Point3 from, to;
+    };
+    /// What motions that are checked together have in common.
+    struct Found {
+        Penetration most;                   ///< of equals the first
+        std::size_t motion = 0;             ///< that has it
+        std::vector<std::uint32_t> beyond;  ///< motions deeper than the tolerance, ascending
+    };
+    /// The same for a row of motions, best for such as follow one another closely: what of the part is near is looked for once for many.
+    /// @param ignore depths up to this are not looked for (0 or more), mm
+    /// @param tolerance every motion deeper than this is found, of the others only those that are deeper than all before, mm
+    [[nodiscard]] Found deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore, double tolerance) const;
 
     /// Whether there is part just under the plane z at (x, y).
     [[nodiscard]] bool covered(double x, double y, double z) const;
@@ -87,6 +95,10 @@ private:
     void walk(Enter&& enter, Visit&& visit) const;
     template <class Squared, class Limit, class Visit>
     void walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit) const;
+    struct Vicinity;
+    void gather(Vicinity& around) const;
+    void gather_covers(Vicinity& around) const;
+    [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
     std::vector<Facet> facets_;              ///< in Morton order
     std::vector<std::vector<Node>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
     Box3 box_{};
