@@ -130,4 +130,32 @@ SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restric
     }
 }
 
+SLABWRIGHT_WIDE void reach_rows(const double* __restrict v, int first, int last, double v_low, double v_high, double r2, double u_low, double u_high,
+                                double* __restrict low, double* __restrict high) {
+    for (int i = first; i < last; ++i) {
+        const double under = v_low - v[i], over = v[i] - v_high, beside = under > over ? under : over, d = beside > 0 ? beside : 0;
+        const double q = r2 - d * d, h = std::sqrt(q > 0 ? q : 0.0);
+        low[i] = q > 0 ? u_low - h : kInfinity;
+        high[i] = q > 0 ? u_high + h : -kInfinity;
+    }
+}
+
+SLABWRIGHT_WIDE void tangent_rows(const TangentTerms& t, const double* __restrict v, int first, int last, double* __restrict low,
+                                  double* __restrict high) {
+    // Near the rim of its reach the tangent is steep, and says nothing.
+    const double least = 0.01 * t.r2, z2 = t.r2 - t.z * t.z;
+    for (int i = first; i < last; ++i) {
+        const double w = v[i] - t.v, q = z2 - w * w;
+        const bool near = q > least;
+        const double h = std::sqrt(near ? q : 1.0), sv = w / h, sz = t.z / h;
+        const double a = sv * t.dv[0] + sz * t.dz[0], b = sv * t.dv[1] + sz * t.dz[1], c = sv * t.dv[2] + sz * t.dz[2];
+        const double a_up = a + t.du[0], b_up = b + t.du[1], c_up = c + t.du[2], a_down = a - t.du[0], b_down = b - t.du[1], c_down = c - t.du[2];
+        const double ab = a_up > b_up ? a_up : b_up, up = ab > c_up ? ab : c_up, ab_d = a_down > b_down ? a_down : b_down,
+                     down = ab_d > c_down ? ab_d : c_down;
+        const double to = t.u + h + up, from = t.u - h - down;
+        high[i] = near && to < high[i] ? to : high[i];
+        low[i] = near && from > low[i] ? from : low[i];
+    }
+}
+
 }  // namespace slabwright

@@ -31,4 +31,16 @@ struct CapsuleTerms {
 };
 void capsule_rows(const CapsuleTerms& capsule, const double* v, int n, double* low, double* high, double* nz_low, double* nz_high);
 
+/// How far along lines [first, last) at v what lies in a box may forbid, when r2 is r² less the box's least height over or under them squared:
+/// low and high, or low > high where it is out of reach.
+void reach_rows(const double* v, int first, int last, double v_low, double v_high, double r2, double u_low, double u_high, double* low, double* high);
+
+/// A facet seen from its middle (u, v) and z under the lines; its corners from there.
+struct TangentTerms {
+    double u, v, z, r2;
+    std::array<double, 3> du, dv, dz;
+};
+/// Narrows that for a facet and a ball, by the tangent of what one point of it forbids, except where the middle is hardly in reach.
+void tangent_rows(const TangentTerms& facet, const double* v, int first, int last, double* low, double* high);
+
 }  // namespace slabwright

@@ -72,147 +72,95 @@ struct Crossing {
     int turn;
 };
 
+// Whether a cutter at this height can touch what lies in [z_min, z_max]: the ball by its lower half, the disc by its plane, both by what
+// overhangs them, up to `overhang`.
+bool may_touch(double z_min, double z_max, double overhang, bool ball, double r, double zc) {
+    if (ball && z_max > zc - r && z_min <= zc) return true;
+    return overhang > zc || (!ball && z_max > zc && z_min <= zc);
+}
+
+// Whether all of [low, high] is forbidden on a line already; `at` remembers the interval that was looked at last.
+bool covered(const std::vector<Stretch>& cover, std::uint32_t& at, double low, double high) {
+    if (at < cover.size() && cover[at].low <= low && high <= cover[at].high) return true;
+    const auto next = std::upper_bound(cover.begin(), cover.end(), low, [](double v, const Stretch& s) { return v < s.low; });
+    if (next == cover.begin()) return false;
+    at = static_cast<std::uint32_t>(next - cover.begin()) - 1;
+    return high <= cover[at].high;
+}
+
 template <int U, int V>
-Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z,
-                    std::span<const std::int32_t> lines) {
-    const bool ball = cutter.profile == Cutter::Profile::ball;
-    const double r = cutter.radius, zc = ball ? tip_z + r : tip_z;  // the ball's centre, or the disc
-    Fibres result;
-    if (lines.empty()) return result;
-    const std::size_t blocks = (lines.size() + kBlock - 1) / kBlock;
-
-    // Which facets can matter, by block of lines.
-    auto first_line = [&](double v) {
-        return static_cast<std::size_t>(
-            std::lower_bound(lines.begin(), lines.end(), v * kUnitsPerMm, [](std::int32_t l, double x) { return l < x; }) - lines.begin());
-    };
-    auto range = [&](const SolidFacet& f) {
-        const double low = std::min({f.p[0][V], f.p[1][V], f.p[2][V]}) - r, high = std::max({f.p[0][V], f.p[1][V], f.p[2][V]}) + r;
-        return std::pair{first_line(low), first_line(high)};
-    };
-    auto active = [&](const SolidFacet& f) {
-        if (ball && f.z_max > zc - r && f.z_min <= zc) return true;     // within the ball's lower half
-        return f.z_max > zc && (f.nz < 0 || (!ball && f.z_min <= zc));  // cut by the disc's plane, or overhanging
-    };
-    std::vector<std::uint32_t> counts(blocks + 1, 0), members;
-    for (int pass = 0; pass < 2; ++pass) {
-        if (pass == 1) {
-            std::uint32_t sum = 0;
-            for (std::uint32_t& c : counts) sum += std::exchange(c, sum);
-            members.resize(sum);
-        }
-        for (std::size_t i = 0; i < solid.facets.size(); ++i) {
-            const SolidFacet& f = solid.facets[i];
-            if (!active(f)) continue;
-            const auto [first, last] = range(f);
-            if (first >= last) continue;
-            for (std::size_t b = first / kBlock; b <= (last - 1) / kBlock; ++b) {
-                if (pass == 1) members[counts[b]] = static_cast<std::uint32_t>(i);
-                ++counts[b];
-            }
-        }
-        if (pass == 1) {  // counts[b] is now the end of block b
-            for (std::size_t b = blocks; b > 0; --b) counts[b] = counts[b - 1];
-            counts[0] = 0;
-        }
+class BlockOfLines {
+public:
+    BlockOfLines(const LayerSolid& solid, const Cutter& cutter, double zc, std::span<const std::int32_t> lines)
+        : solid_(solid), ball_(cutter.profile == Cutter::Profile::ball), r_(cutter.radius), zc_(zc), n_(static_cast<int>(lines.size())) {
+        for (int l = 0; l < n_; ++l) at_[l] = to_mm(lines[static_cast<std::size_t>(l)]);
     }
 
-    // The inside: which segments cross the lines of a block.
-    struct Segment {
-        Point2 a, b;
-    };
-    std::vector<std::vector<Segment>> segments(blocks);
-    auto coordinate = [](Point2 p, int axis) { return axis == 0 ? p.x : p.y; };
-    for (std::size_t l = 0; l < inside.size(); ++l) {
-        const auto loop = inside.loop(l);
-        for (std::size_t i = 0; i < loop.size(); ++i) {
-            const Point2 a = loop[i], b = loop[i + 1 == loop.size() ? 0 : i + 1];
-            const std::int32_t va = coordinate(a, V), vb = coordinate(b, V);
-            if (va == vb) continue;
-            const std::size_t first = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::min(va, vb)) - lines.begin());
-            const std::size_t last = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::max(va, vb)) - lines.begin());
-            if (first >= last) continue;
-            for (std::size_t k = first / kBlock; k <= (last - 1) / kBlock; ++k) segments[k].push_back({a, b});
-        }
-    }
-
-    std::vector<Fibres> parts(blocks);
-    parallel_each(context, blocks, [&](std::size_t block) {
-        const std::size_t begin = block * kBlock, end = std::min(lines.size(), begin + kBlock);
-        std::array<std::vector<Forbidden>, kBlock> found;
-        HullRows hulls;
-        std::array<double, kBlock> at{};
-        for (std::size_t l = begin; l < end; ++l) at[l - begin] = to_mm(lines[l]);
-        for (std::uint32_t m = counts[block]; m < counts[block + 1]; ++m) {
-            const SolidFacet& f = solid.facets[members[m]];
-            const auto crossed = range(f);
-            const std::size_t first = std::max(crossed.first, begin), last = std::min(crossed.second, end), skip = first - begin;
-            const int n = static_cast<int>(last - first);
-            double *const low = hulls.low.data() + skip, *const high = hulls.high.data() + skip;
-            double *const nz_low = hulls.nz_low.data() + skip, *const nz_high = hulls.nz_high.data() + skip;
-            std::fill(low, low + n, kInfinity);
-            std::fill(high, high + n, -kInfinity);
-            auto meet_prism = [&](const PrismTerms& p) { prism_rows(p, at.data() + skip, n, low, high, nz_low, nz_high); };
-            auto meet_capsule = [&](const CapsuleTerms& c) { capsule_rows(c, at.data() + skip, n, low, high, nz_low, nz_high); };
-            if (ball && f.z_max > zc - r && f.z_min <= zc) {
-                if (f.normal != Vec3d{0, 0, 0}) meet_prism(prism<U, V>(f, r, zc));
-                for (int k = 0; k < 3; ++k)
-                    if (f.edges >> k & 1) meet_capsule(capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r, zc));
-            }
-            if (f.z_max > zc) {
-                if (f.nz < 0) {
-                    std::array<Vec3d, 4> polygon;
-                    const int corners = part_above(f, zc, polygon);
-                    for (int k = 0; k < corners; ++k) meet_capsule(capsule<U, V>(polygon[k], polygon[(k + 1) % corners], r, zc, f.nz));
-                } else if (!ball) {
-                    std::array<Vec3d, 2> cut;
-                    if (cut_segment(f, zc, cut)) meet_capsule(capsule<U, V>(cut[0], cut[1], r, zc, f.nz));
-                }
-            }
-            for (std::size_t l = first; l < last; ++l) {
-                const struct {
-                    double low, high;
-                    float nz_low, nz_high;
-                } h{hulls.low[l - begin], hulls.high[l - begin], static_cast<float>(hulls.nz_low[l - begin]),
-                    static_cast<float>(hulls.nz_high[l - begin])};
-                if (!(h.low < h.high)) continue;
-                // Neighbouring facets mostly follow one another, so most intervals only stretch the one before.
-                std::vector<Forbidden>& on_line = found[l - begin];
-                if (!on_line.empty() && h.low <= on_line.back().high && h.high >= on_line.back().low) {
-                    Forbidden& before = on_line.back();
-                    if (h.low < before.low) {
-                        before.low = h.low;
-                        before.nz_low = h.nz_low;
-                    }
-                    if (h.high > before.high) {
-                        before.high = h.high;
-                        before.nz_high = h.nz_high;
-                    }
-                } else on_line.push_back({h.low, h.high, h.nz_low, h.nz_high});
-            }
-        }
-        Fibres& part = parts[block];
-        std::vector<Crossing> crossings;
-        for (std::size_t l = begin; l < end; ++l) {
-            std::vector<Forbidden>& on_line = found[l - begin];
-            crossings.clear();
-            for (const Segment& s : segments[block]) {
-                const std::int64_t va = coordinate(s.a, V), vb = coordinate(s.b, V), v = lines[l];
+    // Forbids the inside, given by the segments of its border that cross these lines.
+    void meet_inside(std::span<const std::array<Point2, 2>> segments, std::span<const std::int32_t> lines) {
+        auto coordinate = [](Point2 p, int axis) { return axis == 0 ? p.x : p.y; };
+        for (std::size_t l = 0; l < lines.size(); ++l) {
+            crossings_.clear();
+            for (const auto& [a, b] : segments) {
+                const std::int64_t va = coordinate(a, V), vb = coordinate(b, V), v = lines[l];
                 if ((va <= v) == (vb <= v)) continue;
                 const double t = static_cast<double>(v - va) / static_cast<double>(vb - va);
-                const double u = (coordinate(s.a, U) + t * (static_cast<double>(coordinate(s.b, U)) - coordinate(s.a, U))) / kUnitsPerMm;
+                const double u = (coordinate(a, U) + t * (static_cast<double>(coordinate(b, U)) - coordinate(a, U))) / kUnitsPerMm;
                 // Solid lies left of a segment, so along +x a falling one enters; along +y the handedness is mirrored.
-                crossings.push_back({u, ((va > vb) == (U == 0)) ? 1 : -1});
+                crossings_.push_back({u, ((va > vb) == (U == 0)) ? 1 : -1});
             }
-            std::sort(crossings.begin(), crossings.end(),
+            std::sort(crossings_.begin(), crossings_.end(),
                       [](const Crossing& a, const Crossing& b) { return a.u != b.u ? a.u < b.u : a.turn > b.turn; });
             int depth = 0;
             double entered = 0;
-            for (const Crossing& c : crossings) {
+            for (const Crossing& c : crossings_) {
                 if (depth <= 0 && depth + c.turn > 0) entered = c.u;
-                if (depth > 0 && depth + c.turn <= 0 && c.u > entered) on_line.push_back({entered, c.u, 0, 0});
+                if (depth > 0 && depth + c.turn <= 0 && c.u > entered) found_[l].push_back({entered, c.u, 0, 0});
                 depth += c.turn;
             }
+        }
+    }
+
+    // Most facets only forbid what others around them forbid as well. One of each group shows about where that is, and of the others those
+    // are met that could reach past it, on the lines where they could.
+    void meet(std::span<const std::uint32_t> groups) {
+        std::vector<std::uint32_t> shown(groups.size());
+        for (std::size_t g = groups.size(); g-- > 0;) {  // of a wall the upper ones come first, which reach farthest
+            const std::size_t first = groups[g] * FacetGroup::kFacets, last = std::min(solid_.facets.size(), first + FacetGroup::kFacets);
+            std::size_t f = first;
+            while (f < last && !active(solid_.facets[f])) ++f;
+            shown[g] = static_cast<std::uint32_t>(f);
+            if (f < last) meet_facet(solid_.facets[f], lines_of(solid_.facets[f]));
+        }
+        for (int l = 0; l < n_; ++l) {
+            std::vector<Stretch>& cover = cover_[l];
+            for (const Forbidden& f : found_[l]) cover.push_back({f.low, f.high});
+            std::sort(cover.begin(), cover.end(), [](const Stretch& a, const Stretch& b) { return a.low < b.low; });
+            std::size_t kept = 0;
+            for (const Stretch& s : cover)
+                if (kept > 0 && s.low <= cover[kept - 1].high) cover[kept - 1].high = std::max(cover[kept - 1].high, s.high);
+                else cover[kept++] = s;
+            cover.resize(kept);
+        }
+        for (std::size_t g = 0; g < groups.size(); ++g) {
+            const FacetGroup& group = solid_.groups[groups[g]];
+            const bool level = !ball_ || group.overhang > zc_;
+            const double dz = level ? 0 : std::max({0.0, group.z_min - zc_, zc_ - group.z_max});
+            if (!group_reaches_out({group.low[U], group.high[U], group.low[V], group.high[V], dz}, lines_between(group.low[V], group.high[V])).any())
+                continue;
+            const std::size_t first = groups[g] * FacetGroup::kFacets, last = std::min(solid_.facets.size(), first + FacetGroup::kFacets);
+            for (std::size_t i = first; i < last; ++i) {
+                const SolidFacet& f = solid_.facets[i];
+                if (i != shown[g] && active(f)) meet_facet(f, reaches_out(f, lines_of(f)));
+            }
+        }
+    }
+
+    // What is forbidden in the end, line by line.
+    [[nodiscard]] Fibres merged() {
+        Fibres part;
+        for (int l = 0; l < n_; ++l) {
+            std::vector<Forbidden>& on_line = found_[l];
             std::sort(on_line.begin(), on_line.end(),
                       [](const Forbidden& a, const Forbidden& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
             for (const Forbidden& f : on_line) {
@@ -226,6 +174,181 @@ Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& insi
             }
             part.starts.push_back(static_cast<std::uint32_t>(part.intervals.size()));
         }
+        return part;
+    }
+
+private:
+    struct LineRange {
+        int first = 0, last = 0;
+        [[nodiscard]] bool any() const { return first < last; }
+    };
+    struct Reach {
+        double u_low, u_high, v_low, v_high, dz;
+    };
+
+    [[nodiscard]] bool active(const SolidFacet& f) const { return may_touch(f.z_min, f.z_max, f.nz < 0 ? f.z_max : -kInfinity, ball_, r_, zc_); }
+
+    // Those within the radius of [low, high].
+    [[nodiscard]] LineRange lines_between(double low, double high) const {
+        const double *begin = at_.data(), *end = begin + n_;
+        return {static_cast<int>(std::lower_bound(begin, end, low - r_) - begin), static_cast<int>(std::lower_bound(begin, end, high + r_) - begin)};
+    }
+    [[nodiscard]] LineRange lines_of(const SolidFacet& f) const {
+        return lines_between(std::min({f.p[0][V], f.p[1][V], f.p[2][V]}), std::max({f.p[0][V], f.p[1][V], f.p[2][V]}));
+    }
+
+    // The lines, from the first to the last of them, on which [low_, high_] is not covered.
+    LineRange not_covered(LineRange lines) {
+        LineRange out{lines.last, lines.last};
+        for (int l = lines.first; l < lines.last; ++l)
+            if (low_[l] < high_[l] && !covered(cover_[l], seen_[l], low_[l], high_[l])) {
+                if (out.first == lines.last) out.first = l;
+                out.last = l + 1;
+            }
+        return out;
+    }
+
+    void reach_of(const Reach& box, LineRange lines) {
+        reach_rows(at_.data(), lines.first, lines.last, box.v_low, box.v_high, r_ * r_ - box.dz * box.dz, box.u_low, box.u_high, low_.data(),
+                   high_.data());
+    }
+
+    // The lines on which what lies within a box may reach past what is known to be forbidden.
+    LineRange group_reaches_out(const Reach& box, LineRange lines) {
+        reach_of(box, lines);
+        return not_covered(lines);
+    }
+
+    // The same for a facet. From a point p of it the ball's centre is kept away up to p_u + √(r² − (v − p_v)² − (zc − p_z)²) on the line at v,
+    // a concave function of p, so no more than what its tangent at the middle of the facet gives at one of the corners.
+    LineRange reaches_out(const SolidFacet& f, LineRange lines) {
+        const auto [ul, uh] = std::minmax({f.p[0][U], f.p[1][U], f.p[2][U]});
+        const auto [vl, vh] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
+        const bool level = !ball_ || (f.nz < 0 && f.z_max > zc_);
+        reach_of({ul, uh, vl, vh, level ? 0 : std::max({0.0, f.z_min - zc_, zc_ - f.z_max})}, lines);
+        if (!level) {
+            TangentTerms t{};
+            for (const Vec3d& p : f.p) t.u += p[U] / 3, t.v += p[V] / 3, t.z += p[2] / 3;
+            for (std::size_t k = 0; k < 3; ++k) t.du[k] = f.p[k][U] - t.u, t.dv[k] = f.p[k][V] - t.v, t.dz[k] = f.p[k][2] - t.z;
+            t.z = zc_ - t.z;
+            t.r2 = r_ * r_;
+            tangent_rows(t, at_.data(), lines.first, lines.last, low_.data(), high_.data());
+        }
+        return not_covered(lines);
+    }
+
+    void meet_facet(const SolidFacet& f, LineRange lines) {
+        if (!lines.any()) return;
+        const int skip = lines.first, n = lines.last - lines.first;
+        double *const low = hulls_.low.data() + skip, *const high = hulls_.high.data() + skip;
+        double *const nz_low = hulls_.nz_low.data() + skip, *const nz_high = hulls_.nz_high.data() + skip;
+        std::fill(low, low + n, kInfinity);
+        std::fill(high, high + n, -kInfinity);
+        auto meet_prism = [&](const PrismTerms& p) { prism_rows(p, at_.data() + skip, n, low, high, nz_low, nz_high); };
+        auto meet_capsule = [&](const CapsuleTerms& c) { capsule_rows(c, at_.data() + skip, n, low, high, nz_low, nz_high); };
+        if (ball_ && f.z_max > zc_ - r_ && f.z_min <= zc_) {
+            if (f.normal != Vec3d{0, 0, 0}) meet_prism(prism<U, V>(f, r_, zc_));
+            for (int k = 0; k < 3; ++k)
+                if (f.edges >> k & 1) meet_capsule(capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r_, zc_));
+        }
+        if (f.z_max > zc_) {
+            if (f.nz < 0) {
+                std::array<Vec3d, 4> polygon;
+                const int corners = part_above(f, zc_, polygon);
+                for (int k = 0; k < corners; ++k) meet_capsule(capsule<U, V>(polygon[k], polygon[(k + 1) % corners], r_, zc_, f.nz));
+            } else if (!ball_) {
+                std::array<Vec3d, 2> cut;
+                if (cut_segment(f, zc_, cut)) meet_capsule(capsule<U, V>(cut[0], cut[1], r_, zc_, f.nz));
+            }
+        }
+        for (int l = lines.first; l < lines.last; ++l) {
+            const Forbidden h{hulls_.low[l], hulls_.high[l], static_cast<float>(hulls_.nz_low[l]), static_cast<float>(hulls_.nz_high[l])};
+            if (!(h.low < h.high)) continue;
+            // Neighbouring facets mostly follow one another, so most intervals only stretch the one before.
+            std::vector<Forbidden>& on_line = found_[l];
+            if (!on_line.empty() && h.low <= on_line.back().high && h.high >= on_line.back().low) {
+                Forbidden& before = on_line.back();
+                if (h.low < before.low) {
+                    before.low = h.low;
+                    before.nz_low = h.nz_low;
+                }
+                if (h.high > before.high) {
+                    before.high = h.high;
+                    before.nz_high = h.nz_high;
+                }
+            } else on_line.push_back(h);
+        }
+    }
+
+    const LayerSolid& solid_;
+    const bool ball_;
+    const double r_, zc_;
+    const int n_;
+    alignas(64) std::array<double, kLinesTogether> at_{}, low_{}, high_{};
+    HullRows hulls_;
+    std::array<std::vector<Forbidden>, kLinesTogether> found_;
+    std::array<std::vector<Stretch>, kLinesTogether> cover_;  // ascending and disjoint
+    std::array<std::uint32_t, kLinesTogether> seen_{};
+    std::vector<Crossing> crossings_;
+};
+
+template <int U, int V>
+Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z,
+                    std::span<const std::int32_t> lines) {
+    const bool ball = cutter.profile == Cutter::Profile::ball;
+    const double r = cutter.radius, zc = ball ? tip_z + r : tip_z;  // the ball's centre, or the disc
+    Fibres result;
+    if (lines.empty()) return result;
+    const std::size_t blocks = (lines.size() + kBlock - 1) / kBlock;
+
+    // Which groups can matter, by block of lines.
+    auto first_line = [&](double v) {
+        return static_cast<std::size_t>(
+            std::lower_bound(lines.begin(), lines.end(), v * kUnitsPerMm, [](std::int32_t l, double x) { return l < x; }) - lines.begin());
+    };
+    struct Active {
+        std::uint32_t group, first, last;  // blocks [first, last)
+    };
+    std::vector<Active> active;
+    std::vector<std::uint32_t> starts(blocks + 1, 0), members;
+    for (std::size_t g = 0; g < solid.groups.size(); ++g) {
+        const FacetGroup& group = solid.groups[g];
+        if (!may_touch(group.z_min, group.z_max, group.overhang, ball, r, zc)) continue;
+        const std::size_t first = first_line(group.low[V] - r), last = first_line(group.high[V] + r);
+        if (first >= last) continue;
+        active.push_back(
+            {static_cast<std::uint32_t>(g), static_cast<std::uint32_t>(first / kBlock), static_cast<std::uint32_t>((last - 1) / kBlock + 1)});
+        for (std::uint32_t b = active.back().first; b < active.back().last; ++b) ++starts[b + 1];
+    }
+    for (std::size_t b = 1; b <= blocks; ++b) starts[b] += starts[b - 1];
+    members.resize(starts.back());
+    std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
+    for (const Active& a : active)
+        for (std::uint32_t b = a.first; b < a.last; ++b) members[next[b]++] = a.group;
+
+    // The inside: which segments cross the lines of a block.
+    std::vector<std::vector<std::array<Point2, 2>>> segments(blocks);
+    auto coordinate = [](Point2 p) { return V == 0 ? p.x : p.y; };
+    for (std::size_t l = 0; l < inside.size(); ++l) {
+        const auto loop = inside.loop(l);
+        for (std::size_t i = 0; i < loop.size(); ++i) {
+            const Point2 a = loop[i], b = loop[i + 1 == loop.size() ? 0 : i + 1];
+            const std::int32_t va = coordinate(a), vb = coordinate(b);
+            if (va == vb) continue;
+            const std::size_t first = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::min(va, vb)) - lines.begin());
+            const std::size_t last = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::max(va, vb)) - lines.begin());
+            if (first >= last) continue;
+            for (std::size_t k = first / kBlock; k <= (last - 1) / kBlock; ++k) segments[k].push_back({a, b});
+        }
+    }
+
+    std::vector<Fibres> parts(blocks);
+    parallel_each(context, blocks, [&](std::size_t b) {
+        const std::span<const std::int32_t> own = lines.subspan(b * kBlock, std::min(kBlock, lines.size() - b * kBlock));
+        BlockOfLines<U, V> block(solid, cutter, zc, own);
+        block.meet_inside(segments[b], own);
+        block.meet(std::span(members).subspan(starts[b], starts[b + 1] - starts[b]));
+        parts[b] = block.merged();
     });
     std::size_t total = 0;
     for (const Fibres& part : parts) total += part.intervals.size();
@@ -269,6 +392,7 @@ Fibres covering(Context& context, std::span<const SolidFacet> facets, double rad
         overhang.facets.back().nz = -1;
     }
     if (facets.empty()) low = overhang.z_top = 0;
+    overhang.groups = facet_groups(context, overhang.facets);
     return fibres(context, overhang, {}, {Cutter::Profile::flat, radius}, low - 1, axis, lines);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
@@ -126,6 +127,31 @@ std::vector<std::uint32_t> facets_between(Context& context, MeshView mesh, doubl
 
 }  // namespace
 
+std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets) {
+    constexpr float inf = std::numeric_limits<float>::infinity();
+    auto down = [](double v) { return std::nextafter(static_cast<float>(v), -inf); };
+    auto up = [](double v) { return std::nextafter(static_cast<float>(v), inf); };
+    std::vector<FacetGroup> groups((facets.size() + FacetGroup::kFacets - 1) / FacetGroup::kFacets);
+    parallel_for(context, groups.size(), 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t g = begin; g < end; ++g) {
+            FacetGroup group{{inf, inf}, {-inf, -inf}, inf, -inf, -inf};
+            for (std::size_t i = g * FacetGroup::kFacets; i < std::min(facets.size(), (g + 1) * FacetGroup::kFacets); ++i) {
+                const SolidFacet& f = facets[i];
+                for (const Vec3d& p : f.p)
+                    for (std::size_t k = 0; k < 2; ++k) {
+                        group.low[k] = std::min(group.low[k], down(p[k]));
+                        group.high[k] = std::max(group.high[k], up(p[k]));
+                    }
+                group.z_min = std::min(group.z_min, down(f.z_min));
+                group.z_max = std::max(group.z_max, up(f.z_max));
+                if (f.nz < 0) group.overhang = std::max(group.overhang, up(f.z_max));
+            }
+            groups[g] = group;
+        }
+    });
+    return groups;
+}
+
 LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_top) {
     LayerSolid solid;
     solid.z_low = z_low;
@@ -163,6 +189,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
         });
     solid.min = {extent[0], extent[1]};
     solid.max = {extent[2], extent[3]};
+    solid.groups = facet_groups(context, solid.facets);
     solid.tree = facet_tree(context, solid.facets, solid.min, solid.max);
     return solid;
 }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "kernels/cutting/cap_cells.h"
@@ -25,11 +26,22 @@ struct SolidFacet {
     float nz = 0;            ///< of the facet before cutting
 };
 
+/// What FacetGroup::kFacets facets that follow one another have in common, mm, rounded outward.
+struct FacetGroup {
+    static constexpr std::size_t kFacets = 8;
+    std::array<float, 2> low{}, high{};  ///< x and y
+    float z_min = 0, z_max = 0;
+    float overhang = 0;  ///< the highest point of those whose own nz is under 0; −infinity: none
+};
+/// Of each eight facets, in their order; the last may have fewer.
+[[nodiscard]] std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets);
+
 struct LayerSolid {
     double z_low = 0, z_top = 0;         ///< facets wholly below z_low are left out
     std::vector<SolidFacet> facets;      ///< in Morton order of the mesh's facets: neighbours in space are near in memory
     Loops cap;                           ///< the section kTopSheet below z_top: the solid's flat upper end
     std::array<double, 2> min{}, max{};  ///< of the facets, in x and y
+    std::vector<FacetGroup> groups;      ///< of the facets, for fibres
     FacetTree tree;                      ///< of the facets, for drops
     CapCells cap_cells;                  ///< of the cap
 };
