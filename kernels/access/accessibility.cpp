@@ -10,9 +10,11 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string>
 
+#include "kernels/access/cap_cover.h"
 #include "kernels/access/poke.h"
 #include "kernels/access/triangle.h"
 #include "kernels/cutting/layer_solid.h"
@@ -29,6 +31,7 @@ constexpr double kUpright = 1e-4;       // rad: what faces down by less counts a
 constexpr double kResolution = 0.5;     // of the tolerance: places nearer than this to each other are not told apart
 constexpr int kMostPlaces = 20000;      // of one point; some tens are usual
 constexpr std::size_t kObstacles = 10;  // points of the part remembered
+constexpr std::size_t kMostCaps = 48;   // of a proof about one point; some are usual
 constexpr double kInset = 0.02;         // of a piece: its corners are tested so far within it
 constexpr int kMostLevels = 40;         // of halving
 constexpr std::size_t kPiecesAtOnce = 128;
@@ -275,8 +278,9 @@ struct Probe {
     const Places* at = nullptr;
     double top = 0;
     Envelope whole, fine;
-    bool ball = false;   ///< upright above a sphere: distances decide
-    bool level = false;  ///< upright above a disc
+    bool ball = false;     ///< upright above a sphere: distances decide
+    bool level = false;    ///< upright above a disc
+    bool deepest = false;  ///< looks for the deepest even where less would do
     Point3 centre{};
     double nearest2 = 0;   ///< of a ball: what is farther is of no interest
     bool hanging = false;  ///< the facets are numbered within the overhangs
@@ -298,7 +302,7 @@ struct Probe {
             if (obstacles[slot].depth.mm >= depth.mm) return;
         } else ++count;
         obstacles[slot] = {q, depth};
-        ruled_out = ruled_out || rules_out(depth, *at);
+        ruled_out = ruled_out || (!deepest && rules_out(depth, *at));
     }
     /// @returns whether it came nearer
     bool look(std::uint32_t f) {
@@ -400,7 +404,10 @@ Question ask(const Scene& scene, double z_low, double z_high, const ToolShape& t
 /// Tests points one after the other; what it remembers makes neighbours cheap.
 class Searcher {
 public:
-    explicit Searcher(const Question& question) : q_(question) {}
+    explicit Searcher(const Question& question)
+        : q_(question),
+          ball_(question.tool[0].core == 0 && question.tool[0].sin_taper == 0),
+          covers_(ball_ || (question.tool[0].rounding == 0 && question.tool[0].sin_taper == 0)) {}
 
     [[nodiscard]] bool reaches(const Point3& p, const Point3& n) {
         ++counts.points;
@@ -408,8 +415,11 @@ public:
         const double across = std::hypot(n[0], n[1]);
         const double u = std::atan2(across, n[2]), phi = across > 0 ? std::atan2(n[1], n[0]) : 0;
         const double l = u <= 1e-9 ? 0 : u >= q_.angle ? q_.length() : q_.disc + q_.rounding * u;
-        if (test(p, {l, phi, 0, 0, false}) == Verdict::free) return true;
-        if (l_ >= 0 && test(p, {l_, phi_, 0, 0, false}) == Verdict::free) return true;
+        if (!(ball_ && n[2] > 0 && known_to_forbid(p, n)) && test(p, {l, phi, 0, 0, false}) == Verdict::free) return true;
+        if (covers_) {
+            const Answer answer = all_around(p, n);
+            if (answer != Answer::unknown) return answer == Answer::reached;
+        } else if (l_ >= 0 && test(p, {l_, phi_, 0, 0, false}) == Verdict::free) return true;
         // What is known of the middle of a patch can rule all of it out. The rest is halved.
         const double finest = q_.options.tolerance * kResolution;
         stack_.clear();
@@ -456,10 +466,90 @@ public:
 
 private:
     enum class Verdict : std::uint8_t { free, too_deep, ruled_out };
+    enum class Answer : std::uint8_t { reached, missed, unknown };
     struct Patch {
         double l, phi, dl, dphi;  // the middle and half the ranges
         bool bent;                // on the profile's arc
     };
+
+    // A ball that touches a point lies in a direction from it. A flat's axis passes it at up to its radius, and stereographic projection makes
+    // a direction of that, discs becoming caps. In either case what an obstacle forbids is a cap of directions.
+    //
+    // The caps are those of obstacles deeper than half of the tolerance: where something is deeper than all of it there is a cap around the
+    // direction, so every place that is tried settles some of them.
+
+    /// What an obstacle forbids about a point, if anything, among others in direction u.
+    std::optional<Cap> cap_of(const Point3& obstacle, const Point3& p, const Point3& u) const {
+        const double tolerance = q_.options.tolerance, r = q_.tool[0].radius, reach = r + tolerance, clear = r - tolerance / 2;
+        const double x = obstacle[0] - p[0], y = obstacle[1] - p[1];
+        if (ball_) {
+            // Whatever stands forbids what is below it too; beside a ball's centre more than above.
+            const double z = std::min(obstacle[2] - p[2], reach * u[2]), d2 = x * x + y * y + z * z, d = std::sqrt(d2);
+            if (d >= reach + clear || d <= reach - clear) return std::nullopt;
+            return Cap{{x / d, y / d, z / d}, (reach * reach + d2 - clear * clear) / (2 * reach * d)};
+        }
+        if (obstacle[2] <= p[2] + 1.5 * tolerance) return std::nullopt;
+        const double a = x / reach, b = y / reach, k = a * a + b * b - clear * clear / (reach * reach);
+        const double length = std::sqrt(4 * (a * a + b * b) + (1 - k) * (1 - k));
+        return Cap{{2 * a / length, 2 * b / length, (1 - k) / length}, (1 + k) / length};
+    }
+
+    /// The place of the tool for a direction.
+    Patch place_at(const Point3& u) const {
+        const double phi = std::atan2(u[1], u[0]);
+        if (ball_) return {std::min(q_.arc, q_.rounding * std::acos(std::clamp(u[2], 0.0, 1.0))), phi, 0, 0, false};
+        // Farther out than its radius the flat's edge touches, and is lower there: at the last by half of the tolerance.
+        const double tolerance = q_.options.tolerance, r = q_.tool[0].radius;
+        const double distance = (r + tolerance) * std::hypot(u[0], u[1]) / (1 + std::max(0.0, u[2]));
+        if (distance <= r) return {distance, phi, 0, 0, false};
+        return {q_.disc + q_.rounding * std::asin(std::min(0.86, (distance - r) / tolerance)), phi, 0, 0, false};
+    }
+
+    [[nodiscard]] bool known_to_forbid(const Point3& p, const Point3& u) const {
+        return std::any_of(obstacles_.begin(), obstacles_.end(), [&](const Point3& obstacle) {
+            const std::optional<Cap> cap = cap_of(obstacle, p, u);
+            return cap && cap->margin(u) > CapCover::kInside;
+        });
+    }
+
+    /// Tries a corner of what no obstacle known so far forbids; what is met there forbids it, until a place is free or nothing is left.
+    Answer all_around(const Point3& p, const Point3& n) {
+        // No ball's centre is below the point, and no tip lower than it may be; no flat's axis passes farther away than its radius.
+        const double r = q_.tool[0].radius, tolerance = q_.options.tolerance, lowest = q_.options.lowest_tip;
+        const double least = ball_ ? std::max(0.0, (lowest - p[2] + r) / (r + tolerance)) : 0.0;
+        if (least >= 1 || (!ball_ && p[2] + tolerance < lowest)) return Answer::missed;
+        cover_.begin({{0, 0, -1}, -least});
+        while (cover_.size() < kMostCaps) {
+            const std::optional<Point3> u = cover_.uncovered(n);
+            if (!u) return Answer::missed;
+            std::optional<Cap> known;
+            std::size_t by = 0;
+            double most = CapCover::kInside;
+            for (std::size_t i = 0; i < obstacles_.size(); ++i)
+                if (const std::optional<Cap> cap = cap_of(obstacles_[i], p, *u))
+                    if (const double margin = cap->margin(*u); margin > most) most = margin, known = cap, by = i;
+            if (known) {
+                cover_.add(*known);
+                std::rotate(obstacles_.begin(), obstacles_.begin() + static_cast<std::ptrdiff_t>(by),
+                            obstacles_.begin() + static_cast<std::ptrdiff_t>(by) + 1);
+                continue;
+            }
+            const Patch place = place_at(*u);
+            met_.clear();
+            if (test(p, place) == Verdict::free) {
+                l_ = place.l, phi_ = place.phi;
+                return Answer::reached;
+            }
+            bool covered = false;
+            for (const Point3& obstacle : met_)
+                if (const std::optional<Cap> cap = cap_of(obstacle, p, *u); cap && cap->margin(*u) > CapCover::kInside) {
+                    cover_.add(*cap);
+                    covered = true;
+                }
+            if (!covered) break;  // the shank or the holder is in the way
+        }
+        return Answer::unknown;
+    }
 
     Places places_of(const Point3& p, const Patch& patch) const {
         const Question::Spot spot = q_.at(patch.l);
@@ -484,7 +574,7 @@ private:
         const Places at = places_of(p, patch);
         const double tolerance = q_.options.tolerance, lowest = q_.options.lowest_tip;
         if (at.tip + at.dl < lowest) return Verdict::ruled_out;
-        if (remembered_rule_out(at)) return Verdict::ruled_out;
+        if (!(covers_ && at.spread == 0) && remembered_rule_out(at)) return Verdict::ruled_out;
         bool free = at.tip >= lowest, buried_known = false;
         double highest = -std::numeric_limits<double>::infinity();  // of the part over the axis
         for (std::size_t part = 0; part < q_.tool.size(); ++part) {
@@ -497,6 +587,7 @@ private:
             probe.fine = q_.shrunken[part];
             if (probe.fine.radius <= 0 || at.tip + probe.fine.low >= q_.top) continue;
             probe.ball = e.core == 0 && e.sin_taper == 0;
+            probe.deepest = part == 0 && covers_ && at.spread == 0;
             probe.level = probe.fine.rounding == 0 && e.sin_taper == 0;
             // A sphere about the part's under side, up to the layer's top.
             double middle = probe.fine.low, radius = e.radius;
@@ -542,7 +633,7 @@ private:
             if (std::min(e.radius, highest - at.tip - e.low) <= tolerance) continue;
             const Point3 over{at.x, at.y, highest};
             const Depth buried = depth_of(over, at, e);
-            if (part == 0 && at.spread > 0) remember(over);
+            if (part == 0 && (covers_ || at.spread > 0)) remember(over);
             if (rules_out(buried, at) || (part == 0 && paired_rule_out(buried, at))) return Verdict::ruled_out;
             free = false;
         }
@@ -573,6 +664,7 @@ private:
     }
 
     void remember(const Point3& obstacle) {
+        if (covers_) met_.push_back(obstacle);
         if (obstacles_.size() == kObstacles) obstacles_.pop_back();
         obstacles_.insert(obstacles_.begin(), obstacle);
     }
@@ -590,9 +682,10 @@ private:
             }
             proofs_[proven_++] = proof_of(depth, at);
         }
-        for (std::size_t i = 1; i < proven_; ++i)
-            for (std::size_t k = 0; k < i; ++k)
-                if (rule_out(proofs_[i], proofs_[k], at.tolerance)) return true;
+        if (at.spread > 0)
+            for (std::size_t i = 1; i < proven_; ++i)
+                for (std::size_t k = 0; k < i; ++k)
+                    if (rule_out(proofs_[i], proofs_[k], at.tolerance)) return true;
         return false;
     }
     /// By an obstacle met just now and one of the others.
@@ -605,6 +698,10 @@ private:
     }
 
     const Question& q_;
+    const bool ball_;    ///< half a ball under its own cylinder
+    const bool covers_;  ///< a ball or a flat
+    CapCover cover_;
+    std::vector<Point3> met_;  ///< obstacles of the last place
     std::vector<Point3> obstacles_;
     std::array<Proof, 2 * kObstacles> proofs_;  ///< of the obstacles known, about the patch in hand
     std::size_t proven_ = 0;
