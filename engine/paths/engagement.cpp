@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/wide.h"
+
 namespace slabwright {
 
 namespace {
@@ -17,6 +19,46 @@ struct Stretch {
     double length = 0;  // mm, in the plane
     int steps = kFeeds;
 };
+
+constexpr int kRows = 64;  // that are looked at together
+
+// The cells on each row that a disc comes over on its way, but for those that it has been over where it starts: [low, left] and [right,
+// high], along the row; low > left, right > high: none.
+struct RowSpans {
+    alignas(64) std::array<std::int32_t, kRows> low, left, right, high;
+};
+
+// The capsule's span on a row is where the row meets either disc, or the strip between them.
+SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows, const std::array<double, 2>& from, const std::array<double, 2>& to,
+                                   double radius, double dx, double dy, bool moves, bool been, RowSpans& spans) {
+    const double inf = 1e300, r2 = radius * radius, nx = grid.nx;
+    const std::array<double, 2> side{-radius, radius};
+    for (int k = 0; k < rows; ++k) {
+        const double y = grid.y0 + (first_row + k) * grid.cell;
+        const double a2 = r2 - (y - from[1]) * (y - from[1]), b2 = r2 - (y - to[1]) * (y - to[1]);
+        const double a = std::sqrt(a2 > 0 ? a2 : 0.0), b = std::sqrt(b2 > 0 ? b2 : 0.0);
+        double low = a2 < 0 ? inf : from[0] - a, high = a2 < 0 ? -inf : from[0] + a;
+        const double low_b = b2 < 0 ? inf : to[0] - b, high_b = b2 < 0 ? -inf : to[0] + b;
+        low = low_b < low ? low_b : low, high = high_b > high ? high_b : high;
+        for (const double s : side) {
+            const double ax = from[0] - s * dy, ay = from[1] + s * dx, bx = to[0] - s * dy, by = to[1] + s * dx;
+            const bool met = moves && (ay <= y) != (by <= y);
+            const double x = ax + (y - ay) / (met ? by - ay : 1.0) * (bx - ax);
+            low = met && x < low ? x : low, high = met && x > high ? x : high;
+        }
+        // What is left of where the disc starts, and what is right of it; all in one where it is not known to have been there.
+        const bool hole = been && !(a2 < 0), none = low > high;
+        const double left = hole ? from[0] - a : high, right = from[0] + a;
+        const double i_low = std::ceil((low - grid.x0) / grid.cell), i_left = std::floor((left - grid.x0) / grid.cell);
+        const double i_right = std::ceil((right - grid.x0) / grid.cell), i_high = std::floor((high - grid.x0) / grid.cell);
+        auto within = [](double v, double least, double most) { return static_cast<std::int32_t>(v < least ? least : v > most ? most : v); };
+        const auto r = static_cast<std::size_t>(k);
+        spans.low[r] = none ? 0 : within(i_low, 0, nx);
+        spans.left[r] = none ? -1 : within(i_left, -1, nx - 1);
+        spans.right[r] = none || !hole ? 0 : within(i_right, 0, nx);
+        spans.high[r] = none || !hole ? -1 : within(i_high, -1, nx - 1);
+    }
+}
 
 std::array<double, 3> place(const Move& m) { return {to_mm(m.x), to_mm(m.y), to_mm(m.z)}; }
 
@@ -41,41 +83,24 @@ double EngagedStock::cut_level(const std::array<double, 3>& from, const std::arr
     const int j1 =
         std::min(grid_.ny - 1, static_cast<int>(std::floor(std::min<double>(grid_.ny, (std::max(from[1], to[1]) + R - grid_.y0) / grid_.cell))));
     double sum = 0;
-    auto take = [&](int j, double low, double high) {
-        const double first = std::ceil((low - grid_.x0) / grid_.cell), last = std::floor((high - grid_.x0) / grid_.cell);
-        float* const row = height_.data() + grid_.index(0, j);
-        for (int i = static_cast<int>(std::clamp(first, 0.0, static_cast<double>(grid_.nx))); i <= std::min<double>(last, grid_.nx - 1); ++i)
+    const auto level = static_cast<float>(z);
+    auto take = [&](float* row, std::int32_t first, std::int32_t last) {
+        for (std::int32_t i = first; i <= last; ++i)
             if (static_cast<double>(row[i]) > z) {
                 sum += static_cast<double>(row[i]) - z;
-                row[i] = static_cast<float>(z);
+                row[i] = level;
             }
     };
-    for (int j = j0; j <= j1; ++j) {
-        // The capsule's span on this row: where the row meets either disc, or the strip between them.
-        const double y = grid_.y(j);
-        double low = 1e300, high = -1e300;
-        for (const auto* p : {&from, &to}) {
-            const double w2 = R * R - (y - (*p)[1]) * (y - (*p)[1]);
-            if (w2 < 0) continue;
-            const double w = std::sqrt(w2);
-            low = std::min(low, (*p)[0] - w), high = std::max(high, (*p)[0] + w);
+    RowSpans spans;
+    for (int j = j0; j <= j1; j += kRows) {
+        const int rows = std::min(kRows, j1 - j + 1);
+        spans_of_rows(grid_, j, rows, {from[0], from[1]}, {to[0], to[1]}, R, dx, dy, run > 1e-9, been, spans);
+        for (int k = 0; k < rows; ++k) {
+            const auto r = static_cast<std::size_t>(k);
+            float* const row = height_.data() + grid_.index(0, j + k);
+            take(row, spans.low[r], spans.left[r]);
+            take(row, spans.right[r], spans.high[r]);
         }
-        if (run > 1e-9)
-            for (const double side : {-R, R}) {
-                const double ax = from[0] - side * dy, ay = from[1] + side * dx, bx = to[0] - side * dy, by = to[1] + side * dx;
-                if ((ay <= y) == (by <= y)) continue;
-                const double x = ax + (y - ay) / (by - ay) * (bx - ax);
-                low = std::min(low, x), high = std::max(high, x);
-            }
-        if (low > high) continue;
-        const double w2 = R * R - (y - from[1]) * (y - from[1]);
-        if (!been || w2 < 0) {
-            take(j, low, high);
-            continue;
-        }
-        const double w = std::sqrt(w2);
-        take(j, low, from[0] - w);
-        take(j, from[0] + w, high);
     }
     return sum * grid_.cell * grid_.cell;
 }
