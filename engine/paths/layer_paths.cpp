@@ -173,10 +173,13 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         // the corners that the ball leaves, by the flat end mill, and what is left of the cusps' limit anywhere.
         const LayerTools& tools = layer.tools;
         LayerStock stock(cut, stock_cell(cut));
-        // A floor's cutter may have taken the whole wall beside it.
-        std::erase_if(result.operations, [&](const Operation& op) {
-            return op.kind != OperationKind::face && stock.cut(cut, op, tools.rough).nothing() && op.kind == OperationKind::finish;
-        });
+        std::vector<Operation> useful;
+        for (Operation& op : result.operations) {
+            const bool idle = op.kind != OperationKind::face && stock.cut(cut, op, tools.rough).nothing();
+            // A floor's cutter may have taken the whole wall beside it.
+            if (!idle || op.kind != OperationKind::finish) useful.push_back(std::move(op));
+        }
+        result.operations = std::move(useful);
         const bool contours = clears_on_contours(cut.job);
         constexpr double kWaste = 1.0;  // mm: what is thicker is cut in steps
         const double finish_r = tools.finish.diameter / 2, finish_swath = kSwathShare * tools.finish.diameter;
