@@ -31,6 +31,7 @@ public:
     Reader(std::string_view text, const std::string& file, const GcodeLimits& limits) : text_(text), limits_(limits) { program_.file = file; }
 
     Program run() {
+        program_.steps.reserve(static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n')));
         std::size_t at = 0;
         while (at < text_.size() && !ended_) {
             std::size_t end = text_.find('\n', at);

@@ -16,6 +16,7 @@
 #include "io/json_text.h"
 #include "io/stl.h"
 #include "kernels/errors.h"
+#include "kernels/parallel/parallel.h"
 
 namespace slabwright {
 
@@ -27,7 +28,9 @@ namespace {
 std::string read_text(const fs::path& path, const std::string& code) {
     std::ifstream file(path, std::ios::binary);
     if (!file) throw Error(ErrorKind::verification, code, "cannot be read", path.string(), "plan again");
-    std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    std::string text;
+    std::array<char, 1 << 16> piece;
+    while (file.read(piece.data(), piece.size()) || file.gcount() > 0) text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
     if (file.bad()) throw Error(ErrorKind::verification, code, "cannot be read to its end", path.string(), "plan again");
     return text;
 }
@@ -433,19 +436,25 @@ Verification verify_folder(Context& context, const std::string& directory, const
                 violations.push_back({"program.missing", "plan.json names it, nc/ does not hold it", file, 0, {}, 0});
                 continue;
             }
-            Program program = read_gcode(read_text(path, "verify.program"), "nc/" + file, limits);
+            Program program;
             program.file = file;
             program.layer = static_cast<int>(l);
             program.kind = operation_kind(op["kind"]);
             program.planned_tool = op["tool"].whole();
             if (op.has("stepdown")) program.planned_stepdown = op["stepdown"].number();
-            if (frame == Frame::layer_top) {
-                for (ProgramStep& s : program.steps) s.z += layer.z_top;
-                for (ProgramArc& a : program.arcs) a.arc.z += layer.z_top;
-            }
             input.programs.push_back(std::move(program));
         }
     }
+    parallel_each(context, input.programs.size(), [&](std::size_t i) {
+        Program& program = input.programs[i];
+        Program read = read_gcode(read_text(out / "nc" / program.file, "verify.program"), "nc/" + program.file, limits);
+        const double up = frame == Frame::layer_top ? input.layers[static_cast<std::size_t>(program.layer)].z_top : 0;
+        for (ProgramStep& s : read.steps) s.z += up;
+        for (ProgramArc& a : read.arcs) a.arc.z += up;
+        read.file = program.file, read.layer = program.layer, read.kind = program.kind;
+        read.planned_tool = program.planned_tool, read.planned_stepdown = program.planned_stepdown;
+        program = std::move(read);
+    });
     if (std::error_code ignored; fs::is_directory(out / "nc", ignored)) {
         std::vector<std::string> strangers;
         for (const auto& entry : fs::directory_iterator(out / "nc"))

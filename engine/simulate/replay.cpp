@@ -6,7 +6,6 @@
 #include <limits>
 #include <numbers>
 
-#include "kernels/access/closest_point.h"
 #include "kernels/access/standing_part.h"
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
@@ -176,7 +175,6 @@ std::vector<float> Replay::left_over(std::size_t layer) const {
     Impl& r = *impl_;
     r.add_slabs(layer);
     const SimulatedLayer& l = r.input.layers[layer];
-    const ClosestPoint closest(r.context, r.input.mesh);
     std::vector<float> left(r.grid.count());
     parallel_each(r.context, r.bands.size(), [&](std::size_t b) {
         const Stock& stock = r.bands[b];
@@ -195,7 +193,7 @@ std::vector<float> Replay::left_over(std::size_t layer) const {
                 const double keep = std::max(l.z_bottom, static_cast<double>(envelope[c]));
                 double over = z - keep;
                 if (over > r.options.cusp) over = std::min(over, r.part.from_shadow({x, y, z}, l.z_top, over).distance);
-                else if (over < 0) over = -std::min(-over, closest.query_unsigned({x, y, z}, -over).distance);
+                else if (over < 0) over = -r.part.from_facets({x, y, z}, -over);
                 out[c] = static_cast<float>(over);
             }
     });

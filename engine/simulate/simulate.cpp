@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "engine/simulate/reach.h"
-#include "kernels/access/closest_point.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/stock/stock.h"
@@ -27,11 +26,11 @@ constexpr double kArcError = 0.001;  // mm: more than an arc's chords may miss o
 
 /// The least box over some motions, widened by nothing yet.
 struct StepBox {
-    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300, z0 = 1e300;
+    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300, z0 = 1e300, z1 = -1e300;
     void add(const ProgramStep& s) {
         x0 = std::min(x0, s.x), x1 = std::max(x1, s.x);
         y0 = std::min(y0, s.y), y1 = std::max(y1, s.y);
-        z0 = std::min(z0, s.z);
+        z0 = std::min(z0, s.z), z1 = std::max(z1, s.z);
     }
     [[nodiscard]] bool meets(const CellGrid& g, double margin, double top) const {
         return z0 < top && x0 - margin <= g.x(g.nx - 1) && g.x0 <= x1 + margin && y0 - margin <= g.y(g.ny - 1) && g.y0 <= y1 + margin;
@@ -115,7 +114,7 @@ void raise(Extreme& a, std::uint32_t& line, const Extreme& b, std::uint32_t b_li
 class Simulation {
 public:
     Simulation(Context& context, const SimulationInput& input, const SimulationOptions& options)
-        : context_(context), input_(input), options_(options), part_(context, input.mesh), closest_(context, input.mesh) {}
+        : context_(context), input_(input), options_(options), part_(context, input.mesh) {}
 
     SimulationReport run() {
         check();
@@ -235,30 +234,22 @@ private:
         }
     }
 
-    /// All that needs no stock: the exact check, the spindle, the machine's travel, the time.
+    /// All that needs no stock: the exact check, the spindle, the machine's travel, the time. Programs are independent.
     void check_motions(SimulationReport& report) {
         report.programs.resize(input_.programs.size());
-        std::optional<StandingPart> walls;  // of the flask, for one layer after the other
-        int walled = -1;
+        std::vector<std::optional<StandingPart>> walls(input_.layers.size());  // of the flasks
+        for (const Program& program : input_.programs) {
+            const auto l = static_cast<std::size_t>(program.layer);
+            if (!walls[l] && !input_.layers[l].flask.empty()) walls[l].emplace(context_, flask_walls(input_.layers, l).view());
+        }
+        std::vector<StepBox> boxes(input_.programs.size());
+        parallel_each(context_, input_.programs.size(), [&](std::size_t i) {
+            boxes[i] = check_program(i, walls[static_cast<std::size_t>(input_.programs[i].layer)], report.programs[i]);
+            context_.advance();
+        });
         for (std::size_t i = 0; i < input_.programs.size(); ++i) {
             const Program& program = input_.programs[i];
-            ProgramFindings& f = report.programs[i];
-            const SimulatedLayer& layer = input_.layers[static_cast<std::size_t>(program.layer)];
-            f.lowest = layer.z_top;
-            f.stock_top = -1e300;
-            f.seconds = program_seconds(program, input_.machine);
-            StepBox box;
-            double z1 = -1e300;
-            for (std::size_t k = 0; k < program.steps.size(); ++k) {
-                const ProgramStep& s = program.steps[k];
-                if (s.known()) box.add(s);
-                if (std::isfinite(s.z)) z1 = std::max(z1, s.z), box.z0 = std::min(box.z0, s.z);
-                if (!s.rapid() && !s.spindle && f.spindle_off_line == 0) f.spindle_off_line = s.line;
-                if (k == 0 || !program.steps[k - 1].known() || !s.known()) continue;
-                const ProgramStep& b = program.steps[k - 1];
-                (s.rapid() ? f.rapid_mm : f.cutting_mm) +=
-                    std::sqrt((s.x - b.x) * (s.x - b.x) + (s.y - b.y) * (s.y - b.y) + (s.z - b.z) * (s.z - b.z));
-            }
+            const ProgramFindings& f = report.programs[i];
             if (f.spindle_off_line != 0) violate(report, "spindle.off", "feeds while the spindle does not turn", &program, f.spindle_off_line, {}, 0);
             const Machine& m = input_.machine;
             auto travel = [&](const char* axis, double span, double limit) {
@@ -266,23 +257,41 @@ private:
                     violate(report, "travel.exceeded", fmt::format("moves over {:.3f} mm in {}; the machine travels {:.3f} mm", span, axis, limit),
                             &program, 0, {}, span - limit);
             };
+            const StepBox& box = boxes[i];
             if (box.x1 >= box.x0) {
                 travel("x", box.x1 - box.x0, m.travel_x);
                 travel("y", box.y1 - box.y0, m.travel_y);
             }
-            if (z1 >= box.z0) travel("z", z1 - box.z0, m.travel_z);
-            if (prepared_[i].tool) f.gouge = check_gouge(context_, part_, layer.z_top, *prepared_[i].tool, program, {options_.gouge, 1e-5});
-            if (prepared_[i].tool && !layer.flask.empty()) {
-                if (walled != program.layer) walls.emplace(context_, flask_walls(input_.layers, static_cast<std::size_t>(program.layer)).view());
-                walled = program.layer;
-                f.flask = check_gouge(context_, *walls, layer.z_top, *prepared_[i].tool, program, {options_.gouge, 1e-5}).cutter;
-            }
+            if (box.z1 >= box.z0) travel("z", box.z1 - box.z0, m.travel_z);
             report.gouge_max = std::max(report.gouge_max, f.gouge.cutter.depth);
             report.seconds += f.seconds;
             report.cutting_mm += f.cutting_mm;
             report.rapid_mm += f.rapid_mm;
-            context_.advance();
         }
+    }
+
+    /// One program's findings. @return what its steps reach over, as far as known
+    StepBox check_program(std::size_t i, const std::optional<StandingPart>& walls, ProgramFindings& f) const {
+        const Program& program = input_.programs[i];
+        const SimulatedLayer& layer = input_.layers[static_cast<std::size_t>(program.layer)];
+        f.lowest = layer.z_top;
+        f.stock_top = -1e300;
+        f.seconds = program_seconds(program, input_.machine);
+        StepBox box;
+        for (std::size_t k = 0; k < program.steps.size(); ++k) {
+            const ProgramStep& s = program.steps[k];
+            if (s.known()) box.add(s);
+            if (std::isfinite(s.z)) box.z1 = std::max(box.z1, s.z), box.z0 = std::min(box.z0, s.z);
+            if (!s.rapid() && !s.spindle && f.spindle_off_line == 0) f.spindle_off_line = s.line;
+            if (k == 0 || !program.steps[k - 1].known() || !s.known()) continue;
+            const ProgramStep& b = program.steps[k - 1];
+            (s.rapid() ? f.rapid_mm : f.cutting_mm) += std::sqrt((s.x - b.x) * (s.x - b.x) + (s.y - b.y) * (s.y - b.y) + (s.z - b.z) * (s.z - b.z));
+        }
+        if (const Tool* const tool = prepared_[i].tool) {
+            f.gouge = check_gouge(context_, part_, layer.z_top, *tool, program, {options_.gouge, 1e-5});
+            if (walls) f.flask = check_gouge(context_, *walls, layer.z_top, *tool, program, {options_.gouge, 1e-5}).cutter;
+        }
+        return box;
     }
 
     /// Tiles are independent: each builds its own stock from the first slab to the last and runs every program over it.
@@ -532,8 +541,8 @@ private:
             const double z = surface[2] + height * k / kPoints, cap = std::min(height, keep - z);
             if (cap <= depth) break;
             const Point3 lost{surface[0], surface[1], z};
-            if (closest_.winding(lost) <= 0) continue;
-            depth = std::max(depth, closest_.query_unsigned(lost, cap).distance);
+            if (!part_.covered(lost[0], lost[1], lost[2])) continue;  // outside of the part
+            depth = std::max(depth, part_.from_facets(lost, cap));
         }
         return depth;
     }
@@ -681,7 +690,6 @@ private:
     const SimulationInput& input_;
     SimulationOptions options_;
     StandingPart part_;
-    ClosestPoint closest_;
     double cell_ = 1;
     int nx_ = 0, ny_ = 0;
     std::vector<PreparedProgram> prepared_;

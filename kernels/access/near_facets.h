@@ -10,29 +10,31 @@
 
 namespace slabwright {
 
-/// What is compared of a facet.
-struct NearFacet {
-    double nx, ny, nz, offset;  ///< signed distance from its plane: n·p + offset
-    double needs;               ///< a place so far above the plane, or farther, does not meet the facet
-    double x, y, far2;          ///< nor does one whose horizontal distance from (x, y), squared, is far2 or more
-    double highest;             ///< z
-};
-
-/// A way of what is compared, and the height that a facet must exceed.
+/// The way of a ball's centre or of a cylinder's lower end, straight from a to b, with all that is above it.
 struct NearWay {
     std::array<double, 3> a, b;
-    double above;
+    double reach;  ///< what is so far away does not meet it, mm; a cylinder's horizontally
+    double above;  ///< nor does what is not higher than this, mm
 };
 
+/// Facets in single precision around an origin, each with what that can be wrong by: none is left out that may be met.
 class NearFacets {
 public:
-    void clear();
-    void add(const NearFacet& facet);
+    /// For ways within a box and a reach of `reach` mm at most. Without facets then.
+    void place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball);
+    /// Adds a facet unless no way within the box can meet it; whether it did.
+    /// @param up mm that the ways are above the box at least
+    bool add(const std::array<std::array<double, 3>, 3>& corners, double up);
     /// keep[i] is 1 where the way may meet facet i, else 0. Its size becomes a multiple of eight, filled with 0.
     void near(const NearWay& way, std::vector<unsigned char>& keep) const;
 
 private:
-    std::array<std::vector<double>, 9> rows_;
+    static constexpr std::size_t kRows = 16;
+    std::array<double, 3> middle_{}, half_{};
+    double reach_ = 0;
+    bool ball_ = false;
+    std::size_t size_ = 0;
+    std::array<std::vector<float>, kRows> rows_;
 };
 
 /// x0, x1, y0, y1

@@ -1,12 +1,15 @@
 #include "kernels/access/standing_part.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
 #include "kernels/access/near_facets.h"
 #include "kernels/access/triangle.h"
 #include "kernels/mesh/morton.h"
+#include "kernels/mesh/raw_array.h"
+#include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -264,25 +267,36 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
     const std::size_t n = mesh.size();
     box_ = bounds(mesh);
     const MortonGrid grid(box_);
-    struct Key {
-        std::uint64_t code;
-        std::uint32_t facet;
+    // A key is as much of the Morton number as fits beside the facet's own.
+    const unsigned facet_bits = static_cast<unsigned>(std::bit_width(std::max<std::size_t>(n, 1))), drop = facet_bits - 1;  // of the number's 63 bits
+    constexpr unsigned part_bits = 12;
+    auto key_of = [&](std::size_t i) {
+        const Index3& f = mesh.facets[i];
+        const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
+        auto middle = [](float u, float v, float w) { return (double{u} + v + w) / 3; };
+        return grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)) >> drop << facet_bits | i;
     };
-    std::vector<Key> keys(n);
-    parallel_for(context, n, 1 << 14, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const Index3& f = mesh.facets[i];
-            const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
-            auto middle = [](float u, float v, float w) { return (double{u} + v + w) / 3; };
-            keys[i] = {grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)), static_cast<std::uint32_t>(i)};
-        }
-    });
-    parallel_sort(context, keys.begin(), keys.end(),
-                  [](const Key& a, const Key& b) { return a.code != b.code ? a.code < b.code : a.facet < b.facet; });
+    auto part_of = [](std::uint64_t key) { return static_cast<std::size_t>(key >> (64 - part_bits)); };
+    RawArray<std::uint64_t> keys(n);
+    deal(
+        context, n, std::max<std::size_t>(1 << 14, (n + 63) / 64), std::size_t{1} << part_bits,
+        [&](std::size_t begin, std::size_t end, auto&& take) {
+            for (std::size_t i = begin; i < end; ++i) take(part_of(key_of(i)));
+        },
+        [&](std::size_t begin, std::size_t end, auto&& take) {
+            for (std::size_t i = begin; i < end; ++i) take(part_of(key_of(i)), key_of(i));
+        },
+        [&](std::uint64_t, std::uint64_t) { return std::pair(keys.data(), std::uint64_t{n}); },
+        [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
+            parallel_for(context, last - first, 8, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t i = begin; i < end; ++i) std::sort(keys.data() + starts[i], keys.data() + starts[i + 1]);
+            });
+        });
+    const std::uint64_t facet_mask = (std::uint64_t{1} << facet_bits) - 1;
     facets_.resize(n);
     parallel_for(context, n, 1 << 14, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const Index3& f = mesh.facets[keys[i].facet];
+            const Index3& f = mesh.facets[keys[i] & facet_mask];
             for (int k = 0; k < 3; ++k) facets_[i].v[k] = mesh.vertices[f[k]];
         }
     });
@@ -420,25 +434,9 @@ bool near(const Cutter& cutter, const Piece& piece, const Shape& shape, double h
     return piece.way.distance2(shape) + dz * dz < reach * reach;
 }
 
-/// Whether a plane stands between a facet and what is deeper than `depth` in the cutter anywhere on a piece. Of all planes one is tried: across the
-/// line from the facet's middle to the ball's centre, or to the cylinder's axis, where that comes nearest. What is above the plane stays so upwards.
-bool parted(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& f, double depth) {
-    const double lift = cutter.ball() ? cutter.radius : 0;
-    const Point3 m{(static_cast<double>(f[0].x) + f[1].x + f[2].x) / 3, (static_cast<double>(f[0].y) + f[1].y + f[2].y) / 3,
-                   (static_cast<double>(f[0].z) + f[1].z + f[2].z) / 3 - lift};
-    const Point3 along = sub(piece.b, piece.a), from = sub(m, piece.a);
-    const double length2 = along[0] * along[0] + along[1] * along[1];
-    const double t = length2 > 0 ? std::clamp((from[0] * along[0] + from[1] * along[1]) / length2, 0.0, 1.0) : 0.5;
-    Point3 u{t * along[0] - from[0], t * along[1] - from[1], cutter.ball() ? std::max(0.0, t * along[2] - from[2]) : 0};
-    auto across = [&](const Vec3f& v) { return u[0] * (v.x - piece.a[0]) + u[1] * (v.y - piece.a[1]) + u[2] * (v.z - lift - piece.a[2]); };
-    const double gap = std::min(0.0, dot(u, along)) - std::max({across(f[0]), across(f[1]), across(f[2])}), reach = cutter.radius - depth + kHair;
-    return gap > 0 && gap * gap >= reach * reach * dot(u, u);
-}
-
 /// Raises the result by what one facet adds to it on one piece.
 void meet(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& facet, Penetration& result) {
-    if (parted(cutter, piece, facet, result.depth) || !near(cutter, piece, facet, std::max({facet[0].z, facet[1].z, facet[2].z}), result.depth))
-        return;
+    if (!near(cutter, piece, facet, std::max({facet[0].z, facet[1].z, facet[2].z}), result.depth)) return;
     if (cutter.ball()) {
         Point3 a = piece.a, b = piece.b;
         a[2] += cutter.radius, b[2] += cutter.radius;
@@ -589,48 +587,31 @@ struct StandingPart::Vicinity {
 void StandingPart::gather(Vicinity& v) const {
     const Cutter& cutter = v.cutter;
     const double reach = cutter.radius - v.at_least + kHair, lowest = v.low[2] + (cutter.ball() ? cutter.radius : 0);
-    const Point3 middle = between(v.low, v.high, 0.5), half = sub(v.high, middle);
-    // The horizontal distance left to what is as high as z at most; negative where nothing so low can be met.
-    auto left = [&](double z) {
-        if (!cutter.ball()) return std::min(z, cutter.top) - lowest > v.at_least ? reach : -1.0;
-        const double dz = lowest - std::min(z, cutter.top);
-        return dz <= 0 ? reach : dz < reach ? std::sqrt(reach * reach - dz * dz) : -1.0;
+    // The square of the horizontal distance left to what is as high as z at most; 0 where nothing so low can be met.
+    auto left2 = [&](double z) {
+        if (!cutter.ball()) return std::min(z, cutter.top) - lowest > v.at_least ? reach * reach : 0.0;
+        const double dz = std::max(0.0, lowest - std::min(z, cutter.top));
+        return reach * reach - dz * dz;
     };
     auto gap2 = [&](double x0, double x1, double y0, double y1) {
         const double dx = std::max({0.0, x0 - v.high[0], v.low[0] - x1}), dy = std::max({0.0, y0 - v.high[1], v.low[1] - y1});
         return dx * dx + dy * dy;
     };
     v.facets.clear();
-    v.terms.clear();
+    v.terms.place(v.low, v.high, reach, cutter.ball());
     walk(
         [&](const Node& n) {
             if (n.z0 >= cutter.top) return false;
-            const double d = left(n.z1);
-            return d >= 0 && gap2(n.x0, n.x1, n.y0, n.y1) < d * d;
+            return gap2(n.x0, n.x1, n.y0, n.y1) < left2(n.z1);
         },
         [&](const Facet& f) {
             const auto& [a, b, c] = f.v;
-            const double z = std::max({a.z, b.z, c.z}), d = left(z);
-            if (d < 0 || std::min({a.z, b.z, c.z}) >= cutter.top) return;
+            if (std::min({a.z, b.z, c.z}) >= cutter.top) return;
             const double x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x}), y0 = std::min({a.y, b.y, c.y}),
                          y1 = std::max({a.y, b.y, c.y});
-            if (gap2(x0, x1, y0, y1) >= d * d) return;
-            // The facet's plane with its normal upwards. What is above it by the reach stays that far from the facet wherever it goes upwards.
-            const Point3 p = to_point(a), e = sub(to_point(b), p), g = sub(to_point(c), p);
-            Point3 n{e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0]};
-            const double area = std::sqrt(dot(n, n)), scale = area > 1e-9 ? (n[2] < 0 ? -1 : 1) / area : 0;
-            for (double& x : n) x *= scale;
-            const double offset = scale != 0 ? -dot(n, p) : -kInfinity;
-            const double needs = cutter.ball() ? reach : reach * std::sqrt(n[0] * n[0] + n[1] * n[1]);
-            const double above = dot(n, middle) + offset + n[2] * (cutter.ball() ? cutter.radius : v.at_least) -
-                                 (std::abs(n[0]) * half[0] + std::abs(n[1]) * half[1] + std::abs(n[2]) * half[2]);
-            if (above >= needs + kHair) return;
-            const double cx = (x0 + x1) / 2, cy = (y0 + y1) / 2;
-            double r2 = 0;
-            for (const Vec3f& q : f.v) r2 = std::max(r2, (q.x - cx) * (q.x - cx) + (q.y - cy) * (q.y - cy));
-            const double far = std::sqrt(r2) + d + kHair;
-            v.facets.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
-            v.terms.add({n[0], n[1], n[2], offset, needs + kHair, cx, cy, far * far, std::min(z, cutter.top)});
+            if (gap2(x0, x1, y0, y1) >= left2(std::max({a.z, b.z, c.z}))) return;
+            if (v.terms.add({to_point(a), to_point(b), to_point(c)}, cutter.ball() ? cutter.radius : v.at_least))
+                v.facets.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
         });
     v.facets_known = true;
 }
@@ -681,9 +662,12 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
         auto look = [&](const Piece& piece, Penetration& result) {
             if (!v.holds(piece.a) || !v.holds(piece.b)) v.place(motions, m, piece.a, piece.b, floor);
             if (!v.facets_known) gather(v);
-            const double up = cutter.ball() ? cutter.radius : result.depth, high = piece.lowest + (cutter.ball() ? cutter.radius : 0);
-            const double deepest = cutter.ball() ? high - (radius - result.depth + kHair) : high + result.depth;
-            v.terms.near({{piece.a[0], piece.a[1], piece.a[2] + up}, {piece.b[0], piece.b[1], piece.b[2] + up}, deepest}, v.keep);
+            const double reach = radius - result.depth + kHair, up = cutter.ball() ? radius : result.depth;
+            v.terms.near({{piece.a[0], piece.a[1], piece.a[2] + up},
+                          {piece.b[0], piece.b[1], piece.b[2] + up},
+                          reach,
+                          piece.lowest + (cutter.ball() ? radius - reach : result.depth)},
+                         v.keep);
             for_each_kept(v.keep, [&](std::size_t k) { meet(cutter, piece, facets_[v.facets[k]].v, result); });
         };
         const Penetration p = motion_depth(cutter, motions[m].from, motions[m].to, floor, covered_at, look);
@@ -815,6 +799,21 @@ StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, 
                      }
                  });
     return best;
+}
+
+double StandingPart::from_facets(const Point3& point, double limit) const {
+    double best2 = limit * limit;
+    walk_nearest(
+        [&](const Node& n) {
+            const double dz = std::max({0.0, n.z0 - point[2], point[2] - n.z1});
+            return xy_distance2(n, point[0], point[1]) + dz * dz;
+        },
+        [&] { return best2; },
+        [&](const Facet& f) {
+            const Point3 away = sub(point, closest_on_triangle(point, {to_point(f.v[0]), to_point(f.v[1]), to_point(f.v[2])}));
+            best2 = std::min(best2, dot(away, away));
+        });
+    return std::sqrt(best2);
 }
 
 }  // namespace slabwright

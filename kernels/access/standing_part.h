@@ -81,6 +81,9 @@ public:
     /// Horizontally from an upright line through (x, y) to what of the part stands higher than z (and below z_top); 0 within it.
     [[nodiscard]] Clearance beside(const Point3& point, double z_top, double limit) const;
 
+    /// From a point to the nearest facet, whatever its height; the limit when none is nearer.
+    [[nodiscard]] double from_facets(const Point3& point, double limit) const;
+
     /// Lowest and highest z, and the extent in x and y, of the facets.
     [[nodiscard]] Box3 box() const { return box_; }
 

@@ -13,6 +13,7 @@
 #include "kernels/errors.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/mesh/raw_array.h"
+#include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -81,8 +82,6 @@ T reduce_fans(Context& context, std::span<const Index3> facets, std::size_t vert
     while ((vertex_count >> shift) + 1 > blocks_wanted && shift < 32) ++shift;
     const std::size_t blocks = (vertex_count >> shift) + 1;
     const std::size_t grain = std::max<std::size_t>(std::size_t{1} << 14, (facets.size() + 63) / 64);
-    const std::size_t chunks = (facets.size() + grain - 1) / grain;
-
     auto each_use = [&](std::size_t begin, std::size_t end, auto&& take) {
         for (std::size_t f = begin; f < end; ++f) {
             const Index3 v = facets[f];
@@ -95,57 +94,36 @@ T reduce_fans(Context& context, std::span<const Index3> facets, std::size_t vert
         }
     };
 
-    std::vector<std::uint32_t> next(chunks * blocks, 0);
-    parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
-        std::uint32_t* count = &next[begin / grain * blocks];
-        each_use(begin, end, [&](EdgeUse use) { ++count[use.low >> shift]; });
-    });
+    auto count = [&](std::size_t begin, std::size_t end, auto&& take) { each_use(begin, end, [&](const EdgeUse& use) { take(use.low >> shift); }); };
+    auto uses = [&](std::size_t begin, std::size_t end, auto&& take) {
+        each_use(begin, end, [&](const EdgeUse& use) { take(use.low >> shift, use); });
+    };
     // To bound memory, about half of the uses are dealt at a time.
-    std::vector<std::uint32_t> sizes(blocks, 0);
-    std::uint64_t total = 0, largest = 0;
-    for (std::size_t block = 0; block < blocks; ++block) {
-        for (std::size_t chunk = 0; chunk < chunks; ++chunk) sizes[block] += next[chunk * blocks + block];
-        total += sizes[block];
-        largest = std::max<std::uint64_t>(largest, sizes[block]);
-    }
-    const std::uint64_t room = std::min(total, std::max(total / 2 + 1, largest) + largest);
     std::optional<MemoryCharge> charge;
-    if (scratch.size() < room * sizeof(EdgeUse)) {
-        charge.emplace(context, room * sizeof(EdgeUse), "the edges of the mesh");
-        scratch = {};
-        scratch = EdgeScratch(room * sizeof(EdgeUse));
-    }
-    EdgeUse* const uses = reinterpret_cast<EdgeUse*>(scratch.data());
-
-    T all = identity;
-    std::vector<std::uint32_t> starts;
-    for (std::size_t first = 0, last = 0; first < blocks; first = last) {
-        starts.assign(1, 0);
-        while (last < blocks && starts.back() + std::uint64_t{sizes[last]} <= room) {
-            std::uint32_t at = starts.back();
-            for (std::size_t chunk = 0; chunk < chunks; ++chunk) at += std::exchange(next[chunk * blocks + last], at);
-            starts.push_back(at);
-            ++last;
+    auto room = [&](std::uint64_t total, std::uint64_t largest) {
+        const std::uint64_t most = std::min(total, std::max(total / 2 + 1, largest) + largest);
+        if (scratch.size() < most * sizeof(EdgeUse)) {
+            charge.emplace(context, most * sizeof(EdgeUse), "the edges of the mesh");
+            scratch = {};
+            scratch = EdgeScratch(most * sizeof(EdgeUse));
         }
-        if (starts.back() == 0) continue;
-        parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
-            std::uint32_t* place = &next[begin / grain * blocks];
-            each_use(begin, end, [&](EdgeUse use) {
-                const std::size_t block = use.low >> shift;
-                if (block - first < last - first) uses[place[block]++] = use;
-            });
-        });
+        return std::pair(reinterpret_cast<EdgeUse*>(scratch.data()), most);
+    };
+    T all = identity;
+    auto reduce = [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
+        const EdgeUse* const dealt = reinterpret_cast<const EdgeUse*>(scratch.data());
         all = join(std::move(all), parallel_reduce(
                                        context, last - first, 1, identity,
                                        [&](std::size_t i, std::size_t) {
                                            T part = identity;
-                                           const std::span<const EdgeUse> mine(uses + starts[i], starts[i + 1] - starts[i]);
+                                           const std::span<const EdgeUse> mine(dealt + starts[i], starts[i + 1] - starts[i]);
                                            sort_fans(mine, static_cast<std::uint32_t>((first + i) << shift), std::size_t{1} << shift,
                                                      [&](std::span<const EdgeUse> fan) { on_fan(part, fan); });
                                            return part;
                                        },
                                        join));
-    }
+    };
+    deal(context, facets.size(), grain, blocks, count, uses, room, reduce);
     return all;
 }
 

@@ -2,12 +2,14 @@
 
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "kernels/errors.h"
 #include "kernels/mesh/clusters.h"
 #include "kernels/mesh/edges.h"
 #include "kernels/mesh/raw_array.h"
+#include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -117,60 +119,45 @@ Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std:
 
     const std::size_t blocks = (facets.count + kBlockFacets - 1) / kBlockFacets;
     const std::size_t grain = kBlockFacets * std::max<std::size_t>(8, (blocks + 63) / 64);
-    const std::size_t chunks = (facets.count + grain - 1) / grain;
-    std::vector<std::uint32_t> next(chunks * parts, 0);
-    parallel_for(context, facets.count, grain, [&](std::size_t begin, std::size_t end) {
-        std::uint32_t* count = &next[begin / grain * parts];
-        if (blockwise) {
-            BlockTable table;
-            for (std::size_t f = begin; f < end; f += kBlockFacets) {
-                table.find_firsts(facets, f, std::min(end, f + kBlockFacets), slots);
-                for (const Key& key : table.firsts()) ++count[part_of(key)];
-            }
-            return;
-        }
-        for (std::size_t f = begin; f < end; ++f)
-            for (std::size_t k = 0; k < 3; ++k) ++count[part_of(key_of(facets.corner(f, k), 3 * f + k))];
-    });
-    std::vector<std::uint32_t> sizes(parts, 0);
-    std::uint64_t total = 0, largest = 0;
-    for (std::size_t part = 0; part < parts; ++part) {
-        for (std::size_t chunk = 0; chunk < chunks; ++chunk) sizes[part] += next[chunk * parts + part];
-        total += sizes[part];
-        largest = std::max<std::uint64_t>(largest, sizes[part]);
-    }
-    // To bound memory, no more than about half of all corners are dealt at a time.
-    const std::uint64_t room = std::min(total, std::max<std::uint64_t>(n / 2 + 1, largest) + largest);
     {
-        const MemoryCharge charge(context, room * sizeof(Key), "welding the facets");
-        EdgeScratch scratch(room * sizeof(Key));
-        Key* const keys = reinterpret_cast<Key*>(scratch.data());
-        std::vector<std::uint32_t> starts;
-        for (std::size_t first = 0, last = 0; first < parts; first = last) {
-            starts.assign(1, 0);
-            while (last < parts && starts.back() + std::uint64_t{sizes[last]} <= room) {
-                std::uint32_t at = starts.back();
-                for (std::size_t chunk = 0; chunk < chunks; ++chunk) at += std::exchange(next[chunk * parts + last], at);
-                starts.push_back(at);
-                ++last;
-            }
-            parallel_for(context, facets.count, grain, [&](std::size_t begin, std::size_t end) {
-                std::uint32_t* place = &next[begin / grain * parts];
-                for (std::size_t f = begin; f < end; ++f) {
-                    for (std::size_t k = 0; k < 3; ++k) {
-                        const std::size_t c = 3 * f + k;
-                        if (blockwise && slots[c] != c) continue;
-                        const Key key = key_of(facets.corner(f, k), c);
-                        const std::size_t part = part_of(key);
-                        if (part - first < last - first) keys[place[part]++] = key;
-                    }
+        std::optional<MemoryCharge> charge;
+        EdgeScratch scratch;
+        auto counted = [&](std::size_t begin, std::size_t end, auto&& take) {
+            if (blockwise) {
+                BlockTable table;
+                for (std::size_t f = begin; f < end; f += kBlockFacets) {
+                    table.find_firsts(facets, f, std::min(end, f + kBlockFacets), slots);
+                    for (const Key& key : table.firsts()) take(part_of(key));
                 }
-            });
+                return;
+            }
+            for (std::size_t f = begin; f < end; ++f)
+                for (std::size_t k = 0; k < 3; ++k) take(part_of(key_of(facets.corner(f, k), 3 * f + k)));
+        };
+        auto keys = [&](std::size_t begin, std::size_t end, auto&& take) {
+            for (std::size_t f = begin; f < end; ++f) {
+                for (std::size_t k = 0; k < 3; ++k) {
+                    const std::size_t c = 3 * f + k;
+                    if (blockwise && slots[c] != c) continue;
+                    const Key key = key_of(facets.corner(f, k), c);
+                    take(part_of(key), key);
+                }
+            }
+        };
+        // To bound memory, no more than about half of all corners are dealt at a time.
+        auto room = [&](std::uint64_t total, std::uint64_t largest) {
+            const std::uint64_t most = std::min(total, std::max<std::uint64_t>(n / 2 + 1, largest) + largest);
+            charge.emplace(context, most * sizeof(Key), "welding the facets");
+            scratch = EdgeScratch(most * sizeof(Key));
+            return std::pair(reinterpret_cast<Key*>(scratch.data()), most);
+        };
+        auto weld_parts = [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
+            const Key* const dealt = reinterpret_cast<const Key*>(scratch.data());
             parallel_for(context, last - first, 4, [&](std::size_t begin, std::size_t end) {
                 constexpr std::uint32_t empty = 0xFFFFFFFFu;
                 std::vector<std::uint32_t> table;
                 for (std::size_t i = begin; i < end; ++i) {
-                    const std::span<const Key> mine(keys + starts[i], starts[i + 1] - starts[i]);
+                    const std::span<const Key> mine(dealt + starts[i], starts[i + 1] - starts[i]);
                     const std::size_t mask = std::bit_ceil(2 * mine.size() + 1) - 1;
                     table.assign(mask + 1, empty);
                     for (std::uint32_t j = 0; j < mine.size(); ++j) {
@@ -181,7 +168,8 @@ Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std:
                     }
                 }
             });
-        }
+        };
+        deal(context, facets.count, grain, parts, counted, keys, room, weld_parts);
         number_by_first(
             context, slots, [&](std::uint32_t count) { mesh.vertices.resize(count); },
             [&](std::size_t c, std::uint32_t number) {
