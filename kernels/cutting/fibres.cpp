@@ -99,21 +99,23 @@ public:
     // Forbids the inside, given by the segments of its border that cross these lines.
     void meet_inside(std::span<const std::array<Point2, 2>> segments, std::span<const std::int32_t> lines) {
         auto coordinate = [](Point2 p, int axis) { return axis == 0 ? p.x : p.y; };
-        for (std::size_t l = 0; l < lines.size(); ++l) {
-            crossings_.clear();
-            for (const auto& [a, b] : segments) {
-                const std::int64_t va = coordinate(a, V), vb = coordinate(b, V), v = lines[l];
-                if ((va <= v) == (vb <= v)) continue;
-                const double t = static_cast<double>(v - va) / static_cast<double>(vb - va);
+        for (const auto& [a, b] : segments) {
+            const std::int32_t va = coordinate(a, V), vb = coordinate(b, V);
+            const auto first = std::lower_bound(lines.begin(), lines.end(), std::min(va, vb));
+            for (auto line = first; line != lines.end() && *line < std::max(va, vb); ++line) {
+                const double t = static_cast<double>(std::int64_t{*line} - va) / static_cast<double>(std::int64_t{vb} - va);
                 const double u = (coordinate(a, U) + t * (static_cast<double>(coordinate(b, U)) - coordinate(a, U))) / kUnitsPerMm;
                 // Solid lies left of a segment, so along +x a falling one enters; along +y the handedness is mirrored.
-                crossings_.push_back({u, ((va > vb) == (U == 0)) ? 1 : -1});
+                crossings_[static_cast<std::size_t>(line - lines.begin())].push_back({u, ((va > vb) == (U == 0)) ? 1 : -1});
             }
-            std::sort(crossings_.begin(), crossings_.end(),
+        }
+        for (std::size_t l = 0; l < lines.size(); ++l) {
+            std::vector<Crossing>& crossings = crossings_[l];
+            std::sort(crossings.begin(), crossings.end(),
                       [](const Crossing& a, const Crossing& b) { return a.u != b.u ? a.u < b.u : a.turn > b.turn; });
             int depth = 0;
             double entered = 0;
-            for (const Crossing& c : crossings_) {
+            for (const Crossing& c : crossings) {
                 if (depth <= 0 && depth + c.turn > 0) entered = c.u;
                 if (depth > 0 && depth + c.turn <= 0 && c.u > entered) found_[l].push_back({entered, c.u, 0, 0});
                 depth += c.turn;
@@ -289,7 +291,7 @@ private:
     std::array<std::vector<Forbidden>, kLinesTogether> found_;
     std::array<std::vector<Stretch>, kLinesTogether> cover_;  // ascending and disjoint
     std::array<std::uint32_t, kLinesTogether> seen_{};
-    std::vector<Crossing> crossings_;
+    std::array<std::vector<Crossing>, kLinesTogether> crossings_;
 };
 
 template <int U, int V>
