@@ -129,6 +129,17 @@ TEST(Sweep, LeavesOutWhatStandsLower) {
                 given[c] = 1;
             });
         for (std::size_t c = 0; c < grid.count(); ++c) EXPECT_EQ(given[c] != 0, all[c] < standing[c]) << "trial " << trial;
+        // Given as heights over a level, which are compared many at once.
+        const double bottom = uz(random);
+        std::vector<float> heights(grid.count());
+        for (std::size_t c = 0; c < grid.count(); ++c) heights[c] = static_cast<float>(standing[c] - bottom);
+        std::fill(given.begin(), given.end(), 0);
+        sweep_above(grid, end, a, b, StandingHeights{heights.data(), bottom}, [&](std::size_t c, double z) {
+            EXPECT_EQ(z, all[c]);
+            given[c] = 1;
+        });
+        for (std::size_t c = 0; c < grid.count(); ++c)
+            EXPECT_EQ(given[c] != 0, all[c] < bottom + static_cast<double>(heights[c])) << "trial " << trial;
     }
 }
 
@@ -138,7 +149,7 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-1, 11), uz(-3, 3), ur(0.4, 4), turn(-3, 3);
     const CellGrid grid{0.1, 0.2, 0.11, 90, 80};
-    std::size_t asked_alone = 0, asked_chained = 0;
+    std::size_t asked_alone = 0, asked_chained = 0, asked_followed = 0, unlike = 0;
     for (int trial = 0; trial < 120; ++trial) {
         const CutterEnd end{static_cast<CutterEnd::Form>(trial % 3), ur(random), 0.6};
         std::vector<std::array<double, 3>> way{{u(random), u(random), uz(random)}};
@@ -153,7 +164,7 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
             if (k % 22 != 3 && (trial % 2 == 0 || k % 7 == 2)) next[2] += 0.1 * turn(random);
             way.push_back(next);
         }
-        std::vector<double> alone(grid.count(), 1), chained(grid.count(), 1);
+        std::vector<double> alone(grid.count(), 1), chained(grid.count(), 1), followed(grid.count(), 1);
         for (std::size_t k = 1; k < way.size(); ++k) {
             auto into = [&](std::vector<double>& height, std::size_t& asked) {
                 return std::pair{[&height, &asked](std::size_t c) { return ++asked, height[c]; },
@@ -166,7 +177,11 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
             if (k + 1 < way.size()) chain.after = &way[k + 1];
             const auto [stands_chained, take_chained] = into(chained, asked_chained);
             sweep_above(grid, end, way[k - 1], way[k], stands_chained, take_chained, chain);
+            const auto [stands_followed, take_followed] = into(followed, asked_followed);
+            sweep_above(grid, end, way[k - 1], way[k], stands_followed, take_followed, {.been = k > 1});
         }
+        for (std::size_t c = 0; c < grid.count(); ++c)
+            if (std::abs(alone[c] - followed[c]) > 1e-9) ++unlike;
         for (std::size_t c = 0; c < grid.count(); ++c) {
             // At the cutter's very rim rounding decides whether it covers a centre.
             if (std::abs(alone[c] - chained[c]) <= 1e-9) continue;
@@ -182,6 +197,8 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
         }
     }
     EXPECT_LT(4 * asked_chained, 3 * asked_alone);
+    EXPECT_LT(asked_followed, asked_alone);
+    EXPECT_LE(unlike, 3U) << "cells that a cutter's rim just touches";
 }
 
 // Level passes of a ball on a plane at α leave L = R − √(R² − (SD / (2 sin α))²) (method.md section 5).

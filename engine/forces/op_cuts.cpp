@@ -49,32 +49,36 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, const std::
     };
     // One straight way, told in equal parts. A cell is met when the cutter's leading edge comes to it, or at the way's begin.
     std::vector<Met> parts;
+    bool been = false;  // the cutter has cut where the way begins
     const auto step = [&](std::uint32_t move, const std::array<double, 3>& from, const std::array<double, 3>& to, std::size_t count) {
         const double length = std::hypot(to[0] - from[0], to[1] - from[1]), slope = length > 0 ? (to[2] - from[2]) / length : 0;
         const double dx = length > 0 ? (to[0] - from[0]) / length : 0, dy = length > 0 ? (to[1] - from[1]) / length : 0;
         const double per_mm = length > 0 ? static_cast<double>(count) / length : 0, part = length / static_cast<double>(count),
                      r2 = end.radius * end.radius;
         parts.assign(count, {});
-        sweep_above(
-            grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_}, StandingHeights{height_.data(), 0},
-            [&](std::size_t c, double z) {
-                const double stood = height_[c], left = std::max(0.0, z);
-                if (stood - left < kLeastTaken) return;
-                height_[c] = static_cast<float>(left);
-                const auto j = static_cast<int>(c / static_cast<std::size_t>(grid_.nx)), i = static_cast<int>(c % static_cast<std::size_t>(grid_.nx));
-                const double px = grid_.x(i) - from[0], py = grid_.y(j) - from[1], along = px * dx + py * dy, across = dx * py - dy * px;
-                std::size_t p = 0;
-                if (count > 1) {
-                    const double first = along - std::sqrt(std::max(0.0, r2 - across * across));
-                    p = std::min(count - 1, static_cast<std::size_t>(std::max(0.0, first) * per_mm));
-                }
-                Met& m = parts[p];
-                const double tip = std::min(from[2] + slope * static_cast<double>(p) * part, from[2] + slope * static_cast<double>(p + 1) * part);
-                m.volume += (stood - left) * area;
-                m.low = std::min(m.low, left + bottom_ - tip);
-                m.high = std::max(m.high, stood + bottom_ - tip);
-                m.side += (stood - left) * across;
-            });
+        sweep_above(grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_}, StandingHeights{height_.data(), 0},
+                    [&](std::size_t c, double z) {
+                        const double stood = height_[c], left = std::max(0.0, z);
+                        if (stood - left < kLeastTaken) return;
+                        height_[c] = static_cast<float>(left);
+                        const auto cell = static_cast<std::uint32_t>(c), nx = static_cast<std::uint32_t>(grid_.nx);
+                        const auto j = static_cast<int>(cell / nx), i = static_cast<int>(cell % nx);
+                        const double px = grid_.x(i) - from[0], py = grid_.y(j) - from[1], along = px * dx + py * dy, across = dx * py - dy * px;
+                        std::size_t p = 0;
+                        if (count > 1) {
+                            const double first = along - std::sqrt(std::max(0.0, r2 - across * across));
+                            p = std::min(count - 1, static_cast<std::size_t>(std::max(0.0, first) * per_mm));
+                        }
+                        Met& m = parts[p];
+                        const double tip =
+                            std::min(from[2] + slope * static_cast<double>(p) * part, from[2] + slope * static_cast<double>(p + 1) * part);
+                        m.volume += (stood - left) * area;
+                        m.low = std::min(m.low, left + bottom_ - tip);
+                        m.high = std::max(m.high, stood + bottom_ - tip);
+                        m.side += (stood - left) * across;
+                    },
+                    {.been = been});
+        been = true;
         if (length == 0) return;
         for (std::size_t p = 0; p < count; ++p) {
             const Met& m = parts[p];
@@ -93,6 +97,7 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, const std::
         const Move &a = operation.moves[k - 1], &b = operation.moves[k];
         if (b.feed == 0) {
             finish();
+            been = false;
             continue;
         }
         const std::array<double, 3> from{to_mm(a.x), to_mm(a.y), to_mm(a.z)}, to{to_mm(b.x), to_mm(b.y), to_mm(b.z)};

@@ -197,7 +197,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             return std::none_of(&tool + 1, tools.rest.data() + tools.rest.size(), [&](const Tool& t) { return t.kind == tool.kind; });
         };
         for (const Tool& tool : tools.rest)
-            if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() && stock.area_over(1.0) > kWasteWorthAChange)
+            if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() && stock.area_over(context, 1.0) > kWasteWorthAChange)
                 semi_rough(tool, finish_swath);
         RestPass between{OperationKind::semi_rough, "waste between walls", kWaste, true};
         if (contours) between.swath = finish_r;
@@ -213,7 +213,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         take(cut_rest(cut, stock, tools.finish, {OperationKind::finish, "what is left", limit, false}));
         reached(0.97);
         for (const Tool& tool : tools.rest) {
-            const double left = stock.area_over(limit);
+            const double left = stock.area_over(context, limit);
             if (!last_of_kind(tool) && left < kCornersWorthAChange) continue;
             // What a tool between others is for is only seen when it has cut; where that is little it has not.
             std::optional<Standing> stood;
@@ -224,13 +224,13 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             else take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste in narrow places", kWaste, true}));
             if (tool.kind == ToolKind::flat) take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
             else take(cut_rest(cut, stock, tool, {OperationKind::finish, "what is left in narrow places", limit, false}));
-            if (!stood || left - stock.area_over(limit) >= kCornersWorthAChange) continue;
+            if (!stood || left - stock.area_over(context, limit) >= kCornersWorthAChange) continue;
             standing = std::move(*stood);
             stock.restore(std::move(heights));
             result.operations.resize(operations);
             cut.no_way_in.resize(no_ways);
         }
-        result.left_mm2 = stock.area_over(limit);
+        result.left_mm2 = stock.area_over(context, limit);
     }
     if (!cut.no_way_in.empty())
         result.diagnostics.push_back({Severity::note, "entry.no_room",

@@ -1,7 +1,9 @@
 #include "engine/paths/layer_stock.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "kernels/parallel/parallel.h"
@@ -10,7 +12,7 @@ namespace slabwright {
 
 namespace {
 
-constexpr int kBand = 32;            // rows of cells that one task cuts
+constexpr int kBand = 64;            // rows of cells that one task cuts
 constexpr std::size_t kBlock = 128;  // moves that share one box
 
 struct Box {
@@ -21,6 +23,24 @@ struct Box {
         z0 = std::min(z0, to_mm(m.z));
     }
 };
+
+// How a row of heights is lower than it was.
+Taken taken_off(const std::vector<float>& before, const float* now) {
+    constexpr std::size_t lanes = 8;  // so that a compiler sees that their order does not matter
+    std::array<float, lanes> most{};
+    std::array<std::uint32_t, lanes> cells{};
+    std::size_t c = 0;
+    for (; c + lanes <= before.size(); c += lanes)
+        for (std::size_t k = 0; k < lanes; ++k) {
+            const float off = before[c + k] - now[c + k];
+            most[k] = off > most[k] ? off : most[k];
+            cells[k] += static_cast<std::uint32_t>(off > kEmpty);
+        }
+    Taken taken;
+    for (; c < before.size(); ++c) taken.most = std::max(taken.most, before[c] - now[c]), taken.cells += before[c] - now[c] > kEmpty;
+    for (std::size_t k = 0; k < lanes; ++k) taken.most = std::max(taken.most, most[k]), taken.cells += cells[k];
+    return taken;
+}
 
 }  // namespace
 
@@ -124,7 +144,18 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         const CellGrid part{grid_.x0, grid_.y(first), grid_.cell, grid_.nx, rows};
         const double y0 = part.y0 - r, y1 = part.y(rows - 1) + r;
         float* height = height_.data() + grid_.index(0, first);
-        const std::vector<float> before(height, height + part.count());
+        // Rows as they were, of those that something is taken off.
+        const auto nx = static_cast<std::size_t>(grid_.nx);
+        std::vector<std::vector<float>> before(static_cast<std::size_t>(rows));
+        std::size_t row_first = 0, row_end = 0;  // the cells of the row that was lowered last
+        auto lower = [&](std::size_t c, float left) {
+            if (c < row_first || c >= row_end) {
+                const std::size_t row = c / nx;
+                row_first = row * nx, row_end = row_first + nx;
+                if (before[row].empty()) before[row].assign(height + row_first, height + row_end);
+            }
+            height[c] = left;
+        };
         for (std::size_t b = 0; b < boxes.size(); ++b) {
             if (boxes[b].y1 < y0 || boxes[b].y0 > y1 || boxes[b].z0 >= top) continue;
             for (std::size_t i = std::max<std::size_t>(1, b * kBlock); i < std::min(moves.size(), (b + 1) * kBlock); ++i) {
@@ -140,14 +171,16 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                     part, end, over_bottom(p), over_bottom(q), StandingHeights{height, 0},
                     [&](std::size_t c, double z) {
                         const auto left = static_cast<float>(std::max(0.0, z));
-                        if (left < height[c]) height[c] = left;
+                        if (left < height[c]) lower(c, left);
                     },
                     chain);
             }
         }
-        for (std::size_t c = 0; c < before.size(); ++c) {
-            taken[band].most = std::max(taken[band].most, before[c] - height[c]);
-            taken[band].cells += before[c] - height[c] > kEmpty;
+        for (std::size_t row = 0; row < before.size(); ++row) {
+            if (before[row].empty()) continue;
+            const Taken off = taken_off(before[row], height + row * nx);
+            taken[band].most = std::max(taken[band].most, off.most);
+            taken[band].cells += off.cells;
         }
     });
     Taken all;
@@ -155,9 +188,15 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
     return all;
 }
 
-double LayerStock::area_over(double limit) const {
-    std::size_t cells = 0;
-    for (std::size_t c = 0; c < height_.size(); ++c) cells += left(c) > limit;
+double LayerStock::area_over(Context& context, double limit) const {
+    const auto cells = parallel_reduce(
+        context, height_.size(), std::size_t{1} << 16, std::size_t{0},
+        [&](std::size_t begin, std::size_t end) {
+            std::size_t over = 0;
+            for (std::size_t c = begin; c < end; ++c) over += left(c) > limit;
+            return over;
+        },
+        std::plus<>());
     return static_cast<double>(cells) * grid_.cell * grid_.cell;
 }
 

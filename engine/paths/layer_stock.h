@@ -48,7 +48,7 @@ public:
     [[nodiscard]] float left(std::size_t cell) const { return (height_[cell] - surface_[cell]) * nz(cell); }
 
     /// mm² on which more than `limit` (mm along the normal) is left over.
-    [[nodiscard]] double area_over(double limit) const;
+    [[nodiscard]] double area_over(Context& context, double limit) const;
 
     /// Bytes of a stock of this many cells.
     [[nodiscard]] static std::uint64_t bytes(std::size_t cells) { return cells * 9; }

@@ -155,7 +155,7 @@ public:
 
     Operation run() {
         Operation op = cut_.operation(OperationKind::semi_rough, pass_.purpose, tool_);
-        if (stock_.area_over(pass_.limit) == 0) return op;
+        if (stock_.area_over(cut_.context, pass_.limit) == 0) return op;
         const std::vector<float> before = stock_.heights();
         const std::vector<RoughLevel> levels = rough_levels(cut_, tool_, 0);
         std::vector<double> tips;

@@ -70,6 +70,7 @@ bool keep_lower(const float* stands, double bottom, int n, double* h);
 struct ChainedSweep {
     const std::array<double, 3>* before = nullptr;  ///< where the motion into `from` began, if that has been swept, or will be
     const std::array<double, 3>* after = nullptr;   ///< where the motion out of `to` ends, if that is swept too
+    bool been = false;                              ///< instead of `before`: the cutter has already taken away what it covers at `from`
 };
 
 /// A straight motion as sweep_above sees it: its direction in the plane, its length there and its slope.
@@ -94,20 +95,34 @@ struct StraightWay {
 inline constexpr int kSweptTogether = 64;  ///< cells of a row
 inline constexpr double kUncovered = std::numeric_limits<double>::infinity();
 
-/// Narrows [low, high] to where value + step·x lies within [least, most], a hair more; to nothing where that is empty.
-inline void narrow(double value, double step, double least, double most, double& low, double& high) {
-    constexpr double hair = 1e-7;
-    if (least > most) {
-        high = -1e300;
-        return;
+/// The places of a line at which a value that grows by `step` a mm lies within [least, most], a hair more.
+class Strip {
+public:
+    Strip(double step, double least, double most)
+        : inverse_(std::abs(step) < 1e-9 ? 0 : 1 / step), least_(least <= most ? least - kHair : kUncovered), most_(most + kHair) {}
+    /// Narrows [low, high] to them, on a line whose value is `value` at 0; to nothing where there are none.
+    void narrow(double value, double& low, double& high) const {
+        if (inverse_ == 0 || least_ > most_) {
+            if (!(value >= least_ && value <= most_)) high = -1e300;
+            return;
+        }
+        const double a = (least_ - value) * inverse_, b = (most_ - value) * inverse_;
+        low = std::max(low, std::min(a, b)), high = std::min(high, std::max(a, b));
     }
-    if (std::abs(step) < 1e-9) {
-        if (value < least - hair || value > most + hair) high = -1e300;
-        return;
-    }
-    double a = (least - hair - value) / step, b = (most + hair - value) / step;
-    if (a > b) std::swap(a, b);
-    low = std::max(low, a), high = std::min(high, b);
+
+private:
+    static constexpr double kHair = 1e-7;
+    double inverse_, least_, most_;
+};
+
+/// ⌈v⌉ and ⌊v⌋ of what an int holds.
+inline int ceiling(double v) {
+    const int i = static_cast<int>(v);
+    return i + static_cast<int>(i < v);
+}
+inline int floor_of(double v) {
+    const int i = static_cast<int>(v);
+    return i - static_cast<int>(i > v);
 }
 
 /// Calls fn(cell index, z) for every cell whose centre the cutter covers while its tip goes straight from `from` to `to`, unless
@@ -131,8 +146,8 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
     const bool shares = way.shares_ends(end);
     const double cone_lead = end.slope > std::abs(slope) ? slope / std::sqrt(end.slope * end.slope - slope * slope) : 0;
     // In a chain: is the begin's place asked, and is the end's?
-    const bool own_end = !shares || chain.after == nullptr, own_begin = !shares || chain.before == nullptr;
-    const StraightWay before(own_begin ? from : *chain.before, from);
+    const bool own_end = !shares || chain.after == nullptr, own_begin = !shares || (chain.before == nullptr && !chain.been);
+    const StraightWay before(own_begin || chain.before == nullptr ? from : *chain.before, from);
     const bool wedge = !own_begin && before.shares_ends(end);
     // Within the way a ball's least height is linear along it and a circle's across it, and a level disc's is its own: many cells of a row
     // are done at once.
@@ -149,22 +164,24 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
     const int j0 = std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - grid.y0) / grid.cell))));
     const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high - grid.y0) / grid.cell))));
     const double x_low = std::min(from[0], to[0]) - R, x_high = std::max(from[0], to[0]) + R;
+    const double per_mm = 1 / grid.cell, beyond = grid.nx + 1.0;
+    auto first_cell = [&](double low) { return std::max(0, ceiling(std::clamp((low + from[0] - grid.x0) * per_mm, -1.0, beyond))); };
+    auto last_cell = [&](double high) { return std::min(grid.nx - 1, floor_of(std::clamp((high + from[0] - grid.x0) * per_mm, -1.0, beyond))); };
+    const Strip along(dx, s0_least, s0_most), across(-dy, -R, R);
+    const Strip along_within(dx, std::max(0.0, R * lead) + wide, run + std::min(0.0, R * lead) - wide), across_within(-dy, wide - R, R - wide);
+    // Around the begin, where neither motion has its least within: beyond the end of the one before and before the begin of this.
+    const double before_lead = end.form == Form::ball ? before.ball_lead : 0;
+    const Strip until_begin(dx, -2 * R, std::max(0.0, R * lead)), since_begin(before.dx, std::min(0.0, R * before_lead), 2 * R);
     for (int j = j0; j <= j1; ++j) {
         const double py = grid.y(j) - from[1];
         const std::size_t row = grid.index(0, j);
-        auto first_cell = [&](double low) {
-            return std::max(0, static_cast<int>(std::ceil(std::clamp((low + from[0] - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
-        };
-        auto last_cell = [&](double high) {
-            return std::min(grid.nx - 1, static_cast<int>(std::floor(std::clamp((high + from[0] - grid.x0) / grid.cell, -1.0, grid.nx + 1.0))));
-        };
         auto cells = [&](int i0, int i1, auto&& each) {
             for (int i = i0; i <= i1; ++i) each(row + static_cast<std::size_t>(i), grid.x(i) - from[0]);
         };
         {
             double low = x_low - from[0], high = x_high - from[0];
-            narrow(py * dy, dx, s0_least, s0_most, low, high);
-            narrow(py * dx, -dy, -R, R, low, high);
+            along.narrow(py * dy, low, high);
+            across.narrow(py * dx, low, high);
             auto one = [&](std::size_t cell, double px) {
                 const double stands = standing(cell);
                 if (stands <= lowest) return;
@@ -203,8 +220,8 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
                 const int i0 = first_cell(low), i1 = last_cell(high);
                 int k0 = i1 + 1, k1 = i1;  // the cells whose least lies within the way for certain
                 if (rows) {
-                    narrow(py * dy, dx, std::max(0.0, R * lead) + wide, run + std::min(0.0, R * lead) - wide, low, high);
-                    narrow(py * dx, -dy, wide - R, R - wide, low, high);
+                    along_within.narrow(py * dy, low, high);
+                    across_within.narrow(py * dx, low, high);
                     if (low <= high) k0 = std::clamp(first_cell(low), i0, i1 + 1), k1 = std::clamp(last_cell(high), k0 - 1, i1);
                 }
                 together(i0, k0 - 1);
@@ -239,11 +256,10 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
             }
         }
         if (!wedge || py * py > R2) continue;
-        // Around the begin, where neither motion has its least within: beyond the end of the one before and before the begin of this.
-        const double w_row = std::sqrt(R2 - py * py), before_lead = end.form == Form::ball ? before.ball_lead : 0;
+        const double w_row = std::sqrt(R2 - py * py);
         double low = -w_row, high = w_row;
-        narrow(py * dy, dx, -2 * R, std::max(0.0, R * lead), low, high);
-        narrow(py * before.dy, before.dx, std::min(0.0, R * before_lead), 2 * R, low, high);
+        until_begin.narrow(py * dy, low, high);
+        since_begin.narrow(py * before.dy, low, high);
         if (!(low <= high)) continue;
         cells(first_cell(low), last_cell(high), [&](std::size_t cell, double px) {
             const double stands = standing(cell);
