@@ -10,6 +10,8 @@ namespace slabwright {
 
 namespace {
 
+constexpr double kRounding = 1e-6;  // mm: more than rounding takes from a height over a plane, a sliver's too
+
 struct Best {
     double tip_z = -std::numeric_limits<double>::infinity();
     double nx = 0, ny = 0, nz = 0;
@@ -29,16 +31,22 @@ void drop_ball(const SolidFacet& f, double r, double x, double y, Best& best) {
     if (n[2] > 1e-9) {
         // Centre above the plane by r: contact p = c − r·n, p inside the triangle.
         const double px = x - r * n[0], py = y - r * n[1];
+        const double pz = f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2], tip = pz + r * n[2] - r;
+        if (tip + kRounding <= best.tip_z) return;  // nor does anything of the facet lift the ball more than its plane
+        double outside2 = 0;                        // how far p lies beyond one of the edges, squared
         bool inside = true;
-        for (int k = 0; k < 3 && inside; ++k) {
+        for (int k = 0; k < 3; ++k) {
             const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
-            inside = (b[0] - a[0]) * (py - a[1]) - (b[1] - a[1]) * (px - a[0]) >= 0;
+            const double dx = b[0] - a[0], dy = b[1] - a[1], across = dx * (py - a[1]) - dy * (px - a[0]);
+            if (across >= 0) continue;
+            inside = false;
+            if (across * across > outside2 * (dx * dx + dy * dy)) outside2 = across * across / (dx * dx + dy * dy);
         }
         if (inside) {
-            const double pz = f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2];
-            best.offer(pz + r * n[2] - r, n[2], n[0], n[1]);
+            best.offer(tip, n[2], n[0], n[1]);
             return;  // inside the prism no edge of this facet stands higher
         }
+        if (tip - outside2 / (2 * r) + kRounding <= best.tip_z) return;  // see ball_bounds
     }
     for (int k = 0; k < 3; ++k) {
         if (!(f.edges >> k & 1)) continue;
@@ -82,10 +90,12 @@ void drop_flat(const SolidFacet& f, double r, double x, double y, Best& best) {
         // On the plane the disc touches at its uphill rim (anywhere, where the plane is level: at its middle).
         const double slope = std::sqrt(n[0] * n[0] + n[1] * n[1]), up = n[2] > 0 ? -1.0 : 1.0;
         const double px = slope > 1e-12 ? x + up * r * n[0] / slope : x, py = slope > 1e-12 ? y + up * r * n[1] / slope : y;
-        if (in_triangle(px, py)) best.offer(f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2], f.nz);
+        const double z = f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2];
+        if (z > best.tip_z && in_triangle(px, py)) best.offer(z, f.nz);
     }
     for (int k = 0; k < 3; ++k) {
         const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
+        if (a[2] <= best.tip_z && b[2] <= best.tip_z) continue;
         const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy, wx = a[0] - x, wy = a[1] - y;
         if (wx * wx + wy * wy < r * r) best.offer(a[2], f.nz);
         if (l2 < 1e-18) continue;
@@ -115,7 +125,7 @@ Rest DropIndex::drop(double x, double y) const {
     Rest rest;
     rest.tip_z = -std::numeric_limits<double>::infinity();
     const FacetTree& tree = solid_.tree;
-    if (tree.facets.empty()) return rest;
+    if (tree.nodes.empty()) return rest;
     if (solid_.cap_cells.inside(x, y)) return {solid_.z_top, 0.0F, 0.0F, 1.0F, true};
     const double r = cutter_.radius;
     if (!(x >= solid_.min[0] - r && x <= solid_.max[0] + r && y >= solid_.min[1] - r && y <= solid_.max[1] + r)) return rest;

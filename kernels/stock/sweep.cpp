@@ -42,36 +42,14 @@ SLABWRIGHT_WIDE bool keep_lower(const float* stands, double bottom, int n, doubl
 // The loops hold no branch, so that a compiler does several cells in one step; what does not depend on the cell is decided outside.
 SLABWRIGHT_WIDE bool row_heights(const RowWay& way, int i0, int n, double py, const float* __restrict stands, double bottom, double* __restrict h) {
     if (stands != nullptr && !some_over(stands, bottom, n, way.lowest)) return false;
-    const double dx = way.dx, dy = way.dy, run = way.run, slope = way.slope, z = way.z, R = way.radius, R2 = R * R, lead = way.lead,
-                 least = way.s_least, most = way.s_most, x0 = way.x0, cell = way.cell, from_x = way.from_x;
-    if (way.ball && slope == 0) {
-        for (int k = 0; k < n; ++k) {
-            const double px = x0 + (i0 + k) * cell - from_x, s0 = px * dx + py * dy, d2 = px * px + py * py - s0 * s0, q2 = d2 > 0 ? d2 : 0.0,
-                         w2 = R2 - q2;
-            const double s_up = s0 > 0 ? s0 : 0.0, s = s_up < run ? s_up : run, over = s0 - s, h2 = w2 - over * over;
-            const double height = z + R - std::sqrt(h2 > 0 ? h2 : 0.0);
-            const bool asked = (h2 >= 0) & (s0 <= most) & (s0 >= least);
-            h[k] = asked ? height : kUncovered;
-        }
-    } else if (way.ball) {
-        for (int k = 0; k < n; ++k) {
-            const double px = x0 + (i0 + k) * cell - from_x, s0 = px * dx + py * dy, d2 = px * px + py * py - s0 * s0, q2 = d2 > 0 ? d2 : 0.0,
-                         w2 = R2 - q2;
-            const double w = std::sqrt(w2 > 0 ? w2 : 0.0), low = s0 - w > 0 ? s0 - w : 0.0, high = s0 + w < run ? s0 + w : run, at = s0 - w * lead;
-            const double s_up = at < low ? low : at, s = high < s_up ? high : s_up, h2 = w2 - (s - s0) * (s - s0);
-            const double height = (R - std::sqrt(h2 > 0 ? h2 : 0.0)) + (z + slope * s);
-            const bool asked = (w2 >= 0) & (low <= high) & (at <= most) & (at >= least);
-            h[k] = asked ? height : kUncovered;
-        }
+    const RowWay w = way;
+    auto centre = [&](int k) { return w.x0 + (i0 + k) * w.cell - w.from_x; };
+    if (!w.ball) {
+        for (int k = 0; k < n; ++k) h[k] = flat_height(w, centre(k), py);
+    } else if (w.slope == 0) {
+        for (int k = 0; k < n; ++k) h[k] = level_ball_height(w, centre(k), py);
     } else {
-        for (int k = 0; k < n; ++k) {
-            const double px = x0 + (i0 + k) * cell - from_x, s0 = px * dx + py * dy, d2 = px * px + py * py - s0 * s0, q2 = d2 > 0 ? d2 : 0.0,
-                         w2 = R2 - q2;
-            const double w = std::sqrt(w2 > 0 ? w2 : 0.0), low = s0 - w > 0 ? s0 - w : 0.0, high = s0 + w < run ? s0 + w : run;
-            const double height = z + slope * (slope >= 0 ? low : high);
-            const bool asked = (w2 >= 0) & (low <= high) & (s0 <= most) & (s0 >= least);
-            h[k] = asked ? height : kUncovered;
-        }
+        for (int k = 0; k < n; ++k) h[k] = sloped_ball_height(w, centre(k), py);
     }
     if (stands != nullptr) return some_lower(stands, bottom, n, h);
     int any = 0;

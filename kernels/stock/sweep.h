@@ -49,6 +49,8 @@ struct StandingHeights {
     double operator()(std::size_t cell) const { return bottom + height[cell]; }
 };
 
+inline constexpr double kUncovered = std::numeric_limits<double>::infinity();
+
 /// A straight way of a ball or a level disc over cells of a row: see sweep_above. Lengths mm, relative to the way's begin.
 struct RowWay {
     double dx = 1, dy = 0, run = 0, slope = 0, z = 0, radius = 0, lead = 0;
@@ -57,6 +59,35 @@ struct RowWay {
     bool ball = true;
     double x0 = 0, cell = 1, from_x = 0;  ///< cell i has its centre at x0 + i·cell − from_x
 };
+/// Height of the cutter over a centre at (px, py) from the begin; infinite where it does not cover it, or the cell is not asked. One for
+/// each kind of way, without branches, so that a loop over them can be done several at a time.
+inline double level_ball_height(const RowWay& way, double px, double py) {
+    const double s0 = px * way.dx + py * way.dy, d2 = px * px + py * py - s0 * s0, w2 = way.radius * way.radius - (d2 > 0 ? d2 : 0.0);
+    const double s_up = s0 > 0 ? s0 : 0.0, over = s0 - (s_up < way.run ? s_up : way.run), h2 = w2 - over * over;
+    const double height = way.z + way.radius - std::sqrt(h2 > 0 ? h2 : 0.0);
+    const bool asked = (h2 >= 0) & (s0 <= way.s_most) & (s0 >= way.s_least);
+    return asked ? height : kUncovered;
+}
+inline double sloped_ball_height(const RowWay& way, double px, double py) {
+    const double s0 = px * way.dx + py * way.dy, d2 = px * px + py * py - s0 * s0, w2 = way.radius * way.radius - (d2 > 0 ? d2 : 0.0);
+    const double w = std::sqrt(w2 > 0 ? w2 : 0.0), low = s0 - w > 0 ? s0 - w : 0.0, high = s0 + w < way.run ? s0 + w : way.run;
+    const double at = s0 - w * way.lead, s_up = at < low ? low : at, s = high < s_up ? high : s_up, h2 = w2 - (s - s0) * (s - s0);
+    const double height = (way.radius - std::sqrt(h2 > 0 ? h2 : 0.0)) + (way.z + way.slope * s);
+    const bool asked = (w2 >= 0) & (low <= high) & (at <= way.s_most) & (at >= way.s_least);
+    return asked ? height : kUncovered;
+}
+inline double flat_height(const RowWay& way, double px, double py) {
+    const double s0 = px * way.dx + py * way.dy, d2 = px * px + py * py - s0 * s0, w2 = way.radius * way.radius - (d2 > 0 ? d2 : 0.0);
+    const double w = std::sqrt(w2 > 0 ? w2 : 0.0), low = s0 - w > 0 ? s0 - w : 0.0, high = s0 + w < way.run ? s0 + w : way.run;
+    const double height = way.z + way.slope * (way.slope >= 0 ? low : high);
+    const bool asked = (w2 >= 0) & (low <= high) & (s0 <= way.s_most) & (s0 >= way.s_least);
+    return asked ? height : kUncovered;
+}
+inline double height_over(const RowWay& way, double px, double py) {
+    if (!way.ball) return flat_height(way, px, py);
+    return way.slope == 0 ? level_ball_height(way, px, py) : sloped_ball_height(way, px, py);
+}
+
 /// Heights of the cutter over cells i0 … i0 + n − 1, whose centres lie py beside the begin; infinite where it does not cover the centre, the
 /// cell is not asked, or `stands` (unless null) over `bottom` is not higher. @returns whether any is finite
 bool row_heights(const RowWay& way, int i0, int n, double py, const float* stands, double bottom, double* h);
@@ -93,7 +124,6 @@ struct StraightWay {
 };
 
 inline constexpr int kSweptTogether = 64;  ///< cells of a row
-inline constexpr double kUncovered = std::numeric_limits<double>::infinity();
 
 /// The places of a line at which a value that grows by `step` a mm lies within [least, most], a hair more.
 class Strip {
@@ -197,6 +227,15 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
             auto together = [&](int i0, int i1) {
                 if (end.form == Form::cone) {
                     cells(i0, i1, one);
+                    return;
+                }
+                constexpr int few = 4;  // not worth to be done together
+                if (i1 - i0 < few) {
+                    cells(i0, i1, [&](std::size_t cell, double px) {
+                        const double stands = standing(cell);
+                        if (stands <= lowest) return;
+                        if (const double height = height_over(row_way, px, py); stands > height) fn(cell, height);
+                    });
                     return;
                 }
                 std::array<double, kSweptTogether> h;
