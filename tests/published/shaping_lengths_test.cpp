@@ -52,6 +52,7 @@ Job shaping_job(FinishStrategy strategy, Projection projection) {
     job.slabs.margin = 30;
     job.machine.travel_z = 400;
     job.tolerances.cusp = 0.003;
+    job.cutting.engagement = Engagement::nominal;  // of lengths alone
     for (Tool& tool : job.tools) tool.flute_length = 110, tool.stickout = 130;
     Tool& ball = job.tools[2];
     ball.name = "ball end mill 1 in";
