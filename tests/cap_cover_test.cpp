@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <random>
 #include <vector>
 
 #include "kernels/access/cap_cover.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -34,9 +34,7 @@ TEST(CapCover, OneCapLeavesTheRest) {
 
 // What is called covered is so in all of many directions, and a corner that is named lies in no cap.
 TEST(CapCover, OfRandomCapsAgainstDenseDirections) {
-    constexpr std::uint64_t seed = 20261121;
-    std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(test::seed());
     auto uniform = [&](double a, double b) { return a + (b - a) * static_cast<double>(random() % 1'000'003) / 1'000'002; };
     std::vector<Point3> dense;
     constexpr int n = 20000;

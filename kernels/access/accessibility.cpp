@@ -32,6 +32,7 @@ constexpr double kResolution = 0.5;     // of the tolerance: places nearer than 
 constexpr int kMostPlaces = 20000;      // of one point; some tens are usual
 constexpr std::size_t kObstacles = 10;  // points of the part remembered
 constexpr std::size_t kMostCaps = 48;   // of a proof about one point; some are usual
+constexpr double kMostAround = 0.5;     // of a ball's radius: points farther from each other are proven to be missed one by one
 constexpr double kInset = 0.02;         // of a piece: its corners are tested so far within it
 constexpr int kMostLevels = 40;         // of halving
 constexpr std::size_t kPiecesAtOnce = 128;
@@ -462,6 +463,22 @@ public:
         return false;
     }
 
+    /// Whether what is remembered proves that a ball reaches nothing within `around` of a point.
+    [[nodiscard]] bool misses_all(const Point3& p, const Point3& n, double around) {
+        const double r = q_.tool[0].radius, reach = r + q_.options.tolerance;
+        if (!ball_ || around > kMostAround * reach) return false;
+        const double lowest = q_.options.lowest_tip - p[2] + r, down = -around / (reach - around);
+        cover_.begin({{0, 0, -1}, -(lowest > 0 ? std::min(lowest / (reach + around), 1.0) : down)});
+        while (cover_.size() < kMostCaps) {
+            const std::optional<Point3> u = cover_.uncovered(n);
+            if (!u) return true;
+            const std::optional<Cap> known = remembered_cap(p, *u, around);
+            if (!known) return false;
+            cover_.add(*known);
+        }
+        return false;
+    }
+
     Counts counts;
 
 private:
@@ -478,20 +495,38 @@ private:
     // The caps are those of obstacles deeper than half of the tolerance: where something is deeper than all of it there is a cap around the
     // direction, so every place that is tried settles some of them.
 
-    /// What an obstacle forbids about a point, if anything, among others in direction u.
-    std::optional<Cap> cap_of(const Point3& obstacle, const Point3& p, const Point3& u) const {
+    /// What an obstacle forbids about a point, if that holds u. For a ball: about all points within `around` of it.
+    std::optional<Cap> cap_of(const Point3& obstacle, const Point3& p, const Point3& u, double around = 0) const {
         const double tolerance = q_.options.tolerance, r = q_.tool[0].radius, reach = r + tolerance, clear = r - tolerance / 2;
         const double x = obstacle[0] - p[0], y = obstacle[1] - p[1];
         if (ball_) {
             // Whatever stands forbids what is below it too; beside a ball's centre more than above.
-            const double z = std::min(obstacle[2] - p[2], reach * u[2]), d2 = x * x + y * y + z * z, d = std::sqrt(d2);
-            if (d >= reach + clear || d <= reach - clear) return std::nullopt;
-            return Cap{{x / d, y / d, z / d}, (reach * reach + d2 - clear * clear) / (2 * reach * d)};
+            const double z = std::min(obstacle[2] - p[2], reach * u[2]), d2 = x * x + y * y + z * z, far = reach + around, near = reach - around;
+            // The square of the centre's distance from the obstacle is largest at the one or the other end.
+            double least = (far * far + d2 - clear * clear) / (2 * far);
+            if (around > 0) least = std::max(least, (near * near + d2 - clear * clear) / (2 * near));
+            if (x * u[0] + y * u[1] + z * u[2] <= least) return std::nullopt;
+            const double d = std::sqrt(d2);
+            return Cap{{x / d, y / d, z / d}, least / d};
         }
         if (obstacle[2] <= p[2] + 1.5 * tolerance) return std::nullopt;
         const double a = x / reach, b = y / reach, k = a * a + b * b - clear * clear / (reach * reach);
         const double length = std::sqrt(4 * (a * a + b * b) + (1 - k) * (1 - k));
-        return Cap{{2 * a / length, 2 * b / length, (1 - k) / length}, (1 + k) / length};
+        const Cap cap{{2 * a / length, 2 * b / length, (1 - k) / length}, (1 + k) / length};
+        return cap.margin(u) > CapCover::kInside ? std::optional<Cap>(cap) : std::nullopt;
+    }
+    /// Of what is remembered, the obstacle that forbids most around u.
+    std::optional<Cap> remembered_cap(const Point3& p, const Point3& u, double around = 0) {
+        std::optional<Cap> known;
+        std::size_t by = 0;
+        double most = CapCover::kInside;
+        for (std::size_t i = 0; i < obstacles_.size(); ++i)
+            if (const std::optional<Cap> cap = cap_of(obstacles_[i], p, u, around))
+                if (const double margin = cap->margin(u); margin > most) most = margin, known = cap, by = i;
+        if (by > 0)
+            std::rotate(obstacles_.begin(), obstacles_.begin() + static_cast<std::ptrdiff_t>(by),
+                        obstacles_.begin() + static_cast<std::ptrdiff_t>(by) + 1);
+        return known;
     }
 
     /// The place of the tool for a direction.
@@ -506,10 +541,7 @@ private:
     }
 
     [[nodiscard]] bool known_to_forbid(const Point3& p, const Point3& u) const {
-        return std::any_of(obstacles_.begin(), obstacles_.end(), [&](const Point3& obstacle) {
-            const std::optional<Cap> cap = cap_of(obstacle, p, u);
-            return cap && cap->margin(u) > CapCover::kInside;
-        });
+        return std::any_of(obstacles_.begin(), obstacles_.end(), [&](const Point3& obstacle) { return cap_of(obstacle, p, u).has_value(); });
     }
 
     /// Tries a corner of what no obstacle known so far forbids; what is met there forbids it, until a place is free or nothing is left.
@@ -522,16 +554,8 @@ private:
         while (cover_.size() < kMostCaps) {
             const std::optional<Point3> u = cover_.uncovered(n);
             if (!u) return Answer::missed;
-            std::optional<Cap> known;
-            std::size_t by = 0;
-            double most = CapCover::kInside;
-            for (std::size_t i = 0; i < obstacles_.size(); ++i)
-                if (const std::optional<Cap> cap = cap_of(obstacles_[i], p, *u))
-                    if (const double margin = cap->margin(*u); margin > most) most = margin, known = cap, by = i;
-            if (known) {
+            if (const std::optional<Cap> known = remembered_cap(p, *u)) {
                 cover_.add(*known);
-                std::rotate(obstacles_.begin(), obstacles_.begin() + static_cast<std::ptrdiff_t>(by),
-                            obstacles_.begin() + static_cast<std::ptrdiff_t>(by) + 1);
                 continue;
             }
             const Patch place = place_at(*u);
@@ -883,7 +907,18 @@ Point3 middle_of(const Triangle& t) { return mixed(t, 1.0 / 3, 1.0 / 3, 1.0 / 3)
 /// Tests a piece at its middle and just within its corners.
 Areas measure(Searcher& searcher, const Question& q, const Piece& piece, const Point3& n, bool& agree) {
     Tally tally;
-    add_point(tally, searcher, q, middle_of(piece.t), n);
+    const Point3 middle = middle_of(piece.t);
+    add_point(tally, searcher, q, middle, n);
+    if (!q.overhangs && tally.reached == 0) {
+        double around2 = 0;
+        for (const Point3& corner : piece.t) around2 = std::max(around2, squared_distance(corner, middle));
+        if (searcher.misses_all(middle, n, std::sqrt(around2))) {
+            tally.points += 3;
+            searcher.counts.points += 3;
+            agree = true;
+            return tally.share(area_of(piece.t));
+        }
+    }
     constexpr double rest = kInset / 2;
     add_point(tally, searcher, q, mixed(piece.t, 1 - kInset, rest, rest), n);
     add_point(tally, searcher, q, mixed(piece.t, rest, 1 - kInset, rest), n);
@@ -1046,7 +1081,15 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
             disagreeing2 += outcome.mixed2;
             counts.add(outcome.counts);
         }
-        if (std::sqrt(squares + disagreeing2) / 2 <= options.accuracy * (total + on_border) || squares <= disagreeing2) break;
+        const double error = std::sqrt(squares + disagreeing2) / 2;
+        if (error <= options.accuracy * (total + on_border) || squares <= disagreeing2) break;
+        if (options.limit > 0) {
+            Areas sum;
+            for (const Areas& areas : of_item) sum.add(areas);
+            for (const Areas& areas : shares) sum.add(areas);
+            constexpr double surely = 4;
+            if (std::abs(sum.reached - options.limit * sum.all) > surely * error) break;
+        }
     }
     for (std::size_t i = 0; i < border.size(); ++i) of_item[border[i].item].add(shares[i]);
 

@@ -28,6 +28,8 @@ struct AccessOptions {
     /// Pieces whose points disagree are halved until the likely error of AR is at most this: each is wrong by half of its area, up or down, and
     /// none knows of the others. What is left of them goes into `uncertain`.
     double accuracy = 0.002;
+    /// An AR that is asked about, over 0: pieces are halved no further where AR is over or under it by four times its likely error.
+    double limit = 0;
     double lowest_tip = -std::numeric_limits<double>::infinity();  ///< mm: no tip goes lower (base board, flask)
     bool shares = false;                                           ///< fill Accessibility::share
 };

@@ -22,7 +22,7 @@ using Seen = std::vector<std::array<std::uint64_t, kWords>>;
 
 struct Part {
     Seen seen;
-    double area = 0, vertical_area = 0, least = std::numbers::pi / 2;
+    double area = 0, vertical_area = 0, least = std::numbers::pi / 2, least_steep = std::numbers::pi / 2;
 };
 
 using P3 = std::array<double, 3>;
@@ -129,6 +129,7 @@ AlphaMap alpha_map(Context& context, MeshView mesh, double z_low, double z_high,
                 part.area += area;
                 if (alpha >= options.upright) part.vertical_area += area;
                 part.least = std::min(part.least, alpha);
+                if (alpha >= options.steep) part.least_steep = std::min(part.least_steep, alpha);
             }
             return part;
         },
@@ -138,9 +139,10 @@ AlphaMap alpha_map(Context& context, MeshView mesh, double z_low, double z_high,
                 for (std::size_t w = 0; w < kWords; ++w) a.seen[i][w] |= b.seen[i][w];
             a.area += b.area, a.vertical_area += b.vertical_area;
             a.least = std::min(a.least, b.least);
+            a.least_steep = std::min(a.least_steep, b.least_steep);
             return a;
         });
-    map.area = sum.area, map.vertical_area = sum.vertical_area, map.least_slope = sum.least;
+    map.area = sum.area, map.vertical_area = sum.vertical_area, map.least_slope = sum.least, map.least_steep = sum.least_steep;
     map.slopes.resize(bins);
     for (std::size_t b = 0; b < sum.seen.size(); ++b)
         for (std::size_t s = 0; s < kSlopes; ++s)

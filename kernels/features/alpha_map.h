@@ -33,6 +33,7 @@ struct AlphaMap {
     double area = 0;                            ///< all that slope
     double vertical_area = 0;                   ///< upright ones, of these
     double least_slope = std::numbers::pi / 2;  ///< not rounded
+    double least_steep = std::numbers::pi / 2;  ///< not rounded, of those that are at least as steep as AlphaOptions::steep
     /// Whether all that slopes is upright, and there is some: one flat end mill cuts it (LUO 5.5.2).
     [[nodiscard]] bool vertical() const { return area > 0 && vertical_area == area; }
 };
@@ -40,6 +41,7 @@ struct AlphaMap {
 struct AlphaOptions {
     double step = 0.1;                               ///< mm, over 0
     double upright = 89.9 * std::numbers::pi / 180;  ///< rad: what is steeper is a vertical wall
+    double steep = 0;                                ///< rad, for AlphaMap::least_steep
     double cut_off = 0.001;                          ///< mm: what lies so near to the layer's top belongs to the next one
 };
 
