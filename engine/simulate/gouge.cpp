@@ -31,7 +31,7 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
     if (n < 2) return {};
     const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
     return parallel_reduce(
-        context, n - 1, 512, GougeReport{},
+        context, n - 1, 2048, GougeReport{},
         [&](std::size_t begin, std::size_t end) {
             GougeReport r;
             std::vector<StandingPart::Motion> motions;

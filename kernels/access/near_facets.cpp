@@ -21,7 +21,7 @@ struct Way {
     float per_length2;  // of the way in plan; 0 where it has none
     float end;          // of it: 1, or 0 where it has none
     float upwards;      // 1 where heights count as distance, 0 where they do not
-    float reach, above;
+    float reach, above, slack;
 };
 
 constexpr float third = 1.0F / 3;
@@ -48,9 +48,10 @@ SLABWRIGHT_WIDE static void near_rows(const Rows& r, const Way& w, int n, unsign
         const float d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1, d2 = ux * x2 + uy * y2 + uz * z2;
         float most = d0 > d1 ? d0 : d1;
         most = most > d2 ? most : d2;
-        const float forward = ux * w.dx + uy * w.dy + uz * w.dz, first = -most, last = forward - most, reach = w.reach + r.wrong[i];
+        const float forward = ux * w.dx + uy * w.dy + uz * w.dz, first = -most, last = forward - most, reach = w.reach + w.slack + r.wrong[i];
         const float gap = first < last ? first : last;
-        keep[i] = (above < r.needs[i]) & ((gap <= 0.0F) | (gap * gap < reach * reach * (ux * ux + uy * uy + uz * uz))) & (r.highest[i] > w.above);
+        keep[i] =
+            (above - w.slack < r.needs[i]) & ((gap <= 0.0F) | (gap * gap < reach * reach * (ux * ux + uy * uy + uz * uz))) & (r.highest[i] > w.above);
     }
 }
 
@@ -85,8 +86,7 @@ bool NearFacets::add(const std::array<std::array<double, 3>, 3>& corners, double
     } else {
         n = {0, 0, 0};
     }
-    if (size_ == rows_[0].size())
-        for (auto& row : rows_) row.resize(std::max<std::size_t>(256, 2 * size_));
+    make_room(size_ + 1);
     const float highest = static_cast<float>(std::max({v[0][2], v[1][2], v[2][2]}));
     const std::array<double, kRows - 1> values{n[0],    n[1],    n[2],    offset,  needs,   v[0][0], v[0][1], v[0][2],
                                                v[1][0], v[1][1], v[1][2], v[2][0], v[2][1], v[2][2], wrong};
@@ -95,6 +95,23 @@ bool NearFacets::add(const std::array<std::array<double, 3>, 3>& corners, double
     rows_[row][size_] = std::nextafter(highest, std::numeric_limits<float>::infinity());
     ++size_;
     return true;
+}
+
+void NearFacets::make_room(std::size_t size) {
+    if (size > rows_[0].size())
+        for (auto& row : rows_) row.resize(std::max<std::size_t>(256, 2 * size));
+}
+
+void NearFacets::take(const NearFacets& others, const std::vector<unsigned char>& keep) {
+    middle_ = others.middle_, half_ = others.half_, reach_ = others.reach_, ball_ = others.ball_;
+    std::size_t count = 0;
+    for_each_kept(keep, [&](std::size_t) { ++count; });
+    make_room(count);
+    size_ = 0;
+    for_each_kept(keep, [&](std::size_t i) {
+        for (std::size_t k = 0; k < kRows; ++k) rows_[k][size_] = others.rows_[k][i];
+        ++size_;
+    });
 }
 
 void NearFacets::near(const NearWay& way, std::vector<unsigned char>& keep) const {
@@ -111,7 +128,8 @@ void NearFacets::near(const NearWay& way, std::vector<unsigned char>& keep) cons
                 length2 > 1e-12 ? 1.0F : 0.0F,
                 ball_ ? 1.0F : 0.0F,
                 static_cast<float>(way.reach),
-                std::nextafter(single(way.above, 2), -std::numeric_limits<float>::infinity())};
+                std::nextafter(single(way.above, 2), -std::numeric_limits<float>::infinity()),
+                static_cast<float>(way.slack)};
     auto row = [&](std::size_t k) { return rows_[k].data(); };
     near_rows({row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7), row(8), row(9), row(10), row(11), row(12), row(13), row(15), row(14)},
               w, static_cast<int>(size_), keep.data());

@@ -15,6 +15,7 @@ struct NearWay {
     std::array<double, 3> a, b;
     double reach;  ///< what is so far away does not meet it, mm; a cylinder's horizontally
     double above;  ///< nor does what is not higher than this, mm
+    double slack;  ///< what is meant may be so far from the straight way, mm
 };
 
 /// Facets in single precision around an origin, each with what that can be wrong by: none is left out that may be met.
@@ -27,10 +28,13 @@ public:
     bool add(const std::array<std::array<double, 3>, 3>& corners, double up);
     /// keep[i] is 1 where the way may meet facet i, else 0. Its size becomes a multiple of eight, filled with 0.
     void near(const NearWay& way, std::vector<unsigned char>& keep) const;
+    /// Becomes what is kept of others.
+    void take(const NearFacets& others, const std::vector<unsigned char>& keep);
 
 private:
     static constexpr std::size_t kRows = 16;
     std::array<double, 3> middle_{}, half_{};
+    void make_room(std::size_t size);
     double reach_ = 0;
     bool ball_ = false;
     std::size_t size_ = 0;

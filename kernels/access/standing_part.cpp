@@ -535,7 +535,7 @@ Penetration StandingPart::depth_of(Form form, double z_top, const Point3& from, 
 /// What of the part motions within a box may meet: facets that can be deeper than `at_least` in the cutter, and those above the layer's top that
 /// cover one of its places.
 struct StandingPart::Vicinity {
-    static constexpr double kSide = 3;  // mm that a box is made long, unless one piece is longer
+    static constexpr double kSide = 6;  // mm that a box is made long, unless one piece is longer
 
     Cutter cutter{};
     double at_least = 0;
@@ -580,6 +580,46 @@ struct StandingPart::Vicinity {
             }
             if (!add(next.to)) return;
         }
+    }
+};
+
+/// A few short motions within a box that are nearly one straight one, and what of the box's facets they may meet.
+struct StandingPart::Run {
+    static constexpr std::size_t kMost = 16;
+    static constexpr double kLength = 1.5, kSlack = 0.05;  // mm
+
+    std::size_t first = 0, last = 0;
+    double slack = 0, lowest = 0;
+    NearFacets terms;
+    std::vector<std::uint32_t> facets;
+
+    /// Takes as many motions from `motion` on as there are; whether there are two at least.
+    bool begin(const Vicinity& around, std::span<const Motion> motions, std::size_t motion) {
+        first = last = motion;
+        const Point3& from = motions[motion].from;
+        double length = 0;
+        for (std::size_t most = std::min(motions.size(), motion + kMost), m = motion; m < most; ++m) {
+            const Motion& next = motions[m];
+            const Point3 way = sub(next.to, next.from);
+            length += std::sqrt(dot(way, way));
+            if ((m > motion && next.from != motions[m - 1].to) || length > kLength || !around.holds(next.to)) break;
+            ++last;
+        }
+        for (;; last = first + (last - first) / 2) {
+            if (last < first + 2) break;
+            const Point3& to = motions[last - 1].to;
+            slack = 0, lowest = std::min(from[2], to[2]);
+            for (std::size_t m = first; m + 1 < last; ++m) {
+                const Point3& p = motions[m].to;
+                const Point3 off = sub(p, closest_on_segment(p, from, to));
+                slack = std::max(slack, dot(off, off));
+                lowest = std::min(lowest, p[2]);
+            }
+            slack = std::sqrt(slack) + kHair;
+            if (slack <= kSlack) return true;
+        }
+        last = first;
+        return false;
     }
 };
 
@@ -640,6 +680,7 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
     Vicinity v;
     v.cutter = {form, radius, z_top - kSheet};
     const Cutter& cutter = v.cutter;
+    Run run;
     Point3 last{};  // the end of one motion is mostly the begin of the next
     bool last_known = false, last_covered = false;
     for (std::size_t m = 0; m < motions.size(); ++m) {
@@ -659,15 +700,31 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
             last = tip, last_known = true;
             return last_covered = winding > 0;
         };
+        // What of the vicinity a way may meet that is nowhere farther than `slack` from the straight one, and lowest at `lowest`.
+        auto near_way = [&](const NearFacets& terms, const Point3& from, const Point3& to, double lowest, double depth, double slack) {
+            const double reach = radius - depth + kHair, up = cutter.ball() ? radius : depth;
+            terms.near(
+                {{from[0], from[1], from[2] + up}, {to[0], to[1], to[2] + up}, reach, lowest + (cutter.ball() ? radius - reach : depth), slack},
+                v.keep);
+        };
         auto look = [&](const Piece& piece, Penetration& result) {
+            if (m >= run.first && m < run.last) {
+                near_way(run.terms, piece.a, piece.b, piece.lowest, result.depth, 0);
+                for_each_kept(v.keep, [&](std::size_t k) { meet(cutter, piece, facets_[run.facets[k]].v, result); });
+                return;
+            }
             if (!v.holds(piece.a) || !v.holds(piece.b)) v.place(motions, m, piece.a, piece.b, floor);
             if (!v.facets_known) gather(v);
-            const double reach = radius - result.depth + kHair, up = cutter.ball() ? radius : result.depth;
-            v.terms.near({{piece.a[0], piece.a[1], piece.a[2] + up},
-                          {piece.b[0], piece.b[1], piece.b[2] + up},
-                          reach,
-                          piece.lowest + (cutter.ball() ? radius - reach : result.depth)},
-                         v.keep);
+            if (piece.a == motions[m].from && piece.b == motions[m].to && run.begin(v, motions, m)) {
+                near_way(v.terms, motions[m].from, motions[run.last - 1].to, run.lowest, result.depth, run.slack);
+                run.terms.take(v.terms, v.keep);
+                run.facets.clear();
+                for_each_kept(v.keep, [&](std::size_t k) { run.facets.push_back(v.facets[k]); });
+                near_way(run.terms, piece.a, piece.b, piece.lowest, result.depth, 0);
+                for_each_kept(v.keep, [&](std::size_t k) { meet(cutter, piece, facets_[run.facets[k]].v, result); });
+                return;
+            }
+            near_way(v.terms, piece.a, piece.b, piece.lowest, result.depth, 0);
             for_each_kept(v.keep, [&](std::size_t k) { meet(cutter, piece, facets_[v.facets[k]].v, result); });
         };
         const Penetration p = motion_depth(cutter, motions[m].from, motions[m].to, floor, covered_at, look);

@@ -99,6 +99,7 @@ private:
     template <class Squared, class Limit, class Visit>
     void walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit) const;
     struct Vicinity;
+    struct Run;
     void gather(Vicinity& around) const;
     void gather_covers(Vicinity& around) const;
     [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
