@@ -1,6 +1,7 @@
 #include "engine/layer_plan.h"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -22,9 +23,10 @@ constexpr double kFirstSetsShare = 0.4;  // of what then remains, the sets of th
 // A layer as one set of tools makes it, with the forces of its programs and the feeds that they allow.
 struct Trial {
     PlannedLayer planned;
-    double minutes = 0;  // of its programs and the changes of tool between them
-    double left_mm2 = 0;
-    bool whole = true;  // false: given up, its feeds were not adapted
+    double minutes = 0;              // of its programs and the changes of tool between them
+    std::optional<double> left_mm2;  // none: given up before all its paths were planned
+    bool leaves_more = false;        // than the first set
+    bool whole = true;               // false: given up, its feeds were not adapted
 };
 
 double minutes_of(const Layer& layer, const Machine& machine) {
@@ -128,7 +130,7 @@ private:
             ProgressPart part(progress_, at, at + step);
             // Adapted feeds seldom make a plan faster by so much; a set that is given up for it is not proven slower.
             constexpr double kHopeless = 1.5;
-            judge(s, plan_with(sets_[s].tools, best_ ? kHopeless * best_->minutes : 1e300, part));
+            judge(s, plan_with(sets_[s].tools, best_ ? kHopeless * best_->minutes : std::numeric_limits<double>::infinity(), part));
             part.reach(1);
         }
     }
@@ -142,15 +144,20 @@ private:
         const double board = job.machine.base_board_cut >= 0 ? overrun_.board : std::min(below, overrun_.board);
         work_.floor_below = layer_.z_bottom - (ground_.carried_by ? below : board);
         work_.feet = flats_between(work_.floor_below);
+        work_.most_minutes = most;
         LayerResult result = plan_layer_paths(context_, work_);
         Trial trial;
         Layer& layer = trial.planned.layer = layer_;
         layer.operations = std::move(result.operations);
         trial.planned.diagnostics = std::move(result.diagnostics);
-        trial.left_mm2 = result.left_mm2;
+        // None may leave more than the first set, but for what differently fine cells see.
+        constexpr double kMore = 1.1, kFew = 5;  // mm²
+        if (!best_) allowed_left_ = kMore * result.left_mm2 + kFew;
+        if (!result.given_up) trial.left_mm2 = result.left_mm2;
+        trial.leaves_more = best_ && !result.given_up && result.left_mm2 > allowed_left_;
         trial.minutes = minutes_of(layer, job.machine);
-        trial.whole = trial.minutes <= most;
-        if (!trial.whole || job.cutting.engagement != Engagement::simulated) return trial;
+        trial.whole = !result.given_up && trial.minutes <= most;
+        if (!trial.whole || trial.leaves_more || job.cutting.engagement != Engagement::simulated) return trial;
         trial.planned.cuts = adapt_layer(context_, layer, ground_.plan, overhang_ ? &*overhang_ : nullptr, trial.planned.diagnostics);
         trial.minutes = minutes_of(layer, job.machine);
         return trial;
@@ -158,18 +165,17 @@ private:
 
     // Keeps the trial of set s where it is the best so far.
     void judge(std::size_t s, Trial trial) {
-        // None may leave more than the first set, but for what differently fine cells see.
-        constexpr double kMore = 1.1, kFew = 5;  // mm²
-        if (s == 0) allowed_left_ = kMore * trial.left_mm2 + kFew;
-        const bool leaves_more = s > 0 && trial.left_mm2 > allowed_left_;
         if (selection_) {
             ToolSet& set =
                 selection_->sets.emplace_back(ToolSet{sets_[s].name, tools_in_order(trial.planned.layer), trial.minutes, trial.left_mm2, false, {}});
-            if (leaves_more)
-                set.reason = fmt::format("leaves {:.1f} mm² over the limit, the first set {:.1f} mm²", set.left_mm2, selection_->sets[0].left_mm2);
+            if (!trial.left_mm2)
+                set.reason = fmt::format("given up: its first programs alone take {:.1f} min, against {:.1f} min", trial.minutes, best_->minutes);
+            else if (trial.leaves_more)
+                set.reason = fmt::format("leaves {:.1f} mm² over the limit, the first set {:.1f} mm²", *trial.left_mm2,
+                                         selection_->sets[0].left_mm2.value_or(0));
             else if (!trial.whole) set.reason = fmt::format("its paths alone take {:.1f} min, against {:.1f} min", trial.minutes, best_->minutes);
         }
-        if (!best_ || (trial.whole && !leaves_more && trial.minutes < best_->minutes)) best_ = std::move(trial), chosen_ = s;
+        if (!best_ || (trial.whole && !trial.leaves_more && trial.minutes < best_->minutes)) best_ = std::move(trial), chosen_ = s;
     }
 
     void give_reasons() {

@@ -54,13 +54,22 @@ struct ArcShape {
 enum class OperationKind : std::uint8_t { face, rough, semi_rough, finish, corner, drill, edge };
 [[nodiscard]] SLABWRIGHT_API std::string_view name(OperationKind kind);  ///< as plan.json spells it
 
+/// Heights between which the surface is about as steep, and how far apart the level passes that cut it lie (LUO 5.4).
+struct StepBand {
+    double z_low = 0, z_high = 0;  ///< mm
+    double least_slope_deg = 90;   ///< from level, of what level passes finish there
+    double stepdown = 0;           ///< mm, the largest
+    friend bool operator==(const StepBand&, const StepBand&) = default;
+};
+
 /// One program: one tool, one purpose. Moves begin and end with a Z-only rapid at `clearance_z`.
 struct Operation {
     OperationKind kind{};
-    std::string purpose;  ///< in words: "level contours", "projected raster", "walls", "floors"…
-    int tool = 0;         ///< Tool::number
-    double stepdown = 0;  ///< mm, the largest; 0 where it has none
-    double stepover = 0;  ///< mm, the largest; 0 where it has none
+    std::string purpose;          ///< in words: "level contours", "projected raster", "walls", "floors"…
+    int tool = 0;                 ///< Tool::number
+    double stepdown = 0;          ///< mm, the largest; 0 where it has none
+    double stepover = 0;          ///< mm, the largest; 0 where it has none
+    std::vector<StepBand> bands;  ///< of level contours, upwards: where they cut
     double spindle_rpm = 0;
     double clearance_z = 0;  ///< mm
     std::vector<Move> moves;
@@ -86,10 +95,10 @@ struct ToolCandidate {
 
 /// A set of tools that a layer was planned with.
 struct ToolSet {
-    std::string name;        ///< "selected", "wider" (the next wider finish tool), "fixed" or "wider rough"
-    std::vector<int> tools;  ///< numbers, in the order of their first cut
-    double minutes = 0;      ///< of its programs, tool changes within the layer included
-    double left_mm2 = 0;     ///< of the layer's plan view, where more than the cusp's limit is left
+    std::string name;                ///< "selected", "wider" (the next wider finish tool), "fixed" or "wider rough"
+    std::vector<int> tools;          ///< numbers, in the order of their first cut
+    double minutes = 0;              ///< of its programs, tool changes within the layer included; of the first of them where it was given up
+    std::optional<double> left_mm2;  ///< of the layer's plan view, where more than the cusp's limit is left; none where it was given up
     bool chosen = false;
     std::string reason;  ///< why it was kept or not, in words
 };

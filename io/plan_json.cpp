@@ -94,6 +94,16 @@ void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const O
     json.key("tool").integer(operation.tool);
     json.key("stepdown").rounded(operation.stepdown, kLength);
     json.key("stepover").rounded(operation.stepover, kLength);
+    json.key("bands").begin_array(Shape::line);
+    for (const StepBand& band : operation.bands) {
+        json.begin_object(Shape::line);
+        json.key("z_low").rounded(band.z_low, kLength);
+        json.key("z_high").rounded(band.z_high, kLength);
+        json.key("least_slope_deg").rounded(band.least_slope_deg, kLength);
+        json.key("stepdown").rounded(band.stepdown, kLength);
+        json.end();
+    }
+    json.end();
     json.key("file").string("nc/" + operation.file);
     json.key("cutting_mm").rounded(operation.cutting_mm, kLength);
     json.key("rapid_mm").rounded(operation.rapid_mm, kLength);
@@ -148,7 +158,7 @@ void put_selection(JsonText& json, const std::optional<LayerSelection>& selectio
         for (const int tool : set.tools) json.integer(tool);
         json.end();
         json.key("minutes").rounded(set.minutes, kMinutes);
-        json.key("left_mm2").rounded(set.left_mm2, kArea);
+        put("left_mm2", set.left_mm2, kArea);
         json.key("chosen").boolean(set.chosen);
         json.key("reason").string(set.reason);
         json.end();

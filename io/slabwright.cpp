@@ -12,7 +12,9 @@
 #include <new>
 
 #include "engine/planner.h"
+#include "engine/tools/access_map.h"
 #include "engine/tools/tools.h"
+#include "io/access_ply.h"
 #include "io/gcode_writer.h"
 #include "io/inspect_json.h"
 #include "io/job_toml.h"
@@ -192,6 +194,27 @@ VerifyResult write_verified(Context& context, const Plan& plan, const std::strin
         context.throw_if_cancelled();
         out.commit();
         return result;
+    });
+}
+
+void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path, const std::string& directory) {
+    guarded([&] {
+        const StlMesh stl = read_stl(context, stl_path, {plan.job.units, plan.job.tolerances.weld});
+        if (stl.input.sha256 != plan.input.sha256)
+            throw Error(ErrorKind::input, "access_maps.stl", "is not the pattern that was planned", stl_path, "give the STL of the plan");
+        std::error_code failed;
+        std::filesystem::create_directories(directory, failed);
+        if (failed)
+            throw Error(ErrorKind::input, "access_maps.write", "cannot be made: " + failed.message(), directory,
+                        "choose another folder for the maps");
+        context.begin_phase("access maps", 1, 1);
+        access_maps(context, stl.mesh.view(), plan, [&](const AccessMap& map) {
+            const Accessibility& a = map.accessibility;
+            const std::string comment = fmt::format("{}: layer {}, tool {} reaches {:.4f} of the surface to be machined; mm, z = 0 at the bottom",
+                                                    plan.input.sha256.substr(0, 12), map.layer, map.tool, a.ratio());
+            const std::filesystem::path file = std::filesystem::path(directory) / fmt::format("layer_{:02}_tool_{:02}.ply", map.layer, map.tool);
+            write_file_whole(file.string(), access_ply(stl.mesh.view(), a.share, comment));
+        });
     });
 }
 

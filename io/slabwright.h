@@ -39,6 +39,13 @@ namespace slabwright {
 /// @throws Error(input) when the place cannot be written
 SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path = {});
 
+/// Writes what tools reach into `directory`, for viewers of meshes: layer_01_tool_02.ply and so on, the facets of layer 1 that are to be
+/// machined with the share of each that tool 2 reaches (io/access_ply.h), pattern-base. Of the flat and ball end mills that were looked at
+/// for a layer or cut it.
+/// @param stl_path the pattern that was planned
+/// @throws Error(input) when the place cannot be written or the STL is another one, Error(cancelled)
+SLABWRIGHT_API void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path, const std::string& directory);
+
 /// Makes report.html of a folder again, from what lies in it (verify.json among it) and the pattern.
 /// @param stl_path as verify's. @param three_d false: a light page without model and paths
 /// @param size_limit_mb the page is made no larger, by showing less detail; it says how much

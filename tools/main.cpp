@@ -34,7 +34,7 @@ extern "C" void on_signal(int signal) {
 }
 
 struct Options {
-    std::string stl, out, maps, job_file, units, strategy, finder, device, library;
+    std::string stl, out, maps, access_maps, job_file, units, strategy, finder, device, library;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, no_verify = false, json = false, quiet = false, defaults = false, weld_given = false, no_3d = false;
@@ -240,6 +240,7 @@ bool run_plan(const Options& options) {
     with_context(options, [&](Context& context) {
         if (!options.no_verify) context.share_progress(0, kPlanningShare);
         const Plan result = plan(context, options.stl, job);
+        if (!options.access_maps.empty()) write_access_maps(context, result, options.stl, options.access_maps);
         if (options.no_verify) {
             write(context, result, options.out, options.stl);
             return options.json ? summary_json(result, options.out, nullptr) : summary(result, options.out);
@@ -350,6 +351,7 @@ int main(int argc, char** argv) {
     plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")->check(CLI::IsMember({"exact", "halving", "both"}));
     plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
 
+    plan_command->add_option("--access-maps", options.access_maps, "folder for what each tool reaches of each layer's facets, as PLY");
     plan_command->add_flag("--no-verify", options.no_verify, "write the plan without simulating its programs");
 
     CLI::App* verify_command = app.add_subcommand("verify", "simulate the programs of a plan against the pattern");

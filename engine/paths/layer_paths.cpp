@@ -10,6 +10,7 @@
 #include "engine/paths/rest.h"
 #include "engine/paths/rings.h"
 #include "engine/paths/semi_rough.h"
+#include "engine/schedule/motion_time.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -148,6 +149,23 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         if (!operation.moves.empty()) result.operations.push_back(std::move(operation));
         context.throw_if_cancelled();
     };
+    const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};
+    // Whether the operations so far, which all stay, take too long. Arcs may be run faster than the straight moves they are made of.
+    auto hopeless = [&] {
+        if (std::isinf(layer.most_minutes)) return false;
+        auto minutes = [&](std::span<const Operation> operations) {
+            double sum = 0;
+            for (const Operation& op : operations) sum += motion_time(op.moves, cut.job.machine).minutes;
+            return sum;
+        };
+        if (minutes(result.operations) <= layer.most_minutes) return false;
+        std::vector<Operation> fitted = result.operations;
+        for (Operation& op : fitted) fit_arcs(op.moves, fit);
+        if (minutes(fitted) <= layer.most_minutes) return false;
+        result.operations = std::move(fitted);
+        result.given_up = true;
+        return true;
+    };
     take(face_layer(cut));
     reached(0.01);
     take(rough_layer(cut));
@@ -158,16 +176,18 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     auto finish = [&](auto&& done) {
         Operation levels = finish_levels(cut, result.diagnostics);
         reached(0.65);
+        done(levels);
+        take(std::move(levels));
+        if (hopeless()) return;
         Operation projected =
             cut.job.cutting.projection == Projection::offset ? finish_offsets(cut, result.diagnostics) : finish_raster(cut, result.diagnostics);
         reached(0.86);
-        for (Operation* op : {&levels, &projected}) {
-            done(*op);
-            take(std::move(*op));
-        }
+        done(projected);
+        take(std::move(projected));
     };
     if (cut.job.cutting.uniform_steps) {
         finish([](const Operation&) {});
+        if (result.given_up) return result;
     } else {
         // What stands now decides the rest: waste where the roughing cutter does not fit before the ball finishes, and after it
         // the corners that the ball leaves, by the flat end mill, and what is left of the cusps' limit anywhere.
@@ -203,9 +223,11 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         if (contours) between.swath = finish_r;
         take(cut_rest(cut, stock, tools.finish, between));
         reached(0.34);
+        if (hopeless()) return result;
         finish([&](Operation& op) {
             if (stock.cut(cut, op, tools.finish).few()) op.moves.clear();
         });
+        if (result.given_up || hopeless()) return result;
         const double limit = cut.job.tolerances.cusp + 0.02;
         // A smaller flat reaches every corner that the roughing cutter reaches, so where one follows it cuts them all.
         const bool smaller = std::any_of(tools.rest.begin(), tools.rest.end(), [](const Tool& t) { return t.kind == ToolKind::flat; });
@@ -240,7 +262,6 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     reached(0.98);
     report_loose(cut, result);
     // Last, so that everything before has straight moves only to think of.
-    const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};
     for (Operation& op : result.operations) fit_arcs(op.moves, fit);
     reached(1);
     return result;

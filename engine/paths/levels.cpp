@@ -75,6 +75,31 @@ Operation finish_walls(const LayerCut& cut) {
     return op;
 }
 
+namespace {
+
+// A level that follows the slope of what it cuts.
+struct SpacedLevel {
+    double contact = 0;  // height at which it touches the least slope, mm
+    double step = 0;     // below the level before, mm
+    bool cuts = false;
+};
+
+// Bands of α of the layer in which levels cut.
+std::vector<StepBand> bands_of(const LayerCut& cut, std::span<const SpacedLevel> levels, double at_least, double least_height) {
+    constexpr double same = std::numbers::pi / 180;
+    std::vector<StepBand> bands;
+    for (const AlphaMap::Band& band : cut.alpha.bands(at_least, same, least_height)) {
+        double step = 0;
+        for (const SpacedLevel& level : levels)
+            if (level.cuts && level.contact >= band.z_low && level.contact < band.z_high) step = std::max(step, level.step);
+        if (step > 0) bands.push_back({std::max(band.z_low, cut.layer.z_bottom), band.z_high, band.alpha * 180 / std::numbers::pi, step});
+    }
+    std::erase_if(bands, [](const StepBand& band) { return band.z_low >= band.z_high; });
+    return bands;
+}
+
+}  // namespace
+
 Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
     const Tool& tool = cut.layer.tools.finish;
     Operation op = cut.operation(OperationKind::finish, "level contours", tool);
@@ -94,6 +119,7 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
 
     // From the highest tip that may touch, down to the lowest whose contact is still in the layer.
     std::vector<double> tips;
+    std::vector<SpacedLevel> spaced;
     const double lowest = std::max(cut.layer.floor_below, low - r);
     double bite = 0;
     for (double z = high; z > lowest;) {
@@ -105,6 +131,7 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             step = cut.job.cutting.min_stepdown;
         }
         z = std::max(z - step, lowest);
+        spaced.push_back({z + r * (1 - std::cos(alpha)), step});
         op.stepdown = std::max(op.stepdown, step);
         tips.push_back(z);
     }
@@ -159,6 +186,8 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             append_level_runs(level, c, to_units(tips[i]), wanted, simplify_tolerance_units(gouge), runs[i]);
         }
     });
+    for (std::size_t i = 0; i < regular; ++i) spaced[i].cuts = !runs[i].empty();
+    op.bands = bands_of(cut, spaced, slopes.levels_keep, tool.stepdown_max);
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
                      cut.layer.z_top + 2);
     const DropIndex& part = cut.drops(cutter);

@@ -26,16 +26,18 @@ struct LayerJob {
     std::array<double, 2> stock_min{}, stock_max{};  ///< mm
     int index = 0;
     LayerTools tools;
-    Loops opening;                     ///< of the flask in this layer; empty: no flask
-    std::vector<Flat> flats;           ///< strictly between z_bottom and z_top
-    ProgressPart* progress = nullptr;  ///< told how far the paths are, up to kPathsShare; the rest is the caller's
-    std::vector<Flat> feet;            ///< on which walls of this layer may stand: `flats` and those just below
+    Loops opening;                                                  ///< of the flask in this layer; empty: no flask
+    std::vector<Flat> flats;                                        ///< strictly between z_bottom and z_top
+    ProgressPart* progress = nullptr;                               ///< told how far the paths are, up to kPathsShare; the rest is the caller's
+    std::vector<Flat> feet;                                         ///< on which walls of this layer may stand: `flats` and those just below
+    double most_minutes = std::numeric_limits<double>::infinity();  ///< when its programs so far take longer than this, the layer is given up
 };
 
 struct LayerResult {
     std::vector<Operation> operations;  ///< in the order of execution
     std::vector<Diagnostic> diagnostics;
-    double left_mm2 = 0;  ///< plan view of what is left over the cusp's limit; 0 where it is not followed (Cutting::uniform_steps)
+    double left_mm2 = 0;    ///< plan view of what is left over the cusp's limit; 0 where it is not followed (Cutting::uniform_steps)
+    bool given_up = false;  ///< the operations are the first ones only, and take longer than `most_minutes`; left_mm2 is not known
 };
 
 /// Face, rough, floors, walls, levels and raster of one layer, and what these leave. Operations that would remove nothing are left out.

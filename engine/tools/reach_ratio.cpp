@@ -7,8 +7,6 @@
 
 namespace slabwright {
 
-namespace {
-
 ToolShape shape_of(const Tool& tool) {
     ToolShape shape;
     shape.profile = tool.kind == ToolKind::ball ? ToolShape::Profile::ball : ToolShape::Profile::flat;
@@ -20,7 +18,12 @@ ToolShape shape_of(const Tool& tool) {
     return shape;
 }
 
-}  // namespace
+AccessOptions access_options(const Job& job, double lowest_tip) {
+    AccessOptions options;
+    options.tolerance = job.tolerances.cusp;
+    options.lowest_tip = lowest_tip;
+    return options;
+}
 
 ReachRatio reach_ratio(Context& context, const LayerJob& layer, const AccessScene* scene) {
     if (layer.job->selection.accessibility == AccessRule::sections) return {};
@@ -29,10 +32,8 @@ ReachRatio reach_ratio(Context& context, const LayerJob& layer, const AccessScen
         if (job.selection.accessibility == AccessRule::printed)
             return printed_accessibility(context, layer.mesh, layer.z_bottom, layer.z_top, tool.diameter / 2, job.selection.overlap_weight).ratio();
         auto ratio = [&](const Tool& t) {
-            AccessOptions options;
-            // What finish passes may leave is no reason to call a place out of reach.
-            options.tolerance = job.tolerances.cusp;
-            options.lowest_tip = layer.floor_below;
+            AccessOptions options = access_options(job, layer.floor_below);
+            options.limit = job.selection.threshold;
             return scene->accessible(context, layer.z_bottom, layer.z_top, shape_of(t), options).ratio();
         };
         double share = ratio(tool);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "kernels/cutting/cusp.h"
+#include "kernels/features/alpha_map.h"
 #include "kernels/slicing/slicing.h"
 #include "kernels/voxels/voxels.h"
 
@@ -31,28 +32,17 @@ std::vector<Tool> falling(const Job& job, ToolKind kind) {
 struct Slopes {
     double least = std::numbers::pi / 2;  // of the steep ones
     bool vertical = true;                 // nothing between upright and level
-    bool any_wall = false;
 };
 
-Slopes slopes_of(const LayerJob& layer) {
+Slopes slopes_of(Context& context, const LayerJob& layer) {
     const Cutting& cutting = layer.job->cutting;
-    const double steep = cutting.steep_limit_deg * kDegree, upright = cutting.vertical_deg * kDegree, level = 0.1 * kDegree;
-    Slopes slopes;
-    for (const Index3& f : layer.mesh.facets) {
-        const Vec3f &a = layer.mesh.vertices[f[0]], &b = layer.mesh.vertices[f[1]], &c = layer.mesh.vertices[f[2]];
-        const auto [low, high] = std::minmax({a.z, b.z, c.z});
-        if (high <= layer.z_bottom + 1e-3 || low >= layer.z_top - 1e-3) continue;
-        const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z, vx = double{c.x} - a.x, vy = double{c.y} - a.y,
-                     vz = double{c.z} - a.z;
-        const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx, n = std::sqrt(nx * nx + ny * ny + nz * nz);
-        if (n < 1e-12 || nz < -1e-6 * n) continue;
-        const double alpha = std::acos(std::clamp(nz / n, 0.0, 1.0));
-        if (alpha < level) continue;
-        slopes.any_wall = true;
-        if (alpha < upright) slopes.vertical = false;
-        if (alpha >= steep) slopes.least = std::min(slopes.least, alpha);
-    }
-    return slopes;
+    AlphaOptions options;
+    options.step = layer.z_top - layer.z_bottom;  // one bin
+    options.upright = cutting.vertical_deg * kDegree;
+    options.steep = cutting.steep_limit_deg * kDegree;
+    constexpr double kJoint = 1e-3;  // mm: what reaches no higher over the joint belongs to the layer below
+    const AlphaMap map = alpha_map(context, layer.mesh, layer.z_bottom + kJoint, layer.z_top, options);
+    return {map.least_steep, map.vertical_area == map.area};
 }
 
 double perimeter(const Loops& loops) {
@@ -82,7 +72,7 @@ public:
 
     ToolChoice run() {
         choice_.tools = fixed_tools(job_);  // also refuses a library that lacks a flat or a ball
-        const Slopes slopes = slopes_of(layer_);
+        const Slopes slopes = slopes_of(context_, layer_);
         LayerSelection& record = choice_.record;
         record.least_slope_deg = slopes.least / kDegree;
         record.vertical = slopes.vertical;
@@ -102,7 +92,7 @@ public:
         std::vector<LayerTools> sets;
         measure();
         const double height = layer_.z_top - layer_.z_bottom, swath = base.finish.diameter;
-        const double allowed = std::min(flat_level_stepdown(slopes_of(layer_).least, base.finish.diameter / 2), height);
+        const double allowed = std::min(flat_level_stepdown(slopes_of(context_, layer_).least, base.finish.diameter / 2), height);
         for (Tool rough : flats_) {
             if (rough.diameter < base.rough.diameter - 1e-9) break;
             rough.stepdown_min = rough.stepdown_max = std::clamp(allowed, std::min(rough.stepdown_min, height), rough.stepdown_max);

@@ -2,7 +2,7 @@
 //     node page_test.mjs SOURCE COMMAND WORK_FOLDER
 
 import {execFileSync} from 'node:child_process';
-import {copyFileSync, mkdirSync, readFileSync, rmSync, statSync} from 'node:fs';
+import {copyFileSync, mkdirSync, readFileSync, rmSync, statSync, writeFileSync} from 'node:fs';
 import {browser, Checks, open, pdfPages} from './browser.mjs';
 
 const [,, source, command, work] = process.argv;
@@ -261,5 +261,27 @@ check.equal('a limit that cannot be kept is refused', refused, 2);
     check.equal('no WebGL: nothing thrown', thrown, []);
     await context.close();
 }
+// Where there is a library to choose from, how the tools of each layer were chosen.
+{
+    const chosen = `${work}/chosen`, job = `${work}/luo.toml`;
+    writeFileSync(job, execFileSync(command, ['job', '--defaults', '--library', 'luo']));
+    execFileSync(command, ['plan', `${source}/tests/data/half-sphere.stl`, '-o', chosen, '--job', job, '--quiet', '--no-verify']);
+    const {layers: planned} = JSON.parse(readFileSync(`${chosen}/plan.json`, 'utf8'));
+    const {page, complaints} = await open(started, `${chosen}/report.html`);
+    for (const [table, key] of [['candidates', 'candidates'], ['sets', 'sets']]) {
+        const entries = planned.flatMap(layer => layer.selection[key]);
+        check.that(`selection: there are ${key}`, entries.length > 0);
+        check.equal(`selection: reasons of ${key}`, await page.locator(`#${table} tbody tr td:last-child`).allTextContents(), entries.map(e => e.reason));
+        check.equal(`selection: chosen ${key}`, await page.locator(`#${table} tbody td.chosen`).count(), entries.filter(e => e.chosen).length);
+    }
+    check.equal('selection: no complaints', complaints, []);
+    await page.close();
+}
+check.equal('selection: no tables without a choice', await (async () => {
+    const {page} = await open(started, file);
+    const count = await page.locator('#candidates, #sets').count();
+    await page.close();
+    return count;
+})(), 0);
 await started.close();
 check.end();

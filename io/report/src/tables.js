@@ -54,6 +54,37 @@ function sortable(id, title, columns, rows, place, show) {
 const number = (name, of, decimals = 2) => ({name, of, text: row => figure(of(row), decimals), numeric: true});
 const text = (name, of, shown) => ({name, of, text: shown});
 
+// How the tools of each layer were chosen, where there was anything to choose.
+function selectionTables(show) {
+    const chosen = plan.layers.map((layer, l) => ({layer, l})).filter(r => r.layer.selection);
+    if (chosen.length === 0) return [];
+    const rows = key => chosen.flatMap(r => r.layer.selection[key].map(entry => ({...r, entry})));
+    const layer = number('Layer', r => r.layer.index, 0);
+    const verdict = {...text('Verdict', r => r.entry.chosen ? 'chosen' : 'not chosen'), tone: r => r.entry.chosen ? 'chosen' : null};
+    const tool = number => {
+        const known = plan.tools.find(t => t.number === number);
+        return known ? `T${number} ${known.name}` : `T${number}`;
+    };
+    const place = r => ({layer: r.l});
+    return [
+        sortable('candidates', 'Tools looked at', [
+            layer, text('For', r => words(r.entry.purpose)), text('Tool', r => r.entry.tool, r => tool(r.entry.tool)), verdict,
+            number('Reached (AR), %', r => r.entry.accessibility === null ? null : 100 * r.entry.accessibility, 2),
+            number('Left to semi-rough (AS), mm²', r => r.entry.semi_rough_mm2, 1), number('Step down, mm', r => r.entry.stepdown, 3),
+            number('Minutes', r => r.entry.minutes, 2), text('Reason', r => r.entry.reason),
+        ], rows('candidates'), place, show),
+        sortable('sets', 'Sets of tools compared', [
+            layer, text('Set', r => r.entry.name), text('Tools, in their order', r => r.entry.tools.map(t => `T${t}`).join(' ')), verdict,
+            number('Minutes', r => r.entry.minutes, 2), number('Left over the limit, mm²', r => r.entry.left_mm2, 1), text('Reason', r => r.entry.reason),
+        ], rows('sets'), place, show),
+    ];
+}
+
+// Where a program's level passes change their distance.
+function bands(operation) {
+    return (operation.bands ?? []).map(b => `${figure(b.z_low, 1)} to ${figure(b.z_high, 1)}: ${figure(b.stepdown, 3)} at ${figure(b.least_slope_deg, 1)}°`).join('; ');
+}
+
 export function buildTables(section, show) {
     section.classList.add('tables');
     const minutes = layerMinutes().map(row => phases.reduce((sum, phase) => sum + row[phase.key], 0));
@@ -71,12 +102,14 @@ export function buildTables(section, show) {
             text('Tool', r => r.tool, r => `T${r.tool}`), number('Step down, mm', r => r.stepdown, 3), number('Step over, mm', r => r.stepover, 3),
             number('Spindle, rpm', r => r.spindle_rpm, 0), number('Cutting, m', r => r.cutting_mm / 1000), number('Rapid, m', r => r.rapid_mm / 1000),
             {...number('Minutes', r => r.minutes), text: r => duration(r.minutes)}, number('Peak force, N', r => r.peak_force_n, 1), number('Deflection, mm', r => r.deflection_mm, 4),
+            text('Steps by height, mm', bands),
         ], operations, r => ({layer: r.layer, operation: r.index, text: operationName(r)}), show),
         sortable('tools', 'Tools', [
             text('Tool', r => r.tool.number, r => `T${r.tool.number}`), text('Name', r => r.tool.name), text('Kind', r => words(r.tool.kind)), number('Diameter, mm', r => r.tool.diameter, 3),
             number('Flutes, mm', r => r.tool.flute_length, 1), number('Shank, mm', r => r.tool.shank_diameter, 3), number('Stick-out, mm', r => r.tool.holder.stickout, 1),
             number('Holder, mm', r => r.tool.holder.diameter, 1), number('Programs', r => r.uses.length, 0), {...number('Minutes', r => r.minutes), text: r => duration(r.minutes)},
         ], toolUse(), r => r.uses.length ? {layer: r.uses[0].layer, operation: r.uses[0].index, text: `first use of T${r.tool.number}: ${operationName(r.uses[0])}`} : null, show),
+        ...selectionTables(show),
         sortable('remarks', 'Remarks and findings', [
             text('Code', r => r.code), {...text('Severity', r => r.severity), tone: r => r.severity}, text('From', r => r.source), text('Message', r => r.message),
             number('x', r => r.where?.[0]), number('y', r => r.where?.[1]), number('z', r => r.where?.[2]),
