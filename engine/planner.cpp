@@ -32,7 +32,8 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kSlabShare = 0.05;  // of a slab's area, against the surface cut in it: what a layer's work is estimated by
+constexpr std::size_t kManyFacets = 200'000;  // from here on fewer facets are worth their gap; the job file says so
+constexpr double kSlabShare = 0.05;           // of a slab's area, against the surface cut in it: what a layer's work is estimated by
 
 // The pattern, and what the paths are laid on: fewer facets where a share of the gouge tolerance allows it.
 struct PathGround {
@@ -41,12 +42,15 @@ struct PathGround {
     std::optional<Mesh> lighter{};
 };
 
+// @param plan has its layers: where nearly level surfaces cross their tops, nothing may move
 PathGround ground_of(Context& context, Plan& plan, MeshView pattern) {
     const Tolerances& tolerances = plan.job.tolerances;
     PathGround ground{pattern, pattern};
-    if (tolerances.simplify <= 0) return ground;
+    if (tolerances.simplify <= 0 || pattern.size() < kManyFacets) return ground;
     ground.gap = tolerances.simplify * tolerances.gouge;
-    ground.mesh = ground.lighter.emplace(simplify(context, pattern, ground.gap)).view();
+    std::vector<double> tops;
+    for (const Layer& layer : plan.layers) tops.push_back(layer.z_top);
+    ground.mesh = ground.lighter.emplace(simplify(context, pattern, ground.gap, tops)).view();
     plan.diagnostics.push_back(
         {Severity::note,
          "paths.simplified",
@@ -216,8 +220,9 @@ void rate(Plan& plan, const Layer& layer, Operation& op) {
 }
 
 // The programs of all layers, with their diagnostics.
-void cut_layers(Context& context, Plan& plan, const PathGround& ground, const std::vector<Loops>& joints, ProgressShare share) {
+void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vector<Loops>& joints, ProgressShare share) {
     const Job& job = plan.job;
+    const PathGround ground = ground_of(context, plan, pattern);
     std::optional<AccessScene> scene;
     if (selects_tools(job) && job.selection.accessibility == AccessRule::exact) scene.emplace(context, ground.mesh);
     const std::vector<LayerShare> shares = shares_of_layers(context, ground.mesh, plan.layers, overrun_of(job).below);
@@ -249,17 +254,16 @@ void cut_layers(Context& context, Plan& plan, const PathGround& ground, const st
 }
 
 // From layers on. `begun` is a plan with its stock and features.
-Plan plan_layers(Context& context, const PathGround& ground, const Plan& begun, const LayerRequest& request, const LayerPlacement& placement,
+Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request, const LayerPlacement& placement,
                  ProgressShare share) {
     Plan plan = begun;
-    const MeshView view = ground.pattern;
     plan.diagnostics.insert(plan.diagnostics.end(), placement.diagnostics.begin(), placement.diagnostics.end());
     warn_of_overhang(plan, request, placement.boundaries);
     plan.layers = layers_between(plan.job, placement.boundaries);
-    settle_undercuts(context, plan, view);
-    if (plan.job.flask.enabled) plan.flask = place_flask(context, view, plan);
-    const std::vector<Loops> joints = joints_of(context, plan, view);
-    cut_layers(context, plan, ground, joints, share);
+    settle_undercuts(context, plan, pattern);
+    if (plan.job.flask.enabled) plan.flask = place_flask(context, pattern, plan);
+    const std::vector<Loops> joints = joints_of(context, plan, pattern);
+    cut_layers(context, plan, pattern, joints, share);
 
     context.begin_phase("schedule", share.at(0.98), share.at(1));
     for (std::size_t i = 0; i < plan.layers.size(); ++i) bond_layer(plan.layers[i], joints[i], plan, plan.diagnostics);
@@ -269,8 +273,8 @@ Plan plan_layers(Context& context, const PathGround& ground, const Plan& begun, 
 }
 
 // Every placement planned whole; the one that is built in the least time stays.
-Plan fastest_plan(Context& context, const PathGround& ground, const Plan& begun, const LayerRequest& request,
-                  const std::vector<LayerCandidate>& tried, ProgressShare share) {
+Plan fastest_plan(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request, const std::vector<LayerCandidate>& tried,
+                  ProgressShare share) {
     std::optional<Plan> best;
     std::exception_ptr refused;  // the first
     std::string words;
@@ -280,7 +284,7 @@ Plan fastest_plan(Context& context, const PathGround& ground, const Plan& begun,
         LayerRequest asked = request;
         asked.max_layer = tried[i].max_layer;
         try {
-            Plan plan = plan_layers(context, ground, begun, asked, tried[i].placement, {share.at(at), share.at(at + step)});
+            Plan plan = plan_layers(context, pattern, begun, asked, tried[i].placement, {share.at(at), share.at(at + step)});
             words += fmt::format("{}{} {:.1f} min", words.empty() ? "" : ", ", tried[i].name, plan.totals.build_minutes);
             if (!best || plan.totals.build_minutes < best->totals.build_minutes) best = std::move(plan), name = tried[i].name;
         } catch (const Error& e) {
@@ -335,10 +339,9 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     request.saddles_constrain = job.layers.saddles_constrain;
     request.features = plan.features;
     request.section_area = SectionAreas(context, view);
-    const PathGround ground = ground_of(context, plan, view);
     if (job.layers.strategy == LayerStrategy::combined)
-        return fastest_plan(context, ground, plan, request, layer_candidates(context, view, job, request), {0.04, 0.98});
-    return plan_layers(context, ground, plan, request,
+        return fastest_plan(context, view, plan, request, layer_candidates(context, view, job, request), {0.04, 0.98});
+    return plan_layers(context, view, plan, request,
                        job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request), {0.04, 0.98});
 }
 

@@ -136,7 +136,7 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("undercut", job.tolerances.undercut, "mm: an undercut that leaves less is a remark, not a refusal");
     visit.key("gap", job.tolerances.gap, "mm: open chains this near are closed, and reported");
     visit.key("weld", job.tolerances.weld, "mm: vertices this near are merged, and reported; 0: only equal ones");
-    visit.key("simplify", job.tolerances.simplify, "share of gouge that facets may be made fewer for, under the paths; 0: as they are");
+    visit.key("simplify", job.tolerances.simplify, "share of gouge for which 200 000 facets and more are made fewer, under the paths; 0: never");
 
     visit.table("layers", "where layers end");
     visit.word("strategy", job.layers.strategy, kStrategyWords,

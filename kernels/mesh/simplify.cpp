@@ -21,6 +21,9 @@ constexpr int kMostAround = 16;                // a vertex with more facets arou
 constexpr double kLeastFacing = 0.2;           // cosine between the mean normal and any facet's: below, the gap along it says too much
 constexpr double kSameFacing = 0.99985;        // cosine of one degree
 constexpr double kLeastHeight = 0.05;          // mm: of a new facet, unless one was flatter before
+constexpr double kNearlyLevel = 0.866;         // cosine of 30°
+constexpr double kBesidePlane = 5;             // tolerances
+constexpr double kRounding = 1e-9;             // mm
 constexpr double kLeastRound = 0.002;          // of a block's facets; a round in which fewer vertices go is the last
 
 Place minus(const Place& a, const Place& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
@@ -36,7 +39,7 @@ struct Face {
 /// The facets of one block, with vertices of its own numbering.
 class Block {
 public:
-    Block(MeshView mesh, std::span<const Face> faces, double tolerance) : tolerance_(tolerance) {
+    Block(MeshView mesh, std::span<const Face> faces, double tolerance, std::span<const double> planes) : tolerance_(tolerance), planes_(planes) {
         ids_.reserve(3 * faces.size());
         for (const Face& f : faces) ids_.insert(ids_.end(), f.v.begin(), f.v.end());
         std::sort(ids_.begin(), ids_.end());
@@ -126,6 +129,21 @@ private:
         return true;
     }
 
+    // Whether the fan has a facet of less than 30° from level, and reaches as near to one of the planes as it may move.
+    [[nodiscard]] bool crosses_nearly_level(std::uint32_t v) const {
+        if (planes_.empty()) return false;
+        double low = place_[v][2], high = low, most = 0;
+        for (int i = 0; i < n_; ++i) {
+            const auto a = static_cast<std::size_t>(i);
+            low = std::min(low, place_[ring_[a]][2]), high = std::max(high, place_[ring_[a]][2]);
+            most = std::max(most, std::abs(facing_[a][2]));
+        }
+        if (most < kNearlyLevel) return false;
+        const double beside = kBesidePlane * tolerance_;
+        const auto plane = std::lower_bound(planes_.begin(), planes_.end(), low - beside);
+        return plane != planes_.end() && *plane <= high + beside;
+    }
+
     // The vertices around v as (u, v, w) from v, w along the facets' mean normal.
     bool look(std::uint32_t v) {
         Place sum{0, 0, 0};
@@ -151,6 +169,7 @@ private:
         const Place w{sum[0] / length, sum[1] / length, sum[2] / length};
         for (int i = 0; i < n_; ++i)
             if (dot(facing_[static_cast<std::size_t>(i)], w) < kLeastFacing) return false;
+        exactly_ = crosses_nearly_level(v);
         const Place side = std::abs(w[0]) < 0.6 ? Place{1, 0, 0} : Place{0, 1, 0};
         Place u = cross(side, w);
         const double ul = std::sqrt(dot(u, u));
@@ -188,6 +207,7 @@ private:
         auto fits = [&](double gap) {
             low = std::min(low, gap);
             high = std::max(high, gap);
+            if (exactly_) return std::max(high, -low) <= kRounding && low_ == 0 && high_ == 0;
             return low + low_ >= -allowed_ && high + high_ <= allowed_;
         };
         // The new facets: upright, and the gap at v itself.
@@ -277,6 +297,7 @@ private:
     }
 
     double tolerance_, allowed_ = 0;
+    std::span<const double> planes_;  // ascending
     std::vector<std::uint32_t> ids_;  // of the mesh, ascending
     std::vector<Place> place_;
     std::vector<Face> faces_;
@@ -286,13 +307,15 @@ private:
     int n_ = 0;
     std::array<std::uint32_t, kMostAround> ring_{}, fan_{};
     std::array<Place, kMostAround> flat_{}, facing_{}, new_facing_{};
+    bool exactly_ = false;               // nothing may move
     float low_ = 0, high_ = 0;           // of the facets around it
     double new_low_ = 0, new_high_ = 0;  // that going to the last neighbour looked at adds
     double least_height_ = 0, new_height_ = 0;
 };
 
 // The faces by cells of a grid whose origin is `shift` of a cell lower, so that other places lie at its borders each time.
-std::vector<Face> pass(Context& context, MeshView mesh, const std::vector<Face>& faces, double tolerance, double shift) {
+std::vector<Face> pass(Context& context, MeshView mesh, const std::vector<Face>& faces, double tolerance, std::span<const double> planes,
+                       double shift) {
     const Box3 box = bounds(mesh);
     const std::array<double, 3> low{box.min.x, box.min.y, box.min.z},
         size{double{box.max.x} - low[0], double{box.max.y} - low[1], double{box.max.z} - low[2]};
@@ -325,7 +348,7 @@ std::vector<Face> pass(Context& context, MeshView mesh, const std::vector<Face>&
     std::vector<std::vector<Face>> parts(blocks);
     parallel_each(context, blocks, [&](std::size_t b) {
         if (starts[b] == starts[b + 1]) return;
-        parts[b] = Block(mesh, std::span(dealt).subspan(starts[b], starts[b + 1] - starts[b]), tolerance).simplified();
+        parts[b] = Block(mesh, std::span(dealt).subspan(starts[b], starts[b + 1] - starts[b]), tolerance, planes).simplified();
     });
     std::vector<Face> all;
     std::size_t total = 0;
@@ -337,13 +360,15 @@ std::vector<Face> pass(Context& context, MeshView mesh, const std::vector<Face>&
 
 }  // namespace
 
-Mesh simplify(Context& context, MeshView mesh, double tolerance_mm) {
+Mesh simplify(Context& context, MeshView mesh, double tolerance_mm, std::span<const double> planes) {
     if (!(tolerance_mm > 0) || !std::isfinite(tolerance_mm))
         throw Error(ErrorKind::usage, "simplify.tolerance", "the tolerance of simplifying must be positive", {}, "give a length in mm");
     const MemoryCharge charge(context, 100 * mesh.facets.size(), "the facets that a tolerance needs");
     std::vector<Face> faces(mesh.facets.size());
     for (std::size_t i = 0; i < faces.size(); ++i) faces[i].v = mesh.facets[i];
-    for (const double shift : {0.0, 0.5}) faces = pass(context, mesh, faces, tolerance_mm, shift);
+    std::vector<double> ascending(planes.begin(), planes.end());
+    std::sort(ascending.begin(), ascending.end());
+    for (const double shift : {0.0, 0.5}) faces = pass(context, mesh, faces, tolerance_mm, ascending, shift);
     Mesh result;
     constexpr std::uint32_t unused = 0xFFFFFFFFu;
     std::vector<std::uint32_t> to(mesh.vertices.size(), unused);

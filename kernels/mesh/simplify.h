@@ -1,6 +1,8 @@
 // Fewer facets for the same surface: what a finely facetted plane, wall or fillet has more of than a tolerance asks for.
 #pragma once
 
+#include <span>
+
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 
@@ -13,11 +15,15 @@ namespace slabwright {
 /// new facet turns by more than a degree from all of the old ones, gets flatter than it need be, or joins sheets that were apart. Open
 /// edges, and vertices around which the facets do not form one fan, stay.
 ///
+/// Where a surface is flatter than 30° and crosses one of the `planes`, its section by the plane would move much farther than the surface
+/// itself: there it stays as it is, but for what lies in one plane exactly.
+///
 /// Works in blocks of space, in parallel, twice over blocks that do not share borders; the result is the same on any number of threads,
 /// and its facets come in the order of the blocks. About 100 bytes a facet besides the meshes, charged.
 /// @param mesh with or without neighbours
 /// @returns a mesh with neighbours
 /// @throws Error(usage, "simplify.tolerance") unless the tolerance is positive and finite; Error(no_plan, "memory.limit"), Error(cancelled)
-[[nodiscard]] Mesh simplify(Context& context, MeshView mesh, double tolerance_mm);
+/// @param planes heights in mm, in any order
+[[nodiscard]] Mesh simplify(Context& context, MeshView mesh, double tolerance_mm, std::span<const double> planes = {});
 
 }  // namespace slabwright
