@@ -10,6 +10,7 @@
 #include "kernels/access/closest_point.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
+#include "kernels/slicing/slicing.h"
 #include "tests/data/models.h"
 #include "tests/support/closed_mesh.h"
 #include "tests/support/height_field.h"
@@ -96,6 +97,23 @@ TEST(Simplify, OwnModelsStayTheyAre) {
         const Mesh mesh = weld(context, facets);
         expect_same_solid(context, mesh.view(), simplify(context, mesh.view(), 0.01), 0.01, random);
     }
+}
+
+// A thousandth of a millimetre in height moves the section of a surface that is nearly level by far more, so there nothing moves.
+TEST(Simplify, SectionsOfNearlyLevelSurfacesStay) {
+    Context context;
+    const Mesh mesh = test::height_field(context, 64, 0.5, [](double x, double y) { return 10 - 0.002 * x * x - 0.001 * y * y; });
+    const std::vector<double> planes{9.3, 9.8};
+    const Mesh kept = simplify(context, mesh.view(), 0.02, planes), moved = simplify(context, mesh.view(), 0.02);
+    EXPECT_LT(kept.facets.size(), mesh.facets.size() * 9 / 10);
+    double most = 0;
+    for (const double z : planes) {
+        const Plane plane{z, Side::above};
+        auto section = [&](const Mesh& of) { return area(slice(context, of.view(), {&plane, 1})[0].loops); };
+        EXPECT_DOUBLE_EQ(section(kept), section(mesh)) << z;
+        most = std::max(most, std::abs(section(moved) / section(mesh) - 1));
+    }
+    EXPECT_GT(most, 0.01);
 }
 
 // A tetrahedron has nothing to spare; two that touch at a vertex or along an edge are not torn, joined or turned inside out.
