@@ -179,6 +179,11 @@ private:
             const auto a = static_cast<std::size_t>(i);
             flat_[a] = {dot(arm[a], u), dot(arm[a], t), dot(arm[a], w)};
         }
+        for (int i = 0; i < n_; ++i) {
+            const auto a = static_cast<std::size_t>(i);
+            flat_normal_[a] = cross(flat_[a], flat_[static_cast<std::size_t>((i + 1) % n_)]);
+            same_facing_[a] = kSameFacing * std::sqrt(dot(flat_normal_[a], flat_normal_[a]));
+        }
         return true;
     }
 
@@ -243,13 +248,10 @@ private:
             if (new_height_ < least_height_ * (1 - 1e-9)) return false;
             new_facing_[static_cast<std::size_t>(i)] = {n[0] / area2, n[1] / area2, n[2] / area2};
         }
-        // facing_ is in the frame of the pattern; compare in the plan's frame by what the flattened arms give.
         for (int i = 1; i + 1 < n_; ++i) {
             bool found = false;
-            for (int j = 0; j < n_ && !found; ++j) {
-                const Place n = cross(flat_[static_cast<std::size_t>(j)], flat_[static_cast<std::size_t>((j + 1) % n_)]);
-                found = dot(n, new_facing_[static_cast<std::size_t>(i)]) >= kSameFacing * std::sqrt(dot(n, n));
-            }
+            for (std::size_t j = 0; j < static_cast<std::size_t>(n_) && !found; ++j)
+                found = dot(flat_normal_[j], new_facing_[static_cast<std::size_t>(i)]) >= same_facing_[j];
             if (!found) return false;
         }
         // None of the new edges may exist already: the surface would be pinched there.
@@ -306,10 +308,11 @@ private:
     // Around the vertex in work.
     int n_ = 0;
     std::array<std::uint32_t, kMostAround> ring_{}, fan_{};
-    std::array<Place, kMostAround> flat_{}, facing_{}, new_facing_{};
-    bool exactly_ = false;               // nothing may move
-    float low_ = 0, high_ = 0;           // of the facets around it
-    double new_low_ = 0, new_high_ = 0;  // that going to the last neighbour looked at adds
+    std::array<Place, kMostAround> flat_{}, flat_normal_{}, facing_{}, new_facing_{};  // facing_ as the pattern stands, the others as flat_
+    std::array<double, kMostAround> same_facing_{};                                    // what a normal along flat_normal_ makes with it at least
+    bool exactly_ = false;                                                             // nothing may move
+    float low_ = 0, high_ = 0;                                                         // of the facets around it
+    double new_low_ = 0, new_high_ = 0;                                                // that going to the last neighbour looked at adds
     double least_height_ = 0, new_height_ = 0;
 };
 
