@@ -184,6 +184,24 @@ TEST(Links, ARunWithoutRoomIsLeftByAToolThatDoesNotPlunge) {
     }
 }
 
+TEST(Links, APlaceWithoutRoomForARampIsEnteredFromWhereItIsCleared) {
+    Bench bench;
+    bench.tool.plunges = false;
+    bench.standing.cut({Cutter::Profile::flat, 5}, {-30, -20, 10}, {-20, -20, 10});
+    PathBuilder path = bench.builder();
+    path.follow(std::vector<PathPoint>{{to_units(-17), to_units(-20), to_units(10)}});
+    EXPECT_TRUE(bench.cut.no_way_in.empty());
+    ASSERT_GE(bench.operation.moves.size(), 3U);
+    const Move &last = bench.operation.moves.back(), &beside = bench.operation.moves[bench.operation.moves.size() - 2];
+    EXPECT_EQ(last.x, to_units(-17));
+    EXPECT_EQ(last.z, to_units(10));
+    // Down where the slot is, and straight across from there.
+    EXPECT_EQ(beside.z, to_units(10));
+    EXPECT_LE(to_mm(beside.x), -18);
+    for (std::size_t k = 0; k + 1 < bench.operation.moves.size(); ++k)
+        EXPECT_TRUE(to_mm(bench.operation.moves[k].z) >= kTop || to_mm(bench.operation.moves[k].x) <= -18) << k;
+}
+
 TEST(Leads, AreTangentFreeAndOverlapClosedRuns) {
     Bench bench;
     bench.clear(5);

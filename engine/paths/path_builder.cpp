@@ -11,6 +11,8 @@ namespace {
 constexpr double kBallMiddle = 0.75;                // of a ball's radius: what counts as head-on
 constexpr std::array kHelixRadii{0.9, 0.65, 0.45};  // of the cutter's radius: under it, so that no post is left in the middle
 constexpr int kHelixChords = 24;                    // a turn, at least
+constexpr int kSideRings = 6, kSideWays = 16;       // places looked at beside a run that no helix and no ramp reaches
+constexpr double kSideStep = 0.4;                   // of the cutter's radius, between their rings
 
 // The middle of a cutter: what stands there is entered head-on.
 Cutter middle(const Cutter& cutter) {
@@ -116,11 +118,15 @@ void PathBuilder::go_above(Point2 p) {
 // The way between two free places at one height, looked at in steps that no part can hide between.
 bool PathBuilder::straight_is_free(Point2 to, std::int32_t z) {
     const std::array<double, 2> a{to_mm(x_), to_mm(y_)}, b{to_mm(to.x), to_mm(to.y)};
-    const double way = std::hypot(b[0] - a[0], b[1] - a[1]);
-    if (way > kLongestWay) return false;
+    if (std::hypot(b[0] - a[0], b[1] - a[1]) > kLongestWay) return false;
     learn();
-    if (around_.standing->free_tip(around_.cutter, a, b) > to_mm(z) + kBite) return false;
-    const int steps = static_cast<int>(std::ceil(way / around_.chord));
+    return around_.standing->free_tip(around_.cutter, a, b) <= to_mm(z) + kBite && part_leaves_way({x_, y_}, to, z);
+}
+
+// The same of the part alone, between two free places.
+bool PathBuilder::part_leaves_way(Point2 from, Point2 to, std::int32_t z) const {
+    const std::array<double, 2> a{to_mm(from.x), to_mm(from.y)}, b{to_mm(to.x), to_mm(to.y)};
+    const int steps = static_cast<int>(std::ceil(std::hypot(b[0] - a[0], b[1] - a[1]) / around_.chord));
     for (int k = 1; k < steps; ++k) {
         const double t = static_cast<double>(k) / steps, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
         if (around_.part->drop(x, y).tip_z > to_mm(z) || !has_room({to_units(x), to_units(y)})) return false;
@@ -150,7 +156,7 @@ bool PathBuilder::enter(std::span<const PathPoint> run) {
     descend(first);
     const double most = plunges_ ? kPlunge : kScrape;
     if (to_mm(z_ - first.z) > most && standing_middle({first.x, first.y}) > to_mm(first.z) + most && !enter_on_helix(run) && !enter_on_ramp(run) &&
-        !plunges_)
+        !plunges_ && !enter_from_side(first))
         return false;
     plunge(first.z);
     return true;
@@ -236,6 +242,28 @@ bool PathBuilder::enter_on_ramp(std::span<const PathPoint> run) {
         }
     }
     return true;
+}
+
+// Down beside the run's beginning, at the nearest place where the cutter is free and its middle meets nothing, and from there
+// straight across: into the corner of a pocket that was cleared before.
+bool PathBuilder::enter_from_side(const PathPoint& first) {
+    if (around_.part == nullptr) return false;
+    const Point2 target{first.x, first.y};
+    for (int ring = 1; ring <= kSideRings; ++ring)
+        for (int k = 0; k < kSideWays; ++k) {
+            const double turn = 2 * std::numbers::pi * k / kSideWays, far = ring * kSideStep * around_.cutter.radius * kUnitsPerMm;
+            const Point2 beside{first.x + static_cast<std::int32_t>(std::lround(far * std::cos(turn))),
+                                first.y + static_cast<std::int32_t>(std::lround(far * std::sin(turn)))};
+            if (!has_room(beside) || around_.part->drop(to_mm(beside.x), to_mm(beside.y)).tip_z > to_mm(first.z) ||
+                standing_middle(beside) > to_mm(first.z) + kScrape || !part_leaves_way(beside, target, first.z))
+                continue;
+            go_above(beside);
+            descend({beside.x, beside.y, first.z});
+            plunge(first.z);
+            cut(target, first.z);
+            return true;
+        }
+    return false;
 }
 
 void PathBuilder::follow(std::span<const PathPoint> run) {

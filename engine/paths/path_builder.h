@@ -46,7 +46,8 @@ public:
     /// way is free of the part and of standing stock; else above what stands. What stands at the run's start is entered on a
     /// helix that ends along the run, on its left, where the part leaves room for one; else on a ramp along the run, to and fro;
     /// up to kPlunge of it straight down, or kScrape by a tool that does not plunge. Where a run is too short for a ramp, a tool
-    /// that plunges does; for others the run is left out (Surroundings::no_way_in).
+    /// that plunges does; others come from beside it, where they have room already, or else the run is left out
+    /// (Surroundings::no_way_in).
     /// Every point of the run must be free, and so must be what lies straight above it (as of a drop or a level contour).
     void follow(std::span<const PathPoint> run);
     /// Straight down (or up) by plunge feed to z.
@@ -87,6 +88,8 @@ private:
     [[nodiscard]] bool enter(std::span<const PathPoint> run);
     [[nodiscard]] bool enter_on_helix(std::span<const PathPoint> run);
     [[nodiscard]] bool enter_on_ramp(std::span<const PathPoint> run);
+    [[nodiscard]] bool enter_from_side(const PathPoint& first);
+    [[nodiscard]] bool part_leaves_way(Point2 from, Point2 to, std::int32_t z) const;
     Operation& operation_;
     Surroundings around_;
     std::size_t learnt_ = 0;          // moves that have been cut into what stands
