@@ -8,10 +8,13 @@
 // under a bulge. The sign is exact wherever the surface does not cross itself, overhangs included, which a sum of
 // normals is not.
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
 #include "kernels/features/finders.h"
+#include "kernels/mesh/clusters.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -20,37 +23,13 @@ namespace {
 
 constexpr std::size_t kGrain = 4096;
 
-// The facets around every vertex; facets with two equal corners are left out.
-struct Incidence {
-    std::vector<std::uint32_t> starts, facets;
-    [[nodiscard]] std::span<const std::uint32_t> around(std::uint32_t v) const {
-        return std::span(facets).subspan(starts[v], starts[v + 1] - starts[v]);
-    }
-};
-
 bool collapsed(const Index3& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
-
-Incidence incidence_of(MeshView mesh) {
-    Incidence incidence;
-    incidence.starts.assign(mesh.vertices.size() + 1, 0);
-    for (const Index3& t : mesh.facets)
-        if (!collapsed(t))
-            for (const std::uint32_t v : t) ++incidence.starts[v];
-    std::uint32_t sum = 0;
-    for (std::uint32_t& s : incidence.starts) s = sum += s;
-    incidence.facets.resize(sum);
-    for (std::size_t f = mesh.size(); f-- > 0;)  // backwards, so that each list ascends
-        if (!collapsed(mesh.facets[f]))
-            for (const std::uint32_t v : mesh.facets[f]) incidence.facets[--incidence.starts[v]] = static_cast<std::uint32_t>(f);
-    return incidence;
-}
 
 // What lies around a plateau at height z, gathered facet by facet.
 struct Star {
     bool above = false, below = false;
-    int changes = 0;                       // facets that lead from higher to lower neighbours
-    double nearest = HUGE_VAL;             // least height difference to a neighbour
-    int rings_above = 0, rings_below = 0;  // runs of higher and of lower neighbours, once rings were walked
+    int changes = 0;            // facets that lead from higher to lower neighbours
+    double nearest = HUGE_VAL;  // least height difference to a neighbour
     [[nodiscard]] bool mixed() const { return above && below; }
 };
 
@@ -95,47 +74,89 @@ bool extremum(MeshView mesh, std::span<const std::uint32_t> star_facets, std::ui
     return true;
 }
 
-// Walks the rings of a star and counts its runs of higher and of lower neighbours. Facets are sorted; a plateau facet
-// (all of one height) is no part of a ring. An open mesh ends a ring, which is then walked from its other end too.
-void walk_rings(MeshView mesh, std::span<const std::uint32_t> star_facets, float z, Star& star) {
-    std::vector<std::uint8_t> seen(star_facets.size(), 0);
-    auto position = [&](std::uint32_t f) {
-        const auto it = std::lower_bound(star_facets.begin(), star_facets.end(), f);
-        return it != star_facets.end() && *it == f ? static_cast<std::size_t>(it - star_facets.begin()) : star_facets.size();
-    };
-    std::vector<std::size_t> stack;
-    for (std::size_t seed = 0; seed < star_facets.size(); ++seed) {
-        if (seen[seed]) continue;
-        Star ring;
-        seen[seed] = 1;
+// A plateau's star facets, each to be met once on a walk from neighbour to neighbour. Facets of a plateau mostly follow one another in
+// the mesh: then a bit for each from the first to the last sorts them and finds them again.
+class StarFacets {
+public:
+    /// Sorts `facets` and leaves out what comes again.
+    void set(std::vector<std::uint32_t>& facets) {
+        in_order_.clear();
+        bits_.clear();
+        if (facets.empty()) return;
+        const auto [low, high] = std::minmax_element(facets.begin(), facets.end());
+        first_ = *low;
+        const std::size_t words = (*high - first_) / 64 + 1;
+        if (words > 4 * facets.size()) {
+            std::sort(facets.begin(), facets.end());
+            facets.erase(std::unique(facets.begin(), facets.end()), facets.end());
+            in_order_.assign(facets.begin(), facets.end());
+            bits_.assign(facets.size() / 64 + 1, ~std::uint64_t{0});
+            return;
+        }
+        bits_.assign(words, 0);
+        for (const std::uint32_t f : facets) bits_[(f - first_) / 64] |= std::uint64_t{1} << (f - first_) % 64;
+        facets.clear();
+        for (std::size_t w = 0; w < words; ++w)
+            for (std::uint64_t rest = bits_[w]; rest != 0; rest &= rest - 1)
+                facets.push_back(first_ + static_cast<std::uint32_t>(64 * w) + static_cast<std::uint32_t>(std::countr_zero(rest)));
+    }
+    /// Whether the facet is one of the star that nobody has taken yet.
+    bool take(std::uint32_t facet) {
+        std::size_t at = std::size_t{facet} - first_;  // far past the end for a facet before the first
+        if (!in_order_.empty()) {
+            const auto it = std::lower_bound(in_order_.begin(), in_order_.end(), facet);
+            if (it == in_order_.end() || *it != facet) return false;
+            at = static_cast<std::size_t>(it - in_order_.begin());
+        }
+        if (at / 64 >= bits_.size()) return false;
+        std::uint64_t& word = bits_[at / 64];
+        const std::uint64_t bit = std::uint64_t{1} << at % 64;
+        const bool there = (word & bit) != 0;
+        word &= ~bit;
+        return there;
+    }
+
+private:
+    std::uint32_t first_ = 0;
+    std::vector<std::uint32_t> in_order_;  // of facets that lie far apart; else empty
+    std::vector<std::uint64_t> bits_;      // a bit for each facet from first_, or for each of in_order_: not yet taken
+};
+
+// Whether the rings of a star have more than one run of higher or of lower neighbours. Rings are walked until that is known; `left`
+// holds the star's facets. A plateau facet (all of one height) is no part of a ring. An open mesh ends a ring, which is then walked from
+// its other end too.
+bool saddle(MeshView mesh, std::span<const std::uint32_t> star_facets, float z, const Star& star, StarFacets& left) {
+    // A ring with n changes has at least n / 2 runs of either kind, so three changes are two runs wherever they lie.
+    if (star.changes > 2) return true;
+    int runs_above = 0, runs_below = 0;
+    std::vector<std::uint32_t> stack;
+    for (const std::uint32_t seed : star_facets) {
+        if (!left.take(seed)) continue;
+        bool above = false, below = false;
+        int changes = 0;
         stack.assign(1, seed);
         while (!stack.empty()) {
-            const std::uint32_t f = star_facets[stack.back()];
+            const std::uint32_t f = stack.back();
             stack.pop_back();
-            add_facet(mesh, f, z, ring);
-            for (int k = 0; k < 3; ++k) {
-                const bool a_on = mesh.vertices[mesh.facets[f][k]].z == z, b_on = mesh.vertices[mesh.facets[f][(k + 1) % 3]].z == z;
+            const Index3 t = mesh.facets[f];
+            const std::array<float, 3> height{mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z};
+            bool higher = false, lower = false;
+            for (std::size_t k = 0; k < 3; ++k) {
+                higher = higher || height[k] > z;
+                lower = lower || height[k] < z;
+                if ((height[k] == z) == (height[(k + 1) % 3] == z)) continue;
                 const std::uint32_t g = mesh.neighbours[f][k];
-                if (a_on == b_on || g == kNoFacet) continue;
-                const std::size_t next = position(g);
-                if (next == star_facets.size() || seen[next]) continue;
-                seen[next] = 1;
-                stack.push_back(next);
+                if (g != kNoFacet && left.take(g)) stack.push_back(g);
             }
+            above = above || higher;
+            below = below || lower;
+            changes += higher && lower;
         }
-        if (ring.changes == 0) {
-            star.rings_above += ring.above;
-            star.rings_below += ring.below;
-        } else {
-            star.rings_above += (ring.changes + 1) / 2;
-            star.rings_below += (ring.changes + 1) / 2;
-        }
+        runs_above += changes == 0 ? above : (changes + 1) / 2;
+        runs_below += changes == 0 ? below : (changes + 1) / 2;
+        if (runs_above > 1 || runs_below > 1) return true;
     }
-}
-
-bool saddle(MeshView mesh, std::span<const std::uint32_t> star_facets, float z, Star& star) {
-    walk_rings(mesh, star_facets, z, star);
-    return star.rings_above > 1 || star.rings_below > 1;
+    return false;
 }
 
 Feature point_feature(MeshView mesh, FeatureType type, std::uint32_t vertex) {
@@ -167,36 +188,46 @@ std::vector<Feature> append(std::vector<Feature> a, std::vector<Feature> b) {
 }
 
 // A vertex without neighbours of its own height.
-void judge_vertex(MeshView mesh, const Incidence& incidence, const Flats& flats, std::uint32_t v, std::vector<Feature>& found) {
-    const auto facets = incidence.around(v);
+void judge_vertex(MeshView mesh, const VertexStars& stars, const Flats& flats, std::uint32_t v, std::vector<Feature>& found) {
+    const auto facets = stars.around(v);
     const float z = mesh.vertices[v].z;
     Star star;
     for (const std::uint32_t f : facets) add_facet(mesh, f, z, star);
     FeatureType type{};
     if (star.mixed()) {
         // Two changes are a slope; anything else is a saddle or a place where several sheets touch.
-        if (star.changes == 2 || !saddle(mesh, facets, z, star)) return;
+        if (star.changes == 2) return;
+        std::vector<std::uint32_t> star_facets(facets.begin(), facets.end());
+        StarFacets left;
+        left.set(star_facets);
+        if (!saddle(mesh, star_facets, z, star, left)) return;
         type = FeatureType::saddle;
     } else if (!extremum(mesh, facets, v, star, type)) return;
     if (!flats.touched(mesh, facets, z)) found.push_back(point_feature(mesh, type, v));
 }
 
-void judge_plateau(MeshView mesh, const Incidence& incidence, const Flats& flats, std::span<const std::uint32_t> plateau,
+// Memory that one plateau after the other may use.
+struct PlateauScratch {
+    std::vector<std::uint32_t> facets;
+    StarFacets left;
+};
+
+void judge_plateau(MeshView mesh, const VertexStars& stars, const Flats& flats, std::span<const std::uint32_t> plateau, PlateauScratch& scratch,
                    std::vector<Feature>& found) {
     const float z = mesh.vertices[plateau.front()].z;
-    std::vector<std::uint32_t> facets;
+    std::vector<std::uint32_t>& facets = scratch.facets;
+    facets.clear();
     Star star;
     for (const std::uint32_t v : plateau)
-        for (const std::uint32_t f : incidence.around(v)) {
+        for (const std::uint32_t f : stars.around(v)) {
             const Index3 t = mesh.facets[f];
             if (mesh.vertices[t[0]].z != z || mesh.vertices[t[1]].z != z || mesh.vertices[t[2]].z != z) facets.push_back(f);
         }
-    std::sort(facets.begin(), facets.end());
-    facets.erase(std::unique(facets.begin(), facets.end()), facets.end());
+    scratch.left.set(facets);
     for (const std::uint32_t f : facets) add_facet(mesh, f, z, star);
     FeatureType type{};
     if (star.mixed()) {
-        if (!saddle(mesh, facets, z, star)) return;
+        if (!saddle(mesh, facets, z, star, scratch.left)) return;
         type = FeatureType::saddle;
     } else if (!extremum(mesh, facets, plateau.front(), star, type)) return;
     if (flats.touched(mesh, facets, z)) return;
@@ -222,74 +253,77 @@ void judge_plateau(MeshView mesh, const Incidence& incidence, const Flats& flats
 
 }  // namespace
 
-std::vector<Feature> find_exact(Context& context, MeshView mesh, std::span<const Feature> flats, double flat_reach) {
+VertexStars vertex_stars(Context& context, MeshView mesh) {
     const std::size_t n = mesh.vertices.size();
-    if (mesh.size() == 0) return {};
-    const MemoryCharge charge(context, mesh.size() * 12 + n * 15, "the search for peaks and valleys");
-    const Incidence incidence = incidence_of(mesh);
+    VertexStars stars;
+    stars.starts.assign(n + 1, 0);
+    for (const Index3& t : mesh.facets)
+        if (!collapsed(t))
+            for (const std::uint32_t v : t) ++stars.starts[v];
+    std::uint32_t sum = 0;
+    for (std::uint32_t& s : stars.starts) s = sum += s;
+    context.throw_if_cancelled();
+    stars.facets.resize(sum);
+    for (std::size_t f = mesh.size(); f-- > 0;)  // backwards, so that each list ascends
+        if (!collapsed(mesh.facets[f]))
+            for (const std::uint32_t v : mesh.facets[f]) stars.facets[--stars.starts[v]] = static_cast<std::uint32_t>(f);
     context.throw_if_cancelled();
 
-    // Facets with a level edge are found in parallel; their few edges are then united one by one.
-    std::vector<std::uint32_t> level = parallel_reduce(
-        context, mesh.size(), kGrain, std::vector<std::uint32_t>{},
-        [&](std::size_t begin, std::size_t end) {
-            std::vector<std::uint32_t> part;
-            for (std::size_t f = begin; f < end; ++f) {
-                const Index3 t = mesh.facets[f];
-                const float a = mesh.vertices[t[0]].z, b = mesh.vertices[t[1]].z, c = mesh.vertices[t[2]].z;
-                if (a == b || b == c || c == a) part.push_back(static_cast<std::uint32_t>(f));
+    stars.lowest.resize(n);
+    stars.level.assign(n, 0);
+    parallel_for(context, n, 4 * kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) stars.lowest[v] = static_cast<std::uint32_t>(v);
+    });
+    parallel_for(context, mesh.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t f = begin; f < end; ++f) {
+            const Index3 t = mesh.facets[f];
+            for (std::size_t k = 0; k < 3; ++k) {
+                const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+                if (mesh.vertices[a].z != mesh.vertices[b].z || a == b) continue;
+                std::atomic_ref(stars.level[a]).store(1, std::memory_order_relaxed);
+                std::atomic_ref(stars.level[b]).store(1, std::memory_order_relaxed);
+                join_clusters(stars.lowest, a, b);
             }
-            return part;
-        },
-        [](std::vector<std::uint32_t> a, std::vector<std::uint32_t> b) {
-            a.insert(a.end(), b.begin(), b.end());
-            return a;
-        });
-    std::vector<std::uint32_t> leader(n);
-    std::iota(leader.begin(), leader.end(), 0u);
-    auto find = [&](std::uint32_t v) {
-        while (leader[v] != v) v = leader[v] = leader[leader[v]];
-        return v;
-    };
-    std::vector<std::uint8_t> kind(n, 0);  // 0: alone at its height, 1: of a plateau, 2: of a plateau in which a flat lies
-    for (const std::uint32_t f : level)
-        for (int k = 0; k < 3; ++k) {
-            std::uint32_t a = mesh.facets[f][k], b = mesh.facets[f][(k + 1) % 3];
-            if (a == b || mesh.vertices[a].z != mesh.vertices[b].z) continue;
-            kind[a] = kind[b] = 1;
-            a = find(a);
-            b = find(b);
-            leader[std::max(a, b)] = std::min(a, b);
         }
+    });
+    return stars;
+}
+
+std::vector<Feature> find_exact(Context& context, MeshView mesh, VertexStars stars, std::span<const Feature> flats, double flat_reach) {
+    const std::size_t n = mesh.vertices.size();
+    if (mesh.size() == 0) return {};
+    std::vector<std::uint8_t>& kind = stars.level;  // 0: alone at its height, 1: of a plateau, 2: the lowest of a plateau in which a flat lies
+    auto lowest = [&](std::uint32_t v) { return cluster_root(stars.lowest, v); };
     Flats touching{std::vector<std::uint8_t>(n, 0), flat_reach};
     for (const Feature& flat : flats)
         for (const std::uint32_t f : flat.facets)
             for (const std::uint32_t v : mesh.facets[f]) {
-                if (kind[v] != 0) kind[find(v)] = 2;
+                if (kind[v] != 0) kind[lowest(v)] = 2;
                 if (flat.type == FeatureType::up_flat) touching.on[v] = 1;
             }
-    std::vector<std::uint32_t> members;  // of plateaus without flats, one after the other
+    // The vertices of plateaus without flats, one plateau after the other by their lowest vertices, each ascending: counted, then placed.
+    parallel_for(context, n, 4 * kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v)
+            if (kind[v] != 0) lowest(static_cast<std::uint32_t>(v));  // shortens its way to one step, or nearly
+    });
+    std::vector<std::uint32_t> next(n, 0), plateau_starts{0};
     for (std::uint32_t v = 0; v < n; ++v)
-        if (kind[v] != 0 && kind[find(v)] != 2) members.push_back(v);
-    std::vector<std::uint32_t> root(members.size());
-    for (std::size_t i = 0; i < members.size(); ++i) root[i] = find(members[i]);
-    std::vector<std::uint32_t> order(members.size());
-    std::iota(order.begin(), order.end(), 0u);
-    parallel_sort(context, order.begin(), order.end(),
-                  [&](std::uint32_t a, std::uint32_t b) { return std::pair(root[a], a) < std::pair(root[b], b); });
-    std::vector<std::uint32_t> sorted(members.size()), plateau_starts;
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        sorted[i] = members[order[i]];
-        if (i == 0 || root[order[i]] != root[order[i - 1]]) plateau_starts.push_back(static_cast<std::uint32_t>(i));
+        if (kind[v] != 0) ++next[lowest(v)];
+    for (std::uint32_t v = 0; v < n; ++v)
+        if (kind[v] == 1 && next[v] != 0) plateau_starts.push_back(plateau_starts.back() + std::exchange(next[v], plateau_starts.back()));
+    std::vector<std::uint32_t> sorted(plateau_starts.back());
+    for (std::uint32_t v = 0; v < n; ++v) {
+        if (kind[v] == 0) continue;
+        const std::uint32_t of = lowest(v);
+        if (kind[of] != 2) sorted[next[of]++] = v;
     }
-    plateau_starts.push_back(static_cast<std::uint32_t>(sorted.size()));
 
     std::vector<Feature> found = parallel_reduce(
         context, n, kGrain, std::vector<Feature>{},
         [&](std::size_t begin, std::size_t end) {
             std::vector<Feature> part;
             for (std::size_t v = begin; v < end; ++v)
-                if (kind[v] == 0) judge_vertex(mesh, incidence, touching, static_cast<std::uint32_t>(v), part);
+                if (kind[v] == 0) judge_vertex(mesh, stars, touching, static_cast<std::uint32_t>(v), part);
             return part;
         },
         append);
@@ -297,10 +331,11 @@ std::vector<Feature> find_exact(Context& context, MeshView mesh, std::span<const
                                         context, plateau_starts.size() - 1, 64, std::vector<Feature>{},
                                         [&](std::size_t begin, std::size_t end) {
                                             std::vector<Feature> part;
+                                            PlateauScratch scratch;
                                             for (std::size_t p = begin; p < end; ++p)
-                                                judge_plateau(mesh, incidence, touching,
+                                                judge_plateau(mesh, stars, touching,
                                                               std::span(sorted).subspan(plateau_starts[p], plateau_starts[p + 1] - plateau_starts[p]),
-                                                              part);
+                                                              scratch, part);
                                             return part;
                                         },
                                         append));

@@ -33,13 +33,24 @@ Extent extent_of(Context& context, MeshView mesh) {
         });
 }
 
-double longest_edge(MeshView mesh, std::uint32_t facet) {
+// Of its three edges, squared.
+double longest_edge2(const Vec3d& p, const Vec3d& q, const Vec3d& r) {
     double longest = 0;
-    for (int k = 0; k < 3; ++k) {
-        const Vec3d e = minus(to_double(mesh.vertices[mesh.facets[facet][(k + 1) % 3]]), to_double(mesh.vertices[mesh.facets[facet][k]]));
-        longest = std::max(longest, dot(e, e));
-    }
-    return std::sqrt(longest);
+    for (const Vec3d& e : {minus(q, p), minus(r, q), minus(p, r)}) longest = std::max(longest, dot(e, e));
+    return longest;
+}
+
+// Twice the area times the outward unit normal.
+Vec3d normal_of(const Vec3d& p, const Vec3d& q, const Vec3d& r) { return cross(minus(q, p), minus(r, p)); }
+
+// Whether a ≤ b, told from their squares, which need no roots; exact() decides where the two are so near, or so small, that
+// rounding could.
+template <class Exact>
+bool at_most(double a2, double b2, Exact&& exact) {
+    constexpr double near = 1e-6, smallest = 1e-280;
+    if (b2 > smallest && a2 < (1 - near) * b2) return true;
+    if (a2 > smallest && a2 > (1 + near) * b2) return false;
+    return exact();
 }
 
 Vec3d centroid_of(MeshView mesh, std::uint32_t facet) {
@@ -55,13 +66,14 @@ Vec3d centroid_of(MeshView mesh, std::uint32_t facet) {
 
 Vec3d area_normal(MeshView mesh, std::uint32_t facet) {
     const Index3 t = mesh.facets[facet];
-    const Vec3d a = to_double(mesh.vertices[t[0]]);
-    return cross(minus(to_double(mesh.vertices[t[1]]), a), minus(to_double(mesh.vertices[t[2]]), a));
+    return normal_of(to_double(mesh.vertices[t[0]]), to_double(mesh.vertices[t[1]]), to_double(mesh.vertices[t[2]]));
 }
 
 double smallest_height(MeshView mesh, std::uint32_t facet) {
-    const double longest = longest_edge(mesh, facet);
-    const Vec3d n = area_normal(mesh, facet);
+    const Index3 t = mesh.facets[facet];
+    const Vec3d p = to_double(mesh.vertices[t[0]]), q = to_double(mesh.vertices[t[1]]), r = to_double(mesh.vertices[t[2]]);
+    const double longest = std::sqrt(longest_edge2(p, q, r));
+    const Vec3d n = normal_of(p, q, r);
     return longest > 0 ? std::sqrt(dot(n, n)) / longest : 0;
 }
 
@@ -75,23 +87,29 @@ FacetClasses classify_facets(Context& context, MeshView mesh, const FeatureOptio
     // a facet thinner than that has no normal, and a wall that overhangs by less is vertical.
     const double noise = extent.largest * std::ldexp(1.0, -22);
     const double horizontal = std::tan(options.horizontal_rad), shallow = std::tan(options.shallow_limit_rad);
+    const double noise2 = noise * noise;
     parallel_for(context, mesh.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const auto f = static_cast<std::uint32_t>(i);
-            const Vec3d n = area_normal(mesh, f);
-            const double across = std::hypot(n[0], n[1]);
-            double low = HUGE_VAL, high = -HUGE_VAL;
-            for (const std::uint32_t v : mesh.facets[f]) {
-                low = std::min<double>(low, mesh.vertices[v].z);
-                high = std::max<double>(high, mesh.vertices[v].z);
-            }
+            const Index3 t = mesh.facets[f];
+            const Vec3d p = to_double(mesh.vertices[t[0]]), q = to_double(mesh.vertices[t[1]]), r = to_double(mesh.vertices[t[2]]);
+            const Vec3d n = normal_of(p, q, r);
+            const double across2 = n[0] * n[0] + n[1] * n[1], low = std::min({p[2], q[2], r[2]}), high = std::max({p[2], q[2], r[2]});
+            auto across = [&] { return std::hypot(n[0], n[1]); };
             FacetClass& facet = classes.of[f];
-            if (smallest_height(mesh, f) <= noise) facet = FacetClass::sliver;
-            else if (across <= horizontal * std::abs(n[2])) {
+            if (at_most(dot(n, n), noise2 * longest_edge2(p, q, r), [&] { return smallest_height(mesh, f) <= noise; })) {
+                facet = FacetClass::sliver;
+                continue;
+            }
+            const double lying = horizontal * std::abs(n[2]), sloping = shallow * n[2], overhang = (high - low) * -n[2];
+            if (at_most(across2, lying * lying, [&] { return across() <= lying; })) {
                 if (n[2] > 0) facet = FacetClass::up_flat;
                 else facet = high - classes.z_base <= kBaseTolerance ? FacetClass::base : FacetClass::down_flat;
-            } else if (n[2] > 0 && across < shallow * n[2]) facet = FacetClass::shallow;
-            else if (n[2] < 0 && (high - low) * -n[2] > noise * across) facet = FacetClass::undercut;
+            } else if (n[2] > 0) {
+                if (!at_most(sloping * sloping, across2, [&] { return sloping <= across(); })) facet = FacetClass::shallow;
+            } else if (n[2] < 0) {
+                if (!at_most(overhang * overhang, noise2 * across2, [&] { return overhang <= noise * across(); })) facet = FacetClass::undercut;
+            }
         }
     });
     return classes;

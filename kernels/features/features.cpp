@@ -7,6 +7,7 @@
 
 #include "kernels/errors.h"
 #include "kernels/features/finders.h"
+#include "kernels/parallel/parallel.h"
 
 namespace slabwright {
 
@@ -100,16 +101,27 @@ std::vector<FinderDisagreement> compare(const std::vector<Feature>& exact, const
 FeatureSet find_features(Context& context, MeshView mesh, const FeatureOptions& options) {
     check(options);
     FeatureSet set;
-    std::vector<Patch> patches = connected_patches(context, mesh, classify_facets(context, mesh, options));
-    const std::vector<Feature> flats = find_flats(mesh, patches, options);
-    set.features = flats;
-    for (auto find : {find_shallow, find_undercuts}) {
-        std::vector<Feature> found = find(mesh, patches);
-        set.features.insert(set.features.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));
-    }
+    const FacetClasses classes = classify_facets(context, mesh, options);
+    const bool search = options.finder != Finder::halving;
+    const MemoryCharge charge(context, search ? VertexStars::bytes(mesh) : 0, "the search for peaks and valleys");
+    VertexStars stars;
+    std::vector<Feature> flats;
+    // Patches grow facet by facet, which takes one thread; meanwhile others gather the facets around vertices.
+    parallel_each(context, 2, [&](std::size_t task) {
+        if (task == 1) {
+            if (search) stars = vertex_stars(context, mesh);
+            return;
+        }
+        std::vector<Patch> patches = connected_patches(context, mesh, classes);
+        set.features = flats = find_flats(mesh, patches, options);
+        for (auto find : {find_shallow, find_undercuts}) {
+            std::vector<Feature> found = find(mesh, patches);
+            set.features.insert(set.features.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));
+        }
+    });
     std::vector<Feature> exact, halving;
     if (options.finder != Finder::halving) {
-        exact = find_exact(context, mesh, flats, options.flat_merge_mm);
+        exact = find_exact(context, mesh, std::move(stars), flats, options.flat_merge_mm);
         drop_near_flats(context, mesh, flats, options.flat_merge_mm, options.flat_merge_mm, exact);
         sort_features(exact);
     }
