@@ -42,6 +42,36 @@ TEST(Engagement, VolumeIsThatOfTheSlot) {
     EXPECT_EQ(stock.cut({20, 40, kTop - kDepth}, {80, 40, kTop - kDepth}), 0) << "it is gone";
 }
 
+// What is told by parts of a way is what ways of that length take one after the other.
+TEST(Engagement, PartsOfAWayTakeWhatTheyTakeOneByOne) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> ux(-8, 108), uy(-8, 88), uz(kTop - 9, kTop + 1), share(0, 1);
+    EngagedStock whole = slab(), pieces = slab();
+    std::array<double, 3> at{20, 20, kTop - kDepth};
+    std::size_t met = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+        const std::array<double, 3> to{at[0] + 0.3 * (ux(random) - at[0]), at[1] + 0.3 * (uy(random) - at[1]),
+                                       share(random) < 0.8 ? at[2] : uz(random)};
+        std::vector<double> volumes(1 + static_cast<std::size_t>(9 * share(random)));
+        whole.cut(at, to, volumes);
+        std::array<double, 3> from = at;
+        for (std::size_t k = 1; k <= volumes.size(); ++k) {
+            std::array<double, 3> next = to;
+            const double t = static_cast<double>(k) / static_cast<double>(volumes.size());
+            if (k < volumes.size())
+                for (std::size_t a = 0; a < 3; ++a) next[a] = at[a] + t * (to[a] - at[a]);
+            const double volume = pieces.cut(from, next);
+            // A cell of a quarter of a square millimetre whose centre lies on an edge goes to either part.
+            EXPECT_NEAR(volumes[k - 1], volume, 0.26 * 9 + 1e-9) << "seed " << seed << ", trial " << trial << ", part " << k;
+            met += volume > 3;
+            from = next;
+        }
+        at = to;
+    }
+    EXPECT_GT(met, 50U);
+}
+
 // Against the sweep that the simulator uses, over chains of level and sloping moves.
 TEST(Engagement, TakesWhatTheExactSweepTakes) {
     const unsigned seed = test::seed();

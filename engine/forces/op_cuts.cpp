@@ -11,6 +11,54 @@ namespace {
 constexpr double kFinestCell = 0.2;   // mm
 constexpr double kLeastTaken = 1e-4;  // mm: less is rounding, of paths and of heights
 
+// What a stretch has met so far.
+struct Met {
+    double volume = 0, low = 1e300, high = -1e300, side = 0;
+};
+
+// Lowers cells, and tells the part of the way on which the cutter's edge comes to each of them, or the first if it is there already.
+struct Meeting {
+    const CellGrid& grid;
+    float* height;
+    PartedWay way;
+    std::array<double, 2> from;
+    double tip, rise;  // over the slab's bottom, mm: of the way's begin, and from part to part
+    std::vector<Met>& parts;
+
+    void operator()(std::size_t cell, double z) {
+        const std::array<double, 1> one{z};
+        row(cell, 1, one.data(), z);
+    }
+    void row(std::size_t first, int n, const double* h, double /*lowest*/) {
+        const auto nx = static_cast<std::size_t>(grid.nx);
+        std::array<std::int32_t, kSweptTogether> part;
+        std::array<double, kSweptTogether> across;
+        edge_parts(way, grid.x(static_cast<int>(first % nx)) - from[0], grid.cell, grid.y(static_cast<int>(first / nx)) - from[1], n, part.data(),
+                   across.data());
+        const double area = grid.cell * grid.cell;
+        for (int k = 0; k < n; ++k) {
+            const double stood = height[first + static_cast<std::size_t>(k)], left = std::max(0.0, h[k]);
+            if (stood - left < kLeastTaken) continue;
+            height[first + static_cast<std::size_t>(k)] = static_cast<float>(left);
+            const std::int32_t p = part[static_cast<std::size_t>(k)];
+            Met& m = parts[static_cast<std::size_t>(p)];
+            const double low = std::min(tip + rise * p, tip + rise * (p + 1));
+            m.volume += (stood - left) * area;
+            m.low = std::min(m.low, left - low);
+            m.high = std::max(m.high, stood - low);
+            m.side += (stood - left) * across[static_cast<std::size_t>(k)];
+        }
+    }
+    void level(std::size_t first, int n, double z) {
+        std::array<double, kSweptTogether> h;
+        h.fill(z);
+        for (int k = 0; k < n; k += kSweptTogether) {
+            const int cells = std::min(kSweptTogether, n - k);
+            if (any_over(height + first + k, 0, cells, z)) row(first + static_cast<std::size_t>(k), cells, h.data(), z);
+        }
+    }
+};
+
 CutterEnd end_of(const Tool& tool) { return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0}; }
 
 }  // namespace
@@ -28,11 +76,7 @@ StandingSlab::StandingSlab(std::array<double, 2> stock_min, std::array<double, 2
 
 void StandingSlab::run(const Operation& operation, const Tool& tool, const std::function<void(const CutStretch&)>& stretch) {
     const CutterEnd end = end_of(tool);
-    const double enough = std::max(end.radius / 2, 3 * grid_.cell), area = grid_.cell * grid_.cell;
-    /// What a stretch has met so far.
-    struct Met {
-        double volume = 0, low = 1e300, high = -1e300, side = 0;
-    };
+    const double enough = std::max(end.radius / 2, 3 * grid_.cell);
     CutStretch now;
     Met met;
     const auto finish = [&] {
@@ -52,31 +96,13 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, const std::
     bool been = false;  // the cutter has cut where the way begins
     const auto step = [&](std::uint32_t move, const std::array<double, 3>& from, const std::array<double, 3>& to, std::size_t count) {
         const double length = std::hypot(to[0] - from[0], to[1] - from[1]), slope = length > 0 ? (to[2] - from[2]) / length : 0;
-        const double dx = length > 0 ? (to[0] - from[0]) / length : 0, dy = length > 0 ? (to[1] - from[1]) / length : 0;
-        const double per_mm = length > 0 ? static_cast<double>(count) / length : 0, part = length / static_cast<double>(count),
-                     r2 = end.radius * end.radius;
+        const double part = length / static_cast<double>(count);
         parts.assign(count, {});
-        sweep_above(grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_}, StandingHeights{height_.data(), 0},
-                    [&](std::size_t c, double z) {
-                        const double stood = height_[c], left = std::max(0.0, z);
-                        if (stood - left < kLeastTaken) return;
-                        height_[c] = static_cast<float>(left);
-                        const auto cell = static_cast<std::uint32_t>(c), nx = static_cast<std::uint32_t>(grid_.nx);
-                        const auto j = static_cast<int>(cell / nx), i = static_cast<int>(cell % nx);
-                        const double px = grid_.x(i) - from[0], py = grid_.y(j) - from[1], along = px * dx + py * dy, across = dx * py - dy * px;
-                        std::size_t p = 0;
-                        if (count > 1) {
-                            const double first = along - std::sqrt(std::max(0.0, r2 - across * across));
-                            p = std::min(count - 1, static_cast<std::size_t>(std::max(0.0, first) * per_mm));
-                        }
-                        Met& m = parts[p];
-                        const double tip =
-                            std::min(from[2] + slope * static_cast<double>(p) * part, from[2] + slope * static_cast<double>(p + 1) * part);
-                        m.volume += (stood - left) * area;
-                        m.low = std::min(m.low, left + bottom_ - tip);
-                        m.high = std::max(m.high, stood + bottom_ - tip);
-                        m.side += (stood - left) * across;
-                    },
+        Meeting meeting{grid_, height_.data(), {}, {from[0], from[1]}, from[2] - bottom_, slope * part, parts};
+        if (length > 0)
+            meeting.way = {(to[0] - from[0]) / length, (to[1] - from[1]) / length, end.radius, static_cast<double>(count) / length,
+                           static_cast<int>(count)};
+        sweep_above(grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_}, StandingHeights{height_.data(), 0}, meeting,
                     {.been = been});
         been = true;
         if (length == 0) return;

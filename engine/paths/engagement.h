@@ -18,11 +18,13 @@ public:
     EngagedStock(std::array<double, 2> min, std::array<double, 2> max, double top, double radius);
     /// The tip goes straight from `from` to `to`, mm. Returns the volume taken, mm³.
     double cut(const std::array<double, 3>& from, const std::array<double, 3>& to);
+    /// The same told by parts: `volumes` has one place for each of that many equal parts of the way and gets
+    /// what is taken there, mm³: a cell belongs to the part on which the cutter's edge comes to it.
+    void cut(const std::array<double, 3>& from, const std::array<double, 3>& to, std::vector<double>& volumes);
 
     static constexpr double kMostCells = 4e6;  ///< 16 MB
 
 private:
-    double cut_level(const std::array<double, 3>& from, const std::array<double, 3>& to);
     CellGrid grid_;
     CutterEnd end_;
     double top_;

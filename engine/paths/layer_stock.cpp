@@ -24,7 +24,15 @@ struct Box {
     }
 };
 
-// How a row of heights is lower than it was.
+// Lowers cells of a band of rows.
+struct Lowering {
+    float* height;
+    void operator()(std::size_t cell, double z) { height[cell] = std::min(height[cell], static_cast<float>(std::max(0.0, z))); }
+    void row(std::size_t first, int n, const double* h, double /*lowest*/) { lower_to(height + first, n, h); }
+    void level(std::size_t first, int n, double z) { lower_to(height + first, n, z); }
+};
+
+// How heights are lower than they were.
 Taken taken_off(const std::vector<float>& before, const float* now) {
     constexpr std::size_t lanes = 8;  // so that a compiler sees that their order does not matter
     std::array<float, lanes> most{};
@@ -144,18 +152,8 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         const CellGrid part{grid_.x0, grid_.y(first), grid_.cell, grid_.nx, rows};
         const double y0 = part.y0 - r, y1 = part.y(rows - 1) + r;
         float* height = height_.data() + grid_.index(0, first);
-        // Rows as they were, of those that something is taken off.
-        const auto nx = static_cast<std::size_t>(grid_.nx);
-        std::vector<std::vector<float>> before(static_cast<std::size_t>(rows));
-        std::size_t row_first = 0, row_end = 0;  // the cells of the row that was lowered last
-        auto lower = [&](std::size_t c, float left) {
-            if (c < row_first || c >= row_end) {
-                const std::size_t row = c / nx;
-                row_first = row * nx, row_end = row_first + nx;
-                if (before[row].empty()) before[row].assign(height + row_first, height + row_end);
-            }
-            height[c] = left;
-        };
+        Lowering lowering{height};
+        std::vector<float> before;  // of a band that the operation comes to
         for (std::size_t b = 0; b < boxes.size(); ++b) {
             if (boxes[b].y1 < y0 || boxes[b].y0 > y1 || boxes[b].z0 >= top) continue;
             for (std::size_t i = std::max<std::size_t>(1, b * kBlock); i < std::min(moves.size(), (b + 1) * kBlock); ++i) {
@@ -163,25 +161,15 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 if (q.feed == 0) continue;
                 const double py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
                 if (std::max(py, qy) < y0 || std::min(py, qy) > y1 || std::min(pz, qz) >= top) continue;
+                if (before.empty()) before.assign(height, height + part.count());
                 std::array<double, 3> previous{}, next{};
                 ChainedSweep chain;
                 if (p.feed != 0 && i > 1) previous = over_bottom(moves[i - 2]), chain.before = &previous;
                 if (i + 1 < moves.size() && moves[i + 1].feed != 0) next = over_bottom(moves[i + 1]), chain.after = &next;
-                sweep_above(
-                    part, end, over_bottom(p), over_bottom(q), StandingHeights{height, 0},
-                    [&](std::size_t c, double z) {
-                        const auto left = static_cast<float>(std::max(0.0, z));
-                        if (left < height[c]) lower(c, left);
-                    },
-                    chain);
+                sweep_above(part, end, over_bottom(p), over_bottom(q), StandingHeights{height, 0}, lowering, chain);
             }
         }
-        for (std::size_t row = 0; row < before.size(); ++row) {
-            if (before[row].empty()) continue;
-            const Taken off = taken_off(before[row], height + row * nx);
-            taken[band].most = std::max(taken[band].most, off.most);
-            taken[band].cells += off.cells;
-        }
+        if (!before.empty()) taken[band] = taken_off(before, height);
     });
     Taken all;
     for (const Taken& t : taken) all.most = std::max(all.most, t.most), all.cells += t.cells;

@@ -50,8 +50,7 @@ public:
     [[nodiscard]] std::uint64_t bytes() const { return grid_.count() * 4 * (slabs_.size() + 1); }
 
 private:
-    template <class Sweep>
-    CutEffect take(double deep, Sweep&& sweep);
+    class Taking;
     struct Slab {
         double bottom, thickness;
         std::vector<float> height;  ///< above the slab's bottom: a float holds 50 mm to 4e-6

@@ -9,6 +9,7 @@
 #include <limits>
 #include <numbers>
 #include <type_traits>
+#include <utility>
 
 namespace slabwright {
 
@@ -92,10 +93,33 @@ inline double height_over(const RowWay& way, double px, double py) {
 /// cell is not asked, or `stands` (unless null) over `bottom` is not higher. @returns whether any is finite
 bool row_heights(const RowWay& way, int i0, int n, double py, const float* stands, double bottom, double* h);
 
+/// Lowers n heights to max(0, z), or to max(0, h), where they are over it.
+void lower_to(float* height, int n, double z);
+void lower_to(float* height, int n, const double* h);
+
+/// A straight way in equal parts: dx, dy its direction, `per_mm` parts a mm.
+struct PartedWay {
+    double dx = 1, dy = 0, radius = 0, per_mm = 0;
+    int count = 1;
+};
+/// Of n cells in a row, whose centres lie from (px, py) on `cell` apart as seen from the way's begin: on which part the edge of a disc comes to
+/// each, or the first where it is there already; and how far each lies left of the way, mm.
+void edge_parts(const PartedWay& way, double px, double cell, double py, int n, std::int32_t* part, double* across);
+
 /// Whether any of n heights over `bottom` is over a level.
 [[nodiscard]] bool any_over(const float* stands, double bottom, int n, double level);
 /// Makes those of n heights infinite over which nothing stands. @returns whether any is left
 bool keep_lower(const float* stands, double bottom, int n, double* h);
+
+/// The cells of some rows that a level disc comes over on its way, but for those that it has been over where it starts: [low, left] and
+/// [right, high] along each row; low > left, right > high: none.
+struct RowSpans {
+    static constexpr int kRows = 64;  ///< that are looked at together
+    alignas(64) std::array<std::int32_t, kRows> low, left, right, high;
+};
+/// @param rows at most RowSpans::kRows, from first_row on  @param been whether the disc has been where it starts; else nothing is left out
+void spans_of_rows(const CellGrid& grid, int first_row, int rows, const std::array<double, 2>& from, const std::array<double, 2>& to, double radius,
+                   bool been, RowSpans& spans);
 
 /// What else of a chain of straight motions is swept, so that no cell is asked twice about the place where two of them meet.
 struct ChainedSweep {
@@ -155,6 +179,41 @@ inline int floor_of(double v) {
     return i - static_cast<int>(i > v);
 }
 
+/// Calls fn(cell, z) for all of n cells in a row from `first` on over which h is finite, or once fn.row(first, n, h, lowest) where it has
+/// that: it then compares with what stands by itself, many cells at once. No h is under `lowest`.
+template <class Fn>
+void take_row(Fn& fn, std::size_t first, int n, const double* h, double lowest) {
+    if constexpr (requires { fn.row(first, n, h, lowest); }) fn.row(first, n, h, lowest);
+    else
+        for (int i = 0; i < n; ++i)
+            if (h[i] < kUncovered) fn(first + static_cast<std::size_t>(i), h[i]);
+}
+/// The same at one height: fn.level(first, n, z), or fn(cell, z) for those that stand higher.
+template <class Fn>
+void take_level(Fn& fn, std::size_t first, int n, double z, const StandingHeights& standing) {
+    if constexpr (requires { fn.level(first, n, z); }) fn.level(first, n, z);
+    else if (any_over(standing.height + first, standing.bottom, n, z))
+        for (std::size_t c = first; c < first + static_cast<std::size_t>(n); ++c)
+            if (standing(c) > z) fn(c, z);
+}
+
+/// A disc at one height: see sweep_above.
+template <class Fn>
+void sweep_level_disc(const CellGrid& grid, double radius, const std::array<double, 2>& from, const std::array<double, 2>& to, double z, bool been,
+                      const StandingHeights& standing, Fn&& fn) {
+    const double y_low = std::min(from[1], to[1]) - radius, y_high = std::max(from[1], to[1]) + radius;
+    const int j0 = std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - grid.y0) / grid.cell))));
+    const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high - grid.y0) / grid.cell))));
+    RowSpans spans;
+    for (int j = j0; j <= j1; j += RowSpans::kRows) {
+        const int rows = std::min(RowSpans::kRows, j1 - j + 1);
+        spans_of_rows(grid, j, rows, from, to, radius, been, spans);
+        for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k)
+            for (const auto& [first, last] : {std::pair{spans.low[k], spans.left[k]}, {spans.right[k], spans.high[k]}})
+                if (first <= last) take_level(fn, grid.index(first, j + static_cast<int>(k)), last - first + 1, z, standing);
+    }
+}
+
 /// Calls fn(cell index, z) for every cell whose centre the cutter covers while its tip goes straight from `from` to `to`, unless
 /// standing(cell index) ≤ z: what stands lower than the cutter gets is left out, mostly before anything costly is computed.
 /// With s the way along the motion in the plane, s0 the foot of the centre on it, q its distance from it and m the way's slope, the
@@ -165,6 +224,9 @@ inline int floor_of(double v) {
 /// whose least value over this motion lies at its end is left to the motion after, and one whose least lies at its begin is
 /// asked only if the motion before has its least there too: of both motions one gets as low or lower. All of a chain together call fn
 /// with the same least value for every cell as without, but go to most cells once instead of 2R / L times.
+///
+/// Given StandingHeights many cells are compared at once; fn may then take rows of them instead (take_row, take_level). A level disc in a
+/// chain leaves out what it covers at its begin then, and that only.
 template <class Standing, class Fn>
 void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, Standing&& standing,
                  Fn&& fn, const ChainedSweep& chain = {}) {
@@ -174,6 +236,10 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
     const StraightWay way(from, to);
     const double dx = way.dx, dy = way.dy, run = way.run, slope = way.slope, z = way.z, lowest = std::min(from[2], to[2]);
     const bool shares = way.shares_ends(end);
+    if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>)
+        if (end.form == Form::flat && (run == 0 || slope == 0))
+            return sweep_level_disc(grid, R, {from[0], from[1]}, {to[0], to[1]}, lowest, run > 0 && (chain.before != nullptr || chain.been), standing,
+                                    fn);
     const double cone_lead = end.slope > std::abs(slope) ? slope / std::sqrt(end.slope * end.slope - slope * slope) : 0;
     // In a chain: is the begin's place asked, and is the end's?
     const bool own_end = !shares || chain.after == nullptr, own_begin = !shares || (chain.before == nullptr && !chain.been);
@@ -243,9 +309,8 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
                     const int n = std::min(kSweptTogether, i1 + 1 - k);
                     const std::size_t first = row + static_cast<std::size_t>(k);
                     if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>) {
-                        if (!row_heights(row_way, k, n, py, standing.height + first, standing.bottom, h.data())) continue;
-                        for (int i = 0; i < n; ++i)
-                            if (h[static_cast<std::size_t>(i)] < kUncovered) fn(first + static_cast<std::size_t>(i), h[static_cast<std::size_t>(i)]);
+                        if (row_heights(row_way, k, n, py, standing.height + first, standing.bottom, h.data()))
+                            take_row(fn, first, n, h.data(), lowest);
                     } else {
                         if (!row_heights(row_way, k, n, py, nullptr, 0, h.data())) continue;
                         for (int i = 0; i < n; ++i)
@@ -280,10 +345,7 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
                     if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>) {
                         if (!any_over(standing.height + first, standing.bottom, n, lowest)) continue;
                         rest_of_row();
-                        if (!keep_lower(standing.height + first, standing.bottom, n, h.data())) continue;
-                        for (int i = 0; i < n; ++i)
-                            if (const double z_cell = h[static_cast<std::size_t>(i)]; z_cell < kUncovered)
-                                fn(first + static_cast<std::size_t>(i), z_cell);
+                        if (keep_lower(standing.height + first, standing.bottom, n, h.data())) take_row(fn, first, n, h.data(), lowest);
                     } else {
                         rest_of_row();
                         for (int i = 0; i < n; ++i)
