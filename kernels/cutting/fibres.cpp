@@ -311,22 +311,28 @@ Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& insi
     struct Active {
         std::uint32_t group, first, last;  // blocks [first, last)
     };
-    std::vector<Active> active;
+    constexpr std::size_t grain = 2048;
+    std::vector<std::vector<Active>> active((solid.groups.size() + grain - 1) / grain);
+    parallel_for(context, solid.groups.size(), grain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t g = begin; g < end; ++g) {
+            const FacetGroup& group = solid.groups[g];
+            if (!may_touch(group.z_min, group.z_max, group.overhang, ball, r, zc)) continue;
+            const std::size_t first = first_line(group.low[V] - r), last = first_line(group.high[V] + r);
+            if (first < last)
+                active[begin / grain].push_back(
+                    {static_cast<std::uint32_t>(g), static_cast<std::uint32_t>(first / kBlock), static_cast<std::uint32_t>((last - 1) / kBlock + 1)});
+        }
+    });
     std::vector<std::uint32_t> starts(blocks + 1, 0), members;
-    for (std::size_t g = 0; g < solid.groups.size(); ++g) {
-        const FacetGroup& group = solid.groups[g];
-        if (!may_touch(group.z_min, group.z_max, group.overhang, ball, r, zc)) continue;
-        const std::size_t first = first_line(group.low[V] - r), last = first_line(group.high[V] + r);
-        if (first >= last) continue;
-        active.push_back(
-            {static_cast<std::uint32_t>(g), static_cast<std::uint32_t>(first / kBlock), static_cast<std::uint32_t>((last - 1) / kBlock + 1)});
-        for (std::uint32_t b = active.back().first; b < active.back().last; ++b) ++starts[b + 1];
-    }
+    for (const std::vector<Active>& part : active)
+        for (const Active& a : part)
+            for (std::uint32_t b = a.first; b < a.last; ++b) ++starts[b + 1];
     for (std::size_t b = 1; b <= blocks; ++b) starts[b] += starts[b - 1];
     members.resize(starts.back());
     std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
-    for (const Active& a : active)
-        for (std::uint32_t b = a.first; b < a.last; ++b) members[next[b]++] = a.group;
+    for (const std::vector<Active>& part : active)
+        for (const Active& a : part)
+            for (std::uint32_t b = a.first; b < a.last; ++b) members[next[b]++] = a.group;
 
     // The inside: which segments cross the lines of a block.
     std::vector<std::vector<std::array<Point2, 2>>> segments(blocks);

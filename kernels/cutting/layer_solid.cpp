@@ -47,7 +47,8 @@ bool edge_matters(MeshView mesh, std::uint32_t f, int k, const Vec3d& a, const V
     return true;
 }
 
-void append_facet(MeshView mesh, std::uint32_t f, double z_top, std::vector<SolidFacet>& out) {
+// Writes the facets that it makes to `out`, as many as pieces() says, and moves that on.
+void append_facet(MeshView mesh, std::uint32_t f, double z_top, SolidFacet*& out) {
     std::array<Vec3d, 3> p;
     for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     const Vec3d n = unit_normal(p[0], p[1], p[2]);
@@ -82,7 +83,7 @@ void append_facet(MeshView mesh, std::uint32_t f, double z_top, std::vector<Soli
         s.edges = static_cast<std::uint8_t>((ij ? 1 : 0) | (jk ? 2 : 0) | (ki ? 4 : 0));
         s.z_min = std::min({s.p[0][2], s.p[1][2], s.p[2][2]});
         s.z_max = std::max({s.p[0][2], s.p[1][2], s.p[2][2]});
-        out.push_back(s);
+        *out++ = s;
     };
     if (corners == 3) emit(0, 1, 2, edge[0], edge[1], edge[2]);
     else {
@@ -91,37 +92,66 @@ void append_facet(MeshView mesh, std::uint32_t f, double z_top, std::vector<Soli
     }
 }
 
-}  // namespace
+// How many facets append_facet makes of one.
+std::size_t pieces(MeshView mesh, std::uint32_t f, double z_top) {
+    const std::array<double, 3> z{mesh.vertices[mesh.facets[f][0]].z, mesh.vertices[mesh.facets[f][1]].z, mesh.vertices[mesh.facets[f][2]].z};
+    std::size_t corners = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const double a = z[k], b = z[(k + 1) % 3];
+        corners += a <= z_top;
+        corners += (a <= z_top) != (b <= z_top) && a != z_top && b != z_top;
+    }
+    return corners < 3 ? 0 : corners - 2;
+}
 
-namespace {
+constexpr std::size_t kGrain = std::size_t{1} << 14;
 
 // The facets of the mesh that the layer's solid has a part of, in Morton order of their middles.
-std::vector<std::uint32_t> facets_between(Context& context, MeshView mesh, double z_low, double cut_off) {
+BulkVector<std::uint32_t> facets_between(Context& context, MeshView mesh, double z_low, double cut_off) {
+    // Which they are and the box of the mesh, in one reading of it.
     constexpr std::size_t grain = std::size_t{1} << 16;
+    std::vector<std::vector<std::uint32_t>> parts((mesh.size() + grain - 1) / grain);
+    std::vector<Box3> boxes(parts.size());
+    parallel_for(context, mesh.size(), grain, [&](std::size_t begin, std::size_t end) {
+        std::vector<std::uint32_t>& part = parts[begin / grain];
+        Box3 box{mesh.vertices[mesh.facets[begin][0]], mesh.vertices[mesh.facets[begin][0]]};
+        for (std::size_t f = begin; f < end; ++f) {
+            const Vec3f a = mesh.vertices[mesh.facets[f][0]], b = mesh.vertices[mesh.facets[f][1]], c = mesh.vertices[mesh.facets[f][2]];
+            box.min = {std::min({box.min.x, a.x, b.x, c.x}), std::min({box.min.y, a.y, b.y, c.y}), std::min({box.min.z, a.z, b.z, c.z})};
+            box.max = {std::max({box.max.x, a.x, b.x, c.x}), std::max({box.max.y, a.y, b.y, c.y}), std::max({box.max.z, a.z, b.z, c.z})};
+            if (std::min({a.z, b.z, c.z}) >= cut_off || std::max({a.z, b.z, c.z}) < z_low) continue;  // a flat at the top itself belongs to the cap
+            part.push_back(static_cast<std::uint32_t>(f));
+        }
+        boxes[begin / grain] = box;
+    });
+    Box3 box = boxes.empty() ? Box3{} : boxes.front();
+    for (const Box3& b : boxes) {
+        box.min = {std::min(box.min.x, b.min.x), std::min(box.min.y, b.min.y), std::min(box.min.z, b.min.z)};
+        box.max = {std::max(box.max.x, b.max.x), std::max(box.max.y, b.max.y), std::max(box.max.z, b.max.z)};
+    }
     struct Key {
         std::uint64_t code;
         std::uint32_t facet;
     };
-    const MortonGrid grid(bounds(mesh));
-    auto middle = [](float u, float v, float w) { return (double{u} + v + w) / 3; };
-    std::vector<std::vector<Key>> parts((mesh.size() + grain - 1) / grain);
-    parallel_for(context, mesh.size(), grain, [&](std::size_t begin, std::size_t end) {
-        std::vector<Key>& part = parts[begin / grain];
-        for (std::size_t f = begin; f < end; ++f) {
+    std::vector<std::size_t> starts{0};
+    for (const auto& part : parts) starts.push_back(starts.back() + part.size());
+    BulkVector<Key> keys(starts.back());
+    const MortonGrid grid(box);
+    parallel_each(context, parts.size(), [&](std::size_t p) {
+        auto middle = [](float u, float v, float w) { return (double{u} + v + w) / 3; };
+        std::size_t at = starts[p];
+        for (const std::uint32_t f : parts[p]) {
             const Vec3f &a = mesh.vertices[mesh.facets[f][0]], &b = mesh.vertices[mesh.facets[f][1]], &c = mesh.vertices[mesh.facets[f][2]];
-            if (std::min({a.z, b.z, c.z}) >= cut_off || std::max({a.z, b.z, c.z}) < z_low) continue;  // a flat at the top itself belongs to the cap
-            part.push_back({grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)), static_cast<std::uint32_t>(f)});
+            keys[at++] = {grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)), f};
         }
+        std::vector<std::uint32_t>().swap(parts[p]);
     });
-    std::vector<Key> keys;
-    for (std::vector<Key>& part : parts) {
-        keys.insert(keys.end(), part.begin(), part.end());
-        std::vector<Key>().swap(part);
-    }
     parallel_sort(context, keys.begin(), keys.end(),
                   [](const Key& a, const Key& b) { return a.code != b.code ? a.code < b.code : a.facet < b.facet; });
-    std::vector<std::uint32_t> facets(keys.size());
-    for (std::size_t i = 0; i < keys.size(); ++i) facets[i] = keys[i].facet;
+    BulkVector<std::uint32_t> facets(keys.size());
+    parallel_for(context, keys.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) facets[i] = keys[i].facet;
+    });
     return facets;
 }
 
@@ -157,27 +187,31 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     solid.z_low = z_low;
     solid.z_top = z_top;
     const double cut_off = z_top - kTopSheet;  // the part is cut off here, facets and cap alike
-    const std::vector<std::uint32_t> facets = facets_between(context, mesh, z_low, cut_off);
-    constexpr std::size_t grain = std::size_t{1} << 14;
-    std::vector<std::vector<SolidFacet>> parts((facets.size() + grain - 1) / grain);
-    parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
-        std::vector<SolidFacet>& part = parts[begin / grain];
-        part.reserve(end - begin);
-        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], cut_off, part);
+    const BulkVector<std::uint32_t> facets = facets_between(context, mesh, z_low, cut_off);
+    std::vector<std::size_t> starts((facets.size() + kGrain - 1) / kGrain + 1, 0);
+    parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        std::size_t count = 0;
+        for (std::size_t i = begin; i < end; ++i) count += pieces(mesh, facets[i], cut_off);
+        starts[begin / kGrain + 1] = count;
     });
-    std::size_t total = 0;
-    for (const auto& part : parts) total += part.size();
-    solid.facets.reserve(total);
-    for (auto& part : parts) {
-        solid.facets.insert(solid.facets.end(), part.begin(), part.end());
-        std::vector<SolidFacet>().swap(part);
-    }
-    const Plane top{cut_off, Side::below};
-    solid.cap = std::move(slice(context, mesh, {&top, 1})[0].loops);
-    solid.cap_cells = CapCells(solid.cap);
+    for (std::size_t c = 1; c < starts.size(); ++c) starts[c] += starts[c - 1];
+    // Making room for the facets takes one thread; others meanwhile cut the cap.
+    parallel_each(context, 2, [&](std::size_t task) {
+        if (task == 1) {
+            solid.facets.resize(starts.back());
+            return;
+        }
+        const Plane top{cut_off, Side::below};
+        solid.cap = std::move(slice(context, mesh, {&top, 1})[0].loops);
+        solid.cap_cells = CapCells(solid.cap);
+    });
+    parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        SolidFacet* to = solid.facets.data() + starts[begin / kGrain];
+        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], cut_off, to);
+    });
     using Extent = std::array<double, 4>;  // least x, y; greatest x, y
     const Extent extent = parallel_reduce(
-        context, solid.facets.size(), grain, Extent{1e300, 1e300, -1e300, -1e300},
+        context, solid.facets.size(), kGrain, Extent{1e300, 1e300, -1e300, -1e300},
         [&](std::size_t begin, std::size_t end) {
             Extent e{1e300, 1e300, -1e300, -1e300};
             for (std::size_t i = begin; i < end; ++i)
