@@ -10,47 +10,50 @@ void Stock::add_slab(double z_bottom, double thickness) {
 
 namespace {
 
-// What one row of cells over a slab's bottom lost.
-struct RowLoss {
-    double removed = 0, most = 0, highest = -1e300, lowest = 1e300;
-    int deepest = 0;  // the first cell that lost most
-    std::uint64_t deep = 0;
+constexpr int kLanes = 8;
+
+// What cells over a slab's bottom lost, told in eight places, so that a compiler sees that the order of cells does not matter.
+struct Losses {
+    std::array<double, kLanes> removed{}, most{}, highest{}, lowest{}, deepest{}, deep{};
+    Losses() { highest.fill(-1e300), lowest.fill(1e300); }
 };
 
-// Lowers n cells to h where they stand higher, none to under the slab's bottom. Eight places for each figure, so that a compiler sees that
-// the order of cells does not matter.
-SLABWRIGHT_WIDE RowLoss lower_row(float* __restrict height, int n, const double* __restrict h, double bottom, double deep) {
-    constexpr std::size_t lanes = 8;
-    std::array<double, lanes> removed{}, most{}, highest, lowest;
-    std::array<std::uint64_t, lanes> cells{};
-    std::array<int, lanes> deepest{};
-    highest.fill(-1e300), lowest.fill(1e300);
-    const auto one = [&](int c, std::size_t k) {
-        const float stood = height[c], left = static_cast<float>(h[c] - bottom);
-        const bool lower = left < stood;
-        const double before = bottom + static_cast<double>(stood), after = bottom + static_cast<double>(left), lost = lower ? before - after : 0.0;
-        removed[k] += lost;
-        deepest[k] = lost > most[k] ? c : deepest[k];
-        most[k] = lost > most[k] ? lost : most[k];
-        const double top = lower ? before : -1e300, low = lower ? after : 1e300;
-        highest[k] = top > highest[k] ? top : highest[k];
-        lowest[k] = low < lowest[k] ? low : lowest[k];
-        cells[k] += static_cast<std::uint64_t>(lost > deep);
-        height[c] = lower ? left : stood;
-    };
-    int c = 0;
-    for (; c + static_cast<int>(lanes) <= n; c += static_cast<int>(lanes))
-        for (std::size_t k = 0; k < lanes; ++k) one(c + static_cast<int>(k), k);
-    for (; c < n; ++c) one(c, 0);
-    RowLoss loss;
-    for (std::size_t k = 0; k < lanes; ++k) {
-        loss.removed += removed[k];
-        if (most[k] > loss.most || (most[k] == loss.most && deepest[k] < loss.deepest)) loss.most = most[k], loss.deepest = deepest[k];
-        loss.highest = std::max(loss.highest, highest[k]);
-        loss.lowest = std::min(loss.lowest, lowest[k]);
-        loss.deep += cells[k];
-    }
-    return loss;
+// Lowers n cells, whole eights of them, to h where they stand higher; no h is under the slab's bottom. `first` is the first one's number.
+SLABWRIGHT_WIDE void lower_eights(float* __restrict height, int n, const double* __restrict h, double bottom, double deep, int first,
+                                  Losses& __restrict losses) {
+    constexpr double none = 2e300;
+    Losses all = losses;
+    for (int c = 0; c < n; c += kLanes)
+        for (std::size_t k = 0; k < kLanes; ++k) {
+            const std::size_t at = static_cast<std::size_t>(c) + k;
+            const float stood = height[at], left = static_cast<float>(h[at] - bottom), stands = left < stood ? left : stood;
+            const double before = bottom + static_cast<double>(stood), after = bottom + static_cast<double>(stands), lost = before - after;
+            const double top = before - (stands < stood ? 0.0 : none), low = after + (stands < stood ? 0.0 : none);
+            all.removed[k] += lost;
+            all.deepest[k] = lost > all.most[k] ? static_cast<double>(first + static_cast<int>(at)) : all.deepest[k];
+            all.most[k] = lost > all.most[k] ? lost : all.most[k];
+            all.highest[k] = top > all.highest[k] ? top : all.highest[k];
+            all.lowest[k] = low < all.lowest[k] ? low : all.lowest[k];
+            all.deep[k] += lost > deep ? 1.0 : 0.0;
+            height[at] = stands;
+        }
+    losses = all;
+}
+
+// The same of any number of cells.
+Losses lower_row(float* height, int n, const double* h, double bottom, double deep) {
+    Losses losses;
+    const int whole = n / kLanes * kLanes;
+    lower_eights(height, whole, h, bottom, deep, 0, losses);
+    if (whole == n) return losses;
+    std::array<float, kLanes> rest{};
+    std::array<double, kLanes> rest_h;
+    rest_h.fill(kUncovered);
+    std::copy(height + whole, height + n, rest.begin());
+    std::copy(h + whole, h + n, rest_h.begin());
+    lower_eights(rest.data(), kLanes, rest_h.data(), bottom, deep, whole, losses);
+    std::copy_n(rest.begin(), n - whole, height + whole);
+    return losses;
 }
 
 }  // namespace
@@ -92,12 +95,17 @@ public:
             return;
         }
         Slab& slab = stock_.slabs_.back();
-        const RowLoss loss = lower_row(slab.height.data() + first, n, h, slab.bottom, deep_);
-        effect_.removed += loss.removed;
-        effect_.highest = std::max(effect_.highest, loss.highest);
-        effect_.lowest = std::min(effect_.lowest, loss.lowest);
-        effect_.deep_cells += loss.deep;
-        if (loss.most > effect_.deepest) effect_.deepest = loss.most, deepest_cell_ = first + static_cast<std::size_t>(loss.deepest);
+        const Losses losses = lower_row(slab.height.data() + first, n, h, slab.bottom, deep_);
+        double most = 0, deepest = 0;
+        for (std::size_t k = 0; k < kLanes; ++k) {
+            effect_.removed += losses.removed[k];
+            effect_.highest = std::max(effect_.highest, losses.highest[k]);
+            effect_.lowest = std::min(effect_.lowest, losses.lowest[k]);
+            effect_.deep_cells += static_cast<std::uint64_t>(losses.deep[k]);
+            // Of cells that lost as much the first.
+            if (losses.most[k] > most || (losses.most[k] == most && losses.deepest[k] < deepest)) most = losses.most[k], deepest = losses.deepest[k];
+        }
+        if (most > effect_.deepest) effect_.deepest = most, deepest_cell_ = first + static_cast<std::size_t>(deepest);
     }
     void level(std::size_t first, int n, double z) {
         std::array<double, kSweptTogether> h;

@@ -1,5 +1,6 @@
 #include "kernels/stock/sweep.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "kernels/wide.h"
@@ -57,41 +58,46 @@ SLABWRIGHT_WIDE bool row_heights(const RowWay& way, int i0, int n, double py, co
     return any != 0;
 }
 
-// The capsule's span on a row is where the row meets either disc, or the strip between them.
+// The capsule's span on a row is where the row meets either disc, or the strip between them; with a hole, what is left of where the disc
+// starts and what is right of it. No branch, and whole vectors of rows: what is past the last is not asked for.
 SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows, const std::array<double, 2>& from, const std::array<double, 2>& to,
                                    double radius, bool been, RowSpans& spans) {
-    double dx = to[0] - from[0], dy = to[1] - from[1];
-    const double run = std::sqrt(dx * dx + dy * dy);
+    constexpr int lanes = 8;
+    const double inf = 1e300, r2 = radius * radius, nx = grid.nx, per_mm = 1 / grid.cell;
+    const double fx = from[0], fy = from[1], tx = to[0], ty = to[1];
+    double dx = tx - fx, dy = ty - fy;
+    const double run = std::sqrt(dx * dx + dy * dy), rise = dy;
     const bool moves = run > 1e-9;
     if (moves) dx /= run, dy /= run;
-    const double inf = 1e300, r2 = radius * radius, nx = grid.nx, per_mm = 1 / grid.cell;
-    const std::array<double, 2> side{-radius, radius};
-    constexpr int lanes = 8;  // whole vectors of rows: what is past the last is not asked for
-    const double rise = to[1] - from[1], inverse = rise == 0 ? 0 : (to[0] - from[0]) / rise;
-    for (int k = 0; k < (rows + lanes - 1) / lanes * lanes; ++k) {
-        const double y = grid.y0 + (first_row + k) * grid.cell;
-        const double a2 = r2 - (y - from[1]) * (y - from[1]), b2 = r2 - (y - to[1]) * (y - to[1]);
+    const double inverse = rise == 0 ? 0 : (tx - fx) / rise, x0 = grid.x0, y0 = grid.y0, cell = grid.cell;
+    // The sides of the strip; of one that runs along the rows, or nowhere, none is met.
+    const double lx = fx - radius * dy, ly = fy + radius * dx, rx = fx + radius * dy, ry = fy - radius * dx;
+    const double l_from = rise == 0 ? inf : std::min(ly, ly + rise), l_to = rise == 0 ? -inf : std::max(ly, ly + rise);
+    const double r_from = rise == 0 ? inf : std::min(ry, ry + rise), r_to = rise == 0 ? -inf : std::max(ry, ry + rise);
+    const double hole = been ? 0.0 : inf;
+    const int count = (rows + lanes - 1) / lanes * lanes;
+    std::int32_t *const low_out = spans.low.data(), *const left_out = spans.left.data(), *const right_out = spans.right.data(),
+                        *const high_out = spans.high.data();
+    for (int k = 0; k < count; ++k) {
+        const double y = y0 + (first_row + k) * cell;
+        const double a2 = r2 - (y - fy) * (y - fy), b2 = r2 - (y - ty) * (y - ty);
         const double a = std::sqrt(a2 > 0 ? a2 : 0.0), b = std::sqrt(b2 > 0 ? b2 : 0.0);
-        double low = a2 < 0 ? inf : from[0] - a, high = a2 < 0 ? -inf : from[0] + a;
-        const double low_b = b2 < 0 ? inf : to[0] - b, high_b = b2 < 0 ? -inf : to[0] + b;
+        const double on_a = a2 < 0 ? inf : 0.0, on_b = b2 < 0 ? inf : 0.0;
+        double low = fx - a + on_a, high = fx + a - on_a;
+        const double low_b = tx - b + on_b, high_b = tx + b - on_b;
         low = low_b < low ? low_b : low, high = high_b > high ? high_b : high;
-        for (const double s : side) {
-            const double ax = from[0] - s * dy, ay = from[1] + s * dx, by = to[1] + s * dx;
-            const bool met = moves && (ay <= y) != (by <= y);
-            const double x = ax + (y - ay) * inverse;
-            low = met && x < low ? x : low, high = met && x > high ? x : high;
-        }
-        // What is left of where the disc starts, and what is right of it; all in one where it is not known to have been there.
-        const bool hole = been && !(a2 < 0), none = low > high;
-        const double left = hole ? from[0] - a : high, right = from[0] + a;
-        const double i_low = std::ceil((low - grid.x0) * per_mm), i_left = std::floor((left - grid.x0) * per_mm);
-        const double i_right = std::ceil((right - grid.x0) * per_mm), i_high = std::floor((high - grid.x0) * per_mm);
-        auto within = [](double v, double least, double most) { return static_cast<std::int32_t>(v < least ? least : v > most ? most : v); };
-        const auto r = static_cast<std::size_t>(k);
-        spans.low[r] = none ? 0 : within(i_low, 0, nx);
-        spans.left[r] = none ? -1 : within(i_left, -1, nx - 1);
-        spans.right[r] = none || !hole ? 0 : within(i_right, 0, nx);
-        spans.high[r] = none || !hole ? -1 : within(i_high, -1, nx - 1);
+        const double l = lx + (y - ly) * inverse, r = rx + (y - ry) * inverse;
+        const double l_off = (y < l_from) | (y > l_to) ? inf : 0.0, r_off = (y < r_from) | (y > r_to) ? inf : 0.0;
+        low = l + l_off < low ? l + l_off : low, high = l - l_off > high ? l - l_off : high;
+        low = r + r_off < low ? r + r_off : low, high = r - r_off > high ? r - r_off : high;
+        const double off = on_a + hole;
+        const double left = off > 0 ? high : fx - a, right = fx + a + off;
+        const double i_low = std::ceil((low - x0) * per_mm), i_left = std::floor((left - x0) * per_mm);
+        const double i_right = std::ceil((right - x0) * per_mm), i_high = std::floor((high - x0) * per_mm);
+        low_out[k] = static_cast<std::int32_t>(i_low < 0 ? 0.0 : i_low > nx ? nx : i_low);
+        left_out[k] = static_cast<std::int32_t>(i_left < -1 ? -1.0 : i_left > nx - 1 ? nx - 1 : i_left);
+        right_out[k] = static_cast<std::int32_t>(i_right < 0 ? 0.0 : i_right > nx ? nx : i_right);
+        high_out[k] = static_cast<std::int32_t>(i_high < -1 ? -1.0 : i_high > nx - 1 ? nx - 1 : i_high);
     }
 }
 
