@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <limits>
 #include <map>
 #include <utility>
@@ -156,33 +157,41 @@ bool closest(RTCPointQueryFunctionArguments* args) {
     return true;
 }
 
-/// Arguments: facets, and whether of the relief or of the pattern. One thread.
-void bare_embree(benchmark::State& state) {
-    const Model& m = model(state.range(0), state.range(1));
-    RTCDevice device = rtcNewDevice(nullptr);
-    RTCScene scene = rtcNewScene(device);
-    rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
-    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    std::copy(
-        m.mesh.vertices.begin(), m.mesh.vertices.end(),
-        static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), m.mesh.vertices.size())));
-    std::copy(
-        m.mesh.facets.begin(), m.mesh.facets.end(),
-        static_cast<Index3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Index3), m.mesh.facets.size())));
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene, geometry);
-    rtcReleaseGeometry(geometry);
-    rtcCommitScene(scene);
-    std::uint64_t met = 0;
-    for (auto _ : state) {
-        met = 0;
-        for (const Place& place : m.places) {
+/// Embree's tree over a mesh, with nothing around it.
+class Bare {
+public:
+    explicit Bare(const Model& m) : model_(m), device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_)) {
+        rtcSetSceneFlags(scene_, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
+        RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+        std::copy(m.mesh.vertices.begin(), m.mesh.vertices.end(),
+                  static_cast<Vec3f*>(
+                      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), m.mesh.vertices.size())));
+        std::copy(m.mesh.facets.begin(), m.mesh.facets.end(),
+                  static_cast<Index3*>(
+                      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Index3), m.mesh.facets.size())));
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(scene_, geometry);
+        rtcReleaseGeometry(geometry);
+        rtcCommitScene(scene_);
+    }
+    Bare(const Bare&) = delete;
+    Bare& operator=(const Bare&) = delete;
+    ~Bare() {
+        rtcReleaseScene(scene_);
+        rtcReleaseDevice(device_);
+    }
+    /// Two questions a place.
+    [[nodiscard]] double questions() const { return static_cast<double>(2 * model_.places.size()); }
+    /// How many of the questions met something.
+    [[nodiscard]] std::uint64_t ask() const {
+        std::uint64_t met = 0;
+        for (const Place& place : model_.places) {
             const auto radius = static_cast<float>(kRadius - 0.01);
-            Closest nearest{&m.mesh, place.centre, radius * radius};
+            Closest nearest{&model_.mesh, place.centre, radius * radius};
             RTCPointQuery query{place.centre.x, place.centre.y, place.centre.z, 0, radius};
             RTCPointQueryContext stack;
             rtcInitPointQueryContext(&stack);
-            rtcPointQuery(scene, &query, &stack, &closest, &nearest);
+            rtcPointQuery(scene_, &query, &stack, &closest, &nearest);
             met += nearest.squared < radius * radius;
             RTCRayHit ray{};
             ray.ray.org_x = place.centre.x, ray.ray.org_y = place.centre.y, ray.ray.org_z = static_cast<float>(kHigh);
@@ -191,40 +200,63 @@ void bare_embree(benchmark::State& state) {
             ray.ray.mask = 0xFFFFFFFFu;
             ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
 #if defined(RTC_VERSION_MAJOR) && RTC_VERSION_MAJOR >= 4
-            rtcIntersect1(scene, &ray);
+            rtcIntersect1(scene_, &ray);
 #else
             RTCIntersectContext context;
             rtcInitIntersectContext(&context);
-            rtcIntersect1(scene, &context, &ray);
+            rtcIntersect1(scene_, &context, &ray);
 #endif
             met += ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
         }
-        benchmark::DoNotOptimize(met);
+        return met;
     }
-    rtcReleaseScene(scene);
-    rtcReleaseDevice(device);
-    state.counters["asked"] = static_cast<double>(2 * m.places.size());
-    state.counters["asked/s"] = benchmark::Counter(static_cast<double>(2 * m.places.size()), benchmark::Counter::kIsIterationInvariantRate);
+
+private:
+    const Model& model_;
+    RTCDevice device_;
+    RTCScene scene_;
+};
+
+/// Arguments: facets, and whether of the relief or of the pattern. One thread.
+void bare_embree(benchmark::State& state) {
+    const Bare bare(model(state.range(0), state.range(1)));
+    for (auto _ : state) benchmark::DoNotOptimize(bare.ask());
+    state.counters["asked"] = bare.questions();
+    state.counters["asked/s"] = benchmark::Counter(bare.questions(), benchmark::Counter::kIsIterationInvariantRate);
 }
 
-/// Arguments: facets, relief, threads, profile (0 flat, 1 ball, 2 bull nose). Without refinement on borders, so that points are those of the facets.
-void accessibility(benchmark::State& state) {
-    const Model& m = model(state.range(0), state.range(1));
-    Context context({.threads = static_cast<int>(state.range(2))});
-    const AccessScene scene(context, m.mesh.view());
-    ToolShape tool{.profile = static_cast<ToolShape::Profile>(state.range(3)), .radius = kRadius, .corner_radius = 1};
-    AccessOptions options;
-    options.spacing = 1000;
-    options.shares = true;  // every facet by itself
-    options.accuracy = 1;
-    Accessibility result;
-    for (auto _ : state) {
-        result = scene.accessible(context, kLow, kHigh, tool, options);
+/// Accessibility of a ball, bull nose or flat on a model; without refinement on borders, so that points are those of the facets.
+class Kernel {
+public:
+    Kernel(const Model& m, int threads, std::int64_t profile)
+        : context_({.threads = threads}),
+          scene_(context_, m.mesh.view()),
+          tool_{.profile = static_cast<ToolShape::Profile>(profile), .radius = kRadius, .corner_radius = 1} {
+        options_.spacing = 1000;
+        options_.shares = true;  // every facet by itself
+        options_.accuracy = 1;
+    }
+    [[nodiscard]] Accessibility ask() {
+        Accessibility result = scene_.accessible(context_, kLow, kHigh, tool_, options_);
         if (!(result.area > 0)) {
             std::fprintf(stderr, "access_bench: nothing is to be machined\n");
             std::exit(1);
         }
+        return result;
     }
+
+private:
+    Context context_;
+    AccessScene scene_;
+    ToolShape tool_;
+    AccessOptions options_;
+};
+
+/// Arguments: facets, relief, threads, profile (0 flat, 1 ball, 2 bull nose).
+void accessibility(benchmark::State& state) {
+    Kernel kernel(model(state.range(0), state.range(1)), static_cast<int>(state.range(2)), state.range(3));
+    Accessibility result;
+    for (auto _ : state) result = kernel.ask();
     const double asked = static_cast<double>(result.queries + result.rays);
     state.counters["AR"] = result.ratio();
     state.counters["points/s"] = benchmark::Counter(static_cast<double>(result.points), benchmark::Counter::kIsIterationInvariantRate);
@@ -232,9 +264,44 @@ void accessibility(benchmark::State& state) {
     state.counters["asked/s"] = benchmark::Counter(asked, benchmark::Counter::kIsIterationInvariantRate);
 }
 
+/// Of the bare rate, the kernel's: the median of rounds in which the two take turns, in processor time, for a machine that others use
+/// meanwhile. Arguments: facets, relief. A ball, one thread.
+void share_of_bare(benchmark::State& state) {
+    constexpr std::size_t rounds = 9;
+    const Model& m = model(state.range(0), state.range(1));
+    const Bare bare(m);
+    Kernel kernel(m, 1, 1);
+    auto seconds = [](auto&& work) {
+        const std::clock_t begin = std::clock();
+        work();
+        return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    };
+    Accessibility result = kernel.ask();  // what both need is in memory from here on
+    benchmark::DoNotOptimize(bare.ask());
+    const double asked = static_cast<double>(result.queries + result.rays);
+    std::vector<double> shares, bare_rates, rates;
+    for (auto _ : state)
+        for (std::size_t i = 0; i < rounds; ++i) {
+            bare_rates.push_back(bare.questions() / seconds([&] { benchmark::DoNotOptimize(bare.ask()); }));
+            rates.push_back(asked / seconds([&] { result = kernel.ask(); }));
+            shares.push_back(rates.back() / bare_rates.back());
+        }
+    for (std::vector<double>* row : {&shares, &bare_rates, &rates}) std::sort(row->begin(), row->end());
+    const std::size_t middle = shares.size() / 2;
+    state.counters["share"] = shares[middle];
+    state.counters["lowest"] = shares.front();
+    state.counters["highest"] = shares.back();
+    state.counters["bare/s"] = bare_rates[middle];
+    state.counters["asked/s"] = rates[middle];
+    state.counters["points/s"] = rates[middle] * static_cast<double>(result.points) / asked;
+    state.counters["asked/point"] = asked / static_cast<double>(result.points);
+    state.counters["AR"] = result.ratio();
+}
+
 }  // namespace
 
 BENCHMARK(bare_embree)->ArgNames({"facets", "relief"})->Args({200'000, 1})->Args({200'000, 0})->Unit(benchmark::kMillisecond);
+BENCHMARK(share_of_bare)->ArgNames({"facets", "relief"})->Args({200'000, 1})->Args({200'000, 0})->Iterations(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(accessibility)
     ->ArgNames({"facets", "relief", "threads", "profile"})
     ->Args({200'000, 1, 1, 1})

@@ -15,6 +15,7 @@
 #include <string>
 
 #include "kernels/access/cap_cover.h"
+#include "kernels/access/obstacles.h"
 #include "kernels/access/poke.h"
 #include "kernels/access/triangle.h"
 #include "kernels/cutting/layer_solid.h"
@@ -26,15 +27,18 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kFloatMargin = 4e-7;   // of the coordinates' size: Embree works in float32 and only finds candidates
-constexpr double kUpright = 1e-4;       // rad: what faces down by less counts as upright
-constexpr double kResolution = 0.5;     // of the tolerance: places nearer than this to each other are not told apart
-constexpr int kMostPlaces = 20000;      // of one point; some tens are usual
-constexpr std::size_t kObstacles = 10;  // points of the part remembered
-constexpr std::size_t kMostCaps = 48;   // of a proof about one point; some are usual
-constexpr double kMostAround = 0.5;     // of a ball's radius: points farther from each other are proven to be missed one by one
-constexpr double kInset = 0.02;         // of a piece: its corners are tested so far within it
-constexpr int kMostLevels = 40;         // of halving
+constexpr double kFloatMargin = 4e-7;  // of the coordinates' size: Embree works in float32 and only finds candidates
+constexpr double kUpright = 1e-4;      // rad: what faces down by less counts as upright
+constexpr double kResolution = 0.5;    // of the tolerance: places nearer than this to each other are not told apart
+constexpr int kMostPlaces = 20000;     // of one point; some tens are usual
+constexpr std::size_t kMostCaps = 48;  // of a proof about one point; some are usual
+constexpr double kMostAround = 0.5;    // of a ball's radius: points farther from each other are proven to be missed one by one
+constexpr double kInset = 0.02;        // of a piece: its corners are tested so far within it
+constexpr double kShared = 1.5;        // of a point's distance from the corner: within it other pieces' points are hoped to be
+constexpr int kMostLevels = 40;        // of halving
+constexpr std::size_t kMissed = 64;    // balls without a reached point remembered
+constexpr int kHope = 8;               // pieces in a row that may fail to be proven at once, until only
+constexpr unsigned kTryAgain = 16;     // every so many is tried
 constexpr std::size_t kPiecesAtOnce = 128;
 
 float up(double v) { return std::nextafter(static_cast<float>(v), std::numeric_limits<float>::infinity()); }
@@ -112,11 +116,47 @@ struct Counts {
     void add(const Counts& c) { points += c.points, queries += c.queries, rays += c.rays, undecided += c.undecided; }
 };
 
+using Four [[gnu::vector_size(16)]] = float;
+
+/// Four planes of a facet, n·p + d: its own, and those upright on it through its edges, which face outward. A line of the cache says how
+/// far a place is from most facets, in single precision.
+struct Planes {
+    Four x, y, z, d;
+    /// What the square of the distance is at least; less than it is only where a corner is nearest, and on slivers.
+    [[nodiscard]] float least_squared(const Vec3f& p) const {
+        const Four at = x * p.x + y * p.y + z * p.z + d;
+        const float beside = std::max(std::max(at[1], at[2]), std::max(at[3], 0.0f));
+        return at[0] * at[0] + beside * beside;
+    }
+};
+
+Planes planes_of(const Triangle& t) {
+    auto sub = [](const Point3& a, const Point3& b) { return Point3{a[0] - b[0], a[1] - b[1], a[2] - b[2]}; };
+    auto cross = [](const Point3& a, const Point3& b) {
+        return Point3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    };
+    Planes planes{};
+    const Point3 n = cross(sub(t[1], t[0]), sub(t[2], t[0]));
+    const double longest2 = std::max({squared_distance(t[0], t[1]), squared_distance(t[1], t[2]), squared_distance(t[2], t[0])});
+    constexpr double sliver = 1e-16;  // of twice the area and the longest edge, squared: rounding makes up the plane of a facet that is thinner
+    if (!(dot(n, n) > sliver * longest2 * longest2)) return planes;
+    auto set = [&](int i, const Point3& normal, const Point3& on) {
+        const double l = std::sqrt(dot(normal, normal));
+        const Point3 unit{static_cast<float>(normal[0] / l), static_cast<float>(normal[1] / l), static_cast<float>(normal[2] / l)};
+        planes.x[i] = static_cast<float>(unit[0]), planes.y[i] = static_cast<float>(unit[1]), planes.z[i] = static_cast<float>(unit[2]);
+        planes.d[i] = static_cast<float>(-dot(unit, on));
+    };
+    set(0, n, t[0]);
+    for (int k = 0; k < 3; ++k) set(k + 1, cross(sub(t[(k + 1) % 3], t[k]), n), t[k]);
+    return planes;
+}
+
 }  // namespace
 
 struct AccessScene::Impl {
     MeshView mesh;
     double margin = 0;
+    std::vector<Planes> planes;  ///< by facet
     Box3 box;
     std::vector<std::uint32_t> overhangs;  ///< the facets that face down
     RTCDevice device = nullptr;
@@ -213,9 +253,9 @@ struct Places {
 /// How deep a point of the part is in a part of the tool, and how that changes as the tool moves: by the motion's component along
 /// `gradient` at least, less its square over 2·`bend`. No bend: only that depth changes by no more than the tool moves.
 struct Depth {
-    double mm = 0;
-    Point3 gradient{};
-    double bend = 0;
+    double mm;
+    Point3 gradient;
+    double bend;
 };
 
 // The tool part is a core, which is a cone on a disc, grown by the rounding. A ball of that radius about the core's point nearest to q
@@ -278,6 +318,7 @@ struct Probe {
     const Scene* scene = nullptr;
     const Places* at = nullptr;
     double top = 0;
+    double margin = 0;  ///< mm that a distance in single precision may be wrong by
     Envelope whole, fine;
     bool ball = false;     ///< upright above a sphere: distances decide
     bool level = false;    ///< upright above a disc
@@ -285,9 +326,11 @@ struct Probe {
     Point3 centre{};
     double nearest2 = 0;   ///< of a ball: what is farther is of no interest
     bool hanging = false;  ///< the facets are numbered within the overhangs
+    Vec3f middle{};        ///< of a ball, and the square of what is of no interest even if distances are wrong by rounding
+    float beyond2 = 0;
     bool found = false, ruled_out = false;
     struct Obstacle {
-        Point3 point{};
+        Point3 point;
         Depth depth;
     };
     std::array<Obstacle, 8> obstacles;  ///< the deepest ones found
@@ -335,6 +378,17 @@ struct Probe {
     }
 };
 
+/// Of a ball, which most facets around miss.
+bool look_around(RTCPointQueryFunctionArguments* args) {
+    auto& probe = *static_cast<Probe*>(args->userPtr);
+    if (probe.scene->planes[args->primID].least_squared(probe.middle) > probe.beyond2) return false;
+    if (!probe.look(args->primID)) return false;
+    const float within = probe.ruled_out ? 0 : up(std::sqrt(probe.nearest2) + probe.margin);
+    probe.beyond2 = within * within;
+    args->query->radius = std::min(args->query->radius, within);
+    return true;
+}
+
 bool look(RTCPointQueryFunctionArguments* args) {
     auto& probe = *static_cast<Probe*>(args->userPtr);
     const bool nearer = probe.look(probe.hanging ? probe.scene->overhangs[args->primID] : args->primID);
@@ -343,7 +397,7 @@ bool look(RTCPointQueryFunctionArguments* args) {
         return true;
     }
     if (!nearer) return false;
-    args->query->radius = std::min(args->query->radius, up(std::sqrt(probe.nearest2) + probe.scene->margin));
+    args->query->radius = std::min(args->query->radius, up(std::sqrt(probe.nearest2) + probe.margin));
     return true;
 }
 
@@ -351,6 +405,7 @@ bool look(RTCPointQueryFunctionArguments* args) {
 struct Question {
     const Scene* scene = nullptr;
     double top = 0;
+    double margin = 0;                     ///< mm that places and distances in single precision may be wrong by
     bool overhangs = false;                ///< some may hang over a place of the tool
     std::vector<Envelope> tool, shrunken;  ///< its parts, and what of them is deeper than the tolerance
     AccessOptions options;
@@ -391,6 +446,7 @@ Question ask(const Scene& scene, double z_low, double z_high, const ToolShape& t
     if (cutter.sin_taper > 0) q.flank = std::max(0.0, (cutter.radius - cutter.core - cutter.rounding * cutter.cos_taper) / cutter.sin_taper);
     double reach = 0;
     for (const Envelope& e : q.tool) reach = std::max(reach, e.radius);
+    q.margin = scene.margin + 3 * kFloatMargin * reach;
     for (const std::uint32_t f : scene.overhangs) {
         const Triangle t = scene.triangle(f);
         const auto [low, high] = std::minmax({t[0][2], t[1][2], t[2][2]});
@@ -402,22 +458,53 @@ Question ask(const Scene& scene, double z_low, double z_high, const ToolShape& t
     return q;
 }
 
+/// Balls in which no point is reached, the last ones found.
+class MissedBalls {
+public:
+    void add(const Point3& middle, double radius) {
+        x_[next_] = middle[0], y_[next_] = middle[1], z_[next_] = middle[2], radius2_[next_] = radius * radius;
+        next_ = (next_ + 1) % kMissed;
+        used_ = std::max(used_, next_);
+        if (next_ == 0) used_ = kMissed;
+    }
+    [[nodiscard]] bool hold(const Point3& p) const {
+        for (std::size_t i = 0; i < used_; ++i) {
+            const double x = x_[i] - p[0], y = y_[i] - p[1], z = z_[i] - p[2];
+            if (x * x + y * y + z * z < radius2_[i]) return true;
+        }
+        return false;
+    }
+
+private:
+    std::size_t next_ = 0, used_ = 0;
+    std::array<double, kMissed> x_, y_, z_, radius2_;
+};
+
 /// Tests points one after the other; what it remembers makes neighbours cheap.
 class Searcher {
 public:
     explicit Searcher(const Question& question)
         : q_(question),
           ball_(question.tool[0].core == 0 && question.tool[0].sin_taper == 0),
-          covers_(ball_ || (question.tool[0].rounding == 0 && question.tool[0].sin_taper == 0)) {}
+          covers_(ball_ || (question.tool[0].rounding == 0 && question.tool[0].sin_taper == 0)),
+          known_(ball_ ? Obstacles::Tool::ball : Obstacles::Tool::flat, question.tool[0].radius, question.options.tolerance) {}
 
-    [[nodiscard]] bool reaches(const Point3& p, const Point3& n) {
+    /// @param corner of the piece, from which the point is no farther than `around`: others are tested near it, and may be missed for the same reason
+    [[nodiscard]] bool reaches(const Point3& p, const Point3& n, const Point3& corner = {}, double around = 0) {
         ++counts.points;
+        if (missed_.hold(p)) return false;
         // Where the normal says, then where the last point was reached from.
+        bool forbidden = false;
+        if (ball_) {
+            forbidden = n[2] > 0 && known_.strongest(p, n, 0) < Obstacles::kMost;
+            if (!forbidden && test(toward(p, n)) == Verdict::free) return true;
+        }
         const double across = std::hypot(n[0], n[1]);
         const double u = std::atan2(across, n[2]), phi = across > 0 ? std::atan2(n[1], n[0]) : 0;
         const double l = u <= 1e-9 ? 0 : u >= q_.angle ? q_.length() : q_.disc + q_.rounding * u;
-        if (!(ball_ && n[2] > 0 && known_to_forbid(p, n)) && test(p, {l, phi, 0, 0, false}) == Verdict::free) return true;
+        if (!ball_ && test(p, {l, phi, 0, 0, false}) == Verdict::free) return true;
         if (covers_) {
+            if (around > 0 && prove_missed(corner, n, around)) return false;
             const Answer answer = all_around(p, n);
             if (answer != Answer::unknown) return answer == Answer::reached;
         } else if (l_ >= 0 && test(p, {l_, phi_, 0, 0, false}) == Verdict::free) return true;
@@ -445,10 +532,10 @@ public:
                 l_ = patch.l, phi_ = patch.phi;
                 return true;
             }
-            const double around = q_.at(patch.l).distance * patch.dphi;
-            if (verdict == Verdict::ruled_out || patch.dl + around <= finest) continue;
+            const double sideways = q_.at(patch.l).distance * patch.dphi;
+            if (verdict == Verdict::ruled_out || patch.dl + sideways <= finest) continue;
             Patch a = patch, b = patch;
-            if (patch.dl > around) {
+            if (patch.dl > sideways) {
                 a.dl = b.dl = patch.dl / 2;
                 a.l -= a.dl, b.l += b.dl;
                 if (std::abs(a.l - l) < std::abs(b.l - l)) std::swap(a, b);
@@ -463,20 +550,10 @@ public:
         return false;
     }
 
-    /// Whether what is remembered proves that a ball reaches nothing within `around` of a point.
-    [[nodiscard]] bool misses_all(const Point3& p, const Point3& n, double around) {
-        const double r = q_.tool[0].radius, reach = r + q_.options.tolerance;
-        if (!ball_ || around > kMostAround * reach) return false;
-        const double lowest = q_.options.lowest_tip - p[2] + r, down = -around / (reach - around);
-        cover_.begin({{0, 0, -1}, -(lowest > 0 ? std::min(lowest / (reach + around), 1.0) : down)});
-        while (cover_.size() < kMostCaps) {
-            const std::optional<Point3> u = cover_.uncovered(n);
-            if (!u) return true;
-            const std::optional<Cap> known = remembered_cap(p, *u, around);
-            if (!known) return false;
-            cover_.add(*known);
-        }
-        return false;
+    /// Looks whether a whole piece is missed, if others have been of late.
+    void hope_missed(const Point3& middle, const Point3& n, double around) {
+        if (hope_ <= 0 && ++despaired_ % kTryAgain != 0) return;
+        hope_ = prove_missed(middle, n, around) ? kHope : hope_ - 1;
     }
 
     Counts counts;
@@ -489,50 +566,26 @@ private:
         bool bent;                // on the profile's arc
     };
 
-    // A ball that touches a point lies in a direction from it. A flat's axis passes it at up to its radius, and stereographic projection makes
-    // a direction of that, discs becoming caps. In either case what an obstacle forbids is a cap of directions.
-    //
-    // The caps are those of obstacles deeper than half of the tolerance: where something is deeper than all of it there is a cap around the
-    // direction, so every place that is tried settles some of them.
-
-    /// What an obstacle forbids about a point, if that holds u. For a ball: about all points within `around` of it.
-    std::optional<Cap> cap_of(const Point3& obstacle, const Point3& p, const Point3& u, double around = 0) const {
-        const double tolerance = q_.options.tolerance, r = q_.tool[0].radius, reach = r + tolerance, clear = r - tolerance / 2;
-        const double x = obstacle[0] - p[0], y = obstacle[1] - p[1];
-        if (ball_) {
-            // Whatever stands forbids what is below it too; beside a ball's centre more than above.
-            const double z = std::min(obstacle[2] - p[2], reach * u[2]), d2 = x * x + y * y + z * z, far = reach + around, near = reach - around;
-            // The square of the centre's distance from the obstacle is largest at the one or the other end.
-            double least = (far * far + d2 - clear * clear) / (2 * far);
-            if (around > 0) least = std::max(least, (near * near + d2 - clear * clear) / (2 * near));
-            if (x * u[0] + y * u[1] + z * u[2] <= least) return std::nullopt;
-            const double d = std::sqrt(d2);
-            return Cap{{x / d, y / d, z / d}, least / d};
-        }
-        if (obstacle[2] <= p[2] + 1.5 * tolerance) return std::nullopt;
-        const double a = x / reach, b = y / reach, k = a * a + b * b - clear * clear / (reach * reach);
-        const double length = std::sqrt(4 * (a * a + b * b) + (1 - k) * (1 - k));
-        const Cap cap{{2 * a / length, 2 * b / length, (1 - k) / length}, (1 + k) / length};
-        return cap.margin(u) > CapCover::kInside ? std::optional<Cap>(cap) : std::nullopt;
-    }
-    /// Of what is remembered, the obstacle that forbids most around u.
-    std::optional<Cap> remembered_cap(const Point3& p, const Point3& u, double around = 0) {
-        std::optional<Cap> known;
-        std::size_t by = 0;
-        double most = CapCover::kInside;
-        for (std::size_t i = 0; i < obstacles_.size(); ++i)
-            if (const std::optional<Cap> cap = cap_of(obstacles_[i], p, u, around))
-                if (const double margin = cap->margin(u); margin > most) most = margin, known = cap, by = i;
-        if (by > 0)
-            std::rotate(obstacles_.begin(), obstacles_.begin() + static_cast<std::ptrdiff_t>(by),
-                        obstacles_.begin() + static_cast<std::ptrdiff_t>(by) + 1);
-        return known;
+    /// Covers the most around u that something remembered forbids.
+    bool add_known(const Point3& p, const Point3& u, double around = 0) {
+        const std::size_t i = known_.strongest(p, u, around);
+        if (i == Obstacles::kMost) return false;
+        cover_.add(known_.cap(known_.point(i), p, u, around));
+        known_.use(i);
+        return true;
     }
 
-    /// The place of the tool for a direction.
+    /// The place of a ball that touches a point from a direction.
+    Places toward(const Point3& p, const Point3& u) const {
+        const double across = u[2] < 0 ? q_.rounding / std::hypot(u[0], u[1]) : q_.rounding;
+        Places at;
+        at.x = p[0] + across * u[0], at.y = p[1] + across * u[1], at.tip = p[2] - q_.tool[0].rounding + std::max(0.0, across * u[2]);
+        at.tolerance = q_.options.tolerance;
+        return at;
+    }
+    /// The place of a flat for a direction.
     Patch place_at(const Point3& u) const {
         const double phi = std::atan2(u[1], u[0]);
-        if (ball_) return {std::min(q_.arc, q_.rounding * std::acos(std::clamp(u[2], 0.0, 1.0))), phi, 0, 0, false};
         // Farther out than its radius the flat's edge touches, and is lower there: at the last by half of the tolerance.
         const double tolerance = q_.options.tolerance, r = q_.tool[0].radius;
         const double distance = (r + tolerance) * std::hypot(u[0], u[1]) / (1 + std::max(0.0, u[2]));
@@ -540,39 +593,46 @@ private:
         return {q_.disc + q_.rounding * std::asin(std::min(0.86, (distance - r) / tolerance)), phi, 0, 0, false};
     }
 
-    [[nodiscard]] bool known_to_forbid(const Point3& p, const Point3& u) const {
-        return std::any_of(obstacles_.begin(), obstacles_.end(), [&](const Point3& obstacle) { return cap_of(obstacle, p, u).has_value(); });
+    /// Whether what is remembered proves that a ball reaches nothing within `around` of a point; points there are missed from then on.
+    bool prove_missed(const Point3& p, const Point3& n, double around) {
+        if (!ball_ || around > kMostAround * (q_.tool[0].radius + q_.options.tolerance)) return false;
+        begin_cover(p, around);
+        while (cover_.size() < kMostCaps) {
+            const std::optional<Point3> u = cover_.uncovered(n);
+            if (!u) missed_.add(p, around);
+            if (!u || !add_known(p, *u, around)) return !u;
+        }
+        return false;
     }
 
     /// Tries a corner of what no obstacle known so far forbids; what is met there forbids it, until a place is free or nothing is left.
     Answer all_around(const Point3& p, const Point3& n) {
-        // No ball's centre is below the point, and no tip lower than it may be; no flat's axis passes farther away than its radius.
-        const double r = q_.tool[0].radius, tolerance = q_.options.tolerance, lowest = q_.options.lowest_tip;
-        const double least = ball_ ? std::max(0.0, (lowest - p[2] + r) / (r + tolerance)) : 0.0;
-        if (least >= 1 || (!ball_ && p[2] + tolerance < lowest)) return Answer::missed;
-        cover_.begin({{0, 0, -1}, -least});
+        const double tolerance = q_.options.tolerance, lowest = q_.options.lowest_tip;
+        if (ball_ ? lowest - p[2] >= tolerance : p[2] + tolerance < lowest) return Answer::missed;
+        begin_cover(p, 0);
         while (cover_.size() < kMostCaps) {
             const std::optional<Point3> u = cover_.uncovered(n);
             if (!u) return Answer::missed;
-            if (const std::optional<Cap> known = remembered_cap(p, *u)) {
-                cover_.add(*known);
-                continue;
-            }
-            const Patch place = place_at(*u);
+            if (add_known(p, *u)) continue;
             met_.clear();
-            if (test(p, place) == Verdict::free) {
-                l_ = place.l, phi_ = place.phi;
-                return Answer::reached;
-            }
+            if (test(ball_ ? toward(p, *u) : places_of(p, place_at(*u))) == Verdict::free) return Answer::reached;
             bool covered = false;
             for (const Point3& obstacle : met_)
-                if (const std::optional<Cap> cap = cap_of(obstacle, p, *u); cap && cap->margin(*u) > CapCover::kInside) {
-                    cover_.add(*cap);
+                if (const Cap cap = known_.cap(obstacle, p, *u, 0); cap.margin(*u) > CapCover::kInside) {
+                    cover_.add(cap);
                     covered = true;
                 }
             if (!covered) break;  // the shank or the holder is in the way
         }
         return Answer::unknown;
+    }
+
+    /// No ball's centre is below a point, and no tip lower than it may be; no flat's axis passes farther away than its radius.
+    void begin_cover(const Point3& p, double around) {
+        const double reach = q_.tool[0].radius + q_.options.tolerance, lowest = q_.options.lowest_tip - p[2] + q_.tool[0].radius;
+        double least = 0;
+        if (ball_) least = lowest > 0 ? std::min(lowest / (reach + around), 1.0) : -around / (reach - around);
+        cover_.begin({{0, 0, -1}, -least});
     }
 
     Places places_of(const Point3& p, const Patch& patch) const {
@@ -594,8 +654,8 @@ private:
         return at;
     }
 
-    Verdict test(const Point3& p, const Patch& patch) {
-        const Places at = places_of(p, patch);
+    Verdict test(const Point3& p, const Patch& patch) { return test(places_of(p, patch)); }
+    Verdict test(const Places& at) {
         const double tolerance = q_.options.tolerance, lowest = q_.options.lowest_tip;
         if (at.tip + at.dl < lowest) return Verdict::ruled_out;
         if (!(covers_ && at.spread == 0) && remembered_rule_out(at)) return Verdict::ruled_out;
@@ -607,6 +667,7 @@ private:
             probe.scene = q_.scene;
             probe.at = &at;
             probe.top = q_.top;
+            probe.margin = q_.margin;
             probe.whole = e;
             probe.fine = q_.shrunken[part];
             if (probe.fine.radius <= 0 || at.tip + probe.fine.low >= q_.top) continue;
@@ -620,6 +681,8 @@ private:
                 radius = e.radius - tolerance;
                 probe.centre = {at.x, at.y, at.tip + middle};
                 probe.nearest2 = radius * radius;
+                probe.middle = {static_cast<float>(probe.centre[0]), static_cast<float>(probe.centre[1]), static_cast<float>(probe.centre[2])};
+                probe.beyond2 = up(radius + q_.margin) * up(radius + q_.margin);
             } else {
                 const double rise = std::min(e.height(e.radius), q_.top - at.tip) - middle;
                 if (rise > 0) {
@@ -668,10 +731,10 @@ private:
         ++counts.queries;
         RTCPointQuery query{};
         query.x = static_cast<float>(probe.at->x), query.y = static_cast<float>(probe.at->y), query.z = static_cast<float>(probe.at->tip + middle);
-        query.radius = up(radius + q_.scene->margin);
+        query.radius = up(radius + q_.margin);
         RTCPointQueryContext stack;
         rtcInitPointQueryContext(&stack);
-        rtcPointQuery(scene, &query, &stack, &look, &probe);
+        rtcPointQuery(scene, &query, &stack, probe.ball && !probe.hanging ? &look_around : &look, &probe);
         if (!probe.found || !keep) return;
         // The deepest one, and of the others the one that pushes most against it.
         std::size_t first = 0;
@@ -689,19 +752,17 @@ private:
 
     void remember(const Point3& obstacle) {
         if (covers_) met_.push_back(obstacle);
-        if (obstacles_.size() == kObstacles) obstacles_.pop_back();
-        obstacles_.insert(obstacles_.begin(), obstacle);
+        known_.remember(obstacle);
     }
 
     /// By obstacles met before, alone or in pairs. Keeps what they prove for the ones that are yet to be met here.
     bool remembered_rule_out(const Places& at) {
         proven_ = 0;
-        for (std::size_t i = 0; i < obstacles_.size(); ++i) {
-            const Depth depth = depth_of(obstacles_[i], at, q_.tool[0]);
+        for (std::size_t i = 0; i < known_.size(); ++i) {
+            const Depth depth = depth_of(known_.point(i), at, q_.tool[0]);
             if (depth.mm <= at.tolerance - at.spread) continue;
             if (rules_out(depth, at)) {
-                std::rotate(obstacles_.begin(), obstacles_.begin() + static_cast<std::ptrdiff_t>(i),
-                            obstacles_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+                known_.use(i);
                 return true;
             }
             proofs_[proven_++] = proof_of(depth, at);
@@ -726,8 +787,11 @@ private:
     const bool covers_;  ///< a ball or a flat
     CapCover cover_;
     std::vector<Point3> met_;  ///< obstacles of the last place
-    std::vector<Point3> obstacles_;
-    std::array<Proof, 2 * kObstacles> proofs_;  ///< of the obstacles known, about the patch in hand
+    Obstacles known_;
+    MissedBalls missed_;
+    int hope_ = kHope;  ///< that whole pieces are proven to be missed
+    unsigned despaired_ = 0;
+    std::array<Proof, 2 * Obstacles::kMost> proofs_;  ///< of the obstacles known, about the patch in hand
     std::size_t proven_ = 0;
     std::vector<Patch> stack_;
     double l_ = -1, phi_ = 0;  ///< where the last point was found
@@ -845,32 +909,34 @@ Work collect(Context& context, const Scene& scene, double low, double high) {
         }
     });
     Work work;
-    std::vector<Piece> unsorted;
-    for (Part& part : parts) {
+    struct Key {
+        std::uint64_t code;
+        std::uint32_t part, index;
+    };
+    std::vector<Key> keys;
+    std::size_t items = 0, pieces = 0;
+    for (const Part& part : parts) items += part.items.size(), pieces += part.pieces.size();
+    work.items.reserve(items);
+    work.pieces.reserve(pieces);
+    keys.reserve(pieces);
+    const MortonGrid grid(scene.box);
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+        Part& part = parts[p];
         const auto first = static_cast<std::uint32_t>(work.items.size());
-        for (Piece& piece : part.pieces) {
+        for (std::size_t i = 0; i < part.pieces.size(); ++i) {
+            Piece& piece = part.pieces[i];
             piece.item += first;
-            unsorted.push_back(piece);
+            auto middle = [&](int k) { return (piece.t[0][k] + piece.t[1][k] + piece.t[2][k]) / 3; };
+            keys.push_back({grid.code(middle(0), middle(1), middle(2)), static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(i)});
         }
         work.items.insert(work.items.end(), part.items.begin(), part.items.end());
         work.undercut += part.undercut;
-        part = {};
     }
-    struct Key {
-        std::uint64_t code;
-        std::uint32_t index;
-    };
-    std::vector<Key> keys(unsorted.size());
-    const MortonGrid grid(scene.box);
-    for (std::size_t i = 0; i < keys.size(); ++i) {
-        const Triangle& t = unsorted[i].t;
-        auto middle = [&](int k) { return (t[0][k] + t[1][k] + t[2][k]) / 3; };
-        keys[i] = {grid.code(middle(0), middle(1), middle(2)), static_cast<std::uint32_t>(i)};
-    }
-    parallel_sort(context, keys.begin(), keys.end(),
-                  [](const Key& a, const Key& b) { return a.code != b.code ? a.code < b.code : a.index < b.index; });
-    work.pieces.reserve(keys.size());
-    for (const Key& key : keys) work.pieces.push_back(unsorted[key.index]);
+    parallel_sort(context, keys.begin(), keys.end(), [](const Key& a, const Key& b) {
+        if (a.code != b.code) return a.code < b.code;
+        return a.part != b.part ? a.part < b.part : a.index < b.index;
+    });
+    for (const Key& key : keys) work.pieces.push_back(parts[key.part].pieces[key.index]);
     return work;
 }
 
@@ -884,7 +950,7 @@ struct Tally {
     }
 };
 
-void add_point(Tally& tally, Searcher& searcher, const Question& q, const Point3& p, const Point3& n) {
+void add_point(Tally& tally, Searcher& searcher, const Question& q, const Point3& p, const Point3& n, const Point3& corner = {}, double around = 0) {
     ++tally.points;
     if (q.overhangs) {
         ++searcher.counts.rays;
@@ -894,7 +960,7 @@ void add_point(Tally& tally, Searcher& searcher, const Question& q, const Point3
             return;
         }
     }
-    if (searcher.reaches(p, n)) ++tally.reached;
+    if (searcher.reaches(p, n, corner, around)) ++tally.reached;
 }
 
 Point3 mixed(const Triangle& t, double a, double b, double c) {
@@ -912,17 +978,14 @@ Areas measure(Searcher& searcher, const Question& q, const Piece& piece, const P
     if (!q.overhangs && tally.reached == 0) {
         double around2 = 0;
         for (const Point3& corner : piece.t) around2 = std::max(around2, squared_distance(corner, middle));
-        if (searcher.misses_all(middle, n, std::sqrt(around2))) {
-            tally.points += 3;
-            searcher.counts.points += 3;
-            agree = true;
-            return tally.share(area_of(piece.t));
-        }
+        searcher.hope_missed(middle, n, std::sqrt(around2));
     }
-    constexpr double rest = kInset / 2;
-    add_point(tally, searcher, q, mixed(piece.t, 1 - kInset, rest, rest), n);
-    add_point(tally, searcher, q, mixed(piece.t, rest, 1 - kInset, rest), n);
-    add_point(tally, searcher, q, mixed(piece.t, rest, rest, 1 - kInset), n);
+    for (int k = 0; k < 3; ++k) {
+        std::array<double, 3> w{kInset / 2, kInset / 2, kInset / 2};
+        w[k] = 1 - kInset;
+        const Point3 p = mixed(piece.t, w[0], w[1], w[2]);
+        add_point(tally, searcher, q, p, n, piece.t[k], kShared * std::sqrt(squared_distance(p, piece.t[k])));
+    }
     agree = tally.agree();
     return tally.share(area_of(piece.t));
 }
@@ -941,8 +1004,10 @@ AccessScene::AccessScene(Context& context, MeshView mesh) : impl_(std::make_uniq
     }
     impl_->margin = 3 * size * kFloatMargin;
     std::vector<Index3> hanging;
+    impl_->planes.resize(mesh.size());
     for (std::size_t f = 0; f < mesh.size(); ++f) {
         const Triangle t = impl_->triangle(static_cast<std::uint32_t>(f));
+        impl_->planes[f] = planes_of(t);
         const double nz = (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]);
         // The part's own bottom hangs over nothing that a tool could be in.
         const double lowest = impl_->box.min.z;
@@ -968,13 +1033,16 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
     const Question question = ask(*impl_, z_low, z_high, tool, options);
     constexpr double tasks_per_edge = 16;  // pieces of a large facet that are handed out as one, by length
     Work work = collect(context, *impl_, z_low + kTopSheet, z_high - kTopSheet);
-    double surface = 0;
-    for (const Piece& piece : work.pieces) surface += area_of(piece.t);
-    const double spacing = options.spacing > 0 ? options.spacing : std::max(1.0, std::sqrt(surface) / 50);
-    {
+    double spacing = options.spacing;
+    if (spacing == 0) {
+        double surface = 0;
+        for (const Piece& piece : work.pieces) surface += area_of(piece.t);
+        spacing = std::max(1.0, std::sqrt(surface) / 50);
+    }
+    const double longest = spacing * tasks_per_edge;
+    if (std::any_of(work.pieces.begin(), work.pieces.end(), [&](const Piece& piece) { return longest_edge(piece.t) > longest; })) {
         std::vector<Piece> tasks;
-        for (const Piece& piece : work.pieces)
-            split_to(piece.t, spacing * tasks_per_edge, [&](const Triangle& t) { tasks.push_back({t, piece.item}); });
+        for (const Piece& piece : work.pieces) split_to(piece.t, longest, [&](const Triangle& t) { tasks.push_back({t, piece.item}); });
         work.pieces.swap(tasks);
     }
     std::vector<Areas> of_item(work.items.size());
@@ -1055,7 +1123,7 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
         return outcomes;
     };
 
-    std::vector<Piece> border = work.pieces;
+    std::vector<Piece> border = std::move(work.pieces);
     std::vector<Areas> shares;
     double total = 0;
     double on_border = 0, disagreeing = 0, disagreeing2 = 0;
