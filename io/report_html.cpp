@@ -292,7 +292,9 @@ std::uint8_t left_over_code(float left, double gouge) {
 }
 
 /// Reads and runs every program. The replay's figures go into the page with a light page too; its maps only with the model.
-void replay_programs(Context& context, const fs::path& out, const PlanFolder& folder, const SimulationInput& input, bool three_d, Figures& figures) {
+/// @param part of the input's mesh; none with a light page
+void replay_programs(Context& context, const fs::path& out, const PlanFolder& folder, const SimulationInput& input, const StandingPart* part,
+                     Figures& figures) {
     ReplayOptions options;
     options.cell = stock_cell(input);
     options.cusp = folder.tolerances.cusp;
@@ -317,7 +319,7 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
             program.layer = named.layer;
             if (folder.frame == Frame::layer_top)
                 for (ProgramStep& s : program.steps) s.z += input.layers[static_cast<std::size_t>(named.layer)].z_top;
-            if (!three_d) return;
+            if (part == nullptr) return;
             figures.paths[begin + i] = path_of(program, input.machine.rapid_feed);
             thin(figures.paths[begin + i], kPathTolerance);
         });
@@ -337,13 +339,13 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
     figures.data["engagement"] = std::move(engagement);
     figures.data["stock"] = {
         {"cell_mm", options.cell}, {"nx", replay.nx()}, {"ny", replay.ny()}, {"x0", replay.first()[0]}, {"y0", replay.first()[1]}};
-    if (!three_d) return;
+    if (part == nullptr) return;
     figures.replay = Json::array();
-    for (std::size_t l = 0; l < input.layers.size(); ++l) {
+    replay.left_over(*part, [&](std::size_t, const std::vector<float>& left_over) {
         std::string codes;
-        for (const float left : replay.left_over(l)) codes += static_cast<char>(left_over_code(left, folder.tolerances.gouge));
+        for (const float left : left_over) codes += static_cast<char>(left_over_code(left, folder.tolerances.gouge));
         figures.replay.push_back(base64(codes));
-    }
+    });
 }
 
 /// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
@@ -595,7 +597,8 @@ std::string report_html(Context& context, const std::string& directory, const Re
     });
     SimulationInput input = folder.input;
     input.mesh = stl.mesh.view();
-    replay_programs(context, out, folder, input, options.three_d, figures);
+    const auto part = options.three_d ? std::make_unique<StandingPart>(context, stl.mesh.view()) : nullptr;
+    replay_programs(context, out, folder, input, part.get(), figures);
     context.throw_if_cancelled();
 
     const auto limit = static_cast<std::size_t>(options.size_limit_mb * 1e6);
@@ -610,9 +613,8 @@ std::string report_html(Context& context, const std::string& directory, const Re
         return text;
     }
     figures.data["left_over"] = {{"layers", figures.replay}};
-    const StandingPart part(context, stl.mesh.view());
     std::size_t facets = kMostFacets, points = kMostPoints;
-    Json model = model_json(context, stl.mesh.view(), part, folder, facets), paths = paths_json(figures.paths, folder, points);
+    Json model = model_json(context, stl.mesh.view(), *part, folder, facets), paths = paths_json(figures.paths, folder, points);
     for (;;) {
         figures.data["model"] = model;
         figures.data["paths"] = paths;
@@ -628,7 +630,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
             paths = paths_json(figures.paths, folder, points);
         } else if (facets > kFewestFacets) {
             facets /= 2;
-            model = model_json(context, stl.mesh.view(), part, folder, facets);
+            model = model_json(context, stl.mesh.view(), *part, folder, facets);
         } else {
             throw too_large(text.size());
         }

@@ -249,8 +249,9 @@ TEST(StandingPart, EnvelopeByPointsAndByGrid) {
     const StandingPart part(context, m.view());
     const int nx = 37, ny = 29;
     std::vector<float> grid(static_cast<std::size_t>(nx) * ny);
-    for (const double z_top : {100.0, 6.5}) {
-        part.envelope_grid(-1, -0.5, 0.5, nx, ny, z_top, -1, grid.data());
+    RisingEnvelope rising(part, -1, -0.5, 0.5, nx, ny);
+    for (const double z_top : {2.0, 6.5, 6.5, 7.25, 100.0}) {
+        rising.at(z_top, -1, grid.data());
         int capped = 0, open = 0;
         for (int j = 0; j < ny; ++j)
             for (int i = 0; i < nx; ++i) {
@@ -270,6 +271,9 @@ TEST(StandingPart, EnvelopeByPointsAndByGrid) {
         if (z_top < 10) {
             EXPECT_GT(capped, 0);
         }
+        std::vector<float> alone(grid.size());
+        RisingEnvelope(part, -1, -0.5, 0.5, nx, ny).at(z_top, -1, alone.data());
+        EXPECT_EQ(grid, alone);
     }
 }
 

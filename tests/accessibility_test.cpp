@@ -169,7 +169,7 @@ public:
         low_ = -room;
         n_ = static_cast<int>((size + 2 * room) / kCell);
         std::vector<float> columns(static_cast<std::size_t>(n_) * n_);
-        part.envelope_grid(low_, low_, kCell, n_, n_, z_top, -1e6f, columns.data());
+        RisingEnvelope(part, low_, low_, kCell, n_, n_).at(z_top, -1e6f, columns.data());
         tips_.assign(columns.size(), -1e6f);
         const int r = static_cast<int>(tool.radius / kCell) + 1;
         for (int dj = -r; dj <= r; ++dj)

@@ -13,6 +13,7 @@
 #include "io/slabwright.h"
 #include "io/stl.h"
 #include "io/thinned_path.h"
+#include "kernels/access/standing_part.h"
 #include "tests/support/files.h"
 #include "tests/support/temporary_folder.h"
 
@@ -115,7 +116,10 @@ TEST(Replay, AStraightSlotIsAsDeepAndAsWideAsItIs) {
     EXPECT_EQ(again.removed_mm3, 0);
     for (const ReplayPiece& piece : again.pieces) EXPECT_EQ(piece.force_n, 0);
     // What is left stands over the layer's bottom beside the pattern: where the slot went 47.5, elsewhere the slab's top.
-    const std::vector<float> left = replay.left_over(0);
+    std::vector<float> left;
+    replay.left_over(StandingPart(context, input.mesh), [&](std::size_t layer, const std::vector<float>& of) {
+        if (layer == 0) left = of;
+    });
     const auto at = [&](double x, double y) {
         const auto i = static_cast<std::size_t>(std::lround((x - replay.first()[0]) / options.cell)),
                    j = static_cast<std::size_t>(std::lround((y - replay.first()[1]) / options.cell));

@@ -56,12 +56,11 @@ void rate(ReplayPiece& piece, const Tool& tool, const Material& m, double feed, 
 }  // namespace
 
 struct Replay::Impl {
-    Impl(Context& c, const SimulationInput& i, const ReplayOptions& o) : context(c), input(i), options(o), part(c, i.mesh) {}
+    Impl(Context& c, const SimulationInput& i, const ReplayOptions& o) : context(c), input(i), options(o) {}
 
     Context& context;
     const SimulationInput& input;
     ReplayOptions options;
-    StandingPart part;
     CellGrid grid;
     std::vector<Stock> bands;
     std::size_t slabs = 0;
@@ -171,33 +170,40 @@ ReplayedProgram Replay::run(const Program& program) {
     return result;
 }
 
-std::vector<float> Replay::left_over(std::size_t layer) const {
+void Replay::left_over(const StandingPart& part, const std::function<void(std::size_t, const std::vector<float>&)>& fn) const {
     Impl& r = *impl_;
-    r.add_slabs(layer);
-    const SimulatedLayer& l = r.input.layers[layer];
-    std::vector<float> left(r.grid.count());
+    r.add_slabs(r.input.layers.size() - 1);
+    std::vector<std::unique_ptr<RisingEnvelope>> envelopes(r.bands.size());
     parallel_each(r.context, r.bands.size(), [&](std::size_t b) {
-        const Stock& stock = r.bands[b];
-        const CellGrid& g = stock.grid();
-        std::vector<float> envelope(g.count());
-        r.part.envelope_grid(g.x0, g.y0, g.cell, g.nx, g.ny, l.z_top, std::numeric_limits<float>::lowest(), envelope.data());
-        float* out = left.data() + b * static_cast<std::size_t>(kBandRows) * static_cast<std::size_t>(g.nx);
-        for (int j = 0; j < g.ny; ++j)
-            for (int i = 0; i < g.nx; ++i) {
-                const std::size_t c = g.index(i, j);
-                const double x = g.x(i), y = g.y(j), z = stock.surface(layer, c);
-                if (!l.flask.empty() && winding(l.flask, {to_units(x), to_units(y)}) > 0) {
-                    out[c] = std::numeric_limits<float>::quiet_NaN();
-                    continue;
-                }
-                const double keep = std::max(l.z_bottom, static_cast<double>(envelope[c]));
-                double over = z - keep;
-                if (over > r.options.cusp) over = std::min(over, r.part.from_shadow({x, y, z}, l.z_top, over).distance);
-                else if (over < 0) over = -r.part.from_facets({x, y, z}, -over);
-                out[c] = static_cast<float>(over);
-            }
+        const CellGrid& g = r.bands[b].grid();
+        envelopes[b] = std::make_unique<RisingEnvelope>(part, g.x0, g.y0, g.cell, g.nx, g.ny);
     });
-    return left;
+    std::vector<float> left(r.grid.count());
+    for (std::size_t layer = 0; layer < r.input.layers.size(); ++layer) {
+        const SimulatedLayer& l = r.input.layers[layer];
+        parallel_each(r.context, r.bands.size(), [&](std::size_t b) {
+            const Stock& stock = r.bands[b];
+            const CellGrid& g = stock.grid();
+            std::vector<float> envelope(g.count());
+            envelopes[b]->at(l.z_top, std::numeric_limits<float>::lowest(), envelope.data());
+            float* out = left.data() + b * static_cast<std::size_t>(kBandRows) * static_cast<std::size_t>(g.nx);
+            for (int j = 0; j < g.ny; ++j)
+                for (int i = 0; i < g.nx; ++i) {
+                    const std::size_t c = g.index(i, j);
+                    const double x = g.x(i), y = g.y(j), z = stock.surface(layer, c);
+                    if (!l.flask.empty() && winding(l.flask, {to_units(x), to_units(y)}) > 0) {
+                        out[c] = std::numeric_limits<float>::quiet_NaN();
+                        continue;
+                    }
+                    const double keep = std::max(l.z_bottom, static_cast<double>(envelope[c]));
+                    double over = z - keep;
+                    if (over > r.options.cusp) over = std::min(over, part.from_shadow({x, y, z}, l.z_top, over).distance);
+                    else if (over < 0) over = -part.from_facets({x, y, z}, -over);
+                    out[c] = static_cast<float>(over);
+                }
+        });
+        fn(layer, left);
+    }
 }
 
 }  // namespace slabwright

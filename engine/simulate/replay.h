@@ -1,6 +1,7 @@
 // The programs run once more over a coarse stock, for a picture of the build: what each cuts as it goes, and what is left.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -42,9 +43,9 @@ public:
     /// Cuts. A program whose tool the input does not hold cuts nothing.
     ReplayedProgram run(const Program& program);
 
-    /// What stands over the finished surface of a layer, row after row from the least y: mm along the normal (negative: cut into the
-    /// part); NaN where the flask stays.
-    [[nodiscard]] std::vector<float> left_over(std::size_t layer) const;
+    /// Calls fn(layer, left) for every layer, from the lowest: what stands over its finished surface, row after row from the least y, mm
+    /// along the normal (negative: cut into the part); NaN where the flask stays. @param part of the input's mesh
+    void left_over(const StandingPart& part, const std::function<void(std::size_t, const std::vector<float>&)>& fn) const;
 
     [[nodiscard]] int nx() const;
     [[nodiscard]] int ny() const;

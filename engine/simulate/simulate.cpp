@@ -376,10 +376,12 @@ private:
             }
         }
         for (std::size_t c = 0; c < grid.count(); ++c) result.board_cut = std::max(result.board_cut, stock.board_cut(c));
-        std::vector<float> envelope(grid.count());
+        std::vector<float> heights(grid.count());
+        RisingEnvelope envelope(part_, grid.x0, grid.y0, grid.cell, grid.nx, grid.ny);
         for (std::size_t l = 0; l < input_.layers.size(); ++l) {
             context_.throw_if_cancelled();
-            measure_layer(l, stock, envelope, result, i0, j0, report);
+            envelope.at(input_.layers[l].z_top, std::numeric_limits<float>::lowest(), heights.data());
+            measure_layer(l, stock, heights, result, i0, j0, report);
         }
         return result;
     }
@@ -477,16 +479,14 @@ private:
         return static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i);
     }
 
-    /// Compares one layer's stock with the part, when all programs of all layers have run.
-    void measure_layer(std::size_t l, const Stock& stock, std::vector<float>& envelope, TileResult& result, int i0, int j0,
+    /// Compares one layer's stock with the part's envelope, when all programs of all layers have run.
+    void measure_layer(std::size_t l, const Stock& stock, const std::vector<float>& envelope, TileResult& result, int i0, int j0,
                        SimulationReport& report) const {
         const SimulatedLayer& layer = input_.layers[l];
         const CellGrid& grid = stock.grid();
         const std::vector<FlaskCell> flask = flask_cells(flasks_[l], grid);
         TileLayer& out = result.layers[l];
         LayerFindings& f = out.findings;
-        const float none = std::numeric_limits<float>::lowest();
-        part_.envelope_grid(grid.x0, grid.y0, grid.cell, grid.nx, grid.ny, layer.z_top, none, envelope.data());
         const double limit = options_.cusp + options_.slack;
         const double lowest = l == 0 && options_.board_cut >= 0 ? layer.z_bottom - options_.board_cut : -std::numeric_limits<double>::infinity();
         Reach reach(part_, input_.tools, layer.z_bottom, layer.z_top, lowest);

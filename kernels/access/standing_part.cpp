@@ -761,45 +761,64 @@ double StandingPart::envelope(double x, double y, double z_top, double none) con
     return height > -kInfinity ? height : none;
 }
 
-void StandingPart::envelope_grid(double x0, double y0, double cell, int nx, int ny, double z_top, float none, float* out) const {
-    const double top = z_top - kSheet, x1 = x0 + cell * (nx - 1), y1 = y0 + cell * (ny - 1);
-    const std::size_t count = static_cast<std::size_t>(nx) * ny;
-    std::vector<int> winding(count, 0);
-    constexpr float nothing = -std::numeric_limits<float>::infinity();
-    std::fill(out, out + count, nothing);
-    walk([&](const Node& n) { return n.x0 <= x1 && x0 <= n.x1 && n.y0 <= y1 && y0 <= n.y1; },
-         [&](const Facet& f) {
-             const double fx0 = std::min({f.v[0].x, f.v[1].x, f.v[2].x}), fx1 = std::max({f.v[0].x, f.v[1].x, f.v[2].x});
-             const double fy0 = std::min({f.v[0].y, f.v[1].y, f.v[2].y}), fy1 = std::max({f.v[0].y, f.v[1].y, f.v[2].y});
-             const int j0 = static_cast<int>(std::max(0.0, std::ceil((fy0 - y0) / cell) - 1)),
-                       j1 = static_cast<int>(std::min<double>(ny - 1, std::floor((fy1 - y0) / cell) + 1));
-             for (int j = j0; j <= j1; ++j) {
-                 const double y = y0 + j * cell;
-                 if (y < fy0 || y > fy1) continue;
-                 // Where the row crosses the outline, a cell wider: facet_winding() decides, this only saves asking it.
-                 double low = fx1, high = fx0;
-                 for (int k = 0; k < 3; ++k) {
-                     const Vec3f &a = f.v[k], &b = f.v[(k + 1) % 3];
-                     if ((a.y <= y) == (b.y <= y)) continue;
-                     const double x = a.x + (y - a.y) / (static_cast<double>(b.y) - a.y) * (static_cast<double>(b.x) - a.x);
-                     low = std::min(low, x), high = std::max(high, x);
-                 }
-                 const int i0 = static_cast<int>(std::clamp(std::floor((low - x0) / cell), 0.0, static_cast<double>(nx)));
-                 const int i1 = static_cast<int>(std::clamp(std::ceil((high - x0) / cell), -1.0, nx - 1.0));
-                 for (int i = i0; i <= i1; ++i) {
-                     const double x = x0 + i * cell;
-                     const int w = facet_winding(f.v, x, y);
-                     if (w == 0) continue;
-                     const double z = facet_height(f.v, x, y);
-                     const std::size_t k = static_cast<std::size_t>(j) * nx + i;
-                     if (z >= top) winding[k] += w;
-                     else out[k] = std::max(out[k], static_cast<float>(z));
-                 }
-             }
-         });
-    for (std::size_t k = 0; k < count; ++k)
-        if (winding[k] > 0) out[k] = static_cast<float>(z_top);
-        else if (out[k] == nothing) out[k] = none;
+// fn(point, winding, height) for all points that facets come over which may be as high as z_low and lower than z_high.
+template <class Fn>
+void RisingEnvelope::for_each_point(double z_low, double z_high, Fn&& fn) const {
+    const double x1 = x0_ + cell_ * (nx_ - 1), y1 = y0_ + cell_ * (ny_ - 1);
+    part_->walk([&](const auto& n) { return n.x0 <= x1 && x0_ <= n.x1 && n.y0 <= y1 && y0_ <= n.y1 && n.z1 >= z_low && n.z0 < z_high; },
+                [&](const auto& facet) {
+                    const auto& [a, b, c] = facet.v;
+                    if (std::max({a.z, b.z, c.z}) < z_low || std::min({a.z, b.z, c.z}) >= z_high) return;
+                    const double fx0 = std::min({a.x, b.x, c.x}), fx1 = std::max({a.x, b.x, c.x});
+                    const double fy0 = std::min({a.y, b.y, c.y}), fy1 = std::max({a.y, b.y, c.y});
+                    const int j0 = static_cast<int>(std::max(0.0, std::ceil((fy0 - y0_) / cell_) - 1)),
+                              j1 = static_cast<int>(std::min<double>(ny_ - 1, std::floor((fy1 - y0_) / cell_) + 1));
+                    for (int j = j0; j <= j1; ++j) {
+                        const double y = y0_ + j * cell_;
+                        if (y < fy0 || y > fy1) continue;
+                        // Where the row crosses the outline, a cell wider: facet_winding() decides, this only saves asking it.
+                        double low = fx1, high = fx0;
+                        for (int k = 0; k < 3; ++k) {
+                            const Vec3f &p = facet.v[static_cast<std::size_t>(k)], &q = facet.v[static_cast<std::size_t>((k + 1) % 3)];
+                            if ((p.y <= y) == (q.y <= y)) continue;
+                            const double x = p.x + (y - p.y) / (static_cast<double>(q.y) - p.y) * (static_cast<double>(q.x) - p.x);
+                            low = std::min(low, x), high = std::max(high, x);
+                        }
+                        const int i0 = static_cast<int>(std::clamp(std::floor((low - x0_) / cell_), 0.0, static_cast<double>(nx_)));
+                        const int i1 = static_cast<int>(std::clamp(std::ceil((high - x0_) / cell_), -1.0, nx_ - 1.0));
+                        for (int i = i0; i <= i1; ++i) {
+                            const double x = x0_ + i * cell_;
+                            if (const int w = facet_winding(facet.v, x, y); w != 0)
+                                fn(static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i), w,
+                                   facet_height(facet.v, x, y));
+                        }
+                    }
+                });
+}
+
+RisingEnvelope::RisingEnvelope(const StandingPart& part, double x0, double y0, double cell, int nx, int ny)
+    : part_(&part),
+      x0_(x0),
+      y0_(y0),
+      cell_(cell),
+      nx_(nx),
+      ny_(ny),
+      passed_(-kInfinity),
+      above_(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny), 0),
+      below_(above_.size(), -std::numeric_limits<float>::infinity()) {
+    for_each_point(-kInfinity, kInfinity, [&](std::size_t k, int w, double) { above_[k] += w; });
+}
+
+void RisingEnvelope::at(double z_top, float none, float* out) {
+    const double top = z_top - StandingPart::kSheet;
+    for_each_point(passed_, top, [&](std::size_t k, int w, double z) {
+        if (z < passed_ || z >= top) return;
+        above_[k] -= w;
+        below_[k] = std::max(below_[k], static_cast<float>(z));
+    });
+    passed_ = std::max(passed_, top);
+    for (std::size_t k = 0; k < above_.size(); ++k)
+        out[k] = above_[k] > 0 ? static_cast<float>(z_top) : below_[k] == -std::numeric_limits<float>::infinity() ? none : below_[k];
 }
 
 StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_top, double limit) const {

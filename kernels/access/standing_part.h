@@ -68,9 +68,6 @@ public:
 
     /// The largest z ≤ z_top of the part over (x, y); `none` where there is no part.
     [[nodiscard]] double envelope(double x, double y, double z_top, double none) const;
-    /// The same for a grid of nx × ny points (x0 + i·cell, y0 + j·cell), row j after row j − 1, by scan conversion.
-    void envelope_grid(double x0, double y0, double cell, int nx, int ny, double z_top, float none, float* out) const;
-
     /// How far something stands away, and which way: `away` leads from its nearest point to the point asked for.
     struct Clearance {
         double distance = 0;  ///< mm; the limit when nothing is nearer
@@ -103,9 +100,30 @@ private:
     void gather(Vicinity& around) const;
     void gather_covers(Vicinity& around) const;
     [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
+    friend class RisingEnvelope;
     std::vector<Facet> facets_;              ///< in Morton order
     std::vector<std::vector<Node>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
     Box3 box_{};
+};
+
+/// The envelope (StandingPart::envelope) over a grid of nx × ny points (x0 + i·cell, y0 + j·cell), row j after row j − 1, for planes that
+/// rise, by scan conversion: a facet is looked at once at first and then as its heights are passed.
+class RisingEnvelope {
+public:
+    /// The part must outlive it.
+    RisingEnvelope(const StandingPart& part, double x0, double y0, double cell, int nx, int ny);
+    /// @pre z_top is no lower than when asked before  @param out gets nx × ny heights; `none` where there is no part
+    void at(double z_top, float none, float* out);
+
+private:
+    template <class Fn>
+    void for_each_point(double z_low, double z_high, Fn&& fn) const;
+    const StandingPart* part_;
+    double x0_, y0_, cell_;
+    int nx_, ny_;
+    double passed_;                    // facets are looked at up to here
+    std::vector<std::int32_t> above_;  // winding number of what is there or higher
+    std::vector<float> below_;         // highest of what is lower
 };
 
 }  // namespace slabwright
