@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "kernels/access/near_facets.h"
@@ -11,12 +12,13 @@
 #include "kernels/mesh/raw_array.h"
 #include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
+#include "kernels/wide.h"
 
 namespace slabwright {
 
 namespace {
 
-constexpr std::size_t kFan = 4;
+constexpr std::size_t kFan = 8;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kHair = 1e-9;  // mm: rounding of a bound
 
@@ -307,44 +309,88 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
     std::size_t below_count = n;
     do {
         const std::size_t count = (below_count + kFan - 1) / kFan, level = levels_.size();
-        levels_.emplace_back(count);
-        parallel_for(context, count, 1 << 12, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
+        levels_.emplace_back((count + kFan - 1) / kFan);
+        parallel_for(context, levels_.back().size(), 1 << 10, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin * kFan; i < end * kFan; ++i) {
                 constexpr float inf = std::numeric_limits<float>::infinity();
                 Node node{inf, inf, inf, -inf, -inf, -inf};
                 for (std::size_t k = i * kFan; k < std::min(below_count, (i + 1) * kFan); ++k) {
                     if (level == 0)
                         for (const Vec3f& v : facets_[k].v) join(node, {v.x, v.y, v.z, v.x, v.y, v.z});
-                    else join(node, levels_[level - 1][k]);
+                    else join(node, levels_[level - 1][k / kFan][k % kFan]);
                 }
-                levels_[level][i] = node;
+                Nodes& eight = levels_[level][i / kFan];
+                const std::size_t k = i % kFan;
+                eight.x0[k] = node.x0, eight.y0[k] = node.y0, eight.z0[k] = node.z0;
+                eight.x1[k] = node.x1, eight.y1[k] = node.y1, eight.z1[k] = node.z1;
             }
         });
         below_count = count;
-    } while (below_count > 1);
+    } while (below_count > kFan);
 }
 
-/// Visits, in one fixed order, every facet of whose nodes enter(box) holds.
-template <class Enter, class Visit>
-void StandingPart::walk(Enter&& enter, Visit&& visit) const {
+StandingPart::Within::Within(const Point3& from, const Point3& to) {
+    constexpr float inf = std::numeric_limits<float>::infinity();
+    for (std::size_t k = 0; k < 3; ++k) {
+        low[k] = static_cast<float>(from[k]), high[k] = static_cast<float>(to[k]);
+        if (low[k] > from[k]) low[k] = std::nextafter(low[k], -inf);
+        if (high[k] < to[k]) high[k] = std::nextafter(high[k], inf);
+    }
+}
+
+SLABWRIGHT_WIDE void StandingPart::overlapping(const Nodes& n, const Within& box, std::array<unsigned char, 8>& keep) {
+    const float x0 = box.low[0], y0 = box.low[1], z0 = box.low[2], x1 = box.high[0], y1 = box.high[1], z1 = box.high[2];
+    std::array<unsigned char, 8> kept;
+    for (std::size_t k = 0; k < kFan; ++k)
+        kept[k] =
+            static_cast<unsigned char>((n.x0[k] <= x1) & (x0 <= n.x1[k]) & (n.y0[k] <= y1) & (y0 <= n.y1[k]) & (n.z0[k] <= z1) & (z0 <= n.z1[k]));
+    keep = kept;
+}
+
+/// Visits, in one fixed order, every facet of the nodes that choose(eight nodes, keep) keeps.
+template <class Choose, class Visit>
+void StandingPart::walk_chosen(Choose&& choose, Visit&& visit) const {
     struct Item {
         std::uint32_t level;
-        std::size_t index;
+        std::size_t eight;
     };
-    std::array<Item, 96> stack;
+    std::array<Item, 128> stack;
     std::size_t size = 0;
     if (facets_.empty()) return;
     stack[size++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0};
+    std::array<unsigned char, 8> keep;
     while (size > 0) {
         const Item item = stack[--size];
-        if (!enter(levels_[item.level][item.index])) continue;
-        if (item.level == 0) {
-            for (std::size_t k = item.index * kFan; k < std::min(facets_.size(), (item.index + 1) * kFan); ++k) visit(facets_[k]);
-        } else {
-            const std::size_t end = std::min(levels_[item.level - 1].size(), (item.index + 1) * kFan);
-            for (std::size_t k = end; k-- > item.index * kFan;) stack[size++] = {item.level - 1, k};
+        choose(levels_[item.level][item.eight], keep);
+        std::uint64_t kept;
+        std::memcpy(&kept, keep.data(), sizeof(kept));
+        if (kept == 0) continue;
+        const std::size_t first = item.eight * kFan;
+        if (item.level > 0) {
+            for (std::size_t k = kFan; k-- > 0;)
+                if (keep[k]) stack[size++] = {item.level - 1, first + k};
+            continue;
         }
+        for (std::size_t k = 0; k < kFan; ++k)
+            if (keep[k])
+                for (std::size_t f = (first + k) * kFan; f < std::min(facets_.size(), (first + k + 1) * kFan); ++f) visit(facets_[f]);
     }
+}
+
+/// The same of every node whose box enter() holds for.
+template <class Enter, class Visit>
+void StandingPart::walk(Enter&& enter, Visit&& visit) const {
+    walk_chosen(
+        [&](const Nodes& nodes, std::array<unsigned char, 8>& keep) {
+            for (std::size_t k = 0; k < kFan; ++k) keep[k] = nodes.x0[k] <= nodes.x1[k] && enter(nodes[k]);
+        },
+        visit);
+}
+
+/// The same of every node whose box has something in common with this.
+template <class Visit>
+void StandingPart::walk_within(const Within& box, Visit&& visit) const {
+    walk_chosen([&](const Nodes& nodes, std::array<unsigned char, 8>& keep) { overlapping(nodes, box, keep); }, visit);
 }
 
 namespace {
@@ -492,25 +538,28 @@ void StandingPart::walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit)
         std::size_t index;
         double d;
     };
-    std::array<Item, 96> stack;
+    std::array<Item, 128> stack;
     std::size_t size = 0;
     if (facets_.empty()) return;
-    stack[size++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0, squared(levels_.back()[0])};
-    while (size > 0) {
-        const Item item = stack[--size];
-        if (!(item.d < limit())) continue;
-        if (item.level == 0) {
-            for (std::size_t k = item.index * kFan; k < std::min(facets_.size(), (item.index + 1) * kFan); ++k) visit(facets_[k]);
-            continue;
-        }
-        const std::size_t end = std::min(levels_[item.level - 1].size(), (item.index + 1) * kFan), first = size;
-        for (std::size_t k = end; k-- > item.index * kFan;) {
-            const double d = squared(levels_[item.level - 1][k]);
+    const auto push = [&](std::uint32_t level, std::size_t eight) {
+        const Nodes& nodes = levels_[level][eight];
+        const std::size_t first = size;
+        for (std::size_t k = kFan; k-- > 0;) {
+            if (!(nodes.x0[k] <= nodes.x1[k])) continue;
+            const double d = squared(nodes[k]);
             if (!(d < limit())) continue;
             std::size_t at = size++;
             for (; at > first && stack[at - 1].d < d; --at) stack[at] = stack[at - 1];
-            stack[at] = {item.level - 1, k, d};
+            stack[at] = {level, eight * kFan + k, d};
         }
+    };
+    push(static_cast<std::uint32_t>(levels_.size() - 1), 0);
+    while (size > 0) {
+        const Item item = stack[--size];
+        if (!(item.d < limit())) continue;
+        if (item.level > 0) push(item.level - 1, item.index);
+        else
+            for (std::size_t k = item.index * kFan; k < std::min(facets_.size(), (item.index + 1) * kFan); ++k) visit(facets_[k]);
     }
 }
 
@@ -639,20 +688,17 @@ void StandingPart::gather(Vicinity& v) const {
     };
     v.facets.clear();
     v.terms.place(v.low, v.high, reach, cutter.ball());
-    walk(
-        [&](const Node& n) {
-            if (n.z0 >= cutter.top) return false;
-            return gap2(n.x0, n.x1, n.y0, n.y1) < left2(n.z1);
-        },
-        [&](const Facet& f) {
-            const auto& [a, b, c] = f.v;
-            if (std::min({a.z, b.z, c.z}) >= cutter.top) return;
-            const double x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x}), y0 = std::min({a.y, b.y, c.y}),
-                         y1 = std::max({a.y, b.y, c.y});
-            if (gap2(x0, x1, y0, y1) >= left2(std::max({a.z, b.z, c.z}))) return;
-            if (v.terms.add({to_point(a), to_point(b), to_point(c)}, cutter.ball() ? cutter.radius : v.at_least))
-                v.facets.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
-        });
+    walk_within(Within({v.low[0] - reach, v.low[1] - reach, cutter.ball() ? lowest - reach : lowest + v.at_least},
+                       {v.high[0] + reach, v.high[1] + reach, cutter.top}),
+                [&](const Facet& f) {
+                    const auto& [a, b, c] = f.v;
+                    if (std::min({a.z, b.z, c.z}) >= cutter.top) return;
+                    const double x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x}), y0 = std::min({a.y, b.y, c.y}),
+                                 y1 = std::max({a.y, b.y, c.y});
+                    if (gap2(x0, x1, y0, y1) >= left2(std::max({a.z, b.z, c.z}))) return;
+                    if (v.terms.add({to_point(a), to_point(b), to_point(c)}, cutter.ball() ? cutter.radius : v.at_least))
+                        v.facets.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
+                });
     v.facets_known = true;
 }
 
@@ -661,16 +707,14 @@ void StandingPart::gather_covers(Vicinity& v) const {
     const double top = v.cutter.top;
     v.covers.clear();
     v.boxes.clear();
-    walk([&](const Node& n) { return n.z1 >= top && n.x0 <= v.high[0] && v.low[0] <= n.x1 && n.y0 <= v.high[1] && v.low[1] <= n.y1; },
-         [&](const Facet& f) {
-             const auto& [a, b, c] = f.v;
-             if (a.z < top && b.z < top && c.z < top) return;
-             const float x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x}), y0 = std::min({a.y, b.y, c.y}),
-                         y1 = std::max({a.y, b.y, c.y});
-             if (x0 > v.high[0] || v.low[0] > x1 || y0 > v.high[1] || v.low[1] > y1) return;
-             v.covers.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
-             v.boxes.add({x0, x1, y0, y1});
-         });
+    walk_within(Within({v.low[0], v.low[1], top}, {v.high[0], v.high[1], kInfinity}), [&](const Facet& f) {
+        const auto& [a, b, c] = f.v;
+        if (a.z < top && b.z < top && c.z < top) return;
+        const float x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x}), y0 = std::min({a.y, b.y, c.y}), y1 = std::max({a.y, b.y, c.y});
+        if (x0 > v.high[0] || v.low[0] > x1 || y0 > v.high[1] || v.low[1] > y1) return;
+        v.covers.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
+        v.boxes.add({x0, x1, y0, y1});
+    });
     v.covers_known = true;
 }
 
@@ -736,12 +780,11 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
 
 bool StandingPart::covered(double x, double y, double z) const {
     int winding = 0;
-    walk([&](const Node& n) { return n.z1 >= z && n.x0 <= x && x <= n.x1 && n.y0 <= y && y <= n.y1; },
-         [&](const Facet& f) {
-             if (f.v[0].z < z && f.v[1].z < z && f.v[2].z < z) return;
-             const int w = facet_winding(f.v, x, y);
-             if (w != 0 && facet_height(f.v, x, y) >= z) winding += w;
-         });
+    walk_within(Within({x, y, z}, {x, y, kInfinity}), [&](const Facet& f) {
+        if (f.v[0].z < z && f.v[1].z < z && f.v[2].z < z) return;
+        const int w = facet_winding(f.v, x, y);
+        if (w != 0 && facet_height(f.v, x, y) >= z) winding += w;
+    });
     return winding > 0;
 }
 
@@ -749,14 +792,13 @@ double StandingPart::envelope(double x, double y, double z_top, double none) con
     const double top = z_top - kSheet;
     int winding = 0;
     double height = -kInfinity;
-    walk([&](const Node& n) { return n.x0 <= x && x <= n.x1 && n.y0 <= y && y <= n.y1; },
-         [&](const Facet& f) {
-             const int w = facet_winding(f.v, x, y);
-             if (w == 0) return;
-             const double z = facet_height(f.v, x, y);
-             if (z >= top) winding += w;
-             else height = std::max(height, z);
-         });
+    walk_within(Within({x, y, -kInfinity}, {x, y, kInfinity}), [&](const Facet& f) {
+        const int w = facet_winding(f.v, x, y);
+        if (w == 0) return;
+        const double z = facet_height(f.v, x, y);
+        if (z >= top) winding += w;
+        else height = std::max(height, z);
+    });
     if (winding > 0) return z_top;
     return height > -kInfinity ? height : none;
 }
@@ -765,35 +807,33 @@ double StandingPart::envelope(double x, double y, double z_top, double none) con
 template <class Fn>
 void RisingEnvelope::for_each_point(double z_low, double z_high, Fn&& fn) const {
     const double x1 = x0_ + cell_ * (nx_ - 1), y1 = y0_ + cell_ * (ny_ - 1);
-    part_->walk([&](const auto& n) { return n.x0 <= x1 && x0_ <= n.x1 && n.y0 <= y1 && y0_ <= n.y1 && n.z1 >= z_low && n.z0 < z_high; },
-                [&](const auto& facet) {
-                    const auto& [a, b, c] = facet.v;
-                    if (std::max({a.z, b.z, c.z}) < z_low || std::min({a.z, b.z, c.z}) >= z_high) return;
-                    const double fx0 = std::min({a.x, b.x, c.x}), fx1 = std::max({a.x, b.x, c.x});
-                    const double fy0 = std::min({a.y, b.y, c.y}), fy1 = std::max({a.y, b.y, c.y});
-                    const int j0 = static_cast<int>(std::max(0.0, std::ceil((fy0 - y0_) / cell_) - 1)),
-                              j1 = static_cast<int>(std::min<double>(ny_ - 1, std::floor((fy1 - y0_) / cell_) + 1));
-                    for (int j = j0; j <= j1; ++j) {
-                        const double y = y0_ + j * cell_;
-                        if (y < fy0 || y > fy1) continue;
-                        // Where the row crosses the outline, a cell wider: facet_winding() decides, this only saves asking it.
-                        double low = fx1, high = fx0;
-                        for (int k = 0; k < 3; ++k) {
-                            const Vec3f &p = facet.v[static_cast<std::size_t>(k)], &q = facet.v[static_cast<std::size_t>((k + 1) % 3)];
-                            if ((p.y <= y) == (q.y <= y)) continue;
-                            const double x = p.x + (y - p.y) / (static_cast<double>(q.y) - p.y) * (static_cast<double>(q.x) - p.x);
-                            low = std::min(low, x), high = std::max(high, x);
-                        }
-                        const int i0 = static_cast<int>(std::clamp(std::floor((low - x0_) / cell_), 0.0, static_cast<double>(nx_)));
-                        const int i1 = static_cast<int>(std::clamp(std::ceil((high - x0_) / cell_), -1.0, nx_ - 1.0));
-                        for (int i = i0; i <= i1; ++i) {
-                            const double x = x0_ + i * cell_;
-                            if (const int w = facet_winding(facet.v, x, y); w != 0)
-                                fn(static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i), w,
-                                   facet_height(facet.v, x, y));
-                        }
-                    }
-                });
+    part_->walk_within(StandingPart::Within({x0_, y0_, z_low}, {x1, y1, z_high}), [&](const auto& facet) {
+        const auto& [a, b, c] = facet.v;
+        if (std::max({a.z, b.z, c.z}) < z_low || std::min({a.z, b.z, c.z}) >= z_high) return;
+        const double fx0 = std::min({a.x, b.x, c.x}), fx1 = std::max({a.x, b.x, c.x});
+        const double fy0 = std::min({a.y, b.y, c.y}), fy1 = std::max({a.y, b.y, c.y});
+        const int j0 = static_cast<int>(std::max(0.0, std::ceil((fy0 - y0_) / cell_) - 1)),
+                  j1 = static_cast<int>(std::min<double>(ny_ - 1, std::floor((fy1 - y0_) / cell_) + 1));
+        for (int j = j0; j <= j1; ++j) {
+            const double y = y0_ + j * cell_;
+            if (y < fy0 || y > fy1) continue;
+            // Where the row crosses the outline, a cell wider: facet_winding() decides, this only saves asking it.
+            double low = fx1, high = fx0;
+            for (int k = 0; k < 3; ++k) {
+                const Vec3f &p = facet.v[static_cast<std::size_t>(k)], &q = facet.v[static_cast<std::size_t>((k + 1) % 3)];
+                if ((p.y <= y) == (q.y <= y)) continue;
+                const double x = p.x + (y - p.y) / (static_cast<double>(q.y) - p.y) * (static_cast<double>(q.x) - p.x);
+                low = std::min(low, x), high = std::max(high, x);
+            }
+            const int i0 = static_cast<int>(std::clamp(std::floor((low - x0_) / cell_), 0.0, static_cast<double>(nx_)));
+            const int i1 = static_cast<int>(std::clamp(std::ceil((high - x0_) / cell_), -1.0, nx_ - 1.0));
+            for (int i = i0; i <= i1; ++i) {
+                const double x = x0_ + i * cell_;
+                if (const int w = facet_winding(facet.v, x, y); w != 0)
+                    fn(static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i), w, facet_height(facet.v, x, y));
+            }
+        }
+    });
 }
 
 RisingEnvelope::RisingEnvelope(const StandingPart& part, double x0, double y0, double cell, int nx, int ny)

@@ -91,8 +91,23 @@ private:
     struct Node {
         float x0, y0, z0, x1, y1, z1;
     };
+    /// Boxes of eight nodes that follow one another, as rows of numbers; those that there are none of are empty.
+    struct Nodes {
+        std::array<float, 8> x0, y0, z0, x1, y1, z1;
+        [[nodiscard]] Node operator[](std::size_t k) const { return {x0[k], y0[k], z0[k], x1[k], y1[k], z1[k]}; }
+    };
+    /// A box in single precision; it holds what it was made of.
+    struct Within {
+        Within(const Point3& low, const Point3& high);
+        std::array<float, 3> low, high;
+    };
+    static void overlapping(const Nodes& nodes, const Within& box, std::array<unsigned char, 8>& keep);
+    template <class Choose, class Visit>
+    void walk_chosen(Choose&& choose, Visit&& visit) const;
     template <class Enter, class Visit>
     void walk(Enter&& enter, Visit&& visit) const;
+    template <class Visit>
+    void walk_within(const Within& box, Visit&& visit) const;
     template <class Squared, class Limit, class Visit>
     void walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit) const;
     struct Vicinity;
@@ -101,8 +116,8 @@ private:
     void gather_covers(Vicinity& around) const;
     [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
     friend class RisingEnvelope;
-    std::vector<Facet> facets_;              ///< in Morton order
-    std::vector<std::vector<Node>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
+    std::vector<Facet> facets_;               ///< in Morton order
+    std::vector<std::vector<Nodes>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
     Box3 box_{};
 };
 
