@@ -245,6 +245,8 @@ public:
         return result;
     }
 
+    [[nodiscard]] double bytes() const { return static_cast<double>(context_.memory_charged()); }
+
 private:
     Context context_;
     AccessScene scene_;
@@ -296,6 +298,7 @@ void share_of_bare(benchmark::State& state) {
     state.counters["points/s"] = rates[middle] * static_cast<double>(result.points) / asked;
     state.counters["asked/point"] = asked / static_cast<double>(result.points);
     state.counters["AR"] = result.ratio();
+    state.counters["bytes/facet"] = kernel.bytes() / static_cast<double>(m.mesh.facets.size());
 }
 
 }  // namespace

@@ -420,3 +420,28 @@ TEST(Accessibility, CanBeCancelledAndRefuses) {
     context.cancel();
     EXPECT_THROW((void)scene.accessible(context, 0, 12, ball(3)), Error);
 }
+
+TEST(Accessibility, IsChargedForItsTrees) {
+    std::uint64_t taken = 0;
+    {
+        Context context;
+        const Mesh mesh = blocks(context, 40, 1, [](int i, int j) { return 2 + (i * 7 + j * 5) % 11; });
+        const std::uint64_t before = context.memory_charged();
+        {
+            const AccessScene scene(context, mesh.view());
+            taken = context.memory_charged() - before;
+            EXPECT_GT(taken, mesh.facets.size() * 100);
+            EXPECT_LT(taken, mesh.facets.size() * 1000);
+        }
+        EXPECT_EQ(context.memory_charged(), before);
+        // Room for the planes, not for the tree.
+        Context narrow({.memory_bytes = taken * 3 / 5});
+        try {
+            const AccessScene scene(narrow, mesh.view());
+            ADD_FAILURE() << "no limit was kept";
+        } catch (const Error& e) {
+            EXPECT_EQ(e.code(), "memory.limit");
+        }
+        EXPECT_EQ(narrow.memory_charged(), 0u);
+    }
+}

@@ -17,6 +17,7 @@
 #include "kernels/access/cap_cover.h"
 #include "kernels/access/obstacles.h"
 #include "kernels/access/poke.h"
+#include "kernels/access/tree_memory.h"
 #include "kernels/access/triangle.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
@@ -154,6 +155,10 @@ Planes planes_of(const Triangle& t) {
 }  // namespace
 
 struct AccessScene::Impl {
+    Impl(Context& context, MeshView of) : planes_memory(context, of.size() * sizeof(Planes), "the planes of the facets"), memory(context), mesh(of) {}
+
+    MemoryCharge planes_memory;
+    TreeMemory memory;
     MeshView mesh;
     double margin = 0;
     std::vector<Planes> planes;  ///< by facet
@@ -175,7 +180,7 @@ struct AccessScene::Impl {
         }
         return t;
     }
-    RTCScene build(std::span<const Index3> facets) const {
+    RTCScene build(std::span<const Index3> facets) {
         RTCScene scene = rtcNewScene(device);
         rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
         RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -194,6 +199,7 @@ struct AccessScene::Impl {
         rtcCommitScene(scene);
         if (rtcGetDeviceError(device) != RTC_ERROR_NONE) {
             rtcReleaseScene(scene);
+            memory.charge();
             throw Error(ErrorKind::no_plan, "embree.build", "Embree could not build its tree", {}, "free memory, or plan with fewer facets");
         }
         return scene;
@@ -992,8 +998,7 @@ Areas measure(Searcher& searcher, const Question& q, const Piece& piece, const P
 
 }  // namespace
 
-AccessScene::AccessScene(Context& context, MeshView mesh) : impl_(std::make_unique<Impl>()) {
-    impl_->mesh = mesh;
+AccessScene::AccessScene(Context& context, MeshView mesh) : impl_(std::make_unique<Impl>(context, mesh)) {
     impl_->box = bounds(mesh);
     double size = 1;
     for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
@@ -1018,8 +1023,10 @@ AccessScene::AccessScene(Context& context, MeshView mesh) : impl_(std::make_uniq
     context.throw_if_cancelled();
     impl_->device = rtcNewDevice(nullptr);  // "threads=…" here would clamp TBB for the whole process
     if (!impl_->device) throw Error(ErrorKind::no_plan, "embree.device", "Embree offers no device", {}, "check the installation of libembree");
+    rtcSetDeviceMemoryMonitorFunction(impl_->device, &TreeMemory::monitor, &impl_->memory);
     impl_->all = impl_->build(mesh.facets);
     if (!hanging.empty()) impl_->hanging = impl_->build(hanging);
+    impl_->memory.charge();
 }
 
 AccessScene::~AccessScene() = default;

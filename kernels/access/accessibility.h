@@ -48,8 +48,9 @@ struct Accessibility {
     [[nodiscard]] double ratio() const { return area > 0 ? reached / area : 1; }
 };
 
-/// Embree's trees over a mesh, built once for all layers and tools. Borrows the mesh's arrays.
-/// @throws Error(input, "mesh.not_finite")
+/// Embree's trees over a mesh, built once for all layers and tools, some 120 bytes a facet, charged to the context, which must outlive it. Borrows the
+/// mesh's arrays.
+/// @throws Error(input, "mesh.not_finite"), Error(no_plan, "memory.limit")
 class AccessScene {
 public:
     AccessScene(Context& context, MeshView mesh);

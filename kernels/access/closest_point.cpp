@@ -11,6 +11,7 @@
 #include <limits>
 #include <string>
 
+#include "kernels/access/tree_memory.h"
 #include "kernels/access/triangle.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/morton.h"
@@ -30,6 +31,9 @@ float down(double v) { return std::nextafter(static_cast<float>(v), -std::numeri
 }  // namespace
 
 struct ClosestPoint::Impl {
+    explicit Impl(Context& context) : memory(context) {}
+
+    TreeMemory memory;
     MeshView mesh;
     double margin = 0;  ///< mm
     Box3 box;
@@ -109,7 +113,7 @@ void count_crossing(const RTCOccludedFunctionNArguments* args) {
 
 }  // namespace
 
-ClosestPoint::ClosestPoint(Context& context, MeshView mesh) : impl_(std::make_unique<Impl>()) {
+ClosestPoint::ClosestPoint(Context& context, MeshView mesh) : impl_(std::make_unique<Impl>(context)) {
     impl_->mesh = mesh;
     impl_->box = bounds(mesh);
     double size = 1;
@@ -124,6 +128,7 @@ ClosestPoint::ClosestPoint(Context& context, MeshView mesh) : impl_(std::make_un
     context.throw_if_cancelled();
     impl_->device = rtcNewDevice(nullptr);  // "threads=…" here would clamp TBB for the whole process
     if (!impl_->device) throw Error(ErrorKind::no_plan, "embree.device", "Embree offers no device", {}, "check the installation of libembree");
+    rtcSetDeviceMemoryMonitorFunction(impl_->device, &TreeMemory::monitor, &impl_->memory);
     impl_->scene = rtcNewScene(impl_->device);
     rtcSetSceneFlags(impl_->scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
     RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_USER);
@@ -136,6 +141,7 @@ ClosestPoint::ClosestPoint(Context& context, MeshView mesh) : impl_(std::make_un
     rtcAttachGeometry(impl_->scene, geometry);
     rtcReleaseGeometry(geometry);
     rtcCommitScene(impl_->scene);
+    impl_->memory.charge();
     if (rtcGetDeviceError(impl_->device) != RTC_ERROR_NONE)
         throw Error(ErrorKind::no_plan, "embree.build", "Embree could not build its tree", {}, "free memory, or plan with fewer facets");
 }

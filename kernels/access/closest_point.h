@@ -21,8 +21,8 @@ struct ClosestHit {
 };
 
 /// Embree's tree over a mesh, for queries from many threads. Distances are computed in double from the float32 vertices;
-/// Embree only finds the candidates. The mesh's arrays must outlive it.
-/// @throws Error(input) on a facet with a non-finite corner (Embree would leave it out in silence)
+/// Embree only finds the candidates. The mesh's arrays and the context, to which its memory is charged, must outlive it.
+/// @throws Error(no_plan, "memory.limit"), and Error(input) on a facet with a non-finite corner (Embree would leave it out in silence)
 class ClosestPoint {
 public:
     ClosestPoint(Context& context, MeshView mesh);
