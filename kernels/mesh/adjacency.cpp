@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "kernels/mesh/edges.h"
@@ -118,29 +121,125 @@ void pair_edges(Context& context, Mesh& mesh, std::vector<std::uint32_t>* odd) {
     pair_edges(context, mesh, scratch, odd);
 }
 
+namespace {
+
+/// Facets that follow one another and have most of their vertices for themselves. What is known of their edges fits the cache.
+constexpr std::size_t kBlockFacets = 16384;
+
+/// Which vertices only the facets of one block use. In a file that was not shuffled most are such.
+struct OwnVertices {
+    std::vector<std::uint32_t> first;   ///< of each block: the vertices from this one on are used by no block before; and their number
+    std::vector<std::uint64_t> shared;  ///< a bit for each vertex that other blocks may use too
+    bool many = false;                  ///< more than half of all
+
+    [[nodiscard]] bool is_shared(std::uint32_t v) const noexcept { return (shared[v >> 6] >> (v & 63) & 1) != 0; }
+};
+
+OwnVertices own_vertices(Context& context, const Mesh& mesh) {
+    const std::size_t blocks = (mesh.facets.size() + kBlockFacets - 1) / kBlockFacets;
+    OwnVertices own;
+    own.first.assign(blocks + 1, 0);
+    parallel_for(context, mesh.facets.size(), kBlockFacets, [&](std::size_t begin, std::size_t end) {
+        std::uint32_t past = 0;
+        for (std::size_t f = begin; f < end; ++f)
+            for (const std::uint32_t v : mesh.facets[f]) past = std::max(past, v + 1);
+        own.first[begin / kBlockFacets + 1] = past;
+    });
+    for (std::size_t b = 1; b <= blocks; ++b) own.first[b] = std::max(own.first[b], own.first[b - 1]);
+    own.shared.assign(mesh.vertices.size() / 64 + 1, 0);
+    parallel_for(context, mesh.facets.size(), kBlockFacets, [&](std::size_t begin, std::size_t end) {
+        const std::uint32_t mine = own.first[begin / kBlockFacets];
+        for (std::size_t f = begin; f < end; ++f)
+            for (const std::uint32_t v : mesh.facets[f]) {
+                if (v >= mine) continue;
+                const std::atomic_ref word(own.shared[v >> 6]);
+                const std::uint64_t bit = std::uint64_t{1} << (v & 63);
+                if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
+            }
+    });
+    std::size_t count = 0;
+    for (const std::uint64_t word : own.shared) count += static_cast<std::size_t>(std::popcount(word));
+    own.many = 2 * count < mesh.vertices.size();
+    return own;
+}
+
+/// Calls on_fan(T& part, uses) as reduce_fans() does, for the vertices that only one block uses. Such a block is at hand as a whole, so
+/// that its edges need not be dealt first. @param others for each chunk of kBlocksTogether blocks the uses that are left
+constexpr std::size_t kBlocksTogether = 8;
+template <class T, class OnFan, class Join>
+T reduce_own_fans(Context& context, const Mesh& mesh, const OwnVertices& own, std::span<BulkVector<EdgeUse>> others, T identity, OnFan&& on_fan,
+                  Join&& join) {
+    return parallel_reduce(
+        context, mesh.facets.size(), kBlocksTogether * kBlockFacets, identity,
+        [&](std::size_t begin, std::size_t end) {
+            T part = identity;
+            BulkVector<EdgeUse>& other = others[begin / (kBlocksTogether * kBlockFacets)];
+            RawArray<EdgeUse> uses(3 * std::min(kBlockFacets, end - begin));
+            for (std::size_t block = begin; block < end; block += kBlockFacets) {
+                const std::uint32_t origin = own.first[block / kBlockFacets], past = own.first[block / kBlockFacets + 1];
+                std::size_t count = 0;
+                for (std::size_t f = block; f < std::min(end, block + kBlockFacets); ++f) {
+                    const Index3 v = mesh.facets[f];
+                    for (std::uint32_t k = 0; k < 3; ++k) {
+                        const std::uint32_t a = v[k], b = v[k == 2 ? 0 : k + 1], low = std::min(a, b);
+                        if (a == b) continue;
+                        const EdgeUse use{low, std::max(a, b), 2 * (3 * static_cast<std::uint32_t>(f) + k) + (a > b ? 1u : 0u)};
+                        if (low < origin || own.is_shared(low)) other.push_back(use);
+                        else uses[count++] = use;
+                    }
+                }
+                sort_fans(std::span<const EdgeUse>(uses.data(), count), origin, past - origin,
+                          [&](std::span<const EdgeUse> fan) { on_fan(part, fan); });
+            }
+            return part;
+        },
+        join);
+}
+
+}  // namespace
+
 void pair_edges(Context& context, Mesh& mesh, EdgeScratch& scratch, std::vector<std::uint32_t>* odd) {
     mesh.neighbours.resize(mesh.facets.size());
     parallel_for(context, mesh.neighbours.size(), std::size_t{1} << 16, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end; ++f) mesh.neighbours[f] = {kNoFacet, kNoFacet, kNoFacet};
     });
     using Vertices = std::vector<std::uint32_t>;
-    Vertices found = reduce_fans(
-        context, mesh.facets, mesh.vertices.size(), scratch, Vertices{}, [](std::uint32_t) { return true; },
-        [&](Vertices& part, std::span<const EdgeUse> fan) {
-            if (odd != nullptr && is_odd(fan)) part.push_back(fan[0].low);
-            each_edge(fan, [&](std::span<const EdgeUse> uses) {
-                if (uses.size() == 2) {
-                    if (uses[0].reversed() != uses[1].reversed()) link(mesh, uses[0], uses[1]);
-                } else if (uses.size() > 2) {
-                    pair_around_edge(mesh, uses);
-                }
-            });
-        },
-        [](Vertices a, const Vertices& b) {
-            a.insert(a.end(), b.begin(), b.end());
-            return a;
+    auto pair_fan = [&](Vertices& part, std::span<const EdgeUse> fan) {
+        if (odd != nullptr && is_odd(fan)) part.push_back(fan[0].low);
+        each_edge(fan, [&](std::span<const EdgeUse> uses) {
+            if (uses.size() == 2) {
+                if (uses[0].reversed() != uses[1].reversed()) link(mesh, uses[0], uses[1]);
+            } else if (uses.size() > 2) {
+                pair_around_edge(mesh, uses);
+            }
         });
-    if (odd != nullptr) *odd = std::move(found);
+    };
+    auto join = [](Vertices a, const Vertices& b) {
+        a.insert(a.end(), b.begin(), b.end());
+        return a;
+    };
+    if (mesh.facets.size() > kMaxFacets) throw too_many_facets(mesh.facets.size());
+    const OwnVertices own = own_vertices(context, mesh);
+    Vertices found, others;
+    if (own.many) {
+        constexpr std::size_t chunk = kBlocksTogether * kBlockFacets;
+        std::vector<BulkVector<EdgeUse>> uses((mesh.facets.size() + chunk - 1) / chunk);
+        found = reduce_own_fans(context, mesh, own, uses, Vertices{}, pair_fan, join);
+        std::size_t total = 0;
+        for (const auto& part : uses) total += part.size();
+        const MemoryCharge charge(context, total * sizeof(EdgeUse), "the edges of the mesh");
+        auto each_use = [&](std::size_t begin, std::size_t end, auto&& take) {
+            for (std::size_t part = begin; part < end; ++part)
+                for (const EdgeUse& use : uses[part]) take(use);
+        };
+        others = reduce_dealt_fans(context, uses.size(), 1, total, mesh.vertices.size(), scratch, Vertices{}, each_use, pair_fan, join);
+    } else {
+        others = reduce_fans(
+            context, mesh.facets, mesh.vertices.size(), scratch, Vertices{}, [](std::uint32_t) { return true; }, pair_fan, join);
+    }
+    if (odd == nullptr) return;
+    odd->clear();
+    std::merge(found.begin(), found.end(), others.begin(), others.end(), std::back_inserter(*odd));
 }
 
 }  // namespace slabwright

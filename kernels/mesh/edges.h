@@ -31,6 +31,11 @@ struct EdgeUse {
 /// The largest mesh whose edge uses and corners can be numbered in 32 bits.
 inline constexpr std::size_t kMaxFacets = 0xFFFFFFFFu / 6;
 
+[[nodiscard]] inline Error too_many_facets(std::size_t facets) {
+    return {ErrorKind::input, "mesh.too_large", "a mesh may have " + std::to_string(kMaxFacets) + " facets at most",
+            std::to_string(facets) + " facets", "reduce the mesh or split the pattern"};
+}
+
 /// Fans of more uses are sorted by other means, and not searched for what is odd about them.
 inline constexpr std::size_t kPlainFan = 24;
 
@@ -62,38 +67,20 @@ void sort_fans(std::span<const EdgeUse> uses, std::uint32_t origin, std::size_t 
 /// Memory that one step after the other may use, so that the system clears its pages only once.
 using EdgeScratch = RawArray<std::byte>;
 
-/// Calls on_fan(T& part, uses) once for every vertex v that wanted(v) says, with all uses of edges whose lower end is v, sorted by
-/// the upper end and then by facet; vertices without any are left out, and so are edges of no length (both ends the same vertex). The
-/// parts, one per block of vertices, are joined in order. Scratch: 20 bytes a facet on an ordinary mesh, 36 at most; charged where
-/// `scratch` is too small.
-/// @throws Error(input, "mesh.too_large") over kMaxFacets
-template <class T, class Wanted, class OnFan, class Join>
-T reduce_fans(Context& context, std::span<const Index3> facets, std::size_t vertex_count, EdgeScratch& scratch, T identity, Wanted&& wanted,
-              OnFan&& on_fan, Join&& join) {
-    if (facets.size() > kMaxFacets)
-        throw Error(ErrorKind::input, "mesh.too_large", "a mesh may have " + std::to_string(kMaxFacets) + " facets at most",
-                    std::to_string(facets.size()) + " facets", "reduce the mesh or split the pattern");
-    if (facets.empty()) return identity;
+/// Calls on_fan(T& part, uses) once for every vertex that is the lower end of an edge, with all uses of edges whose lower end it is, sorted by
+/// the upper end and then by facet. The parts, one per block of vertices, are joined in order. The uses are those of n sources, in
+/// chunks of `grain`: each_use(begin, end, take) calls take(EdgeUse) for every one of these sources, some times over. Scratch: 12 bytes a use where
+/// there are few, 20 bytes for three on an ordinary mesh, 36 at most; charged where `scratch` is too small.
+template <class T, class Uses, class OnFan, class Join>
+T reduce_dealt_fans(Context& context, std::size_t n, std::size_t grain, std::size_t uses_about, std::size_t vertex_count, EdgeScratch& scratch,
+                    T identity, Uses&& each_use, OnFan&& on_fan, Join&& join) {
     // Uses are brought together in two steps: first by block of low vertices, then inside each block, which fits the
     // cache, by low vertex and by (high, facet). Vertices are numbered by first use, so a block is a piece of surface.
     const std::size_t uses_wanted = std::size_t{1} << 14, most_blocks = 2048;
-    const std::size_t blocks_wanted = std::clamp<std::size_t>(3 * facets.size() / uses_wanted, 1, most_blocks);
+    const std::size_t blocks_wanted = std::clamp<std::size_t>(uses_about / uses_wanted, 1, most_blocks);
     unsigned shift = 0;
     while ((vertex_count >> shift) + 1 > blocks_wanted && shift < 32) ++shift;
     const std::size_t blocks = (vertex_count >> shift) + 1;
-    const std::size_t grain = std::max<std::size_t>(std::size_t{1} << 14, (facets.size() + 63) / 64);
-    auto each_use = [&](std::size_t begin, std::size_t end, auto&& take) {
-        for (std::size_t f = begin; f < end; ++f) {
-            const Index3 v = facets[f];
-            for (std::uint32_t k = 0; k < 3; ++k) {
-                const std::uint32_t a = v[k], b = v[k == 2 ? 0 : k + 1];
-                const std::uint32_t low = std::min(a, b);
-                if (a == b || !wanted(low)) continue;
-                take(EdgeUse{low, std::max(a, b), 2 * (3 * static_cast<std::uint32_t>(f) + k) + (a > b ? 1u : 0u)});
-            }
-        }
-    };
-
     auto count = [&](std::size_t begin, std::size_t end, auto&& take) { each_use(begin, end, [&](const EdgeUse& use) { take(use.low >> shift); }); };
     auto uses = [&](std::size_t begin, std::size_t end, auto&& take) {
         each_use(begin, end, [&](const EdgeUse& use) { take(use.low >> shift, use); });
@@ -107,7 +94,7 @@ T reduce_fans(Context& context, std::span<const Index3> facets, std::size_t vert
             scratch = {};
             scratch = EdgeScratch(most * sizeof(EdgeUse));
         }
-        return std::pair(reinterpret_cast<EdgeUse*>(scratch.data()), most);
+        return std::pair(reinterpret_cast<EdgeUse*>(scratch.data()), std::max<std::uint64_t>(most, scratch.size() / sizeof(EdgeUse)));
     };
     T all = identity;
     auto reduce = [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
@@ -123,8 +110,30 @@ T reduce_fans(Context& context, std::span<const Index3> facets, std::size_t vert
                                        },
                                        join));
     };
-    deal(context, facets.size(), grain, blocks, count, uses, room, reduce);
+    deal(context, n, grain, blocks, count, uses, room, reduce);
     return all;
+}
+
+/// The same for the edges of all facets whose lower end v wanted(v) says; edges of no length (both ends the same vertex) are left out.
+/// @throws Error(input, "mesh.too_large") over kMaxFacets
+template <class T, class Wanted, class OnFan, class Join>
+T reduce_fans(Context& context, std::span<const Index3> facets, std::size_t vertex_count, EdgeScratch& scratch, T identity, Wanted&& wanted,
+              OnFan&& on_fan, Join&& join) {
+    if (facets.size() > kMaxFacets) throw too_many_facets(facets.size());
+    if (facets.empty()) return identity;
+    const std::size_t grain = std::max<std::size_t>(std::size_t{1} << 14, (facets.size() + 63) / 64);
+    auto each_use = [&](std::size_t begin, std::size_t end, auto&& take) {
+        for (std::size_t f = begin; f < end; ++f) {
+            const Index3 v = facets[f];
+            for (std::uint32_t k = 0; k < 3; ++k) {
+                const std::uint32_t a = v[k], b = v[k == 2 ? 0 : k + 1];
+                const std::uint32_t low = std::min(a, b);
+                if (a == b || !wanted(low)) continue;
+                take(EdgeUse{low, std::max(a, b), 2 * (3 * static_cast<std::uint32_t>(f) + k) + (a > b ? 1u : 0u)});
+            }
+        }
+    };
+    return reduce_dealt_fans(context, facets.size(), grain, 3 * facets.size(), vertex_count, scratch, std::move(identity), each_use, on_fan, join);
 }
 
 /// As the public function, with scratch memory that is at hand.

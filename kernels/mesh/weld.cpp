@@ -97,9 +97,7 @@ Mesh weld(Context& context, std::span<const std::array<Vec3f, 3>> corners, std::
 
 Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std::uint32_t>* odd) {
     if (odd != nullptr) odd->clear();
-    if (facets.count > kMaxFacets)
-        throw Error(ErrorKind::input, "mesh.too_large", "a mesh may have " + std::to_string(kMaxFacets) + " facets at most",
-                    std::to_string(facets.count) + " facets", "reduce the mesh or split the pattern");
+    if (facets.count > kMaxFacets) throw too_many_facets(facets.count);
     Mesh mesh;
     if (facets.count == 0) return mesh;
     const std::size_t n = 3 * facets.count;
@@ -122,12 +120,18 @@ Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std:
     {
         std::optional<MemoryCharge> charge;
         EdgeScratch scratch;
+        std::vector<BulkVector<Key>> firsts(blockwise ? (facets.count + grain - 1) / grain : 0);  // of each chunk: the keys that it deals
         auto counted = [&](std::size_t begin, std::size_t end, auto&& take) {
             if (blockwise) {
                 BlockTable table;
+                BulkVector<Key>& mine = firsts[begin / grain];
+                mine.reserve((end - begin) * 3 / 4);  // what is not needed is never touched
                 for (std::size_t f = begin; f < end; f += kBlockFacets) {
                     table.find_firsts(facets, f, std::min(end, f + kBlockFacets), slots);
-                    for (const Key& key : table.firsts()) take(part_of(key));
+                    for (const Key& key : table.firsts()) {
+                        take(part_of(key));
+                        mine.push_back(key);
+                    }
                 }
                 return;
             }
@@ -135,11 +139,13 @@ Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std:
                 for (std::size_t k = 0; k < 3; ++k) take(part_of(key_of(facets.corner(f, k), 3 * f + k)));
         };
         auto keys = [&](std::size_t begin, std::size_t end, auto&& take) {
+            if (blockwise) {
+                for (const Key& key : firsts[begin / grain]) take(part_of(key), key);
+                return;
+            }
             for (std::size_t f = begin; f < end; ++f) {
                 for (std::size_t k = 0; k < 3; ++k) {
-                    const std::size_t c = 3 * f + k;
-                    if (blockwise && slots[c] != c) continue;
-                    const Key key = key_of(facets.corner(f, k), c);
+                    const Key key = key_of(facets.corner(f, k), 3 * f + k);
                     take(part_of(key), key);
                 }
             }
@@ -147,7 +153,7 @@ Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std:
         // To bound memory, no more than about half of all corners are dealt at a time.
         auto room = [&](std::uint64_t total, std::uint64_t largest) {
             const std::uint64_t most = std::min(total, std::max<std::uint64_t>(n / 2 + 1, largest) + largest);
-            charge.emplace(context, most * sizeof(Key), "welding the facets");
+            charge.emplace(context, (most + (blockwise ? total : 0)) * sizeof(Key), "welding the facets");
             scratch = EdgeScratch(most * sizeof(Key));
             return std::pair(reinterpret_cast<Key*>(scratch.data()), most);
         };
@@ -170,6 +176,7 @@ Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std:
             });
         };
         deal(context, facets.count, grain, parts, counted, keys, room, weld_parts);
+        firsts.clear();
         number_by_first(
             context, slots, [&](std::uint32_t count) { mesh.vertices.resize(count); },
             [&](std::size_t c, std::uint32_t number) {
