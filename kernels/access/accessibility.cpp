@@ -358,12 +358,20 @@ struct Probe {
     bool look(std::uint32_t f) {
         const Triangle facet = scene->triangle(f);
         const double high = std::max({facet[0][2], facet[1][2], facet[2][2]});
+        if ((!ball || hanging) && (high <= at->tip + fine.low || beside(facet))) return false;
         if (high <= top) return look(facet);
         if (std::min({facet[0][2], facet[1][2], facet[2][2]}) >= top) return false;
         const Below parts = below(facet, top);
         bool nearer = false;
         for (int i = 0; i < parts.n; ++i) nearer = look(parts.t[i]) || nearer;
         return nearer;
+    }
+    /// Whether all of a facet is farther from the axis than the part's radius, by its box.
+    [[nodiscard]] bool beside(const Triangle& t) const {
+        constexpr double rounding = 1 + 1e-9;
+        const double r = fine.radius * rounding;
+        return std::min({t[0][0], t[1][0], t[2][0]}) - at->x > r || at->x - std::max({t[0][0], t[1][0], t[2][0]}) > r ||
+               std::min({t[0][1], t[1][1], t[2][1]}) - at->y > r || at->y - std::max({t[0][1], t[1][1], t[2][1]}) > r;
     }
     bool look(const Triangle& t) {
         Point3 q;
