@@ -143,13 +143,29 @@ TEST(Sweep, LeavesOutWhatStandsLower) {
     }
 }
 
+// Takes rows of cells over kBottom at once.
+constexpr double kBottom = -20;
+struct RowsOver {
+    float* height;
+    void operator()(std::size_t cell, double z) const { height[cell] = std::min(height[cell], static_cast<float>(z - kBottom)); }
+    void row(std::size_t first, int n, const double* h, double lowest) const {
+        for (int k = 0; k < n; ++k) {
+            EXPECT_GE(h[k], lowest - 1e-12);
+            (*this)(first + static_cast<std::size_t>(k), h[k]);
+        }
+    }
+    void level(std::size_t first, int n, double z) const {
+        for (int k = 0; k < n; ++k) (*this)(first + static_cast<std::size_t>(k), z);
+    }
+};
+
 // A chain of motions that share their ends leaves what they leave one by one, and asks far fewer cells.
 TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-1, 11), uz(-3, 3), ur(0.4, 4), turn(-3, 3);
     const CellGrid grid{0.1, 0.2, 0.11, 90, 80};
-    std::size_t asked_alone = 0, asked_chained = 0, asked_followed = 0, unlike = 0;
+    std::size_t asked_alone = 0, asked_chained = 0, asked_followed = 0, unlike = 0, unlike_rows = 0;
     for (int trial = 0; trial < 120; ++trial) {
         const CutterEnd end{static_cast<CutterEnd::Form>(trial % 3), ur(random), 0.6};
         std::vector<std::array<double, 3>> way{{u(random), u(random), uz(random)}};
@@ -165,6 +181,7 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
             way.push_back(next);
         }
         std::vector<double> alone(grid.count(), 1), chained(grid.count(), 1), followed(grid.count(), 1);
+        std::vector<float> rows_chained(grid.count(), static_cast<float>(1 - kBottom)), rows_followed = rows_chained;
         for (std::size_t k = 1; k < way.size(); ++k) {
             auto into = [&](std::vector<double>& height, std::size_t& asked) {
                 return std::pair{[&height, &asked](std::size_t c) { return ++asked, height[c]; },
@@ -179,6 +196,12 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
             sweep_above(grid, end, way[k - 1], way[k], stands_chained, take_chained, chain);
             const auto [stands_followed, take_followed] = into(followed, asked_followed);
             sweep_above(grid, end, way[k - 1], way[k], stands_followed, take_followed, {.been = k > 1});
+            // Given as heights over a level, of which rows are taken at once.
+            for (auto& [height, of] : {std::pair{&rows_chained, chain}, {&rows_followed, ChainedSweep{.been = k > 1}}})
+                sweep_above(grid, end, way[k - 1], way[k], StandingHeights{height->data(), kBottom}, RowsOver{height->data()}, of);
+        }
+        for (std::size_t c = 0; c < grid.count(); ++c) {
+            for (const std::vector<float>* rows : {&rows_chained, &rows_followed}) unlike_rows += std::abs((*rows)[c] + kBottom - alone[c]) > 1e-5;
         }
         for (std::size_t c = 0; c < grid.count(); ++c)
             if (std::abs(alone[c] - followed[c]) > 1e-9) ++unlike;
@@ -199,6 +222,54 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
     EXPECT_LT(4 * asked_chained, 3 * asked_alone);
     EXPECT_LT(asked_followed, asked_alone);
     EXPECT_LE(unlike, 3U) << "cells that a cutter's rim just touches";
+    EXPECT_LE(unlike_rows, 6U) << "cells that a cutter's rim just touches";
+}
+
+// What a cut says that it did is what it did to the cells.
+TEST(Stock, EffectsAreThoseOfTheCells) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-2, 22), uz(-1, 11), ur(0.3, 4);
+    const CellGrid grid{0.1, 0.2, 0.21, 97, 93};
+    constexpr double deep = 1.5;
+    std::size_t through = 0, lowered = 0;
+    for (int trial = 0; trial < 60; ++trial) {
+        Stock stock(grid);
+        stock.add_slab(0, 4);
+        stock.add_slab(4, 6);
+        for (int k = 0; k < 12; ++k) {
+            const CutterEnd end{static_cast<CutterEnd::Form>(k % 2), ur(random), 0};
+            const std::array<double, 3> a{u(random), u(random), uz(random)}, b{u(random), u(random), k % 3 == 0 ? uz(random) : a[2]};
+            std::vector<std::array<double, 2>> before;
+            for (std::size_t c = 0; c < grid.count(); ++c) before.push_back({stock.surface(0, c), stock.surface(1, c)});
+            const CutEffect effect = stock.cut(end, a, b, deep);
+            double removed = 0, deepest = 0, highest = -1e300, lowest = 1e300;
+            std::uint64_t deep_cells = 0;
+            for (std::size_t c = 0; c < grid.count(); ++c) {
+                double lost = 0;
+                for (const std::size_t slab : {0U, 1U}) {
+                    const double stood = before[c][slab], now = stock.surface(slab, c);
+                    if (now == stood) continue;
+                    lost += stood - now;
+                    highest = std::max(highest, stood), lowest = std::min(lowest, now);
+                }
+                if (lost > 0) ++lowered;
+                removed += lost;
+                deepest = std::max(deepest, lost);
+                deep_cells += lost > deep;
+            }
+            EXPECT_NEAR(effect.removed, removed, 1e-9 * (1 + removed)) << "seed " << seed;
+            EXPECT_EQ(effect.deepest, deepest);
+            EXPECT_EQ(effect.deep_cells, deep_cells);
+            EXPECT_EQ(effect.highest, highest);
+            if (std::min(a[2], b[2]) >= 0) {
+                EXPECT_EQ(effect.lowest, lowest);
+            }
+            through += std::min(a[2], b[2]) < 4 && removed > 0;
+        }
+    }
+    EXPECT_GT(through, 100U);
+    EXPECT_GT(lowered, 100000U);
 }
 
 // Level passes of a ball on a plane at α leave L = R − √(R² − (SD / (2 sin α))²) (method.md section 5).

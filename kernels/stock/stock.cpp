@@ -18,7 +18,7 @@ struct Losses {
     Losses() { highest.fill(-1e300), lowest.fill(1e300); }
 };
 
-// Lowers n cells, whole eights of them, to h where they stand higher; no h is under the slab's bottom. `first` is the first one's number.
+// Lowers n cells, whole eights of them, to h where they stand higher; no h is under the slab's bottom but by rounding. `first` is the first one's number.
 SLABWRIGHT_WIDE void lower_eights(float* __restrict height, int n, const double* __restrict h, double bottom, double deep, int first,
                                   Losses& __restrict losses) {
     constexpr double none = 2e300;
@@ -26,7 +26,8 @@ SLABWRIGHT_WIDE void lower_eights(float* __restrict height, int n, const double*
     for (int c = 0; c < n; c += kLanes)
         for (std::size_t k = 0; k < kLanes; ++k) {
             const std::size_t at = static_cast<std::size_t>(c) + k;
-            const float stood = height[at], left = static_cast<float>(h[at] - bottom), stands = left < stood ? left : stood;
+            const double over = h[at] - bottom;
+            const float stood = height[at], left = static_cast<float>(over > 0 ? over : 0.0), stands = left < stood ? left : stood;
             const double before = bottom + static_cast<double>(stood), after = bottom + static_cast<double>(stands), lost = before - after;
             const double top = before - (stands < stood ? 0.0 : none), low = after + (stands < stood ? 0.0 : none);
             all.removed[k] += lost;

@@ -180,7 +180,7 @@ inline int floor_of(double v) {
 }
 
 /// Calls fn(cell, z) for all of n cells in a row from `first` on over which h is finite, or once fn.row(first, n, h, lowest) where it has
-/// that: it then compares with what stands by itself, many cells at once. No h is under `lowest`.
+/// that: it then compares with what stands by itself, many cells at once. No h is under `lowest` but by rounding.
 template <class Fn>
 void take_row(Fn& fn, std::size_t first, int n, const double* h, double lowest) {
     if constexpr (requires { fn.row(first, n, h, lowest); }) fn.row(first, n, h, lowest);
