@@ -582,7 +582,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
         throw Error(ErrorKind::input, "report.other_pattern", "is not the pattern that was planned: its SHA-256 is " + stl.input.sha256,
                     pattern.string(), "name the planned STL with --stl, or plan again");
 
-    context.begin_phase("report", 0.1, 1.0, folder.programs.size() + 2);
+    context.begin_phase("report", 0.1, options.three_d ? 0.45 : 1.0, folder.programs.size() + 1);
     Figures figures;
     figures.data = {{"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", folder.plan}, {"verify", verify}};
     understood(out / "sequence.json", "report.sequence", [&] {
@@ -613,15 +613,19 @@ std::string report_html(Context& context, const std::string& directory, const Re
         return text;
     }
     figures.data["left_over"] = {{"layers", figures.replay}};
+    context.begin_phase("report's model and paths", 0.45, 1.0, 3);
     std::size_t facets = kMostFacets, points = kMostPoints;
-    Json model = model_json(context, stl.mesh.view(), *part, folder, facets), paths = paths_json(figures.paths, folder, points);
+    Json model = model_json(context, stl.mesh.view(), *part, folder, facets);
+    context.advance();
+    Json paths = paths_json(figures.paths, folder, points);
+    context.advance();
     for (;;) {
         figures.data["model"] = model;
         figures.data["paths"] = paths;
         std::string text = page(figures.data, true);
         context.throw_if_cancelled();
         if (text.size() <= limit) {
-            context.advance(2);
+            context.advance();
             return text;
         }
         // Paths are thinned before the model: they take more, and lose less.

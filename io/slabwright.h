@@ -56,7 +56,7 @@ SLABWRIGHT_API void report(Context& context, const std::string& directory, const
 
 /// Of the time that plan() and write_verified() take together, usually: planning is done at the first, verifying at the second. A caller
 /// that shows progress begins with `context.share_progress(0, kPlanningShare)`; write_verified() goes on from there.
-inline constexpr double kPlanningShare = 0.62, kVerifyingShare = 0.93;
+inline constexpr double kPlanningShare = 0.7, kVerifyingShare = 0.93;
 
 /// What the simulation of a folder's programs found.
 struct VerifyResult {
