@@ -1,5 +1,5 @@
 // How true the time left is that a progress bar shows while a pattern is planned, written and verified: after the first tenth of the
-// progress, the time that was foretold over the time that it took in the end.
+// progress and of the time, the time that was foretold over the time that it took in the end.
 //     build/release/time_left_bench --benchmark_counters_tabular=true
 #include <benchmark/benchmark.h>
 #include <unistd.h>
@@ -34,7 +34,7 @@ void time_left(benchmark::State& state) {
     const fs::path folder = fs::temp_directory_path() / ("slabwright_time_left_" + std::to_string(::getpid()));
     fs::create_directories(folder);
     const std::string stl = written(pattern, folder);
-    double least = 1e300, most = 0, last = 0;
+    double least = 1e300, most = 0, last = 0, left_when_wrong = 0;
     bool falls = false;
     for (auto _ : state) {
         using Clock = std::chrono::steady_clock;
@@ -58,15 +58,18 @@ void time_left(benchmark::State& state) {
             falls = falls || s.fraction < last;
             last = s.fraction;
             // Neither at the very end, where both are nothing.
-            if (s.fraction < 0.1 || total - s.at < 0.02 * total) continue;
+            if (s.fraction < 0.1 || s.at < 0.1 * total || total - s.at < 0.02 * total) continue;
             const double foretold = s.at * (1 - s.fraction) / s.fraction, was = total - s.at;
             least = std::min(least, foretold / was), most = std::max(most, foretold / was);
+            if (foretold < was / 2 || foretold > 2 * was) left_when_wrong = std::max(left_when_wrong, was / total);
         }
         if (falls) state.SkipWithError("progress falls");
     }
     fs::remove_all(folder);
     state.counters["least"] = least;
     state.counters["most"] = most;
+    // The share of all time that was left when the time foretold was first wrong by more than a factor of two.
+    state.counters["left_when_wrong"] = left_when_wrong;
 }
 BENCHMARK(time_left)
     ->ArgNames({"size_mm", "facets", "threads"})
