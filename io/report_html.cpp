@@ -582,7 +582,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
         throw Error(ErrorKind::input, "report.other_pattern", "is not the pattern that was planned: its SHA-256 is " + stl.input.sha256,
                     pattern.string(), "name the planned STL with --stl, or plan again");
 
-    context.begin_phase("report", 0.1, options.three_d ? 0.45 : 1.0, folder.programs.size() + 1);
+    context.begin_phase("report", 0.1, options.three_d ? 0.45 : 1.0, folder.programs.size());
     Figures figures;
     figures.data = {{"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", folder.plan}, {"verify", verify}};
     understood(out / "sequence.json", "report.sequence", [&] {

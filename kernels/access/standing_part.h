@@ -68,6 +68,7 @@ public:
 
     /// The largest z ≤ z_top of the part over (x, y); `none` where there is no part.
     [[nodiscard]] double envelope(double x, double y, double z_top, double none) const;
+
     /// How far something stands away, and which way: `away` leads from its nearest point to the point asked for.
     struct Clearance {
         double distance = 0;  ///< mm; the limit when nothing is nearer
