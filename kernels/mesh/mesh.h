@@ -10,6 +10,8 @@
 
 namespace slabwright {
 
+class Context;
+
 /// A point in millimetres, frame `pattern-base` (z = 0 at the pattern's bottom).
 struct Vec3f {
     float x = 0, y = 0, z = 0;
@@ -47,5 +49,7 @@ struct Mesh {
 
 /// Bounding box of the vertices that facets use; all zeros for an empty mesh.
 [[nodiscard]] Box3 bounds(MeshView mesh);
+/// The same, in parallel.
+[[nodiscard]] Box3 bounds(Context& context, MeshView mesh);
 
 }  // namespace slabwright

@@ -103,17 +103,6 @@ struct Sums {
     std::vector<std::uint32_t> open;  ///< components seen with an edge that has no partner
 };
 
-Box3 merged(const Box3& a, const Box3& b) {
-    return {{std::min(a.min.x, b.min.x), std::min(a.min.y, b.min.y), std::min(a.min.z, b.min.z)},
-            {std::max(a.max.x, b.max.x), std::max(a.max.y, b.max.y), std::max(a.max.z, b.max.z)}};
-}
-
-Box3 bounds(Context& context, MeshView mesh) {
-    if (mesh.facets.empty()) return {};
-    auto part = [&](std::size_t begin, std::size_t end) { return bounds(MeshView{mesh.vertices, mesh.facets.subspan(begin, end - begin), {}}); };
-    return parallel_reduce(context, mesh.size(), kGrain, part(0, 1), part, merged);
-}
-
 /// A point of a component of which it is asked how much material of the other components surrounds it.
 struct Query {
     Point p;

@@ -2,12 +2,21 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "kernels/errors.h"
+#include "kernels/mesh/raw_array.h"
 #include "kernels/mesh/weld.h"
+#include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -16,15 +25,17 @@ namespace {
 
 using Place = std::array<double, 3>;
 
-constexpr std::size_t kBlockFacets = 1 << 15;  // that a block has on the average
-constexpr int kMostAround = 16;                // a vertex with more facets around it stays
-constexpr double kLeastFacing = 0.2;           // cosine between the mean normal and any facet's: below, the gap along it says too much
-constexpr double kSameFacing = 0.99985;        // cosine of one degree
-constexpr double kLeastHeight = 0.05;          // mm: of a new facet, unless one was flatter before
-constexpr double kNearlyLevel = 0.866;         // cosine of 30°
-constexpr double kBesidePlane = 5;             // tolerances
-constexpr double kRounding = 1e-9;             // mm
-constexpr double kLeastRound = 0.002;          // of a block's facets; a round in which fewer vertices go is the last
+constexpr std::size_t kBlockFacets = 1 << 15;    // that a block has on the average
+constexpr int kMostAround = 16;                  // a vertex with more facets around it stays
+constexpr double kLeastFacing = 0.2;             // cosine between the mean normal and any facet's: below, the gap along it says too much
+constexpr double kSameFacing = 0.99985;          // cosine of one degree
+constexpr double kLeastHeight = 0.05;            // mm: of a new facet, unless one was flatter before
+constexpr double kNearlyLevel = 0.866;           // cosine of 30°
+constexpr double kBesidePlane = 5;               // tolerances
+constexpr double kRounding = 1e-9;               // mm
+constexpr std::uint64_t kDealtAtOnce = 1 << 24;  // facets, unless one block has more
+constexpr std::size_t kSparse = 8;               // of a block's facets: words of 64 vertices from which on sorting numbers them sooner
+constexpr double kLeastRound = 0.002;            // of a block's facets; a round in which fewer vertices go is the last
 
 Place minus(const Place& a, const Place& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Place cross(const Place& a, const Place& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
@@ -36,60 +47,137 @@ struct Face {
     float low = 0, high = 0;
 };
 
-/// The facets of one block, with vertices of its own numbering.
-class Block {
+/// Of a vertex that no tolerance lets go.
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+/// A bit for each vertex of a mesh. Set from several threads.
+class VertexBits {
 public:
-    Block(MeshView mesh, std::span<const Face> faces, double tolerance, std::span<const double> planes) : tolerance_(tolerance), planes_(planes) {
-        ids_.reserve(3 * faces.size());
-        for (const Face& f : faces) ids_.insert(ids_.end(), f.v.begin(), f.v.end());
-        std::sort(ids_.begin(), ids_.end());
-        ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
-        faces_.assign(faces.begin(), faces.end());
-        for (Face& f : faces_)
-            for (std::uint32_t& v : f.v) v = static_cast<std::uint32_t>(std::lower_bound(ids_.begin(), ids_.end(), v) - ids_.begin());
-        place_.reserve(ids_.size());
-        for (const std::uint32_t id : ids_) place_.push_back({mesh.vertices[id].x, mesh.vertices[id].y, mesh.vertices[id].z});
+    explicit VertexBits(std::size_t vertices) : words_(vertices / 64 + 1, 0) {}
+    [[nodiscard]] bool has(std::uint32_t v) const noexcept { return (words_[v >> 6] >> (v & 63) & 1) != 0; }
+    void set(std::uint32_t v) noexcept {
+        const std::atomic_ref word(words_[v >> 6]);
+        const std::uint64_t bit = std::uint64_t{1} << (v & 63);
+        if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
     }
 
-    std::vector<Face> simplified() {
+private:
+    std::vector<std::uint64_t> words_;
+};
+
+/// What all blocks of a pass ask.
+struct Task {
+    Context& context;
+    MeshView mesh;
+    double tolerance;
+    std::span<const double> planes;  ///< ascending
+    const VertexBits* settled;       ///< the vertices that are not set here stay unless something around them changes; none: nothing is known
+    VertexBits* unsettled;           ///< where those are set that a block has not settled; none: nobody asks
+};
+
+/// The facets of one block, with vertices of its own numbering. Used for one block after another, its memory stays.
+class Block {
+public:
+    /// @param face_of(i) the face number i of the block's n
+    template <class FaceOf>
+    void load(const Task& task, std::size_t n, FaceOf&& face_of) {
+        tolerance_ = task.tolerance;
+        planes_ = task.planes;
+        faces_.resize(n);
+        for (std::size_t i = 0; i < n; ++i) faces_[i] = face_of(i);
+        number_vertices();
+        place_.resize(ids_.size());
+        for (std::size_t v = 0; v < ids_.size(); ++v) {
+            const Vec3f& p = task.mesh.vertices[ids_[v]];
+            place_[v] = {p.x, p.y, p.z};
+        }
+        need_.assign(ids_.size(), 0);
+        if (task.settled != nullptr)
+            for (std::size_t v = 0; v < ids_.size(); ++v)
+                if (!task.settled->has(ids_[v])) need_[v] = kNever;
+    }
+
+    /// Takes away what the tolerance allows. @return the faces that stay, with the mesh's vertices, until the next block is loaded
+    std::span<const Face> simplified(const Task& task) {
         find_around();
         // Whether all facets around a vertex are in this block, as far as an open fan tells.
-        inner_.assign(ids_.size(), 0);
+        inner_.resize(ids_.size());
         for (std::uint32_t v = 0; v < ids_.size(); ++v) inner_[v] = gather(v);
+        awake_.resize(ids_.size());
         // What costs little goes first: rounding in a plane adds up less then.
         for (const double share : {0.25, 0.5, 1.0}) {
             allowed_ = share * tolerance_;
-            awake_.assign(ids_.size(), 1);
+            for (std::size_t v = 0; v < ids_.size(); ++v) awake_[v] = inner_[v] && need_[v] <= allowed_;
             for (std::size_t gone = faces_.size(); static_cast<double>(gone) > kLeastRound * static_cast<double>(faces_.size());) {
                 gone = 0;
                 touched_.assign(ids_.size(), 0);
-                for (std::uint32_t v = 0; v < ids_.size(); ++v) gone += inner_[v] && awake_[v] && !touched_[v] && remove(v);
+                for (std::uint32_t v = 0; v < ids_.size(); ++v) {
+                    if (v % 8192 == 0) task.context.throw_if_cancelled();
+                    gone += awake_[v] && !touched_[v] && remove(v);
+                }
+                if (gone == 0) break;
                 std::erase_if(faces_, [](const Face& f) { return f.v[0] == f.v[1]; });
                 find_around();
             }
         }
+        if (task.unsettled != nullptr)
+            for (std::size_t v = 0; v < ids_.size(); ++v)
+                if (starts_[v] < starts_[v + 1] && !(inner_[v] && need_[v] > tolerance_)) task.unsettled->set(ids_[v]);
         for (Face& f : faces_)
             for (std::uint32_t& v : f.v) v = ids_[v];
-        return std::move(faces_);
+        return faces_;
     }
 
 private:
-    void find_around() {
-        starts_.assign(ids_.size() + 1, 0);
+    // Ascending by the mesh's numbers. A bit for each number between the lowest and the highest, and how many are before each 64 of them, tell
+    // quickly which one a vertex is; where the block's vertices are few among many they are sorted.
+    void number_vertices() {
+        ids_.clear();
+        if (faces_.empty()) return;
+        std::uint32_t lowest = faces_[0].v[0], highest = lowest;
         for (const Face& f : faces_)
-            for (const std::uint32_t v : f.v) ++starts_[v + 1];
-        for (std::size_t i = 1; i < starts_.size(); ++i) starts_[i] += starts_[i - 1];
-        around_.resize(starts_.back());
-        next_.assign(starts_.begin(), starts_.end() - 1);
+            for (const std::uint32_t v : f.v) lowest = std::min(lowest, v), highest = std::max(highest, v);
+        const std::size_t words = (highest - lowest) / 64 + 1;
+        if (words > kSparse * faces_.size()) {
+            for (const Face& f : faces_) ids_.insert(ids_.end(), f.v.begin(), f.v.end());
+            std::sort(ids_.begin(), ids_.end());
+            ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
+            for (Face& f : faces_)
+                for (std::uint32_t& v : f.v) v = static_cast<std::uint32_t>(std::lower_bound(ids_.begin(), ids_.end(), v) - ids_.begin());
+            return;
+        }
+        used_.assign(words, 0);
+        before_.resize(words);
+        for (const Face& f : faces_)
+            for (const std::uint32_t v : f.v) used_[(v - lowest) / 64] |= std::uint64_t{1} << (v - lowest) % 64;
+        for (std::size_t w = 0; w < words; ++w) {
+            before_[w] = static_cast<std::uint32_t>(ids_.size());
+            for (std::uint64_t bits = used_[w]; bits != 0; bits &= bits - 1)
+                ids_.push_back(lowest + static_cast<std::uint32_t>(64 * w) + static_cast<std::uint32_t>(std::countr_zero(bits)));
+        }
+        for (Face& f : faces_)
+            for (std::uint32_t& v : f.v) {
+                const std::uint32_t i = v - lowest;
+                v = before_[i / 64] + static_cast<std::uint32_t>(std::popcount(used_[i / 64] & ((std::uint64_t{1} << i % 64) - 1)));
+            }
+    }
+
+    void find_around() {
+        // Counted two places on and dealt one place on, the starts are where they belong in the end.
+        starts_.assign(ids_.size() + 2, 0);
+        for (const Face& f : faces_)
+            for (const std::uint32_t v : f.v) ++starts_[v + 2];
+        for (std::size_t i = 2; i < starts_.size(); ++i) starts_[i] += starts_[i - 1];
+        around_.resize(3 * faces_.size());
         for (std::size_t f = 0; f < faces_.size(); ++f)
-            for (const std::uint32_t v : faces_[f].v) around_[next_[v]++] = static_cast<std::uint32_t>(f);
+            for (const std::uint32_t v : faces_[f].v) around_[starts_[v + 1]++] = static_cast<std::uint32_t>(f);
     }
 
     // The facets around v and the vertices around it, counter-clockwise: facet i is (v, ring_[i], ring_[i + 1]). False where they are not one closed fan.
     bool gather(std::uint32_t v) {
         const auto n = static_cast<int>(starts_[v + 1] - starts_[v]);
         if (n < 3 || n > kMostAround) return false;
-        std::array<std::uint32_t, kMostAround> from{}, to{};
+        std::array<std::uint32_t, kMostAround> from, to;  // written as far as they are read
         for (int i = 0; i < n; ++i) {
             const Index3& f = faces_[around_[starts_[v] + static_cast<std::uint32_t>(i)]].v;
             if (f[0] == f[1] || f[1] == f[2] || f[2] == f[0]) return false;
@@ -117,12 +205,14 @@ private:
     // Takes a vertex away where one of its edges allows it.
     bool remove(std::uint32_t v) {
         awake_[v] = 0;
+        need_[v] = kNever;
         if (!gather(v) || !look(v)) return false;
         // Of the neighbours that it may go to the one that leaves the least flat facets.
         int best = -1;
-        double best_height = 0, low = 0, high = 0;
+        double low = 0, high = 0;
+        best_height_ = 0;
         for (int k = 0; k < n_; ++k)
-            if (may_go_to(k) && new_height_ > best_height) best = k, best_height = new_height_, low = new_low_, high = new_high_;
+            if (may_go_to(v, k)) best = k, best_height_ = new_height_, low = new_low_, high = new_high_;
         if (best < 0) return false;
         new_low_ = low, new_high_ = high;
         go_to(v, best);
@@ -132,60 +222,61 @@ private:
     // Whether the fan has a facet of less than 30° from level, and reaches as near to one of the planes as it may move.
     [[nodiscard]] bool crosses_nearly_level(std::uint32_t v) const {
         if (planes_.empty()) return false;
-        double low = place_[v][2], high = low, most = 0;
-        for (int i = 0; i < n_; ++i) {
-            const auto a = static_cast<std::size_t>(i);
-            low = std::min(low, place_[ring_[a]][2]), high = std::max(high, place_[ring_[a]][2]);
-            most = std::max(most, std::abs(facing_[a][2]));
-        }
-        if (most < kNearlyLevel) return false;
+        double low = place_[v][2], high = low;
+        for (std::size_t a = 0; a < count(); ++a) low = std::min(low, place_[ring_[a]][2]), high = std::max(high, place_[ring_[a]][2]);
         const double beside = kBesidePlane * tolerance_;
         const auto plane = std::lower_bound(planes_.begin(), planes_.end(), low - beside);
-        return plane != planes_.end() && *plane <= high + beside;
+        if (plane == planes_.end() || *plane > high + beside) return false;
+        for (std::size_t a = 0; a < count(); ++a)
+            if (std::abs(normal_[a][2] / area2_[a]) >= kNearlyLevel) return true;
+        return false;
     }
 
-    // The vertices around v as (u, v, w) from v, w along the facets' mean normal.
+    // The vertices around v as (u, v, w) from v, w along the facets' mean normal. False where nothing lets v go.
     bool look(std::uint32_t v) {
         Place sum{0, 0, 0};
-        std::array<Place, kMostAround> arm;
         low_ = high_ = 0;
-        least_height_ = kLeastHeight;
-        for (int i = 0; i < n_; ++i) arm[static_cast<std::size_t>(i)] = minus(place_[ring_[static_cast<std::size_t>(i)]], place_[v]);
-        for (int i = 0; i < n_; ++i) {
-            const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>((i + 1) % n_);
-            const Place n = cross(arm[a], arm[b]);
-            const double area2 = std::sqrt(dot(n, n));
-            if (area2 == 0) return false;
+        for (std::size_t a = 0; a < count(); ++a) arm_[a] = minus(place_[ring_[a]], place_[v]);
+        arm_[count()] = arm_[0];
+        for (std::size_t a = 0; a < count(); ++a) {
+            const Place n = normal_[a] = cross(arm_[a], arm_[a + 1]);
+            area2_[a] = std::sqrt(dot(n, n));
+            if (area2_[a] == 0) return false;
             for (std::size_t k = 0; k < 3; ++k) sum[k] += n[k];
-            facing_[a] = {n[0] / area2, n[1] / area2, n[2] / area2};
-            const Place third = minus(arm[b], arm[a]);
-            const double longest = std::sqrt(std::max({dot(arm[a], arm[a]), dot(arm[b], arm[b]), dot(third, third)}));
-            least_height_ = std::min(least_height_, area2 / longest);
             low_ = std::min(low_, faces_[fan_[a]].low);
             high_ = std::max(high_, faces_[fan_[a]].high);
         }
         const double length = std::sqrt(dot(sum, sum));
         if (length == 0) return false;
         const Place w{sum[0] / length, sum[1] / length, sum[2] / length};
-        for (int i = 0; i < n_; ++i)
-            if (dot(facing_[static_cast<std::size_t>(i)], w) < kLeastFacing) return false;
+        for (std::size_t a = 0; a < count(); ++a)
+            if (dot(normal_[a], w) < kLeastFacing * area2_[a]) return false;
         exactly_ = crosses_nearly_level(v);
         const Place side = std::abs(w[0]) < 0.6 ? Place{1, 0, 0} : Place{0, 1, 0};
         Place u = cross(side, w);
         const double ul = std::sqrt(dot(u, u));
         for (double& x : u) x /= ul;
         const Place t = cross(w, u);
-        for (int i = 0; i < n_; ++i) {
-            const auto a = static_cast<std::size_t>(i);
-            flat_[a] = {dot(arm[a], u), dot(arm[a], t), dot(arm[a], w)};
-        }
-        for (int i = 0; i < n_; ++i) {
-            const auto a = static_cast<std::size_t>(i);
-            flat_normal_[a] = cross(flat_[a], flat_[static_cast<std::size_t>((i + 1) % n_)]);
-            same_facing_[a] = kSameFacing * std::sqrt(dot(flat_normal_[a], flat_normal_[a]));
-        }
+        for (std::size_t a = 0; a < count(); ++a) flat_[a] = flat_[a + count()] = {dot(arm_[a], u), dot(arm_[a], t), dot(arm_[a], w)};
+        old_facets_known_ = false;
         return true;
     }
+
+    // How flat the facets around are and which way they face: asked only where the gap allows going.
+    void look_at_old_facets() {
+        if (old_facets_known_) return;
+        old_facets_known_ = true;
+        least_height_ = kLeastHeight;
+        for (std::size_t a = 0; a < count(); ++a) {
+            const Place third = minus(arm_[a + 1], arm_[a]);
+            const double longest = std::sqrt(std::max({dot(arm_[a], arm_[a]), dot(arm_[a + 1], arm_[a + 1]), dot(third, third)}));
+            least_height_ = std::min(least_height_, area2_[a] / longest);
+            flat_normal_[a] = cross(flat_[a], flat_[a + 1]);
+            same_facing_[a] = kSameFacing * std::sqrt(dot(flat_normal_[a], flat_normal_[a]));
+        }
+    }
+
+    [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(n_); }
 
     static double turn(const Place& a, const Place& b) { return a[0] * b[1] - a[1] * b[0]; }  // of the plan views
 
@@ -203,66 +294,85 @@ private:
         return false;
     }
 
-    // Whether v may be drawn into the vertex k of its ring.
-    bool may_go_to(int k) {
-        auto at = [&](int i) { return static_cast<std::size_t>((k + i) % n_); };
-        const Place& a = flat_[at(0)];
+    // Whether v may be drawn into the vertex k of its ring, and leaves less flat facets than going to the best one so far. need_[v] becomes no more
+    // than what a tolerance must allow so that this may change.
+    bool may_go_to(std::uint32_t v, int k) {
+        const Place* const ring = &flat_[static_cast<std::size_t>(k)];
+        const std::size_t n = count();
+        const Place& a = ring[0];
         // How far what was there stands over what follows.
         double low = 0, high = 0;
         auto fits = [&](double gap) {
             low = std::min(low, gap);
             high = std::max(high, gap);
             if (exactly_) return std::max(high, -low) <= kRounding && low_ == 0 && high_ == 0;
-            return low + low_ >= -allowed_ && high + high_ <= allowed_;
+            const double asks = std::max(-(low + low_), high + high_);
+            if (asks <= allowed_) return true;
+            need_[v] = std::min(need_[v], asks);
+            return false;
         };
-        // The new facets: upright, and the gap at v itself.
-        for (int i = 1; i + 1 < n_; ++i) {
-            const Place p = minus(flat_[at(i)], a), q = minus(flat_[at(i + 1)], a);
+        // The gap at v itself, which is a + s·p + t·q with s = of_q / area2, t = of_p / area2 in the new facet that it lies in: what
+        // most often forbids to go.
+        for (std::size_t i = 1; i < n; ++i) {
+            from_a_[i] = minus(ring[i], a);
+            side_[i] = -turn(from_a_[i], a);
+        }
+        for (std::size_t i = 1; i + 1 < n; ++i) {
+            const Place &p = from_a_[i], &q = from_a_[i + 1];
+            const double of_p = side_[i], of_q = -side_[i + 1];
+            if (!(of_p >= 0 && of_q >= 0)) continue;
             const double area2 = turn(p, q);
             if (!(area2 > 0)) return false;
-            const double of_q = -turn(a, q), of_p = -turn(p, a);  // v = 0 is a + s·p + t·q, s = of_q / area2, t = of_p / area2
-            if (of_p >= 0 && of_q >= 0) {
-                const double s = of_q / area2, t = of_p / area2;
-                if (!fits(-(a[2] + s * p[2] + t * q[2]))) return false;
-            }
+            const double s = of_q / area2, t = of_p / area2;
+            if (!fits(-(a[2] + s * p[2] + t * q[2]))) return false;
         }
+        // The new facets are upright.
+        for (std::size_t i = 1; i + 1 < n; ++i)
+            if (!(turn(from_a_[i], from_a_[i + 1]) > 0)) return false;
         // Where the new edges cross those that meet in v.
-        for (int i = 2; i + 1 < n_; ++i) {
-            const Place d = minus(flat_[at(i)], a);
-            for (int j = 1; j < n_; ++j) {
+        for (std::size_t i = 2; i + 1 < n; ++i) {
+            const Place& d = from_a_[i];
+            const double of_t = turn(a, d);
+            for (std::size_t j = 1; j < n; ++j) {
                 if (j == i) continue;
-                const Place& r = flat_[at(j)];
-                // a + s·d = t·r
-                const double det = turn(r, d);
-                if (det == 0) continue;
-                const double t = turn(a, d) / det, s = turn(a, r) / det;
-                if (t <= 0 || t >= 1 || s <= 0 || s >= 1) continue;
+                const Place& r = ring[j];
+                // a + s·d = t·r with s and t between 0 and 1, which is seen before it is divided
+                const double det = turn(r, d), of_s = turn(a, r), size = std::abs(det);
+                if (std::abs(of_t) >= size || std::abs(of_s) >= size || of_t * det <= 0 || of_s * det <= 0) continue;
+                const double t = of_t / det, s = of_s / det;
+                if (t >= 1 || s >= 1) continue;
                 if (!fits(t * r[2] - (a[2] + s * d[2]))) return false;
             }
         }
+        look_at_old_facets();
         new_height_ = std::numeric_limits<double>::infinity();
-        for (int i = 1; i + 1 < n_; ++i) {
-            const Place p = minus(flat_[at(i)], a), q = minus(flat_[at(i + 1)], a), third = minus(q, p), n = cross(p, q);
-            const double area2 = std::sqrt(dot(n, n)), longest = std::sqrt(std::max({dot(p, p), dot(q, q), dot(third, third)}));
-            new_height_ = std::min(new_height_, area2 / longest);
-            if (new_height_ < least_height_ * (1 - 1e-9)) return false;
-            new_facing_[static_cast<std::size_t>(i)] = {n[0] / area2, n[1] / area2, n[2] / area2};
+        for (std::size_t i = 1; i + 1 < n; ++i) {
+            const Place &p = from_a_[i], &q = from_a_[i + 1], third = minus(q, p);
+            new_normal_[i] = cross(p, q);
+            new_area2_[i] = std::sqrt(dot(new_normal_[i], new_normal_[i]));
+            const double longest = std::sqrt(std::max({dot(p, p), dot(q, q), dot(third, third)}));
+            new_height_ = std::min(new_height_, new_area2_[i] / longest);
+            if (new_height_ < least_height_ * (1 - 1e-9) || new_height_ <= best_height_) return false;
         }
-        for (int i = 1; i + 1 < n_; ++i) {
+        for (std::size_t i = 1; i + 1 < n; ++i) {
             bool found = false;
-            for (std::size_t j = 0; j < static_cast<std::size_t>(n_) && !found; ++j)
-                found = dot(flat_normal_[j], new_facing_[static_cast<std::size_t>(i)]) >= same_facing_[j];
+            for (std::size_t j = 0; j < n && !found; ++j) found = dot(flat_normal_[j], new_normal_[i]) >= same_facing_[j] * new_area2_[i];
             if (!found) return false;
         }
         // None of the new edges may exist already: the surface would be pinched there.
-        const std::uint32_t target = ring_[at(0)];
-        for (int i = 2; i + 1 < n_; ++i)
-            if (joined(target, ring_[at(i)])) return false;
-        if (n_ == 3 && joined_across(target, ring_[at(1)], ring_[at(2)])) return false;
+        const std::uint32_t target = ring_[at(k, 0)];
+        bool pinched = n == 3 && joined_across(target, ring_[at(k, 1)], ring_[at(k, 2)]);
+        for (int i = 2; i + 1 < n_ && !pinched; ++i) pinched = joined(target, ring_[at(k, i)]);
+        if (pinched) {
+            need_[v] = 0;  // what is known of the vertices around changes from round to round
+            return false;
+        }
         new_low_ = low;
         new_high_ = high;
         return true;
     }
+
+    [[nodiscard]] std::size_t at(int k, int i) const { return static_cast<std::size_t>(k + i < n_ ? k + i : k + i - n_); }
 
     // With three facets around, the one that follows may be there already, turned over: a tetrahedron must stay one.
     [[nodiscard]] bool joined_across(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
@@ -280,85 +390,184 @@ private:
     }
 
     void go_to(std::uint32_t v, int k) {
-        auto at = [&](int i) { return static_cast<std::size_t>((k + i) % n_); };
-        const std::uint32_t target = ring_[at(0)];
+        const std::uint32_t target = ring_[at(k, 0)];
         // Outward to the next float: the sum must stay a bound.
         constexpr float inf = std::numeric_limits<float>::infinity();
         const float low = new_low_ < 0 ? std::nextafter(static_cast<float>(low_ + new_low_), -inf) : low_,
                     high = new_high_ > 0 ? std::nextafter(static_cast<float>(high_ + new_high_), inf) : high_;
         for (int i = 0; i < n_; ++i) {
-            Face& f = faces_[fan_[at(i)]];
+            Face& f = faces_[fan_[at(k, i)]];
             if (i == 0 || i == n_ - 1) {
                 f.v = {v, v, v};
                 continue;
             }
-            f = {{target, ring_[at(i)], ring_[at(i + 1)]}, low, high};
+            f = {{target, ring_[at(k, i)], ring_[at(k, i + 1)]}, low, high};
         }
-        for (int i = 0; i < n_; ++i) touched_[ring_[at(i)]] = awake_[ring_[at(i)]] = 1;
+        for (std::size_t i = 0; i < count(); ++i) {
+            const std::uint32_t w = ring_[i];
+            touched_[w] = 1;
+            awake_[w] = inner_[w];
+            need_[w] = 0;
+        }
         touched_[v] = 1;
+        need_[v] = kNever;
     }
 
-    double tolerance_, allowed_ = 0;
+    double tolerance_ = 0, allowed_ = 0;
     std::span<const double> planes_;  // ascending
     std::vector<std::uint32_t> ids_;  // of the mesh, ascending
+    std::vector<std::uint64_t> used_;
+    std::vector<std::uint32_t> before_;
     std::vector<Place> place_;
     std::vector<Face> faces_;
-    std::vector<std::uint32_t> starts_, around_, next_;
+    std::vector<std::uint32_t> starts_, around_;
     std::vector<char> inner_, awake_, touched_;
+    std::vector<double> need_;  // what the tolerance must be, at least, so that a vertex that is asleep may go
     // Around the vertex in work.
+    template <class T, int times = 1>
+    using Around = std::array<T, times * kMostAround + 1>;
     int n_ = 0;
-    std::array<std::uint32_t, kMostAround> ring_{}, fan_{};
-    std::array<Place, kMostAround> flat_{}, flat_normal_{}, facing_{}, new_facing_{};  // facing_ as the pattern stands, the others as flat_
-    std::array<double, kMostAround> same_facing_{};                                    // what a normal along flat_normal_ makes with it at least
-    bool exactly_ = false;                                                             // nothing may move
-    float low_ = 0, high_ = 0;                                                         // of the facets around it
-    double new_low_ = 0, new_high_ = 0;                                                // that going to the last neighbour looked at adds
-    double least_height_ = 0, new_height_ = 0;
+    Around<std::uint32_t> ring_, fan_;
+    Around<Place> arm_, normal_;         // as the pattern stands: to the vertices around, and of the facets, area2_ long
+    Around<Place, 2> flat_;              // the vertices around, twice in a row
+    Around<Place> flat_normal_;          // as flat_
+    Around<Place> from_a_, new_normal_;  // as flat_: from the vertex that v may go to, and of the facets that follow
+    Around<double> area2_, side_, new_area2_;
+    Around<double> same_facing_;  // what a normal along flat_normal_ makes with it at least
+    bool exactly_ = false;        // nothing may move
+    bool old_facets_known_ = false;
+    float low_ = 0, high_ = 0;           // of the facets around it
+    double new_low_ = 0, new_high_ = 0;  // that going to the last neighbour looked at adds
+    double least_height_ = 0, new_height_ = 0, best_height_ = 0;
 };
 
-// The faces by cells of a grid whose origin is `shift` of a cell lower, so that other places lie at its borders each time.
-std::vector<Face> pass(Context& context, MeshView mesh, const std::vector<Face>& faces, double tolerance, std::span<const double> planes,
-                       double shift) {
-    const Box3 box = bounds(mesh);
-    const std::array<double, 3> low{box.min.x, box.min.y, box.min.z},
-        size{double{box.max.x} - low[0], double{box.max.y} - low[1], double{box.max.z} - low[2]};
-    // A surface meets about the square of cells to a side.
-    const double cells = std::max(1.0, std::sqrt(static_cast<double>(faces.size()) / kBlockFacets));
-    const double cell = std::max({size[0], size[1], size[2], 1e-6}) / cells;
-    std::array<std::uint32_t, 3> count{};
-    for (std::size_t k = 0; k < 3; ++k) count[k] = static_cast<std::uint32_t>(size[k] / cell + shift) + 1;
-    const std::size_t blocks = std::size_t{count[0]} * count[1] * count[2];
-    auto block_of = [&](const Face& f) {
-        const Vec3f& p = mesh.vertices[std::min({f.v[0], f.v[1], f.v[2]})];
-        const std::array<double, 3> at{p.x, p.y, p.z};
-        std::size_t block = 0;
-        for (std::size_t k = 3; k-- > 0;)
-            block = block * count[k] + std::min(count[k] - 1, static_cast<std::uint32_t>(std::max(0.0, (at[k] - low[k]) / cell + shift)));
+/// Blocks that were used before.
+class Blocks {
+public:
+    [[nodiscard]] std::unique_ptr<Block> take() {
+        const std::lock_guard lock(mutex_);
+        if (free_.empty()) return std::make_unique<Block>();
+        auto block = std::move(free_.back());
+        free_.pop_back();
         return block;
-    };
-    std::vector<std::size_t> starts(blocks + 1, 0);
-    std::vector<std::uint32_t> of(faces.size());
-    parallel_for(context, faces.size(), std::size_t{1} << 16, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) of[i] = static_cast<std::uint32_t>(block_of(faces[i]));
-    });
-    for (const std::uint32_t b : of) ++starts[b + 1];
-    for (std::size_t b = 1; b <= blocks; ++b) starts[b] += starts[b - 1];
-    std::vector<Face> dealt(faces.size());
-    {
-        std::vector<std::size_t> next(starts.begin(), starts.end() - 1);
-        for (std::size_t i = 0; i < faces.size(); ++i) dealt[next[of[i]]++] = faces[i];
     }
-    std::vector<std::vector<Face>> parts(blocks);
-    parallel_each(context, blocks, [&](std::size_t b) {
-        if (starts[b] == starts[b + 1]) return;
-        parts[b] = Block(mesh, std::span(dealt).subspan(starts[b], starts[b + 1] - starts[b]), tolerance, planes).simplified();
-    });
-    std::vector<Face> all;
-    std::size_t total = 0;
-    for (const std::vector<Face>& part : parts) total += part.size();
-    all.reserve(total);
-    for (const std::vector<Face>& part : parts) all.insert(all.end(), part.begin(), part.end());
-    return all;
+    void give(std::unique_ptr<Block> block) {
+        const std::lock_guard lock(mutex_);
+        free_.push_back(std::move(block));
+    }
+
+private:
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<Block>> free_;
+};
+
+/// A grid of cubes, in each of which a surface of so many facets has about kBlockFacets.
+class Cells {
+public:
+    /// @param shift of a cell by which the grid's origin lies lower, so that other places lie at its borders
+    Cells(const Box3& box, std::size_t facets, double shift) : low_{box.min.x, box.min.y, box.min.z}, shift_(shift) {
+        const std::array<double, 3> size{double{box.max.x} - low_[0], double{box.max.y} - low_[1], double{box.max.z} - low_[2]};
+        // A surface meets about the square of cells to a side.
+        const double cells = std::max(1.0, std::sqrt(static_cast<double>(facets) / kBlockFacets));
+        cell_ = std::max({size[0], size[1], size[2], 1e-6}) / cells;
+        for (std::size_t k = 0; k < 3; ++k) count_[k] = static_cast<std::uint32_t>(size[k] / cell_ + shift) + 1;
+    }
+    [[nodiscard]] std::size_t count() const { return std::size_t{count_[0]} * count_[1] * count_[2]; }
+    /// Of the cell that holds a facet's lowest vertex.
+    [[nodiscard]] std::size_t of(MeshView mesh, const Index3& facet) const {
+        const Vec3f& p = mesh.vertices[std::min({facet[0], facet[1], facet[2]})];
+        const std::array<double, 3> at{p.x, p.y, p.z};
+        std::size_t cell = 0;
+        for (std::size_t k = 3; k-- > 0;)
+            cell = cell * count_[k] + std::min(count_[k] - 1, static_cast<std::uint32_t>(std::max(0.0, (at[k] - low_[k]) / cell_ + shift_)));
+        return cell;
+    }
+
+private:
+    std::array<double, 3> low_;
+    double shift_, cell_ = 1;
+    std::array<std::uint32_t, 3> count_{};
+};
+
+/// Memory for so many elements, of which each block writes only the first of those that are its own: what is not written takes no memory.
+template <class T>
+struct Sparse {
+    struct Part {
+        std::size_t begin = 0, end = 0;
+    };
+    RawArray<T> all;
+    std::vector<Part> parts;
+    std::unique_ptr<std::optional<MemoryCharge>[]> charges;  ///< one for each part
+
+    Sparse(std::size_t size, std::size_t blocks) : all(size), parts(blocks), charges(new std::optional<MemoryCharge>[blocks]) {}
+    [[nodiscard]] std::size_t size() const {
+        std::size_t sum = 0;
+        for (const Part& part : parts) sum += part.end - part.begin;
+        return sum;
+    }
+    void release() { all = {}, charges.reset(); }
+};
+
+// The numbers of the n sources' faces are dealt by cells and each cell made simpler, its faces written as keep(face) says.
+// @param each_face(begin, end, take) calls take(number, facet) for the faces of these sources @param face_of(number) a face
+template <class T, class EachFace, class FaceOf, class Keep>
+Sparse<T> pass(const Task& task, const Cells& cells, std::size_t faces, std::size_t n, std::size_t grain, EachFace&& each_face, FaceOf&& face_of,
+               Keep&& keep) {
+    Sparse<T> out(faces, cells.count());
+    Blocks blocks;
+    RawArray<std::uint32_t> numbers;
+    std::optional<MemoryCharge> charge;
+    std::size_t before = 0;  // faces dealt in earlier rounds
+    deal(
+        task.context, n, grain, cells.count(),
+        [&](std::size_t begin, std::size_t end, auto&& take) {
+            each_face(begin, end, [&](std::uint32_t, const Index3& facet) { take(cells.of(task.mesh, facet)); });
+        },
+        [&](std::size_t begin, std::size_t end, auto&& take) {
+            each_face(begin, end, [&](std::uint32_t number, const Index3& facet) { take(cells.of(task.mesh, facet), number); });
+        },
+        [&](std::uint64_t total, std::uint64_t largest) {
+            const std::uint64_t most = std::min(total, std::max(kDealtAtOnce, 2 * largest));
+            charge.emplace(task.context, most * sizeof(std::uint32_t), "the facets that a tolerance needs");
+            numbers = RawArray<std::uint32_t>(most);
+            return std::pair(numbers.data(), most);
+        },
+        [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
+            parallel_each(task.context, last - first, [&](std::size_t b) {
+                const std::span<const std::uint32_t> mine(numbers.data() + starts[b], starts[b + 1] - starts[b]);
+                if (mine.empty()) return;
+                auto block = blocks.take();
+                block->load(task, mine.size(), [&](std::size_t i) { return face_of(mine[i]); });
+                const std::span<const Face> few = block->simplified(task);
+                out.charges[first + b].emplace(task.context, few.size() * sizeof(T), "the facets that a tolerance needs");
+                const std::size_t begin = before + starts[b];
+                out.parts[first + b] = {begin, begin + few.size()};
+                std::transform(few.begin(), few.end(), out.all.data() + begin, keep);
+                blocks.give(std::move(block));
+            });
+            before += starts.back();
+        });
+    return out;
+}
+
+/// Twice over blocks that do not share borders.
+Sparse<Index3> few_facets(Context& context, MeshView mesh, double tolerance, std::span<const double> planes) {
+    const Box3 box = bounds(context, mesh);
+    VertexBits unsettled(mesh.vertices.size());
+    auto of_mesh = [&](std::size_t begin, std::size_t end, auto&& take) {
+        for (std::size_t f = begin; f < end; ++f) take(static_cast<std::uint32_t>(f), mesh.facets[f]);
+    };
+    const Sparse<Face> some = pass<Face>(
+        Task{context, mesh, tolerance, planes, nullptr, &unsettled}, Cells(box, mesh.size(), 0), mesh.size(), mesh.size(), std::size_t{1} << 16,
+        of_mesh, [&](std::uint32_t f) { return Face{mesh.facets[f]}; }, [](const Face& face) { return face; });
+    auto of_some = [&](std::size_t begin, std::size_t end, auto&& take) {
+        for (std::size_t part = begin; part < end; ++part)
+            for (std::size_t f = some.parts[part].begin; f < some.parts[part].end; ++f) take(static_cast<std::uint32_t>(f), some.all[f].v);
+    };
+    const std::size_t left = some.size();
+    return pass<Index3>(
+        Task{context, mesh, tolerance, planes, &unsettled, nullptr}, Cells(box, left, 0.5), left, some.parts.size(), 1, of_some,
+        [&](std::uint32_t f) { return some.all[f]; }, [](const Face& face) { return face.v; });
 }
 
 }  // namespace
@@ -366,25 +575,37 @@ std::vector<Face> pass(Context& context, MeshView mesh, const std::vector<Face>&
 Mesh simplify(Context& context, MeshView mesh, double tolerance_mm, std::span<const double> planes) {
     if (!(tolerance_mm > 0) || !std::isfinite(tolerance_mm))
         throw Error(ErrorKind::usage, "simplify.tolerance", "the tolerance of simplifying must be positive", {}, "give a length in mm");
-    const MemoryCharge charge(context, 100 * mesh.facets.size(), "the facets that a tolerance needs");
-    std::vector<Face> faces(mesh.facets.size());
-    for (std::size_t i = 0; i < faces.size(); ++i) faces[i].v = mesh.facets[i];
     std::vector<double> ascending(planes.begin(), planes.end());
     std::sort(ascending.begin(), ascending.end());
-    for (const double shift : {0.0, 0.5}) faces = pass(context, mesh, faces, tolerance_mm, ascending, shift);
     Mesh result;
-    constexpr std::uint32_t unused = 0xFFFFFFFFu;
-    std::vector<std::uint32_t> to(mesh.vertices.size(), unused);
-    result.facets.resize(faces.size());
-    for (std::size_t i = 0; i < faces.size(); ++i)
-        for (std::size_t k = 0; k < 3; ++k) {
-            std::uint32_t& id = to[faces[i].v[k]];
-            if (id == unused) {
-                id = static_cast<std::uint32_t>(result.vertices.size());
-                result.vertices.push_back(mesh.vertices[faces[i].v[k]]);
+    if (mesh.facets.empty()) return result;
+    {
+        Sparse<Index3> few = few_facets(context, mesh, tolerance_mm, ascending);
+        const std::size_t left = few.size();
+        const MemoryCharge charge(context, left * sizeof(Index3) + mesh.vertices.size() * sizeof(std::uint32_t), "the facets that a tolerance needs");
+        // Vertices are numbered as the facets name them.
+        constexpr std::uint32_t unused = 0xFFFFFFFFu;
+        std::vector<std::uint32_t> to(mesh.vertices.size(), unused);
+        result.facets.reserve(left);
+        std::uint32_t used = 0;
+        for (std::size_t part = 0; part < few.parts.size(); ++part) {
+            context.throw_if_cancelled();
+            for (std::size_t i = few.parts[part].begin; i < few.parts[part].end; ++i) {
+                Index3 facet = few.all[i];
+                for (std::uint32_t& v : facet) {
+                    if (to[v] == unused) to[v] = used++;
+                    v = to[v];
+                }
+                result.facets.push_back(facet);
             }
-            result.facets[i][k] = id;
         }
+        few.release();
+        result.vertices.resize(used);
+        parallel_for(context, to.size(), std::size_t{1} << 16, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t v = begin; v < end; ++v)
+                if (to[v] != unused) result.vertices[to[v]] = mesh.vertices[v];
+        });
+    }
     pair_edges(context, result);
     return result;
 }

@@ -19,7 +19,7 @@ namespace slabwright {
 /// itself: there it stays as it is, but for what lies in one plane exactly.
 ///
 /// Works in blocks of space, in parallel, twice over blocks that do not share borders; the result is the same on any number of threads,
-/// and its facets come in the order of the blocks. About 100 bytes a facet besides the meshes, charged.
+/// and its facets come in the order of the blocks. Besides the meshes 64 MB, 32 bytes for each facet that stays and 2 for each of `mesh`, charged.
 /// @param mesh with or without neighbours
 /// @returns a mesh with neighbours
 /// @throws Error(usage, "simplify.tolerance") unless the tolerance is positive and finite; Error(no_plan, "memory.limit"), Error(cancelled)
