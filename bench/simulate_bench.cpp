@@ -79,7 +79,7 @@ void simulate_metre_pattern(benchmark::State& state) {
     double metres = 0, cells = 0, square_metres = 0;
     const double before = peak_mib(true);
     for (auto _ : state) {
-        const SimulationReport r = simulate(context, p.input);
+        const SimulationReport r = simulate(context, p.input, StandingPart(context, p.input.mesh));
         metres = r.cutting_mm / 1000;
         cells = static_cast<double>(r.nx) * r.ny * static_cast<double>(r.layers.size());
         square_metres = r.nx * r.cell * r.ny * r.cell * 1e-6;

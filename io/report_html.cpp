@@ -19,7 +19,6 @@
 #include "engine/simulate/reach.h"
 #include "engine/simulate/replay.h"
 #include "io/base64.h"
-#include "io/gcode_reader.h"
 #include "io/job_keys.h"
 #include "io/output_folder.h"
 #include "io/report_template.h"
@@ -181,16 +180,9 @@ PlanFolder read_plan_folder(const fs::path& out) {
     return folder;
 }
 
-/// Where the pattern lies: as named, or where plan.json's file name leads.
-fs::path find_pattern(const fs::path& out, const std::string& file, const std::string& given) {
-    if (!given.empty()) return given;
-    const fs::path base = fs::path(file).filename();
-    fs::path folder = fs::absolute(out).lexically_normal();
-    if (!folder.has_filename()) folder = folder.parent_path();
-    for (const fs::path& place : {folder / base, folder.parent_path() / base, base})
-        if (std::error_code ignored; !base.empty() && fs::exists(place, ignored)) return place;
-    throw Error(ErrorKind::input, "report.no_pattern", "the pattern " + base.string() + " is neither in nor beside the folder", out.string(),
-                "name the STL with --stl");
+PlannedPattern planned_pattern(const PlanFolder& folder) {
+    const Json& input = folder.plan.at("input");
+    return {input.at("file").get<std::string>(), input.value("sha256", ""), {folder.units, folder.tolerances.weld}};
 }
 
 /// Douglas and Peucker on a closed loop, from its first point and the one farthest from that.
@@ -291,47 +283,57 @@ std::uint8_t left_over_code(float left, double gouge) {
     return static_cast<std::uint8_t>(std::min(253.0, std::round(100 * std::sqrt(std::max(0.0, static_cast<double>(left))))));
 }
 
-/// Reads and runs every program. The replay's figures go into the page with a light page too; its maps only with the model.
+/// Reads a program of OUT.
+Program read_program(const fs::path& out, const PlanFolder& folder, const Named& named) {
+    const std::string text = read_text(out / named.file, "report.program");
+    try {
+        Program program = read_gcode(text, named.file, gcode_limits(folder.tolerances));
+        program.layer = named.layer;
+        if (folder.frame == Frame::layer_top)
+            for (ProgramStep& s : program.steps) s.z += folder.input.layers[static_cast<std::size_t>(named.layer)].z_top;
+        return program;
+    } catch (const Error& e) {
+        throw Error(ErrorKind::input, "report.program", e.message(), e.place(), e.remedy());
+    }
+}
+
+/// Runs every program, one layer's after the other's. The replay's figures go into the page with a light page too; its maps only with the model.
+/// @param programs those that have been read already; each is let go when it has run, the others are read
 /// @param part of the input's mesh; none with a light page
-void replay_programs(Context& context, const fs::path& out, const PlanFolder& folder, const SimulationInput& input, const StandingPart* part,
-                     Figures& figures) {
+void replay_programs(Context& context, const fs::path& out, const PlanFolder& folder, const SimulationInput& input, std::vector<Program> programs,
+                     const StandingPart* part, Figures& figures) {
     ReplayOptions options;
     options.cell = stock_cell(input);
     options.cusp = folder.tolerances.cusp;
     options.material = folder.material;
     Replay replay(context, input, options);
+    std::map<std::string, Program*> read;
+    for (Program& program : programs) read.emplace("nc/" + program.file, &program);
     Json engagement = Json::array();
     figures.paths.resize(folder.programs.size());
     for (std::size_t begin = 0; begin < folder.programs.size();) {
         std::size_t end = begin;
         while (end < folder.programs.size() && folder.programs[end].layer == folder.programs[begin].layer) ++end;
-        std::vector<Program> programs(end - begin);
-        parallel_each(context, programs.size(), [&](std::size_t i) {
+        std::vector<Program> of_layer(end - begin);
+        parallel_each(context, of_layer.size(), [&](std::size_t i) {
             const Named& named = folder.programs[begin + i];
-            Program& program = programs[i];
-            const std::string text = read_text(out / named.file, "report.program");
-            try {
-                program = read_gcode(text, named.file);
-            } catch (const Error& e) {
-                throw Error(ErrorKind::input, "report.program", e.message(), e.place(), e.remedy());
-            }
-            program.file = named.file;
-            program.layer = named.layer;
-            if (folder.frame == Frame::layer_top)
-                for (ProgramStep& s : program.steps) s.z += input.layers[static_cast<std::size_t>(named.layer)].z_top;
+            const auto known = read.find(named.file);
+            of_layer[i] = known != read.end() ? std::move(*known->second) : read_program(out, folder, named);
             if (part == nullptr) return;
-            figures.paths[begin + i] = path_of(program, input.machine.rapid_feed);
-            thin(figures.paths[begin + i], kPathTolerance);
+            figures.paths[begin + i] = path_of(of_layer[i], input.machine.rapid_feed, kPathTolerance);
         });
-        for (const Program& program : programs) {
-            const ReplayedProgram found = replay.run(program);
+        for (std::size_t i = 0; i < of_layer.size(); ++i) {
+            const ReplayedProgram found = replay.run(of_layer[i]);
             Json depth = Json::array(), width = Json::array(), force = Json::array(), deflection = Json::array();
             for (const ReplayPiece& piece : found.pieces) {
                 depth.push_back(rounded(piece.depth_mm, 3)), width.push_back(rounded(piece.width_mm, 3));
                 force.push_back(rounded(piece.force_n, 2)), deflection.push_back(rounded(piece.deflection_mm, 5));
             }
-            engagement.push_back(
-                {{"file", program.file}, {"depth_mm", depth}, {"width_mm", width}, {"force_n", force}, {"deflection_mm", deflection}});
+            engagement.push_back({{"file", folder.programs[begin + i].file},
+                                  {"depth_mm", depth},
+                                  {"width_mm", width},
+                                  {"force_n", force},
+                                  {"deflection_mm", deflection}});
             context.advance();
         }
         begin = end;
@@ -475,7 +477,7 @@ Json model_json(Context& context, MeshView mesh, const StandingPart& part, const
         }
     return {{"facets", model.facets.size()},
             {"of", mesh.facets.size()},
-            {"error_mm", rounded(surface_deviation(context, mesh, model.view()), 4)},
+            {"error_mm", rounded(surface_deviation(context, part, StandingPart(context, model.view())), 4)},
             {"min", {low[0], low[1], low[2]}},
             {"max", {high[0], high[1], high[2]}},
             {"index_bytes", narrow ? 2 : 4},
@@ -487,7 +489,7 @@ Json model_json(Context& context, MeshView mesh, const StandingPart& part, const
 }
 
 /// All paths within a number of points: the tolerance is doubled until they fit, then the longest are left out.
-Json paths_json(std::vector<std::vector<ReplayPoint>> paths, const PlanFolder& folder, std::size_t most) {
+Json paths_json(Context& context, std::vector<std::vector<ReplayPoint>> paths, const PlanFolder& folder, std::size_t most) {
     const auto count = [&] {
         std::size_t points = 0;
         for (const auto& path : paths) points += path.size();
@@ -497,7 +499,7 @@ Json paths_json(std::vector<std::vector<ReplayPoint>> paths, const PlanFolder& f
     while (count() > most && tolerance < kWidestTolerance) {
         tolerance *= 2;
         error += tolerance;  // each thinning works on what the one before left
-        for (auto& path : paths) thin(path, tolerance);
+        parallel_each(context, paths.size(), [&](std::size_t i) { thin(paths[i], tolerance); });
     }
     std::vector<char> left_out(paths.size(), 0);
     while (count() > most) {
@@ -565,7 +567,7 @@ std::string page(const Json& data, bool three_d) {
 
 bool reports_are_built() { return !report_template().empty(); }
 
-std::string report_html(Context& context, const std::string& directory, const ReportOptions& options) {
+std::string report_html(Context& context, const std::string& directory, const ReportOptions& options, std::optional<Verification> verified) {
     if (!reports_are_built())
         throw Error(ErrorKind::usage, "report.not_built", "this build of slabwright has no report page", "",
                     "run tools/setup, which fetches its parts, and build again with SLABWRIGHT_REPORT=ON");
@@ -575,12 +577,14 @@ std::string report_html(Context& context, const std::string& directory, const Re
     const PlanFolder folder = read_plan_folder(out);
     const Json sequence = fs::exists(out / "sequence.json") ? read_json(out / "sequence.json", "report.sequence") : Json();
     const Json verify = fs::exists(out / "verify.json") ? read_json(out / "verify.json", "report.verify") : Json();
-    const fs::path pattern = find_pattern(
-        out, understood(out / "plan.json", "report.plan", [&] { return folder.plan.at("input").at("file").get<std::string>(); }), options.stl);
-    const StlMesh stl = read_stl(context, pattern.string(), {folder.units, folder.tolerances.weld});
-    if (folder.plan["input"].value("sha256", "") != stl.input.sha256)
-        throw Error(ErrorKind::input, "report.other_pattern", "is not the pattern that was planned: its SHA-256 is " + stl.input.sha256,
-                    pattern.string(), "name the planned STL with --stl, or plan again");
+    Pattern pattern = verified
+                          ? std::move(verified->pattern)
+                          : read_pattern(context, directory, understood(out / "plan.json", "report.plan", [&] { return planned_pattern(folder); }),
+                                         options.stl, "report");
+    std::vector<Program> programs;
+    if (verified) programs = std::move(verified->input.programs);
+    verified.reset();
+    const MeshView mesh = pattern.stl.mesh.view();
 
     context.begin_phase("report", 0.1, options.three_d ? 0.45 : 1.0, folder.programs.size());
     Figures figures;
@@ -592,13 +596,13 @@ std::string report_html(Context& context, const std::string& directory, const Re
                 steps.push_back({step.at("layer").get<int>(), step.at("action").get<std::string>(), step.at("seconds").get<double>(),
                                  step.contains("program") ? step.at("program") : Json()});
         figures.data["steps"] = std::move(steps);
-        draw_figures(context, stl.mesh.view(), folder, sequence, figures.data);
+        draw_figures(context, mesh, folder, sequence, figures.data);
         return 0;
     });
     SimulationInput input = folder.input;
-    input.mesh = stl.mesh.view();
-    const auto part = options.three_d ? std::make_unique<StandingPart>(context, stl.mesh.view()) : nullptr;
-    replay_programs(context, out, folder, input, part.get(), figures);
+    input.mesh = mesh;
+    if (options.three_d && !pattern.part) pattern.part.emplace(context, mesh);
+    replay_programs(context, out, folder, input, std::move(programs), options.three_d ? &*pattern.part : nullptr, figures);
     context.throw_if_cancelled();
 
     const auto limit = static_cast<std::size_t>(options.size_limit_mb * 1e6);
@@ -615,9 +619,9 @@ std::string report_html(Context& context, const std::string& directory, const Re
     figures.data["left_over"] = {{"layers", figures.replay}};
     context.begin_phase("report's model and paths", 0.45, 1.0, 3);
     std::size_t facets = kMostFacets, points = kMostPoints;
-    Json model = model_json(context, stl.mesh.view(), *part, folder, facets);
+    Json model = model_json(context, mesh, *pattern.part, folder, facets);
     context.advance();
-    Json paths = paths_json(figures.paths, folder, points);
+    Json paths = paths_json(context, figures.paths, folder, points);
     context.advance();
     for (;;) {
         figures.data["model"] = model;
@@ -631,18 +635,18 @@ std::string report_html(Context& context, const std::string& directory, const Re
         // Paths are thinned before the model: they take more, and lose less.
         if (points > kFewestPoints) {
             points /= 2;
-            paths = paths_json(figures.paths, folder, points);
+            paths = paths_json(context, figures.paths, folder, points);
         } else if (facets > kFewestFacets) {
             facets /= 2;
-            model = model_json(context, stl.mesh.view(), *part, folder, facets);
+            model = model_json(context, mesh, *pattern.part, folder, facets);
         } else {
             throw too_large(text.size());
         }
     }
 }
 
-void write_report(Context& context, const std::string& directory, const ReportOptions& options) {
-    write_file_whole((fs::path(directory) / "report.html").string(), report_html(context, directory, options));
+void write_report(Context& context, const std::string& directory, const ReportOptions& options, std::optional<Verification> verified) {
+    write_file_whole((fs::path(directory) / "report.html").string(), report_html(context, directory, options, std::move(verified)));
 }
 
 }  // namespace slabwright

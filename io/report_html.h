@@ -2,8 +2,10 @@
 // programs, sequence.json, verify.json where there is one) and the STL that plan.json names.
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "io/verify.h"
 #include "kernels/parallel/context.h"
 
 namespace slabwright {
@@ -17,13 +19,16 @@ struct ReportOptions {
 /// Whether this library can write reports.
 [[nodiscard]] bool reports_are_built();
 
-/// The page. The same OUT and options give the same bytes on any number of threads.
+/// The page.
+/// @param verified what verify_folder() read of the same OUT and pattern just now: it is not read again, and let go as it has been used
+/// The same OUT and options give the same bytes on any number of threads.
 /// @throws Error(usage, "report.not_built"), Error(usage, "report.size_limit") when nothing more can be left out,
 ///         Error(input, "report.plan" | "report.program" | "report.sequence" | "report.verify") when OUT cannot be understood,
 ///         Error(input) when the STL is missing, unreadable, or not the one that was planned (by its SHA-256)
-[[nodiscard]] std::string report_html(Context& context, const std::string& directory, const ReportOptions& options = {});
+[[nodiscard]] std::string report_html(Context& context, const std::string& directory, const ReportOptions& options = {},
+                                      std::optional<Verification> verified = {});
 
 /// Writes it to OUT/report.html, whole or not at all. @throws as report_html, and Error(input) when the place cannot be written
-void write_report(Context& context, const std::string& directory, const ReportOptions& options = {});
+void write_report(Context& context, const std::string& directory, const ReportOptions& options = {}, std::optional<Verification> verified = {});
 
 }  // namespace slabwright

@@ -188,9 +188,10 @@ VerifyResult write_verified(Context& context, const Plan& plan, const std::strin
         options.stl = stl_path;
         options.cell = cell_mm;
         context.share_progress(kPlanningShare, kVerifyingShare);
-        VerifyResult result = verdict(verify_folder(context, out.path("").string(), options));
+        Verification found = verify_folder(context, out.path("").string(), options);
+        VerifyResult result = verdict(found);
         context.share_progress(kVerifyingShare, 1);
-        if (reports_are_built()) write_report(context, out.path("").string(), {stl_path});
+        if (reports_are_built()) write_report(context, out.path("").string(), {stl_path}, std::move(found));
         context.throw_if_cancelled();
         out.commit();
         return result;

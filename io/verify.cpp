@@ -11,10 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "io/gcode_reader.h"
 #include "io/job_keys.h"
 #include "io/json_text.h"
-#include "io/stl.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 
@@ -148,17 +146,6 @@ void add_polygon(Loops& loops, const Field& polygon) {
         loops.points.push_back({to_units(x), to_units(y)});
     }
     loops.close_loop();
-}
-
-fs::path find_pattern(const fs::path& directory, const std::string& file, const std::string& given) {
-    if (!given.empty()) return given;
-    const fs::path base = fs::path(file).filename();
-    if (base.empty()) throw Error(ErrorKind::input, "verify.no_pattern", "plan.json names no pattern", directory.string(), "name the STL with --stl");
-    const fs::path parent = fs::absolute(directory).lexically_normal();
-    for (const fs::path& place : {directory / base, (parent.has_filename() ? parent.parent_path() : parent.parent_path().parent_path()) / base, base})
-        if (std::error_code ignored; fs::exists(place, ignored)) return place;
-    throw Error(ErrorKind::input, "verify.no_pattern", "the pattern " + base.string() + " is neither in nor beside the folder", directory.string(),
-                "name the STL with --stl");
 }
 
 /// tool.tbl against the library: what the machine believes of a tool is what the paths were made for.
@@ -379,6 +366,12 @@ void write_maps(const SimulationReport& report, const std::string& directory) {
     }
 }
 
+GcodeLimits gcode_limits(const Tolerances& tolerances) {
+    GcodeLimits limits;
+    limits.arc_error = std::clamp(0.02 * tolerances.gouge, 1e-5, limits.arc_error);
+    return limits;
+}
+
 Verification verify_folder(Context& context, const std::string& directory, const VerifyOptions& options) {
     const fs::path out(directory);
     const std::string plan_path = (out / "plan.json").string();
@@ -394,9 +387,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     const Frame frame = enumerator(kFrameWords, plan["frame"]);
     const JobPart part = read_job_part(plan);
 
-    // Chords that stand for an arc take next to nothing of the gouge tolerance that the paths were made for.
-    GcodeLimits limits;
-    limits.arc_error = std::clamp(0.02 * part.job.tolerances.gouge, 1e-5, limits.arc_error);
+    const GcodeLimits limits = gcode_limits(part.job.tolerances);
 
     Verification result;
     SimulationInput& input = result.input;
@@ -464,14 +455,11 @@ Verification verify_folder(Context& context, const std::string& directory, const
             violations.push_back({"program.unplanned", "nc/ holds it, plan.json does not name it", file, 0, {}, 0});
     }
 
-    const fs::path pattern = find_pattern(out, plan["input"]["file"].text(), options.stl);
-    StlOptions stl_options;
-    stl_options.units = part.job.units;
-    stl_options.weld_mm = part.job.tolerances.weld;
-    const StlMesh stl = read_stl(context, pattern.string(), stl_options);
-    if (const std::string planned_hash = plan["input"]["sha256"].text(); stl.input.sha256 != planned_hash)
-        throw Error(ErrorKind::input, "verify.other_pattern", "is not the pattern that was planned: its SHA-256 is " + stl.input.sha256,
-                    pattern.string(), "name the planned STL with --stl, or plan again");
+    result.pattern =
+        read_pattern(context, directory, {plan["input"]["file"].text(), plan["input"]["sha256"].text(), {part.job.units, part.job.tolerances.weld}},
+                     options.stl, "verify");
+    input.mesh = result.pattern.stl.mesh.view();
+    result.pattern.part.emplace(context, input.mesh);
 
     SimulationOptions simulation;
     simulation.cell = options.cell;
@@ -486,11 +474,10 @@ Verification verify_folder(Context& context, const std::string& directory, const
             if (tool.kind == ToolKind::ball) simulation.board_cut = std::max(simulation.board_cut, tool.diameter / 2);
     }
     simulation.board_cut = std::min(simulation.board_cut, part.job.machine.base_board_thickness);
-    input.mesh = stl.mesh.view();
-    result.report = simulate(context, input, simulation);
+    result.report = simulate(context, input, *result.pattern.part, simulation);
     input.mesh = {};
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
-    result.json = report_json(input, result.report, simulation, pattern.filename().string(), part.stated);
+    result.json = report_json(input, result.report, simulation, fs::path(result.pattern.path).filename().string(), part.stated);
 
     if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);
     if (options.write) {

@@ -4,6 +4,8 @@
 #include <string>
 
 #include "engine/simulate/simulate.h"
+#include "io/gcode_reader.h"
+#include "io/pattern.h"
 
 namespace slabwright {
 
@@ -15,12 +17,16 @@ struct VerifyOptions {
     bool write = true;             ///< write OUT/verify.json
 };
 
-/// What was found, and the plan's own words that it was found about.
+/// What was found, and what was read to find it.
 struct Verification {
-    SimulationInput input;  ///< its mesh is not set: it ends with this function
+    Pattern pattern;        ///< with its part
+    SimulationInput input;  ///< its mesh is not set: pattern has it
     SimulationReport report;
     std::string json;  ///< what verify.json holds (schema slabwright.verify/1)
 };
+
+/// How a plan's programs are read: chords that stand for an arc take next to nothing of the gouge tolerance that the paths were made for.
+[[nodiscard]] GcodeLimits gcode_limits(const Tolerances& tolerances);
 
 /// Reads plan.json, every program of nc/, tool.tbl and the STL, simulates, and writes OUT/verify.json (a whole file or none). The
 /// report's violations say what is wrong with programs and part; `report.passed()` is the verdict.

@@ -32,7 +32,7 @@ TEST(Decimate, KeepsTheShapeOfOwnModels) {
         EXPECT_GT(few.facets.size(), wished * 9 / 10);
         EXPECT_TRUE(closed(few.view()));
         EXPECT_NEAR(volume(few.view()), volume(mesh.view()), 0.003 * volume(mesh.view()));
-        const double error = surface_deviation(context, mesh.view(), few.view());
+        const double error = surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view()));
         const Box3 box = bounds(mesh.view());
         EXPECT_GT(error, 0);
         EXPECT_LT(error, 0.003 * (box.max.x - box.min.x));
@@ -65,7 +65,7 @@ TEST(Decimate, FlatPlatesNeedFewFacets) {
     const Mesh few = decimate(context, mesh.view(), 60);
     EXPECT_LE(few.facets.size(), 60u);
     EXPECT_TRUE(closed(few.view()));
-    EXPECT_LT(surface_deviation(context, mesh.view(), few.view()), 1e-3);
+    EXPECT_LT(surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view())), 1e-3);
     EXPECT_NEAR(volume(few.view()), 5.0 * n * n, 1e-2);
 }
 
@@ -77,7 +77,7 @@ TEST(Decimate, SameOnAnyThreadsAndUntouchedWhenSmall) {
     EXPECT_EQ(a.facets, b.facets);
     const Mesh same = decimate(one, mesh.view(), mesh.facets.size());
     EXPECT_EQ(same.facets.size(), mesh.facets.size());
-    EXPECT_LT(surface_deviation(one, mesh.view(), same.view()), 1e-9);
+    EXPECT_LT(surface_deviation(one, StandingPart(one, mesh.view()), StandingPart(one, same.view())), 1e-9);
     EXPECT_TRUE(decimate(one, MeshView{}, 100).facets.empty());
 }
 
@@ -99,8 +99,31 @@ TEST(Deviation, IsTheDistanceOfShiftedPlanes) {
         a.vertices = {{0, 0, 0}, {10, 0, 0}, {0, 10, 0}};
         b.vertices = {{0, 0, up}, {10, 0, up}, {0, 10, up}};
         a.facets = b.facets = {{0, 1, 2}};
-        EXPECT_NEAR(surface_deviation(context, a.view(), b.view()), up, 1e-6);
+        EXPECT_NEAR(surface_deviation(context, StandingPart(context, a.view()), StandingPart(context, b.view())), up, 1e-6);
     }
+}
+
+TEST(Deviation, AgreesWithClosestPoints) {
+    Context context;
+    const Mesh mesh = welded(context, pump_cover());
+    const Mesh few = decimate(context, mesh.view(), 900);
+    double most = 0;
+    const auto measure = [&](const Mesh& from, const Mesh& to) {
+        const ClosestPoint closest(context, to.view());
+        for (const Index3& f : from.facets) {
+            Point3 middle{};
+            for (const std::uint32_t i : f) {
+                const Vec3f& v = from.vertices[i];
+                most = std::max(most, closest.query_unsigned({v.x, v.y, v.z}, 1e9).distance);
+                middle[0] += v.x / 3.0, middle[1] += v.y / 3.0, middle[2] += v.z / 3.0;
+            }
+            most = std::max(most, closest.query_unsigned(middle, 1e9).distance);
+        }
+    };
+    measure(mesh, few);
+    measure(few, mesh);
+    EXPECT_GT(most, 0.01);
+    EXPECT_NEAR(surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view())), most, 1e-9);
 }
 
 TEST(Slopes, OfACone) {

@@ -68,6 +68,9 @@ TEST(ThinnedPath, EveryPointLeftOutLiesNearTheWayThatReplacesIt) {
         const double tolerance = 0.05;
         thin(thinned, tolerance);
         EXPECT_LT(thinned.size(), whole.size() / 2);
+        const std::vector<ReplayPoint> at_once = path_of(program, 12000, tolerance);
+        ASSERT_EQ(at_once.size(), thinned.size());
+        for (std::size_t k = 0; k < thinned.size(); ++k) ASSERT_EQ(at_once[k].seconds, thinned[k].seconds) << k;
         EXPECT_EQ(thinned.front().x, whole.front().x);
         EXPECT_EQ(thinned.back().seconds, whole.back().seconds);
         std::size_t next = 1;
@@ -162,6 +165,10 @@ TEST(Report, HoldsWhatLiesInTheFolder) {
     EXPECT_FALSE(seen.contains("model"));
     EXPECT_EQ(light.find("<canvas"), std::string::npos);
     EXPECT_LT(light.size(), 1'000'000u);
+    // What verification has read makes the same page as what the report reads.
+    const std::string checked = folder / "checked";
+    (void)write_verified(one, planned, checked, kStl, 0.5);
+    EXPECT_EQ(slurp(fs::path(checked) / "report.html"), report_html(four, checked, {kStl}));
     // Without the pattern's path no page is written, and the rest is.
     write(one, planned, folder / "bare");
     EXPECT_FALSE(fs::exists(folder.path / "bare/report.html"));

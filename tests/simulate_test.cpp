@@ -102,7 +102,7 @@ struct Block {
     SimulationReport run(int threads = 0) {
         input.mesh = solid.mesh.view();
         Context context({.threads = threads});
-        return simulate(context, input, options);
+        return simulate(context, input, StandingPart(context, input.mesh), options);
     }
     Program& rough() { return input.programs[1]; }
 };
@@ -509,23 +509,24 @@ TEST(Simulate, MapsCancelMemoryAndNonsense) {
     Context cancelled;
     cancelled.cancel();
     try {
-        (void)simulate(cancelled, block.input, block.options);
+        (void)simulate(cancelled, block.input, StandingPart(cancelled, block.input.mesh), block.options);
         FAIL() << "was not cancelled";
     } catch (const Error& e) {
         EXPECT_EQ(e.kind(), ErrorKind::cancelled);
     }
     Context poor({.threads = 1, .memory_bytes = 1000});
     try {
-        (void)simulate(poor, block.input, block.options);
+        (void)simulate(poor, block.input, StandingPart(poor, block.input.mesh), block.options);
         FAIL() << "took more than it may";
     } catch (const Error& e) {
         EXPECT_EQ(e.code(), "memory.limit");
     }
     Context context;
+    const StandingPart part(context, block.input.mesh);
     SimulationInput nonsense = block.input;
     nonsense.layers[0].z_top = nonsense.layers[0].z_bottom;
-    EXPECT_THROW((void)simulate(context, nonsense, block.options), Error);
+    EXPECT_THROW((void)simulate(context, nonsense, part, block.options), Error);
     nonsense = block.input;
     nonsense.stock_max[0] = nonsense.stock_min[0];
-    EXPECT_THROW((void)simulate(context, nonsense, block.options), Error);
+    EXPECT_THROW((void)simulate(context, nonsense, part, block.options), Error);
 }

@@ -113,8 +113,8 @@ void raise(Extreme& a, std::uint32_t& line, const Extreme& b, std::uint32_t b_li
 
 class Simulation {
 public:
-    Simulation(Context& context, const SimulationInput& input, const SimulationOptions& options)
-        : context_(context), input_(input), options_(options), part_(context, input.mesh) {}
+    Simulation(Context& context, const SimulationInput& input, const StandingPart& part, const SimulationOptions& options)
+        : context_(context), input_(input), options_(options), part_(part) {}
 
     SimulationReport run() {
         check();
@@ -689,7 +689,7 @@ private:
     Context& context_;
     const SimulationInput& input_;
     SimulationOptions options_;
-    StandingPart part_;
+    const StandingPart& part_;
     double cell_ = 1;
     int nx_ = 0, ny_ = 0;
     std::vector<PreparedProgram> prepared_;
@@ -710,8 +710,8 @@ double simulation_cell(const std::vector<Tool>& tools, double cusp) {
     return std::clamp(std::sqrt(2 * radius * std::max(cusp, 1e-4)) / 2, 0.05, 1.0);
 }
 
-SimulationReport simulate(Context& context, const SimulationInput& input, const SimulationOptions& options) {
-    return Simulation(context, input, options).run();
+SimulationReport simulate(Context& context, const SimulationInput& input, const StandingPart& part, const SimulationOptions& options) {
+    return Simulation(context, input, part, options).run();
 }
 
 }  // namespace slabwright

@@ -134,8 +134,10 @@ struct SimulationReport {
 
 /// Runs everything. Stock at the cells' centres is exact, not sampled, so a gouge or left-over is what stands there; between
 /// the centres the exact check of every motion decides about gouges.
+/// @param part of the input's mesh
 /// @throws Error(usage) on layers or stock that make no sense, Error(no_plan, "memory.limit"), Error(cancelled)
-[[nodiscard]] SimulationReport simulate(Context& context, const SimulationInput& input, const SimulationOptions& options = {});
+[[nodiscard]] SimulationReport simulate(Context& context, const SimulationInput& input, const StandingPart& part,
+                                        const SimulationOptions& options = {});
 
 /// Time of a program in seconds: trapezoids of speed under one acceleration, slowed at corners so that a path rounded by
 /// `corner` mm at most would need no more than that acceleration across (junction deviation).

@@ -1,42 +1,120 @@
 #include "kernels/access/deviation.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
+#include <tuple>
 
-#include "kernels/access/closest_point.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
 
 namespace {
 
-double farthest(Context& context, MeshView from, MeshView to) {
-    const ClosestPoint closest(context, to);
-    const std::size_t vertices = from.vertices.size();
-    return parallel_reduce(
-        context, vertices + from.facets.size(), 4096, 0.0,
-        [&](std::size_t begin, std::size_t end) {
-            double most = 0;
-            for (std::size_t i = begin; i < end; ++i) {
-                Point3 p{};
-                if (i < vertices) {
-                    p = {from.vertices[i].x, from.vertices[i].y, from.vertices[i].z};
-                } else {
-                    for (const std::uint32_t v : from.facets[i - vertices])
-                        p[0] += from.vertices[v].x / 3.0, p[1] += from.vertices[v].y / 3.0, p[2] += from.vertices[v].z / 3.0;
-                }
-                most = std::max(most, closest.query_unsigned(p, std::numeric_limits<double>::infinity()).distance);
-            }
-            return most;
-        },
-        [](double a, double b) { return std::max(a, b); });
-}
+/// The room upright over and under a facet: there the facet is as far as its plane.
+class Prism {
+public:
+    explicit Prism(const std::array<Vec3f, 3>& v) {
+        const auto less = [](const Vec3f& a, const Vec3f& b) { return Point3{double{a.x} - b.x, double{a.y} - b.y, double{a.z} - b.z}; };
+        const auto cross = [](const Point3& a, const Point3& b) {
+            return Point3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+        };
+        const Point3 n = cross(less(v[1], v[0]), less(v[2], v[0]));
+        const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Point3 inwards = cross(n, less(v[(k + 1) % 3], v[k]));
+            sides_[k] = {inwards[0], inwards[1], inwards[2], -(inwards[0] * v[k].x + inwards[1] * v[k].y + inwards[2] * v[k].z)};
+        }
+        const double share = length > 0 ? 1 / length : std::numeric_limits<double>::infinity();  // of a sliver nothing is told
+        plane_ = {n[0] * share, n[1] * share, n[2] * share, -(n[0] * v[0].x + n[1] * v[0].y + n[2] * v[0].z) * share};
+    }
+    /// Whether a place is in the prism and no farther from the facet than this.
+    [[nodiscard]] bool within(const Point3& p, double distance) const {
+        const auto over = [&](const std::array<double, 4>& side) { return side[0] * p[0] + side[1] * p[1] + side[2] * p[2] + side[3]; };
+        return (over(sides_[0]) >= 0) & (over(sides_[1]) >= 0) & (over(sides_[2]) >= 0) & (std::abs(over(plane_)) <= distance);
+    }
+
+private:
+    std::array<std::array<double, 4>, 3> sides_{};
+    std::array<double, 4> plane_{};
+};
 
 }  // namespace
 
-double surface_deviation(Context& context, MeshView a, MeshView b) {
-    if (a.facets.empty() || b.facets.empty()) return 0;
-    return std::max(farthest(context, a, b), farthest(context, b, a));
+// Only the greatest distance matters. A facet of the other part bounds the distance of all that is near it, so most of the tree is done with
+// after one look at eight nodes or at one; a place whose bound is beyond the greatest known distance is measured. A sample of places is
+// measured before, so that the greatest known is near the greatest from the start. The result is exact, so it depends on no order.
+double StandingPart::farthest_from(Context& context, const StandingPart& other) const {
+    if (facets_.empty() || other.facets_.empty()) return 0;
+    constexpr std::size_t kFan = std::tuple_size_v<decltype(Nodes::x0)>, kSample = 509;
+    const auto corner = [](const Vec3f& v) { return Point3{v.x, v.y, v.z}; };
+    const auto larger = [](double a, double b) { return std::max(a, b); };
+    const double sampled = parallel_reduce(
+        context, (facets_.size() + kSample - 1) / kSample, 64, 0.0,
+        [&](std::size_t begin, std::size_t end) {
+            double most = 0;
+            for (std::size_t i = begin; i < end; ++i)
+                for (const Vec3f& v : facets_[i * kSample].v)
+                    most = std::max(most, other.nearest(corner(v), {std::numeric_limits<double>::infinity(), 0}, most).distance);
+            return most;
+        },
+        larger);
+    return parallel_reduce(
+        context, levels_[0].size(), 64, 0.0,
+        [&](std::size_t begin, std::size_t end) {
+            double most = sampled;
+            std::uint32_t facet = 0;  // of the other part: the nearest to a place lately
+            Prism prism(other.facets_[facet].v);
+            const auto take = [&](std::uint32_t nearest) {
+                if (nearest != facet) prism = Prism(other.facets_[facet = nearest].v);
+            };
+            // Whether some place of a box may be farther than the greatest known.
+            const auto may_be_farther = [&](const Node& box, bool search) {
+                const Point3 middle{(double{box.x0} + box.x1) / 2, (double{box.y0} + box.y1) / 2, (double{box.z0} + box.z1) / 2};
+                const double x = double{box.x1} - box.x0, y = double{box.y1} - box.y0, z = double{box.z1} - box.z0;
+                const double half = std::sqrt(x * x + y * y + z * z) / 2;
+                Near near{other.distance(middle, facet), facet};
+                if (search && near.distance + half > most) near = other.nearest(middle, near, 0), take(near.facet);
+                return near.distance + half > most;
+            };
+            const auto look = [&](const Point3& place) {
+                if (prism.within(place, most)) return;
+                Near near{other.distance(place, facet), facet};
+                if (near.distance <= most) return;
+                near = other.nearest(place, near, most);
+                take(near.facet);
+                most = std::max(most, near.distance);
+            };
+            for (std::size_t i = begin; i < end; ++i) {
+                const Nodes& eight = levels_[0][i];
+                Node around = eight[0];
+                for (std::size_t k = 1; k < kFan; ++k) {
+                    around.x0 = std::min(around.x0, eight.x0[k]), around.x1 = std::max(around.x1, eight.x1[k]);
+                    around.y0 = std::min(around.y0, eight.y0[k]), around.y1 = std::max(around.y1, eight.y1[k]);
+                    around.z0 = std::min(around.z0, eight.z0[k]), around.z1 = std::max(around.z1, eight.z1[k]);
+                }
+                if (!may_be_farther(around, true)) continue;
+                for (std::size_t k = 0; k < kFan; ++k) {
+                    if (!(eight.x0[k] <= eight.x1[k]) || !may_be_farther(eight[k], false)) continue;
+                    const std::size_t first = (i * kFan + k) * kFan;
+                    for (std::size_t f = first; f < std::min(facets_.size(), first + kFan); ++f) {
+                        Point3 middle{};
+                        for (const Vec3f& v : facets_[f].v) {
+                            look(corner(v));
+                            middle[0] += v.x / 3.0, middle[1] += v.y / 3.0, middle[2] += v.z / 3.0;
+                        }
+                        look(middle);
+                    }
+                }
+            }
+            return most;
+        },
+        larger);
+}
+
+double surface_deviation(Context& context, const StandingPart& a, const StandingPart& b) {
+    return std::max(a.farthest_from(context, b), b.farthest_from(context, a));
 }
 
 }  // namespace slabwright

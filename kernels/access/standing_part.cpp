@@ -917,6 +917,31 @@ StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, 
     return best;
 }
 
+double StandingPart::distance(const Point3& point, std::uint32_t facet) const {
+    const std::array<Vec3f, 3>& v = facets_[facet].v;
+    const Point3 away = sub(point, closest_on_triangle(point, {to_point(v[0]), to_point(v[1]), to_point(v[2])}));
+    return std::sqrt(dot(away, away));
+}
+
+StandingPart::Near StandingPart::nearest(const Point3& point, const Near& known, double enough) const {
+    Near best = known;
+    walk_nearest(
+        [&](const Node& n) {
+            const double dz = std::max({0.0, n.z0 - point[2], point[2] - n.z1});
+            return xy_distance2(n, point[0], point[1]) + dz * dz;
+        },
+        [&] { return best.distance <= enough ? 0.0 : best.distance * best.distance; },
+        [&](const Facet& f) {
+            const double dz =
+                std::max({0.0, std::min({f.v[0].z, f.v[1].z, f.v[2].z}) - point[2], point[2] - std::max({f.v[0].z, f.v[1].z, f.v[2].z})});
+            if (xy_distance2(f.v, point[0], point[1]) + dz * dz >= best.distance * best.distance) return;
+            const auto facet = static_cast<std::uint32_t>(&f - facets_.data());
+            const double d = distance(point, facet);
+            if (d < best.distance) best = {d, facet};
+        });
+    return best;
+}
+
 double StandingPart::from_facets(const Point3& point, double limit) const {
     double best2 = limit * limit;
     walk_nearest(

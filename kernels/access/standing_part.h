@@ -82,6 +82,9 @@ public:
     /// From a point to the nearest facet, whatever its height; the limit when none is nearer.
     [[nodiscard]] double from_facets(const Point3& point, double limit) const;
 
+    /// The greatest distance from a corner or middle of its facets to the nearest facet of another part, mm; 0 when either has none.
+    [[nodiscard]] double farthest_from(Context& context, const StandingPart& other) const;
+
     /// Lowest and highest z, and the extent in x and y, of the facets.
     [[nodiscard]] Box3 box() const { return box_; }
 
@@ -111,6 +114,14 @@ private:
     void walk_within(const Within& box, Visit&& visit) const;
     template <class Squared, class Limit, class Visit>
     void walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit) const;
+    /// A facet and how far it is from a place.
+    struct Near {
+        double distance;  ///< mm
+        std::uint32_t facet;
+    };
+    /// The nearest facet, or the first found that is no farther than `enough`; `known` when none is nearer.
+    [[nodiscard]] Near nearest(const Point3& point, const Near& known, double enough) const;
+    [[nodiscard]] double distance(const Point3& point, std::uint32_t facet) const;
     struct Vicinity;
     struct Run;
     void gather(Vicinity& around) const;

@@ -1,0 +1,41 @@
+#include "io/pattern.h"
+
+#include <filesystem>
+
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Where the pattern lies: as named, or where plan.json's file name leads.
+fs::path find_pattern(const fs::path& directory, const std::string& file, const std::string& given, const std::string& asker) {
+    if (!given.empty()) return given;
+    const auto refuse = [&](const std::string& message) -> fs::path {
+        throw Error(ErrorKind::input, asker + ".no_pattern", message, directory.string(), "name the STL with --stl");
+    };
+    const fs::path base = fs::path(file).filename();
+    if (base.empty()) return refuse("plan.json names no pattern");
+    fs::path folder = fs::absolute(directory).lexically_normal();
+    if (!folder.has_filename()) folder = folder.parent_path();
+    for (const fs::path& place : {folder / base, folder.parent_path() / base, base})
+        if (std::error_code ignored; fs::exists(place, ignored)) return place;
+    return refuse("the pattern " + base.string() + " is neither in nor beside the folder");
+}
+
+}  // namespace
+
+Pattern read_pattern(Context& context, const std::string& directory, const PlannedPattern& planned, const std::string& given,
+                     const std::string& asker) {
+    Pattern pattern;
+    pattern.path = find_pattern(directory, planned.file, given, asker).string();
+    pattern.stl = read_stl(context, pattern.path, planned.reading);
+    if (pattern.stl.input.sha256 != planned.sha256)
+        throw Error(ErrorKind::input, asker + ".other_pattern", "is not the pattern that was planned: its SHA-256 is " + pattern.stl.input.sha256,
+                    pattern.path, "name the planned STL with --stl, or plan again");
+    return pattern;
+}
+
+}  // namespace slabwright
