@@ -311,7 +311,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     plan.job = job;
     if (mesh.facets.empty()) throw refusal("input.empty", "there is nothing to make: the mesh has no facets", input.file, "export the pattern again");
     const MeshView view = mesh.view();
-    const Box3 box = bounds(view);
+    const Box3 box = bounds(context, view);
     const double height = box.max.z;
     place_stock(plan, box);
 
@@ -339,10 +339,14 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     request.saddles_constrain = job.layers.saddles_constrain;
     request.features = plan.features;
     request.section_area = SectionAreas(context, view);
-    if (job.layers.strategy == LayerStrategy::combined)
-        return fastest_plan(context, view, plan, request, layer_candidates(context, view, job, request), {0.04, 0.98});
-    return plan_layers(context, view, plan, request,
-                       job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request), {0.04, 0.98});
+    if (job.layers.strategy == LayerStrategy::combined) {
+        const std::vector<LayerCandidate> tried = layer_candidates(context, view, job, request);
+        request.section_area = {};  // nobody asks again, and it is large
+        return fastest_plan(context, view, plan, request, tried, {0.04, 0.98});
+    }
+    const LayerPlacement placement = job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request);
+    request.section_area = {};
+    return plan_layers(context, view, plan, request, placement, {0.04, 0.98});
 }
 
 }  // namespace slabwright

@@ -125,7 +125,7 @@ double least_material(const Job& job, double overhang_mm) {
 SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {
     SlabOverhang result;
     std::vector<double>& heights = result.heights;
-    const double height = bounds(mesh).max.z;
+    const double height = bounds(context, mesh).max.z;
     for (const Feature& f : plan.features)
         if (f.z_low > 0 && f.z_low < height) heights.push_back(f.z_low);
     for (int i = 1; i <= 16; ++i) heights.push_back(height / 16 * i);

@@ -241,7 +241,7 @@ struct Bracket {
 }  // namespace
 
 std::vector<Feature> find_halving(Context& context, MeshView mesh, const FeatureOptions& options) {
-    const Box3 box = bounds(mesh);
+    const Box3 box = bounds(context, mesh);
     const double bottom = box.min.z, top = box.max.z;
     if (mesh.size() == 0 || !(top > bottom)) return {};
     std::vector<Plane> planes;

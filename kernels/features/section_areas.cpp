@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "kernels/features/facet_classes.h"
+#include "kernels/parallel/deal.h"
+#include "kernels/parallel/parallel.h"
 
 namespace slabwright {
 
@@ -41,44 +43,61 @@ std::size_t SectionAreas::slab(double z) const {
 }
 
 SectionAreas::SectionAreas(Context& context, MeshView mesh) : mesh_(mesh) {
-    const Box3 box = bounds(mesh);
+    const Box3 box = bounds(context, mesh);
     bottom_ = box.min.z;
     const double height = std::max(1e-3, static_cast<double>(box.max.z) - bottom_);
-    struct Span {
-        double low, high;
-    };
-    auto span_of = [&](std::uint32_t f) {
+    constexpr std::size_t grain = std::size_t{1} << 16;
+    // Calls take(first slab, last slab, plan area) for a facet that is seen from above or below.
+    auto with_slabs = [&](std::size_t f, auto&& take) {
+        const double area = area_normal(mesh, static_cast<std::uint32_t>(f))[2] / 2;
+        if (area == 0) return;
         const Index3 t = mesh.facets[f];
         const auto [low, high] = std::minmax({mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z});
-        return Span{low, high};
+        take(slab(low), slab(high), area);
     };
     // Fewer slabs where tall facets would be listed in too many of them.
     for (std::size_t slabs = 1024;; slabs /= 4) {
         pitch_ = height / static_cast<double>(slabs);
         whole_.assign(slabs, 0);
-        starts_.assign(slabs + 1, 0);
-        std::uint64_t entries = 0;
-        for (std::uint32_t f = 0; f < mesh.size(); ++f) {
-            if (area_normal(mesh, f)[2] == 0) continue;
-            const Span s = span_of(f);
-            for (std::size_t i = slab(s.low); i <= slab(s.high); ++i) ++starts_[i];
-            entries += slab(s.high) - slab(s.low) + 1;
-        }
-        context.throw_if_cancelled();
+        const std::uint64_t entries = parallel_reduce(
+            context, mesh.size(), grain, std::uint64_t{0},
+            [&](std::size_t begin, std::size_t end) {
+                std::uint64_t count = 0;
+                for (std::size_t f = begin; f < end; ++f)
+                    with_slabs(f, [&](std::size_t first, std::size_t last, double) { count += last - first + 1; });
+                return count;
+            },
+            [](std::uint64_t x, std::uint64_t y) { return x + y; });
         if (slabs == 1 || entries <= 8 * mesh.size() + 4096) break;
     }
-    std::uint32_t sum = 0;
-    for (std::uint32_t& s : starts_) s = sum += s;
-    facets_.resize(sum);
-    std::vector<double> begins(whole_.size(), 0);  // plan area of the facets that begin in each slab
-    for (std::size_t i = mesh.size(); i-- > 0;) {
-        const auto f = static_cast<std::uint32_t>(i);
-        const double area = area_normal(mesh, f)[2] / 2;
-        if (area == 0) continue;
-        const Span s = span_of(f);
-        for (std::size_t k = slab(s.low); k <= slab(s.high); ++k) facets_[--starts_[k]] = f;
-        begins[slab(s.low)] += area;
-    }
+    auto each_slab = [&](std::size_t begin, std::size_t end, auto&& take) {
+        for (std::size_t f = begin; f < end; ++f)
+            with_slabs(f, [&](std::size_t first, std::size_t last, double) {
+                for (std::size_t k = first; k <= last; ++k) take(k, static_cast<std::uint32_t>(f));
+            });
+    };
+    starts_.assign(whole_.size() + 1, 0);
+    deal(
+        context, mesh.size(), grain, whole_.size(),
+        [&](std::size_t begin, std::size_t end, auto&& take) { each_slab(begin, end, [&](std::size_t k, std::uint32_t) { take(k); }); }, each_slab,
+        [&](std::uint64_t total, std::uint64_t) {
+            charge_ = std::make_shared<MemoryCharge>(context, total * sizeof(std::uint32_t), "the areas of sections");
+            facets_.resize(total);
+            return std::pair(facets_.data(), total);
+        },
+        [&](std::size_t, std::size_t, std::span<const std::uint32_t> starts) { starts_.assign(starts.begin(), starts.end()); });
+    // Plan area of the facets that begin in each slab.
+    const std::vector<double> begins = parallel_reduce(
+        context, mesh.size(), std::max(grain, mesh.size() / 64), std::vector<double>(whole_.size(), 0),
+        [&](std::size_t begin, std::size_t end) {
+            std::vector<double> part(whole_.size(), 0);
+            for (std::size_t f = begin; f < end; ++f) with_slabs(f, [&](std::size_t first, std::size_t, double area) { part[first] += area; });
+            return part;
+        },
+        [](std::vector<double> x, const std::vector<double>& y) {
+            for (std::size_t k = 0; k < x.size(); ++k) x[k] += y[k];
+            return x;
+        });
     for (std::size_t k = whole_.size() - 1; k-- > 0;) whole_[k] = whole_[k + 1] + begins[k + 1];
 }
 
