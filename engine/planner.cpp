@@ -246,7 +246,10 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
     if (job.cutting.engagement == Engagement::simulated) rated = rate_layers(context, plan, cuts);
     for (std::size_t i = 0; i < planned.size(); ++i) {
         for (const auto* found : {&planned[i].diagnostics, &rated[i]}) plan.diagnostics.insert(plan.diagnostics.end(), found->begin(), found->end());
-        for (Operation& op : plan.layers[i].operations) rate(plan, plan.layers[i], op);
+        for (Operation& op : plan.layers[i].operations) {
+            context.throw_if_cancelled();
+            rate(plan, plan.layers[i], op);
+        }
     }
     if (std::all_of(plan.layers.begin(), plan.layers.end(), [](const Layer& layer) { return layer.operations.empty(); }))
         throw refusal("plan.empty", "nothing would be cut", plan.input.file, "check the units and the slabs");
@@ -266,7 +269,11 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     cut_layers(context, plan, pattern, joints, share);
 
     context.begin_phase("schedule", share.at(0.98), share.at(1));
-    for (std::size_t i = 0; i < plan.layers.size(); ++i) bond_layer(plan.layers[i], joints[i], plan, plan.diagnostics);
+    for (std::size_t i = 0; i < plan.layers.size(); ++i) {
+        context.throw_if_cancelled();
+        bond_layer(plan.layers[i], joints[i], plan, plan.diagnostics);
+    }
+    context.throw_if_cancelled();
     schedule(plan);
     check_mass(plan);
     return plan;

@@ -149,7 +149,10 @@ public:
         settle();
         keep_what_lowers();
         std::vector<std::vector<PathPoint>> runs;
-        for (const Line& line : lines_) append_runs(line, runs);
+        for (const Line& line : lines_) {
+            cut_.context.throw_if_cancelled();
+            append_runs(line, runs);
+        }
         op.stepover = to_mm(spacing_);
         op.stepdown = pass_.in_steps ? tool_.stepdown_max : 0;
         emit(op, runs);
@@ -432,6 +435,7 @@ private:
         path.know(cut_.around(tool_, index_.get()));
         const Slide slide{index_.get(), ball_, chord_, cut_.layer.z_top, kBridge};
         if (!pass_.in_steps) {
+            cut_.context.throw_if_cancelled();
             follow_nearest(path, chained(runs, slide));
             path.finish();
             return;
@@ -440,14 +444,17 @@ private:
         std::vector<std::vector<double>> stood_at(runs.size());
         std::vector<double> tops(runs.size(), -1e300);
         double lowest = cut_.layer.z_top;
-        for (std::size_t r = 0; r < runs.size(); ++r)
+        for (std::size_t r = 0; r < runs.size(); ++r) {
+            cut_.context.throw_if_cancelled();
             for (const PathPoint& p : runs[r]) {
                 stood_at[r].push_back(stood(p.x, p.y));
                 tops[r] = std::max(tops[r], stood_at[r].back());
                 lowest = std::min(lowest, to_mm(p.z));
             }
+        }
         const double step = tool_.stepdown_max > 0 ? tool_.stepdown_max : cut_.layer.z_top - cut_.layer.z_bottom;
         for (double above = cut_.layer.z_top; above > lowest + 1e-6; above -= step) {
+            cut_.context.throw_if_cancelled();
             const double level = above - step;
             std::vector<std::vector<PathPoint>> parts;
             for (std::size_t r = 0; r < runs.size(); ++r) {

@@ -22,6 +22,7 @@ namespace slabwright {
 namespace {
 
 constexpr std::size_t kGrain = 4096;
+constexpr std::size_t kCheckedAfter = std::size_t{1} << 18;  // facets on one thread: whether the work is still wanted
 
 bool collapsed(const Index3& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
@@ -257,16 +258,21 @@ VertexStars vertex_stars(Context& context, MeshView mesh) {
     const std::size_t n = mesh.vertices.size();
     VertexStars stars;
     stars.starts.assign(n + 1, 0);
-    for (const Index3& t : mesh.facets)
+    for (std::size_t f = 0; f < mesh.size(); ++f) {
+        if (f % kCheckedAfter == 0) context.throw_if_cancelled();
+        const Index3& t = mesh.facets[f];
         if (!collapsed(t))
             for (const std::uint32_t v : t) ++stars.starts[v];
+    }
     std::uint32_t sum = 0;
     for (std::uint32_t& s : stars.starts) s = sum += s;
     context.throw_if_cancelled();
     stars.facets.resize(sum);
-    for (std::size_t f = mesh.size(); f-- > 0;)  // backwards, so that each list ascends
+    for (std::size_t f = mesh.size(); f-- > 0;) {  // backwards, so that each list ascends
+        if (f % kCheckedAfter == 0) context.throw_if_cancelled();
         if (!collapsed(mesh.facets[f]))
             for (const std::uint32_t v : mesh.facets[f]) stars.facets[--stars.starts[v]] = static_cast<std::uint32_t>(f);
+    }
     context.throw_if_cancelled();
 
     stars.lowest.resize(n);
@@ -307,10 +313,13 @@ std::vector<Feature> find_exact(Context& context, MeshView mesh, VertexStars sta
             if (kind[v] != 0) lowest(static_cast<std::uint32_t>(v));  // shortens its way to one step, or nearly
     });
     std::vector<std::uint32_t> next(n, 0), plateau_starts{0};
+    context.throw_if_cancelled();
     for (std::uint32_t v = 0; v < n; ++v)
         if (kind[v] != 0) ++next[lowest(v)];
+    context.throw_if_cancelled();
     for (std::uint32_t v = 0; v < n; ++v)
         if (kind[v] == 1 && next[v] != 0) plateau_starts.push_back(plateau_starts.back() + std::exchange(next[v], plateau_starts.back()));
+    context.throw_if_cancelled();
     std::vector<std::uint32_t> sorted(plateau_starts.back());
     for (std::uint32_t v = 0; v < n; ++v) {
         if (kind[v] == 0) continue;

@@ -128,7 +128,8 @@ std::vector<Patch> connected_patches(Context& context, MeshView mesh, const Face
         const auto bit = static_cast<std::uint8_t>(1u << static_cast<unsigned>(c));
         done[seed] = 1;
         stack.assign(1, seed);
-        while (!stack.empty()) {
+        for (std::size_t met = 1; !stack.empty(); ++met) {
+            if (met % (1u << 16) == 0) context.throw_if_cancelled();
             const std::uint32_t f = stack.back();
             stack.pop_back();
             if (classes.of[f] == c) patch.facets.push_back(f);
