@@ -147,13 +147,14 @@ std::vector<Patch> connected_patches(Context& context, MeshView mesh, const Face
                 stack.push_back(g);
             }
         }
+        context.throw_if_cancelled();
         std::sort(patch.facets.begin(), patch.facets.end());
         patches.push_back(std::move(patch));
     }
     return patches;
 }
 
-Feature feature_of_patch(MeshView mesh, FeatureType type, Patch patch) {
+Feature feature_of_patch(Context& context, MeshView mesh, FeatureType type, Patch patch) {
     Feature feature;
     feature.type = type;
     feature.found_by = FoundBy::facets;
@@ -162,7 +163,12 @@ Feature feature_of_patch(MeshView mesh, FeatureType type, Patch patch) {
     const bool flat = type == FeatureType::up_flat || type == FeatureType::down_flat;
     double total = 0;
     Vec3d middle{};
+    std::size_t looked_at = 0;
+    auto check = [&] {
+        if (++looked_at % (1u << 16) == 0) context.throw_if_cancelled();
+    };
     for (const std::uint32_t f : patch.facets) {
+        check();
         const Vec3d n = area_normal(mesh, f), c = centroid_of(mesh, f);
         const double area = std::sqrt(dot(n, n)) / 2;
         feature.area += flat ? std::abs(n[2]) / 2 : area;
@@ -176,6 +182,7 @@ Feature feature_of_patch(MeshView mesh, FeatureType type, Patch patch) {
     for (double& m : middle) m /= total;
     double best = HUGE_VAL;
     for (const std::uint32_t f : patch.facets) {
+        check();
         const Vec3d c = centroid_of(mesh, f), d = minus(c, middle);
         if (dot(d, d) >= best) continue;
         best = dot(d, d);

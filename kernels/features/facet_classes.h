@@ -48,6 +48,7 @@ struct Patch {
 
 /// The patch as a feature: z range of its corners, its area (projected for flats), and the facet centroid nearest to
 /// its centroid of area.
-[[nodiscard]] Feature feature_of_patch(MeshView mesh, FeatureType type, Patch patch);
+/// @throws Error(cancelled)
+[[nodiscard]] Feature feature_of_patch(Context& context, MeshView mesh, FeatureType type, Patch patch);
 
 }  // namespace slabwright

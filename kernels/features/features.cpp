@@ -113,9 +113,9 @@ FeatureSet find_features(Context& context, MeshView mesh, const FeatureOptions& 
             return;
         }
         std::vector<Patch> patches = connected_patches(context, mesh, classes);
-        set.features = flats = find_flats(mesh, patches, options);
+        set.features = flats = find_flats(context, mesh, patches, options);
         for (auto find : {find_shallow, find_undercuts}) {
-            std::vector<Feature> found = find(mesh, patches);
+            std::vector<Feature> found = find(context, mesh, patches);
             set.features.insert(set.features.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));
         }
     });

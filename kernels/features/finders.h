@@ -11,11 +11,11 @@ namespace slabwright {
 
 /// up_flat or down_flat (never the base), or nothing when the patch is a single facet narrower than the chordal
 /// deviation: what repair programs add is no feature (LUO 4.2.3). Takes the patches' facets.
-[[nodiscard]] std::vector<Feature> find_flats(MeshView mesh, std::vector<Patch>& patches, const FeatureOptions& options);
+[[nodiscard]] std::vector<Feature> find_flats(Context& context, MeshView mesh, std::vector<Patch>& patches, const FeatureOptions& options);
 /// Type III: patches under the slope limit that are not horizontal.
-[[nodiscard]] std::vector<Feature> find_shallow(MeshView mesh, std::vector<Patch>& patches);
+[[nodiscard]] std::vector<Feature> find_shallow(Context& context, MeshView mesh, std::vector<Patch>& patches);
 /// Down-facing patches that are not horizontal.
-[[nodiscard]] std::vector<Feature> find_undercuts(MeshView mesh, std::vector<Patch>& patches);
+[[nodiscard]] std::vector<Feature> find_undercuts(Context& context, MeshView mesh, std::vector<Patch>& patches);
 
 /// The facets around every vertex, those with two equal corners left out, and the plateaus: vertices of one height that edges join.
 struct VertexStars {

@@ -8,13 +8,13 @@
 
 namespace slabwright {
 
-std::vector<Feature> find_flats(MeshView mesh, std::vector<Patch>& patches, const FeatureOptions& options) {
+std::vector<Feature> find_flats(Context& context, MeshView mesh, std::vector<Patch>& patches, const FeatureOptions& options) {
     std::vector<Feature> flats;
     for (Patch& patch : patches) {
         const bool up = patch.facet_class == FacetClass::up_flat;
         if (!up && patch.facet_class != FacetClass::down_flat) continue;
         if (patch.facets.size() == 1 && smallest_height(mesh, patch.facets.front()) < options.chordal_deviation_mm) continue;
-        flats.push_back(feature_of_patch(mesh, up ? FeatureType::up_flat : FeatureType::down_flat, std::move(patch)));
+        flats.push_back(feature_of_patch(context, mesh, up ? FeatureType::up_flat : FeatureType::down_flat, std::move(patch)));
     }
     return flats;
 }

@@ -3,10 +3,10 @@
 
 namespace slabwright {
 
-std::vector<Feature> find_shallow(MeshView mesh, std::vector<Patch>& patches) {
+std::vector<Feature> find_shallow(Context& context, MeshView mesh, std::vector<Patch>& patches) {
     std::vector<Feature> found;
     for (Patch& patch : patches)
-        if (patch.facet_class == FacetClass::shallow) found.push_back(feature_of_patch(mesh, FeatureType::shallow, std::move(patch)));
+        if (patch.facet_class == FacetClass::shallow) found.push_back(feature_of_patch(context, mesh, FeatureType::shallow, std::move(patch)));
     return found;
 }
 

@@ -16,10 +16,10 @@
 
 namespace slabwright {
 
-std::vector<Feature> find_undercuts(MeshView mesh, std::vector<Patch>& patches) {
+std::vector<Feature> find_undercuts(Context& context, MeshView mesh, std::vector<Patch>& patches) {
     std::vector<Feature> found;
     for (Patch& patch : patches)
-        if (patch.facet_class == FacetClass::undercut) found.push_back(feature_of_patch(mesh, FeatureType::undercut, std::move(patch)));
+        if (patch.facet_class == FacetClass::undercut) found.push_back(feature_of_patch(context, mesh, FeatureType::undercut, std::move(patch)));
     return found;
 }
 
