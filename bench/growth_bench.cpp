@@ -1,6 +1,7 @@
 // How every phase before and under the paths grows with the facets of one pattern (metre_pattern, 1160 × 1160 × 300 mm), on one thread and on two.
 //     build/release/growth_bench --benchmark_counters_tabular=true
-// `output` counts what comes out besides: segments, features, facets, points. bench/table makes exponents of it.
+// `output` counts what comes out besides: segments, features, facets, points. bench/table makes exponents of it. The memory is what a phase
+// takes at its most over the mesh that it is given (30 bytes a facet).
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
@@ -8,11 +9,13 @@
 #include <memory>
 #include <string>
 
+#include "bench/peak_memory.h"
 #include "engine/job.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/cutting/level_contours.h"
 #include "kernels/features/alpha_map.h"
 #include "kernels/features/features.h"
+#include "kernels/features/section_areas.h"
 #include "kernels/mesh/simplify.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/parallel/parallel.h"
@@ -64,9 +67,12 @@ void measure(benchmark::State& state, Phase&& phase) {
     const Pattern& of = pattern(static_cast<std::uint64_t>(state.range(0)));
     Context context({.threads = static_cast<int>(state.range(1))});
     std::size_t output = 0;
+    PeakMemory memory;
     for (auto _ : state) output = phase(context, of);
+    const double peak = memory.finish();
     if (output == 0) stop("nothing comes out");
     state.counters["facets"] = static_cast<double>(of.mesh.facets.size());
+    state.counters["anonymous bytes/facet"] = peak / static_cast<double>(of.mesh.facets.size());
     state.counters["output"] = static_cast<double>(output);
     state.counters["output/s"] = benchmark::Counter(static_cast<double>(output), benchmark::Counter::kIsIterationInvariantRate);
 }
@@ -121,6 +127,11 @@ void drops(benchmark::State& state) {
     });
 }
 
+void areas_of_sections(benchmark::State& state) {
+    measure(state,
+            [](Context& context, const Pattern& of) { return SectionAreas(context, of.mesh.view())(kBottom) > 0 ? std::size_t{1} : std::size_t{0}; });
+}
+
 // One level at the height of most walls, such that chords stay within 0.01 mm.
 void level_contour(benchmark::State& state) {
     measure(state, [](Context& context, const Pattern& of) {
@@ -138,10 +149,15 @@ int main(int argc, char** argv) {
     using namespace slabwright;
     // All phases of one size before the next, so that each pattern is made once.
     using Phase = void (*)(benchmark::State&);
-    constexpr std::pair<const char*, Phase> phases[] = {
-        {"slice_600", slice_600}, {"features", features},          {"undercuts", undercuts},
-        {"slopes", slopes},       {"fewer_facets", fewer_facets},  {"solid_of_a_layer", solid_of_a_layer},
-        {"drops", drops},         {"level_contour", level_contour}};
+    constexpr std::pair<const char*, Phase> phases[] = {{"slice_600", slice_600},
+                                                        {"features", features},
+                                                        {"undercuts", undercuts},
+                                                        {"slopes", slopes},
+                                                        {"fewer_facets", fewer_facets},
+                                                        {"solid_of_a_layer", solid_of_a_layer},
+                                                        {"areas_of_sections", areas_of_sections},
+                                                        {"drops", drops},
+                                                        {"level_contour", level_contour}};
     for (const std::int64_t facets : {100'000, 1'000'000, 10'000'000})
         for (const auto& [name, phase] : phases)
             for (const std::int64_t threads : {1, 2})

@@ -4,12 +4,9 @@
 // `read_mesh` is what other programs' loaders do too; `read_stl` adds the SHA-256 of the file and the report of all that is wrong.
 // A file that does not load, or not with all of its facets, stops the program.
 #include <benchmark/benchmark.h>
-#include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -17,9 +14,9 @@
 #include <map>
 #include <random>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "bench/peak_memory.h"
 #include "io/stl.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
@@ -85,45 +82,6 @@ Files& files() {
     static Files all;
     return all;
 }
-
-/// The most anonymous memory (resident, not of a file) while this lives, over what there was before; looked at every millisecond.
-class PeakMemory {
-public:
-    PeakMemory() {
-        ::malloc_trim(0);  // what earlier runs left in the heap would be used again and not be seen
-        before_ = now();
-        watcher_ = std::thread([this] { watch(); });
-    }
-    ~PeakMemory() { finish(); }
-    PeakMemory(const PeakMemory&) = delete;
-    PeakMemory& operator=(const PeakMemory&) = delete;
-    /// Bytes.
-    double finish() {
-        if (watcher_.joinable()) {
-            done_ = true;
-            watcher_.join();
-        }
-        return static_cast<double>(std::max(0L, peak_ - before_)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
-    }
-
-private:
-    static long now() {
-        long size = 0, resident = 0, shared = 0;
-        std::FILE* file = std::fopen("/proc/self/statm", "r");
-        if (file == nullptr || std::fscanf(file, "%ld %ld %ld", &size, &resident, &shared) != 3) stop("/proc/self/statm cannot be read");
-        std::fclose(file);
-        return resident - shared;
-    }
-    void watch() {
-        while (!done_) {
-            peak_ = std::max(peak_, now());
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
-        }
-    }
-    long before_ = 0, peak_ = 0;
-    std::atomic<bool> done_{false};
-    std::thread watcher_;
-};
 
 /// STREAM's triad, a = b + s·c, on arrays far larger than the caches: what all else is to be compared with. Bytes as STREAM counts
 /// them: two read, one written.
