@@ -141,6 +141,42 @@ TEST_P(Cutting, ContoursTouchAndSpareThePart) {
     }
 }
 
+// Levels found from one another against each by itself; the torus overhangs itself.
+TEST_P(Cutting, LevelsTogetherForbidWhatEachDoes) {
+    const auto [number, profile] = GetParam();
+    std::mt19937 random(test::seed() + static_cast<std::uint32_t>(number));
+    Context context;
+    Mesh mesh = number % 3 == 0 ? weld(context, shapes::torus(24, 9, 4))
+                                : test::random_height_field(context, 20, 1.0, 12, number % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
+    const LayerSolid solid = layer_solid(context, mesh.view(), -5, number % 2 ? 3.5 : 12.5);
+    const Cutter cutter{profile, 2.0};
+    std::vector<double> tips;
+    for (int k = 0; k < 12; ++k) tips.push_back(static_cast<double>(random() % 16000) / 1000 - 4);
+    tips.push_back(tips[3]);
+    std::vector<Plane> planes;
+    for (const double tip : tips) planes.push_back(inside_plane(solid, cutter, tip));
+    std::vector<Section> inside;  // one by one, for planes need not be in order here
+    for (const Plane& plane : planes) inside.push_back(std::move(slice(context, mesh.view(), {&plane, 1}).front()));
+    std::vector<FibreLevel> levels;
+    for (std::size_t i = 0; i < tips.size(); ++i) levels.push_back({tips[i], &inside[i].loops});
+    std::vector<std::int32_t> lines;
+    for (std::int32_t v = -160000; v < 160000; v += 1 + static_cast<std::int32_t>(random() % 9000)) lines.push_back(v);
+    std::size_t compared = 0;
+    for (const Axis axis : {Axis::x, Axis::y}) {
+        const std::vector<Fibres> together = fibres(context, solid, levels, cutter, axis, lines);
+        ASSERT_EQ(together.size(), levels.size());
+        for (std::size_t i = 0; i < levels.size(); ++i) {
+            const Fibres alone = fibres(context, solid, inside[i].loops, cutter, tips[i], axis, lines);
+            ASSERT_EQ(together[i].starts, alone.starts) << tips[i];
+            for (std::size_t k = 0; k < alone.intervals.size(); ++k, ++compared) {
+                EXPECT_NEAR(together[i].intervals[k].low, alone.intervals[k].low, 1e-9);
+                EXPECT_NEAR(together[i].intervals[k].high, alone.intervals[k].high, 1e-9);
+            }
+        }
+    }
+    EXPECT_GT(compared, 300U);
+}
+
 TEST_P(Cutting, DropRestsOnThePart) {
     const auto [seed, profile] = GetParam();
     std::printf("seed %d\n", seed);

@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "engine/paths/layer_cut.h"
+#include "engine/schedule/motion_time.h"
 #include "tests/support/height_field.h"
+#include "tests/support/seed.h"
 
 using namespace slabwright;
 
@@ -67,6 +70,44 @@ struct Bench {
 
 std::vector<PathPoint> line(double x0, double y0, double x1, double y1, double z) {
     return {{to_units(x0), to_units(y0), to_units(z)}, {to_units(x1), to_units(y1), to_units(z)}};
+}
+
+// Longer chords where the machine does not slow down for them: within the tolerance, fewer, and no slower.
+TEST(Thinning, LosesNoTimeByLongerChords) {
+    std::mt19937 random(test::seed());
+    Machine machine;
+    for (int round = 0; round < 20; ++round) {
+        const double a = 20 + static_cast<double>(random() % 200), b = 3 + static_cast<double>(random() % 20), fine = 0.02 * kUnitsPerMm,
+                     loose = 0.1 * kUnitsPerMm, wave = static_cast<double>(random() % 10);
+        std::vector<PathPoint> line;
+        for (int k = 0; k <= 4000; ++k) {
+            const double t = 0.0015 * k, x = a * std::cos(t) + b * std::sin(wave * t), y = a * std::sin(t) + (k / 1000 % 2 ? 2 : 0);
+            line.push_back({to_units(x), to_units(y), 0});
+        }
+        const double feed = 9000;
+        const auto finely = simplify(line, fine), coarsely = simplify(line, fine, loose, fast_turn(machine, feed));
+        auto seconds = [&](const std::vector<PathPoint>& points) {
+            std::vector<MotionLeg> legs;
+            for (std::size_t k = 1; k < points.size(); ++k) {
+                const double dx = to_mm(std::int64_t{points[k].x} - points[k - 1].x), dy = to_mm(std::int64_t{points[k].y} - points[k - 1].y),
+                             l = std::hypot(dx, dy);
+                legs.push_back({l, feed / 60, {dx / l, dy / l, 0}});
+                legs.back().leaving = legs.back().direction;
+            }
+            return travel_seconds(legs, machine.acceleration);
+        };
+        EXPECT_LT(coarsely.size(), finely.size());
+        EXPECT_LT(seconds(coarsely), 1.01 * seconds(finely)) << a << ' ' << b << ' ' << wave;
+        for (const PathPoint& p : line) {
+            double nearest = 1e300;
+            for (std::size_t k = 1; k < coarsely.size(); ++k) {
+                const double ax = coarsely[k - 1].x, ay = coarsely[k - 1].y, dx = coarsely[k].x - ax, dy = coarsely[k].y - ay;
+                const double t = std::clamp(((p.x - ax) * dx + (p.y - ay) * dy) / (dx * dx + dy * dy), 0.0, 1.0);
+                nearest = std::min(nearest, std::hypot(p.x - ax - t * dx, p.y - ay - t * dy));
+            }
+            ASSERT_LE(nearest, fine + loose + 1);
+        }
+    }
 }
 
 }  // namespace

@@ -58,10 +58,9 @@ std::vector<Section> LayerCut::insides(const Cutter& cutter, std::span<const dou
 
 std::vector<Contours> LayerCut::contours(const Cutter& cutter, std::span<const double> tip_z, std::int32_t pitch) const {
     const std::vector<Section> inside = insides(cutter, tip_z);
-    const FibreGrid grid = fibre_grid(solid, cutter, pitch);
-    std::vector<Contours> result(tip_z.size());
-    parallel_each(context, tip_z.size(), [&](std::size_t i) { result[i] = level_contours(context, solid, inside[i].loops, cutter, tip_z[i], grid); });
-    return result;
+    std::vector<FibreLevel> levels;
+    for (std::size_t i = 0; i < tip_z.size(); ++i) levels.push_back({tip_z[i], &inside[i].loops});
+    return level_contours(context, solid, levels, cutter, fibre_grid(solid, cutter, pitch));
 }
 
 const DropIndex& LayerCut::drops(const Cutter& cutter) const {
@@ -74,7 +73,9 @@ const DropIndex& LayerCut::drops(const Cutter& cutter) const {
 Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
     const Cutter cutter{tool.kind == ToolKind::ball ? Cutter::Profile::ball : Cutter::Profile::flat, tool.diameter / 2};
     Surroundings around{standing, part, cutter};
-    around.chord = safe_chord_mm(cutter.radius, job.tolerances.gouge);
+    // Where the places are those of a wider cutter, half of what it is wider by may go.
+    const double wider = part != nullptr ? part->cutter().radius - cutter.radius : 0;
+    around.chord = safe_chord_mm(cutter.radius, std::max(job.tolerances.gouge, wider / 2));
     around.ramp_deg = job.cutting.ramp_deg;
     around.no_way_in = &no_way_in;
     around.lowest_rapid = layer.z_bottom + PathBuilder::kStop;

@@ -4,13 +4,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/schedule/motion_time.h"
+
 namespace slabwright {
 
 namespace {
 
 constexpr double kBallMiddle = 0.75;                // of a ball's radius: what counts as head-on
 constexpr std::array kHelixRadii{0.9, 0.65, 0.45};  // of the cutter's radius: under it, so that no post is left in the middle
-constexpr int kHelixChords = 24;                    // a turn, at least
 constexpr int kSideRings = 6, kSideWays = 16;       // places looked at beside a run that no helix and no ramp reaches
 constexpr double kSideStep = 0.4;                   // of the cutter's radius, between their rings
 
@@ -177,7 +178,9 @@ bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
     ux /= length, uy /= length;
     for (const double share : kHelixRadii) {
         const double radius = share * around_.cutter.radius, cx = to_mm(first.x) - radius * uy, cy = to_mm(first.y) + radius * ux;
-        const int chords = std::max(kHelixChords, static_cast<int>(std::ceil(2 * std::numbers::pi * radius / around_.chord)));
+        // Chords that the machine takes as fast as the circle: no farther from it than it may pass by a corner.
+        const double chord = std::min(around_.chord, std::sqrt(8 * radius * kJunction));
+        const int chords = static_cast<int>(std::ceil(2 * std::numbers::pi * radius / chord));
         std::vector<std::array<double, 2>> circle;
         bool free = true;
         for (int k = 0; k <= chords && free; ++k) {
@@ -319,8 +322,10 @@ bool PathBuilder::finish() {
     return true;
 }
 
-std::vector<PathPoint> simplify(std::span<const PathPoint> line, double tolerance) {
-    if (line.size() < 3) return {line.begin(), line.end()};
+namespace {
+
+// Of each point of a line, whether it stays.
+std::vector<char> kept_within(std::span<const PathPoint> line, double tolerance) {
     std::vector<char> keep(line.size(), 0);
     keep.front() = keep.back() = 1;
     std::vector<std::pair<std::size_t, std::size_t>> open{{0, line.size() - 1}};
@@ -347,10 +352,49 @@ std::vector<PathPoint> simplify(std::span<const PathPoint> line, double toleranc
         open.push_back({first, at});
         open.push_back({at, last});
     }
+    return keep;
+}
+
+std::vector<PathPoint> kept_points(std::span<const PathPoint> line, std::span<const char> keep) {
     std::vector<PathPoint> result;
     for (std::size_t i = 0; i < line.size(); ++i)
         if (keep[i] && (result.empty() || !(result.back() == line[i]))) result.push_back(line[i]);
     return result;
 }
+
+// The change of direction from a to b to c, seen from above; none where two of them are one.
+double turn_at(const PathPoint& a, const PathPoint& b, const PathPoint& c) {
+    const double ux = static_cast<double>(b.x) - a.x, uy = static_cast<double>(b.y) - a.y, vx = static_cast<double>(c.x) - b.x,
+                 vy = static_cast<double>(c.y) - b.y;
+    return std::abs(std::atan2(ux * vy - uy * vx, ux * vx + uy * vy));
+}
+
+}  // namespace
+
+std::vector<PathPoint> simplify(std::span<const PathPoint> line, double tolerance) {
+    if (line.size() < 3) return {line.begin(), line.end()};
+    return kept_points(line, kept_within(line, tolerance));
+}
+
+std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, double loose, double turn) {
+    if (line.size() < 3) return {line.begin(), line.end()};
+    // What stays of the finely thinned line within the wider tolerance is a part of it.
+    const std::vector<PathPoint> finely = kept_points(line, kept_within(line, fine));
+    if (finely.size() < 3) return finely;
+    std::vector<char> keep = kept_within(finely, loose);
+    std::vector<std::size_t> corners;
+    for (std::size_t i = 0; i < finely.size(); ++i)
+        if (keep[i]) corners.push_back(i);
+    for (std::size_t k = 1; k + 1 < corners.size(); ++k) {
+        const std::size_t a = corners[k - 1], b = corners[k], c = corners[k + 1];
+        const double sharp = turn_at(finely[a], finely[b], finely[c]);
+        // A corner of the line itself is no less sharp between short chords.
+        if (sharp <= turn || turn_at(finely[b - 1], finely[b], finely[b + 1]) > 0.9 * sharp) continue;
+        std::fill(keep.begin() + static_cast<std::ptrdiff_t>(a), keep.begin() + static_cast<std::ptrdiff_t>(c), 1);
+    }
+    return kept_points(finely, keep);
+}
+
+double fast_turn(const Machine& machine, double feed) { return std::sqrt(8 * machine.acceleration * kJunction) * 60 / feed; }
 
 }  // namespace slabwright

@@ -16,7 +16,7 @@ struct Surroundings {
     Standing* standing = nullptr;     ///< what may stand; the builder cuts its own moves into it
     const DropIndex* part = nullptr;  ///< drops of this very cutter, or of a wider one; none: it never stays down
     Cutter cutter;
-    double chord = 0;                     ///< mm: longest chord between free places that is safe (safe_chord_mm)
+    double chord = 0;                     ///< mm: longest chord between places where `part` is free that is safe (safe_chord_mm)
     double ramp_deg = 5;                  ///< entry into stock
     std::shared_ptr<const Loops> room{};  ///< where the cutter's middle may be beside a flask; none: anywhere
     double lowest_rapid = -1e9;           ///< mm: rapids go no deeper
@@ -104,5 +104,12 @@ private:
 /// (Ramer–Douglas–Peucker in three dimensions). First and last stay. Every point of the result lies within `tolerance`
 /// of the polyline given.
 [[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double tolerance);
+
+/// The same to two tolerances: to `loose` (0.1 µm) where the line then turns by no more than `turn` (radians) at a point, to `fine`
+/// elsewhere. A machine slows down in sharper turns (travel_seconds), so where it need not, no time is lost by longer chords.
+[[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, double loose, double turn);
+
+/// The turn at a point, radians, that a machine takes at a feed (mm/min) without slowing down: θ = √(8aδ)/v (travel_seconds).
+[[nodiscard]] double fast_turn(const Machine& machine, double feed);
 
 }  // namespace slabwright

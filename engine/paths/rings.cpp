@@ -8,31 +8,16 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kBeyond = 20;           // mm that the flask's region reaches past the stock
-constexpr double kRingTolerance = 0.02;  // mm, as that of roughing's borders
-constexpr double kStepShare = 0.45;      // of the diameter: less than the radius by what offsets and thinning may add
-constexpr double kBeside = 0.5;          // mm of air between the stock and a cutter that goes down beside it
-constexpr double kOnEdge = 0.1;          // mm
-constexpr double kSlide = 1.2;           // steps along the next ring that the way to it slants
+constexpr double kBeyond = 20;        // mm that the flask's region reaches past the stock
+constexpr double kFineRing = 0.02;    // mm: what a ring may leave its line by, at least
+constexpr double kBorderShare = 0.1;  // of the wall's allowance: by what the ring next to it may
+constexpr double kRingShare = 0.008;  // of the diameter: by what all others may, for they meet nothing but waste
+constexpr double kStepShare = 0.45;   // of the diameter: less than the radius by more than offsets and thinning may add
+constexpr double kBeside = 0.5;       // mm of air between the stock and a cutter that goes down beside it
+constexpr double kOnEdge = 0.1;       // mm
+constexpr double kSlide = 1.2;        // steps along the next ring that the way to it slants
 
 double length(const PathPoint& a, const PathPoint& b) { return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y); }
-
-// What a ring shows near the stock: the whole ring, or pieces of it. All pieces around one region of the free area are cut
-// before those around the wider region that it lies in.
-struct Piece {
-    std::vector<PathPoint> points;
-    std::array<double, 4> box{};  // smallest x and y, largest x and y
-    std::size_t region = 0;
-    bool closed = false;
-};
-
-// A connected part of what is free at one distance from the forbidden region. Within it, farther off, lie others.
-struct Region {
-    std::size_t ring = 0, around = SIZE_MAX;  // how many steps off; the region one step nearer that holds this one
-    std::size_t waits_for = 0;                // regions within this one that are not cut yet
-    std::vector<std::size_t> pieces;
-    std::size_t left = 0;  // pieces not cut yet
-};
 
 // Where the middle of a cutter may be of use: the stock grown by `reach`, its corners rounded, as far as the machine travels.
 struct Bound {
@@ -49,8 +34,8 @@ struct Bound {
 
 // The pieces of one loop of the free area that are no edge of the bound. Outer loops run counter-clockwise and holes clockwise, so
 // the free area is on the left, what stays on the right, and the cutter climbs.
-void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bound, std::size_t region, std::vector<Piece>& out) {
-    const double tolerance = kRingTolerance * kUnitsPerMm;
+void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bound, std::size_t region, double tolerance,
+                   std::vector<RingPlan::Piece>& out) {
     const std::size_t n = loop.size();
     auto on_edge = [&](std::size_t k) {
         const Point2 &a = loop[k % n], &b = loop[(k + 1) % n];
@@ -60,7 +45,7 @@ void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bo
     auto point = [&](std::size_t k) { return PathPoint{loop[k % n].x, loop[k % n].y, z}; };
     auto take = [&](std::vector<PathPoint>& points, bool closed) {
         if (points.size() > 1) {
-            Piece piece{simplify(points, tolerance), {1e300, 1e300, -1e300, -1e300}, region, closed};
+            RingPlan::Piece piece{simplify(points, tolerance), {1e300, 1e300, -1e300, -1e300}, region, closed};
             for (const PathPoint& p : piece.points)
                 piece.box = {std::min<double>(piece.box[0], p.x), std::min<double>(piece.box[1], p.y), std::max<double>(piece.box[2], p.x),
                              std::max<double>(piece.box[3], p.y)};
@@ -96,7 +81,7 @@ struct Start {
 
 // The nearest beginning of a piece, as long as that is nearer than `best`: of a closed one, the nearest point; of an open one its first,
 // or either end.
-bool nearer(const Piece& piece, Point2 from, bool either_end, Start& best) {
+bool nearer(const RingPlan::Piece& piece, Point2 from, bool either_end, Start& best) {
     const PathPoint q{from.x, from.y, 0};
     const double bx = std::max({piece.box[0] - q.x, q.x - piece.box[2], 0.0}), by = std::max({piece.box[1] - q.y, q.y - piece.box[3], 0.0});
     if (std::hypot(bx, by) >= best.way) return false;
@@ -243,14 +228,71 @@ void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_
 
 namespace {
 
-struct RingPlan {
-    std::vector<Piece> pieces;
-    std::vector<Region> regions;
-};
+// The region's loops with fewer points (0.1 µm). Small loops stay as they are.
+Loops thinned(const Loops& region, double loose, double turn) {
+    Loops result;
+    std::vector<PathPoint> line;
+    for (std::size_t l = 0; l < region.size(); ++l) {
+        line.clear();
+        for (const Point2 p : region.loop(l)) line.push_back({p.x, p.y, 0});
+        if (line.empty()) continue;
+        line.push_back(line.front());
+        if (std::vector<PathPoint> fewer = simplify(line, kFineRing * kUnitsPerMm, loose, turn); fewer.size() > 3) line = std::move(fewer);
+        for (std::size_t k = 0; k + 1 < line.size(); ++k) result.points.push_back({line[k].x, line[k].y});
+        result.close_loop();
+    }
+    return result;
+}
 
-// Rings around the forbidden region, one step after the other, and which part of the free area each of them bounds.
-RingPlan plan_rings(const LayerCut& cut, double r, double step, const Loops& forbidden, std::int32_t z, const std::array<double, 4>& stands) {
+// The rectangles from the stock's edge inwards, as far as they surround the forbidden region and what is within it.
+std::vector<std::array<double, 4>> frames_around(const LayerCut& cut, double r, double step, const Loops& forbidden) {
+    std::vector<std::array<double, 4>> frames;
+    std::array<double, 4> stands{cut.layer.stock_min[0], cut.layer.stock_min[1], cut.layer.stock_max[0], cut.layer.stock_max[1]};
+    const double out = r + kBeside;
+    for (int axis = 0; axis < 2; ++axis)  // without room beside the stock there is no way in
+        if (cut.low(axis, out) > cut.layer.stock_min[axis] - out || cut.high(axis, out) < cut.layer.stock_max[axis] + out) return frames;
+    std::array<double, 4> keep{1e300, 1e300, -1e300, -1e300};
+    for (const Point2 p : forbidden.points)
+        keep = {std::min(keep[0], to_mm(p.x)), std::min(keep[1], to_mm(p.y)), std::max(keep[2], to_mm(p.x)), std::max(keep[3], to_mm(p.y))};
+    for (;;) {
+        const std::array<double, 4> ring{stands[0] + step - r, stands[1] + step - r, stands[2] - step + r, stands[3] - step + r};
+        if (ring[0] > keep[0] || ring[1] > keep[1] || ring[2] < keep[2] || ring[3] < keep[3]) return frames;
+        frames.push_back(ring);
+        stands = {stands[0] + step, stands[1] + step, stands[2] - step, stands[3] - step};
+    }
+}
+
+// Cuts them in one spiral with the stock on its right: what still stands is one piece then.
+void cut_frames(PathBuilder& path, const RingPlan& plan) {
+    double south = plan.south;
+    for (const std::array<double, 4>& ring : plan.frames) {
+        const Point2 begin{to_units(ring[0]), to_units(south)};
+        if (&ring == &plan.frames.front()) path.go_above(begin), path.sink(plan.z);
+        else path.cut(begin, plan.z);
+        path.cut({to_units(ring[0]), to_units(ring[3])}, plan.z);
+        path.cut({to_units(ring[2]), to_units(ring[3])}, plan.z);
+        path.cut({to_units(ring[2]), to_units(ring[1])}, plan.z);
+        path.cut({to_units(ring[0]), to_units(ring[1])}, plan.z);
+        south = ring[1];
+    }
+}
+
+}  // namespace
+
+double ring_tolerance(const Tool& tool) { return std::max(kFineRing, kRingShare * tool.diameter); }
+
+RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z) {
     RingPlan plan;
+    const double r = tool.diameter / 2;
+    plan.step = std::min(kStepShare, tool.stepover) * tool.diameter;
+    plan.z = to_units(tip_z);
+    if (forbidden.empty()) return plan;
+    plan.frames = frames_around(cut, r, plan.step, forbidden);
+    plan.south = cut.layer.stock_min[1] - r - kBeside;
+    // What stands within them.
+    const double cleared = static_cast<double>(plan.frames.size()) * plan.step;
+    const std::array<double, 4> stands{cut.layer.stock_min[0] + cleared, cut.layer.stock_min[1] + cleared, cut.layer.stock_max[0] - cleared,
+                                       cut.layer.stock_max[1] - cleared};
     Bound bound;
     for (std::size_t k = 0; k < 4; ++k) bound.stock[k] = stands[k] * kUnitsPerMm;
     bound.reach = (r + kBeside) * kUnitsPerMm;
@@ -262,8 +304,10 @@ RingPlan plan_rings(const LayerCut& cut, double r, double step, const Loops& for
         loops.close_loop();
         return loops;
     };
-    const Loops useful = intersect(offset(rectangle(stands[0], stands[1], stands[2], stands[3]), r + kBeside, kRingTolerance),
+    const Loops useful = intersect(offset(rectangle(stands[0], stands[1], stands[2], stands[3]), r + kBeside, kFineRing),
                                    rectangle(cut.low(0, far), cut.low(1, far), cut.high(0, far), cut.high(1, far)));
+    const double loose = ring_tolerance(tool);
+    const double turn = fast_turn(cut.job.machine, std::min(tool.max_feed, cut.job.machine.max_feed));
     Loops nearer_free;
     std::vector<std::size_t> nearer_region;  // by loop of nearer_free; SIZE_MAX for holes
     std::size_t ring = 0;
@@ -277,18 +321,18 @@ RingPlan plan_rings(const LayerCut& cut, double r, double step, const Loops& for
                 if ((signed_area(free.loop(l)) < 0) != holes) continue;
                 if (!holes) {
                     region_of[l] = plan.regions.size();
-                    plan.regions.push_back({ring, SIZE_MAX, 0, {}, 0});
+                    plan.regions.push_back({ring, SIZE_MAX, 0, {}});
                 } else if (free.parents[l] < 0) {
                     continue;
                 }
                 const std::size_t of = holes ? region_of[static_cast<std::size_t>(free.parents[l])] : region_of[l];
-                if (of != SIZE_MAX) append_pieces(free.loop(l), z, bound, of, plan.pieces);
+                if (of != SIZE_MAX) append_pieces(free.loop(l), plan.z, bound, of, ring == 0 ? kFineRing * kUnitsPerMm : 0, plan.pieces);
             }
         for (std::size_t p = first_piece; p < plan.pieces.size(); ++p) plan.regions[plan.pieces[p].region].pieces.push_back(p);
         // Which nearer region holds each of these: by a point off the bound's edge, which both may share.
         for (std::size_t l = 0; ring > 0 && l < free.size(); ++l) {
             if (region_of[l] == SIZE_MAX) continue;
-            Region& inner = plan.regions[region_of[l]];
+            RingPlan::Region& inner = plan.regions[region_of[l]];
             if (inner.pieces.empty()) continue;
             const PathPoint& p = plan.pieces[inner.pieces.front()].points[plan.pieces[inner.pieces.front()].points.size() / 2];
             double least = 1e300;
@@ -304,53 +348,24 @@ RingPlan plan_rings(const LayerCut& cut, double r, double step, const Loops& for
         if (plan.pieces.size() == first_piece) break;
         nearer_free = std::move(free);
         nearer_region = std::move(region_of);
-        region = offset(region, step, kRingTolerance);
+        region = thinned(offset(region, plan.step, kFineRing), loose * kUnitsPerMm, turn);
         cut.context.throw_if_cancelled();
     }
-    for (Region& region : plan.regions) region.left = region.pieces.size();
     return plan;
 }
 
-// Rectangles from the stock's edge inwards, in one spiral with the stock on its right, as far as they surround the forbidden region
-// and what is within it: what still stands is one piece then. Returns what stands: smallest x and y, largest x and y, mm.
-std::array<double, 4> cut_frames(PathBuilder& path, const LayerCut& cut, double r, double step, const Loops& forbidden, std::int32_t z) {
-    std::array<double, 4> stands{cut.layer.stock_min[0], cut.layer.stock_min[1], cut.layer.stock_max[0], cut.layer.stock_max[1]};
-    const double out = r + kBeside;
-    for (int axis = 0; axis < 2; ++axis)  // without room beside the stock there is no way in
-        if (cut.low(axis, out) > cut.layer.stock_min[axis] - out || cut.high(axis, out) < cut.layer.stock_max[axis] + out) return stands;
-    std::array<double, 4> keep{1e300, 1e300, -1e300, -1e300};
-    for (const Point2 p : forbidden.points)
-        keep = {std::min(keep[0], to_mm(p.x)), std::min(keep[1], to_mm(p.y)), std::max(keep[2], to_mm(p.x)), std::max(keep[3], to_mm(p.y))};
-    double south = stands[1] - out;
-    for (bool first = true;; first = false) {
-        const std::array<double, 4> ring{stands[0] + step - r, stands[1] + step - r, stands[2] - step + r, stands[3] - step + r};
-        if (ring[0] > keep[0] || ring[1] > keep[1] || ring[2] < keep[2] || ring[3] < keep[3]) break;
-        const Point2 begin{to_units(ring[0]), to_units(south)};
-        if (first) path.go_above(begin), path.sink(z);
-        else path.cut(begin, z);
-        path.cut({to_units(ring[0]), to_units(ring[3])}, z);
-        path.cut({to_units(ring[2]), to_units(ring[3])}, z);
-        path.cut({to_units(ring[2]), to_units(ring[1])}, z);
-        path.cut({to_units(ring[0]), to_units(ring[1])}, z);
-        south = ring[1];
-        stands = {stands[0] + step, stands[1] + step, stands[2] - step, stands[3] - step};
-    }
-    return stands;
-}
-
-}  // namespace
-
-double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, bool hold) {
-    const double r = tool.diameter / 2, step = std::min(kStepShare, tool.stepover) * tool.diameter, step_units = step * kUnitsPerMm;
-    const std::int32_t z = to_units(tip_z);
-    if (forbidden.empty()) return 0;
-    const std::array<double, 4> stands = cut_frames(path, cut, r, step, forbidden, z);
-    RingPlan plan = plan_rings(cut, r, step, forbidden, z, stands);
+void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan, bool hold) {
+    if (plan.pieces.empty()) return;
+    const double step_units = plan.step * kUnitsPerMm;
+    const std::int32_t z = plan.z;
+    cut_frames(path, plan);
+    std::vector<std::size_t> left;  // by region: pieces not cut yet
+    for (const RingPlan::Region& region : plan.regions) left.push_back(region.pieces.size());
     std::vector<std::size_t> ready;  // pieces that wait for nothing
     auto release = [&](auto&& self, std::size_t region) -> void {
-        Region& of = plan.regions[region];
+        RingPlan::Region& of = plan.regions[region];
         if (of.waits_for > 0) return;
-        if (of.left > 0) {
+        if (left[region] > 0) {
             ready.insert(ready.end(), of.pieces.begin(), of.pieces.end());
         } else if (of.around != SIZE_MAX) {
             --plan.regions[of.around].waits_for;
@@ -372,7 +387,7 @@ double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool,
             if ((!hold || plan.regions[plan.pieces[ready[k]].region].ring == far) &&
                 nearer(plan.pieces[ready[k]], path.at(), !cut.job.cutting.climb, start))
                 next = k;
-        Piece& piece = plan.pieces[ready[next]];
+        RingPlan::Piece& piece = plan.pieces[ready[next]];
         ready.erase(ready.begin() + static_cast<std::ptrdiff_t>(next));
         const std::size_t on = plan.regions[piece.region].ring;
         // From ring to ring straight: a place `ring` steps from the forbidden region has that much room on all sides. Slantwise,
@@ -387,14 +402,13 @@ double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool,
             for (const PathPoint& p : piece.points) path.cut({p.x, p.y}, z);
         else path.follow(piece.points);
         ring = on;
-        if (--plan.regions[piece.region].left == 0 && plan.regions[piece.region].around != SIZE_MAX) {
+        if (--left[piece.region] == 0 && plan.regions[piece.region].around != SIZE_MAX) {
             const std::size_t around = plan.regions[piece.region].around;
             --plan.regions[around].waits_for;
             release(release, around);
         }
     }
     path.retract();
-    return plan.pieces.empty() ? 0 : step;
 }
 
 }  // namespace slabwright

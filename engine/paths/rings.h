@@ -1,6 +1,7 @@
 // Rings around what must stay: how a region is entered and travelled, and how the last level of a layer is cleared.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "engine/paths/layer_cut.h"
@@ -25,16 +26,46 @@ namespace slabwright {
 /// along the ring itself; the stretch of the ramp is cut again. Heights in 0.1 µm.
 void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_t above, std::int32_t z, double ramp_deg);
 
-/// Clears everything between `forbidden` and the edge of the stock at one height: first in rectangles from the stock's edge as far
-/// as these surround the forbidden region, then in rings around that region from the farthest to its border. The forbidden region
-/// is on the right of every ring (but see Cutting::climb), so the cutter climbs. A ring is cut once all rings within its part of the free
+/// What a ring that meets nothing but waste may leave its line by, mm: little of the step between rings, so that they still overlap.
+[[nodiscard]] double ring_tolerance(const Tool& tool);
+
+/// Rings around a forbidden region at one height, as far as they are of use, and which part of the free area each of them bounds.
+struct RingPlan {
+    /// What a ring shows near the stock: the whole ring, or pieces of it.
+    struct Piece {
+        std::vector<PathPoint> points;  ///< closed ones repeat their first point
+        std::array<double, 4> box{};    ///< 0.1 µm: smallest x and y, largest x and y
+        std::size_t region = 0;
+        bool closed = false;
+    };
+    /// A connected part of what is free at one distance from the forbidden region. Within it, farther off, lie others.
+    struct Region {
+        std::size_t ring = 0, around = SIZE_MAX;  ///< how many steps off; the region one step nearer that holds this one
+        std::size_t waits_for = 0;                ///< regions within this one
+        std::vector<std::size_t> pieces;
+    };
+    std::vector<std::array<double, 4>> frames;  ///< rectangles cut before the rings, from the stock's edge inwards: smallest x, y, largest x, y, mm
+    double south = 0;                           ///< mm: y beside the stock, where the first of them is entered
+    std::vector<Piece> pieces;
+    std::vector<Region> regions;
+    double step = 0;  ///< mm between rings
+    std::int32_t z = 0;
+};
+
+/// Plans to clear everything between `forbidden` and the edge of the stock at one height: first in rectangles from the stock's edge as
+/// far as these surround the forbidden region, then in rings around that region. The forbidden region is on the right of every ring (but see
+/// Cutting::climb), so the cutter climbs. Neighbouring rings are at most 0.48 of the tool's diameter apart; the ring next to the
+/// forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region is
+/// nowhere near the stock.
+/// @param forbidden of the tool's middle, outer loops counter-clockwise; the flask's included
+/// @param tip_z mm
+[[nodiscard]] RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z);
+
+/// Cuts rings from the farthest to the forbidden region's border. A ring is cut once all rings within its part of the free
 /// area are; of those whose turn it is the nearest comes next, and from ring to next ring the cutter stays down. With `hold`, all
 /// rings of one distance are cut before any nearer one: the pieces that hang over a cavity below, or over the edge of the stack, go from the
 /// middle or from the free edge inwards, and what still stands hangs on what stays, for from each of its points the shortest way
-/// to the forbidden region runs through standing stock. Neighbouring rings are at most 0.45 of the tool's diameter apart.
-/// @param forbidden of the tool's middle, outer loops counter-clockwise; the flask's included
-/// @param tip_z mm
-/// @return the largest distance of two rings, mm; 0 when the forbidden region is nowhere near the stock, and nothing was cut
-double clear_from_afar(PathBuilder& path, const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, bool hold);
+/// to the forbidden region runs through standing stock.
+void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan, bool hold);
 
 }  // namespace slabwright

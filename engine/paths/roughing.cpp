@@ -82,17 +82,27 @@ Operation rough_layer(const LayerCut& cut) {
     const double from = cut.low(0, r + 2), to = cut.high(0, r + 2);
 
     struct Level {
-        std::vector<std::vector<Stretch>> free;
+        RingPlan rings;
+        std::vector<std::vector<Stretch>> free;  // where no rings are cut
         Contours border;
     };
     const bool flask = !cut.layer.opening.empty();
     const Loops room = flask ? flask_room(cut, r) : Loops{};
+    std::vector<FibreLevel> heights;
+    for (std::size_t i = 0; i < levels.size(); ++i) heights.push_back({levels[i].spare, &inside[i].loops});
+    std::vector<Contours> borders = level_contours(cut.context, cut.solid, heights, cutter, grid);
     std::vector<Level> cuts(levels.size());
     parallel_each(cut.context, levels.size(), [&](std::size_t i) {
+        cuts[i].border = std::move(borders[i]);
+        if (i + 1 == levels.size() || contour) {
+            Loops forbidden = forbidden_region(cuts[i].border);
+            if (flask) forbidden = unite(forbidden, beyond_room(cut, r, room));
+            cuts[i].rings = plan_rings(cut, tool, forbidden, levels[i].tip);
+            if (!cuts[i].rings.pieces.empty()) return;
+        }
         const Fibres forbidden =
             beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::x, lines), Axis::x, lines);
         for (std::size_t l = 0; l < lines.size(); ++l) cuts[i].free.push_back(free_stretches(forbidden.line(l), from, to, 0.2));
-        cuts[i].border = level_contours(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, grid);
     });
 
     PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance, cut.layer.z_top + 2);
@@ -101,14 +111,11 @@ Operation rough_layer(const LayerCut& cut) {
     double above = cut.layer.z_top;
     for (std::size_t i = 0; i < levels.size(); ++i) {
         op.stepdown = std::max(op.stepdown, above - levels[i].tip);
-        if (i + 1 == levels.size() || contour) {
-            Loops forbidden = forbidden_region(cuts[i].border);
-            if (flask) forbidden = unite(forbidden, beyond_room(cut, r, room));
-            if (const double step = clear_from_afar(path, cut, tool, forbidden, levels[i].tip, i + 1 == levels.size()); step > 0) {
-                op.stepover = std::max(op.stepover, step);
-                above = levels[i].tip;
-                continue;
-            }
+        if (!cuts[i].rings.pieces.empty()) {
+            op.stepover = std::max(op.stepover, cuts[i].rings.step);
+            clear_from_afar(path, cut, std::move(cuts[i].rings), i + 1 == levels.size());
+            above = levels[i].tip;
+            continue;
         }
         op.stepover = std::max(op.stepover, depth / gaps);
         zigzag(path, cut, tool, lines, cuts[i].free, levels[i].tip, [&](std::span<const std::int32_t> at) {

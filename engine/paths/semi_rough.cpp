@@ -13,7 +13,7 @@ namespace slabwright {
 namespace {
 
 constexpr double kStepShare = 0.45;      // of the diameter, between rings
-constexpr double kRingTolerance = 0.02;  // mm, of every ring that keeps off the finished surface
+constexpr double kRingTolerance = 0.02;  // mm, of the ring that keeps off the finished surface by its allowance
 constexpr double kSample = 0.4;          // mm between places of a ring that are looked at
 constexpr double kSwathPitch = 0.3;      // mm: the swath's border need not be exact
 constexpr float kStands = 0.05F;         // mm over the tip: less is nothing to cut
@@ -207,6 +207,7 @@ private:
         const CellGrid& grid = stock_.grid();
         const double step = kStepShare * tool_.diameter;
         std::vector<Loops> rings{border};
+        const double loose = ring_tolerance(tool_);
         const Loops thin = thinned(border);
         std::vector<std::array<int, 2>> outside = targets.cells();
         for (int k = 1; k < kMostRings; ++k) {
@@ -216,17 +217,18 @@ private:
                 return std::any_of(row.begin(), row.end(), [&](const std::array<int, 2>& s) { return s[0] <= c[0] && c[0] <= s[1]; });
             });
             if (outside.empty()) break;
-            rings.push_back(offset(thin, k * step, kRingTolerance));
+            rings.push_back(offset(thin, k * step, loose));
         }
         const std::int32_t z = to_units(tip) + 1;
         const CutterEnd end = cutter_end(tool_);
         for (std::size_t k = rings.size(); k-- > 0;) {
             runs.emplace_back();
             const double tolerance = k > 0 || keeps_off ? kRingTolerance * kUnitsPerMm : simplify_tolerance_units(cut_.job.tolerances.gouge);
+            const double most = k > 0 ? loose * kUnitsPerMm : tolerance;
             for (std::size_t l = 0; l < rings[k].size(); ++l) {
                 std::vector<RingPlace> places = places_of(rings[k].loop(l), z);
                 for (RingPlace& p : places) p.useful = within_travel(p.at) && targets.met(to_mm(p.at.x), to_mm(p.at.y), r_);
-                append_useful(places, tolerance, runs.back());
+                append_useful(places, tolerance, most, runs.back());
             }
             for (const LevelRun& run : runs.back())
                 for (std::size_t p = 0; p < run.points.size(); ++p) {
@@ -263,7 +265,8 @@ private:
     }
 
     // Useful stretches with a place before and after them; short gaps are travelled along the ring, which is free.
-    void append_useful(std::vector<RingPlace>& places, double tolerance, std::vector<LevelRun>& out) const {
+    void append_useful(std::vector<RingPlace>& places, double tolerance, double most, std::vector<LevelRun>& out) const {
+        const double turn = fast_turn(cut_.job.machine, feed());
         const std::size_t n = places.size();
         std::vector<std::size_t> useful;
         for (std::size_t k = 0; k < n; ++k)
@@ -293,7 +296,7 @@ private:
                 if (p.corner || k == 0 || k + 1 == count) run.points.push_back(p.at);
             }
             if (closed) run.points.push_back(run.points.front());
-            run.points = simplify(run.points, tolerance);
+            run.points = simplify(run.points, tolerance, most, turn);
             if (run.points.size() > (closed ? 2U : 1U)) out.push_back(std::move(run));
         };
         if (ends.empty()) return append(0, n, true);
@@ -306,10 +309,11 @@ private:
         }
     }
 
+    // mm/min: the first cut through a place is as wide as the cutter.
+    [[nodiscard]] double feed() const { return std::min(tool_.max_feed, cut_.job.machine.max_feed) * cut_.job.cutting.max_engagement; }
+
     void emit(Operation& op, std::vector<std::vector<LevelRun>>& runs) const {
-        // The first cut through a place is as wide as the cutter.
-        const double feed = std::min(tool_.max_feed, cut_.job.machine.max_feed) * cut_.job.cutting.max_engagement;
-        PathBuilder path(op, tool_, feed, cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
+        PathBuilder path(op, tool_, feed(), cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
         const DropIndex& part = cut_.drops({Cutter::Profile::flat, r_});
         path.know(cut_.around(tool_, &part));
         cut_levels(path, cut_, tool_, part, runs, false);

@@ -24,6 +24,7 @@ public:
     /// Exact over facets, edges and vertices (for a flat cutter over their shadow, tip on the highest of them). Of contacts that are equally
     /// high the one is given that the solid's tree leads to first.
     [[nodiscard]] Rest drop(double x, double y) const;
+    [[nodiscard]] const Cutter& cutter() const { return cutter_; }
 
 private:
     const LayerSolid& solid_;

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <optional>
 
 #include "kernels/cutting/fibre_rows.h"
 #include "kernels/parallel/parallel.h"
@@ -96,6 +98,14 @@ public:
         for (int l = 0; l < n_; ++l) at_[l] = to_mm(lines[static_cast<std::size_t>(l)]);
     }
 
+    // Forbids what a higher level forbids.
+    void begin_with(const Fibres& above) {
+        for (int l = 0; l < n_; ++l) {
+            const auto line = above.line(static_cast<std::size_t>(l));
+            found_[l].assign(line.begin(), line.end());
+        }
+    }
+
     // Forbids the inside, given by the segments of its border that cross these lines.
     void meet_inside(std::span<const std::array<Point2, 2>> segments, std::span<const std::int32_t> lines) {
         auto coordinate = [](Point2 p, int axis) { return axis == 0 ? p.x : p.y; };
@@ -123,34 +133,25 @@ public:
         }
     }
 
-    // Most facets only forbid what others around them forbid as well. One of each group shows about where that is, and of the others those
-    // are met that could reach past it, on the lines where they could.
+    // Most facets only forbid what others around them forbid as well, or what is forbidden already. One of each group shows about where that is,
+    // and of the others those are met that could reach past it, on the lines where they could.
     void meet(std::span<const std::uint32_t> groups) {
-        std::vector<std::uint32_t> shown(groups.size());
+        constexpr std::uint32_t none = UINT32_MAX;  // the group reaches out of nothing
+        cover();
+        std::vector<std::uint32_t> shown(groups.size(), none);
         for (std::size_t g = groups.size(); g-- > 0;) {  // of a wall the upper ones come first, which reach farthest
-            const std::size_t first = groups[g] * FacetGroup::kFacets, last = std::min(solid_.facets.size(), first + FacetGroup::kFacets);
+            if (!group_reaches_out(groups[g])) continue;
+            const auto [first, last] = facets_of(groups[g]);
             std::size_t f = first;
             while (f < last && !active(solid_.facets[f])) ++f;
+            if (f == last) continue;
             shown[g] = static_cast<std::uint32_t>(f);
-            if (f < last) meet_facet(solid_.facets[f], lines_of(solid_.facets[f]));
+            meet_facet(solid_.facets[f], reaches_out(solid_.facets[f], lines_of(solid_.facets[f])));
         }
-        for (int l = 0; l < n_; ++l) {
-            std::vector<Stretch>& cover = cover_[l];
-            for (const Forbidden& f : found_[l]) cover.push_back({f.low, f.high});
-            std::sort(cover.begin(), cover.end(), [](const Stretch& a, const Stretch& b) { return a.low < b.low; });
-            std::size_t kept = 0;
-            for (const Stretch& s : cover)
-                if (kept > 0 && s.low <= cover[kept - 1].high) cover[kept - 1].high = std::max(cover[kept - 1].high, s.high);
-                else cover[kept++] = s;
-            cover.resize(kept);
-        }
+        cover();
         for (std::size_t g = 0; g < groups.size(); ++g) {
-            const FacetGroup& group = solid_.groups[groups[g]];
-            const bool level = !ball_ || group.overhang > zc_;
-            const double dz = level ? 0 : std::max({0.0, group.z_min - zc_, zc_ - group.z_max});
-            if (!group_reaches_out({group.low[U], group.high[U], group.low[V], group.high[V], dz}, lines_between(group.low[V], group.high[V])).any())
-                continue;
-            const std::size_t first = groups[g] * FacetGroup::kFacets, last = std::min(solid_.facets.size(), first + FacetGroup::kFacets);
+            if (shown[g] == none || !group_reaches_out(groups[g])) continue;
+            const auto [first, last] = facets_of(groups[g]);
             for (std::size_t i = first; i < last; ++i) {
                 const SolidFacet& f = solid_.facets[i];
                 if (i != shown[g] && active(f)) meet_facet(f, reaches_out(f, lines_of(f)));
@@ -199,15 +200,13 @@ private:
         return lines_between(std::min({f.p[0][V], f.p[1][V], f.p[2][V]}), std::max({f.p[0][V], f.p[1][V], f.p[2][V]}));
     }
 
+    [[nodiscard]] bool is_covered(int l) { return low_[l] >= high_[l] || covered(cover_[l], seen_[l], low_[l], high_[l]); }
+
     // The lines, from the first to the last of them, on which [low_, high_] is not covered.
     LineRange not_covered(LineRange lines) {
-        LineRange out{lines.last, lines.last};
-        for (int l = lines.first; l < lines.last; ++l)
-            if (low_[l] < high_[l] && !covered(cover_[l], seen_[l], low_[l], high_[l])) {
-                if (out.first == lines.last) out.first = l;
-                out.last = l + 1;
-            }
-        return out;
+        while (lines.any() && is_covered(lines.first)) ++lines.first;
+        while (lines.any() && is_covered(lines.last - 1)) --lines.last;
+        return lines;
     }
 
     void reach_of(const Reach& box, LineRange lines) {
@@ -215,13 +214,40 @@ private:
                    high_.data());
     }
 
-    // The lines on which what lies within a box may reach past what is known to be forbidden.
-    LineRange group_reaches_out(const Reach& box, LineRange lines) {
-        reach_of(box, lines);
-        return not_covered(lines);
+    // Takes what has been found so far for covered.
+    void cover() {
+        for (int l = 0; l < n_; ++l) {
+            std::vector<Stretch>& cover = cover_[l];
+            cover.clear();
+            for (const Forbidden& f : found_[l]) cover.push_back({f.low, f.high});
+            std::sort(cover.begin(), cover.end(), [](const Stretch& a, const Stretch& b) { return a.low < b.low; });
+            std::size_t kept = 0;
+            for (const Stretch& s : cover)
+                if (kept > 0 && s.low <= cover[kept - 1].high) cover[kept - 1].high = std::max(cover[kept - 1].high, s.high);
+                else cover[kept++] = s;
+            cover.resize(kept);
+            seen_[l] = 0;
+        }
     }
 
-    // The same for a facet. From a point p of it the ball's centre is kept away up to p_u + √(r² − (v − p_v)² − (zc − p_z)²) on the line at v,
+    [[nodiscard]] std::array<std::size_t, 2> facets_of(std::uint32_t group) const {
+        const std::size_t first = group * FacetGroup::kFacets;
+        return {first, std::min(solid_.facets.size(), first + FacetGroup::kFacets)};
+    }
+
+    // Whether what lies within a group's box may reach past what is covered.
+    bool group_reaches_out(std::uint32_t index) {
+        const FacetGroup& group = solid_.groups[index];
+        const bool level = !ball_ || group.overhang > zc_;
+        const double dz = level ? 0 : std::max({0.0, group.z_min - zc_, zc_ - group.z_max});
+        const LineRange lines = lines_between(group.low[V], group.high[V]);
+        reach_of({group.low[U], group.high[U], group.low[V], group.high[V], dz}, lines);
+        for (int l = lines.first; l < lines.last; ++l)
+            if (!is_covered(l)) return true;
+        return false;
+    }
+
+    // The lines on which a facet may reach past it. From a point p of it the ball's centre is kept away up to p_u + √(r² − (v − p_v)² − (zc − p_z)²) on the line at v,
     // a concave function of p, so no more than what its tangent at the middle of the facet gives at one of the corners.
     LineRange reaches_out(const SolidFacet& f, LineRange lines) {
         const auto [ul, uh] = std::minmax({f.p[0][U], f.p[1][U], f.p[2][U]});
@@ -294,79 +320,128 @@ private:
     std::array<std::vector<Crossing>, kLinesTogether> crossings_;
 };
 
-template <int U, int V>
-Fibres fibres_along(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z,
-                    std::span<const std::int32_t> lines) {
-    const bool ball = cutter.profile == Cutter::Profile::ball;
-    const double r = cutter.radius, zc = ball ? tip_z + r : tip_z;  // the ball's centre, or the disc
-    Fibres result;
-    if (lines.empty()) return result;
-    const std::size_t blocks = (lines.size() + kBlock - 1) / kBlock;
+// What matters to each block of lines at one height.
+template <int V>
+class BlocksOfLevel {
+public:
+    BlocksOfLevel(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double zc,
+                  std::span<const std::int32_t> lines) {
+        const std::size_t blocks = (lines.size() + kBlock - 1) / kBlock;
+        list_groups(context, solid, cutter, zc, lines, blocks);
+        list_segments(inside, lines, blocks);
+    }
+    [[nodiscard]] std::span<const std::uint32_t> groups(std::size_t b) const {
+        return std::span(members_).subspan(starts_[b], starts_[b + 1] - starts_[b]);
+    }
+    /// Of the inside's border, those that cross the block's lines.
+    [[nodiscard]] std::span<const std::array<Point2, 2>> segments(std::size_t b) const { return segments_[b]; }
 
-    // Which groups can matter, by block of lines.
-    auto first_line = [&](double v) {
-        return static_cast<std::size_t>(
-            std::lower_bound(lines.begin(), lines.end(), v * kUnitsPerMm, [](std::int32_t l, double x) { return l < x; }) - lines.begin());
-    };
-    struct Active {
-        std::uint32_t group, first, last;  // blocks [first, last)
-    };
-    constexpr std::size_t grain = 2048;
-    std::vector<std::vector<Active>> active((solid.groups.size() + grain - 1) / grain);
-    parallel_for(context, solid.groups.size(), grain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t g = begin; g < end; ++g) {
-            const FacetGroup& group = solid.groups[g];
-            if (!may_touch(group.z_min, group.z_max, group.overhang, ball, r, zc)) continue;
-            const std::size_t first = first_line(group.low[V] - r), last = first_line(group.high[V] + r);
-            if (first < last)
-                active[begin / grain].push_back(
-                    {static_cast<std::uint32_t>(g), static_cast<std::uint32_t>(first / kBlock), static_cast<std::uint32_t>((last - 1) / kBlock + 1)});
-        }
-    });
-    std::vector<std::uint32_t> starts(blocks + 1, 0), members;
-    for (const std::vector<Active>& part : active)
-        for (const Active& a : part)
-            for (std::uint32_t b = a.first; b < a.last; ++b) ++starts[b + 1];
-    for (std::size_t b = 1; b <= blocks; ++b) starts[b] += starts[b - 1];
-    members.resize(starts.back());
-    std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
-    for (const std::vector<Active>& part : active)
-        for (const Active& a : part)
-            for (std::uint32_t b = a.first; b < a.last; ++b) members[next[b]++] = a.group;
+private:
+    void list_groups(Context& context, const LayerSolid& solid, const Cutter& cutter, double zc, std::span<const std::int32_t> lines,
+                     std::size_t blocks) {
+        const bool ball = cutter.profile == Cutter::Profile::ball;
+        const double r = cutter.radius;
+        auto first_line = [&](double v) {
+            return static_cast<std::size_t>(
+                std::lower_bound(lines.begin(), lines.end(), v * kUnitsPerMm, [](std::int32_t l, double x) { return l < x; }) - lines.begin());
+        };
+        struct Active {
+            std::uint32_t group, first, last;  // blocks [first, last)
+        };
+        constexpr std::size_t grain = 2048;
+        std::vector<std::vector<Active>> active((solid.groups.size() + grain - 1) / grain);
+        parallel_for(context, solid.groups.size(), grain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t g = begin; g < end; ++g) {
+                const FacetGroup& group = solid.groups[g];
+                if (!may_touch(group.z_min, group.z_max, group.overhang, ball, r, zc)) continue;
+                const std::size_t first = first_line(group.low[V] - r), last = first_line(group.high[V] + r);
+                if (first < last)
+                    active[begin / grain].push_back({static_cast<std::uint32_t>(g), static_cast<std::uint32_t>(first / kBlock),
+                                                     static_cast<std::uint32_t>((last - 1) / kBlock + 1)});
+            }
+        });
+        starts_.assign(blocks + 1, 0);
+        for (const std::vector<Active>& part : active)
+            for (const Active& a : part)
+                for (std::uint32_t b = a.first; b < a.last; ++b) ++starts_[b + 1];
+        for (std::size_t b = 1; b <= blocks; ++b) starts_[b] += starts_[b - 1];
+        members_.resize(starts_.back());
+        std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
+        for (const std::vector<Active>& part : active)
+            for (const Active& a : part)
+                for (std::uint32_t b = a.first; b < a.last; ++b) members_[next[b]++] = a.group;
+    }
 
-    // The inside: which segments cross the lines of a block.
-    std::vector<std::vector<std::array<Point2, 2>>> segments(blocks);
-    auto coordinate = [](Point2 p) { return V == 0 ? p.x : p.y; };
-    for (std::size_t l = 0; l < inside.size(); ++l) {
-        const auto loop = inside.loop(l);
-        for (std::size_t i = 0; i < loop.size(); ++i) {
-            const Point2 a = loop[i], b = loop[i + 1 == loop.size() ? 0 : i + 1];
-            const std::int32_t va = coordinate(a), vb = coordinate(b);
-            if (va == vb) continue;
-            const std::size_t first = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::min(va, vb)) - lines.begin());
-            const std::size_t last = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::max(va, vb)) - lines.begin());
-            if (first >= last) continue;
-            for (std::size_t k = first / kBlock; k <= (last - 1) / kBlock; ++k) segments[k].push_back({a, b});
+    void list_segments(const Loops& inside, std::span<const std::int32_t> lines, std::size_t blocks) {
+        segments_.resize(blocks);
+        auto coordinate = [](Point2 p) { return V == 0 ? p.x : p.y; };
+        for (std::size_t l = 0; l < inside.size(); ++l) {
+            const auto loop = inside.loop(l);
+            for (std::size_t i = 0; i < loop.size(); ++i) {
+                const Point2 a = loop[i], b = loop[i + 1 == loop.size() ? 0 : i + 1];
+                const std::int32_t va = coordinate(a), vb = coordinate(b);
+                if (va == vb) continue;
+                const std::size_t first = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::min(va, vb)) - lines.begin());
+                const std::size_t last = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::max(va, vb)) - lines.begin());
+                if (first >= last) continue;
+                for (std::size_t k = first / kBlock; k <= (last - 1) / kBlock; ++k) segments_[k].push_back({a, b});
+            }
         }
     }
 
-    std::vector<Fibres> parts(blocks);
-    parallel_each(context, blocks, [&](std::size_t b) {
-        const std::span<const std::int32_t> own = lines.subspan(b * kBlock, std::min(kBlock, lines.size() - b * kBlock));
-        BlockOfLines<U, V> block(solid, cutter, zc, own);
-        block.meet_inside(segments[b], own);
-        block.meet(std::span(members).subspan(starts[b], starts[b + 1] - starts[b]));
-        parts[b] = block.merged();
-    });
+    std::vector<std::uint32_t> starts_, members_;
+    std::vector<std::vector<std::array<Point2, 2>>> segments_;
+};
+
+Fibres joined(std::span<const Fibres> parts, std::size_t lines) {
+    Fibres result;
     std::size_t total = 0;
     for (const Fibres& part : parts) total += part.intervals.size();
     result.intervals.reserve(total);
-    result.starts.reserve(lines.size() + 1);
+    result.starts.reserve(lines + 1);
     for (const Fibres& part : parts) {
         const std::uint32_t base = static_cast<std::uint32_t>(result.intervals.size());
         for (std::size_t i = 1; i < part.starts.size(); ++i) result.starts.push_back(base + part.starts[i]);
         result.intervals.insert(result.intervals.end(), part.intervals.begin(), part.intervals.end());
     }
+    return result;
+}
+
+template <int U, int V>
+std::vector<Fibres> fibres_along(Context& context, const LayerSolid& solid, std::span<const FibreLevel> levels, const Cutter& cutter,
+                                 std::span<const std::int32_t> lines) {
+    std::vector<Fibres> result(levels.size());
+    if (lines.empty()) return result;
+    const std::size_t blocks = (lines.size() + kBlock - 1) / kBlock;
+    // The ball's centre, or the disc.
+    auto centre = [&](const FibreLevel& level) { return cutter.profile == Cutter::Profile::ball ? level.tip_z + cutter.radius : level.tip_z; };
+    std::vector<std::size_t> downwards(levels.size());
+    std::iota(downwards.begin(), downwards.end(), std::size_t{0});
+    std::stable_sort(downwards.begin(), downwards.end(), [&](std::size_t a, std::size_t b) { return levels[a].tip_z > levels[b].tip_z; });
+    const Loops none;
+    std::vector<std::optional<BlocksOfLevel<V>>> of_level(levels.size());
+    parallel_each(context, levels.size(), [&](std::size_t i) {
+        // A tip above the solid's upper end stands clear of its inside.
+        const Loops& inside = levels[i].tip_z < solid.z_top - kTopSheet ? *levels[i].inside : none;
+        of_level[i].emplace(context, solid, inside, cutter, centre(levels[i]), lines);
+    });
+    std::vector<std::vector<Fibres>> parts(levels.size(), std::vector<Fibres>(blocks));
+    parallel_each(context, blocks, [&](std::size_t b) {
+        const std::span<const std::int32_t> own = lines.subspan(b * kBlock, std::min(kBlock, lines.size() - b * kBlock));
+        const Fibres* above = nullptr;
+        for (const std::size_t i : downwards) {
+            BlockOfLines<U, V> block(solid, cutter, centre(levels[i]), own);
+            if (above != nullptr) block.begin_with(*above);
+            block.meet_inside(of_level[i]->segments(b), own);
+            block.meet(of_level[i]->groups(b));
+            parts[i][b] = block.merged();
+            above = &parts[i][b];
+        }
+    });
+    parallel_each(context, levels.size(), [&](std::size_t i) {
+        result[i] = joined(parts[i], lines.size());
+        parts[i] = {};
+    });
     return result;
 }
 
@@ -380,12 +455,15 @@ Plane inside_plane(const LayerSolid& solid, const Cutter& cutter, double tip_z) 
     return {end, Side::below};
 }
 
+std::vector<Fibres> fibres(Context& context, const LayerSolid& solid, std::span<const FibreLevel> levels, const Cutter& cutter, Axis axis,
+                           std::span<const std::int32_t> lines) {
+    return axis == Axis::x ? fibres_along<0, 1>(context, solid, levels, cutter, lines) : fibres_along<1, 0>(context, solid, levels, cutter, lines);
+}
+
 Fibres fibres(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z, Axis axis,
               std::span<const std::int32_t> lines) {
-    const Loops none;
-    const Loops& region = tip_z < solid.z_top - kTopSheet ? inside : none;  // a tip above the upper end stands clear of everything
-    return axis == Axis::x ? fibres_along<0, 1>(context, solid, region, cutter, tip_z, lines)
-                           : fibres_along<1, 0>(context, solid, region, cutter, tip_z, lines);
+    const FibreLevel level{tip_z, &inside};
+    return std::move(fibres(context, solid, {&level, 1}, cutter, axis, lines).front());
 }
 
 Fibres covering(Context& context, std::span<const SolidFacet> facets, double radius, Axis axis, std::span<const std::int32_t> lines) {

@@ -42,6 +42,17 @@ struct Fibres {
 [[nodiscard]] Fibres fibres(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z, Axis axis,
                             std::span<const std::int32_t> lines);
 
+/// A height of a cutter's tip, mm, and the mesh's section by inside_plane() there.
+struct FibreLevel {
+    double tip_z = 0;
+    const Loops* inside = nullptr;
+};
+
+/// The same at several heights, in any order; a result for each. What a cutter touches at one height it touches or passes under at every lower
+/// one, so each level begins with the next higher one's intervals, and only what reaches out of them is looked at.
+[[nodiscard]] std::vector<Fibres> fibres(Context& context, const LayerSolid& solid, std::span<const FibreLevel> levels, const Cutter& cutter,
+                                         Axis axis, std::span<const std::int32_t> lines);
+
 /// Where a fibre passes within `radius` of the facets, seen from above: the places from which a cutter of that radius
 /// covers some of them. nz is the facets' own.
 [[nodiscard]] Fibres covering(Context& context, std::span<const SolidFacet> facets, double radius, Axis axis, std::span<const std::int32_t> lines);

@@ -101,12 +101,11 @@ FibreGrid fibre_grid(const LayerSolid& solid, const Cutter& cutter, std::int32_t
     return grid;
 }
 
-Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z, const FibreGrid& grid) {
-    Contours contours;
-    if (grid.x.size() < 2 || grid.y.size() < 2) return contours;
-    const Fibres along_x = fibres(context, solid, inside, cutter, tip_z, Axis::x, grid.y);
-    const Fibres along_y = fibres(context, solid, inside, cutter, tip_z, Axis::y, grid.x);
+namespace {
 
+// The border between what is forbidden along the fibres and what is free.
+Contours linked(const Fibres& along_x, const Fibres& along_y, const FibreGrid& grid, double tip_z) {
+    Contours contours;
     const std::size_t columns = grid.x.size(), rows = grid.y.size();
     std::vector<std::vector<NodeRange>> node_rows(rows);
     for (std::size_t j = 0; j < rows; ++j) node_rows[j] = forbidden_nodes(along_x.line(j), grid.x);
@@ -206,6 +205,26 @@ Contours level_contours(Context& context, const LayerSolid& solid, const Loops& 
         for (std::uint32_t k = on_columns.starts[i]; k < on_columns.starts[i + 1]; ++k)
             if (!on_columns.crossings[k].visited) trace(false, i, &on_columns.crossings[k]);
     return contours;
+}
+
+}  // namespace
+
+std::vector<Contours> level_contours(Context& context, const LayerSolid& solid, std::span<const FibreLevel> levels, const Cutter& cutter,
+                                     const FibreGrid& grid) {
+    std::vector<Contours> contours(levels.size());
+    if (grid.x.size() < 2 || grid.y.size() < 2) return contours;
+    std::vector<Fibres> along_x = fibres(context, solid, levels, cutter, Axis::x, grid.y),
+                        along_y = fibres(context, solid, levels, cutter, Axis::y, grid.x);
+    parallel_each(context, levels.size(), [&](std::size_t i) {
+        contours[i] = linked(along_x[i], along_y[i], grid, levels[i].tip_z);
+        along_x[i] = along_y[i] = {};
+    });
+    return contours;
+}
+
+Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z, const FibreGrid& grid) {
+    const FibreLevel level{tip_z, &inside};
+    return std::move(level_contours(context, solid, {&level, 1}, cutter, grid).front());
 }
 
 }  // namespace slabwright

@@ -35,4 +35,8 @@ struct FibreGrid {
 [[nodiscard]] Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z,
                                       const FibreGrid& grid);
 
+/// The same at several heights, in any order; a result for each.
+[[nodiscard]] std::vector<Contours> level_contours(Context& context, const LayerSolid& solid, std::span<const FibreLevel> levels,
+                                                   const Cutter& cutter, const FibreGrid& grid);
+
 }  // namespace slabwright
