@@ -130,7 +130,7 @@ private:
 bool roughs(OperationKind kind) { return kind == OperationKind::rough || kind == OperationKind::face; }
 
 /// Gives the moves of `level` the feeds that are wanted, faster ones only where they last.
-void set_feeds(Operation& op, std::vector<std::uint32_t> wanted, const std::vector<char>& level) {
+void set_feeds(Context& context, Operation& op, std::vector<std::uint32_t> wanted, const std::vector<char>& level) {
     const std::size_t n = op.moves.size();
     std::vector<double> way(n, 0);  // up to and with each move
     for (std::size_t k = 1; k < n; ++k) {
@@ -144,7 +144,8 @@ void set_feeds(Operation& op, std::vector<std::uint32_t> wanted, const std::vect
     steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
     // From the fastest step down: a stretch at least that fast that is too short goes as fast as its faster neighbour, which
     // is slower. Where it has none, between rapids, it goes no faster than planned.
-    for (const std::uint32_t step : steps)
+    for (const std::uint32_t step : steps) {
+        context.throw_if_cancelled();
         for (std::size_t k = 1; k < n;) {
             if (!level[k] || wanted[k] < step) {
                 ++k;
@@ -160,6 +161,7 @@ void set_feeds(Operation& op, std::vector<std::uint32_t> wanted, const std::vect
             }
             k = end;
         }
+    }
     for (std::size_t k = 1; k < n; ++k)
         if (level[k]) op.moves[k].feed = wanted[k];
 }
@@ -389,6 +391,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             if (!job.cutting.adapt_stepdown || round == kMostRounds) break;
             const std::vector<DeepRun> runs = deep_runs(
                 seen, op, tool.diameter, round, [&](const Seen& s, int n) { return load(s, feeds[static_cast<std::size_t>(&s - seen.data())], n); });
+            context.throw_if_cancelled();
             if (runs.empty()) break;
             for (const DeepRun& run : runs) {
                 ++divided;
@@ -434,7 +437,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                                  "or wood would bear most",
                                  layer.index, op.purpose, 100 * way / static_cast<double>(seen.size()), 100 * lowest_share),
                      worst->place()});
-            set_feeds(op, std::move(wanted), level);
+            set_feeds(context, op, std::move(wanted), level);
         }
         context.throw_if_cancelled();
 

@@ -228,7 +228,7 @@ private:
         const auto plane = std::lower_bound(planes_.begin(), planes_.end(), low - beside);
         if (plane == planes_.end() || *plane > high + beside) return false;
         for (std::size_t a = 0; a < count(); ++a)
-            if (std::abs(normal_[a][2] / area2_[a]) >= kNearlyLevel) return true;
+            if (normal_[a][2] * normal_[a][2] >= kNearlyLevel * kNearlyLevel * square_[a]) return true;
         return false;
     }
 
@@ -240,8 +240,8 @@ private:
         arm_[count()] = arm_[0];
         for (std::size_t a = 0; a < count(); ++a) {
             const Place n = normal_[a] = cross(arm_[a], arm_[a + 1]);
-            area2_[a] = std::sqrt(dot(n, n));
-            if (area2_[a] == 0) return false;
+            square_[a] = dot(n, n);
+            if (square_[a] == 0) return false;
             for (std::size_t k = 0; k < 3; ++k) sum[k] += n[k];
             low_ = std::min(low_, faces_[fan_[a]].low);
             high_ = std::max(high_, faces_[fan_[a]].high);
@@ -250,7 +250,7 @@ private:
         if (length == 0) return false;
         const Place w{sum[0] / length, sum[1] / length, sum[2] / length};
         for (std::size_t a = 0; a < count(); ++a)
-            if (dot(normal_[a], w) < kLeastFacing * area2_[a]) return false;
+            if (const double along = dot(normal_[a], w); along <= 0 || along * along < kLeastFacing * kLeastFacing * square_[a]) return false;
         exactly_ = crosses_nearly_level(v);
         const Place side = std::abs(w[0]) < 0.6 ? Place{1, 0, 0} : Place{0, 1, 0};
         Place u = cross(side, w);
@@ -268,12 +268,16 @@ private:
         old_facets_known_ = true;
         least_height_ = kLeastHeight;
         for (std::size_t a = 0; a < count(); ++a) {
-            const Place third = minus(arm_[a + 1], arm_[a]);
-            const double longest = std::sqrt(std::max({dot(arm_[a], arm_[a]), dot(arm_[a + 1], arm_[a + 1]), dot(third, third)}));
-            least_height_ = std::min(least_height_, area2_[a] / longest);
+            least_height_ = std::min(least_height_, std::sqrt(square_[a]) / std::sqrt(longest2(arm_[a], arm_[a + 1])));
             flat_normal_[a] = cross(flat_[a], flat_[a + 1]);
-            same_facing_[a] = kSameFacing * std::sqrt(dot(flat_normal_[a], flat_normal_[a]));
+            same_facing2_[a] = kSameFacing * kSameFacing * dot(flat_normal_[a], flat_normal_[a]);
         }
+    }
+
+    // Of the edges of a facet from one corner, squared.
+    static double longest2(const Place& p, const Place& q) {
+        const Place third = minus(q, p);
+        return std::max({dot(p, p), dot(q, q), dot(third, third)});
     }
 
     [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(n_); }
@@ -315,12 +319,14 @@ private:
         // most often forbids to go.
         for (std::size_t i = 1; i < n; ++i) {
             from_a_[i] = minus(ring[i], a);
-            side_[i] = -turn(from_a_[i], a);
+            side_[i] = turn(a, from_a_[i]);
         }
+        std::size_t holds_v = 0, holding = 0;
         for (std::size_t i = 1; i + 1 < n; ++i) {
-            const Place &p = from_a_[i], &q = from_a_[i + 1];
             const double of_p = side_[i], of_q = -side_[i + 1];
             if (!(of_p >= 0 && of_q >= 0)) continue;
+            holds_v = i, ++holding;
+            const Place &p = from_a_[i], &q = from_a_[i + 1];
             const double area2 = turn(p, q);
             if (!(area2 > 0)) return false;
             const double s = of_q / area2, t = of_p / area2;
@@ -329,11 +335,13 @@ private:
         // The new facets are upright.
         for (std::size_t i = 1; i + 1 < n; ++i)
             if (!(turn(from_a_[i], from_a_[i + 1]) > 0)) return false;
-        // Where the new edges cross those that meet in v.
+        // Where the new edges cross those that meet in v. A new edge parts the ring: where v lies in one new facet only, just the vertices that are not
+        // on its side have edges to it that cross.
         for (std::size_t i = 2; i + 1 < n; ++i) {
             const Place& d = from_a_[i];
             const double of_t = turn(a, d);
-            for (std::size_t j = 1; j < n; ++j) {
+            const std::size_t first = holding == 1 && i > holds_v ? i + 1 : 1, last = holding == 1 && i <= holds_v ? i : n;
+            for (std::size_t j = first; j < last; ++j) {
                 if (j == i) continue;
                 const Place& r = ring[j];
                 // a + s·d = t·r with s and t between 0 and 1, which is seen before it is divided
@@ -345,18 +353,19 @@ private:
             }
         }
         look_at_old_facets();
-        new_height_ = std::numeric_limits<double>::infinity();
+        new_height_ = kNever;
         for (std::size_t i = 1; i + 1 < n; ++i) {
-            const Place &p = from_a_[i], &q = from_a_[i + 1], third = minus(q, p);
-            new_normal_[i] = cross(p, q);
-            new_area2_[i] = std::sqrt(dot(new_normal_[i], new_normal_[i]));
-            const double longest = std::sqrt(std::max({dot(p, p), dot(q, q), dot(third, third)}));
-            new_height_ = std::min(new_height_, new_area2_[i] / longest);
+            new_normal_[i] = cross(from_a_[i], from_a_[i + 1]);
+            new_square_[i] = dot(new_normal_[i], new_normal_[i]);
+            new_height_ = std::min(new_height_, std::sqrt(new_square_[i]) / std::sqrt(longest2(from_a_[i], from_a_[i + 1])));
             if (new_height_ < least_height_ * (1 - 1e-9) || new_height_ <= best_height_) return false;
         }
         for (std::size_t i = 1; i + 1 < n; ++i) {
             bool found = false;
-            for (std::size_t j = 0; j < n && !found; ++j) found = dot(flat_normal_[j], new_normal_[i]) >= same_facing_[j] * new_area2_[i];
+            for (std::size_t j = 0; j < n && !found; ++j) {
+                const double along = dot(flat_normal_[j], new_normal_[i]);
+                found = along > 0 && along * along >= same_facing2_[j] * new_square_[i];
+            }
             if (!found) return false;
         }
         // None of the new edges may exist already: the surface would be pinched there.
@@ -428,13 +437,14 @@ private:
     using Around = std::array<T, times * kMostAround + 1>;
     int n_ = 0;
     Around<std::uint32_t> ring_, fan_;
-    Around<Place> arm_, normal_;         // as the pattern stands: to the vertices around, and of the facets, area2_ long
-    Around<Place, 2> flat_;              // the vertices around, twice in a row
-    Around<Place> flat_normal_;          // as flat_
-    Around<Place> from_a_, new_normal_;  // as flat_: from the vertex that v may go to, and of the facets that follow
-    Around<double> area2_, side_, new_area2_;
-    Around<double> same_facing_;  // what a normal along flat_normal_ makes with it at least
-    bool exactly_ = false;        // nothing may move
+    Around<Place> arm_, normal_;          // as the pattern stands: to the vertices around, and of the facets, twice their area long
+    Around<Place, 2> flat_;               // the vertices around, twice in a row
+    Around<Place> flat_normal_;           // as flat_
+    Around<Place> from_a_, new_normal_;   // as flat_: from the vertex that v may go to, and of the facets that follow
+    Around<double> square_, new_square_;  // of the lengths of normal_ and new_normal_
+    Around<double> side_;
+    Around<double> same_facing2_;  // what a normal along flat_normal_ makes with it at least
+    bool exactly_ = false;         // nothing may move
     bool old_facets_known_ = false;
     float low_ = 0, high_ = 0;           // of the facets around it
     double new_low_ = 0, new_high_ = 0;  // that going to the last neighbour looked at adds
