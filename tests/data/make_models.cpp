@@ -27,8 +27,12 @@ void write_all(const std::string& directory) {
 
 void write_metre(const std::string& path, const MetrePattern& pattern, bool shuffled) {
     std::ofstream file(path, std::ios::binary);
-    const std::string head = stl_head("metre", metre_pattern_facets(pattern));
-    file.write(head.data(), static_cast<std::streamsize>(head.size()));
+    auto write_head = [&](std::uint64_t facets) {
+        const std::string head = stl_head("metre", facets);
+        file.write(head.data(), static_cast<std::streamsize>(head.size()));
+    };
+    std::uint64_t written = 0;
+    write_head(metre_pattern_facets(pattern));
     if (shuffled) {
         std::vector<std::array<char, 50>> records;
         records.reserve(metre_pattern_facets(pattern));
@@ -36,14 +40,18 @@ void write_metre(const std::string& path, const MetrePattern& pattern, bool shuf
         std::mt19937_64 random(pattern.seed);
         for (std::size_t i = records.size(); i > 1; --i) std::swap(records[i - 1], records[random() % i]);
         file.write(records.front().data(), static_cast<std::streamsize>(records.size() * sizeof records[0]));
+        written = records.size();
     } else {
         metre_pattern(pattern, [&](const Facet& facet) {
             const auto record = stl_facet(facet);
             file.write(record.data(), record.size());
+            ++written;
         });
     }
+    file.seekp(0);
+    write_head(written);
     if (!file.flush()) throw std::runtime_error(path + ": cannot be written");
-    std::cout << path << ": " << metre_pattern_facets(pattern) << " facets\n";
+    std::cout << path << ": " << written << " facets\n";
 }
 
 }  // namespace

@@ -35,7 +35,8 @@ struct MetrePattern {
     std::uint64_t seed = 1;
 };
 
-/// How many facets metre_pattern() gives: at least `facets`, from 20 000 on at most 10 % more.
+/// How many facets metre_pattern() gives: at least `facets`, from 20 000 on at most 10 % more. Of tens of millions a few
+/// are left out whose corners fall on one another in the file's numbers (248 of 50 M).
 /// @throws std::invalid_argument when the walls do not fit (height over 3 × size / tiles) or a number is not positive
 [[nodiscard]] std::uint64_t metre_pattern_facets(const MetrePattern& pattern);
 
