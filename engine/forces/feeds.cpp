@@ -307,7 +307,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             return tool.strength_mpa > 0 ? std::max(wall, bent.stress_mpa / tool.strength_mpa) : wall;
         };
         const auto load_of = [&](const Seen& s, const Bent& bent) {
-            if (++looked_at % 4096 == 0) context.throw_if_cancelled();
+            if (++looked_at % 128 == 0) context.throw_if_cancelled();
             Load l{cutter_share(bent), 0};
             if (s.overhang > 0) l.wood = cutting.needed_wood(bent, s.height, s.overhang) / s.wood;
             return l;
@@ -384,7 +384,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             seen = run_through(context, slab, op, tool, layer, overhang, job.bonding.edge_setback);
             feeds.clear();
             for (const Seen& s : seen) {
-                if (feeds.size() % 1024 == 0) context.throw_if_cancelled();
+                if (feeds.size() % 64 == 0) context.throw_if_cancelled();
                 const std::uint32_t planned = op.moves[s.last].feed;
                 feeds.push_back(job.cutting.adapt_feed ? choose(s, planned) : planned);
             }
@@ -448,7 +448,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         std::size_t broken = 0;
         for (const Seen& s : seen) {
             if (!s.cuts) continue;
-            if (++looked_at % 4096 == 0) context.throw_if_cancelled();
+            if (++looked_at % 128 == 0) context.throw_if_cancelled();
             std::uint32_t feed = 0;
             for (std::uint32_t k = s.first; k <= s.last; ++k) feed = std::max(feed, op.moves[k].feed);
             if (s.overhang > 0)

@@ -379,6 +379,7 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan, bool
     for (const std::size_t k : farthest) release(release, k);
     std::size_t ring = 0;  // that the tool is on, while it is down; none yet
     while (!ready.empty()) {
+        cut.context.throw_if_cancelled();
         std::size_t next = SIZE_MAX;
         Start start;
         std::size_t far = 0;
