@@ -11,6 +11,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -262,11 +263,17 @@ Json silhouette(const std::vector<Section>& sections, bool along_y) {
     return rows;
 }
 
-/// What no budget changes.
+/// The paths as far as they have been thinned.
+struct DrawnPaths {
+    std::vector<std::vector<ReplayPoint>> paths;                ///< by program
+    double tolerance = kPathTolerance, error = kPathTolerance;  ///< mm, of the last thinning and of all together
+};
+
+/// What the page is made of.
 struct Figures {
     Json data;
-    std::vector<std::vector<ReplayPoint>> paths;  ///< by program
-    Json replay;                                  ///< the stock's cells, left-over maps
+    DrawnPaths drawn;
+    Json replay;  ///< the stock's cells, left-over maps
 };
 
 double stock_cell(const SimulationInput& input) {
@@ -310,7 +317,7 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
     std::map<std::string, Program*> read;
     for (Program& program : programs) read.emplace("nc/" + program.file, &program);
     Json engagement = Json::array();
-    figures.paths.resize(folder.programs.size());
+    figures.drawn.paths.resize(folder.programs.size());
     for (std::size_t begin = 0; begin < folder.programs.size();) {
         std::size_t end = begin;
         while (end < folder.programs.size() && folder.programs[end].layer == folder.programs[begin].layer) ++end;
@@ -320,7 +327,7 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
             const auto known = read.find(named.file);
             of_layer[i] = known != read.end() ? std::move(*known->second) : read_program(out, folder, named);
             if (part == nullptr) return;
-            figures.paths[begin + i] = path_of(of_layer[i], input.machine.rapid_feed, kPathTolerance);
+            figures.drawn.paths[begin + i] = path_of(of_layer[i], input.machine.rapid_feed, kPathTolerance);
         });
         for (std::size_t i = 0; i < of_layer.size(); ++i) {
             const ReplayedProgram found = replay.run(of_layer[i]);
@@ -489,27 +496,31 @@ Json model_json(Context& context, MeshView mesh, const StandingPart& part, const
 }
 
 /// All paths within a number of points: the tolerance is doubled until they fit, then the longest are left out.
-Json paths_json(Context& context, std::vector<std::vector<ReplayPoint>> paths, const PlanFolder& folder, std::size_t most) {
-    const auto count = [&] {
-        std::size_t points = 0;
-        for (const auto& path : paths) points += path.size();
-        return points;
+/// @param drawn thinned further where that is needed: fewer points come from where more ended
+Json paths_json(Context& context, DrawnPaths& drawn, const PlanFolder& folder, std::size_t most) {
+    const auto sizes_now = [&] {
+        std::vector<std::size_t> sizes;
+        for (const auto& path : drawn.paths) sizes.push_back(path.size());
+        return sizes;
     };
-    double tolerance = kPathTolerance, error = kPathTolerance;
-    while (count() > most && tolerance < kWidestTolerance) {
-        tolerance *= 2;
-        error += tolerance;  // each thinning works on what the one before left
-        parallel_each(context, paths.size(), [&](std::size_t i) { thin(paths[i], tolerance); });
+    std::vector<std::size_t> sizes = sizes_now();
+    const auto count = [&] { return std::accumulate(sizes.begin(), sizes.end(), std::size_t{0}); };
+    while (count() > most && drawn.tolerance < kWidestTolerance) {
+        drawn.tolerance *= 2;
+        drawn.error += drawn.tolerance;  // each thinning works on what the one before left
+        parallel_each(context, drawn.paths.size(), [&](std::size_t i) { thin(drawn.paths[i], drawn.tolerance); });
+        sizes = sizes_now();
     }
-    std::vector<char> left_out(paths.size(), 0);
+    std::vector<char> left_out(sizes.size(), 0);
     while (count() > most) {
-        const auto longest = std::max_element(paths.begin(), paths.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
-        left_out[static_cast<std::size_t>(longest - paths.begin())] = 1;
-        longest->clear();
+        const auto longest = std::max_element(sizes.begin(), sizes.end());
+        left_out[static_cast<std::size_t>(longest - sizes.begin())] = 1;
+        *longest = 0;
     }
+    const auto shown = [&](std::size_t i) { return left_out[i] ? std::span<const ReplayPoint>() : std::span<const ReplayPoint>(drawn.paths[i]); };
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
-    for (const auto& path : paths)
-        for (const ReplayPoint& p : path) {
+    for (std::size_t i = 0; i < sizes.size(); ++i)
+        for (const ReplayPoint& p : shown(i)) {
             const double at[3] = {p.x, p.y, p.z};
             for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], at[k]), high[k] = std::max(high[k], at[k]);
         }
@@ -519,20 +530,21 @@ Json paths_json(Context& context, std::vector<std::vector<ReplayPoint>> paths, c
         quantum = std::max(quantum, (high[k] - low[k]) / 65535 / 2);
     }
     Json programs = Json::array();
-    for (std::size_t i = 0; i < paths.size(); ++i) {
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+        const std::span<const ReplayPoint> path = shown(i);
         // x, y, z as shares of the box; time as a share of the program's, its lowest bit says rapid.
         std::string bytes;
-        const double seconds = paths[i].empty() ? 0 : paths[i].back().seconds;
-        for (const ReplayPoint& p : paths[i]) {
+        const double seconds = path.empty() ? 0 : path.back().seconds;
+        for (const ReplayPoint& p : path) {
             const double at[3] = {p.x, p.y, p.z};
             for (std::size_t k = 0; k < 3; ++k)
                 append_little_endian(bytes, static_cast<std::uint16_t>(std::round((at[k] - low[k]) / std::max(1e-9, high[k] - low[k]) * 65535)));
             const auto share = static_cast<std::uint16_t>(seconds > 0 ? std::floor(p.seconds / seconds * 32767) : 0);
             append_little_endian(bytes, static_cast<std::uint16_t>(share << 1 | static_cast<unsigned>(p.rapid)));
         }
-        programs.push_back({{"file", folder.programs[i].file}, {"points", paths[i].size()}, {"left_out", left_out[i] != 0}, {"data", base64(bytes)}});
+        programs.push_back({{"file", folder.programs[i].file}, {"points", path.size()}, {"left_out", left_out[i] != 0}, {"data", base64(bytes)}});
     }
-    return {{"tolerance_mm", rounded(error + quantum * std::sqrt(3.0), 4)},
+    return {{"tolerance_mm", rounded(drawn.error + quantum * std::sqrt(3.0), 4)},
             {"min", {low[0], low[1], low[2]}},
             {"max", {high[0], high[1], high[2]}},
             {"programs", std::move(programs)}};
@@ -621,7 +633,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
     std::size_t facets = kMostFacets, points = kMostPoints;
     Json model = model_json(context, mesh, *pattern.part, folder, facets);
     context.advance();
-    Json paths = paths_json(context, figures.paths, folder, points);
+    Json paths = paths_json(context, figures.drawn, folder, points);
     context.advance();
     for (;;) {
         figures.data["model"] = model;
@@ -635,7 +647,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
         // Paths are thinned before the model: they take more, and lose less.
         if (points > kFewestPoints) {
             points /= 2;
-            paths = paths_json(context, figures.paths, folder, points);
+            paths = paths_json(context, figures.drawn, folder, points);
         } else if (facets > kFewestFacets) {
             facets /= 2;
             model = model_json(context, mesh, *pattern.part, folder, facets);
