@@ -263,7 +263,11 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     reached(0.98);
     report_loose(cut, result);
     // Last, so that everything before has straight moves only to think of.
-    for (Operation& op : result.operations) fit_arcs(op.moves, fit);
+    for (Operation& op : result.operations) {
+        context.throw_if_cancelled();
+        fit_arcs(op.moves, fit);
+    }
+    context.throw_if_cancelled();
     reached(1);
     return result;
 }
