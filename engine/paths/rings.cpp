@@ -244,6 +244,19 @@ Loops thinned(const Loops& region, double loose, double turn) {
     return result;
 }
 
+// Of each loop: smallest x and y, largest x and y.
+std::vector<std::array<std::int32_t, 4>> boxes_of(const Loops& loops) {
+    std::vector<std::array<std::int32_t, 4>> boxes;
+    for (std::size_t l = 0; l < loops.size(); ++l) {
+        std::array<std::int32_t, 4> box{INT32_MAX, INT32_MAX, INT32_MIN, INT32_MIN};
+        for (const Point2 p : loops.loop(l)) box = {std::min(box[0], p.x), std::min(box[1], p.y), std::max(box[2], p.x), std::max(box[3], p.y)};
+        boxes.push_back(box);
+    }
+    return boxes;
+}
+
+bool within(const std::array<std::int32_t, 4>& box, const PathPoint& p) { return p.x >= box[0] && p.x <= box[2] && p.y >= box[1] && p.y <= box[3]; }
+
 // The rectangles from the stock's edge inwards, as far as they surround the forbidden region and what is within it.
 std::vector<std::array<double, 4>> frames_around(const LayerCut& cut, double r, double step, const Loops& forbidden) {
     std::vector<std::array<double, 4>> frames;
@@ -310,9 +323,12 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
     const double turn = fast_turn(cut.job.machine, std::min(tool.max_feed, cut.job.machine.max_feed));
     Loops nearer_free;
     std::vector<std::size_t> nearer_region;  // by loop of nearer_free; SIZE_MAX for holes
+    std::vector<std::array<std::int32_t, 4>> nearer_boxes;
     std::size_t ring = 0;
     for (Loops region = simplify(forbidden);; ++ring) {
+        cut.context.throw_if_cancelled();
         Loops free = subtract(useful, region);
+        cut.context.throw_if_cancelled();
         if (free.empty()) break;
         std::vector<std::size_t> region_of(free.size(), SIZE_MAX);
         const std::size_t first_piece = plan.pieces.size();
@@ -337,7 +353,7 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
             const PathPoint& p = plan.pieces[inner.pieces.front()].points[plan.pieces[inner.pieces.front()].points.size() / 2];
             double least = 1e300;
             for (std::size_t m = 0; m < nearer_free.size(); ++m) {
-                if (nearer_region[m] == SIZE_MAX) continue;
+                if (nearer_region[m] == SIZE_MAX || !within(nearer_boxes[m], p)) continue;
                 Loops one;
                 one.points.assign(nearer_free.loop(m).begin(), nearer_free.loop(m).end());
                 one.close_loop();
@@ -346,6 +362,7 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
             if (inner.around != SIZE_MAX) ++plan.regions[inner.around].waits_for;
         }
         if (plan.pieces.size() == first_piece) break;
+        nearer_boxes = boxes_of(free);
         nearer_free = std::move(free);
         nearer_region = std::move(region_of);
         region = thinned(offset(region, plan.step, kFineRing), loose * kUnitsPerMm, turn);
