@@ -187,11 +187,12 @@ VerifyResult write_verified(Context& context, const Plan& plan, const std::strin
         VerifyOptions options;
         options.stl = stl_path;
         options.cell = cell_mm;
-        context.share_progress(kPlanningShare, kVerifyingShare);
+        const bool reports = reports_are_built();
+        context.share_progress(kPlanningShare, reports ? kVerifyingShare : 1);
         Verification found = verify_folder(context, out.path("").string(), options);
         VerifyResult result = verdict(found);
         context.share_progress(kVerifyingShare, 1);
-        if (reports_are_built()) write_report(context, out.path("").string(), {stl_path}, std::move(found));
+        if (reports) write_report(context, out.path("").string(), {stl_path}, std::move(found));
         context.throw_if_cancelled();
         out.commit();
         return result;

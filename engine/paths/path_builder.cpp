@@ -379,7 +379,7 @@ std::vector<PathPoint> simplify(std::span<const PathPoint> line, double toleranc
 std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, double loose, double turn) {
     if (line.size() < 3) return {line.begin(), line.end()};
     // What stays of the finely thinned line within the wider tolerance is a part of it.
-    const std::vector<PathPoint> finely = kept_points(line, kept_within(line, fine));
+    std::vector<PathPoint> finely = kept_points(line, kept_within(line, fine));
     if (finely.size() < 3) return finely;
     std::vector<char> keep = kept_within(finely, loose);
     std::vector<std::size_t> corners;
