@@ -7,6 +7,7 @@
 #include <random>
 
 #include "engine/paths/layer_cut.h"
+#include "engine/paths/rings.h"
 #include "engine/schedule/motion_time.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"
@@ -70,6 +71,47 @@ struct Bench {
 
 std::vector<PathPoint> line(double x0, double y0, double x1, double y1, double z) {
     return {{to_units(x0), to_units(y0), to_units(z)}, {to_units(x1), to_units(y1), to_units(z)}};
+}
+
+// Whatever is thinned, a ring lies a step from the one before it, and the first on the forbidden region's border.
+TEST(Rings, KeepTheirStep) {
+    const Bench bench;
+    for (const double waves : {0.0, 5.0, 9.0}) {
+        // A free place with a wavy border in the middle of what is forbidden.
+        Loops hollow, forbidden;
+        for (int k = 720; k-- > 0;) {
+            const double turn = 2 * std::numbers::pi * k / 720, r = 28 + 2 * std::sin(waves * turn);
+            hollow.points.push_back({to_units(10 + r * std::cos(turn)), to_units(10 + r * std::sin(turn))});
+        }
+        hollow.close_loop();
+        forbidden.points = {
+            {to_units(-29), to_units(-29)}, {to_units(49), to_units(-29)}, {to_units(49), to_units(49)}, {to_units(-29), to_units(49)}};
+        forbidden.close_loop();
+        forbidden.points.insert(forbidden.points.end(), hollow.points.begin(), hollow.points.end());
+        forbidden.close_loop();
+        const RingPlan plan = plan_rings(bench.cut, bench.tool, forbidden, 5);
+        const double most = 0.45 * bench.tool.diameter + ring_tolerance(bench.tool) + 0.04;
+        auto away = [](const PathPoint& p, std::span<const PathPoint> line) {
+            double nearest = 1e300;
+            for (std::size_t k = 1; k < line.size(); ++k) {
+                const double ax = line[k - 1].x, ay = line[k - 1].y, dx = line[k].x - ax, dy = line[k].y - ay, l2 = dx * dx + dy * dy;
+                const double t = l2 > 0 ? std::clamp(((p.x - ax) * dx + (p.y - ay) * dy) / l2, 0.0, 1.0) : 0;
+                nearest = std::min(nearest, std::hypot(p.x - ax - t * dx, p.y - ay - t * dy));
+            }
+            return nearest / kUnitsPerMm;
+        };
+        std::vector<std::vector<PathPoint>> rings;  // the border, and the closed rings from it
+        rings.emplace_back();
+        for (const Point2 p : hollow.points) rings[0].push_back({p.x, p.y, 0});
+        rings[0].push_back(rings[0].front());
+        for (const RingPlan::Piece& piece : plan.pieces)
+            if (piece.closed && rings.size() < 5 && plan.regions[piece.region].ring + 1 == rings.size() && piece.box[0] > to_units(-25))
+                rings.push_back(piece.points);
+        ASSERT_EQ(rings.size(), 5U) << waves;
+        for (const PathPoint& p : rings[1]) EXPECT_LE(away(p, rings[0]), 0.0201);
+        for (std::size_t k = 2; k < rings.size(); ++k)
+            for (const PathPoint& p : rings[k]) EXPECT_LE(away(p, rings[k - 1]), most) << "ring " << k;
+    }
 }
 
 // Longer chords where the machine does not slow down for them: within the tolerance, fewer, and no slower.

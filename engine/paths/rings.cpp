@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kBeyond = 20;        // mm that the flask's region reaches past the stock
 constexpr double kFineRing = 0.02;    // mm: what a ring may leave its line by, at least
-constexpr double kBorderShare = 0.1;  // of the wall's allowance: by what the ring next to it may
 constexpr double kRingShare = 0.008;  // of the diameter: by what all others may, for they meet nothing but waste
 constexpr double kStepShare = 0.45;   // of the diameter: less than the radius by more than offsets and thinning may add
 constexpr double kBeside = 0.5;       // mm of air between the stock and a cutter that goes down beside it

@@ -54,9 +54,8 @@ struct RingPlan {
 
 /// Plans to clear everything between `forbidden` and the edge of the stock at one height: first in rectangles from the stock's edge as
 /// far as these surround the forbidden region, then in rings around that region. The forbidden region is on the right of every ring (but see
-/// Cutting::climb), so the cutter climbs. Neighbouring rings are at most 0.48 of the tool's diameter apart; the ring next to the
-/// forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region is
-/// nowhere near the stock.
+/// Cutting::climb), so the cutter climbs. Neighbouring rings are at most 0.45 of the tool's diameter, ring_tolerance() and 0.04 mm apart; the
+/// ring next to the forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region is nowhere near the stock.
 /// @param forbidden of the tool's middle, outer loops counter-clockwise; the flask's included
 /// @param tip_z mm
 [[nodiscard]] RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z);

@@ -84,18 +84,16 @@ Operation rough_layer(const LayerCut& cut) {
     struct Level {
         RingPlan rings;
         std::vector<std::vector<Stretch>> free;  // where no rings are cut
-        Contours border;
     };
     const bool flask = !cut.layer.opening.empty();
     const Loops room = flask ? flask_room(cut, r) : Loops{};
     std::vector<FibreLevel> heights;
     for (std::size_t i = 0; i < levels.size(); ++i) heights.push_back({levels[i].spare, &inside[i].loops});
-    std::vector<Contours> borders = level_contours(cut.context, cut.solid, heights, cutter, grid);
+    const std::vector<Contours> borders = level_contours(cut.context, cut.solid, heights, cutter, grid);
     std::vector<Level> cuts(levels.size());
     parallel_each(cut.context, levels.size(), [&](std::size_t i) {
-        cuts[i].border = std::move(borders[i]);
         if (i + 1 == levels.size() || contour) {
-            Loops forbidden = forbidden_region(cuts[i].border);
+            Loops forbidden = forbidden_region(borders[i]);
             if (flask) forbidden = unite(forbidden, beyond_room(cut, r, room));
             cuts[i].rings = plan_rings(cut, tool, forbidden, levels[i].tip);
             if (!cuts[i].rings.pieces.empty()) return;
@@ -122,7 +120,7 @@ Operation rough_layer(const LayerCut& cut) {
             return beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::y, at), Axis::y, at);
         });
         // Along the border, begun where a zigzag line ends and the cutter has been already.
-        const Contours& border = cuts[i].border;
+        const Contours& border = borders[i];
         const std::int32_t z = to_units(levels[i].tip);
         for (std::size_t c = 0; c < border.size(); ++c) {
             const auto points = std::span(border.points).subspan(border.starts[c], border.starts[c + 1] - border.starts[c]);
