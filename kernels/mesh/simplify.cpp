@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <utility>
@@ -18,6 +17,7 @@
 #include "kernels/mesh/weld.h"
 #include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
+#include "kernels/parallel/spares.h"
 
 namespace slabwright {
 
@@ -451,26 +451,6 @@ private:
     double least_height_ = 0, new_height_ = 0, best_height_ = 0;
 };
 
-/// Blocks that were used before.
-class Blocks {
-public:
-    [[nodiscard]] std::unique_ptr<Block> take() {
-        const std::lock_guard lock(mutex_);
-        if (free_.empty()) return std::make_unique<Block>();
-        auto block = std::move(free_.back());
-        free_.pop_back();
-        return block;
-    }
-    void give(std::unique_ptr<Block> block) {
-        const std::lock_guard lock(mutex_);
-        free_.push_back(std::move(block));
-    }
-
-private:
-    std::mutex mutex_;
-    std::vector<std::unique_ptr<Block>> free_;
-};
-
 /// A grid of cubes, in each of which a surface of so many facets has about kBlockFacets.
 class Cells {
 public:
@@ -524,7 +504,7 @@ template <class T, class EachFace, class FaceOf, class Keep>
 Sparse<T> pass(const Task& task, const Cells& cells, std::size_t faces, std::size_t n, std::size_t grain, EachFace&& each_face, FaceOf&& face_of,
                Keep&& keep) {
     Sparse<T> out(faces, cells.count());
-    Blocks blocks;
+    Spares<Block> blocks;
     RawArray<std::uint32_t> numbers;
     std::optional<MemoryCharge> charge;
     std::size_t before = 0;  // faces dealt in earlier rounds
@@ -546,7 +526,7 @@ Sparse<T> pass(const Task& task, const Cells& cells, std::size_t faces, std::siz
             parallel_each(task.context, last - first, [&](std::size_t b) {
                 const std::span<const std::uint32_t> mine(numbers.data() + starts[b], starts[b + 1] - starts[b]);
                 if (mine.empty()) return;
-                auto block = blocks.take();
+                auto block = blocks.take([] { return std::make_unique<Block>(); });
                 block->load(task, mine.size(), [&](std::size_t i) { return face_of(mine[i]); });
                 const std::span<const Face> few = block->simplified(task);
                 out.charges[first + b].emplace(task.context, few.size() * sizeof(T), "the facets that a tolerance needs");

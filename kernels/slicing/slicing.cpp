@@ -15,7 +15,6 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <mutex>
 #include <numeric>
 #include <queue>
 #include <string>
@@ -24,6 +23,7 @@
 #include "kernels/errors.h"
 #include "kernels/mesh/bulk_memory.h"
 #include "kernels/parallel/parallel.h"
+#include "kernels/parallel/spares.h"
 
 namespace slabwright {
 
@@ -288,34 +288,6 @@ void cut(MeshView mesh, float limit, std::span<const std::uint32_t> crossed, con
     nest(section.loops);
 }
 
-/// Lends each running task a scratch; which one it gets does not matter, as all are clean.
-class ScratchPool {
-public:
-    explicit ScratchPool(std::size_t facets) : facets_(facets) {}
-    [[nodiscard]] std::unique_ptr<Scratch> take() {
-        {
-            const std::lock_guard lock(mutex_);
-            if (!free_.empty()) {
-                auto scratch = std::move(free_.back());
-                free_.pop_back();
-                return scratch;
-            }
-        }
-        auto scratch = std::make_unique<Scratch>();
-        scratch->pending.assign((facets_ + 63) / 64, 0);
-        return scratch;
-    }
-    void give(std::unique_ptr<Scratch> scratch) {
-        const std::lock_guard lock(mutex_);
-        free_.push_back(std::move(scratch));
-    }
-
-private:
-    std::size_t facets_;
-    std::mutex mutex_;
-    std::vector<std::unique_ptr<Scratch>> free_;
-};
-
 void check(MeshView mesh, std::span<const Plane> planes, const SliceOptions& options) {
     for (std::size_t i = 0; i < planes.size(); ++i) {
         if (std::isfinite(planes[i].z)) continue;
@@ -401,7 +373,12 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
     });
     rank = {};
 
-    ScratchPool pool(facets);
+    Spares<Scratch> pool;  // clean ones
+    const auto clean = [facets] {
+        auto scratch = std::make_unique<Scratch>();
+        scratch->pending.assign((facets + 63) / 64, 0);
+        return scratch;
+    };
     BulkVector<std::uint32_t> crossed;
     for (std::size_t window = 0; window < order.size(); window += kBatchPlanes) {
         const std::size_t window_planes = std::min(kBatchPlanes, order.size() - window);
@@ -443,7 +420,7 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
                 }
             });
             parallel_for(context, last - first, kPlaneGrain, [&](std::size_t begin, std::size_t end) {
-                auto scratch = pool.take();
+                auto scratch = pool.take(clean);
                 for (std::size_t i = begin; i < end; ++i) {
                     context.throw_if_cancelled();
                     const std::size_t p = window + first + i;
