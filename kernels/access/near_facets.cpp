@@ -22,9 +22,47 @@ struct Way {
     float end;          // of it: 1, or 0 where it has none
     float upwards;      // 1 where heights count as distance, 0 where they do not
     float reach, above, slack;
+    float nearer;  // than the farthest reach that there may be, so far this one is
 };
 
-constexpr float third = 1.0F / 3;
+/// The rows as pointers: compilers make no vectors of what is read from arrays within a structure.
+struct Corners {
+    explicit Corners(const FacetRows& f)
+        : x0(f.x0.data()),
+          y0(f.y0.data()),
+          z0(f.z0.data()),
+          x1(f.x1.data()),
+          y1(f.y1.data()),
+          z1(f.z1.data()),
+          x2(f.x2.data()),
+          y2(f.y2.data()),
+          z2(f.z2.data()) {}
+    const float *x0, *y0, *z0, *x1, *y1, *z1, *x2, *y2, *z2;
+};
+
+/// For ways in a box around the middle that facets are measured from.
+struct Box {
+    double mx, my, mz, hx, hy, hz;  // its middle and half its extent
+    double top, lowest;             // of the facets and of the ways, above the middle
+    double upwards, up;             // 1 where heights count as distance, 0 where they do not; mm that the ways are above the box
+    double round, flat;             // what is so far away is out of reach, and what is so far horizontally: one of them is 0
+    double reach2;                  // square of the other
+    double under;                   // what is so far under the ways is out of reach
+    double wrong;                   // what distances may be wrong by beside what the facet's own place makes
+};
+
+constexpr double kHair = 1e-9;  // mm: rounding of a bound
+constexpr float third = 1.0F / 3, tiny = 1e-30F;
+
+// The same as std::min and std::max, but for lists of three no loop.
+inline double min3(double a, double b, double c) {
+    const double d = a < b ? a : b;
+    return d < c ? d : c;
+}
+inline double max3(double a, double b, double c) {
+    const double d = a > b ? a : b;
+    return d > c ? d : c;
+}
 
 }  // namespace
 
@@ -34,7 +72,7 @@ SLABWRIGHT_WIDE static void near_rows(const Rows& r, const Way& w, int n, unsign
     for (int i = 0; i < n; ++i) {
         const float nx = r.nx[i], ny = r.ny[i], nz = r.nz[i];
         const float begin = nx * w.ax + ny * w.ay + nz * w.az + r.offset[i], end = begin + (nx * w.dx + ny * w.dy + nz * w.dz);
-        const float above = begin < end ? begin : end;
+        const float above = (begin < end ? begin : end) + w.nearer;
         const float x0 = r.x0[i] - w.ax, y0 = r.y0[i] - w.ay, z0 = r.z0[i] - w.az;
         const float x1 = r.x1[i] - w.ax, y1 = r.y1[i] - w.ay, z1 = r.z1[i] - w.az;
         const float x2 = r.x2[i] - w.ax, y2 = r.y2[i] - w.ay, z2 = r.z2[i] - w.az;
@@ -55,46 +93,114 @@ SLABWRIGHT_WIDE static void near_rows(const Rows& r, const Way& w, int n, unsign
     }
 }
 
+// The same with a plane across the line from the way to the nearest point of the facet's edges, which parts the two wherever anything but the facet's
+// own plane does, up to what the way's nearest place to the facet and to its middle are apart. Where that point is above the way, what counts of the
+// way is above it too, and the line is level.
+SLABWRIGHT_WIDE static void chosen_near(const Corners& r, const float* wrong, const Way& w, int n, unsigned char* __restrict keep) {
+    for (int i = 0; i < n; ++i) {
+        const float x0 = r.x0[i] - w.ax, y0 = r.y0[i] - w.ay, z0 = (r.z0[i] - w.az) * w.upwards;
+        const float x1 = r.x1[i] - w.ax, y1 = r.y1[i] - w.ay, z1 = (r.z1[i] - w.az) * w.upwards;
+        const float x2 = r.x2[i] - w.ax, y2 = r.y2[i] - w.ay, z2 = (r.z2[i] - w.az) * w.upwards;
+        const float mx = (x0 + x1 + x2) * third, my = (y0 + y1 + y2) * third, mz = (z0 + z1 + z2) * third;
+        float t = (mx * w.dx + my * w.dy) * w.per_length2;
+        t = t < 0.0F ? 0.0F : t;
+        t = t > w.end ? w.end : t;
+        const float px = t * w.dx, py = t * w.dy, low = t * w.dz * w.upwards, pz = low > mz ? low : mz;
+        const float ax = x1 - x0, ay = y1 - y0, az = z1 - z0, bx = x2 - x1, by = y2 - y1, bz = z2 - z1, cx = x0 - x2, cy = y0 - y2, cz = z0 - z2;
+        // From each corner to the place, along the edge that begins there, and what is left of it across the edge.
+        const float fx = px - x0, fy = py - y0, fz = pz - z0, gx = px - x1, gy = py - y1, gz = pz - z1, hx = px - x2, hy = py - y2, hz = pz - z2;
+        float s0 = (fx * ax + fy * ay + fz * az) / (ax * ax + ay * ay + az * az + tiny);
+        float s1 = (gx * bx + gy * by + gz * bz) / (bx * bx + by * by + bz * bz + tiny);
+        float s2 = (hx * cx + hy * cy + hz * cz) / (cx * cx + cy * cy + cz * cz + tiny);
+        s0 = s0 < 0.0F ? 0.0F : s0, s1 = s1 < 0.0F ? 0.0F : s1, s2 = s2 < 0.0F ? 0.0F : s2;
+        s0 = s0 > 1.0F ? 1.0F : s0, s1 = s1 > 1.0F ? 1.0F : s1, s2 = s2 > 1.0F ? 1.0F : s2;
+        const float ux0 = fx - s0 * ax, uy0 = fy - s0 * ay, uz0 = fz - s0 * az, e0 = ux0 * ux0 + uy0 * uy0 + uz0 * uz0;
+        const float ux1 = gx - s1 * bx, uy1 = gy - s1 * by, uz1 = gz - s1 * bz, e1 = ux1 * ux1 + uy1 * uy1 + uz1 * uz1;
+        const float ux2 = hx - s2 * cx, uy2 = hy - s2 * cy, uz2 = hz - s2 * cz, e2 = ux2 * ux2 + uy2 * uy2 + uz2 * uz2;
+        float ux = e1 < e0 ? ux1 : ux0, uy = e1 < e0 ? uy1 : uy0, uz = e1 < e0 ? uz1 : uz0;
+        const float e = e1 < e0 ? e1 : e0;
+        ux = e2 < e ? ux2 : ux, uy = e2 < e ? uy2 : uy, uz = e2 < e ? uz2 : uz;
+        uz = pz > low ? 0.0F : (uz + std::abs(uz)) / 2;
+        const float d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1, d2 = ux * x2 + uy * y2 + uz * z2;
+        float most = d0 > d1 ? d0 : d1;
+        most = most > d2 ? most : d2;
+        const float forward = ux * w.dx + uy * w.dy + uz * w.dz, first = -most, last = forward - most, reach = w.reach + w.slack + wrong[i];
+        const float gap = first < last ? first : last;
+        keep[i] = static_cast<unsigned char>((gap <= 0.0F) | (gap * gap < reach * reach * (ux * ux + uy * uy + uz * uz)));
+    }
+}
+
+// Which facets a way within the box may meet, by their boxes and planes, and the rows of all: each row is FacetRows::kMost long.
+SLABWRIGHT_WIDE static void box_rows(const Corners& r, const Box& box, int n, float* __restrict to, unsigned char* __restrict keep) {
+    const Box b = box;
+    constexpr int most = FacetRows::kMost;
+    for (int i = 0; i < n; ++i) {
+        const double x0 = r.x0[i] - b.mx, y0 = r.y0[i] - b.my, z0 = r.z0[i] - b.mz;
+        const double x1 = r.x1[i] - b.mx, y1 = r.y1[i] - b.my, z1 = r.z1[i] - b.mz;
+        const double x2 = r.x2[i] - b.mx, y2 = r.y2[i] - b.my, z2 = r.z2[i] - b.mz;
+        const double left = min3(x0, x1, x2), right = max3(x0, x1, x2), front = min3(y0, y1, y2), back = max3(y0, y1, y2);
+        const double lowest = min3(z0, z1, z2), highest = max3(z0, z1, z2);
+        // Horizontally from the box of the ways to the facet's, and upwards to the ways.
+        const double dx = max3(0.0, left - b.hx, -b.hx - right), dy = max3(0.0, front - b.hy, -b.hy - back);
+        const double under = b.lowest - (highest < b.top ? highest : b.top), dz = b.upwards * (under > 0 ? under : 0.0);
+        // The facet's plane.
+        const double ex = x1 - x0, ey = y1 - y0, ez = z1 - z0, gx = x2 - x0, gy = y2 - y0, gz = z2 - z0;
+        double nx = ey * gz - ez * gy, ny = ez * gx - ex * gz, nz = ex * gy - ey * gx;
+        const double area = std::sqrt(nx * nx + ny * ny + nz * nz), sign = nz < 0 ? -1.0 : 1.0,
+                     scale = area > 1e-9 ? sign / (area > 1e-9 ? area : 1.0) : 0.0;
+        nx *= scale, ny *= scale, nz *= scale;
+        const double offset = -(nx * x0 + ny * y0 + nz * z0), across = std::sqrt(nx * nx + ny * ny);
+        const double reach = scale == 0 ? 1e30 : b.round + b.flat * across;  // of none that has no plane
+        const double nearest = offset + nz * b.up - std::abs(nx) * b.hx - std::abs(ny) * b.hy - std::abs(nz) * b.hz;
+        const double far_x = -left > right ? -left : right, far_y = -front > back ? -front : back, far_z = -lowest > highest ? -lowest : highest;
+        const double wrong = 1.5e-6 * (max3(far_x, far_y, far_z) + b.wrong);
+        keep[i] = static_cast<unsigned char>((lowest < b.top) & (dx * dx + dy * dy + dz * dz < b.reach2) & (under < b.under) & (nearest < reach));
+        to[0 * most + i] = static_cast<float>(nx), to[1 * most + i] = static_cast<float>(ny), to[2 * most + i] = static_cast<float>(nz);
+        to[3 * most + i] = static_cast<float>(offset), to[4 * most + i] = static_cast<float>(reach + wrong);
+        to[5 * most + i] = static_cast<float>(x0), to[6 * most + i] = static_cast<float>(y0), to[7 * most + i] = static_cast<float>(z0);
+        to[8 * most + i] = static_cast<float>(x1), to[9 * most + i] = static_cast<float>(y1), to[10 * most + i] = static_cast<float>(z1);
+        to[11 * most + i] = static_cast<float>(x2), to[12 * most + i] = static_cast<float>(y2), to[13 * most + i] = static_cast<float>(z2);
+        to[14 * most + i] = static_cast<float>(wrong);
+        to[15 * most + i] = static_cast<float>(highest + 1e-6 * std::abs(highest));
+    }
+}
+
 SLABWRIGHT_WIDE static void around_rows(const float* x0, const float* x1, const float* y0, const float* y1, double x, double y, int n,
                                         unsigned char* __restrict keep) {
     for (int i = 0; i < n; ++i) keep[i] = (x0[i] <= x) & (x <= x1[i]) & (y0[i] <= y) & (y <= y1[i]);
 }
 
-void NearFacets::place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball) {
+void NearFacets::place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball, double top, double up) {
     for (std::size_t k = 0; k < 3; ++k) middle_[k] = (low[k] + high[k]) / 2, half_[k] = (high[k] - low[k]) / 2;
-    reach_ = reach;
+    reach_ = reach, top_ = top, up_ = up;
     ball_ = ball;
     size_ = 0;
 }
 
-bool NearFacets::add(const std::array<std::array<double, 3>, 3>& corners, double up) {
-    std::array<std::array<double, 3>, 3> v = corners;
-    double far = 0;
-    for (auto& p : v)
-        for (std::size_t k = 0; k < 3; ++k) p[k] -= middle_[k], far = std::max(far, std::abs(p[k]));
-    std::array<double, 3> e{}, g{};
-    for (std::size_t k = 0; k < 3; ++k) e[k] = v[1][k] - v[0][k], g[k] = v[2][k] - v[0][k];
-    std::array<double, 3> n{e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0]};
-    const double area = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), wrong = 1.5e-6 * (far + half_[0] + half_[1] + half_[2] + reach_ + up);
-    double offset = 0, needs = std::numeric_limits<double>::infinity();
-    if (area > 1e-9) {
-        for (double& c : n) c *= (n[2] < 0 ? -1 : 1) / area;
-        offset = -(n[0] * v[0][0] + n[1] * v[0][1] + n[2] * v[0][2]);
-        needs = ball_ ? reach_ : reach_ * std::sqrt(n[0] * n[0] + n[1] * n[1]);
-        if (offset + n[2] * up - std::abs(n[0]) * half_[0] - std::abs(n[1]) * half_[1] - std::abs(n[2]) * half_[2] >= needs) return false;
-        needs += wrong;
-    } else {
-        n = {0, 0, 0};
-    }
-    make_room(size_ + 1);
-    const float highest = static_cast<float>(std::max({v[0][2], v[1][2], v[2][2]}));
-    const std::array<double, kRows - 1> values{n[0],    n[1],    n[2],    offset,  needs,   v[0][0], v[0][1], v[0][2],
-                                               v[1][0], v[1][1], v[1][2], v[2][0], v[2][1], v[2][2], wrong};
-    std::size_t row = 0;
-    for (const double value : values) rows_[row++][size_] = static_cast<float>(value);
-    rows_[row][size_] = std::nextafter(highest, std::numeric_limits<float>::infinity());
-    ++size_;
-    return true;
+void NearFacets::add(const FacetRows& facets, std::size_t count, std::vector<unsigned char>& keep) {
+    keep.assign((count + 7) / 8 * 8, 0);
+    std::array<std::array<float, FacetRows::kMost>, kRows> values;
+    const Box box{middle_[0],
+                  middle_[1],
+                  middle_[2],
+                  half_[0],
+                  half_[1],
+                  half_[2],
+                  top_ - middle_[2],
+                  up_ - half_[2],
+                  ball_ ? 1.0 : 0.0,
+                  up_,
+                  ball_ ? reach_ : 0.0,
+                  ball_ ? 0.0 : reach_,
+                  reach_ * reach_,
+                  ball_ ? 1e30 : kHair,
+                  half_[0] + half_[1] + half_[2] + reach_ + up_};
+    box_rows(Corners(facets), box, static_cast<int>(count), values[0].data(), keep.data());
+    make_room(size_ + count);
+    for_each_kept(keep, [&](std::size_t i) {
+        for (std::size_t row = 0; row < kRows; ++row) rows_[row][size_] = values[row][i];
+        ++size_;
+    });
 }
 
 void NearFacets::make_room(std::size_t size) {
@@ -114,7 +220,7 @@ void NearFacets::take(const NearFacets& others, const std::vector<unsigned char>
     });
 }
 
-void NearFacets::near(const NearWay& way, std::vector<unsigned char>& keep) const {
+void NearFacets::near(const NearWay& way, bool closely, std::vector<unsigned char>& keep) const {
     keep.assign((size_ + 7) / 8 * 8, 0);
     auto single = [&](double v, std::size_t k) { return static_cast<float>(v - middle_[k]); };
     const double dx = way.b[0] - way.a[0], dy = way.b[1] - way.a[1], length2 = dx * dx + dy * dy;
@@ -129,10 +235,32 @@ void NearFacets::near(const NearWay& way, std::vector<unsigned char>& keep) cons
                 ball_ ? 1.0F : 0.0F,
                 static_cast<float>(way.reach),
                 std::nextafter(single(way.above, 2), -std::numeric_limits<float>::infinity()),
-                static_cast<float>(way.slack)};
+                static_cast<float>(way.slack),
+                ball_ ? static_cast<float>(reach_ - way.reach) : 0.0F};
     auto row = [&](std::size_t k) { return rows_[k].data(); };
-    near_rows({row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7), row(8), row(9), row(10), row(11), row(12), row(13), row(15), row(14)},
-              w, static_cast<int>(size_), keep.data());
+    const Rows rows{row(0), row(1), row(2),  row(3),  row(4),  row(5),  row(6),  row(7),
+                    row(8), row(9), row(10), row(11), row(12), row(13), row(15), row(14)};
+    near_rows(rows, w, static_cast<int>(size_), keep.data());
+    if (!closely) return;
+    FacetRows chosen;
+    std::array<float, FacetRows::kMost> wrong;
+    std::array<std::size_t, FacetRows::kMost> which;
+    std::array<unsigned char, FacetRows::kMost> met;
+    std::size_t count = 0;
+    auto look = [&] {
+        chosen_near(Corners(chosen), wrong.data(), w, static_cast<int>((count + 7) / 8 * 8), met.data());
+        for (std::size_t k = 0; k < count; ++k) keep[which[k]] = met[k];
+        count = 0;
+    };
+    for_each_kept(keep, [&](std::size_t i) {
+        chosen.x0[count] = rows.x0[i], chosen.y0[count] = rows.y0[i], chosen.z0[count] = rows.z0[i];
+        chosen.x1[count] = rows.x1[i], chosen.y1[count] = rows.y1[i], chosen.z1[count] = rows.z1[i];
+        chosen.x2[count] = rows.x2[i], chosen.y2[count] = rows.y2[i], chosen.z2[count] = rows.z2[i];
+        wrong[count] = rows.wrong[i];
+        which[count++] = i;
+        if (count == FacetRows::kMost) look();
+    });
+    if (count > 0) look();
 }
 
 void NearBoxes::clear() {

@@ -18,16 +18,23 @@ struct NearWay {
     double slack;  ///< what is meant may be so far from the straight way, mm
 };
 
+/// Corners of up to kMost facets, mm.
+struct FacetRows {
+    static constexpr std::size_t kMost = 64;
+    std::array<float, kMost> x0, y0, z0, x1, y1, z1, x2, y2, z2;
+};
+
 /// Facets in single precision around an origin, each with what that can be wrong by: none is left out that may be met.
 class NearFacets {
 public:
-    /// For ways within a box and a reach of `reach` mm at most. Without facets then.
-    void place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball);
-    /// Adds a facet unless no way within the box can meet it; whether it did.
+    /// For ways within a box, and a reach of `reach` mm at most, among what is below `top`. Without facets then.
     /// @param up mm that the ways are above the box at least
-    bool add(const std::array<std::array<double, 3>, 3>& corners, double up);
+    void place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball, double top, double up);
+    /// Adds those of `count` facets that a way within the box may meet, in their order. @param keep gets 1 for them, else 0, filled up as below
+    void add(const FacetRows& facets, std::size_t count, std::vector<unsigned char>& keep);
     /// keep[i] is 1 where the way may meet facet i, else 0. Its size becomes a multiple of eight, filled with 0.
-    void near(const NearWay& way, std::vector<unsigned char>& keep) const;
+    /// @param closely looks a second time at what is kept, so that little is that does not meet; not worth it where the slack is more
+    void near(const NearWay& way, bool closely, std::vector<unsigned char>& keep) const;
     /// Becomes what is kept of others.
     void take(const NearFacets& others, const std::vector<unsigned char>& keep);
 
@@ -35,7 +42,7 @@ private:
     static constexpr std::size_t kRows = 16;
     std::array<double, 3> middle_{}, half_{};
     void make_room(std::size_t size);
-    double reach_ = 0;
+    double reach_ = 0, top_ = 0, up_ = 0;
     bool ball_ = false;
     std::size_t size_ = 0;
     std::array<std::vector<float>, kRows> rows_;

@@ -338,18 +338,23 @@ StandingPart::Within::Within(const Point3& from, const Point3& to) {
     }
 }
 
-SLABWRIGHT_WIDE void StandingPart::overlapping(const Nodes& n, const Within& box, std::array<unsigned char, 8>& keep) {
-    const float x0 = box.low[0], y0 = box.low[1], z0 = box.low[2], x1 = box.high[0], y1 = box.high[1], z1 = box.high[2];
-    std::array<unsigned char, 8> kept;
-    for (std::size_t k = 0; k < kFan; ++k)
-        kept[k] =
-            static_cast<unsigned char>((n.x0[k] <= x1) & (x0 <= n.x1[k]) & (n.y0[k] <= y1) & (y0 <= n.y1[k]) & (n.z0[k] <= z1) & (z0 <= n.z1[k]));
-    keep = kept;
+// Written with vectors of eight, since compilers take such a short loop apart into smaller ones.
+SLABWRIGHT_WIDE void StandingPart::overlapping(const Nodes& n, const Within& box, Kept& keep) {
+    using Eight [[gnu::vector_size(32)]] = float;
+    using Signs [[gnu::vector_size(32)]] = std::int32_t;
+    static_assert(sizeof(Kept) == sizeof(Signs) && sizeof(n.x0) == sizeof(Eight));
+    Eight x0, y0, z0, x1, y1, z1;
+    std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
+    std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
+    const Eight none{}, low_x = none + box.low[0], low_y = none + box.low[1], low_z = none + box.low[2];
+    const Eight high_x = none + box.high[0], high_y = none + box.high[1], high_z = none + box.high[2];
+    const Signs kept = (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
+    std::memcpy(keep.data(), &kept, sizeof(kept));
 }
 
-/// Visits, in one fixed order, every facet of the nodes that choose(eight nodes, keep) keeps.
+/// Visits, in one fixed order, the facets [first, last) of every node that choose(eight nodes, keep) keeps.
 template <class Choose, class Visit>
-void StandingPart::walk_chosen(Choose&& choose, Visit&& visit) const {
+void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
     struct Item {
         std::uint32_t level;
         std::size_t eight;
@@ -358,39 +363,43 @@ void StandingPart::walk_chosen(Choose&& choose, Visit&& visit) const {
     std::size_t size = 0;
     if (facets_.empty()) return;
     stack[size++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0};
-    std::array<unsigned char, 8> keep;
+    Kept keep;
     while (size > 0) {
         const Item item = stack[--size];
         choose(levels_[item.level][item.eight], keep);
-        std::uint64_t kept;
-        std::memcpy(&kept, keep.data(), sizeof(kept));
-        if (kept == 0) continue;
+        std::array<std::uint64_t, 4> pairs;
+        std::memcpy(pairs.data(), keep.data(), sizeof(pairs));
+        if ((pairs[0] | pairs[1] | pairs[2] | pairs[3]) == 0) continue;
         const std::size_t first = item.eight * kFan;
         if (item.level > 0) {
             for (std::size_t k = kFan; k-- > 0;)
-                if (keep[k]) stack[size++] = {item.level - 1, first + k};
+                if (keep[k] != 0) stack[size++] = {item.level - 1, first + k};
             continue;
         }
         for (std::size_t k = 0; k < kFan; ++k)
-            if (keep[k])
-                for (std::size_t f = (first + k) * kFan; f < std::min(facets_.size(), (first + k + 1) * kFan); ++f) visit(facets_[f]);
+            if (keep[k] != 0) visit((first + k) * kFan, std::min(facets_.size(), (first + k + 1) * kFan));
     }
 }
 
 /// The same of every node whose box enter() holds for.
 template <class Enter, class Visit>
 void StandingPart::walk(Enter&& enter, Visit&& visit) const {
-    walk_chosen(
-        [&](const Nodes& nodes, std::array<unsigned char, 8>& keep) {
+    walk_leaves(
+        [&](const Nodes& nodes, Kept& keep) {
             for (std::size_t k = 0; k < kFan; ++k) keep[k] = nodes.x0[k] <= nodes.x1[k] && enter(nodes[k]);
         },
-        visit);
+        [&](std::size_t first, std::size_t last) {
+            for (std::size_t f = first; f < last; ++f) visit(facets_[f]);
+        });
 }
 
 /// The same of every node whose box has something in common with this.
 template <class Visit>
 void StandingPart::walk_within(const Within& box, Visit&& visit) const {
-    walk_chosen([&](const Nodes& nodes, std::array<unsigned char, 8>& keep) { overlapping(nodes, box, keep); }, visit);
+    walk_leaves([&](const Nodes& nodes, Kept& keep) { overlapping(nodes, box, keep); },
+                [&](std::size_t first, std::size_t last) {
+                    for (std::size_t f = first; f < last; ++f) visit(facets_[f]);
+                });
 }
 
 namespace {
@@ -675,30 +684,31 @@ struct StandingPart::Run {
 /// Finds the facets for a box.
 void StandingPart::gather(Vicinity& v) const {
     const Cutter& cutter = v.cutter;
-    const double reach = cutter.radius - v.at_least + kHair, lowest = v.low[2] + (cutter.ball() ? cutter.radius : 0);
-    // The square of the horizontal distance left to what is as high as z at most; 0 where nothing so low can be met.
-    auto left2 = [&](double z) {
-        if (!cutter.ball()) return std::min(z, cutter.top) - lowest > v.at_least ? reach * reach : 0.0;
-        const double dz = std::max(0.0, lowest - std::min(z, cutter.top));
-        return reach * reach - dz * dz;
-    };
-    auto gap2 = [&](double x0, double x1, double y0, double y1) {
-        const double dx = std::max({0.0, x0 - v.high[0], v.low[0] - x1}), dy = std::max({0.0, y0 - v.high[1], v.low[1] - y1});
-        return dx * dx + dy * dy;
-    };
+    const double reach = cutter.radius - v.at_least + kHair, up = cutter.ball() ? cutter.radius : v.at_least, lowest = v.low[2] + up;
+    const Within box({v.low[0] - reach, v.low[1] - reach, cutter.ball() ? lowest - reach : lowest},
+                     {v.high[0] + reach, v.high[1] + reach, cutter.top});
     v.facets.clear();
-    v.terms.place(v.low, v.high, reach, cutter.ball());
-    walk_within(Within({v.low[0] - reach, v.low[1] - reach, cutter.ball() ? lowest - reach : lowest + v.at_least},
-                       {v.high[0] + reach, v.high[1] + reach, cutter.top}),
-                [&](const Facet& f) {
-                    const auto& [a, b, c] = f.v;
-                    if (std::min({a.z, b.z, c.z}) >= cutter.top) return;
-                    const double x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x}), y0 = std::min({a.y, b.y, c.y}),
-                                 y1 = std::max({a.y, b.y, c.y});
-                    if (gap2(x0, x1, y0, y1) >= left2(std::max({a.z, b.z, c.z}))) return;
-                    if (v.terms.add({to_point(a), to_point(b), to_point(c)}, cutter.ball() ? cutter.radius : v.at_least))
-                        v.facets.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
+    v.terms.place(v.low, v.high, reach, cutter.ball(), cutter.top, up);
+    FacetRows rows;
+    std::array<std::uint32_t, FacetRows::kMost> facets;
+    std::size_t count = 0;
+    auto take = [&] {
+        v.terms.add(rows, count, v.keep);
+        for_each_kept(v.keep, [&](std::size_t k) { v.facets.push_back(facets[k]); });
+        count = 0;
+    };
+    walk_leaves([&](const Nodes& nodes, Kept& keep) { overlapping(nodes, box, keep); },
+                [&](std::size_t first, std::size_t last) {
+                    for (std::size_t f = first; f < last; ++f, ++count) {
+                        const auto& [a, b, c] = facets_[f].v;
+                        rows.x0[count] = a.x, rows.y0[count] = a.y, rows.z0[count] = a.z;
+                        rows.x1[count] = b.x, rows.y1[count] = b.y, rows.z1[count] = b.z;
+                        rows.x2[count] = c.x, rows.y2[count] = c.y, rows.z2[count] = c.z;
+                        facets[count] = static_cast<std::uint32_t>(f);
+                    }
+                    if (count + kFan > FacetRows::kMost) take();
                 });
+    if (count > 0) take();
     v.facets_known = true;
 }
 
@@ -749,7 +759,7 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
             const double reach = radius - depth + kHair, up = cutter.ball() ? radius : depth;
             terms.near(
                 {{from[0], from[1], from[2] + up}, {to[0], to[1], to[2] + up}, reach, lowest + (cutter.ball() ? radius - reach : depth), slack},
-                v.keep);
+                slack == 0, v.keep);
         };
         auto look = [&](const Piece& piece, Penetration& result) {
             if (m >= run.first && m < run.last) {

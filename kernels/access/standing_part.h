@@ -105,9 +105,10 @@ private:
         Within(const Point3& low, const Point3& high);
         std::array<float, 3> low, high;
     };
-    static void overlapping(const Nodes& nodes, const Within& box, std::array<unsigned char, 8>& keep);
+    using Kept = std::array<std::int32_t, 8>;  ///< not 0 where a node is kept
+    static void overlapping(const Nodes& nodes, const Within& box, Kept& keep);
     template <class Choose, class Visit>
-    void walk_chosen(Choose&& choose, Visit&& visit) const;
+    void walk_leaves(Choose&& choose, Visit&& visit) const;
     template <class Enter, class Visit>
     void walk(Enter&& enter, Visit&& visit) const;
     template <class Visit>
