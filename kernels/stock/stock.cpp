@@ -18,16 +18,16 @@ struct Losses {
     Losses() { highest.fill(-1e300), lowest.fill(1e300); }
 };
 
-// Lowers n cells, whole eights of them, to h where they stand higher; no h is under the slab's bottom but by rounding. `first` is the first one's number.
-SLABWRIGHT_WIDE void lower_eights(float* __restrict height, int n, const double* __restrict h, double bottom, double deep, int first,
-                                  Losses& __restrict losses) {
+// Lowers n cells, whole eights of them, to `left` over a slab's bottom where they stand higher. `first` is the first one's number.
+template <class Left>
+[[gnu::always_inline]] inline void lower_lanes(float* __restrict height, int n, Left&& left_at, double bottom, double deep, int first,
+                                               Losses& __restrict losses) {
     constexpr double none = 2e300;
     Losses all = losses;
     for (int c = 0; c < n; c += kLanes)
         for (std::size_t k = 0; k < kLanes; ++k) {
             const std::size_t at = static_cast<std::size_t>(c) + k;
-            const double over = h[at] - bottom;
-            const float stood = height[at], left = static_cast<float>(over > 0 ? over : 0.0), stands = left < stood ? left : stood;
+            const float stood = height[at], left = left_at(at), stands = left < stood ? left : stood;
             const double before = bottom + static_cast<double>(stood), after = bottom + static_cast<double>(stands), lost = before - after;
             const double top = before - (stands < stood ? 0.0 : none), low = after + (stands < stood ? 0.0 : none);
             all.removed[k] += lost;
@@ -39,6 +39,35 @@ SLABWRIGHT_WIDE void lower_eights(float* __restrict height, int n, const double*
             height[at] = stands;
         }
     losses = all;
+}
+
+// To h; no h is under the slab's bottom but by rounding.
+SLABWRIGHT_WIDE void lower_eights(float* __restrict height, int n, const double* __restrict h, double bottom, double deep, int first,
+                                  Losses& __restrict losses) {
+    lower_lanes(
+        height, n,
+        [&](std::size_t at) {
+            const double over = h[at] - bottom;
+            return static_cast<float>(over > 0 ? over : 0.0);
+        },
+        bottom, deep, first, losses);
+}
+
+// Lowers any number of cells to one height over the slab's bottom; whether any stood higher.
+SLABWRIGHT_WIDE bool lower_level(float* __restrict height, int n, float left, double bottom, double deep, Losses& __restrict losses) {
+    int higher = 0;
+    for (int i = 0; i < n; ++i) higher |= static_cast<int>(height[i] > left);
+    if (higher == 0) return false;
+    const int whole = n / kLanes * kLanes;
+    lower_lanes(
+        height, whole, [&](std::size_t) { return left; }, bottom, deep, 0, losses);
+    if (whole == n) return true;
+    std::array<float, kLanes> rest{};
+    std::copy(height + whole, height + n, rest.begin());
+    lower_lanes(
+        rest.data(), kLanes, [&](std::size_t) { return left; }, bottom, deep, whole, losses);
+    std::copy_n(rest.begin(), n - whole, height + whole);
+    return true;
 }
 
 // The same of any number of cells.
@@ -96,22 +125,32 @@ public:
             return;
         }
         Slab& slab = stock_.slabs_.back();
-        const Losses losses = lower_row(slab.height.data() + first, n, h, slab.bottom, deep_);
-        double most = 0, deepest = 0;
-        for (std::size_t k = 0; k < kLanes; ++k) {
-            effect_.removed += losses.removed[k];
-            effect_.highest = std::max(effect_.highest, losses.highest[k]);
-            effect_.lowest = std::min(effect_.lowest, losses.lowest[k]);
-            effect_.deep_cells += static_cast<std::uint64_t>(losses.deep[k]);
-            // Of cells that lost as much the first.
-            if (losses.most[k] > most || (losses.most[k] == most && losses.deepest[k] < deepest)) most = losses.most[k], deepest = losses.deepest[k];
+        if (n > kLanes) {
+            take(first, lower_row(slab.height.data() + first, n, h, slab.bottom, deep_));
+            return;
         }
-        if (most > effect_.deepest) effect_.deepest = most, deepest_cell_ = first + static_cast<std::size_t>(deepest);
+        for (int i = 0; i < n; ++i) {
+            const double over = h[i] - slab.bottom;
+            lower(slab, first + static_cast<std::size_t>(i), static_cast<float>(over > 0 ? over : 0.0));
+        }
     }
     void level(std::size_t first, int n, double z) {
-        std::array<double, kSweptTogether> h;
-        h.fill(z);
-        for (int i = 0; i < n; i += kSweptTogether) row(first + static_cast<std::size_t>(i), std::min(kSweptTogether, n - i), h.data(), z);
+        if (!within_top(z)) {
+            for (int i = 0; i < n; ++i) (*this)(first + static_cast<std::size_t>(i), z);
+            return;
+        }
+        Slab& slab = stock_.slabs_.back();
+        const double over = z - slab.bottom;
+        const auto left = static_cast<float>(over > 0 ? over : 0.0);
+        if (n > kLanes) {
+            for (int i = 0; i < n; i += kSweptTogether) {
+                Losses losses;
+                if (lower_level(slab.height.data() + first + i, std::min(kSweptTogether, n - i), left, slab.bottom, deep_, losses))
+                    take(first + static_cast<std::size_t>(i), losses);
+            }
+            return;
+        }
+        for (int i = 0; i < n; ++i) lower(slab, first + static_cast<std::size_t>(i), left);
     }
     [[nodiscard]] CutEffect effect() const {
         CutEffect effect = effect_;
@@ -127,6 +166,31 @@ public:
     }
 
 private:
+    // The same for one cell of the topmost slab alone, to a height over its bottom.
+    void lower(Slab& slab, std::size_t cell, float left) {
+        float& height = slab.height[cell];
+        if (!(left < height)) return;
+        const double before = slab.bottom + static_cast<double>(height), after = slab.bottom + static_cast<double>(left), lost = before - after;
+        effect_.removed += lost;
+        effect_.highest = std::max(effect_.highest, before);
+        effect_.lowest = std::min(effect_.lowest, after);
+        effect_.deep_cells += lost > deep_;
+        if (lost > effect_.deepest) effect_.deepest = lost, deepest_cell_ = cell;
+        height = left;
+    }
+    // Adds what cells from the first one on lost.
+    void take(std::size_t first, const Losses& losses) {
+        double most = 0, deepest = 0;
+        for (std::size_t k = 0; k < kLanes; ++k) {
+            effect_.removed += losses.removed[k];
+            effect_.highest = std::max(effect_.highest, losses.highest[k]);
+            effect_.lowest = std::min(effect_.lowest, losses.lowest[k]);
+            effect_.deep_cells += static_cast<std::uint64_t>(losses.deep[k]);
+            // Of cells that lost as much the first.
+            if (losses.most[k] > most || (losses.most[k] == most && losses.deepest[k] < deepest)) most = losses.most[k], deepest = losses.deepest[k];
+        }
+        if (most > effect_.deepest) effect_.deepest = most, deepest_cell_ = first + static_cast<std::size_t>(deepest);
+    }
     // Whether all that is taken is the topmost slab's.
     [[nodiscard]] bool within_top(double lowest) const { return !stock_.slabs_.empty() && lowest >= std::max(0.0, stock_.slabs_.back().bottom); }
 
