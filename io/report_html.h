@@ -2,6 +2,7 @@
 // programs, sequence.json, verify.json where there is one) and the STL that plan.json names.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -15,6 +16,14 @@ struct ReportOptions {
     bool three_d = true;        ///< false: no model, no paths, no stock
     double size_limit_mb = 10;  ///< 1 MB is 10⁶ bytes; the model gets fewer facets and the paths fewer points until the page is no larger
 };
+
+/// Microseconds of processor time that a report takes on the machine of bench/RESULTS.md, foretold to divide progress by.
+struct ReportWork {
+    double replay = 0;  ///< of the programs
+    double page = 0;    ///< the model, what tools reach of it, and the paths
+};
+/// @param steps of all programs. @param facets of the pattern
+[[nodiscard]] ReportWork report_work(std::uint64_t steps, std::uint64_t facets);
 
 /// Whether this library can write reports.
 [[nodiscard]] bool reports_are_built();

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -12,6 +13,7 @@
 #include <new>
 
 #include "engine/planner.h"
+#include "engine/simulate/work.h"
 #include "engine/tools/access_map.h"
 #include "engine/tools/tools.h"
 #include "io/access_ply.h"
@@ -123,7 +125,7 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out) {
     std::vector<PlannedProgram> programs;
     for (const Layer& layer : plan.layers)
         for (const Operation& operation : layer.operations) programs.push_back({&layer, &operation});
-    context.begin_phase("writing", 0.98, 1.0, programs.size() + 1);
+    context.begin_phase("writing", 0.985, 1.0, programs.size() + 1);
     std::filesystem::create_directory(out.path("nc"));
     const auto write_whole = [&](const char* name, const std::string& text) {
         OutputFile file(out.path(name));
@@ -161,6 +163,25 @@ VerifyResult verdict(const Verification& found) {
     return result;
 }
 
+// Where the progress stands when a plan has been verified and only its report is left.
+double verifying_share(const Plan& plan, double cell_mm) {
+    SimulationSize size;
+    for (const Layer& layer : plan.layers)
+        for (const Operation& op : layer.operations) {
+            const auto tool = std::find_if(plan.job.tools.begin(), plan.job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+            size.steps += op.moves.size();
+            if (tool != plan.job.tools.end()) size.swept_mm2 += op.cutting_mm * tool->diameter;
+        }
+    size.stock_mm2 = (plan.stock_max[0] - plan.stock_min[0]) * (plan.stock_max[1] - plan.stock_min[1]);
+    size.cell_mm = cell_mm > 0 ? cell_mm : simulation_cell(plan.job.tools, plan.job.tolerances.cusp);
+    size.layers = plan.layers.size();
+    size.facets = plan.input.triangles;
+    const SimulationWork simulating = simulation_work(size);
+    const ReportWork reporting = report_work(size.steps, size.facets);
+    const double verifying = simulating.checking + simulating.cutting;
+    return kPlanningShare + (1 - kPlanningShare) * verifying / (verifying + reporting.replay + reporting.page);
+}
+
 void check_cell(double cell_mm) {
     if (cell_mm != 0 && !(cell_mm >= 0.01 && cell_mm <= 10))
         throw Error(ErrorKind::usage, "verify.cell", fmt::format("a stock cannot be simulated with points every {} mm", cell_mm), "--cell",
@@ -188,10 +209,11 @@ VerifyResult write_verified(Context& context, const Plan& plan, const std::strin
         options.stl = stl_path;
         options.cell = cell_mm;
         const bool reports = reports_are_built();
-        context.share_progress(kPlanningShare, reports ? kVerifyingShare : 1);
+        const double verified = reports ? verifying_share(plan, cell_mm) : 1;
+        context.share_progress(kPlanningShare, verified);
         Verification found = verify_folder(context, out.path("").string(), options);
         VerifyResult result = verdict(found);
-        context.share_progress(kVerifyingShare, 1);
+        context.share_progress(verified, 1);
         if (reports) write_report(context, out.path("").string(), {stl_path}, std::move(found));
         context.throw_if_cancelled();
         out.commit();

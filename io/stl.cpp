@@ -549,7 +549,7 @@ Mesh read_mesh(Context& context, const std::string& path, LengthUnit units) {
 }
 
 StlMesh read_stl(Context& context, const std::string& path, const StlOptions& options) {
-    context.begin_phase("read STL", 0.0, 0.02, 4);
+    context.begin_phase("read STL", 0.0, 0.01, 4);
     const MappedFile file(path);
     const double mm_per_unit = options.units == LengthUnit::inch ? kInch : 1.0;
     StlMesh stl;

@@ -141,8 +141,13 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     // What stands once the slab has been faced; every operation after that cuts its moves into it.
     Standing standing(layer.stock_min, layer.stock_max, std::min(cut.stock_top, layer.z_top));
     cut.standing = &standing;
+    // Level contours take their time by the facets that a cutter meets, all else by moves and areas: `share` of that is done.
+    const double facets_mm2 = static_cast<double>(cut.solid.facets.size()) /
+                              std::max(1.0, (layer.stock_max[0] - layer.stock_min[0]) * (layer.stock_max[1] - layer.stock_min[1]));
+    const double levels_against_rest = 0.25 + 0.6 * facets_mm2, levels_share = levels_against_rest / (1 + levels_against_rest);
+    bool levels_done = false;
     const auto reached = [&](double share) {
-        if (layer.progress) layer.progress->reach(kPathsShare * share);
+        if (layer.progress) layer.progress->reach(kPathsShare * ((1 - levels_share) * share + (levels_done ? levels_share : 0)));
     };
 
     LayerResult result;
@@ -170,19 +175,20 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     take(face_layer(cut));
     reached(0.01);
     take(rough_layer(cut));
-    reached(0.16);
+    reached(0.21);
     take(finish_floors(cut));
     take(finish_walls(cut));
-    reached(0.18);
+    reached(0.24);
     auto finish = [&](auto&& done) {
         Operation levels = finish_levels(cut, result.diagnostics);
-        reached(0.65);
+        levels_done = true;
+        reached(0.56);
         done(levels);
         take(std::move(levels));
         if (hopeless()) return;
         Operation projected =
             cut.job.cutting.projection == Projection::offset ? finish_offsets(cut, result.diagnostics) : finish_raster(cut, result.diagnostics);
-        reached(0.86);
+        reached(0.75);
         done(projected);
         take(std::move(projected));
     };
@@ -223,7 +229,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         RestPass between{OperationKind::semi_rough, "waste between walls", kWaste, true};
         if (contours) between.swath = finish_r;
         take(cut_rest(cut, stock, tools.finish, between));
-        reached(0.34);
+        reached(0.56);
         if (hopeless()) return result;
         finish([&](Operation& op) {
             if (stock.cut(cut, op, tools.finish).few()) op.moves.clear();
@@ -234,7 +240,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         const bool smaller = std::any_of(tools.rest.begin(), tools.rest.end(), [](const Tool& t) { return t.kind == ToolKind::flat; });
         if (!smaller) take(cut_rest(cut, stock, tools.rough, {OperationKind::corner, "corners", limit, false}));
         take(cut_rest(cut, stock, tools.finish, {OperationKind::finish, "what is left", limit, false}));
-        reached(0.97);
+        reached(0.94);
         for (const Tool& tool : tools.rest) {
             const double left = stock.area_over(context, limit);
             if (!last_of_kind(tool) && left < kCornersWorthAChange) continue;
@@ -260,7 +266,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
                                       fmt::format("layer {}: {} cut{} left to a tool that plunges: no room for a helix or a ramp", layer.index,
                                                   cut.no_way_in.size(), cut.no_way_in.size() == 1 ? "" : "s"),
                                       cut.no_way_in.front()});
-    reached(0.98);
+    reached(0.95);
     report_loose(cut, result);
     // Last, so that everything before has straight moves only to think of.
     for (Operation& op : result.operations) {

@@ -10,7 +10,7 @@
 namespace slabwright {
 
 /// Of a layer's time, its paths; the forces that follow take the rest.
-inline constexpr double kPathsShare = 0.92;
+inline constexpr double kPathsShare = 0.78;
 
 /// An up-facing flat of at least cutting.min_flat_area. Its facets may differ in their last bits.
 struct Flat {

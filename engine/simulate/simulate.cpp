@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "engine/simulate/reach.h"
+#include "engine/simulate/work.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/stock/stock.h"
@@ -127,7 +128,12 @@ public:
         place_flasks();
         check_stack(report);
         prepare(report);
-        context_.begin_phase("checking moves", 0.02, 0.35, input_.programs.size());
+        constexpr double kReading = 0.02;  // of the whole verification: plan.json and the programs, before this
+        const SimulationWork work = simulation_work(size());
+        checked_ = kReading + (1 - kReading) * work.checking / (work.checking + work.cutting);
+        std::uint64_t steps = 0;
+        for (const Program& program : input_.programs) steps += program.steps.size();
+        context_.begin_phase("checking moves", kReading, checked_, steps);
         check_motions(report);
         cut(report);
         judge(report);
@@ -197,6 +203,25 @@ private:
         }
     }
 
+    /// Once the cells are known.
+    SimulationSize size() const {
+        SimulationSize size;
+        for (const PreparedProgram& p : prepared_) {
+            const auto& steps = p.program->steps;
+            size.steps += steps.size();
+            double cut = 0;
+            for (std::size_t k = 1; k < steps.size(); ++k)
+                if (!steps[k].rapid() && steps[k].known() && steps[k - 1].known())
+                    cut += std::hypot(steps[k].x - steps[k - 1].x, steps[k].y - steps[k - 1].y);
+            if (p.tool) size.swept_mm2 += cut * p.tool->diameter;
+        }
+        size.stock_mm2 = static_cast<double>(nx_) * ny_ * cell_ * cell_;
+        size.cell_mm = cell_;
+        size.layers = input_.layers.size();
+        size.facets = input_.mesh.facets.size();
+        return size;
+    }
+
     const Tool* tool(int number) const {
         for (const Tool& t : input_.tools)
             if (t.number == number) return &t;
@@ -245,7 +270,7 @@ private:
         std::vector<StepBox> boxes(input_.programs.size());
         parallel_each(context_, input_.programs.size(), [&](std::size_t i) {
             boxes[i] = check_program(i, walls[static_cast<std::size_t>(input_.programs[i].layer)], report.programs[i]);
-            context_.advance();
+            context_.advance(input_.programs[i].steps.size());
         });
         for (std::size_t i = 0; i < input_.programs.size(); ++i) {
             const Program& program = input_.programs[i];
@@ -312,7 +337,7 @@ private:
                 l.kinds.assign(l.map.size(), CellKind::beside);
             }
         std::vector<TileResult> results(tiles);
-        context_.begin_phase("cutting stock", 0.35, 1.0, tiles);
+        context_.begin_phase("cutting stock", checked_, 1.0, tiles);
         parallel_each(context_, tiles, [&](std::size_t t) {
             const int i0 = static_cast<int>(t % static_cast<std::size_t>(tx)) * kTileCells,
                       j0 = static_cast<int>(t / static_cast<std::size_t>(tx)) * kTileCells;
@@ -691,6 +716,7 @@ private:
     SimulationOptions options_;
     const StandingPart& part_;
     double cell_ = 1;
+    double checked_ = 0;  // of the progress, when all moves have been checked
     int nx_ = 0, ny_ = 0;
     std::vector<PreparedProgram> prepared_;
     std::vector<double> taken_;  // mm, the most that any cell lost, by program
