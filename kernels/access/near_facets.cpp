@@ -94,38 +94,50 @@ SLABWRIGHT_WIDE static void near_rows(const Rows& r, const Way& w, int n, unsign
 }
 
 // The same with a plane across the line from the way to the nearest point of the facet's edges, which parts the two wherever anything but the facet's
-// own plane does, up to what the way's nearest place to the facet and to its middle are apart. Where that point is above the way, what counts of the
-// way is above it too, and the line is level.
+// own plane does. Of the way the place nearest to the facet's middle is taken, and then the one nearest to what was the nearest point for that. Where
+// such a point is higher, what counts is what is above the way at its height, and the line is level.
 SLABWRIGHT_WIDE static void chosen_near(const Corners& r, const float* wrong, const Way& w, int n, unsigned char* __restrict keep) {
     for (int i = 0; i < n; ++i) {
         const float x0 = r.x0[i] - w.ax, y0 = r.y0[i] - w.ay, z0 = (r.z0[i] - w.az) * w.upwards;
         const float x1 = r.x1[i] - w.ax, y1 = r.y1[i] - w.ay, z1 = (r.z1[i] - w.az) * w.upwards;
         const float x2 = r.x2[i] - w.ax, y2 = r.y2[i] - w.ay, z2 = (r.z2[i] - w.az) * w.upwards;
-        const float mx = (x0 + x1 + x2) * third, my = (y0 + y1 + y2) * third, mz = (z0 + z1 + z2) * third;
-        float t = (mx * w.dx + my * w.dy) * w.per_length2;
+        const float ax = x1 - x0, ay = y1 - y0, az = z1 - z0, bx = x2 - x1, by = y2 - y1, bz = z2 - z1, cx = x0 - x2, cy = y0 - y2, cz = z0 - z2;
+        const float per_a = 1 / (ax * ax + ay * ay + az * az + tiny), per_b = 1 / (bx * bx + by * by + bz * bz + tiny),
+                    per_c = 1 / (cx * cx + cy * cy + cz * cz + tiny);
+        float lowest = z0 < z1 ? z0 : z1;
+        lowest = lowest < z2 ? lowest : z2;
+        float t = ((x0 + x1 + x2) * w.dx + (y0 + y1 + y2) * w.dy) * (third * w.per_length2);
         t = t < 0.0F ? 0.0F : t;
         t = t > w.end ? w.end : t;
-        const float px = t * w.dx, py = t * w.dy, low = t * w.dz * w.upwards, pz = low > mz ? low : mz;
-        const float ax = x1 - x0, ay = y1 - y0, az = z1 - z0, bx = x2 - x1, by = y2 - y1, bz = z2 - z1, cx = x0 - x2, cy = y0 - y2, cz = z0 - z2;
-        // From each corner to the place, along the edge that begins there, and what is left of it across the edge.
+        float px = t * w.dx, py = t * w.dy, low = t * w.dz * w.upwards, pz = low > lowest ? low : lowest;
+        // From each corner to the place, how far along the edge that begins there its nearest point lies, and the square of what is left across.
         const float fx = px - x0, fy = py - y0, fz = pz - z0, gx = px - x1, gy = py - y1, gz = pz - z1, hx = px - x2, hy = py - y2, hz = pz - z2;
-        float s0 = (fx * ax + fy * ay + fz * az) / (ax * ax + ay * ay + az * az + tiny);
-        float s1 = (gx * bx + gy * by + gz * bz) / (bx * bx + by * by + bz * bz + tiny);
-        float s2 = (hx * cx + hy * cy + hz * cz) / (cx * cx + cy * cy + cz * cz + tiny);
+        float s0 = (fx * ax + fy * ay + fz * az) * per_a, s1 = (gx * bx + gy * by + gz * bz) * per_b, s2 = (hx * cx + hy * cy + hz * cz) * per_c;
         s0 = s0 < 0.0F ? 0.0F : s0, s1 = s1 < 0.0F ? 0.0F : s1, s2 = s2 < 0.0F ? 0.0F : s2;
         s0 = s0 > 1.0F ? 1.0F : s0, s1 = s1 > 1.0F ? 1.0F : s1, s2 = s2 > 1.0F ? 1.0F : s2;
         const float ux0 = fx - s0 * ax, uy0 = fy - s0 * ay, uz0 = fz - s0 * az, e0 = ux0 * ux0 + uy0 * uy0 + uz0 * uz0;
         const float ux1 = gx - s1 * bx, uy1 = gy - s1 * by, uz1 = gz - s1 * bz, e1 = ux1 * ux1 + uy1 * uy1 + uz1 * uz1;
         const float ux2 = hx - s2 * cx, uy2 = hy - s2 * cy, uz2 = hz - s2 * cz, e2 = ux2 * ux2 + uy2 * uy2 + uz2 * uz2;
-        float ux = e1 < e0 ? ux1 : ux0, uy = e1 < e0 ? uy1 : uy0, uz = e1 < e0 ? uz1 : uz0;
-        const float e = e1 < e0 ? e1 : e0;
-        ux = e2 < e ? ux2 : ux, uy = e2 < e ? uy2 : uy, uz = e2 < e ? uz2 : uz;
-        uz = pz > low ? 0.0F : (uz + std::abs(uz)) / 2;
+        // The nearest edge: its begin, its direction and how far along it the nearest point lies.
+        const float e01 = e1 < e0 ? e1 : e0;
+        float kx = e1 < e0 ? x1 : x0, ky = e1 < e0 ? y1 : y0, kz = e1 < e0 ? z1 : z0, lx = e1 < e0 ? bx : ax, ly = e1 < e0 ? by : ay,
+              lz = e1 < e0 ? bz : az, per = e1 < e0 ? per_b : per_a, s = e1 < e0 ? s1 : s0;
+        kx = e2 < e01 ? x2 : kx, ky = e2 < e01 ? y2 : ky, kz = e2 < e01 ? z2 : kz, lx = e2 < e01 ? cx : lx, ly = e2 < e01 ? cy : ly;
+        lz = e2 < e01 ? cz : lz, per = e2 < e01 ? per_c : per, s = e2 < e01 ? s2 : s;
+        const float qx = kx + s * lx, qy = ky + s * ly, qz = kz + s * lz;
+        t = (qx * w.dx + qy * w.dy) * w.per_length2;
+        t = t < 0.0F ? 0.0F : t;
+        t = t > w.end ? w.end : t;
+        px = t * w.dx, py = t * w.dy, low = t * w.dz * w.upwards, pz = low > qz ? low : qz;
+        s = ((px - kx) * lx + (py - ky) * ly + (pz - kz) * lz) * per;
+        s = s < 0.0F ? 0.0F : s;
+        s = s > 1.0F ? 1.0F : s;
+        const float ux = px - kx - s * lx, uy = py - ky - s * ly, away = pz - kz - s * lz, uz = pz > low ? 0.0F : (away + std::abs(away)) / 2;
         const float d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1, d2 = ux * x2 + uy * y2 + uz * z2;
         float most = d0 > d1 ? d0 : d1;
         most = most > d2 ? most : d2;
-        const float forward = ux * w.dx + uy * w.dy + uz * w.dz, first = -most, last = forward - most, reach = w.reach + w.slack + wrong[i];
-        const float gap = first < last ? first : last;
+        const float forward = ux * w.dx + uy * w.dy + uz * w.dz, begins = -most, ends = forward - most, reach = w.reach + w.slack + wrong[i];
+        const float gap = begins < ends ? begins : ends;
         keep[i] = static_cast<unsigned char>((gap <= 0.0F) | (gap * gap < reach * reach * (ux * ux + uy * uy + uz * uz)));
     }
 }
