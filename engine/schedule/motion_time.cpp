@@ -2,47 +2,61 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
+#include <utility>
 
 namespace slabwright {
 
-double travel_seconds(std::span<const MotionLeg> legs, double acceleration, double junction_mm) {
-    const double a = acceleration;
-    std::vector<double> entry(legs.size() + 1, 0);  // highest speed at a leg's start
-    const MotionLeg* before = nullptr;
-    for (std::size_t i = 0; i < legs.size(); ++i) {
-        const MotionLeg& leg = legs[i];
-        if (leg.length <= 0) continue;
-        if (before) {
-            const auto &u = before->leaving, &v = leg.direction;
-            const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0), half = std::sqrt((1 + cosine) / 2);
-            const double corner = half >= 1 - 1e-12 ? 1e9 : std::sqrt(a * junction_mm * half / (1 - half));
-            entry[i] = std::min({corner, before->speed, leg.speed});
-        }
-        before = &leg;
+void Travel::add(const MotionLeg& leg) {
+    if (leg.length <= 0) return;
+    double entry = 0;
+    if (begun_) {
+        const auto &u = leaving_, &v = leg.direction;
+        const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0), half = std::sqrt((1 + cosine) / 2);
+        const double corner = half >= 1 - 1e-12 ? 1e9 : std::sqrt(acceleration_ * junction_mm_ * half / (1 - half));
+        entry = std::min({corner, speed_, leg.speed});
     }
-    // Backwards: nobody may enter a leg faster than he can leave it. Forwards: nor faster than he can have become.
-    double next = 0;
-    for (std::size_t i = legs.size(); i-- > 0;) {
-        if (legs[i].length > 0) next = std::min(entry[i], std::sqrt(next * next + 2 * a * legs[i].length));
-        entry[i] = next;
+    begun_ = true, speed_ = leg.speed, leaving_ = leg.leaving;
+    // A leg on which one can stop from the highest speed of its start is entered at that speed, whatever follows.
+    if (legs_.size() >= kTogether && entry <= std::sqrt(2 * acceleration_ * leg.length)) settle(entry);
+    legs_.push_back({leg.length, leg.speed, entry});
+}
+
+double Travel::seconds() {
+    settle(0);
+    begun_ = false;
+    speed_now_ = 0;
+    return std::exchange(seconds_, 0.0);
+}
+
+// Backwards: nobody may enter a leg faster than he can leave it. Forwards: nor faster than he can have become.
+void Travel::settle(double next) {
+    const double a = acceleration_, last = next;
+    for (std::size_t i = legs_.size(); i-- > 0;) {
+        next = std::min(legs_[i].entry, std::sqrt(next * next + 2 * a * legs_[i].length));
+        legs_[i].entry = next;
     }
-    double seconds = 0, v = 0;
-    for (std::size_t i = 0; i < legs.size(); ++i) {
-        const double length = legs[i].length;
-        if (length <= 0) continue;
-        const double out = std::min(entry[i + 1], std::sqrt(v * v + 2 * a * length));
-        const double peak = std::min(legs[i].speed, std::sqrt((2 * a * length + v * v + out * out) / 2));
+    double v = speed_now_;
+    for (std::size_t i = 0; i < legs_.size(); ++i) {
+        const double length = legs_[i].length, left_at = i + 1 < legs_.size() ? legs_[i + 1].entry : last;
+        const double out = std::min(left_at, std::sqrt(v * v + 2 * a * length));
+        const double peak = std::min(legs_[i].speed, std::sqrt((2 * a * length + v * v + out * out) / 2));
         const double ramps = (2 * peak * peak - v * v - out * out) / (2 * a);
-        seconds += (2 * peak - v - out) / a + std::max(0.0, length - ramps) / std::max(peak, 1e-9);
+        seconds_ += (2 * peak - v - out) / a + std::max(0.0, length - ramps) / std::max(peak, 1e-9);
         v = out;
     }
-    return seconds;
+    speed_now_ = v;
+    legs_.clear();
+}
+
+double travel_seconds(std::span<const MotionLeg> legs, double acceleration, double junction_mm) {
+    Travel travel(acceleration, junction_mm);
+    for (const MotionLeg& leg : legs) travel.add(leg);
+    return travel.seconds();
 }
 
 MotionTime motion_time(std::span<const Move> moves, const Machine& machine) {
     MotionTime total;
-    std::vector<MotionLeg> legs;
+    Travel travel(machine.acceleration);
     for (std::size_t i = 1; i < moves.size(); ++i) {
         const Move &a = moves[i - 1], &b = moves[i];
         const std::array<double, 3> d{to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y), to_mm(std::int64_t{b.z} - a.z)};
@@ -54,17 +68,17 @@ MotionTime motion_time(std::span<const Move> moves, const Machine& machine) {
             const double side = arc.sweep > 0 ? 1 : -1, end = arc.start + arc.sweep;
             const double speed = std::min(std::min<double>(b.feed, machine.max_feed) / 60, std::sqrt(machine.acceleration * arc.radius));
             total.cutting_mm += arc.length();
-            legs.push_back({arc.length(),
-                            speed,
-                            {-side * std::sin(arc.start), side * std::cos(arc.start), 0},
-                            {-side * std::sin(end), side * std::cos(end), 0}});
+            travel.add({arc.length(),
+                        speed,
+                        {-side * std::sin(arc.start), side * std::cos(arc.start), 0},
+                        {-side * std::sin(end), side * std::cos(end), 0}});
             continue;
         }
         (rapid ? total.rapid_mm : total.cutting_mm) += length;
-        legs.push_back(
+        travel.add(
             {length, (rapid ? machine.rapid_feed : std::min<double>(b.feed, machine.max_feed)) / 60, {d[0] / length, d[1] / length, d[2] / length}});
     }
-    total.minutes = travel_seconds(legs, machine.acceleration) / 60;
+    total.minutes = travel.seconds() / 60;
     return total;
 }
 

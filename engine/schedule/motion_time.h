@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
+#include <vector>
 
 #include "engine/plan.h"
 
@@ -17,6 +19,29 @@ struct MotionLeg {
 
 /// How near a path may pass by its corners, mm.
 inline constexpr double kJunction = 0.02;
+
+/// The time of legs that are told one after the other, without keeping them all: see travel_seconds.
+class Travel {
+public:
+    explicit Travel(double acceleration, double junction_mm = kJunction) : acceleration_(acceleration), junction_mm_(junction_mm) {}
+    void add(const MotionLeg& leg);
+    /// Of all so far, s, at rest after the last; without legs then.
+    [[nodiscard]] double seconds();
+
+private:
+    static constexpr std::size_t kTogether = 1024;
+    struct Leg {
+        double length, speed;
+        double entry;  ///< highest speed at its start
+    };
+    void settle(double next);
+    double acceleration_, junction_mm_;
+    std::vector<Leg> legs_;  ///< whose speeds depend on what follows, or that few
+    bool begun_ = false;
+    double speed_ = 0;  ///< highest on the last leg
+    std::array<double, 3> leaving_{};
+    double speed_now_ = 0, seconds_ = 0;  ///< where legs_ begins
+};
 
 /// Every leg is a trapezoid of speed under one acceleration (mm/s²); where two legs meet, the speed is limited to what an
 /// arc that passes the corner by `junction_mm` bears: v² = a·δ·c / (1 − c), c = cos(θ/2), θ the change of direction. Starts and
