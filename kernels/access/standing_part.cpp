@@ -593,7 +593,7 @@ Penetration StandingPart::depth_of(Form form, double z_top, const Point3& from, 
 /// What of the part motions within a box may meet: facets that can be deeper than `at_least` in the cutter, and those above the layer's top that
 /// cover one of its places.
 struct StandingPart::Vicinity {
-    static constexpr double kSide = 3.5;  // mm that a box is made long, unless one piece is longer
+    static constexpr double kSide = 5;  // mm that a box is made long, unless one piece is longer
 
     Cutter cutter{};
     double at_least = 0;
