@@ -1,13 +1,17 @@
 // How true the time left is that a progress bar shows while a pattern is planned, written and verified: after the first tenth of the
 // progress and of the time, the time that was foretold over the time that it took in the end.
-//     build/release/time_left_bench --benchmark_counters_tabular=true
+//     SLABWRIGHT_CORPUS=../shared/corpus build/release/time_left_bench --benchmark_counters_tabular=true
+// Generated patterns, the pump cover, and where SLABWRIGHT_CORPUS is set two of its castings.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <string>
+#include <system_error>
 #include <vector>
 
 #include "io/slabwright.h"
@@ -26,14 +30,20 @@ std::string written(const MetrePattern& pattern, const fs::path& folder) {
     return file;
 }
 
-void time_left(benchmark::State& state) {
-    MetrePattern pattern;
-    pattern.size_mm = static_cast<double>(state.range(0));
-    pattern.height_mm = 0.25 * pattern.size_mm;
-    pattern.facets = static_cast<std::uint64_t>(state.range(1));
-    const fs::path folder = fs::temp_directory_path() / ("slabwright_time_left_" + std::to_string(::getpid()));
-    fs::create_directories(folder);
-    const std::string stl = written(pattern, folder);
+/// A folder that goes with all it holds.
+struct Scratch {
+    fs::path path = fs::temp_directory_path() / ("slabwright_time_left_" + std::to_string(::getpid()));
+    Scratch() { fs::create_directories(path); }
+    ~Scratch() {
+        std::error_code ignored;
+        fs::remove_all(path, ignored);
+    }
+    Scratch(const Scratch&) = delete;
+    Scratch& operator=(const Scratch&) = delete;
+};
+
+/// @param cell_mm between the points of the stock; 0: as fine as the cutters ask for
+void measure(benchmark::State& state, const std::string& stl, const Scratch& scratch, double cell_mm, int threads) {
     double least = 1e300, most = 0, last = 0, left_when_wrong = 0;
     bool falls = false;
     for (auto _ : state) {
@@ -44,14 +54,12 @@ void time_left(benchmark::State& state) {
             double at, fraction;
         };
         std::vector<Shown> shown;
-        Context context({.threads = static_cast<int>(state.range(2)), .progress = [&](const Progress& p) {
-                             shown.push_back({elapsed(), p.fraction});
-                         }});
+        Context context({.threads = threads, .progress = [&](const Progress& p) { shown.push_back({elapsed(), p.fraction}); }});
         context.share_progress(0, kPlanningShare);
         Job job;
         job.allow_undercut = true;
         const Plan planned = plan(context, stl, job);
-        const VerifyResult result = write_verified(context, planned, (folder / "out").string(), stl, 0.5);
+        const VerifyResult result = write_verified(context, planned, (scratch.path / "out").string(), stl, cell_mm);
         if (!result.passed) state.SkipWithError("the plan does not make the part");
         const double total = elapsed();
         for (const Shown& s : shown) {
@@ -65,11 +73,19 @@ void time_left(benchmark::State& state) {
         }
         if (falls) state.SkipWithError("progress falls");
     }
-    fs::remove_all(folder);
     state.counters["least"] = least;
     state.counters["most"] = most;
     // The share of all time that was left when the time foretold was first wrong by more than a factor of two.
     state.counters["left_when_wrong"] = left_when_wrong;
+}
+
+void time_left(benchmark::State& state) {
+    MetrePattern pattern;
+    pattern.size_mm = static_cast<double>(state.range(0));
+    pattern.height_mm = 0.25 * pattern.size_mm;
+    pattern.facets = static_cast<std::uint64_t>(state.range(1));
+    const Scratch scratch;
+    measure(state, written(pattern, scratch.path), scratch, 0.5, static_cast<int>(state.range(2)));
 }
 BENCHMARK(time_left)
     ->ArgNames({"size_mm", "facets", "threads"})
@@ -81,7 +97,29 @@ BENCHMARK(time_left)
     ->UseRealTime()
     ->Unit(benchmark::kSecond);
 
+void time_left_of_part(benchmark::State& state, const std::string& stl) {
+    const Scratch scratch;
+    measure(state, stl, scratch, 0, 2);
+}
+
+void add_parts() {
+    std::vector<std::string> parts{"tests/data/pump-cover.stl"};
+    if (const char* const corpus = std::getenv("SLABWRIGHT_CORPUS"); corpus != nullptr)
+        for (const char* const part : {"bearing_block", "casting_cover"}) parts.push_back((fs::path(corpus) / "castings" / part).string() + ".stl");
+    for (const std::string& part : parts)
+        benchmark::RegisterBenchmark(("time_left_of_part/" + fs::path(part).stem().string()).c_str(), time_left_of_part, part)
+            ->Iterations(1)
+            ->UseRealTime()
+            ->Unit(benchmark::kSecond);
+}
+
 }  // namespace
 }  // namespace slabwright
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+    slabwright::add_parts();
+    benchmark::Initialize(&argc, argv);
+    if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+    benchmark::RunSpecifiedBenchmarks();
+    return 0;
+}
