@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -42,41 +43,63 @@ struct Scratch {
     Scratch& operator=(const Scratch&) = delete;
 };
 
+double processor_seconds() {
+    timespec time{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// The time left that was foretold over the time that it took. By the clock it is what a user sees; by the processor time of all threads it
+/// does not depend on what else the machine does.
+struct Foretold {
+    double least = 1e300, most = 0;
+    double left_when_wrong = 0;  ///< the share of all time that was left when it was first wrong by more than a factor of two
+
+    void add(double at, double total, double fraction) {
+        // Neither at the very end, where both are nothing.
+        if (fraction < 0.1 || at < 0.1 * total || total - at < 0.02 * total) return;
+        const double foretold = at * (1 - fraction) / fraction, was = total - at;
+        least = std::min(least, foretold / was), most = std::max(most, foretold / was);
+        if (foretold < was / 2 || foretold > 2 * was) left_when_wrong = std::max(left_when_wrong, was / total);
+    }
+};
+
 /// @param cell_mm between the points of the stock; 0: as fine as the cutters ask for
 void measure(benchmark::State& state, const std::string& stl, const Scratch& scratch, double cell_mm, int threads) {
-    double least = 1e300, most = 0, last = 0, left_when_wrong = 0;
+    Foretold clock, processor;
     bool falls = false;
     for (auto _ : state) {
-        using Clock = std::chrono::steady_clock;
-        const Clock::time_point begin = Clock::now();
-        const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+        const auto begin = std::chrono::steady_clock::now();
+        const double begin_s = processor_seconds();
         struct Shown {
-            double at, fraction;
+            double clock_s, processor_s, fraction;
+        };
+        const auto now = [&](double fraction) {
+            return Shown{std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), processor_seconds() - begin_s, fraction};
         };
         std::vector<Shown> shown;
-        Context context({.threads = threads, .progress = [&](const Progress& p) { shown.push_back({elapsed(), p.fraction}); }});
+        Context context({.threads = threads, .progress = [&](const Progress& p) { shown.push_back(now(p.fraction)); }});
         context.share_progress(0, kPlanningShare);
         Job job;
         job.allow_undercut = true;
         const Plan planned = plan(context, stl, job);
         const VerifyResult result = write_verified(context, planned, (scratch.path / "out").string(), stl, cell_mm);
         if (!result.passed) state.SkipWithError("the plan does not make the part");
-        const double total = elapsed();
+        const Shown end = now(1);
+        double last = 0;
         for (const Shown& s : shown) {
             falls = falls || s.fraction < last;
             last = s.fraction;
-            // Neither at the very end, where both are nothing.
-            if (s.fraction < 0.1 || s.at < 0.1 * total || total - s.at < 0.02 * total) continue;
-            const double foretold = s.at * (1 - s.fraction) / s.fraction, was = total - s.at;
-            least = std::min(least, foretold / was), most = std::max(most, foretold / was);
-            if (foretold < was / 2 || foretold > 2 * was) left_when_wrong = std::max(left_when_wrong, was / total);
+            clock.add(s.clock_s, end.clock_s, s.fraction);
+            processor.add(s.processor_s, end.processor_s, s.fraction);
         }
         if (falls) state.SkipWithError("progress falls");
     }
-    state.counters["least"] = least;
-    state.counters["most"] = most;
-    // The share of all time that was left when the time foretold was first wrong by more than a factor of two.
-    state.counters["left_when_wrong"] = left_when_wrong;
+    state.counters["least"] = clock.least;
+    state.counters["most"] = clock.most;
+    state.counters["left_when_wrong"] = clock.left_when_wrong;
+    state.counters["processor_least"] = processor.least;
+    state.counters["processor_most"] = processor.most;
 }
 
 void time_left(benchmark::State& state) {
