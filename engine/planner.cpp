@@ -291,10 +291,9 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     cut_layers(context, plan, pattern, joints, share);
 
     context.begin_phase("schedule", share.at(0.99), share.at(1));
-    for (std::size_t i = 0; i < plan.layers.size(); ++i) {
-        context.throw_if_cancelled();
-        bond_layer(plan.layers[i], joints[i], plan, plan.diagnostics);
-    }
+    std::vector<std::vector<Diagnostic>> bonded(plan.layers.size());
+    parallel_each(context, plan.layers.size(), [&](std::size_t i) { bond_layer(plan.layers[i], joints[i], plan, bonded[i]); });
+    for (const std::vector<Diagnostic>& found : bonded) plan.diagnostics.insert(plan.diagnostics.end(), found.begin(), found.end());
     context.throw_if_cancelled();
     schedule(plan);
     check_mass(plan);
