@@ -262,6 +262,28 @@ TEST(Simulate, SpindleFlutesShankHolder) {
     EXPECT_NE(find(h, "contact.holder"), nullptr) << codes(h);
 }
 
+// Two levels of 5 mm whose rims lie `apart` mm from each other beside the wall at y = 0; the lower one's is just past the points at y = −0.25.
+SimulationReport two_levels(double apart) {
+    Block block;
+    block.options.cell = 0.5;
+    block.rough().planned_stepdown = 5;
+    for (ProgramStep& s : block.rough().steps)
+        if (s.y == -5) s.y = s.z == 5 ? -5.249 - apart : -5.249, s.x = s.x == -5 ? -9 : s.x == 25 ? 29 : s.x;
+    return block.run();
+}
+
+// A cutter's rim that meets the centres of a row, on one level and not on the one above, has cut a micrometre there and no whole row.
+TEST(Simulate, ARimOnARowOfPointsIsNoDeepCut) {
+    const SimulationReport r = two_levels(0.002);
+    EXPECT_EQ(find(r, "cut.too_deep"), nullptr) << codes(r);
+}
+
+TEST(Simulate, ARidgeThatWasLeftIsADeepCut) {
+    const SimulationReport r = two_levels(1.5);
+    ASSERT_NE(find(r, "cut.too_deep"), nullptr) << codes(r);
+    EXPECT_NEAR(find(r, "cut.too_deep")->size, 5, 1e-6);
+}
+
 TEST(Simulate, EmptyOperationTravelAndUnknownStart) {
     Block twice;
     twice.input.programs.insert(twice.input.programs.begin() + 1, twice.input.programs[0]);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -245,6 +246,7 @@ TEST(Stock, EffectsAreThoseOfTheCells) {
             const CutEffect effect = stock.cut(end, a, b, deep);
             double removed = 0, deepest = 0, highest = -1e300, lowest = 1e300;
             std::uint64_t deep_cells = 0;
+            std::map<std::size_t, std::uint64_t> deep_rows;
             for (std::size_t c = 0; c < grid.count(); ++c) {
                 double lost = 0;
                 for (const std::size_t slab : {0U, 1U}) {
@@ -257,10 +259,14 @@ TEST(Stock, EffectsAreThoseOfTheCells) {
                 removed += lost;
                 deepest = std::max(deepest, lost);
                 deep_cells += lost > deep;
+                if (lost > deep) ++deep_rows[c / static_cast<std::size_t>(grid.nx)];
             }
+            std::uint64_t longer = deep_rows.size();
+            for (const auto& [row, cells] : deep_rows) longer = std::max(longer, cells);
             EXPECT_NEAR(effect.removed, removed, 1e-9 * (1 + removed)) << "seed " << seed;
             EXPECT_EQ(effect.deepest, deepest);
             EXPECT_EQ(effect.deep_cells, deep_cells);
+            EXPECT_EQ(effect.deep_across, deep_cells == 0 ? 0 : static_cast<double>(deep_cells) / static_cast<double>(longer));
             EXPECT_EQ(effect.highest, highest);
             if (std::min(a[2], b[2]) >= 0) {
                 EXPECT_EQ(effect.lowest, lowest);

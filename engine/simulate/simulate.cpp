@@ -21,6 +21,7 @@ constexpr int kTileCells = 128;           // a side; a tile of 20 layers is 1.4 
 constexpr std::size_t kBlockSteps = 128;  // of a program under one box
 constexpr double kTaken = 0.002;          // mm: less is rounding of the text and of the stock's float
 constexpr double kDeeper = 0.05;          // mm by which a roughing cut may pass its planned step
+constexpr double kAbreast = 3;            // fewer cells than this side by side do not tell how wide a cut is
 constexpr double kStanding = 0.01;        // mm by which shank or holder must reach into stock to be reported
 
 constexpr double kArcError = 0.001;  // mm: more than an arc's chords may miss of it
@@ -423,7 +424,8 @@ private:
         const CellGrid& grid = stock.grid();
         const Tool& tool = *p.tool;
         const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
-        // A sliver that stood between passes overloads nobody; a tenth of the cutter's disc does.
+        // A sliver that stood between passes overloads nobody; a tenth of the cutter's disc does. Where cells lie one or two abreast, along a
+        // wall, they do not tell how wide what stood there was: a micrometre at the cutter's rim may hold the centres of a whole row.
         const double deep = p.program->planned_stepdown > 0 ? p.program->planned_stepdown + kDeeper : 1e300;
         const double wide = 0.1 * std::numbers::pi * radius * radius;
         const auto& arcs = p.program->arcs;
@@ -462,7 +464,7 @@ private:
                         out.most = std::max(out.most, e.deepest);
                         const Point3 where{e.where[0], e.where[1], low};
                         if (b.rapid() && e.deepest > kTaken && e.deepest > out.rapid.size) out.rapid = {e.deepest, where}, out.rapid_line = b.line;
-                        if (e.deepest > out.deepest.size && static_cast<double>(e.deep_cells) * cell_ * cell_ > wide)
+                        if (e.deepest > out.deepest.size && static_cast<double>(e.deep_cells) * cell_ * cell_ > wide && e.deep_across >= kAbreast)
                             out.deepest = {e.deepest, where}, out.deepest_line = b.line;
                         const double over = e.highest - low - tool.flute_length;
                         if (tool.flute_length > 0 && over > kStanding && over > out.over_flute.size)

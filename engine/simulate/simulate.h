@@ -105,7 +105,7 @@ struct ProgramFindings {
     std::uint32_t rapid_line = 0;
     Extreme over_flute;  ///< stock taken above the flutes' upper end
     std::uint32_t over_flute_line = 0;
-    Extreme deepest;  ///< most height that one motion took, where over a tenth of the cutter's disc it took more than planned
+    Extreme deepest;  ///< most height that one motion took, where over a tenth of the cutter's disc, three cells abreast, it took more than planned
     std::uint32_t deepest_line = 0;
     Extreme shank, holder;  ///< standing stock that they run into
     GougePlace flask;       ///< how deep it goes into the flask's walls, by the exact check

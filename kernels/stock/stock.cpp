@@ -112,7 +112,7 @@ public:
             }
             if (z >= slab.bottom) break;
         }
-        effect_.deep_cells += lost > deep_;
+        if (lost > deep_) count_deep(cell, 1);
         if (-z > stock_.board_[cell]) {
             effect_.lowest = std::min(effect_.lowest, z);
             stock_.board_[cell] = static_cast<float>(-z);
@@ -155,6 +155,7 @@ public:
     [[nodiscard]] CutEffect effect() const {
         CutEffect effect = effect_;
         const auto nx = static_cast<std::size_t>(stock_.grid_.nx);
+        if (effect.deep_cells > 0) effect.deep_across = static_cast<double>(effect.deep_cells) / static_cast<double>(std::max(deep_rows_, fullest_));
         if (effect.deepest > 0)
             effect.where = {stock_.grid_.x(static_cast<int>(deepest_cell_ % nx)), stock_.grid_.y(static_cast<int>(deepest_cell_ / nx))};
         return effect;
@@ -174,22 +175,31 @@ private:
         effect_.removed += lost;
         effect_.highest = std::max(effect_.highest, before);
         effect_.lowest = std::min(effect_.lowest, after);
-        effect_.deep_cells += lost > deep_;
+        if (lost > deep_) count_deep(cell, 1);
         if (lost > effect_.deepest) effect_.deepest = lost, deepest_cell_ = cell;
         height = left;
     }
     // Adds what cells from the first one on lost.
     void take(std::size_t first, const Losses& losses) {
-        double most = 0, deepest = 0;
+        double most = 0, deepest = 0, deep = 0;
         for (std::size_t k = 0; k < kLanes; ++k) {
             effect_.removed += losses.removed[k];
             effect_.highest = std::max(effect_.highest, losses.highest[k]);
             effect_.lowest = std::min(effect_.lowest, losses.lowest[k]);
-            effect_.deep_cells += static_cast<std::uint64_t>(losses.deep[k]);
+            deep += losses.deep[k];
             // Of cells that lost as much the first.
             if (losses.most[k] > most || (losses.most[k] == most && losses.deepest[k] < deepest)) most = losses.most[k], deepest = losses.deepest[k];
         }
+        if (deep > 0) count_deep(first, static_cast<std::uint64_t>(deep));
         if (most > effect_.deepest) effect_.deepest = most, deepest_cell_ = first + static_cast<std::size_t>(deepest);
+    }
+    // Of n cells of the row of `cell`, which lie together or not.
+    void count_deep(std::size_t cell, std::uint64_t n) {
+        const std::size_t row = cell / static_cast<std::size_t>(stock_.grid_.nx);
+        if (row != deep_row_) deep_row_ = row, in_row_ = 0, ++deep_rows_;
+        in_row_ += n;
+        fullest_ = std::max(fullest_, in_row_);
+        effect_.deep_cells += n;
     }
     // Whether all that is taken is the topmost slab's.
     [[nodiscard]] bool within_top(double lowest) const { return !stock_.slabs_.empty() && lowest >= std::max(0.0, stock_.slabs_.back().bottom); }
@@ -198,6 +208,8 @@ private:
     double deep_;
     CutEffect effect_;
     std::size_t deepest_cell_ = 0;
+    std::size_t deep_row_ = static_cast<std::size_t>(-1);  // the last one with cells that lost more than `deep`
+    std::uint64_t deep_rows_ = 0, in_row_ = 0, fullest_ = 0;
 };
 
 CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep,

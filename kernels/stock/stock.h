@@ -17,6 +17,7 @@ struct CutEffect {
     double lowest = 1e300;          ///< z of the lowest point cut
     std::array<double, 2> where{};  ///< the cell that lost most
     std::uint64_t deep_cells = 0;   ///< cells that lost more than `deep`
+    double deep_across = 0;         ///< how many cells wide they lie on average: their number over the longer of their rows and the fullest row
 };
 
 /// The stock over a rectangle of cells. Slabs are added from below; a column that is cut through a slab's bottom shows what
