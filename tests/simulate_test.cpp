@@ -279,7 +279,7 @@ TEST(Simulate, ARimOnARowOfPointsIsNoDeepCut) {
 }
 
 TEST(Simulate, ARidgeThatWasLeftIsADeepCut) {
-    const SimulationReport r = two_levels(1.5);
+    const SimulationReport r = two_levels(2);
     ASSERT_NE(find(r, "cut.too_deep"), nullptr) << codes(r);
     EXPECT_NEAR(find(r, "cut.too_deep")->size, 5, 1e-6);
 }
