@@ -222,8 +222,7 @@ std::vector<Loops> joints_of(Context& context, const Plan& plan, MeshView mesh) 
 }
 
 // Lengths and times of an operation; its forces too where the job takes cuts as nominal.
-void rate(Plan& plan, const Layer& layer, Operation& op) {
-    const Job& job = plan.job;
+void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnostic>& diagnostics) {
     const MotionTime time = motion_time(op.moves, job.machine);
     op.cutting_mm = time.cutting_mm;
     op.rapid_mm = time.rapid_mm;
@@ -233,12 +232,11 @@ void rate(Plan& plan, const Layer& layer, Operation& op) {
     rate_operation(op, *tool, job);
     const double allowance = std::min(job.cutting.wall_allowance, job.cutting.floor_allowance);
     if (op.kind == OperationKind::rough && op.deflection_mm > allowance)
-        plan.diagnostics.push_back(
-            {Severity::warning,
-             "rough.deflection",
-             fmt::format("layer {}: the roughing cutter may bend by {:.3f} mm, more than the {:.3f} mm it leaves for finishing", layer.index,
-                         op.deflection_mm, allowance),
-             {}});
+        diagnostics.push_back({Severity::warning,
+                               "rough.deflection",
+                               fmt::format("layer {}: the roughing cutter may bend by {:.3f} mm, more than the {:.3f} mm it leaves for finishing",
+                                           layer.index, op.deflection_mm, allowance),
+                               {}});
 }
 
 // The programs of all layers, with their diagnostics.
@@ -266,13 +264,14 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
     context.begin_phase("forces", share.at(0.96), share.at(0.99));
     std::vector<std::vector<Diagnostic>> rated(planned.size());
     if (job.cutting.engagement == Engagement::simulated) rated = rate_layers(context, plan, cuts);
-    for (std::size_t i = 0; i < planned.size(); ++i) {
-        for (const auto* found : {&planned[i].diagnostics, &rated[i]}) plan.diagnostics.insert(plan.diagnostics.end(), found->begin(), found->end());
+    parallel_each(context, planned.size(), [&](std::size_t i) {
         for (Operation& op : plan.layers[i].operations) {
             context.throw_if_cancelled();
-            rate(plan, plan.layers[i], op);
+            rate(job, plan.layers[i], op, rated[i]);
         }
-    }
+    });
+    for (std::size_t i = 0; i < planned.size(); ++i)
+        for (const auto* found : {&planned[i].diagnostics, &rated[i]}) plan.diagnostics.insert(plan.diagnostics.end(), found->begin(), found->end());
     if (std::all_of(plan.layers.begin(), plan.layers.end(), [](const Layer& layer) { return layer.operations.empty(); }))
         throw refusal("plan.empty", "nothing would be cut", plan.input.file, "check the units and the slabs");
     check_travel(plan);

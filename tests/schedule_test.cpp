@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <random>
 #include <set>
 
@@ -172,7 +173,7 @@ TEST(Bonding, GlueKeepsItsSetbackAndPressItsPressure) {
     add_rectangle(below, 20, 10, 180, 90);
     std::vector<Diagnostic> diagnostics;
     bond_layer(plan.layers[0], below, plan, diagnostics);
-    EXPECT_NEAR(plan.layers[0].glue_area_mm2, (160 - 6.02) * (80 - 6.02), 1);
+    EXPECT_NEAR(plan.layers[0].glue_area_mm2, (160 - 6.2) * (80 - 6.2), 1);
     EXPECT_NEAR(plan.layers[0].glue_centroid[0], 100, 1e-3);
     EXPECT_NEAR(plan.layers[0].glue_centroid[1], 50, 1e-3);
     EXPECT_NEAR(plan.layers[0].press_force_n, std::min(17000.0, 0.5 * plan.layers[0].glue_area_mm2), 10);
@@ -186,6 +187,37 @@ TEST(Bonding, GlueKeepsItsSetbackAndPressItsPressure) {
     add_rectangle(wide, 0, 0, 2000, 1000);
     bond_layer(plan.layers[0], wide, plan, diagnostics);
     EXPECT_EQ(plan.layers[0].press_force_n, 17000);
+}
+
+// An outline as a section of many facets has it: the glue keeps its distance from it everywhere, with far fewer points.
+TEST(Bonding, GlueOfAnOutlineOfManyPointsKeepsItsSetback) {
+    constexpr int points = 40000;
+    Plan plan = plan_of_layers(1);
+    Loops below;
+    for (int k = 0; k < points; ++k) {
+        const double a = 2 * std::numbers::pi * k / points, r = 60 + 8 * std::sin(7 * a) + 0.02 * std::sin(900 * a);
+        below.points.push_back({to_units(100 + r * std::cos(a)), to_units(80 + r * std::sin(a))});
+    }
+    below.close_loop();
+    std::vector<Diagnostic> diagnostics;
+    bond_layer(plan.layers[0], below, plan, diagnostics);
+    const Loops& glue = plan.layers[0].glue;
+    ASSERT_EQ(glue.size(), 1U);
+    EXPECT_LT(glue.points.size(), 2000U);
+    const double setback = plan.job.bonding.edge_setback;
+    double farthest = 0;
+    for (std::size_t k = 0; k < glue.points.size(); ++k) {
+        const Point2 a = glue.points[k], b = glue.points[(k + 1) % glue.points.size()];
+        const double dx = to_mm(b.x - a.x), dy = to_mm(b.y - a.y), l2 = dx * dx + dy * dy;
+        double nearest = 1e300;
+        for (const Point2 p : below.points) {
+            const double x = to_mm(p.x - a.x), y = to_mm(p.y - a.y), t = std::clamp((x * dx + y * dy) / l2, 0.0, 1.0);
+            nearest = std::min(nearest, std::hypot(x - t * dx, y - t * dy));
+        }
+        ASSERT_GE(nearest, setback - 1e-3) << "at " << to_mm(a.x) << ' ' << to_mm(a.y);
+        farthest = std::max(farthest, nearest);
+    }
+    EXPECT_LE(farthest, setback + 0.25) << "and no farther from it than that";
 }
 
 TEST(Bonding, MomentsAgreeWithBruteForceOnAFrameWithAHole) {

@@ -32,18 +32,6 @@ Loops filled(const Loops& region) {
     return outer;
 }
 
-// Points that lie within `tolerance` of the chords between those kept are left out.
-Loops thinned(std::span<const Point2> loop, double tolerance) {
-    std::vector<PathPoint> ring;
-    for (const Point2 p : loop) ring.push_back({p.x, p.y, 0});
-    ring.push_back(ring.front());
-    ring = simplify(ring, tolerance * kUnitsPerMm);
-    Loops result;
-    for (std::size_t k = 0; k + 1 < ring.size(); ++k) result.points.push_back({ring[k].x, ring[k].y});
-    result.close_loop();
-    return result;
-}
-
 }  // namespace
 
 double flask_margin(const FlaskShape& shape, double height) {
@@ -59,7 +47,7 @@ Flask place_flask(Context& context, MeshView mesh, const Plan& plan) {
         opening.points = hull;
         opening.close_loop();
     }
-    opening = filled(simplify(thinned(opening.loop(0), kThinned)));
+    opening = filled(simplify(thinned(opening, kThinned)));
 
     Flask flask;
     const Point2 low{to_units(plan.stock_min[0]), to_units(plan.stock_min[1])}, high{to_units(plan.stock_max[0]), to_units(plan.stock_max[1])};

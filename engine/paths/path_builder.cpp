@@ -376,6 +376,22 @@ std::vector<PathPoint> simplify(std::span<const PathPoint> line, double toleranc
     return kept_points(line, kept_within(line, tolerance));
 }
 
+Loops thinned(const Loops& loops, double mm) {
+    Loops result;
+    std::vector<PathPoint> ring;
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+        ring.clear();
+        for (const Point2 p : loops.loop(i)) ring.push_back({p.x, p.y, 0});
+        if (ring.empty()) continue;
+        ring.push_back(ring.front());
+        const std::vector<PathPoint> kept = simplify(ring, mm * kUnitsPerMm);
+        if (kept.size() < 4) continue;
+        for (std::size_t k = 0; k + 1 < kept.size(); ++k) result.points.push_back({kept[k].x, kept[k].y});
+        result.close_loop();
+    }
+    return result;
+}
+
 std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, double loose, double turn) {
     if (line.size() < 3) return {line.begin(), line.end()};
     // What stays of the finely thinned line within the wider tolerance is a part of it.

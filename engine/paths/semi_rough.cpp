@@ -208,7 +208,7 @@ private:
         const double step = kStepShare * tool_.diameter;
         std::vector<Loops> rings{border};
         const double loose = ring_tolerance(tool_);
-        const Loops thin = thinned(border);
+        const Loops thin = thinned(border, kRingTolerance);
         std::vector<std::array<int, 2>> outside = targets.cells();
         for (int k = 1; k < kMostRings; ++k) {
             const auto inside = rows_inside(grid, rings.back());
@@ -242,21 +242,6 @@ private:
                     }
                 }
         }
-    }
-
-    [[nodiscard]] static Loops thinned(const Loops& loops) {
-        Loops result;
-        for (std::size_t l = 0; l < loops.size(); ++l) {
-            std::vector<PathPoint> line;
-            for (const Point2 p : loops.loop(l)) line.push_back({p.x, p.y, 0});
-            line.push_back(line.front());
-            line = simplify(line, kRingTolerance * kUnitsPerMm);
-            line.pop_back();
-            if (line.size() < 3) continue;
-            for (const PathPoint& p : line) result.points.push_back({p.x, p.y});
-            result.close_loop();
-        }
-        return result;
     }
 
     [[nodiscard]] bool within_travel(const PathPoint& p) const {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/forces/cuts.h"
+#include "engine/paths/path_builder.h"
 #include "kernels/polygons/hull.h"
 
 namespace slabwright {
@@ -117,9 +118,12 @@ int width_of(std::size_t largest, int least) { return std::max(least, static_cas
 
 void bond_layer(Layer& layer, const Loops& below, const Plan& plan, std::vector<Diagnostic>& diagnostics) {
     const Bonding& bonding = plan.job.bonding;
-    // offset() errs towards the larger region by up to its tolerance; that much more setback keeps the promised distance.
-    constexpr double tolerance = 0.01;
-    layer.glue = below.empty() ? Loops{} : bonding.edge_setback > 0 ? offset(below, -(bonding.edge_setback + tolerance), tolerance) : below;
+    // A section has a point at every facet that it cuts, more than where glue goes needs. Thinned it may be too wide by as much as it is
+    // thinned, and offset() errs towards the larger region by up to its tolerance; that much more setback keeps the promised distance.
+    constexpr double thinned_by = 0.05, tolerance = 0.05;
+    if (below.empty()) layer.glue = {};
+    else if (bonding.edge_setback > 0) layer.glue = offset(thinned(below, thinned_by), -(bonding.edge_setback + thinned_by + tolerance), tolerance);
+    else layer.glue = below;
     const AreaMoments m = moments(layer.glue);
     layer.glue_area_mm2 = m.area;
     layer.glue_centroid = {m.x, m.y};
