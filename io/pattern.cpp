@@ -27,14 +27,17 @@ fs::path find_pattern(const fs::path& directory, const std::string& file, const 
 
 }  // namespace
 
-Pattern read_pattern(Context& context, const std::string& directory, const PlannedPattern& planned, const std::string& given,
-                     const std::string& asker) {
-    Pattern pattern;
-    pattern.path = find_pattern(directory, planned.file, given, asker).string();
-    pattern.stl = read_stl(context, pattern.path, planned.reading);
-    if (pattern.stl.input.sha256 != planned.sha256)
-        throw Error(ErrorKind::input, asker + ".other_pattern", "is not the pattern that was planned: its SHA-256 is " + pattern.stl.input.sha256,
-                    pattern.path, "name the planned STL with --stl, or plan again");
+bool Pattern::is(const PlannedPattern& planned) const {
+    return stl.input.sha256 == planned.sha256 && reading.units == planned.reading.units && reading.weld_mm == planned.reading.weld_mm;
+}
+
+std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory, const PlannedPattern& planned, const std::string& given,
+                                      const std::string& asker) {
+    const std::string path = find_pattern(directory, planned.file, given, asker).string();
+    auto pattern = std::make_shared<Pattern>(Pattern{path, planned.reading, read_stl(context, path, planned.reading), {}});
+    if (!pattern->is(planned))
+        throw Error(ErrorKind::input, asker + ".other_pattern", "is not the pattern that was planned: its SHA-256 is " + pattern->stl.input.sha256,
+                    path, "name the planned STL with --stl, or plan again");
     return pattern;
 }
 

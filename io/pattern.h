@@ -1,6 +1,7 @@
 // The pattern that a folder OUT was planned for: found, read, and known to be the one.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -18,16 +19,19 @@ struct PlannedPattern {
 
 struct Pattern {
     std::string path;
+    StlOptions reading;
     StlMesh stl;
     std::optional<StandingPart> part;  ///< of the mesh, once somebody needs it
+
+    /// Whether it is what was planned, read alike.
+    [[nodiscard]] bool is(const PlannedPattern& planned) const;
 };
 
 /// @param directory OUT
 /// @param given the STL; "" looks for the file that the plan names: in OUT, beside OUT, in the working folder
 /// @param asker "verify" or "report", the family of the errors' codes
-/// @returns the pattern without its part
 /// @throws Error(input) when the STL is missing, unreadable, or not the one that was planned (by its SHA-256)
-[[nodiscard]] Pattern read_pattern(Context& context, const std::string& directory, const PlannedPattern& planned, const std::string& given,
-                                   const std::string& asker);
+[[nodiscard]] std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory, const PlannedPattern& planned,
+                                                    const std::string& given, const std::string& asker);
 
 }  // namespace slabwright

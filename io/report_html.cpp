@@ -600,14 +600,14 @@ std::string report_html(Context& context, const std::string& directory, const Re
     const PlanFolder folder = read_plan_folder(out);
     const Json sequence = fs::exists(out / "sequence.json") ? read_json(out / "sequence.json", "report.sequence") : Json();
     const Json verify = fs::exists(out / "verify.json") ? read_json(out / "verify.json", "report.verify") : Json();
-    Pattern pattern = verified
-                          ? std::move(verified->pattern)
-                          : read_pattern(context, directory, understood(out / "plan.json", "report.plan", [&] { return planned_pattern(folder); }),
-                                         options.stl, "report");
+    const std::shared_ptr<Pattern> pattern =
+        verified ? std::move(verified->pattern)
+                 : read_pattern(context, directory, understood(out / "plan.json", "report.plan", [&] { return planned_pattern(folder); }),
+                                options.stl, "report");
     std::vector<Program> programs;
     if (verified) programs = std::move(verified->input.programs);
     verified.reset();
-    const MeshView mesh = pattern.stl.mesh.view();
+    const MeshView mesh = pattern->stl.mesh.view();
 
     std::uint64_t moves = 0;
     for (const Program& program : programs) moves += program.steps.size();
@@ -628,8 +628,8 @@ std::string report_html(Context& context, const std::string& directory, const Re
     });
     SimulationInput input = folder.input;
     input.mesh = mesh;
-    if (options.three_d && !pattern.part) pattern.part.emplace(context, mesh);
-    replay_programs(context, out, folder, input, std::move(programs), options.three_d ? &*pattern.part : nullptr, figures);
+    if (options.three_d && !pattern->part) pattern->part.emplace(context, mesh);
+    replay_programs(context, out, folder, input, std::move(programs), options.three_d ? &*pattern->part : nullptr, figures);
     context.throw_if_cancelled();
 
     const auto limit = static_cast<std::size_t>(options.size_limit_mb * 1e6);
@@ -646,7 +646,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
     figures.data["left_over"] = {{"layers", figures.replay}};
     context.begin_phase("report's model and paths", replayed, 1.0, 3);
     std::size_t facets = kMostFacets, points = kMostPoints;
-    Json model = model_json(context, mesh, *pattern.part, folder, facets);
+    Json model = model_json(context, mesh, *pattern->part, folder, facets);
     context.advance();
     Json paths = paths_json(context, figures.drawn, folder, points);
     context.advance();
@@ -665,7 +665,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
             paths = paths_json(context, figures.drawn, folder, points);
         } else if (facets > kFewestFacets) {
             facets /= 2;
-            model = model_json(context, mesh, *pattern.part, folder, facets);
+            model = model_json(context, mesh, *pattern->part, folder, facets);
         } else {
             throw too_large(text.size());
         }

@@ -21,6 +21,7 @@
 #include "io/inspect_json.h"
 #include "io/job_toml.h"
 #include "io/output_folder.h"
+#include "io/pattern.h"
 #include "io/plan_json.h"
 #include "io/report_html.h"
 #include "io/sections_dxf.h"
@@ -92,10 +93,24 @@ std::string default_job_toml(std::string_view library) {
     });
 }
 
-Plan plan(Context& context, const std::string& stl_path, const Job& job) {
+std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& stl_path, const Job& job) {
     return guarded([&] {
         validate(job);
-        StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld});
+        const StlOptions reading{job.units, job.tolerances.weld};
+        return std::make_shared<Pattern>(Pattern{stl_path, reading, read_stl(context, stl_path, reading), {}});
+    });
+}
+
+Plan plan(Context& context, const std::string& stl_path, const Job& job) { return plan(context, *read_pattern(context, stl_path, job), job); }
+
+Plan plan(Context& context, const Pattern& pattern, const Job& job) {
+    return guarded([&] {
+        validate(job);
+        const StlMesh& stl = pattern.stl;
+        const std::string& stl_path = pattern.path;
+        if (pattern.reading.units != job.units || pattern.reading.weld_mm != job.tolerances.weld)
+            throw Error(ErrorKind::usage, "plan.reading", "was read with other units or another tolerance of welding than the job's", stl_path,
+                        "read the pattern with the job that it is planned with");
         require_solid(context, stl, stl_path);
         const auto planned = [&] {
             try {
@@ -200,25 +215,35 @@ void write(Context& context, const Plan& plan, const std::string& directory, con
     });
 }
 
-VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path, double cell_mm) {
+namespace {
+
+VerifyResult write_and_verify(Context& context, const Plan& plan, const std::string& directory, const VerifyOptions& options) {
     return guarded([&] {
-        check_cell(cell_mm);
+        check_cell(options.cell);
         OutputFolder out(directory);
         fill(context, plan, out);
-        VerifyOptions options;
-        options.stl = stl_path;
-        options.cell = cell_mm;
         const bool reports = reports_are_built();
-        const double verified = reports ? verifying_share(plan, cell_mm) : 1;
+        const double verified = reports ? verifying_share(plan, options.cell) : 1;
         context.share_progress(kPlanningShare, verified);
         Verification found = verify_folder(context, out.path("").string(), options);
         VerifyResult result = verdict(found);
         context.share_progress(verified, 1);
-        if (reports) write_report(context, out.path("").string(), {stl_path}, std::move(found));
+        if (reports) write_report(context, out.path("").string(), {options.stl}, std::move(found));
         context.throw_if_cancelled();
         out.commit();
         return result;
     });
+}
+
+}  // namespace
+
+VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path, double cell_mm) {
+    return write_and_verify(context, plan, directory, {.stl = stl_path, .cell = cell_mm});
+}
+
+VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory, const std::shared_ptr<Pattern>& pattern,
+                            double cell_mm) {
+    return write_and_verify(context, plan, directory, {.stl = pattern->path, .pattern = pattern, .cell = cell_mm});
 }
 
 void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path, const std::string& directory) {

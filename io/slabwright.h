@@ -9,6 +9,7 @@
 // nothing to stderr, sets no signal handler and never exits; several plans may run at once, each on its own Context.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,6 +33,16 @@ namespace slabwright {
 
 /// Reads the STL and plans the build. @throws Error(input | no_plan | cancelled | usage)
 [[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const std::string& stl_path, const Job& job);
+
+/// A pattern that was read, for whoever plans it and verifies the plan: its file is then read once. What it holds is this library's.
+struct Pattern;
+
+/// Reads the STL as `job` says. @throws Error(input | cancelled | usage)
+[[nodiscard]] SLABWRIGHT_API std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& stl_path, const Job& job);
+
+/// Plans the build of a pattern that was read with the same units and tolerance of welding. @throws as plan() of an STL, and Error(usage)
+/// when it was read otherwise
+[[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const Pattern& pattern, const Job& job);
 
 /// Writes plan.json, nc/, tool.tbl and sequence.json into `directory`, all or nothing: a fresh folder beside it is
 /// filled and then takes its place; an existing folder is replaced only if it holds a plan.json of ours or is empty.
@@ -73,6 +84,10 @@ struct VerifyResult {
 /// @throws Error as write() and verify()
 [[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
                                                          const std::string& stl_path, double cell_mm = 0);
+/// The same of a pattern that plan() was given. What the programs say is read from their text all the same. Not from two threads at once with
+/// one pattern, which keeps what verification makes of it.
+[[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
+                                                         const std::shared_ptr<Pattern>& pattern, double cell_mm = 0);
 
 /// Simulates the programs in `directory` against the pattern, from the folder's text alone, and writes verify.json into it.
 /// @param stl_path the pattern; "" looks for the file that plan.json names: in the folder, beside it, where the caller stands

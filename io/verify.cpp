@@ -455,11 +455,13 @@ Verification verify_folder(Context& context, const std::string& directory, const
             violations.push_back({"program.unplanned", "nc/ holds it, plan.json does not name it", file, 0, {}, 0});
     }
 
-    result.pattern =
-        read_pattern(context, directory, {plan["input"]["file"].text(), plan["input"]["sha256"].text(), {part.job.units, part.job.tolerances.weld}},
-                     options.stl, "verify");
-    input.mesh = result.pattern.stl.mesh.view();
-    result.pattern.part.emplace(context, input.mesh);
+    const PlannedPattern planned_pattern{plan["input"]["file"].text(), plan["input"]["sha256"].text(), {part.job.units, part.job.tolerances.weld}};
+    result.pattern = options.pattern && options.pattern->is(planned_pattern)
+                         ? options.pattern
+                         : read_pattern(context, directory, planned_pattern, options.stl, "verify");
+    Pattern& pattern = *result.pattern;
+    input.mesh = pattern.stl.mesh.view();
+    if (!pattern.part) pattern.part.emplace(context, input.mesh);
 
     SimulationOptions simulation;
     simulation.cell = options.cell;
@@ -474,10 +476,10 @@ Verification verify_folder(Context& context, const std::string& directory, const
             if (tool.kind == ToolKind::ball) simulation.board_cut = std::max(simulation.board_cut, tool.diameter / 2);
     }
     simulation.board_cut = std::min(simulation.board_cut, part.job.machine.base_board_thickness);
-    result.report = simulate(context, input, *result.pattern.part, simulation);
+    result.report = simulate(context, input, *pattern.part, simulation);
     input.mesh = {};
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
-    result.json = report_json(input, result.report, simulation, fs::path(result.pattern.path).filename().string(), part.stated);
+    result.json = report_json(input, result.report, simulation, fs::path(pattern.path).filename().string(), part.stated);
 
     if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);
     if (options.write) {

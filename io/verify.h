@@ -1,6 +1,7 @@
 // Proof: reads OUT as a stranger would, runs its programs, and says what part results.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "engine/simulate/simulate.h"
@@ -10,7 +11,9 @@
 namespace slabwright {
 
 struct VerifyOptions {
-    std::string stl;               ///< the pattern; "" looks for the file that plan.json names: in OUT, beside OUT, in the working folder
+    std::string stl;  ///< the pattern; "" looks for the file that plan.json names: in OUT, beside OUT, in the working folder
+    /// The pattern where it has been read already: it is not read again if it is the one that plan.json names.
+    std::shared_ptr<Pattern> pattern{};
     double cell = 0;               ///< mm, SimulationOptions::cell
     bool maps = false;             ///< keep the maps in the report
     std::string maps_directory{};  ///< "": none; write layer_01.ppm and so on there (write_maps())
@@ -19,8 +22,8 @@ struct VerifyOptions {
 
 /// What was found, and what was read to find it.
 struct Verification {
-    Pattern pattern;        ///< with its part
-    SimulationInput input;  ///< its mesh is not set: pattern has it
+    std::shared_ptr<Pattern> pattern;  ///< with its part
+    SimulationInput input;             ///< its mesh is not set: pattern has it
     SimulationReport report;
     std::string json;  ///< what verify.json holds (schema slabwright.verify/1)
 };

@@ -13,6 +13,7 @@
 #include "kernels/mesh/weld.h"
 #include "kernels/stock/stock.h"
 #include "tests/data/models.h"
+#include "tests/support/files.h"
 #include "tests/support/height_field.h"
 #include "tests/support/temporary_folder.h"
 
@@ -214,6 +215,39 @@ TEST(Planner, ProgressIsToldAllTheWay) {
     EXPECT_DOUBLE_EQ(before, 1);
     EXPECT_GT(in_paths, 5 * result.layers.size());
     EXPECT_LT(widest, 0.2);
+}
+
+// Read once for both, or for each: the same plan and the same findings.
+TEST(Planner, APatternIsReadOnceForPlanAndVerification) {
+    Context context;
+    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
+    const support::TemporaryFolder folder;
+    const Job job;
+    (void)write_verified(context, plan(context, stl, job), folder / "twice", stl);
+    const std::shared_ptr<Pattern> pattern = read_pattern(context, stl, job);
+    const Plan planned = plan(context, *pattern, job);
+    std::size_t reads = 0;
+    Context counting({.progress = [&](const Progress& p) { reads += p.phase == "read STL"; }});
+    (void)write_verified(counting, planned, folder / "once", pattern);
+    EXPECT_EQ(reads, 0u);
+    for (const char* file : {"/plan.json", "/verify.json"})
+        EXPECT_EQ(support::slurp(folder / "once" + file), support::slurp(folder / "twice" + file)) << file;
+
+    Job inches;
+    inches.units = LengthUnit::inch;
+    try {
+        (void)plan(context, *pattern, inches);
+        FAIL() << "planned in other units than it was read in";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), ErrorKind::usage) << error.what();
+    }
+    const auto other = read_pattern(context, SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl", job);
+    try {
+        (void)write_verified(context, planned, folder / "other", other);
+        FAIL() << "verified against another pattern than was planned";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), "verify.other_pattern") << error.what();
+    }
 }
 
 TEST(Planner, TotalsHoldThePartsVolume) {

@@ -239,13 +239,15 @@ bool run_plan(const Options& options) {
     bool passed = true;
     with_context(options, [&](Context& context) {
         if (!options.no_verify) context.share_progress(0, kPlanningShare);
-        const Plan result = plan(context, options.stl, job);
+        std::shared_ptr<Pattern> pattern = read_pattern(context, options.stl, job);
+        const Plan result = plan(context, *pattern, job);
         if (!options.access_maps.empty()) write_access_maps(context, result, options.stl, options.access_maps);
         if (options.no_verify) {
+            pattern.reset();
             write(context, result, options.out, options.stl);
             return options.json ? summary_json(result, options.out, nullptr) : summary(result, options.out);
         }
-        const VerifyResult found = write_verified(context, result, options.out, options.stl, options.cell);
+        const VerifyResult found = write_verified(context, result, options.out, pattern, options.cell);
         passed = found.passed;
         return options.json ? summary_json(result, options.out, &found) : summary(result, options.out) + verdict(found, options.out);
     });

@@ -52,6 +52,7 @@ struct PreparedProgram {
     const Tool* tool = nullptr;
     CutterEnd end;
     double widest = 0;  // radius of the widest of cutter, shank and holder
+    double cut_mm = 0;  // of feed motions, seen from above
     std::vector<StepBox> blocks;
 };
 
@@ -208,13 +209,8 @@ private:
     SimulationSize size() const {
         SimulationSize size;
         for (const PreparedProgram& p : prepared_) {
-            const auto& steps = p.program->steps;
-            size.steps += steps.size();
-            double cut = 0;
-            for (std::size_t k = 1; k < steps.size(); ++k)
-                if (!steps[k].rapid() && steps[k].known() && steps[k - 1].known())
-                    cut += std::hypot(steps[k].x - steps[k - 1].x, steps[k].y - steps[k - 1].y);
-            if (p.tool) size.swept_mm2 += cut * p.tool->diameter;
+            size.steps += p.program->steps.size();
+            if (p.tool) size.swept_mm2 += p.cut_mm * p.tool->diameter;
         }
         size.stock_mm2 = static_cast<double>(nx_) * ny_ * cell_ * cell_;
         size.cell_mm = cell_;
@@ -249,15 +245,23 @@ private:
                 p.end = cutter_end(*p.tool);
                 p.widest = std::max({p.tool->diameter, p.tool->shank_diameter, p.tool->holder_diameter}) / 2;
             }
-            const auto& steps = program.steps;
-            for (std::size_t i = 1; i < steps.size(); i += kBlockSteps) {
-                StepBox box;
-                for (std::size_t k = i; k < std::min(steps.size(), i + kBlockSteps); ++k)
-                    if (steps[k - 1].known() && steps[k].known()) box.add(steps[k - 1]), box.add(steps[k]);
-                p.blocks.push_back(box);
-            }
             prepared_.push_back(std::move(p));
         }
+        parallel_each(context_, prepared_.size(), [&](std::size_t i) {
+            PreparedProgram& p = prepared_[i];
+            const auto& steps = p.program->steps;
+            p.blocks.reserve(steps.size() / kBlockSteps + 1);
+            for (std::size_t first = 1; first < steps.size(); first += kBlockSteps) {
+                StepBox box;
+                for (std::size_t k = first; k < std::min(steps.size(), first + kBlockSteps); ++k) {
+                    const ProgramStep &a = steps[k - 1], &b = steps[k];
+                    if (!a.known() || !b.known()) continue;
+                    box.add(a), box.add(b);
+                    if (!b.rapid()) p.cut_mm += std::hypot(b.x - a.x, b.y - a.y);
+                }
+                p.blocks.push_back(box);
+            }
+        });
     }
 
     /// All that needs no stock: the exact check, the spindle, the machine's travel, the time. Programs are independent.

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "kernels/mesh/bulk_memory.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 
@@ -129,8 +130,8 @@ private:
     void gather_covers(Vicinity& around) const;
     [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
     friend class RisingEnvelope;
-    std::vector<Facet> facets_;               ///< in Morton order
-    std::vector<std::vector<Nodes>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
+    BulkVector<Facet> facets_;               ///< in Morton order
+    std::vector<BulkVector<Nodes>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
     Box3 box_{};
 };
 
