@@ -16,7 +16,9 @@ struct StlOptions {
 };
 
 struct StlMesh {
-    Mesh mesh;  ///< millimetres, set on z = 0 (the lowest vertex); x and y as in the file
+    /// Millimetres, set on z = 0 (the lowest vertex); x and y as in the file. Facets in the file's order; where a sound file of 50 000 facets or
+    /// more does not have neighbours follow each other, in an order in space in which they do.
+    Mesh mesh;
     MeshReport report;
     InputInfo input;
     std::vector<Diagnostic> diagnostics;  ///< every finding of the report, welds, suspicious units

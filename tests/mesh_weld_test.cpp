@@ -157,6 +157,37 @@ TEST(MeshWeld, RecordsAreScaledLoweredAndNotAligned) {
     EXPECT_EQ(mesh.vertices[mesh.facets[0][0]].z, expected[0][0].z);
 }
 
+FacetRecords records_of(const Facets& facets) { return {reinterpret_cast<const char*>(facets.data()), facets.size()}; }
+
+TEST(MeshWeld, FacetsAreBroughtTogetherInSpace) {
+    Facets facets = shapes::torus(300);
+    ASSERT_TRUE(neighbours_follow(records_of(facets)));
+    std::mt19937_64 random(test::seed());
+    std::shuffle(facets.begin(), facets.end(), random);
+    ASSERT_FALSE(neighbours_follow(records_of(facets)));
+    Context one({.threads = 1});
+    const Mesh as_it_lies = weld(one, facets);
+    BulkVector<std::array<Vec3f, 3>> first;
+    for (const int threads : {1, 2, 4}) {
+        Context context({.threads = threads});
+        BulkVector<std::array<Vec3f, 3>> together = in_space(context, records_of(facets), bounds(as_it_lies.view()));
+        ASSERT_EQ(together.size(), facets.size());
+        const FacetRecords records{reinterpret_cast<const char*>(together.data()), together.size()};
+        EXPECT_TRUE(neighbours_follow(records));
+        if (threads == 1) first = together;
+        ASSERT_EQ(together, first) << "threads " << threads;
+        const Mesh spans = weld(context, std::span<const std::array<Vec3f, 3>>(together)), moved = weld_and_let_go(context, std::move(together));
+        ASSERT_TRUE(same_bytes(spans, moved));
+        check_pairs(moved);
+        EXPECT_EQ(context.memory_charged(), 0u);
+    }
+    auto sorted = [](auto all) {
+        std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return std::memcmp(a.data(), b.data(), sizeof a) < 0; });
+        return Facets(all.begin(), all.end());
+    };
+    EXPECT_EQ(sorted(first), sorted(facets)) << "each facet once, its corners as they were";
+}
+
 TEST(MeshWeld, MemoryStaysUnderEightyBytesAFacet) {
     // Ordered and shuffled, the charge for scratch and the mesh itself together; a limit that is too small is refused.
     Facets facets = shapes::torus(300);

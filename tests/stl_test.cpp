@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <clocale>
 #include <cmath>
 #include <cstring>
@@ -52,6 +53,12 @@ std::string binary(const Facets& facets, std::string header = "binary", std::uin
         header.append(2, '\0');
     }
     return header;
+}
+
+Facets corners_of(const Mesh& mesh) {
+    Facets facets;
+    for (const Index3& f : mesh.facets) facets.push_back({mesh.vertices[f[0]], mesh.vertices[f[1]], mesh.vertices[f[2]]});
+    return facets;
 }
 
 struct AsciiStyle {
@@ -495,6 +502,32 @@ TEST_F(Stl, WeldingEverythingAwayIsRefused) {
 }
 
 // ------------------------------------------------------------------------------------------------- writing
+
+// Facets in any order give the same report, and what is wrong is told by the file's own facets.
+TEST_F(Stl, ShuffledFacetsAreReadAsOrderedOnes) {
+    Facets facets = shapes::torus(180);
+    ASSERT_GT(facets.size(), 60000U);
+    std::mt19937_64 random(test::seed());
+    Facets shuffled = facets;
+    std::shuffle(shuffled.begin(), shuffled.end(), random);
+    Context context({.threads = 2});
+    const StlMesh ordered = read_stl(context, save("ordered.stl", binary(facets))), mixed = read_stl(context, save("mixed.stl", binary(shuffled)));
+    EXPECT_EQ(mixed.mesh.vertices.size(), ordered.mesh.vertices.size());
+    EXPECT_EQ(mixed.report.open_edges.count, 0U);
+    EXPECT_EQ(mixed.report.components, 1U);
+    EXPECT_NEAR(mixed.report.volume_mm3, ordered.report.volume_mm3, 1e-6 * ordered.report.volume_mm3);
+    EXPECT_EQ(mixed.diagnostics.size(), ordered.diagnostics.size());
+    // Neighbours lie together, so that the mesh is no longer in the file's order.
+    const Facets together = corners_of(mixed.mesh);
+    EXPECT_NE(together, shuffled);
+    EXPECT_TRUE(neighbours_follow({reinterpret_cast<const char*>(together.data()), together.size()}));
+
+    shuffled[12345] = {shuffled[12345][0], shuffled[12345][0], shuffled[12345][1]};
+    const StlMesh broken = read_stl(context, save("broken.stl", binary(shuffled)));
+    EXPECT_EQ(broken.report.degenerate_facets.count, 1U);
+    EXPECT_EQ(broken.report.degenerate_facets.first_facet, 12345U);
+    EXPECT_EQ(broken.report.open_edges.count, 3U);
+}
 
 TEST_F(Stl, WrittenAndReadBackIsTheSame) {
     Context context({.threads = 2});

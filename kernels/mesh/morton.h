@@ -11,6 +11,7 @@ namespace slabwright {
 /// A grid of 2²¹ cubic cells along a box's longest side, numbered in Morton order.
 class MortonGrid {
 public:
+    static constexpr int kBits = 21;  ///< along each axis
     explicit MortonGrid(const Box3& box);
     /// The number of the cell that holds a point; that of the nearest one for a point outside.
     [[nodiscard]] std::uint64_t code(double x, double y, double z) const { return spread(x, x0_) | spread(y, y0_) << 1 | spread(z, z0_) << 2; }

@@ -1,5 +1,7 @@
 #include "kernels/mesh/weld.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <optional>
@@ -8,6 +10,7 @@
 #include "kernels/errors.h"
 #include "kernels/mesh/clusters.h"
 #include "kernels/mesh/edges.h"
+#include "kernels/mesh/morton.h"
 #include "kernels/mesh/raw_array.h"
 #include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
@@ -73,7 +76,8 @@ private:
     std::vector<Key> keys_;
 };
 
-/// Whether facets that follow each other share corners, so that it pays to look there first: asked of a few blocks of the file.
+}  // namespace
+
 bool neighbours_follow(const FacetRecords& facets) {
     const std::size_t blocks = (facets.count + kBlockFacets - 1) / kBlockFacets, step = (blocks + 7) / 8;
     BlockTable table;
@@ -89,13 +93,50 @@ bool neighbours_follow(const FacetRecords& facets) {
     return 4 * different < 3 * corners;
 }
 
-}  // namespace
-
-Mesh weld(Context& context, std::span<const std::array<Vec3f, 3>> corners, std::vector<std::uint32_t>* odd) {
-    return weld_records(context, FacetRecords{reinterpret_cast<const char*>(corners.data()), corners.size()}, odd);
+BulkVector<std::array<Vec3f, 3>> in_space(Context& context, const FacetRecords& facets, const Box3& box) {
+    if (facets.count > kMaxFacets) throw too_many_facets(facets.count);
+    using Corners = std::array<Vec3f, 3>;
+    // First into no more parts than the memory's pages can be kept at hand, most of which fit a cache then, and within each into its cells.
+    constexpr int coarse = 4, finer = 4, subcells = 1 << (3 * finer);
+    const MortonGrid grid(box);
+    auto cell_of = [&](const Corners& c) {
+        return static_cast<std::uint32_t>(grid.code(c[0].x, c[0].y, c[0].z) >> (3 * (MortonGrid::kBits - coarse - finer)));
+    };
+    BulkVector<Corners> together(facets.count);
+    auto items = [&](std::size_t begin, std::size_t end, auto&& take) {
+        for (std::size_t f = begin; f < end; ++f) {
+            const Corners c{facets.corner(f, 0), facets.corner(f, 1), facets.corner(f, 2)};
+            take(cell_of(c) / subcells, c);
+        }
+    };
+    auto counted = [&](std::size_t begin, std::size_t end, auto&& take) {
+        for (std::size_t f = begin; f < end; ++f) take(cell_of({facets.corner(f, 0), {}, {}}) / subcells);
+    };
+    auto room = [&](std::uint64_t total, std::uint64_t) { return std::pair(together.data(), total); };
+    auto within_parts = [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
+        parallel_for(context, last - first, 16, [&](std::size_t begin, std::size_t end) {
+            std::vector<Corners> part;
+            std::array<std::uint32_t, subcells + 1> next;
+            for (std::size_t p = begin; p < end; ++p) {
+                part.assign(together.data() + starts[p], together.data() + starts[p + 1]);
+                next.fill(0);
+                for (const Corners& c : part) ++next[cell_of(c) % subcells + 1];
+                next[0] = starts[p];
+                for (std::size_t k = 1; k < subcells; ++k) next[k] += next[k - 1];
+                for (const Corners& c : part) together[next[cell_of(c) % subcells]++] = c;
+            }
+        });
+    };
+    const std::size_t grain = std::max<std::size_t>(std::size_t{1} << 14, (facets.count + 63) / 64);
+    deal(context, facets.count, grain, std::size_t{1} << (3 * coarse), counted, items, room, within_parts);
+    return together;
 }
 
-Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std::uint32_t>* odd) {
+namespace {
+
+// @param let_go called when the records are not needed any more
+template <class LetGo>
+Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<std::uint32_t>* odd, LetGo&& let_go) {
     if (odd != nullptr) odd->clear();
     if (facets.count > kMaxFacets) throw too_many_facets(facets.count);
     Mesh mesh;
@@ -183,9 +224,26 @@ Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std:
                 const Vec3f p = facets.corner(c / 3, c % 3);
                 mesh.vertices[number] = {p.x + 0.0f, p.y + 0.0f, p.z + 0.0f};
             });
+        let_go();
         pair_edges(context, mesh, scratch, odd);
     }
     return mesh;
+}
+
+FacetRecords records_of(std::span<const std::array<Vec3f, 3>> corners) { return {reinterpret_cast<const char*>(corners.data()), corners.size()}; }
+
+}  // namespace
+
+Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std::uint32_t>* odd) {
+    return weld_letting_go(context, facets, odd, [] {});
+}
+
+Mesh weld(Context& context, std::span<const std::array<Vec3f, 3>> corners, std::vector<std::uint32_t>* odd) {
+    return weld_records(context, records_of(corners), odd);
+}
+
+Mesh weld_and_let_go(Context& context, BulkVector<std::array<Vec3f, 3>>&& corners, std::vector<std::uint32_t>* odd) {
+    return weld_letting_go(context, records_of(corners), odd, [&] { corners = {}; });
 }
 
 }  // namespace slabwright
