@@ -251,7 +251,14 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
     for (const LayerShare& s : shares) steps.push_back(static_cast<std::uint64_t>(std::ceil(s.work)));
     context.begin_phase("paths", share.at(0), share.at(0.96), std::accumulate(steps.begin(), steps.end(), std::uint64_t{0}));
     std::vector<PlannedLayer> planned(plan.layers.size());
-    parallel_each(context, plan.layers.size(), [&](std::size_t i) {
+    // Threads begin at the first and in the middle of what there is to do: from either place on it becomes smaller, so that none is left with a
+    // large layer in the end.
+    std::vector<std::size_t> largest_first(plan.layers.size());
+    std::iota(largest_first.begin(), largest_first.end(), std::size_t{0});
+    std::stable_sort(largest_first.begin(), largest_first.end(), [&](std::size_t a, std::size_t b) { return steps[a] > steps[b]; });
+    const std::size_t half = (plan.layers.size() + 1) / 2;
+    parallel_each(context, plan.layers.size(), [&](std::size_t task) {
+        const std::size_t i = largest_first[task < half ? 2 * task : 2 * (task - half) + 1];
         ProgressPart progress(context, steps[i]);
         const Loops* const carried_by = i > 0 ? &joints[i] : nullptr;
         planned[i] = plan_layer(context, {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr, carried_by}, i, progress);
