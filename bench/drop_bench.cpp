@@ -80,7 +80,7 @@ void make_solid(benchmark::State& state) {
         std::fprintf(stderr, "drop_bench: the pattern has only %zu facets\n", mesh.facets.size());
         std::exit(1);
     }
-    for (auto _ : state) benchmark::DoNotOptimize(layer_solid(context, mesh.view(), 0, 2 * pattern.height_mm).tree.nodes.data());
+    for (auto _ : state) benchmark::DoNotOptimize(layer_solid(context, mesh.view(), 0, 2 * pattern.height_mm).tree.tiers.data());
     state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(mesh.facets.size()));
 }
 

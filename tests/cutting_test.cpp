@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "kernels/cutting/drop.h"
@@ -213,6 +214,10 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
         mesh = test::height_field(context, 64, 0.25, [&](double x, double y) {
             return std::max(floor, 3 + 2 * std::sin(a * x + b * y) + std::cos(b * x) + uniform(-rough, rough));
         });
+        // Through it a wall of few facets, which has a tier of its own.
+        shapes::Facets facets = shapes::box({-8.5F, 0.6F, -9}, {8.5F, 0.9F, 4.25F});
+        for (const auto& f : mesh.facets) facets.push_back({mesh.vertices[f[0]], mesh.vertices[f[1]], mesh.vertices[f[2]]});
+        mesh = weld(context, facets);
     } else {
         shapes::Facets facets;
         for (int j = 0; j < 8; ++j)
@@ -225,6 +230,7 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
     const Vec3f away{number > 3 ? 1123.25F : -3.5F, number > 3 ? -877.5F : 2.25F, 0};
     for (Vec3f& v : mesh.vertices) v.x += away.x, v.y += away.y;
     const LayerSolid solid = layer_solid(context, mesh.view(), -20, 100);
+    EXPECT_EQ(solid.tree.tiers.size() > 1, number % 2 == 0);
     for (const double r : {0.4, 3.0, 12.0}) {
         const Cutter cutter{profile, r};
         const DropIndex index(solid, cutter);
@@ -233,6 +239,13 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
             const double x = away.x + (k % 4 ? uniform(-8 - r, 8 + r) : 0.25 * static_cast<double>(random() % 64) - 8),
                          y = away.y + (k % 4 ? uniform(-8 - r, 8 + r) : 0.25 * static_cast<double>(random() % 64) - 8);
             const Rest rest = index.drop(x, y);
+            for (const double z : {-1e9, -r, 0.2 * k, rest.tip_z, std::nextafter(rest.tip_z, -1e9), rest.tip_z + 1e-3, rest.tip_z - 1e-3}) {
+                EXPECT_EQ(index.stands_over(x, y, z), rest.tip_z > z) << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
+                const Rest above = index.drop(x, y, z);
+                EXPECT_EQ(above.tip_z, rest.tip_z > z ? rest.tip_z : -std::numeric_limits<double>::infinity()) << x << ' ' << y << ' ' << z;
+                if (rest.tip_z <= z) continue;
+                EXPECT_TRUE(above.nx == rest.nx && above.ny == rest.ny && above.nz == rest.nz) << x << ' ' << y << ' ' << z;
+            }
             if (rest.tip_z < -r) {
                 EXPECT_GE(room(mesh, 100, cutter, x, y, -r + 1e-6), 0) << x << ' ' << y;
                 continue;

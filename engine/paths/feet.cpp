@@ -68,7 +68,7 @@ void append_foot_runs(const LayerCut& cut, const Tool& tool, double floor, const
                 const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y, l = std::hypot(dx, dy);
                 for (const auto& [drops, radius] : wider)
                     // The solid is on the right, so the free side is on the left.
-                    if (l > 0 && drops->drop(to_mm(p.x) - dy / l * (radius + 0.02 - r), to_mm(p.y) + dx / l * (radius + 0.02 - r)).tip_z <= tip)
+                    if (l > 0 && !drops->stands_over(to_mm(p.x) - dy / l * (radius + 0.02 - r), to_mm(p.y) + dx / l * (radius + 0.02 - r), tip))
                         wanted[k] = 0;
             }
             append_level_runs(foot, c, to_units(tip), wanted, simplify_tolerance_units(cut.job.tolerances.gouge), levels.back());

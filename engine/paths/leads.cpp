@@ -29,7 +29,7 @@ std::optional<std::vector<PathPoint>> quarter(PathBuilder& path, const LayerCut&
             const double px = x - r * std::sin(a) * tx + r * (1 - std::cos(a)) * nx, py = y - r * std::sin(a) * ty + r * (1 - std::cos(a)) * ny;
             const PathPoint p{to_units(px), to_units(py), end.z};
             free = px >= cut.low(0, 1e9) && px <= cut.high(0, 1e9) && py >= cut.low(1, 1e9) && py <= cut.high(1, 1e9) && path.has_room({p.x, p.y}) &&
-                   part.drop(to_mm(p.x), to_mm(p.y)).tip_z <= z;
+                   !part.stands_over(to_mm(p.x), to_mm(p.y), z);
             arc.push_back(p);
         }
         if (free && path.standing_middle({arc.front().x, arc.front().y}) <= z + PathBuilder::kPlunge) return arc;

@@ -180,8 +180,7 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y, l = std::hypot(dx, dy);
                 if (l == 0) continue;
                 // The solid is on the right, so the free side is on the left.
-                const Rest rest = flat->drop(to_mm(p.x) - dy / l * (flat_r - r), to_mm(p.y) + dx / l * (flat_r - r));
-                if (rest.tip_z <= contact) wanted[k] = 0;
+                if (!flat->stands_over(to_mm(p.x) - dy / l * (flat_r - r), to_mm(p.y) + dx / l * (flat_r - r), contact)) wanted[k] = 0;
             }
             append_level_runs(level, c, to_units(tips[i]), wanted, simplify_tolerance_units(gouge), runs[i]);
         }

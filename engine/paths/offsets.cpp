@@ -138,7 +138,7 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
         const double contact = rest.contact_z(r);
         Place p{at.x, at.y, 0, rest.tip_z, false, rest.tip_z >= cut.layer.floor_below && !rest.on_cap, false};
         p.wanted = p.reachable && rest.nz >= keep_nz && contact >= cut.layer.z_bottom - 0.02 && contact < cut.layer.z_top - 1e-6;
-        if (p.wanted && rest.nz > level_nz && floor_done(contact) && flat.drop(x, y).tip_z <= contact + 1e-3) p.wanted = false;
+        if (p.wanted && rest.nz > level_nz && floor_done(contact) && !flat.stands_over(x, y, contact + 1e-3)) p.wanted = false;
         if (p.reachable) p.z = to_units(p.tip) + 1;
         return p;
     };

@@ -130,7 +130,7 @@ bool PathBuilder::part_leaves_way(Point2 from, Point2 to, std::int32_t z) const 
     const int steps = static_cast<int>(std::ceil(std::hypot(b[0] - a[0], b[1] - a[1]) / around_.chord));
     for (int k = 1; k < steps; ++k) {
         const double t = static_cast<double>(k) / steps, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
-        if (around_.part->drop(x, y).tip_z > to_mm(z) || !has_room({to_units(x), to_units(y)})) return false;
+        if (around_.part->stands_over(x, y, to_mm(z)) || !has_room({to_units(x), to_units(y)})) return false;
     }
     return true;
 }
@@ -188,7 +188,7 @@ bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
             const double turn = 2 * std::numbers::pi * (k % chords) / chords, c = std::cos(turn), s = std::sin(turn);
             circle.push_back({cx + radius * (uy * c + ux * s), cy + radius * (-ux * c + uy * s)});
             free = k == 0 || k == chords ||
-                   (around_.part->drop(circle.back()[0], circle.back()[1]).tip_z <= to_mm(first.z) &&
+                   (!around_.part->stands_over(circle.back()[0], circle.back()[1], to_mm(first.z)) &&
                     has_room({to_units(circle.back()[0]), to_units(circle.back()[1])}));
         }
         if (!free) continue;
@@ -257,7 +257,7 @@ bool PathBuilder::enter_from_side(const PathPoint& first) {
             const double turn = 2 * std::numbers::pi * k / kSideWays, far = ring * kSideStep * around_.cutter.radius * kUnitsPerMm;
             const Point2 beside{first.x + static_cast<std::int32_t>(std::lround(far * std::cos(turn))),
                                 first.y + static_cast<std::int32_t>(std::lround(far * std::sin(turn)))};
-            if (!has_room(beside) || around_.part->drop(to_mm(beside.x), to_mm(beside.y)).tip_z > to_mm(first.z) ||
+            if (!has_room(beside) || around_.part->stands_over(to_mm(beside.x), to_mm(beside.y), to_mm(first.z)) ||
                 standing_middle(beside) > to_mm(first.z) + kScrape || !part_leaves_way(beside, target, first.z))
                 continue;
             go_above(beside);

@@ -89,10 +89,10 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     // Whether the flat end mill finishes a floor's place: from right over it, or with its rim from beside a wall.
     auto flat_covers = [&](double x, double y, double z) {
         for (const auto& [flat_r, flat] : flats) {
-            if (flat->drop(x, y).tip_z <= z + 1e-3) return true;
+            if (!flat->stands_over(x, y, z + 1e-3)) return true;
             for (int k = 0; k < 8; ++k) {
                 const double turn = k * std::numbers::pi / 4, beside = 0.95 * flat_r;
-                if (flat->drop(x + beside * std::cos(turn), y + beside * std::sin(turn)).tip_z <= z + 1e-3) return true;
+                if (!flat->stands_over(x + beside * std::cos(turn), y + beside * std::sin(turn), z + 1e-3)) return true;
             }
         }
         return false;

@@ -25,6 +25,9 @@ constexpr double kSettle = 0.01;  // mm by which a low point of a line lies unde
 constexpr float kRise = 0.5F;     // mm: a wall that is lower than what stands beside it by less is as high
 constexpr double kBridge = 3.0;   // mm between two useful stretches that are travelled along the surface
 
+// The greatest number under a height: what stands over it is as high or higher.
+double just_under(double z) { return std::nextafter(z, -std::numeric_limits<double>::infinity()); }
+
 // A place of the cutter on the surface.
 struct Place {
     std::int32_t x = 0, y = 0, z = 0;  // 0.1 µm
@@ -74,7 +77,7 @@ public:
                     for (int i = 0, j = static_cast<int>(r); i < grid.nx; ++i) {
                         const std::size_t c = grid.index(i, j);
                         if (stock.left(c) <= pass.limit || (reach > 0 && beside_wall(i, j))) continue;
-                        if (probe && probe->drop(grid.x(i), grid.y(j)).tip_z >= stock.z_bottom() + stock.height(c) - 1e-3) continue;
+                        if (probe && probe->stands_over(grid.x(i), grid.y(j), just_under(stock.z_bottom() + stock.height(c) - 1e-3))) continue;
                         ++count;
                         if (!rows_[r].empty() && rows_[r].back()[1] + 1 == i) rows_[r].back()[1] = i;
                         else rows_[r].push_back({i, i});
@@ -219,7 +222,9 @@ private:
 
     [[nodiscard]] Place place(std::int32_t ux, std::int32_t uy) const {
         const double x = to_mm(ux), y = to_mm(uy);
-        const Rest rest = index_->drop(x, y);
+        // How far a flat end mill would go under the layer's bottom does not matter.
+        const double matters = ball_ ? -std::numeric_limits<double>::infinity() : std::max(cut_.layer.z_bottom, cut_.layer.floor_below);
+        const Rest rest = index_->drop(x, y, matters);
         Place p;
         p.x = ux;
         p.y = uy;
@@ -355,9 +360,9 @@ private:
             for (bool moved = true; moved;) {
                 moved = false;
                 for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
-                    const double lower = index_->drop(to_mm(x + dx * stride), to_mm(y + dy * stride)).tip_z;
-                    if (lower >= tip - 1e-4) continue;
-                    x += dx * stride, y += dy * stride, tip = lower, moved = true;
+                    const double at_x = to_mm(x + dx * stride), at_y = to_mm(y + dy * stride), less = tip - 1e-4;
+                    if (!(less < tip) || index_->stands_over(at_x, at_y, just_under(less))) continue;  // under nothing there is no lower
+                    x += dx * stride, y += dy * stride, tip = index_->drop(at_x, at_y).tip_z, moved = true;
                     break;
                 }
                 if (tip < cut_.layer.floor_below) break;

@@ -108,6 +108,56 @@ void drop_flat(const SolidFacet& f, double r, double x, double y, Best& best) {
     }
 }
 
+// The contact that lifts the cutter most, if that is above what it begins with. @param any whether the first one above that is enough
+template <bool ball>
+void search(const LayerSolid& solid, const DropProbe& probe, double r, double x, double y, bool any, Best& best) {
+    struct Waiting {
+        float bound;
+        std::uint32_t level, node;
+    };
+    constexpr int most_levels = 12, k_all = FacetTree::kTogether;
+    std::array<Waiting, most_levels * k_all> waiting;  // the highest bound of each level last
+    for (const FacetTree::Tier& tier : solid.tree.tiers) {
+        std::size_t count = 0;
+        waiting[count++] = {std::numeric_limits<float>::infinity(), static_cast<std::uint32_t>(tier.starts.size() - 2), 0};
+        while (count > 0) {
+            const Waiting now = waiting[--count];
+            if (now.bound <= best.tip_z) continue;
+            alignas(64) std::array<float, k_all> bounds;
+            const FacetTree::Node& node = tier.nodes[tier.starts[now.level] + now.node];
+            if (ball) ball_bounds(node, probe, bounds.data());
+            else flat_bounds(node, probe, bounds.data());
+            // The children worth a look, ascending.
+            std::array<std::uint32_t, k_all> order;
+            std::size_t n = 0;
+            for (std::uint32_t k = 0; k < k_all; ++k) {
+                if (bounds[k] <= best.tip_z) continue;
+                std::size_t at = n++;
+                for (; at > 0 && bounds[order[at - 1]] > bounds[k]; --at) order[at] = order[at - 1];
+                order[at] = k;
+            }
+            if (now.level > 0) {
+                for (std::size_t i = 0; i < n; ++i) waiting[count++] = {bounds[order[i]], now.level - 1, k_all * now.node + order[i]};
+                continue;
+            }
+            // Most of them are looked at, and far apart in memory.
+            const std::uint32_t* const facets = tier.facets.data() + std::size_t{k_all} * now.node;
+            for (std::size_t i = 0; i < n; ++i) {
+                const SolidFacet& f = solid.facets[facets[order[i]]];
+                __builtin_prefetch(&f);
+                __builtin_prefetch(&f.z_max);
+            }
+            while (n-- > 0 && bounds[order[n]] > best.tip_z) {
+                const SolidFacet& f = solid.facets[facets[order[n]]];
+                const double before = best.tip_z;
+                if (ball) drop_ball(f, r, x, y, best);
+                else drop_flat(f, r, x, y, best);
+                if (any && best.tip_z > before) return;
+            }
+        }
+    }
+}
+
 }  // namespace
 
 DropIndex::DropIndex(const LayerSolid& solid, const Cutter& cutter) : solid_(solid), cutter_(cutter) {
@@ -121,57 +171,38 @@ DropIndex::DropIndex(const LayerSolid& solid, const Cutter& cutter) : solid_(sol
     probe_.spare = static_cast<float>(5e-7 * (std::abs(solid.z_low) + std::abs(solid.z_top) + 4 * r) + 8 * unit);
 }
 
-Rest DropIndex::drop(double x, double y) const {
+bool DropIndex::nothing_near(double x, double y) const {
+    const double r = cutter_.radius;
+    return solid_.tree.tiers.empty() || !(x >= solid_.min[0] - r && x <= solid_.max[0] + r && y >= solid_.min[1] - r && y <= solid_.max[1] + r);
+}
+
+DropProbe DropIndex::probe_at(double x, double y) const {
+    DropProbe probe = probe_;
+    probe.x = solid_.tree.x_units(x), probe.y = solid_.tree.y_units(y);
+    return probe;
+}
+
+Rest DropIndex::drop(double x, double y, double above) const {
     Rest rest;
     rest.tip_z = -std::numeric_limits<double>::infinity();
-    const FacetTree& tree = solid_.tree;
-    if (tree.nodes.empty()) return rest;
+    if (nothing_near(x, y)) return rest;
     if (solid_.cap_cells.inside(x, y)) return {solid_.z_top, 0.0F, 0.0F, 1.0F, true};
-    const double r = cutter_.radius;
-    if (!(x >= solid_.min[0] - r && x <= solid_.max[0] + r && y >= solid_.min[1] - r && y <= solid_.max[1] + r)) return rest;
-    DropProbe probe = probe_;
-    probe.x = tree.x_units(x), probe.y = tree.y_units(y);
-    const bool ball = cutter_.profile == Cutter::Profile::ball;
     Best best;
-    struct Waiting {
-        float bound;
-        std::uint32_t level, node;
-    };
-    constexpr int most_levels = 12, k_all = FacetTree::kTogether;
-    std::array<Waiting, most_levels * k_all> waiting;  // the highest bound of each level last
-    std::size_t count = 0;
-    waiting[count++] = {std::numeric_limits<float>::infinity(), static_cast<std::uint32_t>(tree.starts.size() - 2), 0};
-    while (count > 0) {
-        const Waiting now = waiting[--count];
-        if (now.bound <= best.tip_z) continue;
-        alignas(64) std::array<float, k_all> bounds;
-        const FacetTree::Node& node = tree.nodes[tree.starts[now.level] + now.node];
-        if (ball) ball_bounds(node, probe, bounds.data());
-        else flat_bounds(node, probe, bounds.data());
-        // The children worth a look, ascending.
-        std::array<std::uint32_t, k_all> order;
-        std::size_t n = 0;
-        for (std::uint32_t k = 0; k < k_all; ++k) {
-            if (bounds[k] <= best.tip_z) continue;
-            std::size_t at = n++;
-            for (; at > 0 && bounds[order[at - 1]] > bounds[k]; --at) order[at] = order[at - 1];
-            order[at] = k;
-        }
-        if (now.level > 0) {
-            for (std::size_t i = 0; i < n; ++i) waiting[count++] = {bounds[order[i]], now.level - 1, k_all * now.node + order[i]};
-            continue;
-        }
-        while (n-- > 0 && bounds[order[n]] > best.tip_z) {
-            const SolidFacet& f = solid_.facets[tree.facets[std::size_t{k_all} * now.node + order[n]]];
-            if (ball) drop_ball(f, r, x, y, best);
-            else drop_flat(f, r, x, y, best);
-        }
-    }
-    rest.tip_z = best.tip_z;
-    rest.nx = static_cast<float>(best.nx);
-    rest.ny = static_cast<float>(best.ny);
-    rest.nz = static_cast<float>(best.nz);
+    best.tip_z = above;
+    if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, false, best);
+    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, false, best);
+    if (best.tip_z > above) rest = {best.tip_z, static_cast<float>(best.nx), static_cast<float>(best.ny), static_cast<float>(best.nz), false};
     return rest;
+}
+
+bool DropIndex::stands_over(double x, double y, double z) const {
+    if (nothing_near(x, y)) return false;
+    if (solid_.cap_cells.inside(x, y)) return solid_.z_top > z;
+    Best best;
+    best.tip_z = z;
+    if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, true, best);
+    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, true, best);
+    return best.tip_z > z;
 }
 
 }  // namespace slabwright

@@ -1,6 +1,8 @@
 // Dropping a ball onto the layer's solid: how low its tip may go over a point (the cutter-location surface).
 #pragma once
 
+#include <limits>
+
 #include "kernels/cutting/cutter.h"
 #include "kernels/cutting/layer_solid.h"
 
@@ -23,10 +25,15 @@ public:
     DropIndex(const LayerSolid& solid, const Cutter& cutter);
     /// Exact over facets, edges and vertices (for a flat cutter over their shadow, tip on the highest of them). Of contacts that are equally
     /// high the one is given that the solid's tree leads to first.
-    [[nodiscard]] Rest drop(double x, double y) const;
+    /// @param above mm: a tip that is no higher need not be told, but may be given as −infinity
+    [[nodiscard]] Rest drop(double x, double y, double above = -std::numeric_limits<double>::infinity()) const;
+    /// Whether drop(x, y).tip_z > z, in a fraction of its time.
+    [[nodiscard]] bool stands_over(double x, double y, double z) const;
     [[nodiscard]] const Cutter& cutter() const { return cutter_; }
 
 private:
+    [[nodiscard]] bool nothing_near(double x, double y) const;
+    [[nodiscard]] DropProbe probe_at(double x, double y) const;
     const LayerSolid& solid_;
     Cutter cutter_;
     DropProbe probe_;

@@ -15,6 +15,8 @@ namespace {
 constexpr double kSteepest = 2;   // slope: what is steeper is bounded by its highest point alone
 constexpr float kOutside = 3.0F;  // units: what rounding places to them may take from a distance
 constexpr std::size_t kLeaf = FacetTree::kTogether;
+constexpr std::uint64_t kSizes = 3;  // of facets, each in a tier
+constexpr std::size_t kGrain = std::size_t{1} << 14;
 constexpr float kNowhere = -std::numeric_limits<float>::infinity();
 
 float rounded_up(double v) {
@@ -44,56 +46,35 @@ FacetTree::Node empty_node() {
 
 std::int32_t middle(std::int32_t low, std::int32_t high) { return low + (high - low) / 2; }
 
-}  // namespace
+std::array<double, 2> extent(const SolidFacet& f, std::size_t axis) {
+    const auto [low, high] = std::minmax({f.p[0][axis], f.p[1][axis], f.p[2][axis]});
+    return {low, high};
+}
 
-FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const std::array<double, 2>& min, const std::array<double, 2>& max) {
-    FacetTree tree;
-    const std::size_t n = facets.size();
-    if (n == 0) return tree;
-    const double width = max[0] - min[0], depth = max[1] - min[1];
-    tree.x0 = min[0], tree.y0 = min[1];
-    tree.unit = (std::max(width, depth) + 2 * FacetTree::kWidestCutter) / (1 << 29);
-    auto box = [&](const SolidFacet& f, int axis) { return std::minmax({f.p[0][axis], f.p[1][axis], f.p[2][axis]}); };
-
-    // The facets along the curve; those that are larger than a mesh as fine as the mean has them apart, so that they do not widen the others' nodes.
-    const double mean = std::sqrt(std::max(width * depth, 1e-12) / static_cast<double>(n));
-    const double to_curve = ((1 << 15) - 1) / std::max({width, depth, 1e-9});
-    std::vector<std::uint64_t> keys(n);
-    constexpr std::size_t grain = std::size_t{1} << 14;
-    parallel_for(context, n, grain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const auto [xl, xh] = box(facets[i], 0);
-            const auto [yl, yh] = box(facets[i], 1);
-            const double extent = std::max(xh - xl, yh - yl);
-            const std::uint64_t size = extent <= 8 * mean ? 0 : extent <= 64 * mean ? 1 : 2;
-            const std::uint32_t along = hilbert(static_cast<std::uint32_t>((0.5 * (xl + xh) - min[0]) * to_curve),
-                                                static_cast<std::uint32_t>((0.5 * (yl + yh) - min[1]) * to_curve));
-            keys[i] = size << 62 | static_cast<std::uint64_t>(along) << 32 | i;
-        }
+// The tree of the facets that keys name in their lower halves, in that order.
+FacetTree::Tier tier(Context& context, std::span<const SolidFacet> facets, const FacetTree& tree, std::span<const std::uint64_t> keys) {
+    FacetTree::Tier tier;
+    const std::size_t n = keys.size();
+    tier.facets.resize(n);
+    parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) tier.facets[i] = static_cast<std::uint32_t>(keys[i]);
     });
-    parallel_sort(context, keys.begin(), keys.end(), std::less<>());
-    tree.facets.resize(n);
-    parallel_for(context, n, grain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) tree.facets[i] = static_cast<std::uint32_t>(keys[i]);
-    });
-    std::vector<std::uint64_t>().swap(keys);
-
-    tree.starts = {0};
+    tier.starts = {0};
     for (std::size_t level = (n + kLeaf - 1) / kLeaf;; level = (level + kLeaf - 1) / kLeaf) {
-        tree.starts.push_back(tree.starts.back() + static_cast<std::uint32_t>(level));
+        tier.starts.push_back(tier.starts.back() + static_cast<std::uint32_t>(level));
         if (level == 1) break;
     }
-    tree.nodes.resize(tree.starts.back());
+    tier.nodes.resize(tier.starts.back());
 
     auto low_units = [&](double v, double from) { return static_cast<std::int32_t>(std::floor((v - from) / tree.unit)); };
     auto high_units = [&](double v, double from) { return static_cast<std::int32_t>(std::ceil((v - from) / tree.unit)); };
-    parallel_for(context, tree.starts[1], grain / kLeaf, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, tier.starts[1], kGrain / kLeaf, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             FacetTree::Node node = empty_node();
             for (std::size_t k = 0; k < kLeaf && kLeaf * i + k < n; ++k) {
-                const SolidFacet& f = facets[tree.facets[kLeaf * i + k]];
-                const auto [xl, xh] = box(f, 0);
-                const auto [yl, yh] = box(f, 1);
+                const SolidFacet& f = facets[tier.facets[kLeaf * i + k]];
+                const auto [xl, xh] = extent(f, 0);
+                const auto [yl, yh] = extent(f, 1);
                 node.x_low[k] = low_units(xl, tree.x0), node.x_high[k] = high_units(xh, tree.x0);
                 node.y_low[k] = low_units(yl, tree.y0), node.y_high[k] = high_units(yh, tree.y0);
                 node.z_max[k] = node.z_mid[k] = rounded_up(f.z_max);
@@ -106,16 +87,16 @@ FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const
                 for (const Vec3d& p : f.p) z = std::max(z, p[2] - node.gx[k] * (p[0] - cx) - node.gy[k] * (p[1] - cy));
                 node.z_mid[k] = rounded_up(z);
             }
-            tree.nodes[i] = node;
+            tier.nodes[i] = node;
         }
     });
-    for (std::size_t level = 1; level + 1 < tree.starts.size(); ++level) {
-        const std::size_t below = tree.starts[level - 1], first = tree.starts[level], children = first - below;
-        parallel_for(context, tree.starts[level + 1] - first, grain / kLeaf, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t level = 1; level + 1 < tier.starts.size(); ++level) {
+        const std::size_t below = tier.starts[level - 1], first = tier.starts[level], children = first - below;
+        parallel_for(context, tier.starts[level + 1] - first, kGrain / kLeaf, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
                 FacetTree::Node node = empty_node();
                 for (std::size_t k = 0; k < kLeaf && kLeaf * i + k < children; ++k) {
-                    const FacetTree::Node& child = tree.nodes[below + kLeaf * i + k];
+                    const FacetTree::Node& child = tier.nodes[below + kLeaf * i + k];
                     std::int32_t xl = INT32_MAX, xh = INT32_MIN, yl = INT32_MAX, yh = INT32_MIN;
                     double z_max = kNowhere, weight = 0, gx = 0, gy = 0;
                     for (std::size_t c = 0; c < kLeaf && child.z_max[c] > kNowhere; ++c) {
@@ -142,9 +123,42 @@ FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const
                     }
                     node.z_mid[k] = rounded_up(z);
                 }
-                tree.nodes[first + i] = node;
+                tier.nodes[first + i] = node;
             }
         });
+    }
+    return tier;
+}
+
+}  // namespace
+
+FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const std::array<double, 2>& min, const std::array<double, 2>& max) {
+    FacetTree tree;
+    const std::size_t n = facets.size();
+    if (n == 0) return tree;
+    const double width = max[0] - min[0], depth = max[1] - min[1];
+    tree.x0 = min[0], tree.y0 = min[1];
+    tree.unit = (std::max(width, depth) + 2 * FacetTree::kWidestCutter) / (1 << 29);
+
+    // The facets along the curve; those that are larger than a mesh as fine as the mean has them apart, so that they do not widen the others' nodes.
+    const double mean = std::sqrt(std::max(width * depth, 1e-12) / static_cast<double>(n));
+    const double to_curve = ((1 << 15) - 1) / std::max({width, depth, 1e-9});
+    std::vector<std::uint64_t> keys(n);
+    parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const auto [xl, xh] = extent(facets[i], 0);
+            const auto [yl, yh] = extent(facets[i], 1);
+            const double widest = std::max(xh - xl, yh - yl);
+            const std::uint64_t size = widest <= 8 * mean ? 0 : widest <= 64 * mean ? 1 : 2;
+            const std::uint32_t along = hilbert(static_cast<std::uint32_t>((0.5 * (xl + xh) - min[0]) * to_curve),
+                                                static_cast<std::uint32_t>((0.5 * (yl + yh) - min[1]) * to_curve));
+            keys[i] = size << 62 | static_cast<std::uint64_t>(along) << 32 | i;
+        }
+    });
+    parallel_sort(context, keys.begin(), keys.end(), std::less<>());
+    for (std::uint64_t size = 0; size < kSizes; ++size) {
+        const auto begin = std::lower_bound(keys.begin(), keys.end(), size << 62), end = std::lower_bound(begin, keys.end(), (size + 1) << 62);
+        if (begin != end) tree.tiers.push_back(tier(context, facets, tree, std::span(begin, end)));
     }
     return tree;
 }

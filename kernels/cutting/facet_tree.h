@@ -25,17 +25,20 @@ struct FacetTree {
         std::array<float, kTogether> z_max;                                ///< mm
         std::array<float, kTogether> z_mid, gx, gy;                        ///< the plane: its height over the middle of the box, mm, and its slopes
     };
-    std::vector<Node> nodes;            ///< the leaves first, then level on level; child k of a level's node i is node 8·i + k of the one below
-    std::vector<std::uint32_t> starts;  ///< of each level in `nodes`, and their end
-    std::vector<std::uint32_t> facets;  ///< in the order of the leaves
-    double x0 = 0, y0 = 0, unit = 1;    ///< mm
+    /// Facets of about one size: those that are much larger than the others would widen the others' nodes, and be looked at first.
+    struct Tier {
+        std::vector<Node> nodes;            ///< the leaves first, then level on level; child k of a level's node i is node 8·i + k of the one below
+        std::vector<std::uint32_t> starts;  ///< of each level in `nodes`, and their end
+        std::vector<std::uint32_t> facets;  ///< in the order of the leaves
+    };
+    std::vector<Tier> tiers;          ///< the smallest facets first; each has some
+    double x0 = 0, y0 = 0, unit = 1;  ///< mm
 
     [[nodiscard]] std::int32_t x_units(double x) const { return static_cast<std::int32_t>((x - x0) / unit); }
     [[nodiscard]] std::int32_t y_units(double y) const { return static_cast<std::int32_t>((y - y0) / unit); }
 };
 
-/// The tree of facets whose extent in the plane is [min, max], mm. Neighbours along a Hilbert curve share a node, and facets that are much
-/// larger than their share of the area have nodes of their own.
+/// The tree of facets whose extent in the plane is [min, max], mm. Neighbours along a Hilbert curve share a node.
 [[nodiscard]] FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const std::array<double, 2>& min,
                                    const std::array<double, 2>& max);
 
