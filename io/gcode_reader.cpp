@@ -39,6 +39,7 @@ public:
             std::string_view line = text_.substr(at, end - at);
             if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
             ++line_;
+            read_ = end;
             execute(parse(line));
             at = end + 1;
         }
@@ -325,7 +326,17 @@ private:
             program_.arcs.push_back({begin, program_.steps.size(), {ca, cb, to[2], (r0 + r1) / 2, start, sweep}});
     }
 
+    /// Arcs have many chords: as many are foreseen in what is left of the text as have come of what was read.
+    void make_room() {
+        std::vector<ProgramStep>& steps = program_.steps;
+        if (steps.size() < steps.capacity()) return;
+        const double so_far = static_cast<double>(steps.size() + 1),
+                     all = so_far * static_cast<double>(text_.size()) / static_cast<double>(read_ + 1);
+        steps.reserve(static_cast<std::size_t>(std::clamp(1.05 * all, 1.25 * so_far, 4 * so_far)) + 64);
+    }
+
     void step(const std::array<double, 3>& to, double feed) {
+        make_room();
         program_.steps.push_back({to[0], to[1], to[2], feed, line_, turning_ && speed_ > 0});
         at_ = to;
     }
@@ -345,6 +356,7 @@ private:
     GcodeLimits limits_;
     Program program_;
     std::uint32_t line_ = 0;
+    std::size_t read_ = 0;  // of the text
     bool ended_ = false;
     Motion motion_ = Motion::none;
     std::array<int, 3> plane_{0, 1, 2};

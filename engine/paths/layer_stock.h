@@ -33,9 +33,17 @@ public:
     /// Takes away what one place of a cutter covers.
     void cut_at(const CutterEnd& end, double x, double y, double tip_z);
 
-    /// All heights, to try something and undo it.
-    [[nodiscard]] const std::vector<float>& heights() const { return height_; }
-    void restore(std::vector<float> heights) { height_ = std::move(heights); }
+    /// A copy of all heights, to try something and undo it. One that was undone leaves its memory to the next: new memory of that size costs more than
+    /// the copying.
+    [[nodiscard]] std::vector<float> heights() {
+        std::vector<float> copy = std::move(spare_);
+        copy.assign(height_.begin(), height_.end());
+        return copy;
+    }
+    void restore(std::vector<float> heights) {
+        height_.swap(heights);
+        spare_ = std::move(heights);
+    }
 
     [[nodiscard]] const CellGrid& grid() const { return grid_; }
     [[nodiscard]] double z_bottom() const { return z_bottom_; }
@@ -56,7 +64,7 @@ public:
 private:
     CellGrid grid_;
     double z_bottom_ = 0;
-    std::vector<float> height_, surface_;
+    std::vector<float> height_, surface_, spare_;
     std::vector<std::uint8_t> nz_;
 };
 

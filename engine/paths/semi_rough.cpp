@@ -156,7 +156,7 @@ public:
     Operation run() {
         Operation op = cut_.operation(OperationKind::semi_rough, pass_.purpose, tool_);
         if (stock_.area_over(cut_.context, pass_.limit) == 0) return op;
-        const std::vector<float> before = stock_.heights();
+        std::vector<float> before = stock_.heights();
         const std::vector<RoughLevel> levels = rough_levels(cut_, tool_, 0);
         std::vector<double> tips;
         for (const RoughLevel& l : levels) tips.push_back(l.tip);
@@ -196,7 +196,7 @@ public:
             if (floor) append_foot_runs(cut_, tool_, tips[i], grid, wider, runs);
         }
         emit(op, runs);
-        stock_.restore(before);
+        stock_.restore(std::move(before));
         if (stock_.cut(cut_, op, tool_).nothing()) op.moves.clear();
         return op;
     }
