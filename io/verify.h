@@ -31,8 +31,8 @@ struct Verification {
 /// How a plan's programs are read: chords that stand for an arc take next to nothing of the gouge tolerance that the paths were made for.
 [[nodiscard]] GcodeLimits gcode_limits(const Tolerances& tolerances);
 
-/// Reads plan.json, every program of nc/, tool.tbl and the STL, simulates, and writes OUT/verify.json (a whole file or none). The
-/// report's violations say what is wrong with programs and part; `report.passed()` is the verdict.
+/// Reads plan.json, every program of nc/, tool.tbl and, if it is not given, the pattern, simulates, and writes OUT/verify.json (a whole file or
+/// none). The report's violations say what is wrong with programs and part; `report.passed()` is the verdict.
 /// @throws Error(verification) when OUT cannot be understood: plan.json missing or not of schema slabwright.plan/1 or without
 ///   a key (names it), a program that read_gcode refuses (file:line)
 /// @throws Error(input) when the STL is missing, unreadable, or not the one that was planned (by its SHA-256)

@@ -1,5 +1,5 @@
 // What part would result if the machine ran these programs? Programs, tools, layers and the pattern go in as values,
-// a report comes out. Nothing of the planner's memory is used: all that is here was read from OUT.
+// a report comes out. All but the pattern was read from OUT; the pattern may be the one that was planned, as its file was read.
 #pragma once
 
 #include <array>
