@@ -144,6 +144,51 @@ TEST(Sweep, LeavesOutWhatStandsLower) {
     }
 }
 
+// What is told of many spans at once is what each cell says, at the rows' ends as well; and the level in floats parts heights as doubles do.
+TEST(Sweep, SpansAgreeWithTheirCells) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(0, 1);
+    for (int trial = 0; trial < 400; ++trial) {
+        const int nx = 1 + static_cast<int>(random() % 40), rows = 1 + static_cast<int>(random() % RowSpans::kRows);
+        const double bottom = trial % 4 == 0 ? 0 : 40 * u(random), share = std::pow(u(random), 3);
+        std::vector<float> heights(static_cast<std::size_t>(nx * rows));
+        for (float& h : heights) h = u(random) < share ? static_cast<float>(3 * u(random)) : 0.5F;
+        // Often the level is that of a cell, to the last bit.
+        const float some = heights[random() % heights.size()];
+        const double z = trial % 3 == 0 ? bottom + 3 * u(random) : bottom + static_cast<double>(some), level_z = trial % 7 == 0 ? bottom : z;
+        const float level = level_over(bottom, level_z);
+        EXPECT_LE(bottom + static_cast<double>(level), level_z);
+        EXPECT_GT(bottom + static_cast<double>(std::nextafter(level, 1e30F)), level_z);
+        RowSpans spans;
+        const auto some_span = [&](std::int32_t& first, std::int32_t& last) {
+            first = static_cast<std::int32_t>(random() % static_cast<unsigned>(nx + 1));
+            last = random() % 3 == 0 ? first - 1 : std::min<std::int32_t>(nx - 1, first + static_cast<std::int32_t>(random() % 24));
+        };
+        for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k)
+            some_span(spans.low[k], spans.left[k]), some_span(spans.right[k], spans.high[k]);
+        const OverSpans over = spans_over(heights.data(), static_cast<std::size_t>(nx), rows, spans, level);
+        std::vector<float> lowered = heights, expected = heights;
+        lower_spans(lowered.data(), static_cast<std::size_t>(nx), rows, spans, level_z);
+        for (int k = 0; k < rows; ++k) {
+            const auto row = static_cast<std::size_t>(k);
+            const auto any = [&](std::int32_t first, std::int32_t last) {
+                bool found = false;
+                for (std::int32_t i = first; i <= last; ++i) {
+                    const std::size_t c = row * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i);
+                    found = found || bottom + static_cast<double>(heights[c]) > level_z;
+                    expected[c] = std::min(expected[c], static_cast<float>(std::max(0.0, level_z)));
+                }
+                return found;
+            };
+            EXPECT_EQ((over.left >> row & 1) != 0, any(spans.low[row], spans.left[row])) << "trial " << trial << " row " << k;
+            EXPECT_EQ((over.right >> row & 1) != 0, any(spans.right[row], spans.high[row])) << "trial " << trial << " row " << k;
+        }
+        EXPECT_EQ(lowered, expected) << "trial " << trial;
+    }
+    EXPECT_EQ(level_over(1e300, 5), -std::numeric_limits<float>::infinity());
+}
+
 // Takes rows of cells over kBottom at once.
 constexpr double kBottom = -20;
 struct RowsOver {

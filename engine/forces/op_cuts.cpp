@@ -54,7 +54,7 @@ struct Meeting {
         h.fill(z);
         for (int k = 0; k < n; k += kSweptTogether) {
             const int cells = std::min(kSweptTogether, n - k);
-            if (any_over(height + first + k, 0, cells, z)) row(first + static_cast<std::size_t>(k), cells, h.data(), z);
+            if (n == cells || any_over(height + first + k, 0, cells, z)) row(first + static_cast<std::size_t>(k), cells, h.data(), z);
         }
     }
 };

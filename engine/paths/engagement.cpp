@@ -39,7 +39,7 @@ struct Taking {
         for (int begin = 0; begin < n; begin += kSweptTogether) {
             const int cells = std::min(kSweptTogether, n - begin);
             float* const row = height + first + begin;
-            if (!any_over(row, 0, cells, z)) continue;
+            if (n > cells && !any_over(row, 0, cells, z)) continue;
             if (way.count > 1)
                 edge_parts(way, grid.x(static_cast<int>(first % nx) + begin) - from[0], grid.cell, py, cells, part.data(), across.data());
             for (int k = 0; k < cells; ++k) {

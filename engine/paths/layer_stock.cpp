@@ -27,9 +27,10 @@ struct Box {
 // Lowers cells of a band of rows.
 struct Lowering {
     float* height;
+    std::size_t nx;
     void operator()(std::size_t cell, double z) { height[cell] = std::min(height[cell], static_cast<float>(std::max(0.0, z))); }
     void row(std::size_t first, int n, const double* h, double /*lowest*/) { lower_to(height + first, n, h); }
-    void level(std::size_t first, int n, double z) { lower_to(height + first, n, z); }
+    void spans(std::size_t first, int rows, const RowSpans& s, double z) { lower_spans(height + first, nx, rows, s, z); }
 };
 
 // How heights are lower than they were.
@@ -152,7 +153,7 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         const CellGrid part{grid_.x0, grid_.y(first), grid_.cell, grid_.nx, rows};
         const double y0 = part.y0 - r, y1 = part.y(rows - 1) + r;
         float* height = height_.data() + grid_.index(0, first);
-        Lowering lowering{height};
+        Lowering lowering{height, static_cast<std::size_t>(grid_.nx)};
         std::vector<float> before;  // of a band that the operation comes to
         for (std::size_t b = 0; b < boxes.size(); ++b) {
             if (boxes[b].y1 < y0 || boxes[b].y0 > y1 || boxes[b].z0 >= top) continue;

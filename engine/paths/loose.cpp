@@ -69,9 +69,16 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
                 for (int i = i0; i <= i1; ++i) holds[grid.index(i, j)] = 1;
             }
 
+    // Cells in the order in which they are put back: those that are never cut through, then the last move's first; of one move's by number.
     std::vector<std::uint32_t> order(grid.count());
-    for (std::size_t c = 0; c < order.size(); ++c) order[c] = static_cast<std::uint32_t>(c);
-    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return when[a] != when[b] ? when[a] > when[b] : a < b; });
+    {
+        const std::size_t count = place.size();
+        const auto turn = [&](std::uint32_t move) { return move == kNever ? 0 : count - move; };
+        std::vector<std::uint32_t> begins(count + 2, 0);
+        for (const std::uint32_t move : when) ++begins[turn(move) + 1];
+        for (std::size_t t = 1; t < begins.size(); ++t) begins[t] += begins[t - 1];
+        for (std::size_t c = 0; c < when.size(); ++c) order[begins[turn(when[c])]++] = static_cast<std::uint32_t>(c);
+    }
 
     std::vector<Piece> pieces(grid.count());
     auto root = [&](std::uint32_t c) {

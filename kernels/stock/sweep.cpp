@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "kernels/wide.h"
 
@@ -101,6 +102,96 @@ SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows
     }
 }
 
+float level_over(double bottom, double level) {
+    const auto under = [&](float h) { return bottom + static_cast<double>(h) <= level; };
+    constexpr float inf = std::numeric_limits<float>::infinity();
+    const auto near = static_cast<float>(level - bottom), below = std::nextafter(near, -inf), above = std::nextafter(near, inf);
+    if (under(near) && !under(above)) return near;
+    if (under(below) && !under(near)) return below;
+    // Where many heights near nothing make the same sum: halving among all floats, whose bits are ordered as they are.
+    const auto of = [](std::int32_t order) { return std::bit_cast<float>(order >= 0 ? order : std::numeric_limits<std::int32_t>::min() - order); };
+    std::int64_t low = -std::bit_cast<std::int32_t>(inf), high = -low;
+    while (low < high) {
+        const std::int64_t middle = low + (high - low + 1) / 2;
+        if (under(of(static_cast<std::int32_t>(middle)))) low = middle;
+        else high = middle - 1;
+    }
+    return of(static_cast<std::int32_t>(low));
+}
+
+namespace {
+
+constexpr int kLanes = 8;
+using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
+using Bits [[gnu::vector_size(kLanes * sizeof(std::int32_t))]] = std::int32_t;
+
+// (Vectors are handed on by reference: how one is passed by value depends on the instruction set.)
+[[gnu::always_inline]] inline void load(const float* from, Floats& v) { std::memcpy(&v, from, sizeof v); }
+
+// Calls fn(eight, mask) for all of the cells [first, last] of a row, eight at a time; the last eight may hold cells that came before. In a
+// shorter span the mask tells which of the eight that end with it are its own. fn(cell) where a row has too few before them.
+template <class Eight, class One>
+[[gnu::always_inline]] inline void by_eights(std::int32_t first, std::int32_t last, Eight&& eight, One&& one) {
+    constexpr Bits lane{0, 1, 2, 3, 4, 5, 6, 7};
+    if (first > last) return;
+    const std::int32_t end = last + 1 - kLanes;
+    if (first <= end) {
+        for (std::int32_t i = first; i < end; i += kLanes) eight(i, Bits{} == Bits{});
+        eight(end, Bits{} == Bits{});
+    } else if (end >= 0) {
+        eight(end, lane >= first - end);
+    } else {
+        for (std::int32_t i = first; i <= last; ++i) one(i);
+    }
+}
+
+[[gnu::always_inline]] inline bool over_in(const float* row, std::int32_t first, std::int32_t last, float level) {
+    Bits over{};
+    bool any = false;
+    by_eights(
+        first, last,
+        [&](std::int32_t i, const Bits& mask) {
+            Floats h;
+            load(row + i, h);
+            over |= (h > level) & mask;
+        },
+        [&](std::int32_t i) { any |= row[i] > level; });
+    std::array<std::uint64_t, sizeof over / sizeof(std::uint64_t)> words;
+    std::memcpy(words.data(), &over, sizeof over);
+    return any || (words[0] | words[1] | words[2] | words[3]) != 0;
+}
+
+[[gnu::always_inline]] inline void lower_in(float* row, std::int32_t first, std::int32_t last, float level) {
+    by_eights(
+        first, last,
+        [&](std::int32_t i, const Bits& mask) {
+            Floats h;
+            load(row + i, h);
+            const Floats lowered = ((h > level) & mask) ? Floats{} + level : h;
+            std::memcpy(row + i, &lowered, sizeof lowered);
+        },
+        [&](std::int32_t i) { row[i] = level < row[i] ? level : row[i]; });
+}
+
+}  // namespace
+
+SLABWRIGHT_WIDE OverSpans spans_over(const float* height, std::size_t nx, int rows, const RowSpans& spans, float level) {
+    OverSpans over;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k, height += nx) {
+        over.left |= std::uint64_t{over_in(height, spans.low[k], spans.left[k], level)} << k;
+        over.right |= std::uint64_t{over_in(height, spans.right[k], spans.high[k], level)} << k;
+    }
+    return over;
+}
+
+SLABWRIGHT_WIDE void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, double z) {
+    const auto level = static_cast<float>(z > 0 ? z : 0.0);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k, height += nx) {
+        lower_in(height, spans.low[k], spans.left[k], level);
+        lower_in(height, spans.right[k], spans.high[k], level);
+    }
+}
+
 SLABWRIGHT_WIDE void lower_to(float* __restrict height, int n, const double* __restrict h) {
     for (int k = 0; k < n; ++k) {
         const auto left = static_cast<float>(h[k] > 0 ? h[k] : 0.0);
@@ -116,7 +207,8 @@ SLABWRIGHT_WIDE void lower_to(float* height, int n, double z) {
 SLABWRIGHT_WIDE void edge_parts(const PartedWay& way, double px, double cell, double py, int n, std::int32_t* __restrict part,
                                 double* __restrict across) {
     const double r2 = way.radius * way.radius, last = way.count - 1;
-    for (int k = 0; k < n; ++k) {
+    const int cells = (n + kLanes - 1) / kLanes * kLanes;
+    for (int k = 0; k < cells; ++k) {
         const double x = px + k * cell, aside = way.dx * py - way.dy * x, w2 = r2 - aside * aside;
         const double met = (x * way.dx + py * way.dy - std::sqrt(w2 > 0 ? w2 : 0.0)) * way.per_mm, from_begin = met > 0 ? met : 0.0;
         part[k] = static_cast<std::int32_t>(from_begin < last ? from_begin : last);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -103,7 +104,7 @@ struct PartedWay {
     int count = 1;
 };
 /// Of n cells in a row, whose centres lie from (px, py) on `cell` apart as seen from the way's begin: on which part the edge of a disc comes to
-/// each, or the first where it is there already; and how far each lies left of the way, mm.
+/// each, or the first where it is there already; and how far each lies left of the way, mm. Both have room for whole eights of cells.
 void edge_parts(const PartedWay& way, double px, double cell, double py, int n, std::int32_t* part, double* across);
 
 /// Whether any of n heights over `bottom` is over a level.
@@ -120,6 +121,17 @@ struct RowSpans {
 /// @param rows at most RowSpans::kRows, from first_row on  @param been whether the disc has been where it starts; else nothing is left out
 void spans_of_rows(const CellGrid& grid, int first_row, int rows, const std::array<double, 2>& from, const std::array<double, 2>& to, double radius,
                    bool been, RowSpans& spans);
+
+/// The greatest float h with bottom + h ≤ level: heights over `bottom` are over the level if they are over it.
+[[nodiscard]] float level_over(double bottom, double level);
+/// Of which rows the left and the right span hold a height over a level: a bit for each row, the first row's lowest.
+struct OverSpans {
+    std::uint64_t left = 0, right = 0;
+};
+/// @param height of the first row's first cell; rows lie nx apart
+[[nodiscard]] OverSpans spans_over(const float* height, std::size_t nx, int rows, const RowSpans& spans, float level);
+/// Lowers the heights in all spans to max(0, z), where they are over it.
+void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, double z);
 
 /// What else of a chain of straight motions is swept, so that no cell is asked twice about the place where two of them meet.
 struct ChainedSweep {
@@ -188,11 +200,11 @@ void take_row(Fn& fn, std::size_t first, int n, const double* h, double lowest) 
         for (int i = 0; i < n; ++i)
             if (h[i] < kUncovered) fn(first + static_cast<std::size_t>(i), h[i]);
 }
-/// The same at one height: fn.level(first, n, z), or fn(cell, z) for those that stand higher.
+/// The same at one height of cells of which at least one stands higher: fn.level(first, n, z), or fn(cell, z) for those that do.
 template <class Fn>
 void take_level(Fn& fn, std::size_t first, int n, double z, const StandingHeights& standing) {
     if constexpr (requires { fn.level(first, n, z); }) fn.level(first, n, z);
-    else if (any_over(standing.height + first, standing.bottom, n, z))
+    else
         for (std::size_t c = first; c < first + static_cast<std::size_t>(n); ++c)
             if (standing(c) > z) fn(c, z);
 }
@@ -205,12 +217,23 @@ void sweep_level_disc(const CellGrid& grid, double radius, const std::array<doub
     const int j0 = std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - grid.y0) / grid.cell))));
     const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high - grid.y0) / grid.cell))));
     RowSpans spans;
+    const float level = level_over(standing.bottom, z);
     for (int j = j0; j <= j1; j += RowSpans::kRows) {
         const int rows = std::min(RowSpans::kRows, j1 - j + 1);
+        const std::size_t row = grid.index(0, j), nx = static_cast<std::size_t>(grid.nx);
         spans_of_rows(grid, j, rows, from, to, radius, been, spans);
-        for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k)
-            for (const auto& [first, last] : {std::pair{spans.low[k], spans.left[k]}, {spans.right[k], spans.high[k]}})
-                if (first <= last) take_level(fn, grid.index(first, j + static_cast<int>(k)), last - first + 1, z, standing);
+        if constexpr (requires { fn.spans(row, rows, spans, z); }) {
+            fn.spans(row, rows, spans, z);
+            continue;
+        }
+        const OverSpans over = spans_over(standing.height + row, nx, rows, spans, level);
+        for (std::uint64_t left = over.left | over.right; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::size_t>(std::countr_zero(left));
+            const std::size_t at = row + k * nx;
+            if ((over.left >> k & 1) != 0) take_level(fn, at + static_cast<std::size_t>(spans.low[k]), spans.left[k] - spans.low[k] + 1, z, standing);
+            if ((over.right >> k & 1) != 0)
+                take_level(fn, at + static_cast<std::size_t>(spans.right[k]), spans.high[k] - spans.right[k] + 1, z, standing);
+        }
     }
 }
 
@@ -225,8 +248,9 @@ void sweep_level_disc(const CellGrid& grid, double radius, const std::array<doub
 /// asked only if the motion before has its least there too: of both motions one gets as low or lower. All of a chain together call fn
 /// with the same least value for every cell as without, but go to most cells once instead of 2R / L times.
 ///
-/// Given StandingHeights many cells are compared at once; fn may then take rows of them instead (take_row, take_level). A level disc in a
-/// chain leaves out what it covers at its begin then, and that only.
+/// Given StandingHeights many cells are compared at once; fn may then take rows of them instead (take_row, take_level), and of a level disc
+/// all spans of many rows, compared or not: fn.spans(cell where the first row begins, rows, spans, z). A level disc in a chain leaves out
+/// what it covers at its begin then, and that only.
 template <class Standing, class Fn>
 void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, Standing&& standing,
                  Fn&& fn, const ChainedSweep& chain = {}) {
