@@ -243,6 +243,42 @@ TEST(StandingPart, RowsOfMotionsAgreeWithOneAfterTheOther) {
     EXPECT_GT(free, 1000u);
 }
 
+// The first motions of a chain of short ones run under the part's top sheet, far deeper than the tolerance: the others are found all the same.
+TEST(StandingPart, ShortMotionsAfterOneInsideThePartAreFound) {
+    Context context;
+    const Mesh m = relief(24, bumpy);
+    const StandingPart part(context, m.view());
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> u(2, 22), uz(2, 6), turn(-0.1, 0.1), ur(0.5, 4), unit(0, 1);
+    constexpr double z_top = 6.5, tolerance = 0.02;
+    std::size_t deep = 0;
+    for (int trial = 0; trial < 300; ++trial) {
+        std::vector<StandingPart::Motion> motions;
+        Point3 at{u(random), u(random), uz(random)};
+        double heading = 6.3 * unit(random);
+        for (int i = 0; i < 40; ++i) {
+            heading += turn(random);
+            const Point3 to{at[0] + 0.12 * std::cos(heading), at[1] + 0.12 * std::sin(heading), at[2]};
+            motions.push_back({at, to});
+            at = to;
+        }
+        const double R = ur(random);
+        for (const auto form : {StandingPart::Form::ball, StandingPart::Form::cylinder}) {
+            const StandingPart::Found found = part.deepest(form, z_top, motions, R, 0, tolerance);
+            for (std::size_t i = 0; i < motions.size(); ++i) {
+                const auto& [from, to] = motions[i];
+                const double depth =
+                    form == StandingPart::Form::ball ? part.ball(z_top, from, to, R, 0).depth : part.cylinder(z_top, from, to, R, 0).depth;
+                if (std::abs(depth - tolerance) < 1e-6) continue;
+                ASSERT_EQ(std::binary_search(found.beyond.begin(), found.beyond.end(), static_cast<std::uint32_t>(i)), depth > tolerance)
+                    << "trial " << trial << " motion " << i << " depth " << depth;
+                deep += depth > tolerance;
+            }
+        }
+    }
+    EXPECT_GT(deep, 1000U);
+}
+
 TEST(StandingPart, EnvelopeByPointsAndByGrid) {
     Context context;
     const Mesh m = relief(12, bumpy);

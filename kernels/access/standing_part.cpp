@@ -770,7 +770,7 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
             if (!v.holds(piece.a) || !v.holds(piece.b)) v.place(motions, m, piece.a, piece.b, floor);
             if (!v.facets_known) gather(v);
             if (piece.a == motions[m].from && piece.b == motions[m].to && run.begin(v, motions, m)) {
-                near_way(v.terms, motions[m].from, motions[run.last - 1].to, run.lowest, result.depth, run.slack);
+                near_way(v.terms, motions[m].from, motions[run.last - 1].to, run.lowest, floor, run.slack);
                 run.terms.take(v.terms, v.keep);
                 run.facets.clear();
                 for_each_kept(v.keep, [&](std::size_t k) { run.facets.push_back(v.facets[k]); });
