@@ -11,14 +11,44 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// How far along n lines at v what lies in a box may forbid: low and high, or low > high where it is out of reach.
+[[gnu::always_inline]] inline void reach(const BoxTerms& b, const double* __restrict v, int n, double* __restrict low, double* __restrict high) {
+    const double u_low = b.u_low, u_high = b.u_high;
+    for (int i = 0; i < n; ++i) {
+        const double under = b.v_low - v[i], over = v[i] - b.v_high, beside = under > over ? under : over, d = beside > 0 ? beside : 0;
+        const double q = b.r2 - d * d,
+                     h = std::sqrt(std::abs(q));  // a choice under the root would keep the compiler from doing several lines at once
+        low[i] = q > 0 ? u_low - h : kInfinity;
+        high[i] = q > 0 ? u_high + h : -kInfinity;
+    }
+}
+
+[[gnu::always_inline]] inline std::int64_t out(const CoverRows& cover, const double* __restrict low, const double* __restrict high, int first, int n,
+                                               std::int64_t* __restrict state) {
+    const double *__restrict const from = cover.low.data() + first, *__restrict const to = cover.high.data() + first,
+                 *__restrict const next = cover.next.data() + first;
+    std::int64_t any = 0;
+    for (int i = 0; i < n; ++i) {
+        const bool within = (from[i] <= low[i]) & (high[i] <= to[i]), nothing = low[i] >= high[i], here = (from[i] <= low[i]) & (low[i] < next[i]);
+        const std::int64_t beyond = here ? kReachesOut : kLooksElsewhere, s = within | nothing ? 0 : beyond;
+        state[i] = s;
+        any |= s;
+    }
+    return any;
+}
+
+// Near the rim of its reach the tangent is steep, and says nothing: what is left of r² there at least, as a share.
+constexpr double kTangentLeast = 0.01;
+
 }  // namespace
 
 // The loops hold no branch that differs from line to line, so that a compiler can do several lines in one step; what does not depend on
 // the line is decided outside of them.
 
-SLABWRIGHT_WIDE void prism_rows(const PrismTerms& p, const double* __restrict v, int n, double* __restrict low, double* __restrict high,
+SLABWRIGHT_WIDE void prism_rows(const PrismTerms& p, const double* __restrict v, int lines, double* __restrict low, double* __restrict high,
                                 double* __restrict nz_low, double* __restrict nz_high) {
     alignas(64) double l[kLinesTogether], h[kLinesTogether], k[kLinesTogether];
+    const int n = lines / kLinesStep * kLinesStep;
     const double r = p.r, nu = p.nu;
     for (int i = 0; i < n; ++i) k[i] = p.nv * v[i] + p.c;  // signed distance is nu·u + k
     if (std::abs(nu) < 1e-12) {
@@ -51,7 +81,7 @@ SLABWRIGHT_WIDE void prism_rows(const PrismTerms& p, const double* __restrict v,
         }
     }
     for (int i = 0; i < n; ++i) {
-        const bool met = l[i] < h[i], lower = met && l[i] < low[i], higher = met && h[i] > high[i];
+        const bool met = l[i] < h[i], lower = met & (l[i] < low[i]), higher = met & (h[i] > high[i]);
         const double nz_l = (nu * l[i] + k[i]) / r * p.nz, nz_h = (nu * h[i] + k[i]) / r * p.nz;
         low[i] = lower ? l[i] : low[i];
         nz_low[i] = lower ? nz_l : nz_low[i];
@@ -60,9 +90,10 @@ SLABWRIGHT_WIDE void prism_rows(const PrismTerms& p, const double* __restrict v,
     }
 }
 
-SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restrict v, int n, double* __restrict low, double* __restrict high,
+SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restrict v, int lines, double* __restrict low, double* __restrict high,
                                   double* __restrict nz_low, double* __restrict nz_high) {
     const double r2 = t.r * t.r;
+    const int n = lines / kLinesStep * kLinesStep;
     // The balls around both ends.
     for (int end = 0; end < 2; ++end) {
         const double centre = end == 0 ? t.au : t.bu, cv = end == 0 ? t.av : t.bv, wz = end == 0 ? t.za : t.zb, over = r2 - wz * wz;
@@ -71,8 +102,8 @@ SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restric
         for (int i = 0; i < n; ++i) {
             const double wv = v[i] - cv, h2 = over - wv * wv;
             const bool met = h2 > 0;
-            const double h = std::sqrt(met ? h2 : 0.0), l = centre - h, u = centre + h;
-            const bool lower = met && l < low[i], higher = met && u > high[i];
+            const double h = std::sqrt(std::abs(h2)), l = centre - h, u = centre + h;
+            const bool lower = met & (l < low[i]), higher = met & (u > high[i]);
             low[i] = lower ? l : low[i];
             nz_low[i] = lower ? nz : nz_low[i];
             high[i] = higher ? u : high[i];
@@ -120,7 +151,7 @@ SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restric
     for (int i = 0; i < n; ++i) {
         const bool met = l[i] < h[i];
         const double from = t.au + l[i], to = t.au + h[i];
-        const bool lower = met && from < low[i], higher = met && to > high[i];
+        const bool lower = met & (from < low[i]), higher = met & (to > high[i]);
         const double nz_l = own ? (t.za - dz * (du * l[i] + s[i]) / length2) / t.r : t.nz;
         const double nz_h = own ? (t.za - dz * (du * h[i] + s[i]) / length2) / t.r : t.nz;
         low[i] = lower ? from : low[i];
@@ -130,32 +161,59 @@ SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restric
     }
 }
 
-SLABWRIGHT_WIDE void reach_rows(const double* __restrict v, int first, int last, double v_low, double v_high, double r2, double u_low, double u_high,
-                                double* __restrict low, double* __restrict high) {
-    for (int i = first; i < last; ++i) {
-        const double under = v_low - v[i], over = v[i] - v_high, beside = under > over ? under : over, d = beside > 0 ? beside : 0;
-        const double q = r2 - d * d, h = std::sqrt(q > 0 ? q : 0.0);
-        low[i] = q > 0 ? u_low - h : kInfinity;
-        high[i] = q > 0 ? u_high + h : -kInfinity;
-    }
+SLABWRIGHT_WIDE std::int64_t cover_rows(const CoverRows& cover, const double* low, const double* high, int first, int last, std::int64_t* state) {
+    return out(cover, low + first, high + first, first, (last - first) / kLinesStep * kLinesStep, state + first);
 }
 
-SLABWRIGHT_WIDE void tangent_rows(const TangentTerms& t, const double* __restrict v, int first, int last, double* __restrict low,
-                                  double* __restrict high) {
-    // Near the rim of its reach the tangent is steep, and says nothing.
-    const double least = 0.01 * t.r2, z2 = t.r2 - t.z * t.z;
-    for (int i = first; i < last; ++i) {
+SLABWRIGHT_WIDE std::int64_t box_out_rows(const BoxTerms& b, const CoverRows& cover, const double* v, int first, int last, double* low, double* high,
+                                          std::int64_t* state) {
+    const int n = (last - first) / kLinesStep * kLinesStep;
+    reach(b, v + first, n, low + first, high + first);
+    return out(cover, low + first, high + first, first, n, state + first);
+}
+
+// From a point p the ball's centre is kept away up to p_u + √(r² − (v − p_v)² − (zc − p_z)²) on the line at v, a concave function of p, so no
+// more than what its tangent at the middle of the facet gives at one of the corners.
+SLABWRIGHT_WIDE std::int64_t facet_out_rows(const BoxTerms& b, const TangentTerms& t, const CoverRows& cover, const double* __restrict v, int first,
+                                            int last, double* __restrict low, double* __restrict high, std::int64_t* __restrict state) {
+    const double least = kTangentLeast * t.r2, z2 = t.r2 - t.z * t.z;
+    const int n = (last - first) / kLinesStep * kLinesStep;
+    v += first, low += first, high += first;
+    reach(b, v, n, low, high);
+    for (int i = 0; i < n; ++i) {
         const double w = v[i] - t.v, q = z2 - w * w;
         const bool near = q > least;
-        const double h = std::sqrt(near ? q : 1.0), sv = w / h, sz = t.z / h;
-        const double a = sv * t.dv[0] + sz * t.dz[0], b = sv * t.dv[1] + sz * t.dz[1], c = sv * t.dv[2] + sz * t.dz[2];
-        const double a_up = a + t.du[0], b_up = b + t.du[1], c_up = c + t.du[2], a_down = a - t.du[0], b_down = b - t.du[1], c_down = c - t.du[2];
-        const double ab = a_up > b_up ? a_up : b_up, up = ab > c_up ? ab : c_up, ab_d = a_down > b_down ? a_down : b_down,
-                     down = ab_d > c_down ? ab_d : c_down;
+        const double h = std::sqrt(near ? q : 1.0), inverse = 1 / h, sv = w * inverse, sz = t.z * inverse;
+        const double a = sv * t.dv[0] + sz * t.dz[0], c = sv * t.dv[1] + sz * t.dz[1], d = sv * t.dv[2] + sz * t.dz[2];
+        const double a_up = a + t.du[0], c_up = c + t.du[1], d_up = d + t.du[2], a_down = a - t.du[0], c_down = c - t.du[1], d_down = d - t.du[2];
+        const double ac = a_up > c_up ? a_up : c_up, up = ac > d_up ? ac : d_up, ac_d = a_down > c_down ? a_down : c_down,
+                     down = ac_d > d_down ? ac_d : d_down;
         const double to = t.u + h + up, from = t.u - h - down;
-        high[i] = near && to < high[i] ? to : high[i];
-        low[i] = near && from > low[i] ? from : low[i];
+        high[i] = near & (to < high[i]) ? to : high[i];
+        low[i] = near & (from > low[i]) ? from : low[i];
     }
+    return out(cover, low, high, first, n, state + first);
+}
+
+// The tangent's slope is (w, z) / h, and (h, w, z) is as long as r; what the disc reaches along that goes by its part along the axis.
+SLABWRIGHT_WIDE std::int64_t disc_out_rows(const BoxTerms& b, const DiscTerms& t, const CoverRows& cover, const double* __restrict v, int first,
+                                           int last, double* __restrict low, double* __restrict high, std::int64_t* __restrict state) {
+    const double least = kTangentLeast * t.r2, z2 = t.r2 - t.z * t.z, az = t.axis_z * t.z;
+    const int n = (last - first) / kLinesStep * kLinesStep;
+    v += first, low += first, high += first;
+    reach(b, v, n, low, high);
+    for (int i = 0; i < n; ++i) {
+        const double w = v[i] - t.v, q = z2 - w * w;
+        const bool near = q > least;
+        const double h = std::sqrt(near ? q : 1.0), across = t.axis_v * w + az, on_high = across + t.axis_u * h, on_low = across - t.axis_u * h;
+        const double high2 = t.r2 - on_high * on_high, low2 = t.r2 - on_low * on_low, inverse = 1 / h;
+        const double up = (std::abs(on_high) * t.thickness + std::sqrt(high2 > 0 ? high2 : 0.0) * t.radius) * inverse,
+                     down = (std::abs(on_low) * t.thickness + std::sqrt(low2 > 0 ? low2 : 0.0) * t.radius) * inverse;
+        const double to = t.u + h + up, from = t.u - h - down;
+        high[i] = near & (to < high[i]) ? to : high[i];
+        low[i] = near & (from > low[i]) ? from : low[i];
+    }
+    return out(cover, low, high, first, n, state + first);
 }
 
 }  // namespace slabwright

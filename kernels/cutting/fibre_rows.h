@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "kernels/cutting/layer_solid.h"
 
@@ -31,16 +32,42 @@ struct CapsuleTerms {
 };
 void capsule_rows(const CapsuleTerms& capsule, const double* v, int n, double* low, double* high, double* nz_low, double* nz_high);
 
-/// How far along lines [first, last) at v what lies in a box may forbid, when r2 is r² less the box's least height over or under them squared:
-/// low and high, or low > high where it is out of reach.
-void reach_rows(const double* v, int first, int last, double v_low, double v_high, double r2, double u_low, double u_high, double* low, double* high);
+/// Lines are met in steps of so many: where lines are numbered from `first`, that and their count are multiples of it, so that no loop has
+/// an odd end.
+inline constexpr int kLinesStep = 8;
+
+/// A box; r2 is r² less its least height over or under the lines squared.
+struct BoxTerms {
+    double u_low, u_high, v_low, v_high, r2;
+};
 
 /// A facet seen from its middle (u, v) and z under the lines; its corners from there.
 struct TangentTerms {
     double u, v, z, r2;
     std::array<double, 3> du, dv, dz;
 };
-/// Narrows that for a facet and a ball, by the tangent of what one point of it forbids, except where the middle is hardly in reach.
-void tangent_rows(const TangentTerms& facet, const double* v, int first, int last, double* low, double* high);
+
+/// A disc seen from its middle (u, v) and z under the lines: its axis, a unit vector, its radius and half its thickness.
+struct DiscTerms {
+    double u, v, z, r2;
+    double axis_u, axis_v, axis_z, radius, thickness;
+};
+/// Of each line the stretch that is covered and was looked at last, and where the next one begins.
+struct CoverRows {
+    alignas(64) std::array<double, kLinesTogether> low, high, next;
+};
+inline constexpr std::int64_t kReachesOut = 1, kLooksElsewhere = 2;
+/// For lines [first, last) whether [low, high] reaches out of what is covered: 0 where it does not or is empty, kReachesOut, or kLooksElsewhere
+/// where another stretch than the one looked at says so. All of them together are returned.
+std::int64_t cover_rows(const CoverRows& cover, const double* low, const double* high, int first, int last, std::int64_t* state);
+
+/// The same for how far what lies in a box may reach (low and high; low > high where it does not reach the line), for a ball narrowed by the
+/// tangent of what one point of it forbids, except where that point is hardly in reach.
+std::int64_t box_out_rows(const BoxTerms& box, const CoverRows& cover, const double* v, int first, int last, double* low, double* high,
+                          std::int64_t* state);
+std::int64_t facet_out_rows(const BoxTerms& box, const TangentTerms& facet, const CoverRows& cover, const double* v, int first, int last, double* low,
+                            double* high, std::int64_t* state);
+std::int64_t disc_out_rows(const BoxTerms& box, const DiscTerms& disc, const CoverRows& cover, const double* v, int first, int last, double* low,
+                           double* high, std::int64_t* state);
 
 }  // namespace slabwright

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kBlock = kLinesTogether;  // lines that share one pass over their facets
+constexpr double kFarAway = 1e30;               // mm; where lines are that fill up a block's last step
 constexpr double kMergeGap = 1e-6;              // mm; gaps this small are rounding between neighbouring elements
 
 // A segment met by lines in direction U at height zc.
@@ -90,12 +91,19 @@ bool covered(const std::vector<Stretch>& cover, std::uint32_t& at, double low, d
     return high <= cover[at].high;
 }
 
+// What a ball forbids is kept ascending and disjoint as it is found, so that each facet is held against all that was met before it. Facets that meet
+// in a corner touch a disc at one place, and whose nz stands there goes by the order in which intervals are joined: for a flat cutter these are
+// sorted in the end, and what reaches out is told from two states of them.
 template <int U, int V>
 class BlockOfLines {
 public:
     BlockOfLines(const LayerSolid& solid, const Cutter& cutter, double zc, std::span<const std::int32_t> lines)
         : solid_(solid), ball_(cutter.profile == Cutter::Profile::ball), r_(cutter.radius), zc_(zc), n_(static_cast<int>(lines.size())) {
+        at_.fill(kFarAway);
         for (int l = 0; l < n_; ++l) at_[l] = to_mm(lines[static_cast<std::size_t>(l)]);
+        cover_.low.fill(-kInfinity);
+        cover_.high.fill(-kInfinity);
+        cover_.next.fill(kInfinity);
     }
 
     // Forbids what a higher level forbids.
@@ -103,6 +111,7 @@ public:
         for (int l = 0; l < n_; ++l) {
             const auto line = above.line(static_cast<std::size_t>(l));
             found_[l].assign(line.begin(), line.end());
+            if (!line.empty()) cover_.next[l] = line.front().low;
         }
     }
 
@@ -127,34 +136,51 @@ public:
             double entered = 0;
             for (const Crossing& c : crossings) {
                 if (depth <= 0 && depth + c.turn > 0) entered = c.u;
-                if (depth > 0 && depth + c.turn <= 0 && c.u > entered) found_[l].push_back({entered, c.u, 0, 0});
+                if (depth > 0 && depth + c.turn <= 0 && c.u > entered) {
+                    if (ball_) forbid(static_cast<int>(l), {entered, c.u, 0, 0});
+                    else found_[l].push_back({entered, c.u, 0, 0});
+                }
                 depth += c.turn;
             }
         }
     }
 
-    // Most facets only forbid what others around them forbid as well, or what is forbidden already. One of each group shows about where that is,
-    // and of the others those are met that could reach past it, on the lines where they could.
+    // Most facets only forbid what others around them forbid as well, or what is forbidden already: those are met that could reach past it, on
+    // the lines where they could.
     void meet(std::span<const std::uint32_t> groups) {
+        if (!ball_) return meet_disc(groups);
+        for (std::size_t g = groups.size(); g-- > 0;) {  // of a wall the upper ones come first, which reach farthest
+            const LineRange lines = group_reaches_out(solid_.groups[groups[g]]);
+            if (!lines.any()) continue;
+            const auto [first, last] = facets_of(groups[g]);
+            for (std::size_t i = first; i < last; ++i) {
+                const SolidFacet& f = solid_.facets[i];
+                if (active(f)) meet_facet(f, reaches_out(f, lines));
+            }
+        }
+    }
+
+    // One facet of each group shows about where others forbid nothing more.
+    void meet_disc(std::span<const std::uint32_t> groups) {
         constexpr std::uint32_t none = UINT32_MAX;  // the group reaches out of nothing
         cover();
         std::vector<std::uint32_t> shown(groups.size(), none);
-        for (std::size_t g = groups.size(); g-- > 0;) {  // of a wall the upper ones come first, which reach farthest
-            if (!group_reaches_out(groups[g])) continue;
+        for (std::size_t g = groups.size(); g-- > 0;) {
+            if (!disc_reaches_out(solid_.groups[groups[g]])) continue;
             const auto [first, last] = facets_of(groups[g]);
             std::size_t f = first;
             while (f < last && !active(solid_.facets[f])) ++f;
             if (f == last) continue;
             shown[g] = static_cast<std::uint32_t>(f);
-            meet_facet(solid_.facets[f], reaches_out(solid_.facets[f], lines_of(solid_.facets[f])));
+            meet_facet(solid_.facets[f], disc_reaches_out(solid_.facets[f]));
         }
         cover();
         for (std::size_t g = 0; g < groups.size(); ++g) {
-            if (shown[g] == none || !group_reaches_out(groups[g])) continue;
+            if (shown[g] == none || !disc_reaches_out(solid_.groups[groups[g]])) continue;
             const auto [first, last] = facets_of(groups[g]);
             for (std::size_t i = first; i < last; ++i) {
                 const SolidFacet& f = solid_.facets[i];
-                if (i != shown[g] && active(f)) meet_facet(f, reaches_out(f, lines_of(f)));
+                if (i != shown[g] && active(f)) meet_facet(f, disc_reaches_out(f));
             }
         }
     }
@@ -163,10 +189,10 @@ public:
     [[nodiscard]] Fibres merged() {
         Fibres part;
         for (int l = 0; l < n_; ++l) {
-            std::vector<Forbidden>& on_line = found_[l];
-            std::sort(on_line.begin(), on_line.end(),
-                      [](const Forbidden& a, const Forbidden& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
-            for (const Forbidden& f : on_line) {
+            if (!ball_)
+                std::sort(found_[l].begin(), found_[l].end(),
+                          [](const Forbidden& a, const Forbidden& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
+            for (const Forbidden& f : found_[l]) {
                 if (part.intervals.size() > part.starts.back() && f.low <= part.intervals.back().high + kMergeGap) {
                     Forbidden& last = part.intervals.back();
                     if (f.high > last.high) {
@@ -185,9 +211,6 @@ private:
         int first = 0, last = 0;
         [[nodiscard]] bool any() const { return first < last; }
     };
-    struct Reach {
-        double u_low, u_high, v_low, v_high, dz;
-    };
 
     [[nodiscard]] bool active(const SolidFacet& f) const { return may_touch(f.z_min, f.z_max, f.nz < 0 ? f.z_max : -kInfinity, ball_, r_, zc_); }
 
@@ -196,28 +219,71 @@ private:
         const double *begin = at_.data(), *end = begin + n_;
         return {static_cast<int>(std::lower_bound(begin, end, low - r_) - begin), static_cast<int>(std::lower_bound(begin, end, high + r_) - begin)};
     }
-    [[nodiscard]] LineRange lines_of(const SolidFacet& f) const {
-        return lines_between(std::min({f.p[0][V], f.p[1][V], f.p[2][V]}), std::max({f.p[0][V], f.p[1][V], f.p[2][V]}));
+    // The kernels' steps that hold them.
+    [[nodiscard]] static LineRange in_steps(LineRange a) {
+        return {a.first / kLinesStep * kLinesStep, (a.last + kLinesStep - 1) / kLinesStep * kLinesStep};
     }
 
-    [[nodiscard]] bool is_covered(int l) { return low_[l] >= high_[l] || covered(cover_[l], seen_[l], low_[l], high_[l]); }
+    // Looks at the last stretch that begins no later than `low`.
+    void look_at(int l, double low) {
+        const std::vector<Forbidden>& on_line = found_[l];
+        look(l, std::upper_bound(on_line.begin(), on_line.end(), low, [](double v, const Forbidden& f) { return v < f.low; }));
+    }
+    void look(int l, std::vector<Forbidden>::const_iterator next) {
+        const std::vector<Forbidden>& on_line = found_[l];
+        cover_.next[l] = next == on_line.end() ? kInfinity : next->low;
+        cover_.low[l] = next == on_line.begin() ? -kInfinity : std::prev(next)->low;
+        cover_.high[l] = next == on_line.begin() ? -kInfinity : std::prev(next)->high;
+    }
 
-    // The lines, from the first to the last of them, on which [low_, high_] is not covered.
-    LineRange not_covered(LineRange lines) {
-        while (lines.any() && is_covered(lines.first)) ++lines.first;
-        while (lines.any() && is_covered(lines.last - 1)) --lines.last;
+    // Whether [low_, high_] reaches out of what is forbidden on a line.
+    [[nodiscard]] bool out(int l) {
+        if (state_[l] != kLooksElsewhere) return state_[l] != 0;
+        look_at(l, low_[l]);
+        return high_[l] > cover_.high[l];
+    }
+
+    // Of these lines those, from the first to the last, on which [low_, high_] does.
+    LineRange narrowed(LineRange lines) {
+        while (lines.any() && !out(lines.first)) ++lines.first;
+        while (lines.any() && !out(lines.last - 1)) --lines.last;
         return lines;
     }
 
-    void reach_of(const Reach& box, LineRange lines) {
-        reach_rows(at_.data(), lines.first, lines.last, box.v_low, box.v_high, r_ * r_ - box.dz * box.dz, box.u_low, box.u_high, low_.data(),
-                   high_.data());
+    // Adds to what is forbidden on a line, which stays ascending and disjoint.
+    void forbid(int l, const Forbidden& h) {
+        std::vector<Forbidden>& on_line = found_[l];
+        auto at = std::lower_bound(on_line.begin(), on_line.end(), h.low, [](const Forbidden& f, double v) { return f.high < v; });
+        if (at == on_line.end() || at->low > h.high) at = on_line.insert(at, h);
+        else {
+            if (h.low < at->low) {
+                at->low = h.low;
+                at->nz_low = h.nz_low;
+            }
+            if (h.high > at->high) {
+                at->high = h.high;
+                at->nz_high = h.nz_high;
+                auto beyond = at + 1;
+                for (; beyond != on_line.end() && beyond->low <= h.high; ++beyond)
+                    if (beyond->high > at->high) {
+                        at->high = beyond->high;
+                        at->nz_high = beyond->nz_high;
+                    }
+                if (beyond != at + 1) at = on_line.erase(at + 1, beyond) - 1;
+            }
+        }
+        look(l, at + 1);
     }
 
-    // Takes what has been found so far for covered.
+    [[nodiscard]] std::array<std::size_t, 2> facets_of(std::uint32_t group) const {
+        const std::size_t first = group * FacetGroup::kFacets;
+        return {first, std::min(solid_.facets.size(), first + FacetGroup::kFacets)};
+    }
+
+    // Takes what a disc has been found to meet so far for covered.
     void cover() {
         for (int l = 0; l < n_; ++l) {
-            std::vector<Stretch>& cover = cover_[l];
+            std::vector<Stretch>& cover = covered_[l];
             cover.clear();
             for (const Forbidden& f : found_[l]) cover.push_back({f.low, f.high});
             std::sort(cover.begin(), cover.end(), [](const Stretch& a, const Stretch& b) { return a.low < b.low; });
@@ -230,44 +296,87 @@ private:
         }
     }
 
-    [[nodiscard]] std::array<std::size_t, 2> facets_of(std::uint32_t group) const {
-        const std::size_t first = group * FacetGroup::kFacets;
-        return {first, std::min(solid_.facets.size(), first + FacetGroup::kFacets)};
-    }
+    [[nodiscard]] bool is_covered(int l) { return low_[l] >= high_[l] || covered(covered_[l], seen_[l], low_[l], high_[l]); }
 
-    // Whether what lies within a group's box may reach past what is covered.
-    bool group_reaches_out(std::uint32_t index) {
-        const FacetGroup& group = solid_.groups[index];
-        const bool level = !ball_ || group.overhang > zc_;
-        const double dz = level ? 0 : std::max({0.0, group.z_min - zc_, zc_ - group.z_max});
-        const LineRange lines = lines_between(group.low[V], group.high[V]);
-        reach_of({group.low[U], group.high[U], group.low[V], group.high[V], dz}, lines);
+    // How far a disc may be kept away by what lies in a box, on the lines within its reach.
+    LineRange disc_reach(double u_low, double u_high, double v_low, double v_high) {
+        const LineRange lines = lines_between(v_low, v_high), steps = in_steps(lines);
+        box_out_rows({u_low, u_high, v_low, v_high, r_ * r_}, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data());
+        return lines;
+    }
+    bool disc_reaches_out(const FacetGroup& group) {
+        const LineRange lines = disc_reach(group.low[U], group.high[U], group.low[V], group.high[V]);
         for (int l = lines.first; l < lines.last; ++l)
             if (!is_covered(l)) return true;
         return false;
     }
-
-    // The lines on which a facet may reach past it. From a point p of it the ball's centre is kept away up to p_u + √(r² − (v − p_v)² − (zc − p_z)²) on the line at v,
-    // a concave function of p, so no more than what its tangent at the middle of the facet gives at one of the corners.
-    LineRange reaches_out(const SolidFacet& f, LineRange lines) {
+    LineRange disc_reaches_out(const SolidFacet& f) {
         const auto [ul, uh] = std::minmax({f.p[0][U], f.p[1][U], f.p[2][U]});
         const auto [vl, vh] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
-        const bool level = !ball_ || (f.nz < 0 && f.z_max > zc_);
-        reach_of({ul, uh, vl, vh, level ? 0 : std::max({0.0, f.z_min - zc_, zc_ - f.z_max})}, lines);
-        if (!level) {
+        LineRange lines = disc_reach(ul, uh, vl, vh);
+        while (lines.any() && is_covered(lines.first)) ++lines.first;
+        while (lines.any() && is_covered(lines.last - 1)) --lines.last;
+        return lines;
+    }
+
+    // Neighbouring facets mostly follow one another, so most intervals only stretch the one before.
+    void append(std::vector<Forbidden>& on_line, const Forbidden& h) {
+        if (on_line.empty() || h.low > on_line.back().high || h.high < on_line.back().low) {
+            on_line.push_back(h);
+            return;
+        }
+        Forbidden& before = on_line.back();
+        if (h.low < before.low) {
+            before.low = h.low;
+            before.nz_low = h.nz_low;
+        }
+        if (h.high > before.high) {
+            before.high = h.high;
+            before.nz_high = h.nz_high;
+        }
+    }
+
+    // The lines on which what lies within a group's box and disc may reach past what is forbidden.
+    LineRange group_reaches_out(const FacetGroup& group) {
+        const bool level = group.overhang > zc_;
+        const double dz = level ? 0 : std::max({0.0, group.z_min - zc_, zc_ - group.z_max});
+        const LineRange lines = lines_between(group.low[V], group.high[V]), steps = in_steps(lines);
+        const BoxTerms box{group.low[U], group.high[U], group.low[V], group.high[V], r_ * r_ - dz * dz};
+        if (level) {
+            if (box_out_rows(box, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data()) == 0) return {};
+        } else {
+            const DiscTerms t{group.middle[U], group.middle[V], zc_ - group.middle[2], r_ * r_,        group.axis[U],
+                              group.axis[V],   group.axis[2],   group.radius,          group.thickness};
+            if (disc_out_rows(box, t, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data()) == 0) return {};
+        }
+        return narrowed(lines);
+    }
+
+    // Those of these lines on which a facet may.
+    LineRange reaches_out(const SolidFacet& f, LineRange lines) {
+        const LineRange steps = in_steps(lines);
+        const auto [ul, uh] = std::minmax({f.p[0][U], f.p[1][U], f.p[2][U]});
+        const auto [vl, vh] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
+        const bool level = f.nz < 0 && f.z_max > zc_;
+        const double dz = level ? 0 : std::max({0.0, f.z_min - zc_, zc_ - f.z_max});
+        const BoxTerms box{ul, uh, vl, vh, r_ * r_ - dz * dz};
+        if (level) {
+            if (box_out_rows(box, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data()) == 0) return {};
+        } else {
             TangentTerms t{};
             for (const Vec3d& p : f.p) t.u += p[U] / 3, t.v += p[V] / 3, t.z += p[2] / 3;
             for (std::size_t k = 0; k < 3; ++k) t.du[k] = f.p[k][U] - t.u, t.dv[k] = f.p[k][V] - t.v, t.dz[k] = f.p[k][2] - t.z;
             t.z = zc_ - t.z;
             t.r2 = r_ * r_;
-            tangent_rows(t, at_.data(), lines.first, lines.last, low_.data(), high_.data());
+            if (facet_out_rows(box, t, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data()) == 0) return {};
         }
-        return not_covered(lines);
+        return narrowed(lines);
     }
 
     void meet_facet(const SolidFacet& f, LineRange lines) {
         if (!lines.any()) return;
-        const int skip = lines.first, n = lines.last - lines.first;
+        const LineRange steps = in_steps(lines);
+        const int skip = steps.first, n = steps.last - steps.first;
         double *const low = hulls_.low.data() + skip, *const high = hulls_.high.data() + skip;
         double *const nz_low = hulls_.nz_low.data() + skip, *const nz_high = hulls_.nz_high.data() + skip;
         std::fill(low, low + n, kInfinity);
@@ -289,22 +398,15 @@ private:
                 if (cut_segment(f, zc_, cut)) meet_capsule(capsule<U, V>(cut[0], cut[1], r_, zc_, f.nz));
             }
         }
-        for (int l = lines.first; l < lines.last; ++l) {
-            const Forbidden h{hulls_.low[l], hulls_.high[l], static_cast<float>(hulls_.nz_low[l]), static_cast<float>(hulls_.nz_high[l])};
-            if (!(h.low < h.high)) continue;
-            // Neighbouring facets mostly follow one another, so most intervals only stretch the one before.
-            std::vector<Forbidden>& on_line = found_[l];
-            if (!on_line.empty() && h.low <= on_line.back().high && h.high >= on_line.back().low) {
-                Forbidden& before = on_line.back();
-                if (h.low < before.low) {
-                    before.low = h.low;
-                    before.nz_low = h.nz_low;
-                }
-                if (h.high > before.high) {
-                    before.high = h.high;
-                    before.nz_high = h.nz_high;
-                }
-            } else on_line.push_back(h);
+        const auto found = [&](int l) {
+            return Forbidden{hulls_.low[l], hulls_.high[l], static_cast<float>(hulls_.nz_low[l]), static_cast<float>(hulls_.nz_high[l])};
+        };
+        if (!ball_) {
+            for (int l = lines.first; l < lines.last; ++l)
+                if (hulls_.low[l] < hulls_.high[l]) append(found_[l], found(l));
+        } else if (cover_rows(cover_, hulls_.low.data(), hulls_.high.data(), steps.first, steps.last, state_.data()) != 0) {
+            for (int l = lines.first; l < lines.last; ++l)
+                if (state_[l] != 0) forbid(l, found(l));
         }
     }
 
@@ -314,8 +416,10 @@ private:
     const int n_;
     alignas(64) std::array<double, kLinesTogether> at_{}, low_{}, high_{};
     HullRows hulls_;
-    std::array<std::vector<Forbidden>, kLinesTogether> found_;
-    std::array<std::vector<Stretch>, kLinesTogether> cover_;  // ascending and disjoint
+    alignas(64) std::array<std::int64_t, kLinesTogether> state_{};
+    std::array<std::vector<Forbidden>, kLinesTogether> found_;  // a ball's: ascending and disjoint
+    CoverRows cover_;                                           // of a ball
+    std::array<std::vector<Stretch>, kLinesTogether> covered_;  // of a disc: ascending and disjoint
     std::array<std::uint32_t, kLinesTogether> seen_{};
     std::array<std::vector<Crossing>, kLinesTogether> crossings_;
 };

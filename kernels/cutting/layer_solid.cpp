@@ -155,6 +155,38 @@ BulkVector<std::uint32_t> facets_between(Context& context, MeshView mesh, double
     return facets;
 }
 
+// The disc lies along the facets' areas together.
+void lay_disc(std::span<const SolidFacet> facets, FacetGroup& group) {
+    Vec3d area{0, 0, 0}, low = facets[0].p[0], high = low;
+    for (const SolidFacet& f : facets) {
+        const Vec3d n = cross(minus(f.p[1], f.p[0]), minus(f.p[2], f.p[0]));
+        for (std::size_t k = 0; k < 3; ++k) {
+            area[k] += n[k];
+            low[k] = std::min({low[k], f.p[0][k], f.p[1][k], f.p[2][k]});
+            high[k] = std::max({high[k], f.p[0][k], f.p[1][k], f.p[2][k]});
+        }
+    }
+    const double length = std::sqrt(dot(area, area));
+    for (std::size_t k = 0; k < 3; ++k) {
+        group.middle[k] = static_cast<float>((low[k] + high[k]) / 2);
+        group.axis[k] = length > 0 ? static_cast<float>(area[k] / length) : (k == 2 ? 1.0F : 0.0F);
+    }
+    const Vec3d middle{group.middle[0], group.middle[1], group.middle[2]}, axis{group.axis[0], group.axis[1], group.axis[2]};
+    double radius2 = 0, thickness = 0, far2 = 0;
+    for (const SolidFacet& f : facets)
+        for (const Vec3d& p : f.p) {
+            const Vec3d d = minus(p, middle);
+            const double along = dot(axis, d), d2 = dot(d, d);
+            thickness = std::max(thickness, std::abs(along));
+            radius2 = std::max(radius2, d2 - along * along);
+            far2 = std::max(far2, d2);
+        }
+    // The axis is rounded, and so is what comes of it.
+    const double rounding = 1e-6 * (1 + std::sqrt(far2));
+    group.radius = static_cast<float>(std::sqrt(radius2) + rounding);
+    group.thickness = static_cast<float>(thickness + rounding);
+}
+
 }  // namespace
 
 std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets) {
@@ -164,9 +196,10 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
     std::vector<FacetGroup> groups((facets.size() + FacetGroup::kFacets - 1) / FacetGroup::kFacets);
     parallel_for(context, groups.size(), 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t g = begin; g < end; ++g) {
-            FacetGroup group{{inf, inf}, {-inf, -inf}, inf, -inf, -inf};
-            for (std::size_t i = g * FacetGroup::kFacets; i < std::min(facets.size(), (g + 1) * FacetGroup::kFacets); ++i) {
-                const SolidFacet& f = facets[i];
+            FacetGroup group{{inf, inf}, {-inf, -inf}, inf, -inf, -inf, {}, {}, 0, 0};
+            const std::span<const SolidFacet> own =
+                facets.subspan(g * FacetGroup::kFacets, std::min(FacetGroup::kFacets, facets.size() - g * FacetGroup::kFacets));
+            for (const SolidFacet& f : own) {
                 for (const Vec3d& p : f.p)
                     for (std::size_t k = 0; k < 2; ++k) {
                         group.low[k] = std::min(group.low[k], down(p[k]));
@@ -176,6 +209,7 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
                 group.z_max = std::max(group.z_max, up(f.z_max));
                 if (f.nz < 0) group.overhang = std::max(group.overhang, up(f.z_max));
             }
+            lay_disc(own, group);
             groups[g] = group;
         }
     });

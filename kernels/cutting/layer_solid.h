@@ -32,6 +32,10 @@ struct FacetGroup {
     std::array<float, 2> low{}, high{};  ///< x and y
     float z_min = 0, z_max = 0;
     float overhang = 0;  ///< the highest point of those whose own nz is under 0; −infinity: none
+    /// A disc that they lie in: no point of theirs is farther than `radius` from the line through `middle` along the unit vector `axis`,
+    /// nor than `thickness` from the plane square to it.
+    std::array<float, 3> middle{}, axis{};
+    float radius = 0, thickness = 0;
 };
 /// Of each eight facets, in their order; the last may have fewer.
 [[nodiscard]] std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets);

@@ -1,0 +1,149 @@
+// What is said of how far facets and their groups may reach along lines, against what they forbid.
+#include "kernels/cutting/fibre_rows.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "kernels/parallel/context.h"
+#include "tests/support/seed.h"
+
+namespace slabwright {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using Row = std::array<double, kLinesTogether>;
+
+CoverRows nothing_covered() {
+    CoverRows cover{};
+    cover.low.fill(-kInfinity);
+    cover.high.fill(-kInfinity);
+    cover.next.fill(kInfinity);
+    return cover;
+}
+
+// Widens the hulls on all lines at v by a facet with all its edges.
+void meet(const SolidFacet& f, double r, double zc, const Row& v, HullRows& hull) {
+    const Vec3d& n = f.normal;
+    PrismTerms prism{n[0], n[1], n[2], n[2] * (zc - f.p[0][2]) - n[0] * f.p[0][0] - n[1] * f.p[0][1], r, {}, {}, {}};
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
+        const Vec3d e{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+        const Vec3d m{n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0]};
+        prism.edge_u[k] = m[0];
+        prism.edge_v[k] = m[1];
+        prism.edge_c[k] = m[2] * (zc - a[2]) - m[0] * a[0] - m[1] * a[1];
+        capsule_rows({a[0], a[1], zc - a[2], b[0], b[1], zc - b[2], r}, v.data(), kLinesTogether, hull.low.data(), hull.high.data(),
+                     hull.nz_low.data(), hull.nz_high.data());
+    }
+    prism_rows(prism, v.data(), kLinesTogether, hull.low.data(), hull.high.data(), hull.nz_low.data(), hull.nz_high.data());
+}
+
+TEST(FibreRows, FacetsAndGroupsForbidNoMoreThanIsSaid) {
+    std::mt19937 random(test::seed());
+    auto within = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+    Context context;
+    const CoverRows none = nothing_covered();
+    std::size_t met = 0, narrowed = 0;
+    for (int round = 0; round < 3000; ++round) {
+        const double r = within(0.5, 5), size = r * std::pow(10, within(-2, 0.5)), steep = within(0, 2), away = within(-500, 500);
+        const double zc = within(-1.2, 1.2) * r;
+        const std::array<double, 2> slope{within(-1, 1) * steep, within(-1, 1) * steep};
+        std::vector<SolidFacet> facets(FacetGroup::kFacets);
+        for (SolidFacet& f : facets) {
+            for (Vec3d& p : f.p) {
+                p = {away + size * within(-1, 1), size * within(-1, 1), 0};
+                p[2] = slope[0] * (p[0] - away) + slope[1] * p[1] + 0.1 * size * within(-1, 1);
+            }
+            const Vec3d a{f.p[1][0] - f.p[0][0], f.p[1][1] - f.p[0][1], f.p[1][2] - f.p[0][2]},
+                b{f.p[2][0] - f.p[0][0], f.p[2][1] - f.p[0][1], f.p[2][2] - f.p[0][2]};
+            f.normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+            const double length = std::hypot(f.normal[0], f.normal[1], f.normal[2]);
+            for (double& n : f.normal) n /= length;
+            f.z_min = std::min({f.p[0][2], f.p[1][2], f.p[2][2]});
+            f.z_max = std::max({f.p[0][2], f.p[1][2], f.p[2][2]});
+        }
+        Row v{}, low{}, high{}, box_low{}, box_high{};
+        for (std::size_t i = 0; i < v.size(); ++i) v[i] = (static_cast<double>(i) - 31.5) * 1.2 * (r + size) / 32;
+        alignas(64) std::array<std::int64_t, kLinesTogether> state{};
+        HullRows together{};
+        together.low.fill(kInfinity);
+        together.high.fill(-kInfinity);
+        auto spares = [&](const HullRows& hull) {
+            for (std::size_t i = 0; i < v.size(); ++i) {
+                if (!(hull.low[i] < hull.high[i])) continue;
+                ++met;
+                ASSERT_LE(low[i], hull.low[i] + 1e-9) << "round " << round;
+                ASSERT_GE(high[i], hull.high[i] - 1e-9) << "round " << round;
+                ASSERT_EQ(state[i], kReachesOut);
+                narrowed += high[i] < box_high[i];
+            }
+        };
+        for (const SolidFacet& f : facets) {
+            const auto [ul, uh] = std::minmax({f.p[0][0], f.p[1][0], f.p[2][0]});
+            const auto [vl, vh] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
+            const double dz = std::max({0.0, f.z_min - zc, zc - f.z_max});
+            const BoxTerms box{ul, uh, vl, vh, r * r - dz * dz};
+            TangentTerms t{};
+            for (const Vec3d& p : f.p) t.u += p[0] / 3, t.v += p[1] / 3, t.z += p[2] / 3;
+            for (std::size_t k = 0; k < 3; ++k) t.du[k] = f.p[k][0] - t.u, t.dv[k] = f.p[k][1] - t.v, t.dz[k] = f.p[k][2] - t.z;
+            t.z = zc - t.z;
+            t.r2 = r * r;
+            HullRows hull{};
+            hull.low.fill(kInfinity);
+            hull.high.fill(-kInfinity);
+            meet(f, r, zc, v, hull);
+            meet(f, r, zc, v, together);
+            box_out_rows(box, none, v.data(), 0, kLinesTogether, box_low.data(), box_high.data(), state.data());
+            low = box_low, high = box_high;
+            spares(hull);
+            facet_out_rows(box, t, none, v.data(), 0, kLinesTogether, low.data(), high.data(), state.data());
+            spares(hull);
+        }
+        const FacetGroup group = facet_groups(context, facets).front();
+        const double dz = std::max({0.0, group.z_min - zc, zc - group.z_max});
+        const BoxTerms box{group.low[0], group.high[0], group.low[1], group.high[1], r * r - dz * dz};
+        const DiscTerms disc{group.middle[0], group.middle[1], zc - group.middle[2], r * r,          group.axis[0],
+                             group.axis[1],   group.axis[2],   group.radius,         group.thickness};
+        box_out_rows(box, none, v.data(), 0, kLinesTogether, box_low.data(), box_high.data(), state.data());
+        disc_out_rows(box, disc, none, v.data(), 0, kLinesTogether, low.data(), high.data(), state.data());
+        spares(together);
+        if (HasFatalFailure()) return;
+    }
+    EXPECT_GT(met, 100'000U);
+    EXPECT_GT(narrowed, met / 4);
+}
+
+TEST(FibreRows, WhatReachesOutOfTheCoverIsTold) {
+    std::mt19937 random(test::seed());
+    std::uniform_int_distribution<int> draw(0, 6);  // few values, so that ends often meet
+    CoverRows cover = nothing_covered();
+    Row low{}, high{};
+    alignas(64) std::array<std::int64_t, kLinesTogether> state{};
+    for (int round = 0; round < 2000; ++round) {
+        for (std::size_t i = 0; i < low.size(); ++i) {
+            cover.low[i] = draw(random);
+            cover.high[i] = cover.low[i] + draw(random);
+            cover.next[i] = cover.high[i] + 1 + draw(random);
+            low[i] = draw(random);
+            high[i] = draw(random) + draw(random);
+        }
+        const int first = kLinesStep * (draw(random) / 2), last = first + kLinesStep * (draw(random) / 2);
+        std::int64_t any = 0;
+        const std::int64_t said = cover_rows(cover, low.data(), high.data(), first, last, state.data());
+        for (int l = first; l < last; ++l) {
+            const auto i = static_cast<std::size_t>(l);
+            std::int64_t wanted = low[i] < cover.low[i] || low[i] >= cover.next[i] ? kLooksElsewhere : high[i] > cover.high[i] ? kReachesOut : 0;
+            if (low[i] >= high[i]) wanted = 0;
+            ASSERT_EQ(state[i], wanted) << low[i] << ' ' << high[i] << " of " << cover.low[i] << ' ' << cover.high[i] << ' ' << cover.next[i];
+            any |= wanted;
+        }
+        ASSERT_EQ(said, any);
+    }
+}
+
+}  // namespace
+}  // namespace slabwright
