@@ -1,6 +1,7 @@
 // Areas, winding, nesting, booleans and offsets against brute force.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -100,6 +101,40 @@ std::vector<Point2> star(std::mt19937_64& random, double x, double y, double inn
             {static_cast<std::int32_t>(std::lround(x + r * std::cos(angle))), static_cast<std::int32_t>(std::lround(y + r * std::sin(angle)))});
     }
     return points;
+}
+
+// Inside the spans of a line the winding number is over 0, beside them it is not; many lines at once say the same as each alone.
+TEST(Polygons, LineSpansAgreeWithWinding) {
+    std::mt19937_64 random(seed_of("LineSpansAgreeWithWinding"));
+    const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+    std::size_t inside = 0, outside = 0;
+    for (int trial = 0; trial < 60; ++trial) {
+        Loops loops;
+        for (int l = pick(1, 4); l > 0; --l) {
+            std::vector<Point2> points;
+            for (int k = pick(3, 12); k > 0; --k) points.push_back({pick(-40, 40), pick(-20, 20)});
+            add(loops, points);
+        }
+        std::vector<double> lines;
+        for (double y = -22; y <= 22; y += trial % 2 == 0 ? 1 : 0.5) lines.push_back(y);
+        const std::vector<std::vector<Span>> all = line_spans(loops, lines);
+        ASSERT_EQ(all.size(), lines.size());
+        for (std::size_t j = 0; j < lines.size(); ++j) {
+            const std::vector<Span> one = line_spans(loops, lines[j]);
+            ASSERT_EQ(all[j].size(), one.size());
+            for (std::size_t k = 0; k < one.size(); ++k) ASSERT_TRUE(all[j][k].low == one[k].low && all[j][k].high == one[k].high);
+            if (std::floor(lines[j]) != lines[j]) continue;  // points are whole
+            for (int x = -42; x <= 42; ++x) {
+                const Point2 p{x, static_cast<std::int32_t>(lines[j])};
+                if (distance_to_boundary(loops, p) < 1e-9) continue;
+                const bool in = std::any_of(all[j].begin(), all[j].end(), [&](const Span& s) { return s.low <= x && x <= s.high; });
+                ASSERT_EQ(in, winding(loops, p) > 0) << "trial " << trial << " at " << x << ' ' << lines[j];
+                ++(in ? inside : outside);
+            }
+        }
+    }
+    EXPECT_GT(inside, 1000U);
+    EXPECT_GT(outside, 10000U);
 }
 
 TEST(Polygons, NestAgreesWithBruteForceOnRandomTrees) {

@@ -53,6 +53,12 @@ Taken taken_off(const std::vector<float>& before, const float* now) {
 
 }  // namespace
 
+std::vector<double> rows_of(const CellGrid& grid) {
+    std::vector<double> y;
+    for (int j = 0; j < grid.ny; ++j) y.push_back(to_units(grid.y(j)));
+    return y;
+}
+
 double stock_cell(const LayerCut& cut) {
     double finest = cut.layer.tools.finish.diameter;
     for (const Tool& tool : cut.layer.tools.rest)
@@ -87,6 +93,7 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
         if (matters(cut.solid.facets[i]))
             for (int b = band_of(rows(cut.solid.facets[i]).first); b <= band_of(rows(cut.solid.facets[i]).second); ++b)
                 members[next[static_cast<std::size_t>(b)]++] = static_cast<std::uint32_t>(i);
+    const std::vector<std::vector<Span>> capped = line_spans(cut.solid.cap, rows_of(grid_));
     parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
         const int first = static_cast<int>(band) * kBand, last = std::min(first + kBand, grid_.ny) - 1;
         for (std::uint32_t m = starts[band]; m < starts[band + 1]; ++m) {
@@ -115,7 +122,7 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
             }
         }
         for (int j = first; j <= last; ++j)
-            for (const Span& s : line_spans(cut.solid.cap, to_units(grid_.y(j)))) {
+            for (const Span& s : capped[static_cast<std::size_t>(j)]) {
                 const int i0 = std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid_.x0) / cell)));
                 const int i1 = std::min<int>(grid_.nx - 1, static_cast<int>(std::floor((s.high / kUnitsPerMm - grid_.x0) / cell)));
                 for (int i = i0; i <= i1; ++i) surface_[grid_.index(i, j)] = static_cast<float>(top), nz_[grid_.index(i, j)] = 255;
@@ -125,9 +132,10 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
     // The flask is to stay, so nothing is left over on it; nor is what roughing keeps off its wall.
     constexpr double beside = 0.1;  // mm
     const Loops opening = offset(cut.layer.opening, -beside, 0.01);
+    const std::vector<std::vector<Span>> open = line_spans(opening, rows_of(grid_));
     for (int j = 0; j < grid_.ny; ++j) {
         std::vector<char> free(static_cast<std::size_t>(grid_.nx), 0);
-        for (const Span& s : line_spans(opening, to_units(grid_.y(j))))
+        for (const Span& s : open[static_cast<std::size_t>(j)])
             for (int i = 0; i < grid_.nx; ++i)
                 if (const double x = grid_.x(i) * kUnitsPerMm; x >= s.low && x <= s.high) free[static_cast<std::size_t>(i)] = 1;
         for (int i = 0; i < grid_.nx; ++i)

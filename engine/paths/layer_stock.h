@@ -9,6 +9,9 @@
 
 namespace slabwright {
 
+/// y of a grid's rows, 0.1 µm.
+[[nodiscard]] std::vector<double> rows_of(const CellGrid& grid);
+
 /// mm: less than this off a cell is nothing done.
 inline constexpr float kEmpty = 0.01F;
 

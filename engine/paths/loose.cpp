@@ -61,13 +61,15 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
     }
 
     std::vector<char> holds(grid.count(), 0);
-    for (int j = 0; j < grid.ny; ++j)
-        for (const Loops* region : {&slab.kept, &slab.glued})
-            for (const Span& s : line_spans(*region, to_units(grid.y(j)))) {
+    for (const Loops* region : {&slab.kept, &slab.glued}) {
+        const std::vector<std::vector<Span>> held = line_spans(*region, rows_of(grid));
+        for (int j = 0; j < grid.ny; ++j)
+            for (const Span& s : held[static_cast<std::size_t>(j)]) {
                 const int i0 = std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid.x0) / cell)));
                 const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((s.high / kUnitsPerMm - grid.x0) / cell)));
                 for (int i = i0; i <= i1; ++i) holds[grid.index(i, j)] = 1;
             }
+    }
 
     // Cells in the order in which they are put back: those that are never cut through, then the last move's first; of one move's by number.
     std::vector<std::uint32_t> order(grid.count());

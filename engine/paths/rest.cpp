@@ -214,8 +214,9 @@ private:
         const CellGrid& grid = stock_.grid();
         const Loops room = flask_room(cut_, r_ + 0.75 * grid.cell);  // a cell's corners are as clear as its middle
         room_.assign(grid.count(), 0);
+        const std::vector<std::vector<Span>> inside = line_spans(room, rows_of(grid));
         for (int j = 0; j < grid.ny; ++j)
-            for (const Span& s : line_spans(room, to_units(grid.y(j))))
+            for (const Span& s : inside[static_cast<std::size_t>(j)])
                 for (int i = 0; i < grid.nx; ++i)
                     if (const double x = grid.x(i) * kUnitsPerMm; x >= s.low && x <= s.high) room_[grid.index(i, j)] = 1;
     }

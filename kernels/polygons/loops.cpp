@@ -237,28 +237,35 @@ void nest(Loops& loops) {
     }
 }
 
-std::vector<Span> line_spans(const Loops& region, double y) {
-    std::vector<std::pair<double, int>> crossings;
+std::vector<Span> line_spans(const Loops& region, double y) { return std::move(line_spans(region, {&y, 1}).front()); }
+
+std::vector<std::vector<Span>> line_spans(const Loops& region, std::span<const double> y) {
+    using Crossing = std::pair<double, int>;
+    std::vector<std::vector<Crossing>> crossings(y.size());
     for (std::size_t l = 0; l < region.size(); ++l) {
         const auto loop = region.loop(l);
         for (std::size_t i = 0; i < loop.size(); ++i) {
             const Point2 a = loop[i], b = loop[i + 1 == loop.size() ? 0 : i + 1];
-            if ((a.y <= y) == (b.y <= y)) continue;
-            const double t = (y - a.y) / (static_cast<double>(b.y) - a.y);
-            crossings.emplace_back(a.x + t * (static_cast<double>(b.x) - a.x), a.y > b.y ? 1 : -1);
+            const double low = std::min(a.y, b.y), high = std::max(a.y, b.y);
+            for (auto at = std::lower_bound(y.begin(), y.end(), low); at != y.end() && *at < high; ++at) {
+                const double t = (*at - a.y) / (static_cast<double>(b.y) - a.y);
+                crossings[static_cast<std::size_t>(at - y.begin())].emplace_back(a.x + t * (static_cast<double>(b.x) - a.x), a.y > b.y ? 1 : -1);
+            }
         }
     }
-    // Entering before leaving where two crossings coincide, so that touching loops make one span.
-    std::sort(crossings.begin(), crossings.end(),
-              [](const auto& a, const auto& b) { return a.first != b.first ? a.first < b.first : a.second > b.second; });
-    std::vector<Span> spans;
-    int depth = 0;
-    for (const auto& [x, turn] : crossings) {
-        if (depth <= 0 && depth + turn > 0) spans.push_back({x, x});
-        depth += turn;
-        if (depth <= 0 && depth - turn > 0) spans.back().high = x;
+    std::vector<std::vector<Span>> lines(y.size());
+    for (std::size_t j = 0; j < y.size(); ++j) {
+        // Entering before leaving where two crossings coincide, so that touching loops make one span.
+        std::sort(crossings[j].begin(), crossings[j].end(),
+                  [](const Crossing& a, const Crossing& b) { return a.first != b.first ? a.first < b.first : a.second > b.second; });
+        int depth = 0;
+        for (const auto& [x, turn] : crossings[j]) {
+            if (depth <= 0 && depth + turn > 0) lines[j].push_back({x, x});
+            depth += turn;
+            if (depth <= 0 && depth - turn > 0) lines[j].back().high = x;
+        }
     }
-    return spans;
+    return lines;
 }
 
 }  // namespace slabwright

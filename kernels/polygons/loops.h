@@ -48,6 +48,8 @@ struct Span {
     double low = 0, high = 0;
 };
 [[nodiscard]] std::vector<Span> line_spans(const Loops& region, double y);
+/// The same at many heights, ascending, in one pass over the region.
+[[nodiscard]] std::vector<std::vector<Span>> line_spans(const Loops& region, std::span<const double> y);
 
 /// Fills `parents` by containment: the smallest larger loop around each. Loops may touch in points and along edges; where
 /// they cross (self-intersecting meshes) the answer is by one point inside each loop, and never cyclic. O(n) in points, plus
