@@ -15,6 +15,7 @@
 #include "engine/layer_plan.h"
 #include "engine/layers/candidates.h"
 #include "engine/layers/layers.h"
+#include "engine/paths/layer_stock.h"
 #include "engine/paths/standing.h"
 #include "engine/schedule/motion_time.h"
 #include "engine/schedule/op_forces.h"
@@ -196,7 +197,7 @@ void settle_undercuts(Context& context, Plan& plan, MeshView mesh) {
 
 double plan_view_mm2(const Plan& plan) { return (plan.stock_max[0] - plan.stock_min[0]) * (plan.stock_max[1] - plan.stock_min[1]); }
 
-// What the layers in work hold at once: their facets with an index of them, and the moves of all layers, of which a raster over the whole
+// What the layers in work hold at once: their facets with an index of them and what stands of them, and the moves of all layers, of which a raster over the whole
 // stock has about three a square millimetre.
 std::uint64_t bytes_of_paths(const Context& context, const Plan& plan, const std::vector<LayerShare>& shares) {
     std::vector<std::uint64_t> reach;
@@ -205,7 +206,7 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan, const std
     const std::size_t at_once = std::min<std::size_t>(reach.size(), context.threads());
     const std::uint64_t held = std::accumulate(reach.begin(), reach.begin() + static_cast<std::ptrdiff_t>(at_once), std::uint64_t{0});
     return held * (sizeof(SolidFacet) + 16) + static_cast<std::uint64_t>(3 * plan_view_mm2(plan)) * (sizeof(Move) + 64) +
-           Standing::bytes(plan.stock_min, plan.stock_max) * at_once;
+           (Standing::bytes(plan.stock_min, plan.stock_max) + LayerStock::bytes(plan.job, plan_view_mm2(plan))) * at_once;
 }
 
 // What a slab is glued to, layer by layer: the section of the pattern at its joint and what of the flask stays there.

@@ -59,12 +59,28 @@ std::vector<double> rows_of(const CellGrid& grid) {
     return y;
 }
 
+namespace {
+
+double cell_for(double finest, double cusp, double plane) {
+    return std::clamp(std::max(std::sqrt(2 * (finest / 2) * cusp) / 2, std::sqrt(plane / kStockCells)), 0.05, 1.0);
+}
+
+}  // namespace
+
 double stock_cell(const LayerCut& cut) {
     double finest = cut.layer.tools.finish.diameter;
     for (const Tool& tool : cut.layer.tools.rest)
         if (tool.kind == ToolKind::ball) finest = std::min(finest, tool.diameter);
     const double width = cut.layer.stock_max[0] - cut.layer.stock_min[0], depth = cut.layer.stock_max[1] - cut.layer.stock_min[1];
-    return std::clamp(std::max(std::sqrt(2 * (finest / 2) * cut.job.tolerances.cusp) / 2, std::sqrt(width * depth / kStockCells)), 0.05, 1.0);
+    return cell_for(finest, cut.job.tolerances.cusp, width * depth);
+}
+
+std::uint64_t LayerStock::bytes(const Job& job, double plane_mm2) {
+    double finest = 1e300;
+    for (const Tool& tool : job.tools)
+        if (tool.kind == ToolKind::ball) finest = std::min(finest, tool.diameter);
+    const double cell = cell_for(finest, job.tolerances.cusp, plane_mm2);
+    return static_cast<std::uint64_t>(13 * plane_mm2 / (cell * cell));
 }
 
 CutterEnd cutter_end(const Tool& tool) { return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0}; }

@@ -61,8 +61,8 @@ public:
     /// mm² on which more than `limit` (mm along the normal) is left over.
     [[nodiscard]] double area_over(Context& context, double limit) const;
 
-    /// Bytes of a stock of this many cells.
-    [[nodiscard]] static std::uint64_t bytes(std::size_t cells) { return cells * 9; }
+    /// Bytes of the stock of a layer of `plane_mm2` with the finest ball of the job, and of a copy of its heights.
+    [[nodiscard]] static std::uint64_t bytes(const Job& job, double plane_mm2);
 
 private:
     CellGrid grid_;
