@@ -271,9 +271,14 @@ private:
 }  // namespace
 
 Mesh decimate(Context& context, MeshView mesh, std::size_t facets) {
-    const MemoryCharge charge(context, 200 * mesh.vertices.size() + 160 * mesh.facets.size(), "fewer facets for the report");
+    // Of a mesh that a grid makes smaller first its vertices and facets are held once more, and then no more than of what that leaves.
+    const bool clustered = mesh.facets.size() > kClusterFrom;
+    const auto left = static_cast<std::uint64_t>(kClusterFacets);
+    const std::uint64_t bytes = clustered ? 28 * mesh.vertices.size() + 12 * mesh.facets.size() + 200 * left + 160 * 2 * left
+                                          : 200 * mesh.vertices.size() + 160 * mesh.facets.size();
+    const MemoryCharge charge(context, bytes, "fewer facets for the report");
     Decimation decimation(context, mesh);
-    if (mesh.facets.size() > kClusterFrom) decimation.cluster();
+    if (clustered) decimation.cluster();
     decimation.collapse_to(std::max<std::size_t>(4, facets));
     return decimation.take();
 }
