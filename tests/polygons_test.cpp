@@ -120,7 +120,7 @@ TEST(Polygons, LineSpansAgreeWithWinding) {
         const std::vector<std::vector<Span>> all = line_spans(loops, lines);
         ASSERT_EQ(all.size(), lines.size());
         for (std::size_t j = 0; j < lines.size(); ++j) {
-            const std::vector<Span> one = line_spans(loops, lines[j]);
+            const std::vector<Span> one = line_spans(loops, {&lines[j], 1}).front();
             ASSERT_EQ(all[j].size(), one.size());
             for (std::size_t k = 0; k < one.size(); ++k) ASSERT_TRUE(all[j][k].low == one[k].low && all[j][k].high == one[k].high);
             if (std::floor(lines[j]) != lines[j]) continue;  // points are whole

@@ -83,10 +83,14 @@ OverhangMap overhang_map(std::span<const Loops* const> regions, const std::array
     std::vector<std::vector<double>> rows(static_cast<std::size_t>(ny), std::vector<double>(static_cast<std::size_t>(nx), 1e18));
     std::vector<double> scratch, bounds, column(static_cast<std::size_t>(ny));
     std::vector<int> roots;
+    std::vector<double> heights;
+    for (int j = 0; j < ny; ++j) heights.push_back(to_units(low[1] + (j + 0.5) * cell));
+    std::vector<std::vector<std::vector<Span>>> spans;
+    for (const Loops* region : regions) spans.push_back(line_spans(*region, heights));
     for (int j = 0; j < ny; ++j) {
         std::vector<double>& row = rows[static_cast<std::size_t>(j)];
-        for (const Loops* region : regions)
-            for (const Span& s : line_spans(*region, to_units(low[1] + (j + 0.5) * cell)))
+        for (const std::vector<std::vector<Span>>& of_region : spans)
+            for (const Span& s : of_region[static_cast<std::size_t>(j)])
                 for (int i = std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - low[0]) / cell - 0.5)));
                      i < nx && (i + 0.5) * cell + low[0] <= s.high / kUnitsPerMm; ++i)
                     row[static_cast<std::size_t>(i)] = 0;

@@ -176,10 +176,11 @@ Fibres beside_flask(const LayerCut& cut, const Loops& room, Fibres forbidden, Ax
     const Loops& seen = axis == Axis::y ? turned : room;
     constexpr double far = 1e6;  // mm
     Fibres result;
+    const std::vector<std::vector<Span>> inside = line_spans(seen, std::vector<double>(lines.begin(), lines.end()));
     for (std::size_t i = 0; i < lines.size(); ++i) {
         std::vector<Forbidden> all(forbidden.line(i).begin(), forbidden.line(i).end());
         double end = -far;
-        for (const Span& s : line_spans(seen, lines[i])) {
+        for (const Span& s : inside[i]) {
             all.push_back({end, s.low / kUnitsPerMm, 0, 0});
             end = s.high / kUnitsPerMm;
         }

@@ -498,11 +498,15 @@ private:
     std::vector<FlaskCell> flask_cells(const Kept& kept, const CellGrid& grid) const {
         std::vector<FlaskCell> cells(kept.border.empty() ? 0 : grid.count(), FlaskCell::none);
         if (cells.empty()) return cells;
-        for (int j = 0; j < grid.ny; ++j)
-            for (const auto& [region, what] : {std::pair{&kept.border, FlaskCell::border}, {&kept.core, FlaskCell::core}})
-                for (const Span& span : line_spans(*region, grid.y(j) * kUnitsPerMm))
+        std::vector<double> rows;
+        for (int j = 0; j < grid.ny; ++j) rows.push_back(grid.y(j) * kUnitsPerMm);
+        for (const auto& [region, what] : {std::pair{&kept.border, FlaskCell::border}, {&kept.core, FlaskCell::core}}) {
+            const std::vector<std::vector<Span>> spans = line_spans(*region, rows);
+            for (int j = 0; j < grid.ny; ++j)
+                for (const Span& span : spans[static_cast<std::size_t>(j)])
                     for (int i = 0; i < grid.nx; ++i)
                         if (const double x = grid.x(i) * kUnitsPerMm; x >= span.low && x < span.high) cells[grid.index(i, j)] = what;
+        }
         return cells;
     }
 

@@ -237,8 +237,6 @@ void nest(Loops& loops) {
     }
 }
 
-std::vector<Span> line_spans(const Loops& region, double y) { return std::move(line_spans(region, {&y, 1}).front()); }
-
 std::vector<std::vector<Span>> line_spans(const Loops& region, std::span<const double> y) {
     using Crossing = std::pair<double, int>;
     std::vector<std::vector<Crossing>> crossings(y.size());

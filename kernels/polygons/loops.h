@@ -43,12 +43,11 @@ struct Loops {
 /// Winding number of the region's loops around p; points on the boundary count as either side.
 [[nodiscard]] int winding(const Loops& loops, Point2 p);
 
-/// Where the line at height y runs inside the region (winding number over 0): [low, high] in 0.1 µm, ascending.
+/// Where lines run inside the region (winding number over 0): [low, high] in 0.1 µm, ascending.
 struct Span {
     double low = 0, high = 0;
 };
-[[nodiscard]] std::vector<Span> line_spans(const Loops& region, double y);
-/// The same at many heights, ascending, in one pass over the region.
+/// Of each of the lines at the heights y, ascending; in one pass over the region.
 [[nodiscard]] std::vector<std::vector<Span>> line_spans(const Loops& region, std::span<const double> y);
 
 /// Fills `parents` by containment: the smallest larger loop around each. Loops may touch in points and along edges; where
