@@ -95,6 +95,10 @@ double max_layer_thickness(const Job& job) {
     return std::min(slab - job.slabs.facing_allowance, max_bonded_layer_thickness(job));
 }
 
+double rough_blend(const Cutting& cutting) {
+    return std::max(kJunction, std::min(cutting.rough_blend, std::min(cutting.wall_allowance, cutting.floor_allowance) / 3));
+}
+
 double least_flask_gap(const Job& job) {
     constexpr double kRoom = 2.5;  // mm: the leads of finish passes swing out by 2
     double widest = 0;
@@ -202,6 +206,7 @@ void validate(const Job& job) {
     const Cutting& k = job.cutting;
     require("cutting.wall_allowance", k.wall_allowance, 0, 100);
     require("cutting.floor_allowance", k.floor_allowance, 0, 100);
+    require("cutting.rough_blend", k.rough_blend, 0.02, 1);
     require("cutting.steep_limit_deg", k.steep_limit_deg, 1, 89);
     require("cutting.overlap_deg", k.overlap_deg, 0, 45);
     require("cutting.vertical_deg", k.vertical_deg, 45, 90);

@@ -127,8 +127,12 @@ struct LayerPlanning {
     double halving_coarse = 2.54, halving_resolution = 0.254;
 };
 
+/// By how much a machine may round a corner of a path where nothing else is allowed, mm.
+inline constexpr double kJunction = 0.02;
+
 struct Cutting {
     double wall_allowance = 0.3, floor_allowance = 0.3;  ///< left by roughing
+    double rough_blend = 0.1;                            ///< by which corners of its paths may be rounded: see rough_blend()
     double steep_limit_deg = 45;                         ///< level contours from here up, projected raster below
     double overlap_deg = 2;                              ///< both cut this far past the limit
     double vertical_deg = 89.5;                          ///< walls from here up go to the flat end mill
@@ -208,6 +212,10 @@ struct Job {
 
 /// The job without those flat and ball end mills that do not make a layer of this height.
 [[nodiscard]] Job with_tools_for(const Job& job, double height);
+
+/// By how much the machine may round corners of roughing paths, mm: Cutting::rough_blend, but no more than a third of what roughing leaves,
+/// and no less than everywhere else (kJunction).
+[[nodiscard]] double rough_blend(const Cutting& cutting);
 
 /// The narrowest flask.gap in which every flat and ball end mill of the job passes between pattern and flask: the widest
 /// cutter, what roughing leaves on the pattern's walls, and room for leads.

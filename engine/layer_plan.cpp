@@ -33,7 +33,7 @@ double minutes_of(const Layer& layer, const Machine& machine) {
     double minutes = 0;
     const Operation* before = nullptr;
     for (const Operation& op : layer.operations) {
-        minutes += motion_time(op.moves, machine).minutes + machine.spindle_dwell_s / 60;
+        minutes += motion_time(op.moves, machine, op.blend).minutes + machine.spindle_dwell_s / 60;
         if (before && before->tool != op.tool) minutes += machine.tool_change_s / 60;
         before = &op;
     }

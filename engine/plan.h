@@ -71,7 +71,8 @@ struct Operation {
     double stepover = 0;          ///< mm, the largest; 0 where it has none
     std::vector<StepBand> bands;  ///< of level contours, upwards: where they cut
     double spindle_rpm = 0;
-    double clearance_z = 0;  ///< mm
+    double clearance_z = 0;    ///< mm
+    double blend = kJunction;  ///< mm by which the machine may round the path's corners (G64 P)
     std::vector<Move> moves;
     std::string file;  ///< name under nc/, "" until named
     double cutting_mm = 0, rapid_mm = 0, minutes = 0;

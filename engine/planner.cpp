@@ -224,7 +224,7 @@ std::vector<Loops> joints_of(Context& context, const Plan& plan, MeshView mesh) 
 
 // Lengths and times of an operation; its forces too where the job takes cuts as nominal.
 void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnostic>& diagnostics) {
-    const MotionTime time = motion_time(op.moves, job.machine);
+    const MotionTime time = motion_time(op.moves, job.machine, op.blend);
     op.cutting_mm = time.cutting_mm;
     op.rapid_mm = time.rapid_mm;
     op.minutes = time.minutes + job.machine.spindle_dwell_s / 60;

@@ -109,7 +109,7 @@ private:
     }
 
     void execute(const Line& line) {
-        bool motion_named = false, dwell = false;
+        bool motion_named = false, dwell = false, path_mode = false;
         int motions = 0;
         bool length_offset = false;
         for (const int g : line.g) {
@@ -170,7 +170,10 @@ private:
                 }
                 case 610:
                 case 611:
+                    blend(0);
+                    break;
                 case 640:
+                    path_mode = true;
                     break;
                 case 900:
                     incremental_ = false;
@@ -239,8 +242,11 @@ private:
         if (dwell) {
             if (!line['P'] || *line['P'] < 0) fail("gcode.dwell", "G4 without a time P");
             program_.dwell_s += *line['P'];
+        } else if (path_mode) {
+            if (line['P'] && *line['P'] < 0) fail("gcode.number", "G64 with a negative tolerance P");
+            if (line['P']) blend(*line['P'] * unit_);
         } else if (line['P']) {
-            fail("gcode.unused_word", "P without G4");
+            fail("gcode.unused_word", "P without G4 or G64");
         }
         const bool axes = line['X'] || line['Y'] || line['Z'];
         const bool arc = motion_ == Motion::clockwise || motion_ == Motion::counter_clockwise;
@@ -248,6 +254,13 @@ private:
         if (axes || (arc && motion_named)) move(line);
         else if (line['I'] || line['J'] || line['K'] || line['R']) fail("gcode.unused_word", "an arc's word (I, J, K or R) without an arc");
         if (stop) ended_ = true;
+    }
+
+    // Of several in one program the widest counts where the cutter may get, the narrowest for its time.
+    void blend(double mm) {
+        program_.blend_most = blended_ ? std::max(program_.blend_most, mm) : mm;
+        program_.blend_least = blended_ ? std::min(program_.blend_least, mm) : mm;
+        blended_ = true;
     }
 
     void move(const Line& line) {
@@ -361,7 +374,7 @@ private:
     Motion motion_ = Motion::none;
     std::array<int, 3> plane_{0, 1, 2};
     double unit_ = 1;
-    bool incremental_ = false, absolute_centres_ = false;
+    bool incremental_ = false, absolute_centres_ = false, blended_ = false;
     int work_offset_ = 0, selected_ = 0;
     double speed_ = 0, feed_ = 0;
     bool turning_ = false;

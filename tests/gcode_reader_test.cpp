@@ -69,6 +69,22 @@ TEST(GcodeReader, SpindleAndUnits) {
     EXPECT_EQ(small.steps.at(0).z, 3);
 }
 
+TEST(GcodeReader, HowFarCornersMayBeRounded) {
+    const auto blends = [](const std::string& body) {
+        const Program p = read(body + "G0 X0 Y0 Z1\nG1 X1 F10\n");
+        return std::pair{p.blend_least, p.blend_most};
+    };
+    EXPECT_EQ(blends(""), std::pair(kJunction, kJunction));
+    EXPECT_EQ(blends("G64\n"), std::pair(kJunction, kJunction));
+    EXPECT_EQ(blends("G64 P0.1\n"), std::pair(0.1, 0.1));
+    EXPECT_EQ(blends("G20\nG64 P0.01\nG21\n"), std::pair(0.254, 0.254));
+    EXPECT_EQ(blends("G64 P0.1\nG64 P0.05\n"), std::pair(0.05, 0.1));
+    EXPECT_EQ(blends("G64 P0.1\nG61\n"), std::pair(0.0, 0.1));
+    EXPECT_EQ(blends("G61.1\n"), std::pair(0.0, 0.0));
+    EXPECT_EQ(refused_body("G64 P-1\n"), "gcode.number nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G61 P0.1\n"), "gcode.unused_word nc/x.ngc:8");
+}
+
 TEST(GcodeReader, ArcsStayWithinTheirTolerance) {
     struct Case {
         std::string text;

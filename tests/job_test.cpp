@@ -285,6 +285,19 @@ TEST(Job, ALayerTallerThanSomeToolsIsLeftToTheOthers) {
     EXPECT_EQ(fitted.tools[2].number, 5);
 }
 
+TEST(Job, RoughBlendStaysWithinTheAllowances) {
+    Cutting cutting;
+    EXPECT_DOUBLE_EQ(rough_blend(cutting), 0.1);
+    cutting.wall_allowance = 0.15;
+    EXPECT_DOUBLE_EQ(rough_blend(cutting), 0.05);
+    cutting.floor_allowance = 0;
+    EXPECT_DOUBLE_EQ(rough_blend(cutting), kJunction);
+    cutting.wall_allowance = cutting.floor_allowance = 9;
+    EXPECT_DOUBLE_EQ(rough_blend(cutting), 0.1);
+    EXPECT_TRUE(is_valid([](Job& j) { j.cutting.rough_blend = 0.02; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.cutting.rough_blend = 0.01; }));
+}
+
 TEST(Job, ToolOfKind) {
     Job job;
     EXPECT_EQ(tool_of_kind(job, ToolKind::face).number, 1);

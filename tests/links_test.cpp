@@ -76,7 +76,7 @@ std::vector<PathPoint> line(double x0, double y0, double x1, double y1, double z
 // Whatever is thinned, a ring lies a step from the one before it, and the first on the forbidden region's border.
 TEST(Rings, KeepTheirStep) {
     const Bench bench;
-    for (const double waves : {0.0, 5.0, 9.0}) {
+    for (const auto& [waves, blend] : {std::pair{0.0, kJunction}, {5.0, kJunction}, {9.0, kJunction}, {5.0, 0.1}, {9.0, 0.1}}) {
         // A free place with a wavy border in the middle of what is forbidden.
         Loops hollow, forbidden;
         for (int k = 720; k-- > 0;) {
@@ -89,7 +89,7 @@ TEST(Rings, KeepTheirStep) {
         forbidden.close_loop();
         forbidden.points.insert(forbidden.points.end(), hollow.points.begin(), hollow.points.end());
         forbidden.close_loop();
-        const RingPlan plan = plan_rings(bench.cut, bench.tool, forbidden, 5);
+        const RingPlan plan = plan_rings(bench.cut, bench.tool, forbidden, 5, blend);
         const double most = 0.45 * bench.tool.diameter + ring_tolerance(bench.tool) + 0.04;
         auto away = [](const PathPoint& p, std::span<const PathPoint> line) {
             double nearest = 1e300;

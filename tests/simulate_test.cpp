@@ -180,6 +180,25 @@ TEST(Simulate, AShiftOfTwentyMicrometresIsCaughtWhereNoCellSees) {
     EXPECT_EQ(codes(fine.run()), "") << "within the tolerance";
 }
 
+// A program that lets the machine round its corners is held against the part as far as that may take the cutter.
+TEST(Simulate, RoundedCornersAreHeldAgainstThePart) {
+    Block block;
+    block.rough().blend_most = kJunction;
+    EXPECT_EQ(codes(block.run()), "") << "walls are cut to their size by a path of the ordinary precision";
+    block.rough().blend_most = 0.1;
+    const SimulationReport tight = block.run();
+    EXPECT_EQ(codes(tight), "gouge.cutter");
+    EXPECT_NEAR(tight.gouge_max, 0.1, 1e-6);
+    for (ProgramStep& s : block.rough().steps)  // the innermost rings go round at 0.095 mm from the walls
+        for (double* const v : {&s.x, &s.y}) {
+            if (*v == -5) *v = -5.095;
+            if (*v == 25) *v = 25.095;
+        }
+    const SimulationReport kept = block.run();
+    EXPECT_EQ(find(kept, "gouge.cutter"), nullptr) << codes(kept);
+    EXPECT_NEAR(kept.gouge_max, 0.005, 1e-6);
+}
+
 TEST(Simulate, DroppedRetractIsARapidThroughStock) {
     Block block;
     auto& steps = block.rough().steps;
@@ -515,6 +534,11 @@ TEST(Simulate, TimeInClosedForm) {
     const double c = std::sqrt(0.5), v = std::sqrt(1000 * 0.02 * c / (1 - c)),
                  leg = 50.0 / 100 + (100.0 * 100 + (100 - v) * (100 - v)) / (2 * 1000 * 100);
     EXPECT_NEAR(program_seconds(p, m), 2 * leg, 1e-9);
+    p.blend_least = 0.1;
+    const double w = std::sqrt(1000 * 0.1 * c / (1 - c));
+    EXPECT_NEAR(program_seconds(p, m), 2 * (50.0 / 100 + (100.0 * 100 + (100 - w) * (100 - w)) / (2 * 1000 * 100)), 1e-9);
+    p.blend_least = 0;  // exactly by the corner: a stop
+    EXPECT_NEAR(program_seconds(p, m), 2 * (0.5 + 0.1), 1e-9);
 }
 
 TEST(Simulate, MapsCancelMemoryAndNonsense) {

@@ -161,7 +161,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         if (std::isinf(layer.most_minutes)) return false;
         auto minutes = [&](std::span<const Operation> operations) {
             double sum = 0;
-            for (const Operation& op : operations) sum += motion_time(op.moves, cut.job.machine).minutes;
+            for (const Operation& op : operations) sum += motion_time(op.moves, cut.job.machine, op.blend).minutes;
             return sum;
         };
         if (minutes(result.operations) <= layer.most_minutes) return false;

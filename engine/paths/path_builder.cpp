@@ -411,6 +411,6 @@ std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, do
     return kept_points(finely, keep);
 }
 
-double fast_turn(const Machine& machine, double feed) { return std::sqrt(8 * machine.acceleration * kJunction) * 60 / feed; }
+double fast_turn(const Machine& machine, double feed, double blend) { return std::sqrt(8 * machine.acceleration * blend) * 60 / feed; }
 
 }  // namespace slabwright

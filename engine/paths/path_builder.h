@@ -114,6 +114,6 @@ private:
 [[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, double loose, double turn);
 
 /// The turn at a point, radians, that a machine takes at a feed (mm/min) without slowing down: θ = √(8aδ)/v (travel_seconds).
-[[nodiscard]] double fast_turn(const Machine& machine, double feed);
+[[nodiscard]] double fast_turn(const Machine& machine, double feed, double blend = kJunction);
 
 }  // namespace slabwright

@@ -294,7 +294,7 @@ void cut_frames(PathBuilder& path, const RingPlan& plan) {
 
 double ring_tolerance(const Tool& tool) { return std::max(kFineRing, kRingShare * tool.diameter); }
 
-RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z) {
+RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double blend) {
     RingPlan plan;
     const double r = tool.diameter / 2;
     plan.step = std::min(kStepShare, tool.stepover) * tool.diameter;
@@ -320,7 +320,7 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
     const Loops useful = intersect(offset(rectangle(stands[0], stands[1], stands[2], stands[3]), r + kBeside, kFineRing),
                                    rectangle(cut.low(0, far), cut.low(1, far), cut.high(0, far), cut.high(1, far)));
     const double loose = ring_tolerance(tool);
-    const double turn = fast_turn(cut.job.machine, std::min(tool.max_feed, cut.job.machine.max_feed));
+    const double turn = fast_turn(cut.job.machine, std::min(tool.max_feed, cut.job.machine.max_feed), blend);
     Loops nearer_free;
     std::vector<std::size_t> nearer_region;  // by loop of nearer_free; SIZE_MAX for holes
     std::vector<std::array<std::int32_t, 4>> nearer_boxes;

@@ -58,7 +58,8 @@ struct RingPlan {
 /// ring next to the forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region is nowhere near the stock.
 /// @param forbidden of the tool's middle, outer loops counter-clockwise; the flask's included
 /// @param tip_z mm
-[[nodiscard]] RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z);
+/// @param blend mm by which the machine rounds the rings' corners (Operation::blend): chords are as long as it then takes at full feed
+[[nodiscard]] RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double blend);
 
 /// Cuts rings from the farthest to the forbidden region's border. A ring is cut once all rings within its part of the free
 /// area are; of those whose turn it is the nearest comes next, and from ring to next ring the cutter stays down. With `hold`, all

@@ -64,6 +64,7 @@ Operation rough_layer(const LayerCut& cut) {
     const Tool& tool = cut.layer.tools.rough;
     const bool contour = cut.job.cutting.rough_pattern == RoughPattern::contour;
     Operation op = cut.operation(OperationKind::rough, contour ? "contour-parallel levels" : "zigzag levels", tool);
+    op.blend = rough_blend(cut.job.cutting);
     const double r = tool.diameter / 2, clearance = cut.layer.z_top + cut.job.machine.clearance;
     const Cutter cutter{Cutter::Profile::flat, r + cut.job.cutting.wall_allowance};
     const std::vector<RoughLevel> levels = rough_levels(cut, tool, cut.job.cutting.floor_allowance);
@@ -95,7 +96,7 @@ Operation rough_layer(const LayerCut& cut) {
         if (i + 1 == levels.size() || contour) {
             Loops forbidden = forbidden_region(borders[i]);
             if (flask) forbidden = unite(forbidden, beyond_room(cut, r, room));
-            cuts[i].rings = plan_rings(cut, tool, forbidden, levels[i].tip);
+            cuts[i].rings = plan_rings(cut, tool, forbidden, levels[i].tip, op.blend);
             if (!cuts[i].rings.pieces.empty()) return;
         }
         const Fibres forbidden =

@@ -54,9 +54,9 @@ double travel_seconds(std::span<const MotionLeg> legs, double acceleration, doub
     return travel.seconds();
 }
 
-MotionTime motion_time(std::span<const Move> moves, const Machine& machine) {
+MotionTime motion_time(std::span<const Move> moves, const Machine& machine, double junction_mm) {
     MotionTime total;
-    Travel travel(machine.acceleration);
+    Travel travel(machine.acceleration, junction_mm);
     for (std::size_t i = 1; i < moves.size(); ++i) {
         const Move &a = moves[i - 1], &b = moves[i];
         const std::array<double, 3> d{to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y), to_mm(std::int64_t{b.z} - a.z)};

@@ -17,9 +17,6 @@ struct MotionLeg {
     std::array<double, 3> leaving = direction;  ///< at its end
 };
 
-/// How near a path may pass by its corners, mm.
-inline constexpr double kJunction = 0.02;
-
 /// The time of legs that are told one after the other, without keeping them all: see travel_seconds.
 class Travel {
 public:
@@ -54,7 +51,7 @@ struct MotionTime {
 };
 
 /// Of a program's moves, the first of which is where it starts. On an arc the speed is also limited to what its radius bears
-/// under the machine's acceleration: v² = a·r.
-[[nodiscard]] MotionTime motion_time(std::span<const Move> moves, const Machine& machine);
+/// under the machine's acceleration: v² = a·r. Corners are rounded by `junction_mm` at most, as in travel_seconds.
+[[nodiscard]] MotionTime motion_time(std::span<const Move> moves, const Machine& machine, double junction_mm = kJunction);
 
 }  // namespace slabwright

@@ -318,7 +318,12 @@ private:
             (s.rapid() ? f.rapid_mm : f.cutting_mm) += std::sqrt((s.x - b.x) * (s.x - b.x) + (s.y - b.y) * (s.y - b.y) + (s.z - b.z) * (s.z - b.z));
         }
         if (const Tool* const tool = prepared_[i].tool) {
-            f.gouge = check_gouge(context_, part_, layer.z_top, *tool, program, {options_.gouge, 1e-5});
+            // A path whose corners the machine may round farther than a finish pass's is safe as far as it may leave it.
+            Tool wide = *tool;
+            if (program.blend_most > kJunction)
+                for (double* const diameter : {&wide.diameter, &wide.shank_diameter, &wide.holder_diameter})
+                    if (*diameter > 0) *diameter += 2 * program.blend_most;
+            f.gouge = check_gouge(context_, part_, layer.z_top, wide, program, {options_.gouge, 1e-5});
             if (walls) f.flask = check_gouge(context_, *walls, layer.z_top, *tool, program, {options_.gouge, 1e-5}).cutter;
         }
         return box;
