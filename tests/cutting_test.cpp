@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <tuple>
 
 #include "kernels/cutting/drop.h"
 #include "kernels/cutting/level_contours.h"
@@ -327,6 +328,51 @@ TEST(Fibres, AFlangeThatBeginsAtTheTopIsNoneOfTheLayer) {
             EXPECT_LE(to_mm(p.x), 20 + half + 0.01);
         }
     }
+}
+
+// Beside some of its facets a solid's contours are those of what lies near them alone.
+TEST(LayerSolid, WhatIsNearSufficesForTheContoursThere) {
+    std::mt19937 random(test::seed());
+    Context context;
+    std::size_t compared = 0, left_out = 0;
+    for (int trial = 0; trial < 8; ++trial) {
+        const Mesh mesh = test::random_height_field(context, 24, 3.0, 12, trial % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
+        const LayerSolid solid = layer_solid(context, mesh.view(), -5, 12.5);
+        const Cutter cutter{trial % 3 == 0 ? Cutter::Profile::flat : Cutter::Profile::ball, 2.0};
+        std::vector<SolidFacet> chosen;
+        const Vec3d middle = solid.facets[random() % solid.facets.size()].p[0];
+        for (const SolidFacet& f : solid.facets)
+            if (std::hypot(f.p[0][0] - middle[0], f.p[0][1] - middle[1]) < 5 && f.nz > 0.5) chosen.push_back(f);
+        const LayerSolid near = solid_near(context, solid, chosen, 2 * cutter.radius + 2 * 0.25);
+        left_out += solid.facets.size() - near.facets.size();
+        const FibreGrid grid = fibre_grid(solid, cutter, 2500);
+        auto beside = [&](Point2 p) {
+            double nearest = 1e9;
+            for (const SolidFacet& f : chosen) {
+                std::array<Vec3d, 3> flat = f.p;
+                for (Vec3d& v : flat) v[2] = 0;
+                nearest = std::min(nearest, distance_to({to_mm(p.x), to_mm(p.y), 0}, flat));
+            }
+            return nearest < cutter.radius;
+        };
+        auto points = [&](const LayerSolid& of, const Loops& inside, double tip) {
+            const Contours contours = level_contours(context, of, inside, cutter, tip, grid);
+            std::vector<std::tuple<std::int32_t, std::int32_t, float>> found;
+            for (std::size_t k = 0; k < contours.points.size(); ++k)
+                if (beside(contours.points[k])) found.emplace_back(contours.points[k].x, contours.points[k].y, contours.nz[k]);
+            std::sort(found.begin(), found.end());
+            return found;
+        };
+        for (const double tip : {1.0, 3.0, 5.0, 8.0}) {
+            const Plane plane = inside_plane(solid, cutter, tip);
+            const std::vector<Section> inside = slice(context, mesh.view(), {&plane, 1});
+            const auto whole = points(solid, inside[0].loops, tip);
+            EXPECT_EQ(points(near, inside[0].loops, tip), whole) << "trial " << trial << " tip " << tip;
+            compared += whole.size();
+        }
+    }
+    EXPECT_GT(compared, 500U);
+    EXPECT_GT(left_out, 4000U);
 }
 
 TEST(Fibres, SameBytesOnAnyNumberOfThreads) {

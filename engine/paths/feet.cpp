@@ -53,10 +53,11 @@ void append_foot_runs(const LayerCut& cut, const Tool& tool, double floor, const
     const Cutter cutter{Cutter::Profile::flat, r};
     const std::vector<SolidFacet> facets = floor_facets(cut, floor);
     const NearFloor near(cut, facets, r, grid);
+    const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(grid.pitch)));
     for (const double above : heights) {
         const double tip = floor + above;
         const std::array<double, 1> tips{tip};
-        const Contours foot = level_contours(cut.context, cut.solid, cut.insides(cutter, tips).front().loops, cutter, tip, grid);
+        const Contours foot = level_contours(cut.context, around, cut.insides(cutter, tips).front().loops, cutter, tip, grid);
         levels.emplace_back();
         for (std::size_t c = 0; c < foot.size(); ++c) {
             const std::size_t first = foot.starts[c], n = foot.starts[c + 1] - first;

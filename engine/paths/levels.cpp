@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "engine/paths/feet.h"
 #include "engine/paths/layer_cut.h"
 #include "engine/paths/level_runs.h"
 #include "kernels/cutting/cusp.h"
@@ -98,6 +100,15 @@ std::vector<StepBand> bands_of(const LayerCut& cut, std::span<const SpacedLevel>
     return bands;
 }
 
+// Heights of the floors on which walls of the layer stand, descending; those within kSameFloor are one.
+std::vector<double> foot_floors(const LayerCut& cut) {
+    std::vector<double> floors;
+    for (const Flat& flat : cut.layer.feet) floors.push_back(flat.highest);
+    std::sort(floors.begin(), floors.end(), std::greater<>());
+    floors.erase(std::unique(floors.begin(), floors.end(), [](double a, double b) { return a - b < kSameFloor; }), floors.end());
+    return floors;
+}
+
 }  // namespace
 
 Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
@@ -135,14 +146,6 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         op.stepdown = std::max(op.stepdown, step);
         tips.push_back(z);
     }
-    // The foot of a wall on a floor is a hollow: the ball turns from wall to floor within a small part of a step. Levels
-    // close above every floor cut what lies there, and only that.
-    const std::size_t regular = tips.size();
-    for (const Flat& flat : cut.layer.feet)
-        for (double above = tool.stepdown_max / 4; above > 0.02; above /= 2)
-            if (flat.z + above < high && flat.z + above > lowest) tips.push_back(flat.z + above);
-    std::sort(tips.begin() + static_cast<std::ptrdiff_t>(regular), tips.end(), std::greater<>());
-    tips.erase(std::unique(tips.begin() + static_cast<std::ptrdiff_t>(regular), tips.end()), tips.end());
     const double foot_nz = std::cos(80 * degree);
 
     if (bite > 0)
@@ -153,7 +156,8 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                                {}});
 
     const Cutter cutter{Cutter::Profile::ball, r};
-    const std::vector<Contours> contours = cut.contours(cutter, tips, safe_pitch(r, gouge));
+    const FibreGrid grid = fibre_grid(cut.solid, cutter, safe_pitch(r, gouge));
+    const std::vector<Contours> contours = cut.contours(cutter, tips, grid.pitch);
     // A vertical wall belongs to the flat end mill wherever that can stand against the place of contact.
     std::unique_ptr<DropIndex> flat;
     double flat_r = 0;
@@ -161,19 +165,18 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         flat_r = cut.layer.tools.rough.diameter / 2;
         flat = std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
     }
-    std::vector<std::vector<LevelRun>> runs(tips.size());
-    parallel_each(cut.context, tips.size(), [&](std::size_t i) {
-        const Contours& level = contours[i];
+    // What of a level is cut: `above`, the tip one level higher, where there is one; `floor`, on whose walls' feet alone, where it is for them.
+    auto append_wanted = [&](const Contours& level, double tip, std::optional<double> above, const NearFloor* floor, std::vector<LevelRun>& out) {
         for (std::size_t c = 0; c < level.size(); ++c) {
             const std::size_t first = level.starts[c], n = level.starts[c + 1] - first;
             std::vector<char> wanted(n, 0);
             for (std::size_t k = 0; k < n; ++k) {
-                const double nz = std::max(0.0F, level.nz[first + k]), contact = tips[i] + r * (1 - nz);
+                const double nz = std::max(0.0F, level.nz[first + k]), contact = tip + r * (1 - nz);
                 if (nz > std::cos(split) || contact > cut.layer.z_top + 1e-6) continue;
                 if (contact < cut.layer.z_bottom - 0.05 &&
-                    (i == 0 || i >= regular || !leaves_foot(r, nz, tips[i - 1] + r * (1 - nz) - cut.layer.z_bottom, cut.job.tolerances.cusp)))
+                    (!above || !leaves_foot(r, nz, *above + r * (1 - nz) - cut.layer.z_bottom, cut.job.tolerances.cusp)))
                     continue;
-                if (i >= regular && nz < foot_nz) continue;
+                if (floor && (nz < foot_nz || !(*floor)(level.points[first + k]))) continue;
                 wanted[k] = 1;
                 if (!flat || nz > vertical) continue;
                 const Point2 a = level.points[first + (k + n - 1) % n], p = level.points[first + k], b = level.points[first + (k + 1) % n];
@@ -182,10 +185,39 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 // The solid is on the right, so the free side is on the left.
                 if (!flat->stands_over(to_mm(p.x) - dy / l * (flat_r - r), to_mm(p.y) + dx / l * (flat_r - r), contact)) wanted[k] = 0;
             }
-            append_level_runs(level, c, to_units(tips[i]), wanted, simplify_tolerance_units(gouge), runs[i]);
+            append_level_runs(level, c, to_units(tip), wanted, simplify_tolerance_units(gouge), out);
         }
-    });
-    for (std::size_t i = 0; i < regular; ++i) spaced[i].cuts = !runs[i].empty();
+    };
+    std::vector<std::vector<LevelRun>> runs(tips.size());
+    parallel_each(cut.context, tips.size(),
+                  [&](std::size_t i) { append_wanted(contours[i], tips[i], i > 0 ? std::optional(tips[i - 1]) : std::nullopt, nullptr, runs[i]); });
+    // The foot of a wall on a floor is a hollow: the ball turns from wall to floor within a small part of a step. Levels
+    // close above every floor cut what lies there, and only that.
+    struct FootLevel {
+        double tip;
+        std::vector<LevelRun> runs;
+    };
+    std::vector<FootLevel> feet;
+    for (const double floor : foot_floors(cut)) {
+        std::vector<double> close;
+        for (double above = tool.stepdown_max / 4; above > 0.02; above /= 2)
+            if (floor + above < high && floor + above > lowest) close.push_back(floor + above);
+        const std::vector<SolidFacet> facets = floor_facets(cut, floor);
+        if (close.empty() || facets.empty()) continue;
+        const NearFloor near(cut, facets, r, grid);
+        const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(grid.pitch)));
+        const std::vector<Section> inside = cut.insides(cutter, close);
+        std::vector<FibreLevel> levels;
+        for (std::size_t i = 0; i < close.size(); ++i) levels.push_back({close[i], &inside[i].loops});
+        const std::vector<Contours> level = level_contours(cut.context, around, levels, cutter, grid);
+        const std::size_t begin = feet.size();
+        for (const double tip : close) feet.push_back({tip, {}});
+        parallel_each(cut.context, close.size(),
+                      [&](std::size_t i) { append_wanted(level[i], close[i], std::nullopt, &near, feet[begin + i].runs); });
+    }
+    std::stable_sort(feet.begin(), feet.end(), [](const FootLevel& a, const FootLevel& b) { return a.tip > b.tip; });
+    for (FootLevel& foot : feet) runs.push_back(std::move(foot.runs));
+    for (std::size_t i = 0; i < tips.size(); ++i) spaced[i].cuts = !runs[i].empty();
     op.bands = bands_of(cut, spaced, slopes.levels_keep, tool.stepdown_max);
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
                      cut.layer.z_top + 2);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
+#include "kernels/cutting/fibres.h"
 #include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/slicing/slicing.h"
@@ -11,6 +13,8 @@
 namespace slabwright {
 
 namespace {
+
+constexpr double kMostTiles = 1024;  // along x and along y, of solid_near
 
 Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
 Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
@@ -260,6 +264,46 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     solid.groups = facet_groups(context, solid.facets);
     solid.tree = facet_tree(context, solid.facets, solid.min, solid.max);
     return solid;
+}
+
+LayerSolid solid_near(Context& context, const LayerSolid& solid, std::span<const SolidFacet> facets, double reach) {
+    LayerSolid near;
+    near.z_low = solid.z_low, near.z_top = solid.z_top, near.min = solid.min, near.max = solid.max;
+    if (facets.empty() || solid.facets.empty()) return near;
+    // Square tiles over the solid; those that come near are marked, by their middles.
+    const double tile = std::max({reach, (solid.max[0] - solid.min[0]) / kMostTiles, (solid.max[1] - solid.min[1]) / kMostTiles});
+    const auto tiles = [&](int axis) { return static_cast<std::size_t>((solid.max[axis] - solid.min[axis]) / tile) + 1; };
+    const std::size_t nx = tiles(0), ny = tiles(1);
+    const auto of = [&](double v, int axis) {
+        return static_cast<std::size_t>(std::clamp((v - solid.min[axis]) / tile, 0.0, static_cast<double>((axis == 0 ? nx : ny) - 1)));
+    };
+    std::vector<std::int32_t> rows;
+    for (std::size_t j = 0; j < ny; ++j) rows.push_back(to_units(solid.min[1] + (static_cast<double>(j) + 0.5) * tile));
+    const double half = tile * std::numbers::sqrt2 / 2 + 0.001;
+    const Fibres marked = covering(context, facets, reach + half, Axis::x, rows);
+    std::vector<std::uint32_t> before(nx * ny + ny, 0);  // by row: how many marked tiles precede a tile
+    for (std::size_t j = 0; j < ny; ++j) {
+        std::uint32_t* const row = before.data() + j * (nx + 1);
+        for (const Forbidden& f : marked.line(j)) {
+            if (f.high < solid.min[0] || f.low > solid.max[0]) continue;
+            for (std::size_t i = of(f.low, 0); i <= of(f.high, 0); ++i) row[i + 1] = 1;
+        }
+        for (std::size_t i = 1; i <= nx; ++i) row[i] += row[i - 1];
+    }
+    const auto meets = [&](const FacetGroup& g) {
+        const std::size_t i0 = of(g.low[0], 0), i1 = of(g.high[0], 0), j1 = of(g.high[1], 1);
+        for (std::size_t j = of(g.low[1], 1); j <= j1; ++j)
+            if (before[j * (nx + 1) + i1 + 1] > before[j * (nx + 1) + i0]) return true;
+        return false;
+    };
+    for (std::size_t g = 0; g < solid.groups.size(); ++g) {
+        if (!meets(solid.groups[g])) continue;
+        const std::size_t first = g * FacetGroup::kFacets, last = std::min(solid.facets.size(), first + FacetGroup::kFacets);
+        near.facets.insert(near.facets.end(), solid.facets.begin() + static_cast<std::ptrdiff_t>(first),
+                           solid.facets.begin() + static_cast<std::ptrdiff_t>(last));
+    }
+    near.groups = facet_groups(context, near.facets);
+    return near;
 }
 
 }  // namespace slabwright

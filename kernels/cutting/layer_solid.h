@@ -57,4 +57,9 @@ inline constexpr double kTopSheet = 0.001;
 /// @param z_low how far down a cutter of this layer can touch anything
 [[nodiscard]] LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_top);
 
+/// Of a solid's facets all that come within `reach` mm of some others, seen from above, and a few more. Where a cutter of radius r covers some of
+/// those others, its contours on a grid are the whole solid's if `reach` is 2r and twice the grid's pitch. For fibres: without cap and tree;
+/// extent and heights are the whole solid's.
+[[nodiscard]] LayerSolid solid_near(Context& context, const LayerSolid& solid, std::span<const SolidFacet> facets, double reach);
+
 }  // namespace slabwright
