@@ -3,15 +3,24 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include <fmt/format.h>
 
 #include "engine/paths/chains.h"
+#include "engine/paths/feet.h"
 #include "engine/paths/layer_cut.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
+
+namespace {
+
+constexpr double kOverFloor = 1e-3;  // mm: a line this near to a floor's facets, seen from above, passes over them
+constexpr double kOnFloor = 1e-3;    // mm: a flat end mill that meets nothing this far over a floor stands on it
+
+}  // namespace
 
 Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
     const Tool& tool = cut.layer.tools.finish;
@@ -89,14 +98,27 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     // Whether the flat end mill finishes a floor's place: from right over it, or with its rim from beside a wall.
     auto flat_covers = [&](double x, double y, double z) {
         for (const auto& [flat_r, flat] : flats) {
-            if (!flat->stands_over(x, y, z + 1e-3)) return true;
+            if (!flat->stands_over(x, y, z + kOnFloor)) return true;
             for (int k = 0; k < 8; ++k) {
                 const double turn = k * std::numbers::pi / 4, beside = 0.95 * flat_r;
-                if (!flat->stands_over(x + beside * std::cos(turn), y + beside * std::sin(turn), z + 1e-3)) return true;
+                if (!flat->stands_over(x + beside * std::cos(turn), y + beside * std::sin(turn), z + kOnFloor)) return true;
             }
         }
         return false;
     };
+
+    // Where lines pass over floors, ascending by line: what most of a raster would only find to be finished.
+    struct FloorSpan {
+        double low, high, z;  // mm
+    };
+    std::vector<std::vector<FloorSpan>> floor_spans(lines.size());
+    for (const double floor : cut.floors) {
+        const Fibres over = covering(cut.context, floor_facets(cut, floor), kOverFloor, Axis::x, lines);
+        for (std::size_t l = 0; l < lines.size(); ++l)
+            for (const Forbidden& f : over.line(l)) floor_spans[l].push_back({f.low, f.high, floor});
+    }
+    for (std::vector<FloorSpan>& spans : floor_spans)
+        std::sort(spans.begin(), spans.end(), [](const FloorSpan& a, const FloorSpan& b) { return a.low < b.low; });
 
     // A place of the ball on the surface: tip and contact.
     struct Sample {
@@ -120,6 +142,21 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         if (s.wanted && floor_done(contact) && flat_covers(s.contact[0], s.contact[1], contact)) s.wanted = false;
         s.tip = rest.tip_z;
         s.reachable = s.tip >= cut.layer.floor_below && !rest.on_cap;
+        if (s.reachable) s.z = to_units(s.tip) + 1;
+        return s;
+    };
+    // A place over a floor on which a flat end mill has stood there, of one that is no narrower than the ball: the ball would rest on that floor as
+    // well (or on something less than kOnFloor higher), and has nothing to cut.
+    auto finished = [&](std::int32_t ux, std::int32_t uy, double floor) -> std::optional<Sample> {
+        const double x = to_mm(ux), y = to_mm(uy);
+        if (std::none_of(flats.begin(), flats.end(),
+                         [&](const auto& one) { return one.second->cutter().radius >= r && !one.second->stands_over(x, y, floor + kOnFloor); }))
+            return std::nullopt;
+        Sample s;
+        s.x = ux;
+        s.contact = {x, y, floor};
+        s.tip = floor + kOnFloor;
+        s.reachable = floor >= cut.layer.floor_below;
         if (s.reachable) s.z = to_units(s.tip) + 1;
         return s;
     };
@@ -159,12 +196,17 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
         const double low_limit = cut.low(0, r) * kUnitsPerMm, high_limit = cut.high(0, r) * kUnitsPerMm;
         std::int32_t next = INT32_MIN;
+        auto floor = floor_spans[l].begin();
         for (const Span& span : spans) {
             const auto first = static_cast<std::int32_t>(std::ceil(std::max(span.low - step, low_limit) / step)),
                        last = static_cast<std::int32_t>(std::floor(std::min(span.high + step, high_limit) / step));
             for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                 next = k + 1;
-                append_between(append_between, samples[l], sample(k * step, lines[l]), lines[l]);
+                const double x = to_mm(k * step);
+                while (floor != floor_spans[l].end() && floor->high < x) ++floor;
+                const std::optional<Sample> done =
+                    floor != floor_spans[l].end() && floor->low < x ? finished(k * step, lines[l], floor->z) : std::nullopt;
+                append_between(append_between, samples[l], done ? *done : sample(k * step, lines[l]), lines[l]);
             }
         }
     });
