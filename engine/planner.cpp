@@ -231,7 +231,7 @@ void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnos
     if (job.cutting.engagement == Engagement::simulated) return;
     const auto tool = std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
     rate_operation(op, *tool, job);
-    const double allowance = std::min(job.cutting.wall_allowance, job.cutting.floor_allowance);
+    const double allowance = bending_limit(op, job);
     if (op.kind == OperationKind::rough && op.deflection_mm > allowance)
         diagnostics.push_back({Severity::warning,
                                "rough.deflection",

@@ -277,7 +277,7 @@ double bending_limit(const Operation& operation, const Job& job) {
             return job.slabs.facing_allowance > 0 ? job.slabs.facing_allowance : job.tolerances.cusp;
         case OperationKind::rough:
         case OperationKind::semi_rough:
-            return std::max(std::min(job.cutting.wall_allowance, job.cutting.floor_allowance), job.tolerances.cusp);
+            return std::max(std::min(job.cutting.wall_allowance, job.cutting.floor_allowance) - (operation.blend - kJunction), job.tolerances.cusp);
         default:
             return job.tolerances.cusp;
     }
