@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include "engine/paths/semi_rough.h"
@@ -13,6 +14,7 @@
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
 #include "tests/support/height_field.h"
+#include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -51,6 +53,40 @@ struct Notch {
         return {};
     }
 };
+
+// However a layer's stock puts the moves of an operation in order, it stands as it does after one move after another.
+TEST(LayerStock, StandsAsAfterOneMoveAfterAnother) {
+    std::mt19937 random(test::seed());
+    Notch n;
+    auto somewhere = [&](double low, double high) { return to_units(std::uniform_real_distribution(low, high)(random)); };
+    for (const ToolKind kind : {ToolKind::flat, ToolKind::ball}) {
+        const Tool tool = tool_of_kind(n.job, kind);
+        Operation op;
+        for (const double level : {11.0, 7.5, 4.0, 0.0, 9.0}) {  // a level over others comes last, as finish passes do
+            op.moves.push_back({somewhere(-40, 40), somewhere(-40, 40), to_units(kTop + 2), 0});
+            std::int32_t z = to_units(level);
+            for (int k = 0; k < 300; ++k) {
+                const Move& at = op.moves.back();
+                if (k % 40 == 39) z = to_units(level) + somewhere(-0.5, 1);
+                op.moves.push_back({std::clamp(at.x + somewhere(-12, 12), to_units(-45), to_units(45)),
+                                    std::clamp(at.y + somewhere(-12, 12), to_units(-45), to_units(45)), z, k % 50 == 49 ? 0U : 1000U});
+            }
+        }
+        LayerStock together(n.cut, 0.25), singly(n.cut, 0.25);
+        const std::vector<float> whole = together.heights();
+        const Taken taken = together.cut(n.cut, op, tool);
+        for (std::size_t i = 1; i < op.moves.size(); ++i) {
+            Operation one;
+            one.moves = {op.moves[i - 1], op.moves[i]};
+            singly.cut(n.cut, one, tool);
+        }
+        EXPECT_EQ(together.heights(), singly.heights());
+        std::size_t cells = 0;
+        for (std::size_t c = 0; c < whole.size(); ++c) cells += whole[c] - together.height(c) > kEmpty;
+        EXPECT_EQ(taken.cells, cells);
+        EXPECT_GT(cells, whole.size() / 2);
+    }
+}
 
 TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
     for (const double swath : {0.0, 3.0, 6.0}) {

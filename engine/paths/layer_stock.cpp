@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 
 #include "kernels/parallel/parallel.h"
 
@@ -31,6 +32,65 @@ struct Lowering {
     void operator()(std::size_t cell, double z) { height[cell] = std::min(height[cell], static_cast<float>(std::max(0.0, z))); }
     void row(std::size_t first, int n, const double* h, double /*lowest*/) { lower_to(height + first, n, h); }
     void spans(std::size_t first, int rows, const RowSpans& s, double z) { lower_spans(height + first, nx, rows, s, z); }
+};
+
+// What stands at most in the tiles of a band of rows: a bound, as near as kStale cuts of a tile ago.
+class TileTops {
+public:
+    TileTops(const float* height, const CellGrid& band)
+        : height_(height),
+          band_(band),
+          nx_((band.nx + kTile - 1) / kTile),
+          tops_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>((band.ny + kTile - 1) / kTile)),
+          cuts_(tops_.size(), kStale) {}
+
+    // Whether anything may stand over a level within a rectangle, mm, of the band; if so it counts as cut.
+    [[nodiscard]] bool cut_over(double x0, double x1, double y0, double y1, double level) {
+        const int i0 = tile((x0 - band_.x0) / band_.cell, band_.nx), i1 = tile((x1 - band_.x0) / band_.cell, band_.nx);
+        const int j0 = tile((y0 - band_.y0) / band_.cell, band_.ny), j1 = tile((y1 - band_.y0) / band_.cell, band_.ny);
+        bool over = false;
+        for (int j = j0; j <= j1 && !over; ++j)
+            for (int i = i0; i <= i1 && !over; ++i) over = stands_over(i, j, level);
+        for (int j = j0; j <= j1 && over; ++j)
+            for (int i = i0; i <= i1; ++i) {
+                std::uint8_t& cuts = cuts_[index(i, j)];
+                if (cuts < kStale) ++cuts;
+            }
+        return over;
+    }
+
+private:
+    static constexpr int kTile = 16;  // cells
+    static constexpr std::uint8_t kStale = 4;
+
+    static int tile(double cell, int cells) { return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(cells - 1))) / kTile; }
+    [[nodiscard]] std::size_t index(int i, int j) const {
+        return static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i);
+    }
+    [[nodiscard]] bool stands_over(int i, int j, double level) {
+        float& top = tops_[index(i, j)];
+        std::uint8_t& cuts = cuts_[index(i, j)];
+        if (cuts == kStale) {
+            const int first = std::max(0, std::min(i * kTile, band_.nx - kTile)), n = std::min(kTile, band_.nx);
+            std::array<float, kTile> tops{};  // side by side, so that a compiler sees that their order does not matter; heights are 0 or more
+            for (int row = j * kTile; row < std::min((j + 1) * kTile, band_.ny); ++row) {
+                const float* const h = height_ + band_.index(first, row);
+                if (n == kTile)
+                    for (std::size_t k = 0; k < kTile; ++k) tops[k] = h[k] > tops[k] ? h[k] : tops[k];
+                else
+                    for (std::size_t k = 0; k < static_cast<std::size_t>(n); ++k) tops[k] = std::max(tops[k], h[k]);
+            }
+            top = *std::max_element(tops.begin(), tops.end());
+            cuts = 0;
+        }
+        return top > level;
+    }
+
+    const float* height_;
+    CellGrid band_;
+    int nx_;
+    std::vector<float> tops_;
+    std::vector<std::uint8_t> cuts_;
 };
 
 // How heights are lower than they were.
@@ -170,6 +230,11 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         boxes[i / kBlock].add(moves[i]);
         if (i % kBlock == 0 && i > 0) boxes[i / kBlock].add(moves[i - 1]);
     }
+    // The lowest first, whatever their order is: of what they leave a cell keeps the least, and over places cut low the higher levels of a
+    // roughing need not be looked at cell by cell.
+    std::vector<std::uint32_t> upwards(boxes.size());
+    std::iota(upwards.begin(), upwards.end(), 0U);
+    std::stable_sort(upwards.begin(), upwards.end(), [&](std::uint32_t a, std::uint32_t b) { return boxes[a].z0 < boxes[b].z0; });
     const int bands = (grid_.ny + kBand - 1) / kBand;
     std::vector<Taken> taken(static_cast<std::size_t>(bands));
     parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
@@ -179,13 +244,18 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         float* height = height_.data() + grid_.index(0, first);
         Lowering lowering{height, static_cast<std::size_t>(grid_.nx)};
         std::vector<float> before;  // of a band that the operation comes to
-        for (std::size_t b = 0; b < boxes.size(); ++b) {
+        TileTops tops(height, part);
+        for (const std::uint32_t b : upwards) {
             if (boxes[b].y1 < y0 || boxes[b].y0 > y1 || boxes[b].z0 >= top) continue;
             for (std::size_t i = std::max<std::size_t>(1, b * kBlock); i < std::min(moves.size(), (b + 1) * kBlock); ++i) {
                 const Move &p = moves[i - 1], &q = moves[i];
                 if (q.feed == 0) continue;
                 const double py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
                 if (std::max(py, qy) < y0 || std::min(py, qy) > y1 || std::min(pz, qz) >= top) continue;
+                const double px = to_mm(p.x), qx = to_mm(q.x);
+                if (!tops.cut_over(std::min(px, qx) - r, std::max(px, qx) + r, std::min(py, qy) - r, std::max(py, qy) + r,
+                                   std::min(pz, qz) - z_bottom_))
+                    continue;
                 if (before.empty()) before.assign(height, height + part.count());
                 std::array<double, 3> previous{}, next{};
                 ChainedSweep chain;
