@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <span>
 
 #include "kernels/access/closest_point.h"
 #include "kernels/access/standing_part.h"
@@ -277,6 +278,103 @@ TEST(StandingPart, ShortMotionsAfterOneInsideThePartAreFound) {
         }
     }
     EXPECT_GT(deep, 1000U);
+}
+
+// Rows as programs have them: arcs of short chords, rings and zigzags of long motions, far from the part, beside it and just within it.
+TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
+    Context context;
+    const Mesh m = relief(24, bumpy);
+    const StandingPart part(context, m.view());
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    auto between = [&](double low, double high) { return low + (high - low) * unit(random); };
+    std::size_t just = 0, free = 0, deep = 0;
+    for (int trial = 0; trial < 100; ++trial) {
+        const double z_top = trial % 4 == 0 ? 6.5 : 100.0, radius = between(0.4, 4);
+        const bool is_ball = trial % 2 == 0;
+        const auto form = is_ball ? StandingPart::Form::ball : StandingPart::Form::cylinder;
+        std::vector<StandingPart::Motion> motions;
+        Point3 at{between(-12, 36), between(-12, 36), between(4, 9)};
+        auto go = [&](const Point3& to) {
+            motions.push_back({at, to});
+            at = to;
+        };
+        const double climb = trial % 3 == 0 ? between(-0.01, 0.01) : 0, stair = trial % 3 == 1 ? between(0, 0.6) : 0;
+        while (motions.size() < 300) {
+            const double kind = unit(random);
+            if (kind < 0.6) {  // an arc
+                const double bend = std::pow(10, between(0, 1.7)) * (unit(random) < 0.5 ? -1 : 1), chord = between(0.05, 0.4);
+                double heading = between(0, 6.3);
+                for (int n = static_cast<int>(between(5, 120)); n > 0; --n, heading += chord / bend)
+                    go({at[0] + chord * std::cos(heading), at[1] + chord * std::sin(heading), at[2] + climb + (n % 2 == 0 ? stair : -stair)});
+            } else if (kind < 0.8) {  // rows and rings
+                for (int n = static_cast<int>(between(3, 20)); n > 0; --n) {
+                    go({at[0] + (at[0] > 12 ? -1 : 1) * between(1, 20), at[1], at[2]});
+                    go({at[0], at[1] + between(-2, 2), at[2]});
+                }
+            } else if (kind < 0.9) {  // up, over the part and down
+                go({at[0], at[1], at[2] + between(0, 12)});
+                go({between(-12, 36), between(-12, 36), at[2]});
+                go({at[0], at[1], between(4, 9)});
+            } else {
+                at = {between(-12, 36), between(-12, 36), between(4, 9)};
+            }
+        }
+        auto deepest_of = [&](double r, double lift) {
+            double most = 0;
+            std::vector<double> depths;
+            for (StandingPart::Motion way : motions) {
+                way.from[2] += lift, way.to[2] += lift;
+                depths.push_back((is_ball ? part.ball(z_top, way.from, way.to, r, 0) : part.cylinder(z_top, way.from, way.to, r, 0)).depth);
+                most = std::max(most, depths.back());
+            }
+            return std::pair(most, depths);
+        };
+        const auto [full, all] = deepest_of(radius, 0);
+        // A cutter as much smaller, its centre or floor as much less deep, is in the part so much less: what is deepest then is less than a hair.
+        for (const double left : {-1.0, 4e-6, 2e-4, -1e-5}) {
+            const double less = left == -1.0 ? 0 : full - left;
+            if (less < 0 || less >= radius) continue;
+            std::vector<StandingPart::Motion> raised = motions;
+            for (auto& [from, to] : raised) from[2] += less, to[2] += less;
+            const auto [most, depths] = deepest_of(radius - less, less);
+            const double tolerance = left == -1.0 ? 0.3 : std::max(left / 2, 0.0);
+            const StandingPart::Found found = part.deepest(form, z_top, raised, radius - less, 0, tolerance);
+            EXPECT_NEAR(found.most.depth, most, 3e-7) << "seed " << seed << " trial " << trial << " left " << left;
+            if (most > 1e-6) {
+                ASSERT_TRUE(found.most.found) << "seed " << seed << " trial " << trial << " left " << left;
+                EXPECT_NEAR(depths[found.motion], most, 3e-7);
+                just += left > 0;
+            } else free += left < 0;
+            for (std::size_t i = 0; i < motions.size(); ++i) {
+                if (std::abs(depths[i] - tolerance) < 1e-6) continue;
+                const bool listed = std::binary_search(found.beyond.begin(), found.beyond.end(), static_cast<std::uint32_t>(i));
+                ASSERT_EQ(listed, depths[i] > tolerance) << "seed " << seed << " trial " << trial << " motion " << i << " depth " << depths[i];
+                deep += listed;
+            }
+        }
+    }
+    EXPECT_GT(just, 40U);
+    EXPECT_GT(free, 20U);
+    EXPECT_GT(deep, 2000U);
+}
+
+// A motion that comes down from high above the part's outline meets nothing but the top sheet.
+TEST(StandingPart, RowsThatComeDownWithinTheOutlineMeetTheTop) {
+    Context context;
+    const Mesh m = relief(60, [](double, double) { return 10.0; });
+    const StandingPart part(context, m.view());
+    for (const auto form : {StandingPart::Form::ball, StandingPart::Form::cylinder}) {
+        std::vector<StandingPart::Motion> motions{{{-3, 30, 60}, {30, 30, 9.5}}};
+        for (int i = 0; i < 40; ++i) motions.push_back({motions.back().to, {30, 30 + 0.2 * i, 9.5}});
+        motions.push_back({motions.back().to, {80, 30, 60}});
+        for (const std::size_t count : {std::size_t{1}, std::size_t{2}, motions.size()}) {
+            const StandingPart::Found found = part.deepest(form, 10, std::span(motions).first(count), 2, 1e-5, 0.01);
+            EXPECT_NEAR(found.most.depth, 0.5 - StandingPart::kSheet, 1e-6);
+            EXPECT_EQ(found.beyond.size(), count);
+        }
+    }
 }
 
 TEST(StandingPart, EnvelopeByPointsAndByGrid) {

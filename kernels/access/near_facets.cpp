@@ -55,12 +55,14 @@ constexpr double kHair = 1e-9;  // mm: rounding of a bound
 constexpr float third = 1.0F / 3, tiny = 1e-30F;
 
 // The same as std::min and std::max, but for lists of three no loop.
-inline double min3(double a, double b, double c) {
-    const double d = a < b ? a : b;
+template <class Number>
+Number min3(Number a, Number b, Number c) {
+    const Number d = a < b ? a : b;
     return d < c ? d : c;
 }
-inline double max3(double a, double b, double c) {
-    const double d = a > b ? a : b;
+template <class Number>
+Number max3(Number a, Number b, Number c) {
+    const Number d = a > b ? a : b;
     return d > c ? d : c;
 }
 
@@ -177,9 +179,23 @@ SLABWRIGHT_WIDE static void box_rows(const Corners& r, const Box& box, int n, fl
     }
 }
 
-SLABWRIGHT_WIDE static void around_rows(const float* x0, const float* x1, const float* y0, const float* y1, double x, double y, int n,
-                                        unsigned char* __restrict keep) {
-    for (int i = 0; i < n; ++i) keep[i] = (x0[i] <= x) & (x <= x1[i]) & (y0[i] <= y) & (y <= y1[i]);
+SLABWRIGHT_WIDE static void around_rows(const Corners& r, const WayAround& way, int n, unsigned char* __restrict keep) {
+    const WayAround w = way;
+    for (int i = 0; i < n; ++i) {
+        const float x0 = r.x0[i] - w.ax, y0 = r.y0[i] - w.ay, x1 = r.x1[i] - w.ax, y1 = r.y1[i] - w.ay, x2 = r.x2[i] - w.ax, y2 = r.y2[i] - w.ay;
+        const float l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
+        const float c0 = y0 * w.ux - x0 * w.uy, c1 = y1 * w.ux - x1 * w.uy, c2 = y2 * w.ux - x2 * w.uy;
+        const float l_low = min3(l0, l1, l2), l_high = max3(l0, l1, l2), c_low = min3(c0, c1, c2), c_high = max3(c0, c1, c2);
+        const float lowest = min3(r.z0[i], r.z1[i], r.z2[i]), highest = max3(r.z0[i], r.z1[i], r.z2[i]);
+        const float l = max3(0.0F, l_low - w.length, -l_high), c = max3(0.0F, c_low, -c_high);
+        const float under = w.lowest - (highest < w.top ? highest : w.top), u = (under > 0.0F ? under : 0.0F) * w.upwards;
+        keep[i] = static_cast<unsigned char>((lowest < w.top) & (highest > w.above) & (l * l + c * c + u * u < w.reach2));
+    }
+}
+
+void facets_around(const FacetRows& facets, std::size_t count, const WayAround& way, std::vector<unsigned char>& keep) {
+    keep.assign((count + 7) / 8 * 8, 0);
+    around_rows(Corners(facets), way, static_cast<int>(count), keep.data());
 }
 
 void NearFacets::place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball, double top, double up) {
@@ -222,10 +238,14 @@ void NearFacets::make_room(std::size_t size) {
 
 void NearFacets::take(const NearFacets& others, const std::vector<unsigned char>& keep) {
     middle_ = others.middle_, half_ = others.half_, reach_ = others.reach_, ball_ = others.ball_;
-    std::size_t count = 0;
+    size_ = 0;
+    add(others, keep);
+}
+
+void NearFacets::add(const NearFacets& others, const std::vector<unsigned char>& keep) {
+    std::size_t count = size_;
     for_each_kept(keep, [&](std::size_t) { ++count; });
     make_room(count);
-    size_ = 0;
     for_each_kept(keep, [&](std::size_t i) {
         for (std::size_t k = 0; k < kRows; ++k) rows_[k][size_] = others.rows_[k][i];
         ++size_;
@@ -273,20 +293,6 @@ void NearFacets::near(const NearWay& way, bool closely, std::vector<unsigned cha
         if (count == FacetRows::kMost) look();
     });
     if (count > 0) look();
-}
-
-void NearBoxes::clear() {
-    for (auto& row : rows_) row.clear();
-}
-
-void NearBoxes::add(const NearBox& box) {
-    for (std::size_t k = 0; k < box.size(); ++k) rows_[k].push_back(box[k]);
-}
-
-void NearBoxes::around(double x, double y, std::vector<unsigned char>& keep) const {
-    const std::size_t n = rows_[0].size();
-    keep.assign((n + 7) / 8 * 8, 0);
-    around_rows(rows_[0].data(), rows_[1].data(), rows_[2].data(), rows_[3].data(), x, y, static_cast<int>(n), keep.data());
 }
 
 }  // namespace slabwright

@@ -35,6 +35,8 @@ public:
     /// keep[i] is 1 where the way may meet facet i, else 0. Its size becomes a multiple of eight, filled with 0.
     /// @param closely looks a second time at what is kept, so that little is that does not meet; not worth it where the slack is more
     void near(const NearWay& way, bool closely, std::vector<unsigned char>& keep) const;
+    /// Adds what is kept of others that were placed alike.
+    void add(const NearFacets& others, const std::vector<unsigned char>& keep);
     /// Becomes what is kept of others.
     void take(const NearFacets& others, const std::vector<unsigned char>& keep);
 
@@ -48,19 +50,17 @@ private:
     std::array<std::vector<float>, kRows> rows_;
 };
 
-/// x0, x1, y0, y1
-using NearBox = std::array<float, 4>;
-
-class NearBoxes {
-public:
-    void clear();
-    void add(const NearBox& box);
-    /// The same for the boxes that hold (x, y), their borders included.
-    void around(double x, double y, std::vector<unsigned char>& keep) const;
-
-private:
-    std::array<std::vector<float>, 4> rows_;
+/// What a straight way may meet by its extent along the way, across it and upwards, in single precision: a first look, before anything is computed of
+/// a facet. The reach holds what the numbers may be wrong by.
+struct WayAround {
+    float ax, ay, ux, uy, length;  ///< where it begins, its direction and its length in plan, mm
+    float lowest, upwards;         ///< of it, mm, and 1 where heights count as distance, 0 where they do not
+    float above, top;              ///< what is no higher, or not below the top, does not count, mm
+    float reach2;                  ///< square of the reach, mm²
 };
+
+/// keep[i] is 1 where the way may meet facet i of `count`, else 0, filled up as above.
+void facets_around(const FacetRows& facets, std::size_t count, const WayAround& way, std::vector<unsigned char>& keep);
 
 /// fn(i) for all that is kept, ascending.
 template <class Fn>

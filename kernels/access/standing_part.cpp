@@ -590,200 +590,280 @@ Penetration StandingPart::depth_of(Form form, double z_top, const Point3& from, 
         });
 }
 
-/// What of the part motions within a box may meet: facets that can be deeper than `at_least` in the cutter, and those above the layer's top that
-/// cover one of its places.
-struct StandingPart::Vicinity {
-    static constexpr double kSide = 5;  // mm that a box is made long, unless one piece is longer
-
-    Cutter cutter{};
-    double at_least = 0;
-    Point3 low{}, high{};  // of the tip
-    bool empty = true, facets_known = false, covers_known = false;
-    std::vector<std::uint32_t> facets, covers;  // both in the order of the tree
-    NearFacets terms;                           // of the facets
-    NearBoxes boxes;                            // of the covers
-    std::vector<unsigned char> keep;
-
-    [[nodiscard]] bool holds(const Point3& p) const {
-        return !empty && p[0] >= low[0] && p[0] <= high[0] && p[1] >= low[1] && p[1] <= high[1] && p[2] >= low[2] && p[2] <= high[2];
-    }
-    /// Whether the box can take a point and stay small. It does so then.
-    bool add(const Point3& p) {
-        Point3 l = low, h = high;
-        for (int k = 0; k < 3; ++k) {
-            l[k] = std::min(l[k], p[k]), h[k] = std::max(h[k], p[k]);
-            if (h[k] - l[k] > std::max(kSide, high[k] - low[k])) return false;
-        }
-        low = l, high = h;
-        return true;
-    }
-    /// A box around a piece of a motion and as much of what follows as makes no more than a small box.
-    void place(std::span<const Motion> motions, std::size_t motion, const Point3& a, const Point3& b, double floor) {
-        at_least = floor;
-        empty = facets_known = covers_known = false;
-        for (int k = 0; k < 3; ++k) low[k] = std::min(a[k], b[k]), high[k] = std::max(a[k], b[k]);
-        Point3 at = b;
-        for (std::size_t m = motion; m < motions.size(); ++m) {
-            const Motion& next = motions[m];
-            if (m > motion) {
-                if (std::min(next.from[2], next.to[2]) >= cutter.top - floor) continue;  // asks for nothing
-                if (!add(next.from)) return;
-                at = next.from;
-            }
-            const Point3 way = sub(next.to, at);
-            const double length = std::sqrt(dot(way, way));
-            if (length > kSide) {
-                add(between(at, next.to, kSide / length));
-                return;
-            }
-            if (!add(next.to)) return;
-        }
-    }
-};
-
-/// A few short motions within a box that are nearly one straight one, and what of the box's facets they may meet.
-struct StandingPart::Run {
-    static constexpr std::size_t kMost = 16;
-    static constexpr double kLength = 1.5, kSlack = 0.05;  // mm
+/// A stretch of a row of motions, or one piece, taken as one straight way that nothing of it is far from, and the facets it may meet.
+struct StandingPart::Stretch {
+    static constexpr std::size_t kLong = 512, kShort = 12, kCalm = 8;  // motions; stretches
+    static constexpr double kLength = 2.5, kSlack = 0.2;               // mm: of short ones
+    static constexpr std::size_t kFew = 32;                            // facets: a long one that meets more is taken in parts
 
     std::size_t first = 0, last = 0;
-    double slack = 0, lowest = 0;
+    Point3 from{}, to{};   // the way
+    Point3 low{}, high{};  // of the tip
+    double slack = 0;      // mm: nothing is farther from the way
     NearFacets terms;
-    std::vector<std::uint32_t> facets;
+    std::vector<std::uint32_t> facets;  // in the order of the tree
 
-    /// Takes as many motions from `motion` on as there are; whether there are two at least.
-    bool begin(const Vicinity& around, std::span<const Motion> motions, std::size_t motion) {
-        first = last = motion;
-        const Point3& from = motions[motion].from;
-        double length = 0;
-        for (std::size_t most = std::min(motions.size(), motion + kMost), m = motion; m < most; ++m) {
-            const Motion& next = motions[m];
-            const Point3 way = sub(next.to, next.from);
-            length += std::sqrt(dot(way, way));
-            if ((m > motion && next.from != motions[m - 1].to) || length > kLength || !around.holds(next.to)) break;
-            ++last;
-        }
-        for (;; last = first + (last - first) / 2) {
-            if (last < first + 2) break;
-            const Point3& to = motions[last - 1].to;
-            slack = 0, lowest = std::min(from[2], to[2]);
-            for (std::size_t m = first; m + 1 < last; ++m) {
-                const Point3& p = motions[m].to;
-                const Point3 off = sub(p, closest_on_segment(p, from, to));
-                slack = std::max(slack, dot(off, off));
-                lowest = std::min(lowest, p[2]);
-            }
-            slack = std::sqrt(slack) + kHair;
-            if (slack <= kSlack) return true;
-        }
-        last = first;
-        return false;
+    void take(const Point3& a, const Point3& b) {
+        from = a, to = b;
+        slack = 0;
+        for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(a[k], b[k]), high[k] = std::max(a[k], b[k]);
     }
+    /// Motions [begin, end), each of which begins where the one before ends. @param flat the way is level, so that what is over it is no slack
+    void take(std::span<const Motion> motions, std::size_t begin, std::size_t end, bool flat) {
+        first = begin, last = end;
+        take(motions[begin].from, motions[end - 1].to);
+        Point3 a = from, b = to;
+        if (flat) a[2] = b[2] = 0;
+        for (std::size_t m = begin; m + 1 < end; ++m) {
+            Point3 p = motions[m].to;
+            for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
+            if (flat) p[2] = 0;
+            const Point3 off = sub(p, closest_on_segment(p, a, b));
+            slack = std::max(slack, dot(off, off));
+        }
+        // The distance from the way is convex, so that a motion is nowhere farther from it than where it begins or ends.
+        if (slack > 0) slack = std::sqrt(slack) + kHair;
+        if (flat && end - begin > 1) sink();
+    }
+    /// Takes all as if it was as low as its lowest point.
+    void sink() { from[2] = to[2] = low[2]; }
 };
 
-/// Finds the facets for a box.
-void StandingPart::gather(Vicinity& v) const {
-    const Cutter& cutter = v.cutter;
-    const double reach = cutter.radius - v.at_least + kHair, up = cutter.ball() ? cutter.radius : v.at_least, lowest = v.low[2] + up;
-    const Within box({v.low[0] - reach, v.low[1] - reach, cutter.ball() ? lowest - reach : lowest},
-                     {v.high[0] + reach, v.high[1] + reach, cutter.top});
-    v.facets.clear();
-    v.terms.place(v.low, v.high, reach, cutter.ball(), cutter.top, up);
-    FacetRows rows;
-    std::array<std::uint32_t, FacetRows::kMost> facets;
-    std::size_t count = 0;
-    auto take = [&] {
-        v.terms.add(rows, count, v.keep);
-        for_each_kept(v.keep, [&](std::size_t k) { v.facets.push_back(facets[k]); });
-        count = 0;
-    };
-    walk_leaves([&](const Nodes& nodes, Kept& keep) { overlapping(nodes, box, keep); },
-                [&](std::size_t first, std::size_t last) {
-                    for (std::size_t f = first; f < last; ++f, ++count) {
-                        const auto& [a, b, c] = facets_[f].v;
-                        rows.x0[count] = a.x, rows.y0[count] = a.y, rows.z0[count] = a.z;
-                        rows.x1[count] = b.x, rows.y1[count] = b.y, rows.z1[count] = b.z;
-                        rows.x2[count] = c.x, rows.y2[count] = c.y, rows.z2[count] = c.z;
-                        facets[count] = static_cast<std::uint32_t>(f);
-                    }
-                    if (count + kFan > FacetRows::kMost) take();
-                });
-    if (count > 0) take();
-    v.facets_known = true;
+// Written with vectors of eight, as overlapping() is.
+SLABWRIGHT_WIDE void StandingPart::around(const Nodes& n, const WayAround& w, Kept& keep) {
+    using Eight [[gnu::vector_size(32)]] = float;
+    using Signs [[gnu::vector_size(32)]] = std::int32_t;
+    Eight x0, y0, z0, x1, y1, z1;
+    std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
+    std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
+    const Eight none{}, top = none + w.top;
+    const float sx = std::abs(w.ux), sy = std::abs(w.uy);
+    const Eight hx = (x1 - x0) * 0.5F, hy = (y1 - y0) * 0.5F, cx = (x1 + x0) * 0.5F - w.ax, cy = (y1 + y0) * 0.5F - w.ay;
+    const Eight along = cx * w.ux + cy * w.uy, aside = cy * w.ux - cx * w.uy, across = aside > none ? aside : -aside;
+    const Eight before = -along - (hx * sx + hy * sy), behind = along - w.length - (hx * sx + hy * sy), beside = across - (hx * sy + hy * sx);
+    Eight l = before > behind ? before : behind, high = z1 < top ? z1 : top, under = w.lowest - high;
+    l = l > none ? l : none, under = under > none ? under : none;
+    const Eight c = beside > none ? beside : none, u = under * w.upwards;
+    const Signs kept = (x0 <= x1) & (z0 < top) & (z1 > none + w.above) & (l * l + c * c + u * u < none + w.reach2);
+    std::memcpy(keep.data(), &kept, sizeof(kept));
 }
 
-/// Finds what covers a place of a box.
-void StandingPart::gather_covers(Vicinity& v) const {
-    const double top = v.cutter.top;
-    v.covers.clear();
-    v.boxes.clear();
-    walk_within(Within({v.low[0], v.low[1], top}, {v.high[0], v.high[1], kInfinity}), [&](const Facet& f) {
-        const auto& [a, b, c] = f.v;
-        if (a.z < top && b.z < top && c.z < top) return;
-        const float x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x}), y0 = std::min({a.y, b.y, c.y}), y1 = std::max({a.y, b.y, c.y});
-        if (x0 > v.high[0] || v.low[0] > x1 || y0 > v.high[1] || v.low[1] > y1) return;
-        v.covers.push_back(static_cast<std::uint32_t>(&f - facets_.data()));
-        v.boxes.add({x0, x1, y0, y1});
-    });
-    v.covers_known = true;
+namespace {
+/// The way of a cutter that is asked for depths above `depth`. @param lowest of the tip
+NearWay asking(const Cutter& cutter, const Point3& from, const Point3& to, double lowest, double depth, double slack) {
+    const double reach = cutter.radius - depth + kHair, up = cutter.ball() ? cutter.radius : depth;
+    return {{from[0], from[1], from[2] + up}, {to[0], to[1], to[2] + up}, reach, lowest + (cutter.ball() ? cutter.radius - reach : depth), slack};
+}
+}  // namespace
+
+/// What finding the facets of a stretch needs, and what is known of the row so far.
+struct StandingPart::Search {
+    Cutter cutter{};
+    NearFacets some;
+    std::vector<unsigned char> keep, met;
+    std::size_t many = Stretch::kShort, calm = 0;  // motions that the next stretch takes if they are free; free stretches before it takes more
+};
+
+/// Finds the facets that a stretch may be deeper than `depth` in. @return false when they would be more than `most`: they are not all found then
+bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t most) const {
+    const Cutter& cutter = search.cutter;
+    // What begins or ends above the layer's top: what is far from it when sunk has no outline of the cap anywhere above or below it.
+    if (s.high[2] >= cutter.top - depth) s.sink();
+    const Point3 &from = s.from, &to = s.to;
+    const NearWay way = asking(cutter, from, to, s.low[2], depth, s.slack);
+    const double dx = to[0] - from[0], dy = to[1] - from[1], length = std::sqrt(dx * dx + dy * dy);
+    double largest = length + std::max({std::abs(from[0]), std::abs(from[1]), std::abs(s.low[2])});
+    for (const float v : {box_.min.x, box_.min.y, box_.min.z, box_.max.x, box_.max.y, box_.max.z}) largest = std::max<double>(largest, std::abs(v));
+    const double reach = way.reach + s.slack + 1e-5 * (largest + cutter.radius);
+    constexpr float inf = std::numeric_limits<float>::infinity();
+    const WayAround place{static_cast<float>(from[0]),
+                          static_cast<float>(from[1]),
+                          length > 0 ? static_cast<float>(dx / length) : 1.0F,
+                          length > 0 ? static_cast<float>(dy / length) : 0.0F,
+                          static_cast<float>(length),
+                          static_cast<float>(s.low[2] + (cutter.ball() ? cutter.radius : 0)),
+                          cutter.ball() ? 1.0F : 0.0F,
+                          std::nextafter(static_cast<float>(way.above), -inf),
+                          std::nextafter(static_cast<float>(cutter.top), inf),
+                          static_cast<float>(reach * reach)};
+    const double lowest = s.low[2] + (cutter.ball() ? cutter.radius : depth);
+    const Within box({s.low[0] - way.reach, s.low[1] - way.reach, cutter.ball() ? lowest - way.reach : lowest},
+                     {s.high[0] + way.reach, s.high[1] + way.reach, cutter.top});
+    s.terms.place(s.low, s.high, way.reach, cutter.ball(), cutter.top, cutter.ball() ? cutter.radius : depth);
+    s.facets.clear();
+    FacetRows rows, close;
+    std::array<std::uint32_t, FacetRows::kMost> facets, which, kept;
+    std::size_t count = 0, some = 0;
+    const bool closely = s.slack == 0 || most == Stretch::kFew;
+    bool all = true;
+    auto look = [&] {
+        search.some.place(s.low, s.high, way.reach, cutter.ball(), cutter.top, cutter.ball() ? cutter.radius : depth);
+        search.some.add(close, some, search.keep);
+        std::size_t n = 0;
+        for_each_kept(search.keep, [&](std::size_t k) { kept[n++] = which[k]; });
+        some = 0;
+        if (n == 0) return;
+        search.some.near(way, closely, search.keep);
+        s.terms.add(search.some, search.keep);
+        for_each_kept(search.keep, [&](std::size_t k) { s.facets.push_back(kept[k]); });
+        all = s.facets.size() <= most;
+    };
+    auto take = [&] {
+        facets_around(rows, count, place, search.met);
+        for_each_kept(search.met, [&](std::size_t k) {
+            close.x0[some] = rows.x0[k], close.y0[some] = rows.y0[k], close.z0[some] = rows.z0[k];
+            close.x1[some] = rows.x1[k], close.y1[some] = rows.y1[k], close.z1[some] = rows.z1[k];
+            close.x2[some] = rows.x2[k], close.y2[some] = rows.y2[k], close.z2[some] = rows.z2[k];
+            which[some++] = facets[k];
+            if (some == FacetRows::kMost) look();
+        });
+        count = 0;
+    };
+    walk_leaves(
+        [&](const Nodes& nodes, Kept& keep) {
+            Kept within;
+            overlapping(nodes, box, within);
+            if (all) around(nodes, place, keep);
+            else keep = {};
+            for (std::size_t k = 0; k < kFan; ++k) keep[k] &= within[k];
+        },
+        [&](std::size_t first, std::size_t last) {
+            for (std::size_t f = first; f < last; ++f, ++count) {
+                const auto& [a, b, c] = facets_[f].v;
+                rows.x0[count] = a.x, rows.y0[count] = a.y, rows.z0[count] = a.z;
+                rows.x1[count] = b.x, rows.y1[count] = b.y, rows.z1[count] = b.z;
+                rows.x2[count] = c.x, rows.y2[count] = c.y, rows.z2[count] = c.z;
+                facets[count] = static_cast<std::uint32_t>(f);
+            }
+            if (count + kFan > FacetRows::kMost) take();
+        });
+    if (count > 0 && all) take();
+    if (some > 0 && all) look();
+    return all;
+}
+
+/// Finds a stretch that begins with a motion: as many as are free of the part, or a short one and its facets; or one motion whose pieces are to be
+/// looked at one by one, and returns false.
+bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Motion> motions, std::size_t m, double depth) const {
+    const double top = search.cutter.top - depth;
+    const bool flat = !search.cutter.ball();
+    std::size_t last = m, short_last = m + 1;
+    double length = 0;
+    for (; last < motions.size() && last - m < std::max(search.many, Stretch::kShort); ++last) {
+        const Motion& next = motions[last];
+        if (std::min(next.from[2], next.to[2]) >= top || (last > m && next.from != motions[last - 1].to)) break;
+        const Point3 way = sub(next.to, next.from);
+        length += std::sqrt(dot(way, way));
+        if (length <= Stretch::kLength && last - m < Stretch::kShort) short_last = last + 1;
+        else if (last - m >= search.many) break;
+    }
+    const Point3 own = sub(motions[m].to, motions[m].from);
+    const bool whole = own[0] * own[0] + own[1] * own[1] <= kSpan * kSpan;
+    if (last > short_last || !whole) {
+        s.take(motions, m, last, flat);
+        if (gather(search, s, depth, Stretch::kFew)) {
+            if (!s.facets.empty()) search.many = std::max<std::size_t>(1, search.many / 2);
+            else if (search.calm > 0) --search.calm;
+            else search.many = std::min(2 * search.many, Stretch::kLong);
+            return true;
+        }
+        search.many = std::max<std::size_t>(1, (last - m) / 4);
+        search.calm = Stretch::kCalm;
+        if (!whole) {
+            s.take(motions, m, m + 1, flat);
+            return false;
+        }
+    }
+    for (last = short_last;; last = m + (last - m) / 2) {
+        s.take(motions, m, last, flat);
+        if (s.slack <= Stretch::kSlack) break;
+    }
+    gather(search, s, depth, std::numeric_limits<std::size_t>::max());
+    if (!s.facets.empty()) return true;
+    if (search.calm > 0) --search.calm;
+    else search.many = std::min(2 * std::max(search.many, last - m), Stretch::kLong);
+    return true;
 }
 
 StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore,
                                           double tolerance) const {
+    constexpr std::size_t kGroup = 8;
+    constexpr double kGroupSlack = 0.001;
     Found found;
-    Vicinity v;
-    v.cutter = {form, radius, z_top - kSheet};
-    const Cutter& cutter = v.cutter;
-    Run run;
-    Point3 last{};  // the end of one motion is mostly the begin of the next
+    Search search;
+    const Cutter& cutter = search.cutter = {form, radius, z_top - kSheet};
+    std::vector<unsigned char>& keep = search.keep;
+    Stretch stretch, group, single;
+    bool whole = true;  // the stretch's facets are known
+    Point3 last{};      // the end of one motion is mostly the begin of the next
     bool last_known = false, last_covered = false;
-    for (std::size_t m = 0; m < motions.size(); ++m) {
+    auto covered_at = [&](const Point3& tip) {
+        if (last_known && last == tip) return last_covered;
+        last = tip, last_known = true;
+        return last_covered = covered(tip[0], tip[1], cutter.top);
+    };
+    auto meet_near = [&](const NearFacets& terms, const std::vector<std::uint32_t>& facets, const Piece& piece, Penetration& result) {
+        if (facets.size() <= 4) {
+            for (const std::uint32_t f : facets) meet(cutter, piece, facets_[f].v, result);
+            return;
+        }
+        terms.near(asking(cutter, piece.a, piece.b, piece.lowest, result.depth, 0), true, keep);
+        for_each_kept(keep, [&](std::size_t k) { meet(cutter, piece, facets_[facets[k]].v, result); });
+    };
+    for (std::size_t m = 0; m < motions.size();) {
         // Only what is deeper than all before can change the maximum; but every motion beyond the tolerance is to be found.
         const double floor = std::max(ignore, std::min(found.most.depth, tolerance));
-        auto covered_at = [&](const Point3& tip) {
-            if (last_known && last == tip) return last_covered;
-            if (!v.holds(tip)) v.place(motions, m, tip, tip, floor);
-            if (!v.covers_known) gather_covers(v);
-            int winding = 0;
-            v.boxes.around(tip[0], tip[1], v.keep);
-            for_each_kept(v.keep, [&](std::size_t k) {
-                const Facet& f = facets_[v.covers[k]];
-                const int w = facet_winding(f.v, tip[0], tip[1]);
-                if (w != 0 && facet_height(f.v, tip[0], tip[1]) >= cutter.top) winding += w;
-            });
-            last = tip, last_known = true;
-            return last_covered = winding > 0;
-        };
-        // What of the vicinity a way may meet that is nowhere farther than `slack` from the straight one, and lowest at `lowest`.
-        auto near_way = [&](const NearFacets& terms, const Point3& from, const Point3& to, double lowest, double depth, double slack) {
-            const double reach = radius - depth + kHair, up = cutter.ball() ? radius : depth;
-            terms.near(
-                {{from[0], from[1], from[2] + up}, {to[0], to[1], to[2] + up}, reach, lowest + (cutter.ball() ? radius - reach : depth), slack},
-                slack == 0, v.keep);
-        };
+        const auto& [from, to] = motions[m];
+        if (radius <= floor || std::min(from[2], to[2]) >= cutter.top - floor) {
+            ++m;
+            continue;
+        }
+        if (m >= stretch.last) {
+            whole = stretch_from(search, stretch, motions, m, floor);
+            group.last = m;
+        }
+        // Where no facet is near, the cap has no outline either, so that what begins beside it stays there.
+        auto free_until = [&](std::size_t end) { m = end, last = motions[end - 1].to, last_covered = false; };
+        if (whole && stretch.facets.empty() && !covered_at(from)) {
+            free_until(stretch.last);
+            continue;
+        }
+        const bool below = stretch.high[2] < cutter.top - floor;
+        if (whole && below && m >= group.last && stretch.last - m > 1) {
+            for (std::size_t end = std::min(stretch.last, m + kGroup);; end = m + (end - m) / 2) {
+                group.take(motions, m, end, !cutter.ball());
+                if (group.slack <= kGroupSlack) break;
+            }
+            stretch.terms.near(asking(cutter, group.from, group.to, group.low[2], floor, group.slack), true, keep);
+            group.terms.take(stretch.terms, keep);
+            group.facets.clear();
+            for_each_kept(keep, [&](std::size_t k) { group.facets.push_back(stretch.facets[k]); });
+            if (group.facets.empty() && !covered_at(from)) {
+                free_until(group.last);
+                continue;
+            }
+        }
         auto look = [&](const Piece& piece, Penetration& result) {
-            if (m >= run.first && m < run.last) {
-                near_way(run.terms, piece.a, piece.b, piece.lowest, result.depth, 0);
-                for_each_kept(v.keep, [&](std::size_t k) { meet(cutter, piece, facets_[run.facets[k]].v, result); });
-                return;
-            }
-            if (!v.holds(piece.a) || !v.holds(piece.b)) v.place(motions, m, piece.a, piece.b, floor);
-            if (!v.facets_known) gather(v);
-            if (piece.a == motions[m].from && piece.b == motions[m].to && run.begin(v, motions, m)) {
-                near_way(v.terms, motions[m].from, motions[run.last - 1].to, run.lowest, floor, run.slack);
-                run.terms.take(v.terms, v.keep);
-                run.facets.clear();
-                for_each_kept(v.keep, [&](std::size_t k) { run.facets.push_back(v.facets[k]); });
-                near_way(run.terms, piece.a, piece.b, piece.lowest, result.depth, 0);
-                for_each_kept(v.keep, [&](std::size_t k) { meet(cutter, piece, facets_[run.facets[k]].v, result); });
-                return;
-            }
-            near_way(v.terms, piece.a, piece.b, piece.lowest, result.depth, 0);
-            for_each_kept(v.keep, [&](std::size_t k) { meet(cutter, piece, facets_[v.facets[k]].v, result); });
+            if (!whole) {
+                single.take(piece.a, piece.b);
+                gather(search, single, result.depth, std::numeric_limits<std::size_t>::max());
+                for (const std::uint32_t f : single.facets) meet(cutter, piece, facets_[f].v, result);
+            } else if (m < group.last) meet_near(group.terms, group.facets, piece, result);
+            else meet_near(stretch.terms, stretch.facets, piece, result);
         };
-        const Penetration p = motion_depth(cutter, motions[m].from, motions[m].to, floor, covered_at, look);
+        Penetration p;
+        if (below && !covered_at(from)) {
+            p = motion_depth(
+                cutter, from, to, floor, [](const Point3&) { return false; }, look);
+            if (!p.found) {
+                free_until(m + 1);
+                continue;
+            }
+        }
+        p = motion_depth(cutter, from, to, floor, covered_at, look);
         if (p.found && p.depth > found.most.depth) found.most = p, found.motion = m;
         if (p.found && p.depth > tolerance) found.beyond.push_back(static_cast<std::uint32_t>(m));
+        ++m;
     }
     return found;
 }

@@ -15,6 +15,7 @@
 
 namespace slabwright {
 
+struct WayAround;
 using Point3 = std::array<double, 3>;  ///< mm
 
 /// Where a cutter is deepest in the part during a motion.
@@ -124,10 +125,11 @@ private:
     /// The nearest facet, or the first found that is no farther than `enough`; `known` when none is nearer.
     [[nodiscard]] Near nearest(const Point3& point, const Near& known, double enough) const;
     [[nodiscard]] double distance(const Point3& point, std::uint32_t facet) const;
-    struct Vicinity;
-    struct Run;
-    void gather(Vicinity& around) const;
-    void gather_covers(Vicinity& around) const;
+    struct Stretch;
+    struct Search;
+    static void around(const Nodes& nodes, const WayAround& way, Kept& keep);
+    bool gather(Search& search, Stretch& stretch, double depth, std::size_t most) const;
+    bool stretch_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m, double depth) const;
     [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
     friend class RisingEnvelope;
     BulkVector<Facet> facets_;               ///< in Morton order
