@@ -22,8 +22,8 @@ std::optional<std::vector<PathPoint>> slide_between(const PathPoint& from, const
         const double t = static_cast<double>(i) / static_cast<double>(n);
         PathPoint p{static_cast<std::int32_t>(from.x + t * (static_cast<double>(to.x) - from.x)),
                     static_cast<std::int32_t>(from.y + t * (static_cast<double>(to.y) - from.y)), 0};
-        const double lerp = from.z + t * (static_cast<double>(to.z) - from.z), matters = std::min(lerp / kUnitsPerMm, slide.top) - 0.01,
-                     rest = slide.part->drop(to_mm(p.x), to_mm(p.y), matters).tip_z;
+        const double lerp = from.z + t * (static_cast<double>(to.z) - from.z), matters = std::min(lerp / kUnitsPerMm, slide.top) - slide.under - 0.01,
+                     rest = slide.part->drop(to_mm(p.x), to_mm(p.y), matters).tip_z + slide.under;
         if (rest >= slide.top - 1e-3) return std::nullopt;
         p.z = static_cast<std::int32_t>(std::ceil(std::max(lerp, rest * kUnitsPerMm))) + 1;
         append_free(link, p, slide);

@@ -9,11 +9,12 @@ namespace slabwright {
 
 /// How a cutter goes along the surface from one run to another.
 struct Slide {
-    const DropIndex* part = nullptr;  ///< drops of this cutter
+    const DropIndex* part = nullptr;  ///< drops of this cutter, or of a wider one that has room where the runs are
     bool ball = true;
     double chord = 0;  ///< mm: safe between free places
     double top = 0;    ///< mm: it does not climb onto this height, the finished top
     double near = 3;   ///< mm that it goes at most
+    double under = 0;  ///< mm that the tip of `part`'s cutter lies under this one's
 };
 
 /// Appends a free place to a line whose last place is free: straight where that is short enough to stay out of the part, else

@@ -76,6 +76,7 @@ Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
     // Where the places are those of a wider cutter, half of what it is wider by may go.
     const double wider = part != nullptr ? part->cutter().radius - cutter.radius : 0;
     around.chord = safe_chord_mm(cutter.radius, std::max(job.tolerances.gouge, wider / 2));
+    around.under = cutter.profile == Cutter::Profile::ball ? wider : 0;
     around.ramp_deg = job.cutting.ramp_deg;
     around.no_way_in = &no_way_in;
     around.lowest_rapid = layer.z_bottom + PathBuilder::kStop;
@@ -210,10 +211,13 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         const bool contours = clears_on_contours(cut.job);
         constexpr double kWaste = 1.0;  // mm: what is thicker is cut in steps
         const double finish_r = tools.finish.diameter / 2, finish_swath = kSwathShare * tools.finish.diameter;
+        auto waste = [&](const Tool& tool, const char* purpose) {
+            return RestPass{OperationKind::semi_rough, purpose, kWaste, true, 0, semi_rough_allowance(cut.job, tool, kWaste)};
+        };
         auto semi_rough = [&](const Tool& tool, double swath) {
             constexpr const char* purpose = "waste beside the roughing cutter";
             if (contours) take(semi_rough_layer(cut, stock, tool, {purpose, kWaste, swath, cut.job.cutting.wall_allowance}));
-            else take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, purpose, kWaste, true}));
+            else take(cut_rest(cut, stock, tool, waste(tool, purpose)));
         };
         for (std::size_t s = 0; s < tools.semi_rough.size(); ++s)
             semi_rough(tools.semi_rough[s],
@@ -226,7 +230,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         for (const Tool& tool : tools.rest)
             if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() && stock.area_over(context, 1.0) > kWasteWorthAChange)
                 semi_rough(tool, finish_swath);
-        RestPass between{OperationKind::semi_rough, "waste between walls", kWaste, true};
+        RestPass between = waste(tools.finish, "waste between walls");
         if (contours) between.swath = finish_r;
         take(cut_rest(cut, stock, tools.finish, between));
         reached(0.56);
@@ -250,7 +254,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             const std::size_t operations = result.operations.size(), no_ways = cut.no_way_in.size();
             if (contours && !last_of_kind(tool)) stood = standing, heights = stock.heights();
             if (contours && tool.kind == ToolKind::flat) take(semi_rough_layer(cut, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
-            else take(cut_rest(cut, stock, tool, {OperationKind::semi_rough, "waste in narrow places", kWaste, true}));
+            else take(cut_rest(cut, stock, tool, waste(tool, "waste in narrow places")));
             if (tool.kind == ToolKind::flat) take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
             else take(cut_rest(cut, stock, tool, {OperationKind::finish, "what is left in narrow places", limit, false}));
             if (!stood || left - stock.area_over(context, limit) >= kCornersWorthAChange) continue;

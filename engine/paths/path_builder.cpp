@@ -130,7 +130,7 @@ bool PathBuilder::part_leaves_way(Point2 from, Point2 to, std::int32_t z) const 
     const int steps = static_cast<int>(std::ceil(std::hypot(b[0] - a[0], b[1] - a[1]) / around_.chord));
     for (int k = 1; k < steps; ++k) {
         const double t = static_cast<double>(k) / steps, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
-        if (around_.part->stands_over(x, y, to_mm(z)) || !has_room({to_units(x), to_units(y)})) return false;
+        if (around_.part->stands_over(x, y, to_mm(z) - around_.under) || !has_room({to_units(x), to_units(y)})) return false;
     }
     return true;
 }
@@ -257,7 +257,7 @@ bool PathBuilder::enter_from_side(const PathPoint& first) {
             const double turn = 2 * std::numbers::pi * k / kSideWays, far = ring * kSideStep * around_.cutter.radius * kUnitsPerMm;
             const Point2 beside{first.x + static_cast<std::int32_t>(std::lround(far * std::cos(turn))),
                                 first.y + static_cast<std::int32_t>(std::lround(far * std::sin(turn)))};
-            if (!has_room(beside) || around_.part->stands_over(to_mm(beside.x), to_mm(beside.y), to_mm(first.z)) ||
+            if (!has_room(beside) || around_.part->stands_over(to_mm(beside.x), to_mm(beside.y), to_mm(first.z) - around_.under) ||
                 standing_middle(beside) > to_mm(first.z) + kScrape || !part_leaves_way(beside, target, first.z))
                 continue;
             go_above(beside);

@@ -16,6 +16,7 @@ struct Surroundings {
     Standing* standing = nullptr;     ///< what may stand; the builder cuts its own moves into it
     const DropIndex* part = nullptr;  ///< drops of this very cutter, or of a wider one; none: it never stays down
     Cutter cutter;
+    double under = 0;                     ///< mm that the tip of `part`'s cutter lies under this one's where their ends are concentric
     double chord = 0;                     ///< mm: longest chord between places where `part` is free that is safe (safe_chord_mm)
     double ramp_deg = 5;                  ///< entry into stock
     std::shared_ptr<const Loops> room{};  ///< where the cutter's middle may be beside a flask; none: anywhere

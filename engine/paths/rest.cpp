@@ -19,10 +19,11 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kFinest = 0.04;  // mm between places where the rest jumps: a wall is met within this
+constexpr double kFinest = 0.04;  // mm between places where the rest jumps: a wall is met within this, or within twice the allowance kept off it
 constexpr double kJump = 0.05;    // mm by which a flat end mill's tip may step between neighbouring places
 constexpr double kSettle = 0.01;  // mm by which a low point of a line lies under its neighbours
 constexpr float kRise = 0.5F;     // mm: a wall that is lower than what stands beside it by less is as high
+constexpr double kPlaces = 0.75;  // of the longest chord, between places of a line
 constexpr double kBridge = 3.0;   // mm between two useful stretches that are travelled along the surface
 
 // The greatest number under a height: what stands over it is as high or higher.
@@ -46,7 +47,7 @@ using Spans = std::vector<std::array<std::int32_t, 2>>;  // 0.1 µm, ascending a
 // The cells worth a visit, row by row, and the stretches of a line from which a cutter covers some of them.
 class Targets {
 public:
-    /// @param probe a flat cutter as wide as the limit: where its rest is as high as what stands, that is within the limit of a wall beside it
+    /// @param probe a flat cutter as wide as the limit, or less: where its rest is as high as what stands, that is as near to a wall beside it
     Targets(Context& context, const LayerStock& stock, const RestPass& pass, double steep, const DropIndex* probe)
         : stock_(stock), rows_(static_cast<std::size_t>(stock.grid().ny)) {
         const CellGrid& grid = stock.grid();
@@ -137,17 +138,24 @@ public:
           pass_(pass),
           ball_(tool.kind == ToolKind::ball),
           r_(tool.diameter / 2),
+          wide_(r_ + pass.allowance),
+          under_(ball_ ? pass.allowance : 0),
           end_(cutter_end(tool)),
           targets_(cut.context, stock, pass, finish_slopes(cut.job.cutting).levels_from,
-                   pass.in_steps || !clears_on_contours(cut.job) ? nullptr : &cut.drops({Cutter::Profile::flat, pass.limit})),
-          chord_(safe_chord_mm(r_, cut.job.tolerances.gouge)),
-          step_(static_cast<std::int32_t>(0.75 * chord_ * kUnitsPerMm)) {}
+                   (pass.in_steps ? pass.skin > 0 : clears_on_contours(cut.job))
+                       ? &cut.drops({Cutter::Profile::flat, pass.in_steps ? std::min(pass.limit, r_ / 2) : pass.limit})
+                       : nullptr),
+          tolerance_(std::max(cut.job.tolerances.gouge, pass.allowance)),
+          chord_(safe_chord_mm(wide_, tolerance_)),
+          step_(static_cast<std::int32_t>(kPlaces * chord_ * kUnitsPerMm)),
+          finest_(to_units(std::max(kFinest, 2 * pass.allowance))),
+          finest_step_(static_cast<std::int32_t>(kPlaces * safe_chord_mm(r_, cut.job.tolerances.gouge) * kUnitsPerMm)) {}
 
     Operation run() {
         Operation op = cut_.operation(pass_.kind, pass_.purpose, tool_);
         if (targets_.count() == 0) return op;
         find_room();
-        index_ = std::make_unique<DropIndex>(cut_.solid, Cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_});
+        index_ = std::make_unique<DropIndex>(cut_.solid, Cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, wide_});
         lay_lines();
         settle();
         keep_what_lowers();
@@ -174,10 +182,10 @@ private:
     // Whether the cutter, here or up to `slack` mm beside, lowers a cell that is worth it.
     [[nodiscard]] bool lowers(double x, double y, double tip, double slack = 0) const {
         const CellGrid& grid = stock_.grid();
-        const double reach = r_ + slack;
+        const double core = r_ - pass_.skin, reach = core + slack;
         const int j0 = std::max(0, static_cast<int>(std::ceil((y - reach - grid.y0) / grid.cell)));
         const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + reach - grid.y0) / grid.cell)));
-        const double above = tip - stock_.z_bottom();
+        const double above = tip + (ball_ ? pass_.skin : 0) - stock_.z_bottom();
         for (int j = j0; j <= j1; ++j) {
             const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, reach * reach - dy * dy));
             const int i0 = std::max(0, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
@@ -189,7 +197,7 @@ private:
                     double z = above;
                     if (ball_) {
                         const double dx = grid.x(i) - x, from_axis = std::max(0.0, std::sqrt(dx * dx + dy * dy) - slack);
-                        z += r_ - std::sqrt(std::max(0.0, r_ * r_ - from_axis * from_axis));
+                        z += core - std::sqrt(std::max(0.0, core * core - from_axis * from_axis));
                     }
                     z = std::max(z, static_cast<double>(stock_.surface(c)));
                     if ((stock_.height(c) - z) * stock_.nz(c) > worth(c)) return true;
@@ -226,13 +234,14 @@ private:
         // How far a flat end mill would go under the layer's bottom does not matter.
         const double matters = ball_ ? -std::numeric_limits<double>::infinity() : std::max(cut_.layer.z_bottom, cut_.layer.floor_below);
         const Rest rest = index_->drop(x, y, matters);
+        const double on_surface = rest.tip_z + under_;
         Place p;
         p.x = ux;
         p.y = uy;
         // A flat end mill stands on the layer's bottom; a ball may pass it where its shape needs it, over waste it does not.
-        const double lowest = ball_ && rest.tip_z > cut_.layer.z_bottom - r_ ? cut_.layer.floor_below : cut_.layer.z_bottom;
-        p.tip = std::max(rest.tip_z, std::max(lowest, cut_.layer.floor_below));
-        p.contact = {x - r_ * rest.nx, y - r_ * rest.ny, p.tip + r_ * (1 - rest.nz)};
+        const double lowest = ball_ && on_surface > cut_.layer.z_bottom - r_ ? cut_.layer.floor_below : cut_.layer.z_bottom;
+        p.tip = std::max(on_surface, std::max(lowest, cut_.layer.floor_below));
+        p.contact = {x - wide_ * rest.nx, y - wide_ * rest.ny, p.tip - under_ + wide_ * (1 - rest.nz)};
         p.reachable = !rest.on_cap && p.tip < cut_.layer.z_top - 1e-3 && beside_flask(x, y);
         if (p.reachable) {
             p.z = to_units(p.tip) + 1;
@@ -252,11 +261,18 @@ private:
         }
         const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
         const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(a.y) - to_mm(b.y), a.tip - b.tip);
-        return c * d > 8 * r_ * (pass_.in_steps ? pass_.limit / 2 : cut_.job.tolerances.cusp);
+        return c * d > 8 * wide_ * (pass_.in_steps ? pass_.limit / 2 : cut_.job.tolerances.cusp);
+    }
+
+    // Whether a ball would go over a corner from one place to the next (append) although places between them may do without.
+    [[nodiscard]] bool too_steep(const Place& a, const Place& b) const {
+        if (!ball_ || !(a.useful || b.useful) || b.x - a.x <= finest_step_ || !a.reachable || !b.reachable) return false;
+        return std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(a.y) - to_mm(b.y), a.tip - b.tip) > chord_;
     }
 
     void append_between(std::vector<Place>& line, std::int32_t y, Place b) const {
-        if (!line.empty() && b.x - line.back().x <= step_ && b.x - line.back().x > 2 * to_units(kFinest) && too_far(line.back(), b)) {
+        if (!line.empty() && b.x - line.back().x <= step_ && b.x - line.back().x > 2 * finest_ &&
+            (too_far(line.back(), b) || too_steep(line.back(), b))) {
             append_between(line, y, place(line.back().x + (b.x - line.back().x) / 2, y));
             append_between(line, y, b);
             return;
@@ -295,7 +311,7 @@ private:
         std::vector<std::vector<Line>> between(even.size());
         parallel_each(cut_.context, even.empty() ? 0 : even.size() - 1, [&](std::size_t l) {
             auto refine = [&](auto&& self, const Line& a, const Line& b) -> void {
-                if (b.y - a.y < 2 * to_units(kFinest)) return;
+                if (b.y - a.y < 2 * finest_) return;
                 Line middle{a.y + (b.y - a.y) / 2, {}};
                 for (const Place& p : a.places) {
                     if (p.x % step_ != 0) continue;
@@ -356,7 +372,7 @@ private:
 
     [[nodiscard]] Place slide(const Place& from) const {
         std::int32_t x = from.x, y = from.y;
-        double tip = from.tip;
+        double tip = from.tip - under_;  // of the cutter that is dropped
         for (std::int32_t stride = to_units(0.1); stride >= to_units(0.0005); stride /= 2)
             for (bool moved = true; moved;) {
                 moved = false;
@@ -366,7 +382,7 @@ private:
                     x += dx * stride, y += dy * stride, tip = index_->drop(at_x, at_y).tip_z, moved = true;
                     break;
                 }
-                if (tip < cut_.layer.floor_below) break;
+                if (tip + under_ < cut_.layer.floor_below) break;
             }
         return place(x, y);
     }
@@ -407,7 +423,7 @@ private:
         const Place* last = nullptr;  // that cuts
         auto close = [&] {
             points.resize(last_cut);
-            if (!points.empty()) runs.push_back(pass_.in_steps ? points : simplify(points, simplify_tolerance_units(cut_.job.tolerances.gouge)));
+            if (!points.empty()) runs.push_back(pass_.in_steps ? points : simplify(points, simplify_tolerance_units(tolerance_)));
             points.clear();
             last_cut = 0;
         };
@@ -439,7 +455,7 @@ private:
         PathBuilder path(op, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed), cut_.layer.z_top + cut_.job.machine.clearance,
                          cut_.layer.z_top + 2);
         path.know(cut_.around(tool_, index_.get()));
-        const Slide slide{index_.get(), ball_, chord_, cut_.layer.z_top, kBridge};
+        const Slide slide{index_.get(), ball_, chord_, cut_.layer.z_top, kBridge, under_};
         if (!pass_.in_steps) {
             cut_.context.throw_if_cancelled();
             follow_nearest(path, chained(runs, slide));
@@ -470,7 +486,7 @@ private:
                     // Nothing to do here on this level: it was cut on the one before, or nothing stands above it.
                     const bool nothing = i == runs[r].size() || to_mm(runs[r][i].z) >= above - 1e-6 || stood_at[r][i] <= level + 1e-3;
                     if (!nothing) part.push_back({runs[r][i].x, runs[r][i].y, std::max(runs[r][i].z, to_units(level))});
-                    else if (!part.empty()) parts.push_back(simplify(part, simplify_tolerance_units(cut_.job.tolerances.gouge))), part.clear();
+                    else if (!part.empty()) parts.push_back(simplify(part, simplify_tolerance_units(tolerance_))), part.clear();
                 }
             }
             follow_nearest(path, chained(std::move(parts), slide));
@@ -484,10 +500,12 @@ private:
     const RestPass& pass_;
     bool ball_;
     double r_;
+    double wide_, under_;  // mm: the radius of the cutter that is dropped, and how far its tip then lies under this one's
     CutterEnd end_;
     Targets targets_;
+    double tolerance_;  // mm of which chords and thinning take their shares: the gouge tolerance, or the allowance
     double chord_;
-    std::int32_t step_;
+    std::int32_t step_, finest_, finest_step_;
     std::int32_t spacing_ = 0;
     std::unique_ptr<DropIndex> index_;
     std::vector<Line> lines_;
@@ -497,6 +515,22 @@ private:
 
 }  // namespace
 
-Operation cut_rest(const LayerCut& cut, LayerStock& stock, const Tool& tool, const RestPass& pass) { return Rester(cut, stock, tool, pass).run(); }
+double semi_rough_allowance(const Job& job, const Tool& tool, double limit) {
+    const double allowance = std::min({std::min(job.cutting.wall_allowance, job.cutting.floor_allowance) / 3, tool.diameter / 10, limit / 5});
+    return allowance < 2 * job.tolerances.gouge ? 0 : allowance;
+}
+
+Operation cut_rest(const LayerCut& cut, LayerStock& stock, const Tool& tool, const RestPass& pass) {
+    Operation op = Rester(cut, stock, tool, pass).run();
+    if (!(pass.allowance > 0)) return op;
+    // What only the cutter itself enters: slots hardly wider, the depth of narrow valleys. The wall of what was kept is no reason to go there.
+    RestPass narrow = pass;
+    narrow.allowance = 0;
+    narrow.skin = 2 * pass.allowance;
+    Operation rest = Rester(cut, stock, tool, narrow).run();
+    if (op.moves.empty()) return rest;
+    op.moves.insert(op.moves.end(), rest.moves.begin(), rest.moves.end());
+    return op;
+}
 
 }  // namespace slabwright

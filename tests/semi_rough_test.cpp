@@ -1,0 +1,142 @@
+// Semi-roughing by a dropped cutter: it keeps its allowance off the part, its chords are longer for it, and what only the bare cutter
+// enters it clears all the same.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "engine/paths/rest.h"
+#include "tests/support/height_field.h"
+
+namespace slabwright {
+namespace {
+
+constexpr double kTop = 14, kLimit = 1.0;
+
+using Height = std::function<double(double, double)>;
+using Reshape = std::function<void(Mesh&)>;
+
+Mesh drawn(Context& context, const Height& height, const Reshape& reshape) {
+    Mesh mesh = test::height_field(context, 80, 0.5, height);
+    if (reshape) reshape(mesh);
+    return mesh;
+}
+
+// A layer of a height field over 40 mm, full but for what the roughing cutter takes.
+struct Waste {
+    Context context;
+    Job job;
+    Mesh mesh;
+    LayerJob layer;
+    LayerCut cut;
+    Standing standing{{-25, -25}, {25, 25}, kTop};
+
+    Waste(const Height& height, const Reshape& reshape)
+        : mesh(drawn(context, height, reshape)),
+          cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, alpha_map(context, mesh.view(), 0, kTop), nullptr, {}} {
+        layer.mesh = mesh.view();
+        layer.job = &job;
+        layer.z_bottom = 0;
+        layer.z_top = layer.slab_thickness = kTop;
+        layer.stock_min = {-25, -25};
+        layer.stock_max = {25, 25};
+        layer.tools.rough = tool_of_kind(job, ToolKind::flat);
+        layer.tools.finish = tool_of_kind(job, ToolKind::ball);
+        cut.standing = &standing;
+    }
+};
+
+struct Passed {
+    double nearest = 1e300;  // by how much a cutter may be wider and has no room at some place, mm, rounded up to hundredths
+    double length = 0;       // mm by feed
+    std::size_t moves = 0;   // by feed
+    double most_left = 0;    // mm along the normal, within 1 mm of the plane x = 0
+};
+
+Passed semi_roughed(const Height& height, ToolKind kind, double allowance, const Reshape& reshape = {}) {
+    Waste w(height, reshape);
+    Tool tool = w.layer.tools.finish;
+    tool.kind = kind;
+    LayerStock stock(w.cut, 0.2);
+    stock.cut(w.cut, rough_layer(w.cut), w.layer.tools.rough);
+    const Operation op = cut_rest(w.cut, stock, tool, {OperationKind::semi_rough, "waste", kLimit, true, 0, allowance});
+    EXPECT_FALSE(op.moves.empty());
+    Passed passed;
+    const double r = tool.diameter / 2;
+    std::vector<DropIndex> wider;
+    const Cutter::Profile profile = kind == ToolKind::ball ? Cutter::Profile::ball : Cutter::Profile::flat;
+    for (int k = -2; k <= 10; ++k) wider.emplace_back(w.cut.solid, Cutter{profile, r + 0.01 * k});
+    for (std::size_t i = 1; i < op.moves.size(); ++i) {
+        const Move &a = op.moves[i - 1], &b = op.moves[i];
+        if (b.feed == 0) continue;
+        const double l = std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z));
+        passed.length += l;
+        ++passed.moves;
+        const int parts = 1 + static_cast<int>(l / 0.1);
+        for (int k = 0; k <= parts; ++k) {
+            const double t = static_cast<double>(k) / parts, x = to_mm(a.x) + t * to_mm(b.x - a.x), y = to_mm(a.y) + t * to_mm(b.y - a.y),
+                         z = to_mm(a.z) + t * to_mm(b.z - a.z);
+            for (std::size_t d = 0; d < wider.size(); ++d) {
+                const double more = 0.01 * (static_cast<double>(d) - 2);
+                if (more > passed.nearest) break;
+                if (wider[d].stands_over(x, y, z - (kind == ToolKind::ball ? more : 0))) passed.nearest = more;
+            }
+        }
+    }
+    for (int j = 0; j < stock.grid().ny; ++j)
+        for (int i = 0; i < stock.grid().nx; ++i)
+            if (std::abs(stock.grid().x(i)) < 1 && std::abs(stock.grid().y(j)) < 12)
+                passed.most_left = std::max(passed.most_left, static_cast<double>(stock.left(stock.grid().index(i, j))));
+    return passed;
+}
+
+// A groove of 11 mm with a floor that rises and falls, too narrow for the roughing cutter of 12.7 mm.
+double wavy_groove(double x, double y) { return std::abs(x) < 5.5 && std::abs(y) < 17 ? 4 + 1.5 * std::sin(y / 3) + 0.02 * x * x : kTop; }
+
+TEST(SemiRough, KeepsOffThePartAndHasLongerChords) {
+    for (const ToolKind kind : {ToolKind::ball, ToolKind::flat}) {
+        const Passed bare = semi_roughed(wavy_groove, kind, 0), kept = semi_roughed(wavy_groove, kind, 0.1);
+        EXPECT_LE(bare.nearest, 0) << "the bare cutter touches";
+        EXPECT_GE(bare.nearest, -0.01) << "within the gouge tolerance";
+        EXPECT_GT(kept.nearest, 0) << "the other does not anywhere";
+        EXPECT_LT(bare.most_left, kLimit);
+        EXPECT_LT(kept.most_left, kLimit);
+        EXPECT_LT(kept.most_left, bare.most_left + 0.2) << "cusps and the allowance";
+        EXPECT_LT(kept.moves, 0.4 * static_cast<double>(bare.moves));
+        EXPECT_GT(kept.length / static_cast<double>(kept.moves), 1.5 * bare.length / static_cast<double>(bare.moves));
+    }
+}
+
+// A slot that is wider than the cutter by less than twice the allowance is cleared to its floor, and no worse than without.
+TEST(SemiRough, ClearsWhatOnlyTheBareCutterEnters) {
+    for (const double wider : {0.04, 0.1, 0.18, 0.3}) {
+        const double half = 6.35 / 2 + wider / 2;
+        auto slot = [&](double x, double y) { return std::abs(x) < 10 && std::abs(y) < 17 ? 5.0 : kTop; };
+        // The field's facets are half a millimetre wide: it is drawn together so that the slot has upright walls where they should be.
+        auto narrow = [&](Mesh& mesh) {
+            for (Vec3f& v : mesh.vertices)
+                if (std::abs(v.x) <= 10) v.x *= static_cast<float>((half + (std::abs(v.x) < 10 ? 0 : 0.01)) / (std::abs(v.x) < 10 ? 9.5 : 10));
+        };
+        for (const double allowance : {0.0, 0.1}) {
+            const Passed passed = semi_roughed(slot, ToolKind::ball, allowance, narrow);
+            EXPECT_LT(passed.most_left, kLimit) << wider << " wider, allowance " << allowance;
+            EXPECT_GE(passed.nearest, -0.01);
+        }
+    }
+}
+
+TEST(SemiRough, TheAllowanceIsAThirdOfRoughings) {
+    Job job;
+    Tool tool = tool_of_kind(job, ToolKind::ball);
+    EXPECT_NEAR(semi_rough_allowance(job, tool, 1.0), 0.1, 1e-12);
+    job.cutting.wall_allowance = 3, job.cutting.floor_allowance = 6;
+    EXPECT_NEAR(semi_rough_allowance(job, tool, 1.0), 0.2, 1e-12) << "little of what is worth a visit";
+    tool.diameter = 1;
+    EXPECT_NEAR(semi_rough_allowance(job, tool, 1.0), 0.1, 1e-12) << "and of the cutter";
+    job.cutting.floor_allowance = 0.05;
+    EXPECT_EQ(semi_rough_allowance(job, tool, 1.0), 0) << "no more than the gouge tolerance";
+}
+
+}  // namespace
+}  // namespace slabwright
