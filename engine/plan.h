@@ -72,6 +72,7 @@ struct Operation {
     std::vector<StepBand> bands;  ///< of level contours, upwards: where they cut
     double spindle_rpm = 0;
     double clearance_z = 0;    ///< mm
+    double spare = 0;          ///< mm that a semi-roughing leaves on the part for what follows
     double blend = kJunction;  ///< mm by which the machine may round the path's corners (G64 P)
     std::vector<Move> moves;
     std::string file;  ///< name under nc/, "" until named

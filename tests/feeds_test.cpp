@@ -430,5 +430,20 @@ TEST(Feeds, OfAWholePlan) {
     EXPECT_EQ(planned.totals.build_minutes, nominal.totals.build_minutes);
 }
 
+TEST(Feeds, AnOperationMayBendItsCutterByWhatItLeaves) {
+    const Job job;  // allowances of 0.3 mm, a cusp of 0.05
+    Operation op;
+    op.kind = OperationKind::rough;
+    EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.3);
+    op.blend = 0.1;
+    EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.3 - (0.1 - kJunction));
+    op.kind = OperationKind::semi_rough;
+    EXPECT_DOUBLE_EQ(bending_limit(op, job), job.tolerances.cusp) << "one that leaves nothing bends as little as a finish pass";
+    op.spare = 0.1;
+    EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.1);
+    op.kind = OperationKind::finish;
+    EXPECT_DOUBLE_EQ(bending_limit(op, job), job.tolerances.cusp);
+}
+
 }  // namespace
 }  // namespace slabwright

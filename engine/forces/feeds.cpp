@@ -275,8 +275,9 @@ double bending_limit(const Operation& operation, const Job& job) {
     switch (operation.kind) {
         case OperationKind::face:
             return job.slabs.facing_allowance > 0 ? job.slabs.facing_allowance : job.tolerances.cusp;
-        case OperationKind::rough:
         case OperationKind::semi_rough:
+            return std::max(operation.spare, job.tolerances.cusp);
+        case OperationKind::rough:
             return std::max(std::min(job.cutting.wall_allowance, job.cutting.floor_allowance) - (operation.blend - kJunction), job.tolerances.cusp);
         default:
             return job.tolerances.cusp;

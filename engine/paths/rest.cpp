@@ -153,6 +153,7 @@ public:
 
     Operation run() {
         Operation op = cut_.operation(pass_.kind, pass_.purpose, tool_);
+        op.spare = pass_.allowance;
         if (targets_.count() == 0) return op;
         find_room();
         index_ = std::make_unique<DropIndex>(cut_.solid, Cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, wide_});

@@ -155,6 +155,7 @@ public:
 
     Operation run() {
         Operation op = cut_.operation(OperationKind::semi_rough, pass_.purpose, tool_);
+        op.spare = pass_.allowance;
         if (stock_.area_over(cut_.context, pass_.limit) == 0) return op;
         std::vector<float> before = stock_.heights();
         const std::vector<RoughLevel> levels = rough_levels(cut_, tool_, 0);
