@@ -23,6 +23,8 @@ using nlohmann::json;
 
 namespace {
 
+constexpr double kArcShare = 0.05;  // of the gouge tolerance, by which an arc may miss its chords
+
 std::string read_text(const fs::path& path, const std::string& code) {
     std::ifstream file(path, std::ios::binary);
     if (!file) throw Error(ErrorKind::verification, code, "cannot be read", path.string(), "plan again");
@@ -368,7 +370,8 @@ void write_maps(const SimulationReport& report, const std::string& directory) {
 
 GcodeLimits gcode_limits(const Tolerances& tolerances) {
     GcodeLimits limits;
-    limits.arc_error = std::clamp(0.02 * tolerances.gouge, 1e-5, limits.arc_error);
+    // Beside kSheet, by which depths may be short, half of that does no harm; twice as near would need 1.4 times the chords.
+    limits.arc_error = std::clamp(kArcShare * tolerances.gouge, 1e-5, StandingPart::kSheet / 2);
     return limits;
 }
 
