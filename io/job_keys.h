@@ -154,7 +154,7 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("wall_allowance", job.cutting.wall_allowance, "mm that roughing leaves on walls");
     visit.key("floor_allowance", job.cutting.floor_allowance, "mm that roughing leaves on floors");
     visit.key("rough_blend", job.cutting.rough_blend,
-              "mm by which the machine may round corners of roughing (G64 P); 0.02 to a third of wall_allowance is what it gets");
+              "mm by which the machine may round corners of roughing (G64 P); 0.02 to a third of the smaller allowance is what it gets");
     visit.key("steep_limit_deg", job.cutting.steep_limit_deg, "degrees from horizontal: level contours from here up, projected raster below");
     visit.key("overlap_deg", job.cutting.overlap_deg, "degrees that both cut past the limit");
     visit.key("vertical_deg", job.cutting.vertical_deg, "degrees: walls from here up go to the flat end mill");
