@@ -110,7 +110,7 @@ void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const O
     json.key("minutes").rounded(operation.minutes, kMinutes);
     json.key("spindle_rpm").rounded(operation.spindle_rpm, 0);
     json.key("blend").rounded(operation.blend, kLength);
-    json.key("spare").rounded(operation.spare, kLength);
+    json.key("bending_limit").rounded(bending_limit(operation, plan.job), kLength);
     json.key("peak_force_n").rounded(operation.peak_force_n, kForce);
     json.key("deflection_mm").rounded(operation.deflection_mm, kDeflection);
     json.key("wall_error_mm").rounded(operation.wall_error_mm, kDeflection);

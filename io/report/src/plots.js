@@ -132,10 +132,7 @@ function forces() {
     select.value = String(Math.max(0, operations.findIndex(o => o.kind === 'rough')));
     function draw() {
         const i = Number(select.value), o = operations[i];
-        const rough = o.kind === 'rough' || o.kind === 'semi_rough';
-        const left = o.kind === 'rough' ? Math.min(plan.job.cutting.wall_allowance, plan.job.cutting.floor_allowance) - (o.blend - 0.02)
-            : Math.max(o.spare, plan.job.tolerances.cusp);
-        const allowed = rough ? {v: left, name: 'what it leaves'} : {v: plan.job.tolerances.cusp, name: 'cusp tolerance'};
+        const allowed = {v: o.bending_limit, name: 'allowed bending'};
         const deflections = data.engagement[i]?.deflection_mm ?? [], most = Math.max(0, ...deflections, o.deflection_mm);
         // A limit far above everything would flatten the curve; then it is told, not drawn.
         const limits = [{v: o.deflection_mm, name: 'plan: heaviest cut'}, ...(allowed.v < 4 * most ? [allowed] : [])];
