@@ -102,7 +102,7 @@ private:
             return;
         }
         if (letter == 'N') return;
-        if (std::string_view("FHIJKPRSTXYZ").find(letter) == std::string_view::npos)
+        if (std::string_view("FHIJKPQRSTXYZ").find(letter) == std::string_view::npos)
             fail("gcode.unknown_word", std::string("a word ") + letter + ", which this reader does not know");
         if (line[letter]) fail("gcode.twice", std::string("the word ") + letter + " stands twice in one line");
         line[letter] = value;
@@ -170,7 +170,7 @@ private:
                 }
                 case 610:
                 case 611:
-                    blend(0);
+                    blend(0, 0);
                     break;
                 case 640:
                     path_mode = true;
@@ -243,11 +243,15 @@ private:
             if (!line['P'] || *line['P'] < 0) fail("gcode.dwell", "G4 without a time P");
             program_.dwell_s += *line['P'];
         } else if (path_mode) {
-            if (line['P'] && *line['P'] < 0) fail("gcode.number", "G64 with a negative tolerance P");
-            if (line['P']) blend(*line['P'] * unit_);
+            for (const char letter : {'P', 'Q'})
+                if (line[letter] && *line[letter] < 0) fail("gcode.number", std::string("G64 with a negative tolerance ") + letter);
+            // LinuxCNC leaves out points within Q of a straight way, and takes P for a Q that is not given.
+            const double rounds = line['P'] ? *line['P'] * unit_ : kJunction;
+            if (line['P'] || line['Q']) blend(rounds, line['Q'] ? *line['Q'] * unit_ : rounds);
         } else if (line['P']) {
             fail("gcode.unused_word", "P without G4 or G64");
         }
+        if (line['Q'] && !path_mode) fail("gcode.unused_word", "Q without G64");
         const bool axes = line['X'] || line['Y'] || line['Z'];
         const bool arc = motion_ == Motion::clockwise || motion_ == Motion::counter_clockwise;
         if (!arc && (line['I'] || line['J'] || line['K'] || line['R'])) fail("gcode.unused_word", "an arc's word (I, J, K or R) without an arc");
@@ -257,9 +261,9 @@ private:
     }
 
     // Of several in one program the widest counts where the cutter may get, the narrowest for its time.
-    void blend(double mm) {
-        program_.blend_most = blended_ ? std::max(program_.blend_most, mm) : mm;
-        program_.blend_least = blended_ ? std::min(program_.blend_least, mm) : mm;
+    void blend(double rounds, double leaves_out) {
+        program_.strays = blended_ ? std::max(program_.strays, rounds + leaves_out) : rounds + leaves_out;
+        program_.blend = blended_ ? std::min(program_.blend, rounds) : rounds;
         blended_ = true;
     }
 

@@ -72,16 +72,21 @@ TEST(GcodeReader, SpindleAndUnits) {
 TEST(GcodeReader, HowFarCornersMayBeRounded) {
     const auto blends = [](const std::string& body) {
         const Program p = read(body + "G0 X0 Y0 Z1\nG1 X1 F10\n");
-        return std::pair{p.blend_least, p.blend_most};
+        return std::pair{p.blend, p.strays};
     };
     EXPECT_EQ(blends(""), std::pair(kJunction, kJunction));
     EXPECT_EQ(blends("G64\n"), std::pair(kJunction, kJunction));
-    EXPECT_EQ(blends("G64 P0.1\n"), std::pair(0.1, 0.1));
-    EXPECT_EQ(blends("G20\nG64 P0.01\nG21\n"), std::pair(0.254, 0.254));
-    EXPECT_EQ(blends("G64 P0.1\nG64 P0.05\n"), std::pair(0.05, 0.1));
-    EXPECT_EQ(blends("G64 P0.1\nG61\n"), std::pair(0.0, 0.1));
+    EXPECT_EQ(blends("G64 P0.1 Q0\n"), std::pair(0.1, 0.1));
+    EXPECT_EQ(blends("G64 P0.1\n"), std::pair(0.1, 0.2)) << "points within P of a straight way are left out too";
+    EXPECT_EQ(blends("G64 P0.1 Q0.03\n"), std::pair(0.1, 0.1 + 0.03));
+    EXPECT_EQ(blends("G64 Q0.03\n"), std::pair(kJunction, kJunction + 0.03));
+    EXPECT_EQ(blends("G20\nG64 P0.01 Q0\nG21\n"), std::pair(0.254, 0.254));
+    EXPECT_EQ(blends("G64 P0.1 Q0\nG64 P0.05 Q0\n"), std::pair(0.05, 0.1));
+    EXPECT_EQ(blends("G64 P0.1 Q0\nG61\n"), std::pair(0.0, 0.1));
     EXPECT_EQ(blends("G61.1\n"), std::pair(0.0, 0.0));
     EXPECT_EQ(refused_body("G64 P-1\n"), "gcode.number nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G64 P1 Q-1\n"), "gcode.number nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G61 Q0.1\n"), "gcode.unused_word nc/x.ngc:8");
     EXPECT_EQ(refused_body("G61 P0.1\n"), "gcode.unused_word nc/x.ngc:8");
 }
 

@@ -92,7 +92,7 @@ TEST(Gcode, WordForWord) {
               "(Slabwright " + version() +
                   ": L002_02_rough_T2.ngc)\n(pattern pump.stl)\n(layer 2 of 1, z 18.5 to 37 mm from the pattern's bottom)\n"
                   "(z = 0 at the pattern's bottom)\n(rough: levels)\n(tool 2: flat end mill 1/2 in, diameter 12.7 mm)\n(cutting 0 mm, 0 min)\n"
-                  "G21 G17 G90 G94 G40 G49 G80\nG64 P0.02\nG54\nT2 M6\nG43 H2\nS18000 M3\nG4 P3\n"
+                  "G21 G17 G90 G94 G40 G49 G80\nG64 P0.02 Q0\nG54\nT2 M6\nG43 H2\nS18000 M3\nG4 P3\n"
                   "G0 Z47\nX-1.25 Y3\nZ38\nG1 Z35.0001 F1500\nX0.0001 F9000\nY-0.5\nG0 Z47\nM5\nM2\n");
 }
 
@@ -117,6 +117,8 @@ TEST(Gcode, InterpreterMovesWhereTheEngineSaid) {
         EXPECT_EQ(canon.dwell_s, 3);
         EXPECT_TRUE(canon.ended);
         EXPECT_EQ(canon.arcs, 0);
+        EXPECT_NE(canon.text.find("SET_MOTION_CONTROL_MODE(CANON_CONTINUOUS, 0.020000)"), std::string::npos);
+        EXPECT_NE(canon.text.find("SET_NAIVECAM_TOLERANCE(0.0000)"), std::string::npos) << "every point is passed by, none left out";
         const double origin = frame == Frame::layer_top ? 37 : 0;
         const std::vector<Move>& moves = plan.layers[0].operations[0].moves;
         // First and last motions are Z-only rapids to the clearance height.
@@ -147,7 +149,7 @@ TEST(Gcode, EveryLineIsPlain) {
     const std::regex motion(
         "(G[01] )?(X-?(0|[1-9][0-9]*)(\\.[0-9]{0,3}[1-9])?)?( ?Y-?(0|[1-9][0-9]*)(\\.[0-9]{0,3}[1-9])?)?( "
         "?Z-?(0|[1-9][0-9]*)(\\.[0-9]{0,3}[1-9])?)?( F[0-9]+)?");
-    const std::regex other("\\([^()]*\\)|G21 G17 G90 G94 G40 G49 G80|G64 P0\\.02|G54|T2 M6|G43 H2|S18000 M3|G4 P3|M5|M2");
+    const std::regex other("\\([^()]*\\)|G21 G17 G90 G94 G40 G49 G80|G64 P0\\.02 Q0|G54|T2 M6|G43 H2|S18000 M3|G4 P3|M5|M2");
     std::istringstream lines(text);
     std::vector<std::string> motions;
     for (std::string line; std::getline(lines, line);) {

@@ -183,9 +183,9 @@ TEST(Simulate, AShiftOfTwentyMicrometresIsCaughtWhereNoCellSees) {
 // A program that lets the machine round its corners is held against the part as far as that may take the cutter.
 TEST(Simulate, RoundedCornersAreHeldAgainstThePart) {
     Block block;
-    block.rough().blend_most = kJunction;
+    block.rough().strays = kJunction;
     EXPECT_EQ(codes(block.run()), "") << "walls are cut to their size by a path of the ordinary precision";
-    block.rough().blend_most = 0.1;
+    block.rough().strays = 0.1;
     const SimulationReport tight = block.run();
     EXPECT_EQ(codes(tight), "gouge.cutter");
     EXPECT_NEAR(tight.gouge_max, 0.1, 1e-6);
@@ -534,10 +534,10 @@ TEST(Simulate, TimeInClosedForm) {
     const double c = std::sqrt(0.5), v = std::sqrt(1000 * 0.02 * c / (1 - c)),
                  leg = 50.0 / 100 + (100.0 * 100 + (100 - v) * (100 - v)) / (2 * 1000 * 100);
     EXPECT_NEAR(program_seconds(p, m), 2 * leg, 1e-9);
-    p.blend_least = 0.1;
+    p.blend = 0.1;
     const double w = std::sqrt(1000 * 0.1 * c / (1 - c));
     EXPECT_NEAR(program_seconds(p, m), 2 * (50.0 / 100 + (100.0 * 100 + (100 - w) * (100 - w)) / (2 * 1000 * 100)), 1e-9);
-    p.blend_least = 0;  // exactly by the corner: a stop
+    p.blend = 0;  // exactly by the corner: a stop
     EXPECT_NEAR(program_seconds(p, m), 2 * (0.5 + 0.1), 1e-9);
 }
 

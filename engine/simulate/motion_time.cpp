@@ -9,7 +9,7 @@
 namespace slabwright {
 
 double program_seconds(const Program& program, const Machine& machine) {
-    Travel travel(machine.acceleration, program.blend_least);
+    Travel travel(machine.acceleration, program.blend);
     for (std::size_t i = 1; i < program.steps.size(); ++i) {
         const ProgramStep &from = program.steps[i - 1], &to = program.steps[i];
         std::array<double, 3> d{to.x - from.x, to.y - from.y, to.z - from.z};

@@ -140,7 +140,7 @@ struct SimulationReport {
                                         const SimulationOptions& options = {});
 
 /// Time of a program in seconds: trapezoids of speed under one acceleration, slowed at corners so that a path rounded by
-/// Program::blend_least at most would need no more than that acceleration across (junction deviation).
+/// Program::blend at most would need no more than that acceleration across (junction deviation).
 [[nodiscard]] double program_seconds(const Program& program, const Machine& machine);
 
 }  // namespace slabwright
