@@ -179,7 +179,7 @@ bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
     for (const double share : kHelixRadii) {
         const double radius = share * around_.cutter.radius, cx = to_mm(first.x) - radius * uy, cy = to_mm(first.y) + radius * ux;
         // Chords that the machine takes as fast as the circle: no farther from it than it may pass by a corner.
-        const double chord = std::min(around_.chord, std::sqrt(8 * radius * kJunction));
+        const double chord = std::min(around_.chord, std::sqrt(8 * radius * operation_.blend));
         const int chords = static_cast<int>(std::ceil(2 * std::numbers::pi * radius / chord));
         std::vector<std::array<double, 2>> circle;
         bool free = true;

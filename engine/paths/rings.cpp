@@ -229,7 +229,7 @@ void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_
 namespace {
 
 // The region's loops with fewer points (0.1 µm). Small loops stay as they are.
-Loops thinned(const Loops& region, double loose, double turn) {
+Loops thinned(const Loops& region, double fine, double loose, double turn) {
     Loops result;
     std::vector<PathPoint> line;
     for (std::size_t l = 0; l < region.size(); ++l) {
@@ -237,7 +237,7 @@ Loops thinned(const Loops& region, double loose, double turn) {
         for (const Point2 p : region.loop(l)) line.push_back({p.x, p.y, 0});
         if (line.empty()) continue;
         line.push_back(line.front());
-        if (std::vector<PathPoint> fewer = simplify(line, kFineRing * kUnitsPerMm, loose, turn); fewer.size() > 3) line = std::move(fewer);
+        if (std::vector<PathPoint> fewer = simplify(line, fine, loose, turn); fewer.size() > 3) line = std::move(fewer);
         for (std::size_t k = 0; k + 1 < line.size(); ++k) result.points.push_back({line[k].x, line[k].y});
         result.close_loop();
     }
@@ -319,7 +319,8 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
     };
     const Loops useful = intersect(offset(rectangle(stands[0], stands[1], stands[2], stands[3]), r + kBeside, kFineRing),
                                    rectangle(cut.low(0, far), cut.low(1, far), cut.high(0, far), cut.high(1, far)));
-    const double loose = ring_tolerance(tool);
+    // Chords that leave a curve by no more than the machine may are run as fast as the curve.
+    const double loose = ring_tolerance(tool), fine = std::min(loose, std::max(kFineRing, blend));
     const double turn = fast_turn(cut.job.machine, std::min(tool.max_feed, cut.job.machine.max_feed), blend);
     Loops nearer_free;
     std::vector<std::size_t> nearer_region;  // by loop of nearer_free; SIZE_MAX for holes
@@ -365,7 +366,7 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
         nearer_boxes = boxes_of(free);
         nearer_free = std::move(free);
         nearer_region = std::move(region_of);
-        region = thinned(offset(region, plan.step, kFineRing), loose * kUnitsPerMm, turn);
+        region = thinned(offset(region, plan.step, kFineRing), fine * kUnitsPerMm, loose * kUnitsPerMm, turn);
         cut.context.throw_if_cancelled();
     }
     return plan;

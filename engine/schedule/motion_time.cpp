@@ -12,10 +12,14 @@ void Travel::add(const MotionLeg& leg) {
     if (begun_) {
         const auto &u = leaving_, &v = leg.direction;
         const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0), half = std::sqrt((1 + cosine) / 2);
-        const double corner = half >= 1 - 1e-12 ? 1e9 : std::sqrt(acceleration_ * junction_mm_ * half / (1 - half));
+        double corner = 1e9;
+        if (half < 1 - 1e-12) {
+            const double touches = std::min(length_, leg.length) / 2;
+            corner = std::sqrt(acceleration_ * std::min(junction_mm_ * half / (1 - half), touches * half / std::sqrt(1 - half * half)));
+        }
         entry = std::min({corner, speed_, leg.speed});
     }
-    begun_ = true, speed_ = leg.speed, leaving_ = leg.leaving;
+    begun_ = true, length_ = leg.length, speed_ = leg.speed, leaving_ = leg.leaving;
     // A leg on which one can stop from the highest speed of its start is entered at that speed, whatever follows.
     if (legs_.size() >= kTogether && entry <= std::sqrt(2 * acceleration_ * leg.length)) settle(entry);
     legs_.push_back({leg.length, leg.speed, entry});

@@ -35,14 +35,15 @@ private:
     double acceleration_, junction_mm_;
     std::vector<Leg> legs_;  ///< whose speeds depend on what follows, or that few
     bool begun_ = false;
-    double speed_ = 0;  ///< highest on the last leg
+    double length_ = 0, speed_ = 0;  ///< of the last leg; the highest on it
     std::array<double, 3> leaving_{};
     double speed_now_ = 0, seconds_ = 0;  ///< where legs_ begins
 };
 
-/// Every leg is a trapezoid of speed under one acceleration (mm/s²); where two legs meet, the speed is limited to what an
-/// arc that passes the corner by `junction_mm` bears: v² = a·δ·c / (1 − c), c = cos(θ/2), θ the change of direction. Starts and
-/// ends at rest. Legs without length are passed over.
+/// Every leg is a trapezoid of speed under one acceleration (mm/s²); where two legs meet, the speed is limited to what the widest arc bears
+/// that touches both, each no farther off than its middle, and passes the corner by δ = `junction_mm` at most: v² = a·r,
+/// r = min(δ·c / (1 − c), l / 2 · c / s), c and s cosine and sine of θ/2, θ the change of direction, l the shorter leg. So chords of a circle are run
+/// no faster than the circle. Starts and ends at rest. Legs without length are passed over.
 [[nodiscard]] double travel_seconds(std::span<const MotionLeg> legs, double acceleration, double junction_mm = kJunction);
 
 struct MotionTime {
