@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 #include <set>
+#include <tuple>
 
 #include "engine/forces/cuts.h"
 #include "engine/forces/feeds.h"
@@ -102,6 +103,59 @@ TEST(OpCuts, StretchesHoldWhatWasTakenAway) {
         // Run again, nothing is left to take.
         for (const CutStretch& s : stretches(slab, op, cutter)) EXPECT_FALSE(s.cuts());
     }
+}
+
+// Of some moves alone: the very stretches that all of them tell there, with what else was cut before, near and far.
+TEST(OpCuts, PartsTellWhatTheWholeTells) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> x(-5, 125), y(-5, 85), z(10, 17), step(-6, 6);
+    Plan plan = plate();
+    std::size_t compared = 0;
+    for (int round = 0; round < 20; ++round) {
+        const int tool = 2 + round % 2;
+        const Tool& cutter = plan.job.tools[static_cast<std::size_t>(tool) - 1];
+        std::vector<Move> moves{at(10, 10, 30, 0)};
+        for (int cut = 0; cut < 25; ++cut) {
+            double px = x(random), py = y(random), pz = z(random);
+            moves.push_back(at(px, py, 30, 0));
+            moves.push_back(at(px, py, pz, 1500));
+            for (int k = 0; k < 30; ++k) {
+                px += step(random), py += step(random);
+                if (k % 10 == 9) moves.push_back(at(px = x(random), py = y(random), pz, 4000));  // told in many parts
+                moves.push_back(at(px, py, pz, k % 7 == 6 ? 3000 : 4000));
+            }
+            moves.push_back(at(px, py, 30, 0));
+        }
+        const Operation op = line(plan, OperationKind::rough, tool, moves);
+        StandingSlab slab(plan.stock_min, plan.stock_max, 0, 18, 0.25);
+        const StandingSlab before = slab;
+        const std::vector<CutStretch> whole = stretches(slab, op, cutter);
+        // Parts from the begin of a stretch to the end of another; no stretch is half within one.
+        std::vector<MoveRange> parts;
+        for (std::size_t i = 5; i + 10 < whole.size(); i += 3 + random() % (whole.size() / 4)) {
+            MoveRange part{whole[i].first, whole[i + random() % 6].last};
+            for (const CutStretch& s : whole)
+                if (s.first <= part.last) part.last = std::max(part.last, s.last);
+            if (whole[i - 1].last < part.first && (parts.empty() || parts.back().last < part.first)) parts.push_back(part);
+        }
+        ASSERT_FALSE(parts.empty());
+        StandingSlab again = before;
+        std::vector<CutStretch> told;
+        again.run_parts(op, cutter, parts, [&](const CutStretch& s) { told.push_back(s); });
+        std::size_t next = 0;
+        for (const CutStretch& s : whole) {
+            if (std::none_of(parts.begin(), parts.end(), [&](const MoveRange& p) { return s.first >= p.first && s.last <= p.last; })) continue;
+            ASSERT_LT(next, told.size()) << "seed " << seed;
+            const CutStretch& t = told[next++];
+            EXPECT_EQ(std::tie(s.first, s.last, s.length, s.low, s.high, s.width, s.left, s.at),
+                      std::tie(t.first, t.last, t.length, t.low, t.high, t.width, t.left, t.at))
+                << "seed " << seed << " moves " << s.first << " to " << s.last;
+            compared += s.cuts();
+        }
+        EXPECT_EQ(next, told.size());
+    }
+    EXPECT_GT(compared, 100U);
 }
 
 TEST(Feeds, AStiffCutterKeepsItsFeedAndAnElasticOneSlowsDown) {

@@ -182,10 +182,11 @@ struct Seen {
 // the ranges of Luo's other tools begin.
 double least_slab(const Tool& tool) { return std::max(kLeastDepth, tool.stepdown_min > 0 ? tool.stepdown_min : tool.stepdown_max / 2); }
 
+/// @param parts only these moves; none: all
 std::vector<Seen> run_through(Context& context, StandingSlab& slab, const Operation& op, const Tool& tool, const Layer& layer,
-                              const OverhangMap* overhang, double setback) {
+                              const OverhangMap* overhang, double setback, std::span<const MoveRange> parts = {}) {
     std::vector<Seen> seen;
-    slab.run(op, tool, [&](const CutStretch& s) {
+    const auto see = [&](const CutStretch& s) {
         if (seen.size() % 1024 == 0) context.throw_if_cancelled();
         Seen now;
         now.first = s.first, now.last = s.last, now.cuts = s.cuts();
@@ -202,8 +203,54 @@ std::vector<Seen> run_through(Context& context, StandingSlab& slab, const Operat
             if (beyond > 0) now.wood = static_cast<float>(wood), now.overhang = static_cast<float>(beyond + setback);
         }
         seen.push_back(now);
-    });
+    };
+    if (parts.empty()) slab.run(op, tool, see);
+    else slab.run_parts(op, tool, parts, see);
     return seen;
+}
+
+/// Where runs lie when they are split (split_runs).
+std::vector<MoveRange> split_parts(std::span<const DeepRun> runs) {
+    std::vector<MoveRange> parts;
+    std::uint32_t more = 0;
+    for (const DeepRun& run : runs) {
+        const std::uint32_t first = run.first + more, length = run.last - run.first + 1;
+        more += static_cast<std::uint32_t>(run.passes - 1) * (1 + 2 * length) + 1;
+        parts.push_back({first, run.last + more});
+    }
+    return parts;
+}
+
+/// Whether a stretch lies partly in a run.
+bool any_halved(const std::vector<Seen>& seen, std::span<const DeepRun> runs) {
+    std::size_t r = 0;
+    for (const Seen& s : seen) {
+        while (r < runs.size() && runs[r].last < s.first) ++r;
+        if (r < runs.size() && runs[r].first <= s.last && (s.first < runs[r].first || s.last > runs[r].last)) return true;
+    }
+    return false;
+}
+
+/// What was seen before runs were split, with `anew` in place of what was seen of the runs.
+/// @param parts where the runs lie now
+std::vector<Seen> replaced(const std::vector<Seen>& seen, std::span<const DeepRun> runs, std::span<const MoveRange> parts,
+                           const std::vector<Seen>& anew) {
+    std::vector<Seen> all;
+    all.reserve(seen.size() + anew.size());
+    std::size_t r = 0, next = 0;  // runs passed, and of what was seen anew
+    const auto take = [&] {
+        for (; next < anew.size() && anew[next].last <= parts[r].last; ++next) all.push_back(anew[next]);
+        ++r;
+    };
+    for (Seen s : seen) {
+        while (r < runs.size() && runs[r].last < s.first) take();
+        if (r < runs.size() && s.first >= runs[r].first) continue;
+        const std::uint32_t more = r == 0 ? 0 : parts[r - 1].last - runs[r - 1].last;
+        s.first += more, s.last += more;
+        all.push_back(s);
+    }
+    while (r < runs.size()) take();
+    return all;
 }
 
 /// By how much a cut passes what it may do: its wall error, the cutter's stress and the wood's, the largest as a share of its limit.
@@ -288,7 +335,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
     const Job& job = plan.job;
     StandingSlab slab(plan.stock_min, plan.stock_max, layer.z_bottom, layer.z_bottom + layer.slab_thickness,
                       StandingSlab::cell_for(job, plan.stock_min, plan.stock_max));
-    const MemoryCharge memory(context, 2 * slab.bytes(), "the stock that forces are computed from");
+    const MemoryCharge memory(context, 3 * slab.bytes(), "the stock that forces are computed from");
     LayerCuts result;
     for (Operation& op : layer.operations) {
         context.throw_if_cancelled();
@@ -381,8 +428,8 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         int passes = 0;
         std::optional<std::array<double, 3>> divided_at;
         const StandingSlab before = slab;
+        seen = run_through(context, slab, op, tool, layer, overhang, job.bonding.edge_setback);
         for (int round = 0;; ++round) {
-            seen = run_through(context, slab, op, tool, layer, overhang, job.bonding.edge_setback);
             feeds.clear();
             for (const Seen& s : seen) {
                 if (feeds.size() % 64 == 0) context.throw_if_cancelled();
@@ -404,7 +451,14 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                 }
             }
             op.moves = split_runs(op.moves, runs, static_cast<std::uint32_t>(std::max(1.0, std::min(tool.plunge_feed, job.machine.max_feed))));
-            slab = before;
+            // After a run there stands what stood after it before, so only the runs themselves are looked at anew.
+            StandingSlab again = before;
+            if (any_halved(seen, runs)) {
+                seen = run_through(context, again, op, tool, layer, overhang, job.bonding.edge_setback);
+            } else {
+                const std::vector<MoveRange> parts = split_parts(runs);
+                seen = replaced(seen, runs, parts, run_through(context, again, op, tool, layer, overhang, job.bonding.edge_setback, parts));
+            }
         }
         if (divided > 0)
             diagnostics.push_back(

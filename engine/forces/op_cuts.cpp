@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 namespace slabwright {
 
@@ -61,6 +62,56 @@ struct Meeting {
 
 CutterEnd end_of(const Tool& tool) { return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0}; }
 
+// Smallest x and y, largest x and y of a move and the cutter on it, mm.
+std::array<double, 4> box_of(const Move& from, const Move& move, double radius) {
+    std::array<double, 4> box{to_mm(std::min(from.x, move.x)), to_mm(std::min(from.y, move.y)), to_mm(std::max(from.x, move.x)),
+                              to_mm(std::max(from.y, move.y))};
+    if (move.is_arc()) box = arc_shape(from, move).box();
+    return {box[0] - radius, box[1] - radius, box[2] + radius, box[3] + radius};
+}
+
+// The surroundings of some moves, as tiles of the grid.
+class Surrounded {
+public:
+    Surrounded(const CellGrid& grid, const Operation& operation, std::span<const MoveRange> parts, double radius)
+        : grid_(grid),
+          radius_(radius + grid.cell),
+          nx_(grid.nx / kTile + 1),
+          ny_(grid.ny / kTile + 1),
+          sums_((static_cast<std::size_t>(nx_) + 1) * (static_cast<std::size_t>(ny_) + 1), 0) {
+        for (const MoveRange& part : parts)
+            for (std::uint32_t k = part.first; k <= part.last; ++k) {
+                const auto [i0, j0, i1, j1] = tiles(operation.moves[k - 1], operation.moves[k]);
+                for (int j = j0; j <= j1; ++j)
+                    for (int i = i0; i <= i1; ++i) sums_[at(i + 1, j + 1)] = 1;
+            }
+        for (int j = 1; j <= ny_; ++j)
+            for (int i = 1; i <= nx_; ++i) sums_[at(i, j)] += sums_[at(i - 1, j)] + sums_[at(i, j - 1)] - sums_[at(i - 1, j - 1)];
+    }
+    [[nodiscard]] bool near(const Move& from, const Move& move) const {
+        const auto [i0, j0, i1, j1] = tiles(from, move);
+        return sums_[at(i1 + 1, j1 + 1)] - sums_[at(i0, j1 + 1)] - sums_[at(i1 + 1, j0)] + sums_[at(i0, j0)] > 0;
+    }
+
+private:
+    static constexpr int kTile = 4;  // cells
+    [[nodiscard]] std::size_t at(int i, int j) const {
+        return static_cast<std::size_t>(j) * (static_cast<std::size_t>(nx_) + 1) + static_cast<std::size_t>(i);
+    }
+    // First and last; what lies beside the grid counts to its border.
+    [[nodiscard]] std::array<int, 4> tiles(const Move& from, const Move& move) const {
+        const std::array<double, 4> box = box_of(from, move, radius_);
+        const auto tile = [&](double v, double begin, int n) {
+            return static_cast<int>(std::clamp(std::floor((v - begin) / (kTile * grid_.cell)), 0.0, n - 1.0));
+        };
+        return {tile(box[0], grid_.x0, nx_), tile(box[1], grid_.y0, ny_), tile(box[2], grid_.x0, nx_), tile(box[3], grid_.y0, ny_)};
+    }
+    const CellGrid& grid_;
+    double radius_;
+    int nx_, ny_;
+    std::vector<std::int32_t> sums_;  // of marked tiles left of and below a corner
+};
+
 }  // namespace
 
 double StandingSlab::cell_for(const Job& job, std::array<double, 2> stock_min, std::array<double, 2> stock_max) {
@@ -75,7 +126,20 @@ StandingSlab::StandingSlab(std::array<double, 2> stock_min, std::array<double, 2
       height_(grid_.count(), static_cast<float>(top - bottom)) {}
 
 void StandingSlab::run(const Operation& operation, const Tool& tool, const std::function<void(const CutStretch&)>& stretch) {
+    run(operation, tool, {}, true, stretch);
+}
+
+void StandingSlab::run_parts(const Operation& operation, const Tool& tool, std::span<const MoveRange> parts,
+                             const std::function<void(const CutStretch&)>& stretch) {
+    run(operation, tool, parts, false, stretch);
+}
+
+void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<const MoveRange> parts, bool all,
+                       const std::function<void(const CutStretch&)>& stretch) {
     const CutterEnd end = end_of(tool);
+    std::optional<Surrounded> around;
+    if (!all) around.emplace(grid_, operation, parts, end.radius);
+    bool told = all;
     const double enough = std::max(end.radius / 2, 3 * grid_.cell);
     CutStretch now;
     Met met;
@@ -92,22 +156,22 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, const std::
         met = {};
     };
     // One straight way, told in equal parts. A cell is met when the cutter's leading edge comes to it, or at the way's begin.
-    std::vector<Met> parts;
+    std::vector<Met> by_part;
     bool been = false;  // the cutter has cut where the way begins
     const auto step = [&](std::uint32_t move, const std::array<double, 3>& from, const std::array<double, 3>& to, std::size_t count) {
         const double length = std::hypot(to[0] - from[0], to[1] - from[1]), slope = length > 0 ? (to[2] - from[2]) / length : 0;
         const double part = length / static_cast<double>(count);
-        parts.assign(count, {});
-        Meeting meeting{grid_, height_.data(), {}, {from[0], from[1]}, from[2] - bottom_, slope * part, parts};
+        by_part.assign(count, {});
+        Meeting meeting{grid_, height_.data(), {}, {from[0], from[1]}, from[2] - bottom_, slope * part, by_part};
         if (length > 0)
             meeting.way = {(to[0] - from[0]) / length, (to[1] - from[1]) / length, end.radius, static_cast<double>(count) / length,
                            static_cast<int>(count)};
         sweep_above(grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_}, StandingHeights{height_.data(), 0}, meeting,
                     {.been = been});
         been = true;
-        if (length == 0) return;
+        if (length == 0 || !told) return;
         for (std::size_t p = 0; p < count; ++p) {
-            const Met& m = parts[p];
+            const Met& m = by_part[p];
             met = {met.volume + m.volume, std::min(met.low, m.low), std::max(met.high, m.high), met.side + m.side};
             if (now.length == 0) now.first = move;
             now.last = move;
@@ -121,6 +185,15 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, const std::
     };
     for (std::size_t k = 1; k < operation.moves.size(); ++k) {
         const Move &a = operation.moves[k - 1], &b = operation.moves[k];
+        if (!all) {
+            if (told && k > parts.front().last) finish(), parts = parts.subspan(1);
+            if (parts.empty()) return;
+            told = k >= parts.front().first;
+            if (!told && b.feed != 0 && !around->near(a, b)) {
+                been = true;
+                continue;
+            }
+        }
         if (b.feed == 0) {
             finish();
             been = false;
@@ -150,7 +223,7 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, const std::
             continue;
         }
         const double length = std::hypot(to[0] - from[0], to[1] - from[1]);
-        const auto count = static_cast<std::size_t>(std::max(1.0, std::floor(length / enough)));
+        const auto count = told ? static_cast<std::size_t>(std::max(1.0, std::floor(length / enough))) : 1;
         if (count > 1) finish();
         step(move, from, to, count);
     }

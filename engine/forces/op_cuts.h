@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "engine/plan.h"
@@ -24,6 +25,11 @@ struct CutStretch {
     [[nodiscard]] bool cuts() const { return width > 0 && high > low; }
 };
 
+/// Moves of an operation, both included.
+struct MoveRange {
+    std::uint32_t first = 0, last = 0;
+};
+
 /// The slab of one layer over a grid of cells, each of which stands for its centre, where it is exact.
 class StandingSlab {
 public:
@@ -35,6 +41,13 @@ public:
     /// down, is taken as at least two cells long. Moves straight down take away and tell nothing: they drill.
     void run(const Operation& operation, const Tool& tool, const std::function<void(const CutStretch&)>& stretch);
 
+    /// The same of some moves only, and of what must be gone before them: of all moves before the last of `parts`, those are cut that come near
+    /// any of these, and the stretches of the parts are told. Where none of run()'s stretches is half within a part these are run()'s
+    /// very stretches; what stands afterwards is right nowhere else.
+    /// @param parts ascending, apart from each other
+    void run_parts(const Operation& operation, const Tool& tool, std::span<const MoveRange> parts,
+                   const std::function<void(const CutStretch&)>& stretch);
+
     /// The cells for a job's stock, mm: as fine as what roughing leaves on a wall, coarser where there would be more than kMostCells. A
     /// strip along the grid that is thinner than a cell is met as a whole cell or not at all.
     [[nodiscard]] static double cell_for(const Job& job, std::array<double, 2> stock_min, std::array<double, 2> stock_max);
@@ -42,6 +55,9 @@ public:
     [[nodiscard]] std::uint64_t bytes() const { return height_.size() * sizeof(float); }
 
 private:
+    void run(const Operation& operation, const Tool& tool, std::span<const MoveRange> parts, bool all,
+             const std::function<void(const CutStretch&)>& stretch);
+
     CellGrid grid_;
     double bottom_ = 0;
     std::vector<float> height_;  // over bottom_
