@@ -1,12 +1,14 @@
 #include "engine/forces/feeds.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <functional>
-#include <map>
 #include <numbers>
 #include <optional>
 #include <set>
+#include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -41,8 +43,25 @@ constexpr ClassSteps kFine{64, 240, 128};  // by which forces are stated: within
 struct CutClass {
     std::int16_t low = 0, depth = 0, width = 0;
     bool left = false;
-    friend auto operator<=>(const CutClass&, const CutClass&) = default;
+    friend bool operator==(const CutClass&, const CutClass&) = default;
 };
+
+/// What is known of classes at a feed, mm/min.
+struct ClassAndFeed {
+    CutClass of;
+    double feed = 0;
+    friend bool operator==(const ClassAndFeed&, const ClassAndFeed&) = default;
+};
+struct HashClassAndFeed {
+    std::size_t operator()(const ClassAndFeed& key) const {
+        const auto word = [](std::int16_t v) { return std::uint64_t{static_cast<std::uint16_t>(v)}; };
+        std::uint64_t h = word(key.of.low) | word(key.of.depth) << 16U | word(key.of.width) << 32U | std::uint64_t{key.of.left} << 48U;
+        h = (h ^ h >> 29U) * 0x9E3779B97F4A7C15U + std::bit_cast<std::uint64_t>(key.feed);
+        return (h ^ h >> 32U) * 0xD6E8FEB86659FD93U >> 16U;
+    }
+};
+template <class T>
+using ByClassAndFeed = std::unordered_map<ClassAndFeed, T, HashClassAndFeed>;
 
 double depth_of(int depth, ClassSteps steps) { return kLeastDepth * std::exp2(static_cast<double>(depth) / steps.depth); }
 
@@ -108,10 +127,10 @@ public:
     }
 
 private:
-    using Known = std::map<std::pair<CutClass, double>, Bent>;
+    using Known = ByClassAndFeed<Bent>;
 
     const Bent& find(Known& known, const CutClass& c, double feed, ClassSteps steps, double accuracy) {
-        const auto [it, fresh] = known.try_emplace({c, feed});
+        const auto [it, fresh] = known.try_emplace(ClassAndFeed{c, feed});
         if (fresh) {
             const CutSegment cut = segment_of(c, idle_, tool_, feed, steps);
             const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut, accuracy) : reference_forces(cut, accuracy);
@@ -377,9 +396,9 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             std::uint32_t feed = 0;
             const Bent* bent = nullptr;
         };
-        std::map<std::pair<CutClass, std::uint32_t>, std::vector<FeedStep>> steps_of;
+        ByClassAndFeed<std::vector<FeedStep>> steps_of;
         const auto slow_enough = [&](const Seen& s, std::uint32_t planned, double chip) {
-            const auto [it, fresh] = steps_of.try_emplace({s.coarse, planned});
+            const auto [it, fresh] = steps_of.try_emplace(ClassAndFeed{s.coarse, static_cast<double>(planned)});
             std::vector<FeedStep>& steps = it->second;
             if (fresh) {
                 // What is planned is a step too, so that a cut that needs no other feed keeps its own.
@@ -402,21 +421,21 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         const auto as_stated = [&](const Seen& s, std::uint32_t planned, std::uint32_t feed) {
             const double bears = cutter_share(cutting.at(s.coarse, feed));
             if (bears < kClassSlack || bears > 1) return feed;
-            for (const FeedStep& step : steps_of.at({s.coarse, planned})) {
+            for (const FeedStep& step : steps_of.at({s.coarse, static_cast<double>(planned)})) {
                 if (step.feed > feed) continue;
                 feed = step.feed;
                 if (cutter_share(cutting.stated(s.fine, feed)) <= 1) break;
             }
             return feed;
         };
-        std::map<std::pair<CutClass, std::uint32_t>, std::uint32_t> chosen;
+        ByClassAndFeed<std::uint32_t> chosen;
         const auto choose = [&](const Seen& s, std::uint32_t planned) -> std::uint32_t {
             // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
             const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
             if (!s.cuts) return static_cast<std::uint32_t>(most);
             const auto thin = [&] { return std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.coarse))); };
             if (s.overhang > 0) return as_stated(s, planned, slow_enough(s, planned, thin()));
-            const auto [it, fresh] = chosen.try_emplace({s.coarse, planned}, planned);
+            const auto [it, fresh] = chosen.try_emplace(ClassAndFeed{s.coarse, static_cast<double>(planned)}, planned);
             if (fresh) it->second = slow_enough(s, planned, thin());
             return as_stated(s, planned, it->second);
         };
@@ -497,7 +516,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         context.throw_if_cancelled();
 
         // Every cut that differs, with the place where it is met first; and where the wood would break.
-        std::map<std::pair<CutClass, std::uint32_t>, bool> listed;
+        std::unordered_set<ClassAndFeed, HashClassAndFeed> listed;
         const Seen* breaks = nullptr;
         double most = 1, needed = 0;
         std::size_t broken = 0;
@@ -511,7 +530,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                     ++broken;
                     if (wood > most) most = wood, breaks = &s, needed = wood * s.wood;
                 }
-            if (!listed.try_emplace({s.fine, feed}, true).second) continue;
+            if (!listed.insert({s.fine, static_cast<double>(feed)}).second) continue;
             result.cuts.push_back(segment_of(s.fine, cutting.idle(), tool, feed, kFine));
             result.places.push_back(s.at);
             result.moves.push_back(s.last);
