@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -123,11 +124,11 @@ using Four [[gnu::vector_size(16)]] = float;
 /// far a place is from most facets, in single precision.
 struct Planes {
     Four x, y, z, d;
-    /// What the square of the distance is at least; less than it is only where a corner is nearest, and on slivers.
-    [[nodiscard]] float least_squared(const Vec3f& p) const {
-        const Four at = x * p.x + y * p.y + z * p.z + d;
-        const float beside = std::max(std::max(at[1], at[2]), std::max(at[3], 0.0f));
-        return at[0] * at[0] + beside * beside;
+    /// Whether the square of the distance is more, as far as the planes tell: they do not where a corner is nearest, and on slivers.
+    [[nodiscard]] bool farther(const Vec3f& p, float squared) const {
+        const Four at = x * p.x + y * p.y + z * p.z + d, none{}, beside = at > none ? at : none, over{at[0], at[0], at[0], at[0]};
+        const auto lanes = std::bit_cast<std::array<std::uint64_t, 2>>(over * over + beside * beside > squared);
+        return ((lanes[0] >> 32U) | lanes[1]) != 0;  // of the edges' planes
     }
 };
 
@@ -395,7 +396,7 @@ struct Probe {
 /// Of a ball, which most facets around miss.
 bool look_around(RTCPointQueryFunctionArguments* args) {
     auto& probe = *static_cast<Probe*>(args->userPtr);
-    if (probe.scene->planes[args->primID].least_squared(probe.middle) > probe.beyond2) return false;
+    if (probe.scene->planes[args->primID].farther(probe.middle, probe.beyond2)) return false;
     if (!probe.look(args->primID)) return false;
     const float within = probe.ruled_out ? 0 : up(std::sqrt(probe.nearest2) + probe.margin);
     probe.beyond2 = within * within;
