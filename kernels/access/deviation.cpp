@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <tuple>
+#include <utility>
 
 #include "kernels/parallel/parallel.h"
 
@@ -40,6 +43,57 @@ private:
     std::array<double, 4> plane_{};
 };
 
+/// The facets that places were nearest to lately: places that follow one another go back and forth between a few.
+class NearLately {
+public:
+    explicit NearLately(const std::array<Vec3f, 3>& first) : prisms_{Prism(first), Prism(first), Prism(first), Prism(first)} {}
+    /// The last one that a place was within or that was taken.
+    [[nodiscard]] std::uint32_t facet() const { return facets_[0]; }
+    /// Whether a place is in the prism of one of them and no farther from the facet than this.
+    [[nodiscard]] bool within(const Point3& p, double distance) {
+        if (prisms_[0].within(p, distance)) return true;
+        for (std::size_t k = 1; k < kMany; ++k)
+            if (prisms_[k].within(p, distance)) {
+                std::swap(prisms_[0], prisms_[k]);
+                std::swap(facets_[0], facets_[k]);
+                return true;
+            }
+        return false;
+    }
+    [[nodiscard]] std::span<const std::uint32_t> facets() const { return facets_; }
+    void take(std::uint32_t facet, const std::array<Vec3f, 3>& v) {
+        if (facet == facets_[0]) return;
+        next_ = next_ % (kMany - 1) + 1;
+        prisms_[next_] = prisms_[0];
+        facets_[next_] = facets_[0];
+        prisms_[0] = Prism(v);
+        facets_[0] = facet;
+    }
+
+private:
+    static constexpr std::size_t kMany = 4;
+    std::array<Prism, kMany> prisms_;
+    std::array<std::uint32_t, kMany> facets_{};
+    std::size_t next_ = 0;
+};
+
+/// Remembers corners for a while: the facets around one lie near one another in the tree.
+class LookedAt {
+public:
+    LookedAt() { places_.fill({std::numeric_limits<float>::quiet_NaN(), 0, 0}); }
+    [[nodiscard]] bool first_time(const Vec3f& v) {
+        const auto bits = [](float x) { return std::bit_cast<std::uint32_t>(x); };
+        const std::uint32_t hash = (bits(v.x) * 0x9E3779B1u) ^ (bits(v.y) * 0x85EBCA77u) ^ (bits(v.z) * 0xC2B2AE3Du);
+        Vec3f& place = places_[hash >> 24];
+        if (place.x == v.x && place.y == v.y && place.z == v.z) return false;
+        place = v;
+        return true;
+    }
+
+private:
+    std::array<Vec3f, 256> places_;
+};
+
 }  // namespace
 
 // Only the greatest distance matters. A facet of the other part bounds the distance of all that is near it, so most of the tree is done with
@@ -64,26 +118,30 @@ double StandingPart::farthest_from(Context& context, const StandingPart& other) 
         context, levels_[0].size(), 64, 0.0,
         [&](std::size_t begin, std::size_t end) {
             double most = sampled;
-            std::uint32_t facet = 0;  // of the other part: the nearest to a place lately
-            Prism prism(other.facets_[facet].v);
-            const auto take = [&](std::uint32_t nearest) {
-                if (nearest != facet) prism = Prism(other.facets_[facet = nearest].v);
-            };
+            NearLately near_lately(other.facets_[0].v);
+            LookedAt looked_at;
             // Whether some place of a box may be farther than the greatest known.
             const auto may_be_farther = [&](const Node& box, bool search) {
                 const Point3 middle{(double{box.x0} + box.x1) / 2, (double{box.y0} + box.y1) / 2, (double{box.z0} + box.z1) / 2};
                 const double x = double{box.x1} - box.x0, y = double{box.y1} - box.y0, z = double{box.z1} - box.z0;
                 const double half = std::sqrt(x * x + y * y + z * z) / 2;
-                Near near{other.distance(middle, facet), facet};
-                if (search && near.distance + half > most) near = other.nearest(middle, near, 0), take(near.facet);
+                if (half > most) return true;  // whatever is near the middle
+                Near near{other.distance(middle, near_lately.facet()), near_lately.facet()};
+                if (near.distance + half <= most) return false;
+                if (!search) return true;
+                near = other.nearest(middle, near, most - half);
+                near_lately.take(near.facet, other.facets_[near.facet].v);
                 return near.distance + half > most;
             };
             const auto look = [&](const Point3& place) {
-                if (prism.within(place, most)) return;
-                Near near{other.distance(place, facet), facet};
-                if (near.distance <= most) return;
+                if (near_lately.within(place, most)) return;
+                Near near{std::numeric_limits<double>::infinity(), 0};  // beside an edge no prism has it
+                for (const std::uint32_t facet : near_lately.facets()) {
+                    if (const double d = other.distance(place, facet); d < near.distance) near = {d, facet};
+                    if (near.distance <= most) return;
+                }
                 near = other.nearest(place, near, most);
-                take(near.facet);
+                near_lately.take(near.facet, other.facets_[near.facet].v);
                 most = std::max(most, near.distance);
             };
             for (std::size_t i = begin; i < end; ++i) {
@@ -101,7 +159,7 @@ double StandingPart::farthest_from(Context& context, const StandingPart& other) 
                     for (std::size_t f = first; f < std::min(facets_.size(), first + kFan); ++f) {
                         Point3 middle{};
                         for (const Vec3f& v : facets_[f].v) {
-                            look(corner(v));
+                            if (looked_at.first_time(v)) look(corner(v));
                             middle[0] += v.x / 3.0, middle[1] += v.y / 3.0, middle[2] += v.z / 3.0;
                         }
                         look(middle);
