@@ -239,7 +239,7 @@ Json outlines(const Loops& loops) {
 }
 
 /// The pattern seen along y and along x: per height, the intervals that it covers, [[x0, x1, …], …] in mm.
-Json silhouette(const std::vector<Section>& sections, bool along_y) {
+Json silhouette(std::span<const Section> sections, bool along_y) {
     Json rows = Json::array();
     for (const Section& section : sections) {
         std::vector<std::pair<double, double>> spans;
@@ -364,7 +364,7 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
 /// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
 void draw_figures(Context& context, MeshView mesh, const PlanFolder& folder, const Json& sequence, Json& data) {
     const SimulationInput& input = folder.input;
-    const Box3 box = bounds(mesh);
+    const Box3 box = bounds(context, mesh);
     std::vector<Plane> planes;
     for (const SimulatedLayer& layer : input.layers) {
         planes.push_back({layer.z_bottom, Side::above});
@@ -372,11 +372,14 @@ void draw_figures(Context& context, MeshView mesh, const PlanFolder& folder, con
     }
     const double step = (static_cast<double>(box.max.z) - box.min.z) / kSilhouetteRows;
     for (int i = 0; i < kSilhouetteRows; ++i) planes.push_back({box.min.z + (i + 0.5) * step, Side::above});
-    std::vector<Section> sections = slice(context, mesh, planes);
+    const std::vector<Section> sections = slice(context, mesh, planes);
+    const std::size_t ends = 2 * input.layers.size();
+    const auto between = std::span<const Section>(sections).subspan(ends);
+    std::vector<Json> drawn(ends + 2);
+    parallel_each(context, drawn.size(), [&](std::size_t i) { drawn[i] = i < ends ? outlines(sections[i].loops) : silhouette(between, i == ends); });
     Json layers = Json::array();
     for (std::size_t l = 0; l < input.layers.size(); ++l)
-        layers.push_back({{"bottom", outlines(sections[2 * l].loops)}, {"top", outlines(sections[2 * l + 1].loops)}, {"glue", Json::array()}});
-    sections.erase(sections.begin(), sections.begin() + static_cast<std::ptrdiff_t>(2 * input.layers.size()));
+        layers.push_back({{"bottom", std::move(drawn[2 * l])}, {"top", std::move(drawn[2 * l + 1])}, {"glue", Json::array()}});
     if (sequence.is_object()) {
         const Json& glue = sequence.at("glue");
         for (std::size_t l = 0; l < std::min(glue.size(), layers.size()); ++l)
@@ -387,8 +390,8 @@ void draw_figures(Context& context, MeshView mesh, const PlanFolder& folder, con
             }
     }
     data["outlines"] = {{"unit_mm", 1 / kHundredths}, {"tolerance_mm", kOutlineTolerance}, {"layers", std::move(layers)}};
-    data["silhouette"] = {{"z0", rounded(box.min.z, 4)}, {"dz", step}, {"x", silhouette(sections, true)}, {"y", silhouette(sections, false)}};
-    const SlopeProfile slopes = slope_profile(mesh, kSlopeRows);
+    data["silhouette"] = {{"z0", rounded(box.min.z, 4)}, {"dz", step}, {"x", std::move(drawn[ends])}, {"y", std::move(drawn[ends + 1])}};
+    const SlopeProfile slopes = slope_profile(context, mesh, kSlopeRows);
     Json least = Json::array(), areas = Json::array();
     for (const double v : slopes.least_deg) least.push_back(rounded(v, 2));
     for (const double v : slopes.area_mm2) areas.push_back(rounded(v, 1));
@@ -465,9 +468,9 @@ ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder&
 }
 
 /// The pattern for the 3D view: places as 16-bit shares of its box.
-Json model_json(Context& context, MeshView mesh, const StandingPart& part, const PlanFolder& folder, std::size_t facets) {
-    Mesh model = decimate(context, mesh, facets);
-    const Box3 box = bounds(mesh);
+/// @param model of the mesh, decimated
+Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart& part, const PlanFolder& folder) {
+    const Box3 box = bounds(context, mesh);
     const float low[3] = {box.min.x, box.min.y, box.min.z}, high[3] = {box.max.x, box.max.y, box.max.z};
     std::string vertices, indices;
     for (Vec3f& v : model.vertices) {
@@ -616,7 +619,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
     context.begin_phase("report", 0.02, replayed, folder.programs.size() + left_over_steps(folder));
     Figures figures;
     figures.data = {{"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", folder.plan}, {"verify", verify}};
-    understood(out / "sequence.json", "report.sequence", [&] {
+    const auto draw = [&] {
         Json steps = Json::array();
         if (sequence.is_object())
             for (const Json& step : sequence.at("steps"))
@@ -625,11 +628,21 @@ std::string report_html(Context& context, const std::string& directory, const Re
         figures.data["steps"] = std::move(steps);
         draw_figures(context, mesh, folder, sequence, figures.data);
         return 0;
-    });
+    };
     SimulationInput input = folder.input;
     input.mesh = mesh;
     if (options.three_d && !pattern->part) pattern->part.emplace(context, mesh);
-    replay_programs(context, out, folder, input, std::move(programs), options.three_d ? &*pattern->part : nullptr, figures);
+    // The model needs nothing of the figures, and its rounds keep one thread busy.
+    std::size_t facets = kMostFacets, points = kMostPoints;
+    Mesh decimated;
+    parallel_each(context, options.three_d ? 2 : 1, [&](std::size_t i) {
+        if (i > 0) {
+            decimated = decimate(context, mesh, facets);
+            return;
+        }
+        understood(out / "sequence.json", "report.sequence", draw);
+        replay_programs(context, out, folder, input, std::move(programs), options.three_d ? &*pattern->part : nullptr, figures);
+    });
     context.throw_if_cancelled();
 
     const auto limit = static_cast<std::size_t>(options.size_limit_mb * 1e6);
@@ -645,8 +658,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
     }
     figures.data["left_over"] = {{"layers", figures.replay}};
     context.begin_phase("report's model and paths", replayed, 1.0, 3);
-    std::size_t facets = kMostFacets, points = kMostPoints;
-    Json model = model_json(context, mesh, *pattern->part, folder, facets);
+    Json model = model_json(context, mesh, std::move(decimated), *pattern->part, folder);
     context.advance();
     Json paths = paths_json(context, figures.drawn, folder, points);
     context.advance();
@@ -665,7 +677,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
             paths = paths_json(context, figures.drawn, folder, points);
         } else if (facets > kFewestFacets) {
             facets /= 2;
-            model = model_json(context, mesh, *pattern->part, folder, facets);
+            model = model_json(context, mesh, decimate(context, mesh, facets), *pattern->part, folder);
         } else {
             throw too_large(text.size());
         }

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "kernels/access/closest_point.h"
 #include "kernels/access/deviation.h"
@@ -81,6 +83,55 @@ TEST(Decimate, SameOnAnyThreadsAndUntouchedWhenSmall) {
     EXPECT_TRUE(decimate(one, MeshView{}, 100).facets.empty());
 }
 
+TEST(Decimate, AGridKeepsEdges) {
+    // A block whose sides are fine grids, turned so that no side lies along the cells: merged vertices must go back to its edges and corners.
+    const int n = 60;
+    const auto turned = [&](double x, double y, double z) {
+        const double c = std::cos(0.4), s = std::sin(0.4), u = c * x - s * y, v = s * x + c * y;
+        return Vec3f{static_cast<float>(u), static_cast<float>(c * v - s * z), static_cast<float>(s * v + c * z)};
+    };
+    std::vector<Facet> facets;
+    for (int side = 0; side < 6; ++side)
+        for (int i = 0; i < n; ++i)
+            for (int j = 0; j < n; ++j) {
+                const auto at = [&](int a, int b) {
+                    std::array<double, 3> p{};
+                    const auto axis = static_cast<std::size_t>(side / 2);
+                    p[axis] = side % 2 * n, p[(axis + 1) % 3] = a, p[(axis + 2) % 3] = b;
+                    return turned(p[0], p[1], p[2]);
+                };
+                Vec3f a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
+                if (side % 2 == 0) std::swap(b, d);
+                facets.push_back({a, b, c});
+                facets.push_back({a, c, d});
+            }
+    Context one({.threads = 1}), four({.threads = 4});
+    const Mesh mesh = welded(one, facets);
+    ASSERT_TRUE(closed(mesh.view()));
+    // 6000 facets are aimed at: cells of 2.7 mm.
+    const Mesh few = decimate(one, mesh.view(), 5000, 24'000), same = decimate(four, mesh.view(), 5000, 24'000);
+    EXPECT_EQ(few.vertices, same.vertices);
+    EXPECT_EQ(few.facets, same.facets);
+    EXPECT_LE(few.facets.size(), 5000u);
+    EXPECT_GT(few.facets.size(), 1000u);
+    EXPECT_LT(surface_deviation(one, StandingPart(one, mesh.view()), StandingPart(one, few.view())), 0.1);
+    EXPECT_NEAR(volume(few.view()), 1.0 * n * n * n, 1e-3 * n * n * n);
+}
+
+TEST(Decimate, AGridKeepsTheShapeOfOwnModels) {
+    Context context;
+    for (const auto& facets : {half_sphere(), pump_cover()}) {
+        const Mesh mesh = welded(context, facets);
+        const Mesh few = decimate(context, mesh.view(), mesh.facets.size() / 40, mesh.facets.size());
+        EXPECT_LE(few.facets.size(), mesh.facets.size() / 40);
+        const Box3 box = bounds(mesh.view());
+        const double area = 2 * (box.max.x - box.min.x) * (box.max.y - box.min.y);
+        const double cell = std::sqrt(2 * area / (static_cast<double>(mesh.facets.size()) / 4));
+        EXPECT_LT(surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view())), 3 * cell);
+        EXPECT_NEAR(volume(few.view()), volume(mesh.view()), 0.02 * volume(mesh.view()));
+    }
+}
+
 TEST(Decimate, Cancels) {
     Context context;
     const Mesh mesh = welded(context, pump_cover());
@@ -141,7 +192,7 @@ TEST(Slopes, OfACone) {
     }
     Context context;
     const Mesh mesh = welded(context, facets);
-    const SlopeProfile profile = slope_profile(mesh.view(), 50);
+    const SlopeProfile profile = slope_profile(context, mesh.view(), 50);
     for (const double least : profile.least_deg) EXPECT_NEAR(least, 60, 0.05);
     double sum = 0;
     for (const double area : profile.area_mm2) sum += area;
@@ -154,7 +205,7 @@ TEST(Slopes, AgreeWithBruteForceOnThePumpCover) {
     Context context;
     const Mesh mesh = welded(context, pump_cover());
     const int steps = 37;
-    const SlopeProfile profile = slope_profile(mesh.view(), steps);
+    const SlopeProfile profile = slope_profile(context, mesh.view(), steps);
     const double step = (profile.z_high - profile.z_low) / steps;
     for (int i = 0; i < steps; ++i) {
         const double low = profile.z_low + i * step, high = low + step;

@@ -157,16 +157,19 @@ ReplayedProgram Replay::run(const Program& program) {
         way[p] += std::hypot(dx, dy, steps[k].z - steps[k - 1].z);
         if (dx != 0 || dy != 0) feed[p] = std::max(feed[p], steps[k].feed);
     }
+    std::vector<Taken> sums(pieces);
     for (std::size_t p = 0; p < pieces; ++p) {
-        Taken sum;
-        for (const auto& band : taken) sum.volume += band[p].volume, sum.deepest = std::max(sum.deepest, band[p].deepest);
-        result.removed_mm3 += sum.volume;
-        if (sum.volume < kLeastVolume || !(way[p] > 0) || !(sum.deepest > 0)) continue;
+        for (const auto& band : taken) sums[p].volume += band[p].volume, sums[p].deepest = std::max(sums[p].deepest, band[p].deepest);
+        result.removed_mm3 += sums[p].volume;
+    }
+    parallel_each(r.context, pieces, [&](std::size_t p) {
+        const Taken& sum = sums[p];
+        if (sum.volume < kLeastVolume || !(way[p] > 0) || !(sum.deepest > 0)) return;
         ReplayPiece& piece = result.pieces[p];
         piece.depth_mm = sum.deepest;
         piece.width_mm = std::min(tool->diameter, sum.volume / (way[p] * sum.deepest));
         rate(piece, *tool, r.options.material, feed[p], program.spindle_rpm);
-    }
+    });
     return result;
 }
 

@@ -3,12 +3,16 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
-#include <unordered_map>
+#include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
+#include "kernels/mesh/raw_array.h"
+#include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -17,12 +21,17 @@ namespace {
 
 using Vector = Eigen::Vector3d;
 
-constexpr std::size_t kClusterFrom = 4'000'000;  // facets: from here on a grid makes them fewer first
-constexpr double kClusterFacets = 2'000'000;     // that the grid aims at
-constexpr double kRoundShare = 0.3;              // of the edges, the cheapest, are tried in one round; the others wait for better figures
-constexpr double kTurn = 0.2;                    // cosine: a facet may turn by no more in one collapse
-constexpr double kLeastProgress = 0.002;         // of the facets; a round that removes fewer is the last
-constexpr double kEdgeWeight = 1e-3;             // pulls a flat neighbourhood's free optimum towards the edge's middle
+constexpr double kMostCells = (1 << 21) - 1;     // of the grid along one axis
+constexpr unsigned kPartBits = 9;                // of a cell's hash: what each part has of the vertices fits a cache
+constexpr std::uint64_t kDealtAtOnce = 1 << 23;  // vertices, unless one part has more
+constexpr std::size_t kGrain = 1 << 16;          // of what is done for one vertex or facet after the other
+constexpr double kFlat = 0.02;                   // of a cell: a vertex as near to the planes around it stays
+constexpr std::size_t kLeastTable = 1 << 10;     // of a part's cells
+constexpr const char* kWhat = "fewer facets for the report";
+constexpr double kRoundShare = 0.3;       // of the edges, the cheapest, are tried in one round; the others wait for better figures
+constexpr double kTurn = 0.2;             // cosine: a facet may turn by no more in one collapse
+constexpr double kLeastProgress = 0.002;  // of the facets; a round that removes fewer is the last
+constexpr double kEdgeWeight = 1e-3;      // pulls a flat neighbourhood's free optimum towards the edge's middle
 
 /// Sum of squared distances from weighted planes: xᵀAx + 2bᵀx + c.
 struct Quadric {
@@ -50,52 +59,24 @@ struct Edge {
 
 bool degenerate(const Index3& f) { return f[0] == f[1] || f[1] == f[2] || f[2] == f[0]; }
 
+Vector vector_of(const Vec3f& v) { return {v.x, v.y, v.z}; }
+
 Vector cross_of(const Vector& p, const Vector& q, const Vector& r) { return (q - p).cross(r - p); }
 
 class Decimation {
 public:
-    Decimation(Context& context, MeshView mesh) : context_(context) {
+    Decimation(Context& context, MeshView mesh, std::size_t clustered_from) : context_(context) {
+        if (mesh.facets.size() >= clustered_from) {
+            cluster(mesh, clustered_from / 4);
+            charge_.emplace(context, 200 * vertices_.size() + 160 * facets_.size(), kWhat);
+            return;
+        }
+        charge_.emplace(context, 200 * mesh.vertices.size() + 160 * mesh.facets.size(), kWhat);
         vertices_.reserve(mesh.vertices.size());
-        for (const Vec3f& v : mesh.vertices) vertices_.emplace_back(v.x, v.y, v.z);
+        for (const Vec3f& v : mesh.vertices) vertices_.push_back(vector_of(v));
         facets_.reserve(mesh.facets.size());
         for (const Index3& f : mesh.facets)
             if (!degenerate(f)) facets_.push_back(f);
-    }
-
-    /// Vertices in one cell of a grid become their mean.
-    void cluster() {
-        double area = 0;
-        for (const Index3& f : facets_) area += cross_of(vertices_[f[0]], vertices_[f[1]], vertices_[f[2]]).norm() / 2;
-        const double cell = std::max(1e-6, std::sqrt(2 * area / kClusterFacets));
-        struct Mean {
-            std::uint32_t id = 0, count = 0;
-            Vector sum = Vector::Zero();
-        };
-        struct Hash {
-            std::size_t operator()(const std::array<std::int32_t, 3>& k) const {
-                return static_cast<std::size_t>(k[0]) * 73856093u ^ static_cast<std::size_t>(k[1]) * 19349663u ^
-                       static_cast<std::size_t>(k[2]) * 83492791u;
-            }
-        };
-        std::unordered_map<std::array<std::int32_t, 3>, std::uint32_t, Hash> cells;
-        std::vector<Mean> means;
-        std::vector<std::uint32_t> to(vertices_.size());
-        for (std::size_t i = 0; i < vertices_.size(); ++i) {
-            if (i % 65536 == 0) context_.throw_if_cancelled();
-            std::array<std::int32_t, 3> key{};
-            for (int k = 0; k < 3; ++k) key[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(std::floor(vertices_[i][k] / cell));
-            const auto [entry, fresh] = cells.try_emplace(key, static_cast<std::uint32_t>(means.size()));
-            if (fresh) means.emplace_back();
-            Mean& mean = means[entry->second];
-            mean.sum += vertices_[i];
-            ++mean.count;
-            to[i] = entry->second;
-        }
-        vertices_.clear();
-        for (const Mean& mean : means) vertices_.push_back(mean.sum / mean.count);
-        for (Index3& f : facets_)
-            for (std::uint32_t& v : f) v = to[v];
-        std::erase_if(facets_, degenerate);
     }
 
     void collapse_to(std::size_t wished) {
@@ -127,6 +108,155 @@ public:
     }
 
 private:
+    /// Vertices in one cell of a grid become one, where the planes of the facets that stay want it. Those are the facets whose corners lie in
+    /// three cells.
+    /// @param aim facets that the grid aims at
+    void cluster(MeshView mesh, std::size_t aim) {
+        charge_.emplace(context_, 4 * mesh.vertices.size() + 100 * aim, kWhat);
+        const auto corners = [&](std::size_t f) {
+            const Index3& v = mesh.facets[f];
+            return std::array<Vector, 3>{vector_of(mesh.vertices[v[0]]), vector_of(mesh.vertices[v[1]]), vector_of(mesh.vertices[v[2]])};
+        };
+        constexpr std::size_t sampled = 16;
+        const double area = sampled * parallel_reduce(
+                                          context_, mesh.facets.size() / sampled, kGrain, 0.0,
+                                          [&](std::size_t begin, std::size_t end) {
+                                              double sum = 0;
+                                              for (std::size_t f = begin; f < end; ++f) {
+                                                  const std::array<Vector, 3> c = corners(f * sampled);
+                                                  sum += cross_of(c[0], c[1], c[2]).norm() / 2;
+                                              }
+                                              return sum;
+                                          },
+                                          [](double x, double y) { return x + y; });
+        const Box3 box = bounds(context_, mesh);
+        const Vector low = vector_of(box.min);
+        const double cell = std::max({1e-6, std::sqrt(2 * area / static_cast<double>(aim)), (vector_of(box.max) - low).maxCoeff() / kMostCells});
+        const double per_cell = 1 / cell;
+        const auto cell_of = [&](const Vec3f& v) {
+            const Vector at = (vector_of(v) - low) * per_cell;
+            const auto share = [&](int k) { return static_cast<std::uint64_t>(std::clamp(at[k], 0.0, kMostCells)); };
+            return share(0) << 42 | share(1) << 21 | share(2);
+        };
+        const auto hash_of = [](std::uint64_t key) { return key * 0x9E3779B97F4A7C15u; };
+        const auto part_of = [&](std::uint64_t key) { return static_cast<std::size_t>(hash_of(key) >> (64 - kPartBits)); };
+
+        // Vertices are dealt by their cell's hash into parts, of which each numbers its cells as they come.
+        struct Item {
+            std::uint64_t key;
+            std::uint32_t vertex;
+        };
+        const std::size_t n = mesh.vertices.size(), parts = std::size_t{1} << kPartBits;
+        RawArray<std::uint32_t> to(n);
+        std::vector<std::vector<Vector>> means(parts);
+        {
+            std::optional<MemoryCharge> charge;
+            RawArray<Item> dealt;
+            deal(
+                context_, n, std::max(kGrain, n / 64 + 1), parts,
+                [&](std::size_t begin, std::size_t end, auto&& take) {
+                    for (std::size_t i = begin; i < end; ++i) take(part_of(cell_of(mesh.vertices[i])));
+                },
+                [&](std::size_t begin, std::size_t end, auto&& take) {
+                    for (std::size_t i = begin; i < end; ++i) {
+                        const std::uint64_t key = cell_of(mesh.vertices[i]);
+                        take(part_of(key), Item{key, static_cast<std::uint32_t>(i)});
+                    }
+                },
+                [&](std::uint64_t total, std::uint64_t largest) {
+                    const std::uint64_t most = std::min(total, std::max(kDealtAtOnce, largest));
+                    charge.emplace(context_, most * sizeof(Item), kWhat);
+                    dealt = RawArray<Item>(most);
+                    return std::pair(dealt.data(), most);
+                },
+                [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
+                    parallel_each(context_, last - first, [&](std::size_t p) {
+                        constexpr std::uint32_t empty = 0xFFFFFFFFu;
+                        const std::span<const Item> mine(dealt.data() + starts[p], starts[p + 1] - starts[p]);
+                        // Cells are many fewer than vertices, so that the table begins small and grows.
+                        std::vector<std::uint32_t> table(kLeastTable, empty);
+                        std::vector<std::uint64_t> keys;
+                        std::vector<std::uint32_t> counts;
+                        std::vector<Vector>& sums = means[first + p];
+                        const auto slot_of = [&](std::uint64_t key) {
+                            std::size_t slot = (hash_of(key) >> 16) & (table.size() - 1);
+                            while (table[slot] != empty && keys[table[slot]] != key) slot = (slot + 1) & (table.size() - 1);
+                            return slot;
+                        };
+                        for (const Item& item : mine) {
+                            const std::size_t slot = slot_of(item.key);
+                            const std::uint32_t id = table[slot] != empty ? table[slot] : static_cast<std::uint32_t>(keys.size());
+                            if (table[slot] == empty) {
+                                table[slot] = id;
+                                keys.push_back(item.key);
+                                sums.push_back(Vector::Zero());
+                                counts.push_back(0);
+                                if (2 * keys.size() > table.size()) {
+                                    table.assign(2 * table.size(), empty);
+                                    for (std::uint32_t k = 0; k < keys.size(); ++k) table[slot_of(keys[k])] = k;
+                                }
+                            }
+                            sums[id] += vector_of(mesh.vertices[item.vertex]);
+                            ++counts[id];
+                            to[item.vertex] = id;
+                        }
+                        for (std::size_t id = 0; id < sums.size(); ++id) sums[id] /= counts[id];
+                    });
+                });
+        }
+        std::vector<std::uint32_t> before(parts);  // cells of the parts before
+        for (std::size_t p = 0; p < parts; ++p) {
+            before[p] = static_cast<std::uint32_t>(vertices_.size());
+            vertices_.insert(vertices_.end(), means[p].begin(), means[p].end());
+            std::vector<Vector>().swap(means[p]);
+        }
+        parallel_for(context_, n, kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) to[i] += before[part_of(cell_of(mesh.vertices[i]))];
+        });
+
+        std::vector<std::vector<std::uint32_t>> staying((mesh.facets.size() + kGrain - 1) / kGrain);
+        const auto merged = [&](std::size_t f) {
+            const Index3& v = mesh.facets[f];
+            return Index3{to[v[0]], to[v[1]], to[v[2]]};
+        };
+        parallel_for(context_, mesh.facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t f = begin; f < end; ++f)
+                if (!degenerate(merged(f))) staying[begin / kGrain].push_back(static_cast<std::uint32_t>(f));
+        });
+        std::vector<std::uint32_t> source;
+        for (const std::vector<std::uint32_t>& some : staying) source.insert(source.end(), some.begin(), some.end());
+        facets_.resize(source.size());
+        struct Oriented {
+            Vector normal, place;
+            double twice_area;
+        };
+        std::vector<Oriented> planes(source.size());
+        parallel_for(context_, source.size(), 4096, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                facets_[i] = merged(source[i]);
+                const std::array<Vector, 3> c = corners(source[i]);
+                const Vector normal = cross_of(c[0], c[1], c[2]);
+                const double twice = normal.norm();
+                planes[i] = {twice > 0 ? Vector(normal / twice) : Vector(Vector::Zero()), c[0], twice};
+            }
+        });
+        find_facets_around();
+        parallel_for(context_, vertices_.size(), 4096, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t v = begin; v < end; ++v) {
+                Quadric sum;  // about the mean
+                for (std::uint32_t k = starts_[v]; k < starts_[v + 1]; ++k) {
+                    const Oriented& plane = planes[around_[k]];
+                    sum.add_plane(plane.normal, plane.normal.dot(vertices_[v] - plane.place), plane.twice_area);
+                }
+                const double weight = sum.a.trace();
+                if (sum.c <= kFlat * kFlat * cell * cell * weight) continue;
+                const Eigen::Matrix3d a = sum.a + (kEdgeWeight * weight + 1e-12) * Eigen::Matrix3d::Identity();
+                const Vector way = a.ldlt().solve(-sum.b);
+                if (way.allFinite() && way.norm() < cell) vertices_[v] += way;
+            }
+        });
+    }
+
     /// The facets around every vertex, ascending.
     void find_facets_around() {
         starts_.assign(vertices_.size() + 1, 0);
@@ -261,6 +391,7 @@ private:
     }
 
     Context& context_;
+    std::optional<MemoryCharge> charge_;
     std::vector<Vector> vertices_;
     std::vector<Index3> facets_;
     std::vector<Quadric> quadrics_;
@@ -270,15 +401,8 @@ private:
 
 }  // namespace
 
-Mesh decimate(Context& context, MeshView mesh, std::size_t facets) {
-    // Of a mesh that a grid makes smaller first its vertices and facets are held once more, and then no more than of what that leaves.
-    const bool clustered = mesh.facets.size() > kClusterFrom;
-    const auto left = static_cast<std::uint64_t>(kClusterFacets);
-    const std::uint64_t bytes = clustered ? 28 * mesh.vertices.size() + 12 * mesh.facets.size() + 200 * left + 160 * 2 * left
-                                          : 200 * mesh.vertices.size() + 160 * mesh.facets.size();
-    const MemoryCharge charge(context, bytes, "fewer facets for the report");
-    Decimation decimation(context, mesh);
-    if (clustered) decimation.cluster();
+Mesh decimate(Context& context, MeshView mesh, std::size_t facets, std::size_t clustered_from) {
+    Decimation decimation(context, mesh, clustered_from);
     decimation.collapse_to(std::max<std::size_t>(4, facets));
     return decimation.take();
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
 
 namespace slabwright {
 
@@ -18,6 +19,6 @@ struct SlopeProfile {
 
 /// @param steps of equal height, 1 or more. A facet within `horizontal_rad` of level or upright counts as such; one that touches a
 ///        step in its border alone does not meet it. Flats under `least_flat_mm2` are left out of the α-map: repair slivers.
-[[nodiscard]] SlopeProfile slope_profile(MeshView mesh, int steps, double horizontal_rad = 1e-4, double least_flat_mm2 = 1e-3);
+[[nodiscard]] SlopeProfile slope_profile(Context& context, MeshView mesh, int steps, double horizontal_rad = 1e-4, double least_flat_mm2 = 1e-3);
 
 }  // namespace slabwright
