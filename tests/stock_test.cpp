@@ -189,6 +189,51 @@ TEST(Sweep, SpansAgreeWithTheirCells) {
     EXPECT_EQ(level_over(1e300, 5), -std::numeric_limits<float>::infinity());
 }
 
+// What is told of many cells at once is what each of them says.
+TEST(Sweep, RowsAgreeWithTheirCells) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> u(0, 1);
+    for (int trial = 0; trial < 2000; ++trial) {
+        const int n = 1 + static_cast<int>(random() % 64);
+        const auto size = static_cast<std::size_t>(n);
+        // At its end: past the last nothing may be read.
+        std::vector<float> stands(size), later(size);
+        for (float& s : stands) s = random() % 4 == 0 ? 2.0F : static_cast<float>(3 * u(random));
+        std::array<double, 64> h{};
+        for (double& z : h) z = random() % 5 == 0 ? kUncovered : random() % 4 == 0 ? 2.0 : 4 * u(random) - 1;
+        const double floor = trial % 2 == 0 ? 0 : -10, least = trial % 3 == 0 ? std::numeric_limits<double>::denorm_min() : 0.4, level = h[0];
+        const double bottom = trial % 2 == 0 ? 0 : 7.3, over_bottom = bottom + static_cast<double>(stands[0]);
+        const std::uint64_t over = cells_over(stands.data(), n, h.data(), floor, least), over_level = cells_over(stands.data(), n, level, least);
+        std::uint64_t expected = 0, expected_level = 0;
+        bool any = false;
+        std::array<double, 64> kept = h;
+        Lost lost, expected_lost;
+        float top = 0;
+        bool left = false;
+        for (std::size_t k = 0; k < size; ++k) {
+            expected |= std::uint64_t{stands[k] - std::max(floor, h[k]) >= least} << k;
+            expected_level |= std::uint64_t{stands[k] - level >= least} << k;
+            any = any || bottom + static_cast<double>(stands[k]) > over_bottom;
+            if (!(bottom + static_cast<double>(stands[k]) > h[k])) kept[k] = kUncovered;
+            left = left || kept[k] < kUncovered;
+            later[k] = random() % 2 == 0 ? stands[k] : stands[k] * static_cast<float>(u(random));
+            expected_lost.most = std::max(expected_lost.most, stands[k] - later[k]);
+            expected_lost.cells += stands[k] - later[k] > 0.3F;
+            top = std::max(top, stands[k]);
+        }
+        EXPECT_EQ(over, expected) << "trial " << trial;
+        EXPECT_EQ(over_level, expected_level) << "trial " << trial;
+        EXPECT_EQ(any_over(stands.data(), bottom, n, over_bottom), any) << "trial " << trial;
+        EXPECT_EQ(keep_lower(stands.data(), bottom, n, h.data()), left) << "trial " << trial;
+        for (std::size_t k = 0; k < size; ++k) EXPECT_EQ(h[k], kept[k]) << "trial " << trial;
+        add_lost(stands.data(), later.data(), n, 0.3F, lost);
+        EXPECT_EQ(lost.most, expected_lost.most) << "trial " << trial;
+        EXPECT_EQ(lost.cells, expected_lost.cells) << "trial " << trial;
+        const int rows = n % 4 == 0 ? 4 : 1;
+        EXPECT_EQ(highest_of(stands.data(), size / static_cast<std::size_t>(rows), n / rows, rows), top) << "trial " << trial;
+    }
+}
+
 // Takes rows of cells over kBottom at once.
 constexpr double kBottom = -20;
 struct RowsOver {

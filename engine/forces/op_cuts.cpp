@@ -1,6 +1,7 @@
 #include "engine/forces/op_cuts.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -26,36 +27,38 @@ struct Meeting {
     double tip, rise;  // over the slab's bottom, mm: of the way's begin, and from part to part
     std::vector<Met>& parts;
 
-    void operator()(std::size_t cell, double z) {
-        const std::array<double, 1> one{z};
-        row(cell, 1, one.data(), z);
-    }
+    void operator()(std::size_t cell, double z) { level(cell, 1, z); }
     void row(std::size_t first, int n, const double* h, double /*lowest*/) {
+        take(first, cells_over(height + first, n, h, 0, kLeastTaken), [&](std::size_t k) { return std::max(0.0, h[k]); });
+    }
+    void level(std::size_t first, int n, double z) {
+        const double left = std::max(0.0, z);
+        for (int k = 0; k < n; k += kSweptTogether) {
+            const std::size_t begin = first + static_cast<std::size_t>(k);
+            take(begin, cells_over(height + begin, std::min(kSweptTogether, n - k), left, kLeastTaken), [&](std::size_t) { return left; });
+        }
+    }
+    // Lowers the cells whose bits are set, counted from the first, to left(k).
+    template <class Left>
+    void take(std::size_t first, std::uint64_t cells, Left&& left_of) {
+        if (cells == 0) return;
         const auto nx = static_cast<std::size_t>(grid.nx);
         std::array<std::int32_t, kSweptTogether> part;
         std::array<double, kSweptTogether> across;
-        edge_parts(way, grid.x(static_cast<int>(first % nx)) - from[0], grid.cell, grid.y(static_cast<int>(first / nx)) - from[1], n, part.data(),
-                   across.data());
+        edge_parts(way, grid.x(static_cast<int>(first % nx)) - from[0], grid.cell, grid.y(static_cast<int>(first / nx)) - from[1],
+                   64 - std::countl_zero(cells), part.data(), across.data());
         const double area = grid.cell * grid.cell;
-        for (int k = 0; k < n; ++k) {
-            const double stood = height[first + static_cast<std::size_t>(k)], left = std::max(0.0, h[k]);
-            if (stood - left < kLeastTaken) continue;
-            height[first + static_cast<std::size_t>(k)] = static_cast<float>(left);
-            const std::int32_t p = part[static_cast<std::size_t>(k)];
+        for (; cells != 0; cells &= cells - 1) {
+            const auto k = static_cast<std::size_t>(std::countr_zero(cells));
+            const double stood = height[first + k], left = left_of(k);
+            height[first + k] = static_cast<float>(left);
+            const std::int32_t p = part[k];
             Met& m = parts[static_cast<std::size_t>(p)];
             const double low = std::min(tip + rise * p, tip + rise * (p + 1));
             m.volume += (stood - left) * area;
             m.low = std::min(m.low, left - low);
             m.high = std::max(m.high, stood - low);
-            m.side += (stood - left) * across[static_cast<std::size_t>(k)];
-        }
-    }
-    void level(std::size_t first, int n, double z) {
-        std::array<double, kSweptTogether> h;
-        h.fill(z);
-        for (int k = 0; k < n; k += kSweptTogether) {
-            const int cells = std::min(kSweptTogether, n - k);
-            if (n == cells || any_over(height + first + k, 0, cells, z)) row(first + static_cast<std::size_t>(k), cells, h.data(), z);
+            m.side += (stood - left) * across[k];
         }
     }
 };

@@ -1,7 +1,10 @@
 #include "engine/paths/engagement.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 namespace slabwright {
 
@@ -10,12 +13,18 @@ namespace {
 constexpr double kCellsARadius = 12;
 constexpr int kFeeds = 20;  // steps between a feed and rest: finer ones only lengthen the program
 
-// A stretch of a move, and the steps of its feed that are left to it.
-struct Stretch {
-    std::size_t move = 0;
-    std::array<double, 3> to{};
-    double length = 0;  // mm, in the plane
-    int steps = kFeeds;
+// The equal parts of every move, told apart by their numbers through all moves; of each only the steps of its move's feed that are left to it are kept,
+// for there is one for every millimetre or so of the way.
+struct Way {
+    std::vector<std::uint8_t> steps;    // by part
+    std::vector<std::uint32_t> starts;  // by move: its first part
+    std::vector<double> lengths;        // by move: of one part in the plane, mm; 0: a rapid, or straight down
+
+    void add(int parts, double length) {
+        starts.push_back(static_cast<std::uint32_t>(steps.size())), lengths.push_back(length);
+        steps.resize(steps.size() + static_cast<std::size_t>(parts), kFeeds);
+    }
+    [[nodiscard]] std::size_t end(std::size_t move) const { return move + 1 < starts.size() ? starts[move + 1] : steps.size(); }
 };
 
 // Lowers cells and adds up by how much, by the part of the way on which the cutter's edge comes to them.
@@ -39,13 +48,15 @@ struct Taking {
         for (int begin = 0; begin < n; begin += kSweptTogether) {
             const int cells = std::min(kSweptTogether, n - begin);
             float* const row = height + first + begin;
-            if (n > cells && !any_over(row, 0, cells, z)) continue;
+            constexpr double any = std::numeric_limits<double>::denorm_min();
+            std::uint64_t over = cells_over(row, cells, z, any);
+            if (over == 0) continue;
             if (way.count > 1)
-                edge_parts(way, grid.x(static_cast<int>(first % nx) + begin) - from[0], grid.cell, py, cells, part.data(), across.data());
-            for (int k = 0; k < cells; ++k) {
-                const double over = static_cast<double>(row[k]) - z;
-                if (over <= 0) continue;
-                sums[static_cast<std::size_t>(part[static_cast<std::size_t>(k)])] += over;
+                edge_parts(way, grid.x(static_cast<int>(first % nx) + begin) - from[0], grid.cell, py, 64 - std::countl_zero(over), part.data(),
+                           across.data());
+            for (; over != 0; over &= over - 1) {
+                const int k = std::countr_zero(over);
+                sums[static_cast<std::size_t>(part[static_cast<std::size_t>(k)])] += static_cast<double>(row[k]) - z;
                 row[k] = level;
             }
         }
@@ -97,17 +108,18 @@ void EngagedStock::cut(const std::array<double, 3>& from, const std::array<doubl
 double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& stock, const EngagementCap& cap) {
     if (moves.size() < 2) return 0;
     const double window = cap.diameter / 8, slot = cap.diameter * cap.stepdown;
-    std::vector<Stretch> way;
-    std::size_t begun = 0;  // first stretch of the window
+    Way way;
+    way.starts.reserve(moves.size()), way.lengths.reserve(moves.size());
+    way.add(0, 0);          // there is no way to the first
+    std::size_t begun = 0;  // first part of the window
     double volume = 0, length = 0;
     std::vector<double> volumes;
-    auto close = [&] {
+    auto close = [&](std::size_t end) {
         // The cutter is slowed by what it has met over the whole window.
         const double section = length > 0 ? volume / length : 0;
         int steps = kFeeds;
         if (section > cap.share * slot) steps = std::max(1, static_cast<int>(std::floor(kFeeds * cap.share * slot / section)));
-        for (std::size_t k = begun; k < way.size(); ++k) way[k].steps = steps;
-        begun = way.size();
+        for (; begun < end; ++begun) way.steps[begun] = static_cast<std::uint8_t>(steps);
         volume = length = 0;
     };
     for (std::size_t i = 1; i < moves.size(); ++i) {
@@ -115,50 +127,62 @@ double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& 
         const double run = std::hypot(b[0] - a[0], b[1] - a[1]);
         if (i % 64 == 0) context.throw_if_cancelled();
         if (moves[i].feed == 0 || run == 0) {
-            close();
+            close(way.steps.size());
             if (moves[i].feed > 0) stock.cut(a, b);
-            way.push_back({i, b, 0, kFeeds});
-            begun = way.size();
+            way.add(1, 0);
+            begun = way.steps.size();
             continue;
         }
         const int parts = std::max(1, static_cast<int>(std::ceil(run / window)));
-        volumes.assign(static_cast<std::size_t>(parts), 0);
+        volumes.resize(static_cast<std::size_t>(parts));
         stock.cut(a, b, volumes);
-        for (int k = 1; k <= parts; ++k) {
-            const double t = static_cast<double>(k) / parts;
-            const std::array<double, 3> to =
-                k == parts ? b : std::array<double, 3>{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
-            way.push_back({i, to, run / parts, kFeeds});
-            volume += volumes[static_cast<std::size_t>(k - 1)];
+        std::size_t part = way.steps.size();
+        way.add(parts, run / parts);
+        for (const double taken : volumes) {
+            volume += taken;
             length += run / parts;
-            if (length >= window - 1e-9) close();
+            ++part;
+            if (length >= window - 1e-9) close(part);
         }
     }
-    close();
+    close(way.steps.size());
     // Short ways at full feed between slow ones gain nothing but two changes of speed.
-    for (std::size_t k = 0; k < way.size();) {
-        if (way[k].steps == kFeeds || way[k].length == 0) {
+    for (std::size_t k = 0, move = 0; k < way.steps.size();) {
+        while (way.end(move) <= k) ++move;
+        if (way.steps[k] == kFeeds || way.lengths[move] == 0) {
             ++k;
             continue;
         }
-        std::size_t next = k + 1;
+        std::size_t next = k + 1, at = move;
         double between = 0;
-        while (next < way.size() && way[next].length > 0 && way[next].steps == kFeeds && between <= 2 * window) between += way[next++].length;
-        if (next > k + 1 && next < way.size() && way[next].length > 0 && way[next].steps < kFeeds)
-            for (std::size_t j = k + 1; j < next; ++j) way[j].steps = std::max(way[k].steps, way[next].steps);
+        const auto cuts = [&] {  // whether there is a next part, and no rapid
+            while (at < way.starts.size() && way.end(at) <= next) ++at;
+            return at < way.starts.size() && way.lengths[at] > 0;
+        };
+        while (cuts() && way.steps[next] == kFeeds && between <= 2 * window) between += way.lengths[at], ++next;
+        if (next > k + 1 && cuts() && way.steps[next] < kFeeds)
+            for (std::size_t j = k + 1; j < next; ++j) way.steps[j] = std::max(way.steps[k], way.steps[next]);
         k = next;
     }
     std::vector<Move> result{moves.front()};
+    result.reserve(moves.size());
     double slowed = 0;
-    for (std::size_t k = 0; k < way.size(); ++k) {
-        const Move& whole = moves[way[k].move];
-        const bool last = k + 1 == way.size() || way[k + 1].move != way[k].move;
-        if (way[k].steps < kFeeds) slowed += way[k].length;
-        if (!last && way[k + 1].steps == way[k].steps) continue;
-        Move m = whole;
-        if (!last) m.x = to_units(way[k].to[0]), m.y = to_units(way[k].to[1]), m.z = to_units(way[k].to[2]);
-        if (way[k].steps < kFeeds) m.feed = std::max<std::uint32_t>(1, whole.feed * static_cast<std::uint32_t>(way[k].steps) / kFeeds);
-        result.push_back(m);
+    for (std::size_t i = 1; i < moves.size(); ++i) {
+        const std::size_t first = way.starts[i], end = way.end(i);
+        const std::array<double, 3> a = place(moves[i - 1]), b = place(moves[i]);
+        for (std::size_t k = first; k < end; ++k) {
+            const std::uint32_t steps = way.steps[k];
+            const bool last = k + 1 == end;
+            if (steps < kFeeds) slowed += way.lengths[i];
+            if (!last && way.steps[k + 1] == steps) continue;
+            Move m = moves[i];
+            if (!last) {
+                const double t = static_cast<double>(k + 1 - first) / static_cast<double>(end - first);
+                m.x = to_units(a[0] + t * (b[0] - a[0])), m.y = to_units(a[1] + t * (b[1] - a[1])), m.z = to_units(a[2] + t * (b[2] - a[2]));
+            }
+            if (steps < kFeeds) m.feed = std::max<std::uint32_t>(1, moves[i].feed * steps / kFeeds);
+            result.push_back(m);
+        }
     }
     moves = std::move(result);
     return slowed;

@@ -8,6 +8,44 @@
 
 namespace slabwright {
 
+namespace {
+
+constexpr int kLanes = 8;
+using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
+using Bits [[gnu::vector_size(kLanes * sizeof(std::int32_t))]] = std::int32_t;
+using Doubles [[gnu::vector_size(kLanes * sizeof(double))]] = double;
+using WideBits [[gnu::vector_size(kLanes * sizeof(std::int64_t))]] = std::int64_t;
+
+// (Vectors are handed on by reference: how one is passed by value depends on the instruction set.)
+template <class T, class Vector>
+[[gnu::always_inline]] inline void load(const T* from, Vector& v) {
+    std::memcpy(&v, from, sizeof v);
+}
+
+// Calls eight(first, stands) for n cells, eight at a time; past the last nothing stands.
+template <class Eight>
+[[gnu::always_inline]] inline void each_eight(const float* stands, int n, Eight&& eight) {
+    Floats f;
+    int k = 0;
+    for (; k + kLanes <= n; k += kLanes) {
+        load(stands + k, f);
+        eight(k, __builtin_convertvector(f, Doubles));
+    }
+    if (k == n) return;
+    std::array<float, kLanes> rest;
+    for (int i = 0; i < kLanes; ++i) rest[static_cast<std::size_t>(i)] = k + i < n ? stands[k + i] : -std::numeric_limits<float>::infinity();
+    load(rest.data(), f);
+    eight(k, __builtin_convertvector(f, Doubles));
+}
+
+[[gnu::always_inline]] inline bool any_of(const WideBits& bits) {
+    std::array<std::uint64_t, kLanes> words;
+    std::memcpy(words.data(), &bits, sizeof bits);
+    return (words[0] | words[1] | words[2] | words[3] | words[4] | words[5] | words[6] | words[7]) != 0;
+}
+
+}  // namespace
+
 SLABWRIGHT_WIDE void ball_row(double a, double b, double c, double r2, double q, double dq, int n, double* h) {
     for (int k = 0; k < n; ++k) {
         const double across = q + k * dq;
@@ -17,41 +55,67 @@ SLABWRIGHT_WIDE void ball_row(double a, double b, double c, double r2, double q,
 
 namespace {
 
-// Eight at a time, so that a compiler sees that their order does not matter.
-inline bool some_over(const float* stands, double bottom, int n, double level) {
-    int k = 0, over = 0;
-    for (; k + 8 <= n; k += 8)
-        for (int i = 0; i < 8; ++i) over |= static_cast<int>(bottom + static_cast<double>(stands[k + i]) > level);
-    for (; k < n; ++k) over |= static_cast<int>(bottom + static_cast<double>(stands[k]) > level);
-    return over != 0;
+[[gnu::always_inline]] inline bool some_over(const float* stands, double bottom, int n, double level) {
+    WideBits over{};
+    each_eight(stands, n, [&](int, const Doubles& f) { over |= bottom + f > level; });
+    return any_of(over);
 }
 
-inline bool some_lower(const float* __restrict stands, double bottom, int n, double* __restrict h) {
-    int any = 0;
-    for (int k = 0; k < n; ++k) {
-        const bool lower = bottom + static_cast<double>(stands[k]) > h[k];
-        h[k] = lower ? h[k] : kUncovered;
-        any |= static_cast<int>(lower);
-    }
-    return any != 0;
+[[gnu::always_inline]] inline bool some_lower(const float* __restrict stands, double bottom, int n, double* __restrict h) {
+    WideBits any{};
+    each_eight(stands, n, [&](int k, const Doubles& f) {
+        Doubles height;
+        load(h + k, height);
+        const WideBits lower = bottom + f > height;
+        height = lower ? height : Doubles{} + kUncovered;
+        std::memcpy(h + k, &height, sizeof height);
+        any |= lower;
+    });
+    return any_of(any);
+}
+
+// Bits of those of n cells that stand at least `least` over max(floor, h).
+template <class Left>
+[[gnu::always_inline]] inline std::uint64_t bits_over(const float* stands, int n, double floor, double least, Left&& left) {
+    constexpr WideBits lane{1, 2, 4, 8, 16, 32, 64, 128};
+    std::uint64_t over = 0;
+    each_eight(stands, n, [&](int k, const Doubles& f) {
+        Doubles h;
+        left(k, h);
+        h = h > floor ? h : Doubles{} + floor;
+        const WideBits bits = (f - h >= least) & lane;
+        std::array<std::uint64_t, kLanes> words;
+        std::memcpy(words.data(), &bits, sizeof bits);
+        over |= (words[0] | words[1] | words[2] | words[3] | words[4] | words[5] | words[6] | words[7]) << k;
+    });
+    return over;
 }
 
 }  // namespace
 
+SLABWRIGHT_WIDE std::uint64_t cells_over(const float* stands, int n, const double* h, double floor, double least) {
+    return bits_over(stands, n, floor, least, [&](int k, Doubles& left) { load(h + k, left); });
+}
+SLABWRIGHT_WIDE std::uint64_t cells_over(const float* stands, int n, double h, double least) {
+    return bits_over(stands, n, h, least, [&](int, Doubles& left) { left = Doubles{} + h; });
+}
+
 SLABWRIGHT_WIDE bool any_over(const float* stands, double bottom, int n, double level) { return some_over(stands, bottom, n, level); }
 SLABWRIGHT_WIDE bool keep_lower(const float* stands, double bottom, int n, double* h) { return some_lower(stands, bottom, n, h); }
 
-// The loops hold no branch, so that a compiler does several cells in one step; what does not depend on the cell is decided outside.
+// The loops hold no branch, so that a compiler does several cells in one step; what does not depend on the cell is decided outside. Whole eights
+// of cells: what is past the last is not asked for.
 SLABWRIGHT_WIDE bool row_heights(const RowWay& way, int i0, int n, double py, const float* __restrict stands, double bottom, double* __restrict h) {
     if (stands != nullptr && !some_over(stands, bottom, n, way.lowest)) return false;
     const RowWay w = way;
+    const int cells = (n + kLanes - 1) / kLanes * kLanes;
     auto centre = [&](int k) { return w.x0 + (i0 + k) * w.cell - w.from_x; };
     if (!w.ball) {
-        for (int k = 0; k < n; ++k) h[k] = flat_height(w, centre(k), py);
+        for (int k = 0; k < cells; ++k) h[k] = flat_height(w, centre(k), py);
     } else if (w.slope == 0) {
-        for (int k = 0; k < n; ++k) h[k] = level_ball_height(w, centre(k), py);
+        for (int k = 0; k < cells; ++k) h[k] = level_ball_height(w, centre(k), py);
     } else {
-        for (int k = 0; k < n; ++k) h[k] = sloped_ball_height(w, centre(k), py);
+        for (int k = 0; k < cells; ++k) h[k] = sloped_ball_height(w, centre(k), py);
     }
     if (stands != nullptr) return some_lower(stands, bottom, n, h);
     int any = 0;
@@ -120,13 +184,6 @@ float level_over(double bottom, double level) {
 }
 
 namespace {
-
-constexpr int kLanes = 8;
-using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
-using Bits [[gnu::vector_size(kLanes * sizeof(std::int32_t))]] = std::int32_t;
-
-// (Vectors are handed on by reference: how one is passed by value depends on the instruction set.)
-[[gnu::always_inline]] inline void load(const float* from, Floats& v) { std::memcpy(&v, from, sizeof v); }
 
 // Calls fn(eight, mask) for all of the cells [first, last] of a row, eight at a time; the last eight may hold cells that came before. In a
 // shorter span the mask tells which of the eight that end with it are its own. fn(cell) where a row has too few before them.
@@ -202,6 +259,37 @@ SLABWRIGHT_WIDE void lower_to(float* __restrict height, int n, const double* __r
 SLABWRIGHT_WIDE void lower_to(float* height, int n, double z) {
     const auto level = static_cast<float>(z > 0 ? z : 0.0);
     for (int k = 0; k < n; ++k) height[k] = level < height[k] ? level : height[k];
+}
+
+SLABWRIGHT_WIDE float highest_of(const float* height, std::size_t nx, int n, int rows) {
+    Floats most{};
+    float of_rest = 0;
+    for (int row = 0; row < rows; ++row, height += nx) {
+        int k = 0;
+        for (; k + kLanes <= n; k += kLanes) {
+            Floats h;
+            load(height + k, h);
+            most = h > most ? h : most;
+        }
+        for (; k < n; ++k) of_rest = std::max(of_rest, height[k]);
+    }
+    for (int k = 0; k < kLanes; ++k) of_rest = std::max(of_rest, most[k]);
+    return of_rest;
+}
+
+SLABWRIGHT_WIDE void add_lost(const float* before, const float* now, int n, float least, Lost& lost) {
+    Floats most{};
+    Bits cells{};
+    int k = 0;
+    for (; k + kLanes <= n; k += kLanes) {
+        Floats b, a;
+        load(before + k, b), load(now + k, a);
+        const Floats off = b - a;
+        most = off > most ? off : most;
+        cells -= off > least;  // true is -1
+    }
+    for (; k < n; ++k) lost.most = std::max(lost.most, before[k] - now[k]), lost.cells += before[k] - now[k] > least;
+    for (int i = 0; i < kLanes; ++i) lost.most = std::max(lost.most, most[i]), lost.cells += static_cast<std::size_t>(cells[i]);
 }
 
 SLABWRIGHT_WIDE void edge_parts(const PartedWay& way, double px, double cell, double py, int n, std::int32_t* __restrict part,

@@ -91,12 +91,21 @@ inline double height_over(const RowWay& way, double px, double py) {
 }
 
 /// Heights of the cutter over cells i0 … i0 + n − 1, whose centres lie py beside the begin; infinite where it does not cover the centre, the
-/// cell is not asked, or `stands` (unless null) over `bottom` is not higher. @returns whether any is finite
+/// cell is not asked, or `stands` (unless null) over `bottom` is not higher. h has room for whole eights of cells. @returns whether any is finite
 bool row_heights(const RowWay& way, int i0, int n, double py, const float* stands, double bottom, double* h);
 
 /// Lowers n heights to max(0, z), or to max(0, h), where they are over it.
 void lower_to(float* height, int n, double z);
 void lower_to(float* height, int n, const double* h);
+
+/// The highest of heights in `rows` rows, n of each, that begin nx apart; 0 at least.
+[[nodiscard]] float highest_of(const float* height, std::size_t nx, int n, int rows);
+/// What heights lost at most, and how many of them more than `least`.
+struct Lost {
+    float most = 0;
+    std::size_t cells = 0;
+};
+void add_lost(const float* before, const float* now, int n, float least, Lost& lost);
 
 /// A straight way in equal parts: dx, dy its direction, `per_mm` parts a mm.
 struct PartedWay {
@@ -109,8 +118,13 @@ void edge_parts(const PartedWay& way, double px, double cell, double py, int n, 
 
 /// Whether any of n heights over `bottom` is over a level.
 [[nodiscard]] bool any_over(const float* stands, double bottom, int n, double level);
-/// Makes those of n heights infinite over which nothing stands. @returns whether any is left
+/// Makes those of n heights infinite over which nothing stands. h has room for whole eights. @returns whether any is left
 bool keep_lower(const float* stands, double bottom, int n, double* h);
+
+/// Which of n ≤ 64 heights stand at least `least` over h, or over max(floor, h): a bit for each, the first one's lowest. There h has room for whole
+/// eights.
+[[nodiscard]] std::uint64_t cells_over(const float* stands, int n, double h, double least);
+[[nodiscard]] std::uint64_t cells_over(const float* stands, int n, const double* h, double floor, double least);
 
 /// The cells of some rows that a level disc comes over on its way, but for those that it has been over where it starts: [low, left] and
 /// [right, high] along each row; low > left, right > high: none.
