@@ -65,6 +65,7 @@ public:
         work_.stock_min = plan.stock_min;
         work_.stock_max = plan.stock_max;
         work_.index = layer_.index;
+        work_.stock_memory = ground.stock_memory;
         if (plan.flask) work_.opening = plan.flask->inner[index];
         fitted_.tolerances.gouge -= ground.mesh_gap;
         work_.flats = flats_between(layer_.z_bottom);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "engine/forces/feeds.h"
+#include "engine/paths/paths.h"
 #include "engine/plan.h"
 #include "kernels/access/accessibility.h"
 #include "kernels/mesh/mesh.h"
@@ -19,12 +20,13 @@ struct Overrun {
 
 /// What a layer's planning looks at besides the layer. All outlives it.
 struct LayerGround {
-    const Plan& plan;                    ///< its job, stock, features and flask; of its layers only the one that is planned
-    MeshView pattern;                    ///< the whole of it, pattern-base; the plan's features name its facets
-    MeshView mesh;                       ///< what the paths are laid on: the pattern, or a lighter one within `mesh_gap` of it
-    double mesh_gap = 0;                 ///< mm
-    const AccessScene* scene = nullptr;  ///< of the mesh; needed where tools are chosen by the exact rule
-    const Loops* carried_by = nullptr;   ///< what stays of the slab below the layer's joint; null: it lies on the board
+    const Plan& plan;                             ///< its job, stock, features and flask; of its layers only the one that is planned
+    MeshView pattern;                             ///< the whole of it, pattern-base; the plan's features name its facets
+    MeshView mesh;                                ///< what the paths are laid on: the pattern, or a lighter one within `mesh_gap` of it
+    double mesh_gap = 0;                          ///< mm
+    const AccessScene* scene = nullptr;           ///< of the mesh; needed where tools are chosen by the exact rule
+    const Loops* carried_by = nullptr;            ///< what stays of the slab below the layer's joint; null: it lies on the board
+    Spares<StockMemory>* stock_memory = nullptr;  ///< which layers leave to each other; null: each has its own
 };
 
 struct PlannedLayer {

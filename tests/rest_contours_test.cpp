@@ -73,18 +73,63 @@ TEST(LayerStock, StandsAsAfterOneMoveAfterAnother) {
             }
         }
         LayerStock together(n.cut, 0.25), singly(n.cut, 0.25);
-        const std::vector<float> whole = together.heights();
+        const std::vector<float> whole(together.heights().begin(), together.heights().end());
         const Taken taken = together.cut(n.cut, op, tool);
         for (std::size_t i = 1; i < op.moves.size(); ++i) {
             Operation one;
             one.moves = {op.moves[i - 1], op.moves[i]};
             singly.cut(n.cut, one, tool);
         }
-        EXPECT_EQ(together.heights(), singly.heights());
+        EXPECT_TRUE(std::ranges::equal(together.heights(), singly.heights()));
         std::size_t cells = 0;
         for (std::size_t c = 0; c < whole.size(); ++c) cells += whole[c] - together.height(c) > kEmpty;
         EXPECT_EQ(taken.cells, cells);
         EXPECT_GT(cells, whole.size() / 2);
+    }
+}
+
+// A trial within another: what the inner one undoes is gone, what it leaves is undone with the outer.
+TEST(LayerStock, StandsAsBeforeWhenATrialIsUndone) {
+    std::mt19937 random(test::seed());
+    Notch n;
+    auto somewhere = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
+    const Tool tool = tool_of_kind(n.job, ToolKind::ball);
+    LayerStock stock(n.cut, 0.25);
+    const auto cut = [&] {
+        for (int k = 0; k < 20; ++k) stock.cut_at(cutter_end(tool), somewhere(-45, 45), somewhere(-45, 45), somewhere(0, kTop));
+        Operation op;
+        for (int k = 0; k < 10; ++k)
+            op.moves.push_back({to_units(somewhere(-45, 45)), to_units(somewhere(-45, 45)), to_units(somewhere(0, kTop)), k == 0 ? 0U : 1000U});
+        stock.cut(n.cut, op, tool);
+    };
+    const auto heights = [&] { return std::vector<float>(stock.heights().begin(), stock.heights().end()); };
+    for (int round = 0; round < 4; ++round) {
+        cut();
+        const std::vector<float> first = heights();
+        {
+            LayerStock::Trial outer(stock);
+            if (round % 2 == 0) cut();
+            const std::vector<float> second = heights();
+            {
+                LayerStock::Trial undone(stock);
+                cut();
+                ASSERT_NE(heights(), second);
+                undone.undo();
+                ASSERT_EQ(heights(), second);
+            }
+            {
+                const LayerStock::Trial stays(stock);
+                cut();
+            }
+            ASSERT_NE(heights(), second);
+            if (round < 2) {
+                outer.undo();
+                ASSERT_EQ(heights(), first);
+            }
+        }
+        if (round >= 2) {
+            ASSERT_NE(heights(), first);
+        }
     }
 }
 

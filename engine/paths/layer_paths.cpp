@@ -6,6 +6,7 @@
 
 #include "engine/paths/arcs.h"
 #include "engine/paths/layer_cut.h"
+#include "engine/paths/layer_stock.h"
 #include "engine/paths/loose.h"
 #include "engine/paths/rest.h"
 #include "engine/paths/rings.h"
@@ -200,7 +201,17 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         // What stands now decides the rest: waste where the roughing cutter does not fit before the ball finishes, and after it
         // the corners that the ball leaves, by the flat end mill, and what is left of the cusps' limit anywhere.
         const LayerTools& tools = layer.tools;
-        LayerStock stock(cut, stock_cell(cut));
+        Spares<StockMemory> own;
+        Spares<StockMemory>& spares = layer.stock_memory != nullptr ? *layer.stock_memory : own;
+        auto memory = spares.take([] { return std::make_unique<StockMemory>(); });
+        LayerStock stock(cut, stock_cell(cut), std::move(*memory));
+        // Left to the next layer, however this one ends.
+        struct Leaving {
+            Spares<StockMemory>& spares;
+            std::unique_ptr<StockMemory> memory;
+            LayerStock& stock;
+            ~Leaving() { *memory = std::move(stock).release(), spares.give(std::move(memory)); }
+        } const leaving{spares, std::move(memory), stock};
         std::vector<Operation> useful;
         for (Operation& op : result.operations) {
             const bool idle = op.kind != OperationKind::face && stock.cut(cut, op, tools.rough).nothing();
@@ -250,16 +261,16 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             if (!last_of_kind(tool) && left < kCornersWorthAChange) continue;
             // What a tool between others is for is only seen when it has cut; where that is little it has not.
             std::optional<Standing> stood;
-            std::vector<float> heights;
+            std::optional<LayerStock::Trial> trial;
             const std::size_t operations = result.operations.size(), no_ways = cut.no_way_in.size();
-            if (contours && !last_of_kind(tool)) stood = standing, heights = stock.heights();
+            if (contours && !last_of_kind(tool)) stood = standing, trial.emplace(stock);
             if (contours && tool.kind == ToolKind::flat) take(semi_rough_layer(cut, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
             else take(cut_rest(cut, stock, tool, waste(tool, "waste in narrow places")));
             if (tool.kind == ToolKind::flat) take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
             else take(cut_rest(cut, stock, tool, {OperationKind::finish, "what is left in narrow places", limit, false}));
             if (!stood || left - stock.area_over(context, limit) >= kCornersWorthAChange) continue;
             standing = std::move(*stood);
-            stock.restore(std::move(heights));
+            trial->undo();
             result.operations.resize(operations);
             cut.no_way_in.resize(no_ways);
         }

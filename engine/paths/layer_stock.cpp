@@ -13,8 +13,8 @@ namespace slabwright {
 
 namespace {
 
-constexpr int kBand = 64;            // rows of cells that one task cuts
-constexpr std::size_t kBlock = 128;  // moves that share one box
+constexpr int kBand = KeptTiles::kTile;  // rows of cells that one task cuts
+constexpr std::size_t kBlock = 128;      // moves that share one box
 
 struct Box {
     double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300, z0 = 1e300;
@@ -44,10 +44,12 @@ public:
           tops_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>((band.ny + kTile - 1) / kTile)),
           cuts_(tops_.size(), kStale) {}
 
-    // Whether anything may stand over a level within a rectangle, mm, of the band; if so it counts as cut.
-    [[nodiscard]] bool cut_over(double x0, double x1, double y0, double y1, double level) {
+    // Whether anything may stand over a level within a rectangle, mm, of the band; if so it counts as cut. `first` and `last` get the columns of
+    // its cells.
+    [[nodiscard]] bool cut_over(double x0, double x1, double y0, double y1, double level, int& first, int& last) {
         const int i0 = tile((x0 - band_.x0) / band_.cell, band_.nx), i1 = tile((x1 - band_.x0) / band_.cell, band_.nx);
         const int j0 = tile((y0 - band_.y0) / band_.cell, band_.ny), j1 = tile((y1 - band_.y0) / band_.cell, band_.ny);
+        first = i0 * kTile, last = std::min((i1 + 1) * kTile, band_.nx) - 1;
         bool over = false;
         for (int j = j0; j <= j1 && !over; ++j)
             for (int i = i0; i <= i1 && !over; ++i) over = stands_over(i, j, level);
@@ -72,15 +74,8 @@ private:
         std::uint8_t& cuts = cuts_[index(i, j)];
         if (cuts == kStale) {
             const int first = std::max(0, std::min(i * kTile, band_.nx - kTile)), n = std::min(kTile, band_.nx);
-            std::array<float, kTile> tops{};  // side by side, so that a compiler sees that their order does not matter; heights are 0 or more
-            for (int row = j * kTile; row < std::min((j + 1) * kTile, band_.ny); ++row) {
-                const float* const h = height_ + band_.index(first, row);
-                if (n == kTile)
-                    for (std::size_t k = 0; k < kTile; ++k) tops[k] = h[k] > tops[k] ? h[k] : tops[k];
-                else
-                    for (std::size_t k = 0; k < static_cast<std::size_t>(n); ++k) tops[k] = std::max(tops[k], h[k]);
-            }
-            top = *std::max_element(tops.begin(), tops.end());
+            const int row = j * kTile;
+            top = highest_of(height_ + band_.index(first, row), static_cast<std::size_t>(band_.nx), n, std::min(kTile, band_.ny - row));
             cuts = 0;
         }
         return top > level;
@@ -93,25 +88,63 @@ private:
     std::vector<std::uint8_t> cuts_;
 };
 
-// How heights are lower than they were.
-Taken taken_off(const std::vector<float>& before, const float* now) {
-    constexpr std::size_t lanes = 8;  // so that a compiler sees that their order does not matter
-    std::array<float, lanes> most{};
-    std::array<std::uint32_t, lanes> cells{};
-    std::size_t c = 0;
-    for (; c + lanes <= before.size(); c += lanes)
-        for (std::size_t k = 0; k < lanes; ++k) {
-            const float off = before[c + k] - now[c + k];
-            most[k] = off > most[k] ? off : most[k];
-            cells[k] += static_cast<std::uint32_t>(off > kEmpty);
+}  // namespace
+
+KeptTiles::KeptTiles(const CellGrid& grid, BulkVector<float> memory)
+    : nx_(grid.nx),
+      ny_(grid.ny),
+      tiles_x_(static_cast<std::size_t>((nx_ + kTile - 1) / kTile)),
+      is_kept_(tiles_x_ * static_cast<std::size_t>((ny_ + kTile - 1) / kTile), 0),
+      memory_(std::move(memory)) {}
+
+void KeptTiles::keep(const float* height, int i0, int i1, int j0, int j1) {
+    for (int tj = j0 / kTile; tj <= j1 / kTile; ++tj)
+        for (int ti = i0 / kTile; ti <= i1 / kTile; ++ti) {
+            const std::size_t t = static_cast<std::size_t>(tj) * tiles_x_ + static_cast<std::size_t>(ti);
+            if (is_kept_[t] != 0) continue;
+            make_room();
+            is_kept_[t] = 1;
+            const int n = std::min(kTile, nx_ - ti * kTile);
+            float* kept = memory_.data() + t * kCells;
+            for (int j = tj * kTile; j < std::min(ny_, (tj + 1) * kTile); ++j, kept += kTile)
+                std::copy_n(height + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(ti) * kTile, n, kept);
         }
-    Taken taken;
-    for (; c < before.size(); ++c) taken.most = std::max(taken.most, before[c] - now[c]), taken.cells += before[c] - now[c] > kEmpty;
-    for (std::size_t k = 0; k < lanes; ++k) taken.most = std::max(taken.most, most[k]), taken.cells += cells[k];
-    return taken;
 }
 
-}  // namespace
+void KeptTiles::add(int tile_row, const KeptTiles& row) {
+    for (std::size_t i = 0; i < row.is_kept_.size(); ++i) {
+        const std::size_t t = static_cast<std::size_t>(tile_row) * tiles_x_ + i;
+        if (row.is_kept_[i] == 0 || is_kept_[t] != 0) continue;
+        is_kept_[t] = 1;
+        std::copy_n(row.memory_.data() + i * kCells, kCells, memory_.data() + t * kCells);
+    }
+}
+
+void KeptTiles::add(const KeptTiles& later) {
+    make_room();
+    add(0, later);
+}
+
+void KeptTiles::put_back(float* height) const {
+    rows([&](const float* kept, std::size_t first, int n) { std::copy_n(kept, n, height + first); });
+}
+
+LayerStock::Trial::~Trial() {
+    if (over_) return;
+    if (outer_ != nullptr) outer_->kept_.add(kept_);
+    end();
+}
+
+void LayerStock::Trial::undo() {
+    kept_.put_back(stock_.memory_.height.data());
+    end();
+}
+
+void LayerStock::Trial::end() {
+    over_ = true;
+    stock_.trial_ = outer_;
+    stock_.memory_.kept = kept_.release();
+}
 
 std::vector<double> rows_of(const CellGrid& grid) {
     std::vector<double> y;
@@ -145,14 +178,17 @@ std::uint64_t LayerStock::bytes(const Job& job, double plane_mm2) {
 
 CutterEnd cutter_end(const Tool& tool) { return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0}; }
 
-LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z_bottom) {
+LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory) : z_bottom_(cut.layer.z_bottom), memory_(std::move(memory)) {
     const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
     grid_ = {lo[0] + cell / 2, lo[1] + cell / 2, cell, std::max(1, static_cast<int>(std::ceil((hi[0] - lo[0]) / cell - 0.5))),
              std::max(1, static_cast<int>(std::ceil((hi[1] - lo[1]) / cell - 0.5)))};
     const double top = cut.layer.z_top - z_bottom_;
-    height_.assign(grid_.count(), static_cast<float>(top));
-    surface_.assign(grid_.count(), 0.0F);
-    nz_.assign(grid_.count(), 255);
+    // Cleared first, so that nothing is copied where there must be more room.
+    memory_.height.clear(), memory_.height.resize(grid_.count());
+    memory_.surface.clear(), memory_.surface.resize(grid_.count());
+    memory_.nz.clear(), memory_.nz.resize(grid_.count());
+    float* const surface = memory_.surface.data();
+    std::uint8_t* const nz = memory_.nz.data();
     // Facets by the bands of rows that they meet, so that bands can be drawn in parallel.
     const int bands = (grid_.ny + kBand - 1) / kBand;
     auto band_of = [&](double y) { return std::clamp(static_cast<int>((y - grid_.y0) / cell) / kBand, 0, bands - 1); };
@@ -172,6 +208,10 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
     const std::vector<std::vector<Span>> capped = line_spans(cut.solid.cap, rows_of(grid_));
     parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
         const int first = static_cast<int>(band) * kBand, last = std::min(first + kBand, grid_.ny) - 1;
+        const std::size_t begin = grid_.index(0, first), cells = grid_.index(0, last + 1) - begin;
+        std::fill_n(memory_.height.data() + begin, cells, static_cast<float>(top));
+        std::fill_n(surface + begin, cells, 0.0F);
+        std::fill_n(nz + begin, cells, std::uint8_t{255});
         for (std::uint32_t m = starts[band]; m < starts[band + 1]; ++m) {
             const SolidFacet& f = cut.solid.facets[members[m]];
             const auto [y_low, y_high] = rows(f);
@@ -193,7 +233,7 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
                     const double z = f.p[0][2] - (f.normal[0] * (grid_.x(i) - f.p[0][0]) + f.normal[1] * (y - f.p[0][1])) / f.normal[2];
                     const auto rise = static_cast<float>(std::min(z, f.z_max) - z_bottom_);
                     const std::size_t c = grid_.index(i, j);
-                    if (rise > surface_[c]) surface_[c] = rise, nz_[c] = std::max<std::uint8_t>(1, share);
+                    if (rise > surface[c]) surface[c] = rise, nz[c] = std::max<std::uint8_t>(1, share);
                 }
             }
         }
@@ -201,7 +241,7 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
             for (const Span& s : capped[static_cast<std::size_t>(j)]) {
                 const int i0 = std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid_.x0) / cell)));
                 const int i1 = std::min<int>(grid_.nx - 1, static_cast<int>(std::floor((s.high / kUnitsPerMm - grid_.x0) / cell)));
-                for (int i = i0; i <= i1; ++i) surface_[grid_.index(i, j)] = static_cast<float>(top), nz_[grid_.index(i, j)] = 255;
+                for (int i = i0; i <= i1; ++i) surface[grid_.index(i, j)] = static_cast<float>(top), nz[grid_.index(i, j)] = 255;
             }
     });
     if (cut.layer.opening.empty()) return;
@@ -215,7 +255,7 @@ LayerStock::LayerStock(const LayerCut& cut, double cell) : z_bottom_(cut.layer.z
             for (int i = 0; i < grid_.nx; ++i)
                 if (const double x = grid_.x(i) * kUnitsPerMm; x >= s.low && x <= s.high) free[static_cast<std::size_t>(i)] = 1;
         for (int i = 0; i < grid_.nx; ++i)
-            if (!free[static_cast<std::size_t>(i)]) surface_[grid_.index(i, j)] = static_cast<float>(top), nz_[grid_.index(i, j)] = 255;
+            if (!free[static_cast<std::size_t>(i)]) surface[grid_.index(i, j)] = static_cast<float>(top), nz[grid_.index(i, j)] = 255;
     }
 }
 
@@ -237,13 +277,14 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
     std::stable_sort(upwards.begin(), upwards.end(), [&](std::uint32_t a, std::uint32_t b) { return boxes[a].z0 < boxes[b].z0; });
     const int bands = (grid_.ny + kBand - 1) / kBand;
     std::vector<Taken> taken(static_cast<std::size_t>(bands));
+    if (trial_ != nullptr) trial_->kept_.make_room();
     parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
         const int first = static_cast<int>(band) * kBand, rows = std::min(kBand, grid_.ny - first);
         const CellGrid part{grid_.x0, grid_.y(first), grid_.cell, grid_.nx, rows};
         const double y0 = part.y0 - r, y1 = part.y(rows - 1) + r;
-        float* height = height_.data() + grid_.index(0, first);
+        float* const height = memory_.height.data() + grid_.index(0, first);
         Lowering lowering{height, static_cast<std::size_t>(grid_.nx)};
-        std::vector<float> before;  // of a band that the operation comes to
+        KeptTiles before(part);  // of what the operation comes to
         TileTops tops(height, part);
         for (const std::uint32_t b : upwards) {
             if (boxes[b].y1 < y0 || boxes[b].y0 > y1 || boxes[b].z0 >= top) continue;
@@ -253,10 +294,11 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 const double py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
                 if (std::max(py, qy) < y0 || std::min(py, qy) > y1 || std::min(pz, qz) >= top) continue;
                 const double px = to_mm(p.x), qx = to_mm(q.x);
+                int left = 0, right = 0;
                 if (!tops.cut_over(std::min(px, qx) - r, std::max(px, qx) + r, std::min(py, qy) - r, std::max(py, qy) + r,
-                                   std::min(pz, qz) - z_bottom_))
+                                   std::min(pz, qz) - z_bottom_, left, right))
                     continue;
-                if (before.empty()) before.assign(height, height + part.count());
+                before.keep(height, left, right, 0, 0);
                 std::array<double, 3> previous{}, next{};
                 ChainedSweep chain;
                 if (p.feed != 0 && i > 1) previous = over_bottom(moves[i - 2]), chain.before = &previous;
@@ -264,7 +306,10 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 sweep_above(part, end, over_bottom(p), over_bottom(q), StandingHeights{height, 0}, lowering, chain);
             }
         }
-        if (!before.empty()) taken[band] = taken_off(before, height);
+        Lost lost;
+        before.rows([&](const float* kept, std::size_t cell, int n) { add_lost(kept, height + cell, n, kEmpty, lost); });
+        taken[band] = {lost.most, lost.cells};
+        if (trial_ != nullptr) trial_->kept_.add(static_cast<int>(band), before);
     });
     Taken all;
     for (const Taken& t : taken) all.most = std::max(all.most, t.most), all.cells += t.cells;
@@ -273,7 +318,7 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
 
 double LayerStock::area_over(Context& context, double limit) const {
     const auto cells = parallel_reduce(
-        context, height_.size(), std::size_t{1} << 16, std::size_t{0},
+        context, grid_.count(), std::size_t{1} << 16, std::size_t{0},
         [&](std::size_t begin, std::size_t end) {
             std::size_t over = 0;
             for (std::size_t c = begin; c < end; ++c) over += left(c) > limit;
@@ -284,8 +329,14 @@ double LayerStock::area_over(Context& context, double limit) const {
 }
 
 void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) {
+    float* const height = memory_.height.data();
+    if (trial_ != nullptr) {
+        const auto cell = [](double c, int cells) { return static_cast<int>(std::clamp(c, 0.0, static_cast<double>(cells - 1))); };
+        trial_->kept_.keep(height, cell((x - end.radius - grid_.x0) / grid_.cell, grid_.nx), cell((x + end.radius - grid_.x0) / grid_.cell, grid_.nx),
+                           cell((y - end.radius - grid_.y0) / grid_.cell, grid_.ny), cell((y + end.radius - grid_.y0) / grid_.cell, grid_.ny));
+    }
     sweep(grid_, end, {x, y, tip_z}, {x, y, tip_z},
-          [&](std::size_t c, double z) { height_[c] = std::min(height_[c], static_cast<float>(std::max(0.0, z - z_bottom_))); });
+          [&](std::size_t c, double z) { height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_))); });
 }
 
 }  // namespace slabwright

@@ -2,9 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "engine/paths/layer_cut.h"
+#include "kernels/mesh/bulk_memory.h"
+#include "kernels/parallel/spares.h"
 #include "kernels/stock/sweep.h"
 
 namespace slabwright {
@@ -24,51 +28,110 @@ struct Taken {
     [[nodiscard]] bool few() const { return cells < 4; }
 };
 
+/// What a layer's stock is kept in, of any content; one layer leaves it to the next, for new memory of that size costs more than filling it.
+struct StockMemory {
+    BulkVector<float> height, surface, kept;
+    BulkVector<std::uint8_t> nz;
+};
+
+/// Tiles of a height field as they were before they were changed.
+class KeptTiles {
+public:
+    static constexpr int kTile = 64;  ///< cells
+    /// @param memory to keep them in: of its pages only those are touched that hold tiles
+    explicit KeptTiles(const CellGrid& grid, BulkVector<float> memory = {});
+
+    /// Keeps the tiles that the cells [i0, i1] × [j0, j1] lie in, but for those that are kept already.
+    void keep(const float* height, int i0, int i1, int j0, int j1);
+    /// Keeps those of a row of tiles that are kept in `row`, which begins at its first cell, as they are there. Rows may be added by several threads
+    /// at once, if there is room.
+    void add(int tile_row, const KeptTiles& row);
+    /// Keeps what is kept in another of the same grid, as it is there.
+    void add(const KeptTiles& later);
+    /// Makes all kept tiles what they were.
+    void put_back(float* height) const;
+    /// Calls fn(kept, first cell, n) for all rows of n cells that are kept.
+    template <class Fn>
+    void rows(Fn&& fn) const {
+        for (std::size_t t = 0; t < is_kept_.size(); ++t) {
+            if (is_kept_[t] == 0) continue;
+            const int i = static_cast<int>(t % tiles_x_) * kTile, j = static_cast<int>(t / tiles_x_) * kTile, n = std::min(kTile, nx_ - i);
+            const float* kept = memory_.data() + t * kCells;
+            for (int k = j; k < std::min(ny_, j + kTile); ++k, kept += kTile)
+                fn(kept, static_cast<std::size_t>(k) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i), n);
+        }
+    }
+    void make_room() {
+        if (memory_.size() != is_kept_.size() * kCells) memory_.clear(), memory_.resize(is_kept_.size() * kCells);
+    }
+    [[nodiscard]] BulkVector<float> release() { return std::move(memory_); }
+
+private:
+    static constexpr std::size_t kCells = std::size_t{kTile} * kTile;
+    int nx_, ny_;
+    std::size_t tiles_x_;
+    std::vector<std::uint8_t> is_kept_;  // by tile
+    BulkVector<float> memory_;           // kCells for each
+};
+
 /// Heights over a grid of cells, mm above the layer's bottom; each stands for its cell's centre, where it is exact (kernels/stock/sweep).
 /// Only what lies within the layer is kept: cuts below its bottom clear nothing that is left to do.
 class LayerStock {
 public:
     /// The faced slab, `cell` mm fine, and the solid's upper surface over the same cells.
-    LayerStock(const LayerCut& cut, double cell);
+    LayerStock(const LayerCut& cut, double cell, StockMemory memory = {});
+    /// What it was kept in.
+    [[nodiscard]] StockMemory release() && { return std::move(memory_); }
 
     /// Takes away what the operation's feed moves meet, all of them straight (arcs are fitted when a layer is planned). Rows in parallel.
     Taken cut(const LayerCut& cut, const Operation& operation, const Tool& tool);
     /// Takes away what one place of a cutter covers.
     void cut_at(const CutterEnd& end, double x, double y, double tip_z);
 
-    /// A copy of all heights, to try something and undo it. One that was undone leaves its memory to the next: new memory of that size costs more than
-    /// the copying.
-    [[nodiscard]] std::vector<float> heights() {
-        std::vector<float> copy = std::move(spare_);
-        copy.assign(height_.begin(), height_.end());
-        return copy;
-    }
-    void restore(std::vector<float> heights) {
-        height_.swap(heights);
-        spare_ = std::move(heights);
-    }
+    [[nodiscard]] std::span<const float> heights() const { return memory_.height; }
+
+    /// What is cut while it lives, within another trial or not, can be undone.
+    class Trial {
+    public:
+        explicit Trial(LayerStock& stock) : stock_(stock), kept_(stock.grid_, std::move(stock.memory_.kept)), outer_(stock.trial_) {
+            stock.trial_ = this;
+        }
+        ~Trial();
+        Trial(const Trial&) = delete;
+        Trial& operator=(const Trial&) = delete;
+        /// The stock stands as it did when the trial began, and the trial is over.
+        void undo();
+
+    private:
+        friend class LayerStock;
+        void end();
+        LayerStock& stock_;
+        KeptTiles kept_;
+        Trial* outer_;
+        bool over_ = false;
+    };
 
     [[nodiscard]] const CellGrid& grid() const { return grid_; }
     [[nodiscard]] double z_bottom() const { return z_bottom_; }
     /// mm above the layer's bottom
-    [[nodiscard]] float height(std::size_t cell) const { return height_[cell]; }
-    [[nodiscard]] float surface(std::size_t cell) const { return surface_[cell]; }
+    [[nodiscard]] float height(std::size_t cell) const { return memory_.height[cell]; }
+    [[nodiscard]] float surface(std::size_t cell) const { return memory_.surface[cell]; }
     /// Share of a height that is a distance from the facet below: the upward part of its normal; 1 beside the pattern.
-    [[nodiscard]] float nz(std::size_t cell) const { return static_cast<float>(nz_[cell]) / 255.0F; }
+    [[nodiscard]] float nz(std::size_t cell) const { return static_cast<float>(memory_.nz[cell]) / 255.0F; }
     /// What is left over in a cell, mm along the normal of the facet below.
-    [[nodiscard]] float left(std::size_t cell) const { return (height_[cell] - surface_[cell]) * nz(cell); }
+    [[nodiscard]] float left(std::size_t cell) const { return (height(cell) - surface(cell)) * nz(cell); }
 
     /// mm² on which more than `limit` (mm along the normal) is left over.
     [[nodiscard]] double area_over(Context& context, double limit) const;
 
-    /// Bytes of the stock of a layer of `plane_mm2` with the finest ball of the job, and of a copy of its heights.
+    /// Bytes of the stock of a layer of `plane_mm2` with the finest ball of the job, and of what a trial may keep of its heights.
     [[nodiscard]] static std::uint64_t bytes(const Job& job, double plane_mm2);
 
 private:
     CellGrid grid_;
     double z_bottom_ = 0;
-    std::vector<float> height_, surface_, spare_;
-    std::vector<std::uint8_t> nz_;
+    StockMemory memory_;
+    Trial* trial_ = nullptr;  // the innermost
 };
 
 /// Cells that resolve what passes of the layer's finest ball leave: a quarter of their distance, coarser where the layer would

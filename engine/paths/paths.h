@@ -9,6 +9,10 @@
 
 namespace slabwright {
 
+template <class T>
+class Spares;
+struct StockMemory;
+
 /// Of a layer's time, its paths; the forces that follow take the rest.
 inline constexpr double kPathsShare = 0.78;
 
@@ -31,6 +35,7 @@ struct LayerJob {
     ProgressPart* progress = nullptr;                               ///< told how far the paths are, up to kPathsShare; the rest is the caller's
     std::vector<Flat> feet;                                         ///< on which walls of this layer may stand: `flats` and those just below
     double most_minutes = std::numeric_limits<double>::infinity();  ///< when its programs so far take longer than this, the layer is given up
+    Spares<StockMemory>* stock_memory = nullptr;                    ///< which layers leave to each other; null: this one has its own
 };
 
 struct LayerResult {

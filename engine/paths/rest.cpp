@@ -168,7 +168,6 @@ public:
         op.stepover = to_mm(spacing_);
         op.stepdown = pass_.in_steps ? tool_.stepdown_max : 0;
         emit(op, runs);
-        stock_.restore(std::move(before_));
         const Taken taken = stock_.cut(cut_, op, tool_);
         if (taken.nothing()) op.moves.clear();
         return op;
@@ -390,9 +389,9 @@ private:
 
     static double apart(const Place& a, const Place& b) { return std::hypot(static_cast<double>(a.x) - b.x, static_cast<double>(a.y) - b.y); }
 
-    // Coarse lines before fine ones: what a place no longer lowers after those before it is not visited.
+    // Coarse lines before fine ones: what a place no longer lowers after those before it is not visited. The stock stands as before.
     void keep_what_lowers() {
-        before_ = stock_.heights();
+        LayerStock::Trial places(stock_);
         for (Line& line : lines_) {
             cut_.context.throw_if_cancelled();
             for (Place& p : line.places) {
@@ -401,6 +400,7 @@ private:
                 stock_.cut_at(end_, to_mm(p.x), to_mm(p.y), p.tip);
             }
         }
+        places.undo();
     }
 
     // Straight up is always free, and so is a level chord of safe length at the height of the higher rest.
@@ -448,7 +448,7 @@ private:
         const double x = to_mm(ux), y = to_mm(uy);
         double top = -1e300;
         sweep(grid, {CutterEnd::Form::flat, r_, 0}, {x, y, 0}, {x, y, 0},
-              [&](std::size_t c, double) { top = std::max(top, static_cast<double>(before_[c])); });
+              [&](std::size_t c, double) { top = std::max(top, static_cast<double>(stock_.height(c))); });
         return top + stock_.z_bottom();
     }
 
@@ -510,8 +510,7 @@ private:
     std::int32_t spacing_ = 0;
     std::unique_ptr<DropIndex> index_;
     std::vector<Line> lines_;
-    std::vector<float> before_;  // heights of the stock when the pass begins
-    std::vector<char> room_;     // by the stock's cells, with a flask only
+    std::vector<char> room_;  // by the stock's cells, with a flask only
 };
 
 }  // namespace

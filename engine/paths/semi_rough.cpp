@@ -157,7 +157,7 @@ public:
         Operation op = cut_.operation(OperationKind::semi_rough, pass_.purpose, tool_);
         op.spare = pass_.allowance;
         if (stock_.area_over(cut_.context, pass_.limit) == 0) return op;
-        std::vector<float> before = stock_.heights();
+        LayerStock::Trial rings(stock_);
         const std::vector<RoughLevel> levels = rough_levels(cut_, tool_, 0);
         std::vector<double> tips;
         for (const RoughLevel& l : levels) tips.push_back(l.tip);
@@ -197,7 +197,7 @@ public:
             if (floor) append_foot_runs(cut_, tool_, tips[i], grid, wider, runs);
         }
         emit(op, runs);
-        stock_.restore(std::move(before));
+        rings.undo();
         if (stock_.cut(cut_, op, tool_).nothing()) op.moves.clear();
         return op;
     }
