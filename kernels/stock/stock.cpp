@@ -1,5 +1,7 @@
 #include "kernels/stock/stock.h"
 
+#include <functional>
+
 #include "kernels/wide.h"
 
 namespace slabwright {
@@ -181,17 +183,24 @@ private:
     }
     // Adds what cells from the first one on lost.
     void take(std::size_t first, const Losses& losses) {
-        double most = 0, deepest = 0, deep = 0;
-        for (std::size_t k = 0; k < kLanes; ++k) {
-            effect_.removed += losses.removed[k];
-            effect_.highest = std::max(effect_.highest, losses.highest[k]);
-            effect_.lowest = std::min(effect_.lowest, losses.lowest[k]);
-            deep += losses.deep[k];
-            // Of cells that lost as much the first.
-            if (losses.most[k] > most || (losses.most[k] == most && losses.deepest[k] < deepest)) most = losses.most[k], deepest = losses.deepest[k];
-        }
+        for (const double removed : losses.removed) effect_.removed += removed;
+        effect_.highest = std::max(effect_.highest, joined(losses.highest, [](double a, double b) { return a > b ? a : b; }));
+        effect_.lowest = std::min(effect_.lowest, joined(losses.lowest, [](double a, double b) { return a < b ? a : b; }));
+        const double deep = joined(losses.deep, std::plus<>()), most = joined(losses.most, [](double a, double b) { return a > b ? a : b; });
         if (deep > 0) count_deep(first, static_cast<std::uint64_t>(deep));
-        if (most > effect_.deepest) effect_.deepest = most, deepest_cell_ = first + static_cast<std::size_t>(deepest);
+        if (!(most > effect_.deepest)) return;
+        // Of cells that lost as much the first.
+        double deepest = 1e300;
+        for (std::size_t k = 0; k < kLanes; ++k)
+            if (losses.most[k] == most) deepest = std::min(deepest, losses.deepest[k]);
+        effect_.deepest = most, deepest_cell_ = first + static_cast<std::size_t>(deepest);
+    }
+    // Of all lanes, halved and halved again.
+    template <class Join>
+    static double joined(std::array<double, kLanes> lanes, Join&& join) {
+        for (std::size_t half = kLanes / 2; half > 0; half /= 2)
+            for (std::size_t k = 0; k < half; ++k) lanes[k] = join(lanes[k], lanes[k + half]);
+        return lanes[0];
     }
     // Of n cells of the row of `cell`, which lie together or not.
     void count_deep(std::size_t cell, std::uint64_t n) {
