@@ -47,11 +47,12 @@ struct Notch {
         cut.standing = &standing;
         cut.floors = {0.5};
     }
-    [[nodiscard]] Tool flat(double inches) const {
+    [[nodiscard]] Tool tool(ToolKind kind, double inches) const {
         for (const Tool& t : job.tools)
-            if (t.kind == ToolKind::flat && std::abs(t.diameter - inches * kInch) < 1e-9) return t;
+            if (t.kind == kind && std::abs(t.diameter - inches * kInch) < 1e-9) return t;
         return {};
     }
+    [[nodiscard]] Tool flat(double inches) const { return tool(ToolKind::flat, inches); }
 };
 
 // However a layer's stock puts the moves of an operation in order, it stands as it does after one move after another.
@@ -173,6 +174,54 @@ TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
             }
         EXPECT_GT(stood, 500);
         EXPECT_EQ(left, 0) << "swath " << swath;
+    }
+}
+
+// A ball's rings keep off the surface on floors, slopes and walls alike, also where these go on below the layer, and take most of the waste.
+TEST(RestContours, ABallsRingsKeepOffTheSurface) {
+    constexpr double allowance = 0.1;
+    auto slopes = [](double x, double y) {  // a valley with one steep and one gentle side, closed at -x
+        const double side = y > 0 ? (y - 4) * 12 : (-y - 4) * 0.9;
+        return std::clamp(std::max(side, x < -10 ? (-10 - x) * 4 : -4.0), -4.0, kTop);
+    };
+    for (const bool below : {false, true}) {
+        Notch n;
+        n.mesh =
+            test::height_field(n.context, 60, 1, [&](double x, double y) { return std::max(slopes(x, y), below ? -4.0 : 0.5) + (below ? 4 : 0); });
+        if (below)
+            for (Vec3f& v : n.mesh.vertices) v.z -= 4;
+        n.layer.mesh = n.mesh.view();
+        n.layer.floor_below = below ? -3 : 0;
+        n.cut.solid = layer_solid(n.context, n.mesh.view(), n.layer.floor_below, kTop);
+        n.cut.alpha = alpha_map(n.context, n.mesh.view(), n.layer.floor_below, kTop);
+        n.cut.floors.clear();
+        const Tool rough = n.flat(1), ball = n.tool(ToolKind::ball, 0.25);
+        n.layer.tools.rough = rough;
+        LayerStock stock(n.cut, 0.25);
+        stock.cut(n.cut, rough_layer(n.cut), rough);
+        const double before = stock.area_over(n.context, 1);
+        const Operation op = semi_rough_layer(n.cut, stock, ball, {"waste", 1.0, 0, allowance});
+        ASSERT_FALSE(op.moves.empty());
+        EXPECT_LE(op.stepdown, ball.stepdown_max + 1e-9);
+        EXPECT_EQ(op.spare, allowance);
+        // Chords may take a part of the allowance.
+        const double kept = 0.3 * allowance;
+        const DropIndex part(n.cut.solid, {Cutter::Profile::ball, ball.diameter / 2 + kept});
+        double lowest = kTop;
+        for (std::size_t i = 1; i < op.moves.size(); ++i) {
+            const Move &a = op.moves[i - 1], &b = op.moves[i];
+            if (b.feed == 0) continue;
+            lowest = std::min(lowest, to_mm(b.z));
+            for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+                const double x = to_mm(a.x) + t * (to_mm(b.x) - to_mm(a.x)), y = to_mm(a.y) + t * (to_mm(b.y) - to_mm(a.y)),
+                             z = to_mm(a.z) + t * (to_mm(b.z) - to_mm(a.z));
+                ASSERT_GE(z, part.drop(x, y).tip_z + kept) << "below " << below << " at " << x << ' ' << y << ' ' << z;
+            }
+        }
+        EXPECT_EQ(lowest < -0.5, below);
+        EXPECT_GE(lowest, n.layer.floor_below);
+        EXPECT_GT(before, 200);
+        EXPECT_LT(stock.area_over(n.context, 1), 0.3 * before) << "below " << below;
     }
 }
 

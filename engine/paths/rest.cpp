@@ -12,6 +12,7 @@
 
 #include "engine/paths/chains.h"
 #include "engine/paths/rings.h"
+#include "engine/paths/semi_rough.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/parallel/parallel.h"
 
@@ -521,16 +522,26 @@ double semi_rough_allowance(const Job& job, const Tool& tool, double limit) {
 }
 
 Operation cut_rest(const LayerCut& cut, LayerStock& stock, const Tool& tool, const RestPass& pass) {
-    Operation op = Rester(cut, stock, tool, pass).run();
-    if (!(pass.allowance > 0)) return op;
+    if (!(pass.allowance > 0)) return Rester(cut, stock, tool, pass).run();
+    Operation all;
+    auto add = [&](Operation&& op) {
+        if (all.moves.empty()) {
+            all = std::move(op);
+            return;
+        }
+        if (op.moves.empty()) return;
+        all.stepdown = std::max(all.stepdown, op.stepdown);
+        all.moves.insert(all.moves.end(), op.moves.begin(), op.moves.end());
+    };
+    // Rings first, which are long and level; what they leave on flat slopes is crossed.
+    if (pass.in_steps && tool.kind == ToolKind::ball) add(semi_rough_layer(cut, stock, tool, {pass.purpose, pass.limit, pass.swath, pass.allowance}));
+    add(Rester(cut, stock, tool, pass).run());
     // What only the cutter itself enters: slots hardly wider, the depth of narrow valleys. The wall of what was kept is no reason to go there.
     RestPass narrow = pass;
     narrow.allowance = 0;
     narrow.skin = 2 * pass.allowance;
-    Operation rest = Rester(cut, stock, tool, narrow).run();
-    if (op.moves.empty()) return rest;
-    op.moves.insert(op.moves.end(), rest.moves.begin(), rest.moves.end());
-    return op;
+    add(Rester(cut, stock, tool, narrow).run());
+    return all;
 }
 
 }  // namespace slabwright

@@ -18,6 +18,8 @@ constexpr double kSample = 0.4;          // mm between places of a ring that are
 constexpr double kSwathPitch = 0.3;      // mm: the swath's border need not be exact
 constexpr float kStands = 0.05F;         // mm over the tip: less is nothing to cut
 constexpr double kEdge = 0.05;           // mm: what only the cutter's very edge meets was cut on the ring before
+constexpr double kWorthOfBall = 0.5;     // mm that a ball must lower a cell by: its rings leave ridges
+constexpr int kLevelsAStep = 2;          // of a ball
 constexpr int kFewCells = 4;             // that a cutter must meet to be of use: one or two may be a matter of rounding
 constexpr int kTile = 16;                // cells
 constexpr int kMostRings = 4000;
@@ -55,42 +57,61 @@ std::vector<std::vector<std::array<int, 2>>> rows_inside(const CellGrid& grid, c
     return rows;
 }
 
-// The cells of one level that are worth a visit.
+// The cells that are worth a visit, level by level.
 class LevelTargets {
 public:
-    /// @param tip    mm above the layer's bottom
-    /// @param floors mm; what stands on one of them is a target even within the swath, for no ball makes a floor
-    LevelTargets(const LayerStock& stock, double tip, double limit, const Loops& swath, std::span<const double> floors)
+    LevelTargets(Context& context, const LayerStock& stock, double limit)
         : stock_(stock),
-          tip_(static_cast<float>(tip)),
+          limit_(limit),
           tiles_x_((stock.grid().nx + kTile - 1) / kTile),
           marked_(stock.grid().count(), 0),
           tiles_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>((stock.grid().ny + kTile - 1) / kTile), 0) {
+        // What is not left over now will not be on any level.
         const CellGrid& grid = stock.grid();
-        const auto covered = rows_inside(grid, swath);
+        std::vector<std::vector<std::array<int, 2>>> rows(static_cast<std::size_t>(grid.ny));
+        parallel_each(context, rows.size(), [&](std::size_t j) {
+            for (int i = 0; i < grid.nx; ++i)
+                if (stock.left(grid.index(i, static_cast<int>(j))) > limit) rows[j].push_back({i, static_cast<int>(j)});
+        });
+        for (const auto& row : rows) left_over_.insert(left_over_.end(), row.begin(), row.end());
+    }
+    [[nodiscard]] bool none() const { return left_over_.empty(); }
+
+    /// Marks the cells of a level.
+    /// @param tip    mm above the layer's bottom
+    /// @param over   mm above the layer's bottom: only what lies over a surface that is higher
+    /// @param floors mm; what stands on one of them is a target even within the swath, for no ball makes a floor
+    void mark(double tip, double over, const Loops& swath, std::span<const double> floors) {
+        const CellGrid& grid = stock_.grid();
+        for (const auto& [i, j] : cells_) marked_[grid.index(i, j)] = 0, tiles_[tile(i, j)] = 0;
+        cells_.clear();
+        tip_ = static_cast<float>(tip);
+        std::erase_if(left_over_, [&](const std::array<int, 2>& c) { return stock_.left(grid.index(c[0], c[1])) <= limit_; });
+        std::vector<std::vector<std::array<int, 2>>> covered;
+        if (!swath.empty()) covered = rows_inside(grid, swath);
+        auto within_swath = [&](int i, int j) {
+            return !covered.empty() && std::any_of(covered[static_cast<std::size_t>(j)].begin(), covered[static_cast<std::size_t>(j)].end(),
+                                                   [&](const std::array<int, 2>& s) { return s[0] <= i && i <= s[1]; });
+        };
         auto on_floor = [&](std::size_t c) {
-            const double z = stock.z_bottom() + stock.surface(c);
+            const double z = stock_.z_bottom() + stock_.surface(c);
             return std::any_of(floors.begin(), floors.end(), [&](double f) { return z <= f + 1e-3 && z >= f - kSameFloor - 1e-3; });
         };
-        for (int j = 0; j < grid.ny; ++j) {
-            const auto& spans = covered[static_cast<std::size_t>(j)];
-            auto span = spans.begin();
-            for (int i = 0; i < grid.nx; ++i) {
-                while (span != spans.end() && (*span)[1] < i) ++span;
-                const std::size_t c = grid.index(i, j);
-                if (span != spans.end() && (*span)[0] <= i && !on_floor(c)) continue;
-                if (stock.height(c) <= tip_ + kStands || stock.surface(c) > tip_ + kStands || stock.left(c) <= limit) continue;
-                marked_[c] = 1;
-                tiles_[tile(i, j)] = 1;
-                cells_.push_back({i, j});
-            }
+        for (const auto& [i, j] : left_over_) {
+            const std::size_t c = grid.index(i, j);
+            if (stock_.height(c) <= tip_ + kStands || stock_.surface(c) > std::max(tip_, 0.0F) + kStands || stock_.surface(c) <= over + kStands)
+                continue;
+            if (within_swath(i, j) && !on_floor(c)) continue;
+            marked_[c] = 1;
+            tiles_[tile(i, j)] = 1;
+            cells_.push_back({i, j});
         }
     }
     [[nodiscard]] bool few() const { return cells_.size() < kFewCells; }
     [[nodiscard]] const std::vector<std::array<int, 2>>& cells() const { return cells_; }
 
-    // Whether a cutter whose middle is here meets some that still stand.
-    [[nodiscard]] bool met(double x, double y, double radius) const {
+    // Whether a cutter whose middle is here meets some that still stand; a ball, some that it lowers by enough.
+    [[nodiscard]] bool met(double x, double y, double radius, bool ball) const {
         const CellGrid& grid = stock_.grid();
         const double r = std::max(radius - kEdge, radius / 2);
         const int j0 = std::max(0, static_cast<int>(std::ceil((y - r - grid.y0) / grid.cell)));
@@ -107,7 +128,12 @@ public:
                     const int last = std::min({ti * kTile + kTile - 1, grid.nx - 1, static_cast<int>(std::floor((x + w - grid.x0) / grid.cell))});
                     for (int i = first; i <= last; ++i) {
                         const std::size_t c = grid.index(i, j);
-                        if (marked_[c] && stock_.height(c) > tip_ + kStands && ++found >= kFewCells) return true;
+                        if (!marked_[c] || stock_.height(c) <= tip_ + kStands) continue;
+                        if (ball) {
+                            const double dx = grid.x(i) - x, flank = radius - std::sqrt(std::max(0.0, radius * radius - dx * dx - dy * dy));
+                            if (stock_.height(c) - std::max(tip_ + flank, static_cast<double>(stock_.surface(c))) <= kWorthOfBall) continue;
+                        }
+                        if (++found >= kFewCells) return true;
                     }
                 }
             }
@@ -119,10 +145,11 @@ private:
         return static_cast<std::size_t>(j / kTile) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(i / kTile);
     }
     const LayerStock& stock_;
-    float tip_;
+    double limit_;
+    float tip_ = 0;
     int tiles_x_;
     std::vector<char> marked_, tiles_;
-    std::vector<std::array<int, 2>> cells_;
+    std::vector<std::array<int, 2>> left_over_, cells_;  // row after row; `cells_` of the level
 };
 
 // A place of the cutter on a ring; corners of the ring, and places between them that are looked at.
@@ -151,16 +178,17 @@ std::vector<RingPlace> places_of(std::span<const Point2> loop, std::int32_t z) {
 class SemiRougher {
 public:
     SemiRougher(const LayerCut& cut, LayerStock& stock, const Tool& tool, const SemiRoughPass& pass)
-        : cut_(cut), stock_(stock), tool_(tool), pass_(pass), r_(tool.diameter / 2) {}
+        : cut_(cut), stock_(stock), tool_(tool), pass_(pass), ball_(tool.kind == ToolKind::ball), r_(tool.diameter / 2) {}
 
     Operation run() {
         Operation op = cut_.operation(OperationKind::semi_rough, pass_.purpose, tool_);
         op.spare = pass_.allowance;
-        if (stock_.area_over(cut_.context, pass_.limit) == 0) return op;
+        LevelTargets targets(cut_.context, stock_, pass_.limit);
+        if (targets.none()) return op;
         LayerStock::Trial rings(stock_);
-        const std::vector<RoughLevel> levels = rough_levels(cut_, tool_, 0);
+        const std::vector<Level> levels = levels_of();
         std::vector<double> tips;
-        for (const RoughLevel& l : levels) tips.push_back(l.tip);
+        for (const Level& l : levels) tips.push_back(l.tip);
         std::vector<Loops> swath(tips.size());
         if (pass_.swath > 0) {
             const std::vector<Contours> walls = cut_.contours({Cutter::Profile::flat, pass_.swath}, tips, to_units(kSwathPitch));
@@ -177,22 +205,22 @@ public:
         double above = cut_.layer.z_top;
         for (std::size_t i = 0; i < tips.size(); ++i) {
             cut_.context.throw_if_cancelled();
-            const LevelTargets targets(stock_, tips[i] - stock_.z_bottom(), pass_.limit, swath[i], cut_.floors);
+            targets.mark(tips[i] - stock_.z_bottom(), levels[i].over - stock_.z_bottom(), swath[i], cut_.floors);
             const double depth = above - tips[i];
             above = tips[i];
             if (targets.few()) continue;
             // A floor is finished with its level, so there the cutter goes up to the walls.
-            const bool floor = std::find(cut_.floors.begin(), cut_.floors.end(), tips[i]) != cut_.floors.end();
+            const bool floor = !ball_ && std::find(cut_.floors.begin(), cut_.floors.end(), tips[i]) != cut_.floors.end();
             const double allowance = floor ? 0 : pass_.allowance;
-            const Cutter cutter{Cutter::Profile::flat, r_ + allowance};
+            const Cutter cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_ + allowance};
             const FibreGrid grid = fibre_grid(cut_.solid, cutter, safe_pitch(r_, allowance > 0 ? std::max(gouge, 0.2 * allowance) : gouge));
-            const std::array<double, 1> tip{tips[i]};
-            Loops border = forbidden_region(level_contours(cut_.context, cut_.solid, cut_.insides(cutter, tip).front().loops, cutter, tips[i], grid));
+            const std::array<double, 1> tip{ball_ ? tips[i] - allowance : tips[i]};  // of the wider ball
+            Loops border = forbidden_region(level_contours(cut_.context, cut_.solid, cut_.insides(cutter, tip).front().loops, cutter, tip[0], grid));
             if (flask) border = unite(border, beyond);
             const std::size_t first = runs.size();
             cut_rings(targets, border, tips[i], allowance > 0, runs);
             if (runs.size() == first) continue;
-            op.stepdown = std::max(op.stepdown, depth);
+            op.stepdown = std::max(op.stepdown, ball_ ? tool_.stepdown_max : depth);
             op.stepover = kStepShare * tool_.diameter;
             if (floor) append_foot_runs(cut_, tool_, tips[i], grid, wider, runs);
         }
@@ -203,6 +231,31 @@ public:
     }
 
 private:
+    struct Level {
+        double tip = 0, over = -1e300;  // mm: what lies over a surface that is no higher than `over` is left to other levels
+    };
+    // In the order in which they are cut. A flat end mill's lie on floors too. Between two of a ball's lie others, for the waste that does not
+    // reach down to the next.
+    [[nodiscard]] std::vector<Level> levels_of() const {
+        std::vector<Level> levels;
+        if (!ball_) {
+            for (const RoughLevel& l : rough_levels(cut_, tool_, 0)) levels.push_back({l.tip});
+            return levels;
+        }
+        const double top = cut_.layer.z_top, bottom = cut_.layer.z_bottom;
+        const int steps = tool_.stepdown_max > 0 ? std::max(1, static_cast<int>(std::ceil((top - bottom) / tool_.stepdown_max - 1e-9))) : 1;
+        auto at = [&](double step) { return top - (top - bottom) * step / steps; };
+        for (int k = 0; k < steps; ++k) {
+            for (int part = 1; part < kLevelsAStep; ++part) levels.push_back({at(k + static_cast<double>(part) / kLevelsAStep), at(k + 1)});
+            levels.push_back({at(k + 1)});
+        }
+        // Walls that go on below the layer are met by its lower half too.
+        if (const double under = std::max(bottom - std::max(0.0, r_ - pass_.limit), cut_.layer.floor_below + pass_.allowance);
+            under < bottom - kStands)
+            levels.push_back({under});
+        return levels;
+    }
+
     // From the farthest ring whose cutter meets a target inwards; what a ring cuts the next need not.
     void cut_rings(const LevelTargets& targets, const Loops& border, double tip, bool keeps_off, std::vector<std::vector<LevelRun>>& runs) {
         const CellGrid& grid = stock_.grid();
@@ -228,7 +281,7 @@ private:
             const double most = k > 0 ? loose * kUnitsPerMm : tolerance;
             for (std::size_t l = 0; l < rings[k].size(); ++l) {
                 std::vector<RingPlace> places = places_of(rings[k].loop(l), z);
-                for (RingPlace& p : places) p.useful = within_travel(p.at) && targets.met(to_mm(p.at.x), to_mm(p.at.y), r_);
+                for (RingPlace& p : places) p.useful = within_travel(p.at) && targets.met(to_mm(p.at.x), to_mm(p.at.y), r_, ball_);
                 append_useful(places, tolerance, most, runs.back());
             }
             for (const LevelRun& run : runs.back())
@@ -296,11 +349,14 @@ private:
     }
 
     // mm/min: the first cut through a place is as wide as the cutter.
-    [[nodiscard]] double feed() const { return std::min(tool_.max_feed, cut_.job.machine.max_feed) * cut_.job.cutting.max_engagement; }
+    [[nodiscard]] double feed() const {
+        if (ball_) return std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed);
+        return std::min(tool_.max_feed, cut_.job.machine.max_feed) * cut_.job.cutting.max_engagement;
+    }
 
     void emit(Operation& op, std::vector<std::vector<LevelRun>>& runs) const {
         PathBuilder path(op, tool_, feed(), cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
-        const DropIndex& part = cut_.drops({Cutter::Profile::flat, r_});
+        const DropIndex& part = cut_.drops(ball_ ? Cutter{Cutter::Profile::ball, r_ + pass_.allowance} : Cutter{Cutter::Profile::flat, r_});
         path.know(cut_.around(tool_, &part));
         cut_levels(path, cut_, tool_, part, runs, false);
         path.finish();
@@ -310,6 +366,7 @@ private:
     LayerStock& stock_;
     const Tool& tool_;
     const SemiRoughPass& pass_;
+    bool ball_;
     double r_;
 };
 

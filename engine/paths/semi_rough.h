@@ -14,8 +14,10 @@ struct SemiRoughPass {
     double allowance = 0.3;  ///< mm kept off the walls; 0: they are met as in finishing
 };
 
-/// Rings of a flat end mill around what must stay, the farthest first, of which only those stretches are kept that cut something worth a
-/// visit; levels lie on floors, on the layer's bottom, and as deep between them as the tool's stepdown. Takes what it cuts off the stock.
+/// Rings around what must stay, the farthest first, of which only those stretches are kept that cut something worth a visit. A flat end mill's
+/// levels lie on floors, on the layer's bottom, and as deep between them as its stepdown; a ball's at even steps down to the bottom, with others
+/// between them for what does not reach down to the next, and one below it, as far as that may be cut into, for walls that go on there. The
+/// allowance of a ball is kept along the normal. Takes what it cuts off the stock.
 [[nodiscard]] Operation semi_rough_layer(const LayerCut& cut, LayerStock& stock, const Tool& tool, const SemiRoughPass& pass);
 
 }  // namespace slabwright
