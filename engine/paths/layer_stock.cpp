@@ -328,15 +328,19 @@ double LayerStock::area_over(Context& context, double limit) const {
     return static_cast<double>(cells) * grid_.cell * grid_.cell;
 }
 
-void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) {
+void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) { cut_along(end, {x, y, tip_z}, {x, y, tip_z}); }
+
+void LayerStock::cut_along(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to) {
     float* const height = memory_.height.data();
     if (trial_ != nullptr) {
-        const auto cell = [](double c, int cells) { return static_cast<int>(std::clamp(c, 0.0, static_cast<double>(cells - 1))); };
-        trial_->kept_.keep(height, cell((x - end.radius - grid_.x0) / grid_.cell, grid_.nx), cell((x + end.radius - grid_.x0) / grid_.cell, grid_.nx),
-                           cell((y - end.radius - grid_.y0) / grid_.cell, grid_.ny), cell((y + end.radius - grid_.y0) / grid_.cell, grid_.ny));
+        const auto cell = [&](double mm, double begin, int cells) {
+            return static_cast<int>(std::clamp((mm - begin) / grid_.cell, 0.0, static_cast<double>(cells - 1)));
+        };
+        trial_->kept_.keep(
+            height, cell(std::min(from[0], to[0]) - end.radius, grid_.x0, grid_.nx), cell(std::max(from[0], to[0]) + end.radius, grid_.x0, grid_.nx),
+            cell(std::min(from[1], to[1]) - end.radius, grid_.y0, grid_.ny), cell(std::max(from[1], to[1]) + end.radius, grid_.y0, grid_.ny));
     }
-    sweep(grid_, end, {x, y, tip_z}, {x, y, tip_z},
-          [&](std::size_t c, double z) { height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_))); });
+    sweep(grid_, end, from, to, [&](std::size_t c, double z) { height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_))); });
 }
 
 }  // namespace slabwright

@@ -87,6 +87,8 @@ public:
     Taken cut(const LayerCut& cut, const Operation& operation, const Tool& tool);
     /// Takes away what one place of a cutter covers.
     void cut_at(const CutterEnd& end, double x, double y, double tip_z);
+    /// Takes away what a cutter covers whose tip goes straight between two places, mm.
+    void cut_along(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to);
 
     [[nodiscard]] std::span<const float> heights() const { return memory_.height; }
 

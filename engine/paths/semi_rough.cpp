@@ -285,15 +285,9 @@ private:
                 append_useful(places, tolerance, most, runs.back());
             }
             for (const LevelRun& run : runs.back())
-                for (std::size_t p = 0; p < run.points.size(); ++p) {
-                    const PathPoint &a = run.points[p == 0 ? 0 : p - 1], &b = run.points[p];
-                    const double l = to_mm(1) * std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
-                    const int parts = std::max(1, static_cast<int>(std::ceil(l / kSample)));
-                    for (int s = 1; s <= parts; ++s) {
-                        const double t = static_cast<double>(s) / parts;
-                        stock_.cut_at(end, to_mm(a.x) + t * to_mm(std::int64_t{b.x} - a.x), to_mm(a.y) + t * to_mm(std::int64_t{b.y} - a.y),
-                                      to_mm(z));
-                    }
+                for (std::size_t p = 1; p < run.points.size(); ++p) {
+                    const PathPoint &a = run.points[p - 1], &b = run.points[p];
+                    stock_.cut_along(end, {to_mm(a.x), to_mm(a.y), to_mm(z)}, {to_mm(b.x), to_mm(b.y), to_mm(z)});
                 }
         }
     }
