@@ -76,6 +76,7 @@ public:
         for (const auto& row : rows) left_over_.insert(left_over_.end(), row.begin(), row.end());
     }
     [[nodiscard]] bool none() const { return left_over_.empty(); }
+    [[nodiscard]] std::uint64_t bytes() const { return marked_.size() + 2 * left_over_.size() * sizeof(left_over_[0]); }
 
     /// Marks the cells of a level.
     /// @param tip    mm above the layer's bottom
@@ -185,6 +186,7 @@ public:
         op.spare = pass_.allowance;
         LevelTargets targets(cut_.context, stock_, pass_.limit);
         if (targets.none()) return op;
+        const MemoryCharge memory(cut_.context, targets.bytes(), "what semi-roughing is to cut");
         LayerStock::Trial rings(stock_);
         const std::vector<Level> levels = levels_of();
         std::vector<double> tips;
