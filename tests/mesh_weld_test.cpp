@@ -14,6 +14,7 @@
 #include <tuple>
 
 #include "kernels/errors.h"
+#include "kernels/mesh/morton.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/seed.h"
 
@@ -186,6 +187,21 @@ TEST(MeshWeld, FacetsAreBroughtTogetherInSpace) {
         return Facets(all.begin(), all.end());
     };
     EXPECT_EQ(sorted(first), sorted(facets)) << "each facet once, its corners as they were";
+    // By cells, and as they were within a cell.
+    const MortonGrid grid(bounds(as_it_lies.view()));
+    std::stable_sort(facets.begin(), facets.end(),
+                     [&](const auto& a, const auto& b) { return grid.code(a[0].x, a[0].y, a[0].z) >> 39 < grid.code(b[0].x, b[0].y, b[0].z) >> 39; });
+    EXPECT_EQ(Facets(first.begin(), first.end()), facets);
+}
+
+TEST(MeshWeld, CoarseCodesBeginAsCodesDo) {
+    std::mt19937_64 random(test::seed());
+    const MortonGrid grid({{-3, 10, 0}, {97, 60, 31}});
+    std::uniform_real_distribution<double> x(-10, 110), y(0, 70), z(-5, 40);
+    for (int i = 0; i < 10'000; ++i) {
+        const double at[] = {x(random), y(random), z(random)};
+        ASSERT_EQ(grid.coarse_code(at[0], at[1], at[2]), grid.code(at[0], at[1], at[2]) >> 39);
+    }
 }
 
 TEST(MeshWeld, MemoryStaysUnderEightyBytesAFacet) {

@@ -99,9 +99,8 @@ BulkVector<std::array<Vec3f, 3>> in_space(Context& context, const FacetRecords& 
     // First into no more parts than the memory's pages can be kept at hand, most of which fit a cache then, and within each into its cells.
     constexpr int coarse = 4, finer = 4, subcells = 1 << (3 * finer);
     const MortonGrid grid(box);
-    auto cell_of = [&](const Corners& c) {
-        return static_cast<std::uint32_t>(grid.code(c[0].x, c[0].y, c[0].z) >> (3 * (MortonGrid::kBits - coarse - finer)));
-    };
+    auto cell_of = [&](const Corners& c) { return grid.coarse_code(c[0].x, c[0].y, c[0].z); };
+    static_assert(coarse + finer == 8);  // bits along each axis, as coarse_code() gives
     BulkVector<Corners> together(facets.count);
     auto items = [&](std::size_t begin, std::size_t end, auto&& take) {
         for (std::size_t f = begin; f < end; ++f) {
@@ -115,15 +114,24 @@ BulkVector<std::array<Vec3f, 3>> in_space(Context& context, const FacetRecords& 
     auto room = [&](std::uint64_t total, std::uint64_t) { return std::pair(together.data(), total); };
     auto within_parts = [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
         parallel_for(context, last - first, 16, [&](std::size_t begin, std::size_t end) {
-            std::vector<Corners> part;
+            BulkVector<Corners> part;
+            BulkVector<std::uint16_t> cells;
             std::array<std::uint32_t, subcells + 1> next;
             for (std::size_t p = begin; p < end; ++p) {
-                part.assign(together.data() + starts[p], together.data() + starts[p + 1]);
+                const std::size_t n = starts[p + 1] - starts[p];
+                if (n < 2) continue;
+                const Corners* const unsorted = together.data() + starts[p];
+                part.resize(std::max(n, part.size()));
+                cells.resize(part.size());
                 next.fill(0);
-                for (const Corners& c : part) ++next[cell_of(c) % subcells + 1];
+                for (std::size_t i = 0; i < n; ++i) {
+                    part[i] = unsorted[i];
+                    cells[i] = static_cast<std::uint16_t>(cell_of(part[i]) % subcells);
+                    ++next[cells[i] + 1u];
+                }
                 next[0] = starts[p];
                 for (std::size_t k = 1; k < subcells; ++k) next[k] += next[k - 1];
-                for (const Corners& c : part) together[next[cell_of(c) % subcells]++] = c;
+                for (std::size_t i = 0; i < n; ++i) together[next[cells[i]]++] = part[i];
             }
         });
     };
