@@ -244,7 +244,10 @@ private:
             for (const RoughLevel& l : rough_levels(cut_, tool_, 0)) levels.push_back({l.tip});
             return levels;
         }
-        const double top = cut_.layer.z_top, bottom = cut_.layer.z_bottom;
+        // As far below the layer as its rings leave ridges between them, so that none stays there as a film that comes loose.
+        const double half_step = kStepShare * r_, ridge = r_ - std::sqrt(r_ * r_ - half_step * half_step);
+        const double deepest = std::min(cut_.layer.z_bottom, cut_.layer.floor_below + pass_.allowance), top = cut_.layer.z_top,
+                     bottom = std::max(cut_.layer.z_bottom - ridge - kStands, deepest);
         const int steps = tool_.stepdown_max > 0 ? std::max(1, static_cast<int>(std::ceil((top - bottom) / tool_.stepdown_max - 1e-9))) : 1;
         auto at = [&](double step) { return top - (top - bottom) * step / steps; };
         for (int k = 0; k < steps; ++k) {
@@ -252,9 +255,7 @@ private:
             levels.push_back({at(k + 1)});
         }
         // Walls that go on below the layer are met by its lower half too.
-        if (const double under = std::max(bottom - std::max(0.0, r_ - pass_.limit), cut_.layer.floor_below + pass_.allowance);
-            under < bottom - kStands)
-            levels.push_back({under});
+        if (const double under = std::max(cut_.layer.z_bottom - r_ + pass_.limit, deepest); under < bottom - kStands) levels.push_back({under});
         return levels;
     }
 
