@@ -172,26 +172,73 @@ SLABWRIGHT_WIDE std::int64_t box_out_rows(const BoxTerms& b, const CoverRows& co
     return out(cover, low + first, high + first, first, n, state + first);
 }
 
-// From a point p the ball's centre is kept away up to p_u + √(r² − (v − p_v)² − (zc − p_z)²) on the line at v, a concave function of p, so no
-// more than what its tangent at the middle of the facet gives at one of the corners.
-SLABWRIGHT_WIDE std::int64_t facet_out_rows(const BoxTerms& b, const TangentTerms& t, const CoverRows& cover, const double* __restrict v, int first,
-                                            int last, double* __restrict low, double* __restrict high, std::int64_t* __restrict state) {
+// Nothing farther than r over or under the lines keeps a ball away, and a tall wall's other parts would make it seem to reach farther.
+void facet_terms(const SolidFacet& f, std::size_t u, double r, double zc, BoxTerms& box, TangentTerms& t) {
+    const std::size_t v = 1 - u;
+    const double bottom = zc - r, top = zc + r, dz = std::max({0.0, f.z_min - zc, zc - f.z_max}),
+                 touched = std::clamp(zc - r * f.normal[2], f.z_min, f.z_max);
+    box = {kInfinity, -kInfinity, kInfinity, -kInfinity, r * r - dz * dz};
+    t.v_low = kInfinity, t.v_high = -kInfinity, t.across = r * f.normal[v], t.z = zc - touched, t.r2 = r * r;
+    std::size_t n = 0;
+    const auto add = [&](double pu, double pv, double z) {
+        t.u[n] = pu, t.v[n] = pv, t.dz[n] = z - touched;
+        box.u_low = std::min(box.u_low, pu), box.u_high = std::max(box.u_high, pu);
+        box.v_low = std::min(box.v_low, pv), box.v_high = std::max(box.v_high, pv);
+        ++n;
+    };
+    const bool whole = f.z_min >= bottom && f.z_max <= top;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3d &a = f.p[k], &b = f.p[k == 2 ? 0 : k + 1];
+        const double low = std::min(a[2], b[2]), high = std::max(a[2], b[2]);
+        if (low <= touched && touched <= high) {
+            const double at = low < high ? a[v] + (touched - a[2]) / (b[2] - a[2]) * (b[v] - a[v]) : a[v];
+            t.v_low = std::min(t.v_low, at), t.v_high = std::max(t.v_high, at);
+        }
+        if (whole || (a[2] >= bottom && a[2] <= top)) add(a[u], a[v], a[2]);
+        if (whole) continue;
+        for (const double z : {bottom, top})
+            if (low < z && z < high) {
+                const double s = (z - a[2]) / (b[2] - a[2]);
+                add(a[u] + s * (b[u] - a[u]), a[v] + s * (b[v] - a[v]), z);
+            }
+    }
+    t.corners = whole ? 3 : TangentTerms::kMostCorners;
+    for (; n < t.corners; ++n) t.u[n] = t.u[0], t.v[n] = t.v[0], t.dz[n] = t.dz[0];
+}
+
+namespace {
+
+template <std::size_t corners>
+[[gnu::always_inline]] inline void narrow(const TangentTerms& t, const double* __restrict v, int n, double* __restrict low, double* __restrict high) {
     const double least = kTangentLeast * t.r2, z2 = t.r2 - t.z * t.z;
-    const int n = (last - first) / kLinesStep * kLinesStep;
-    v += first, low += first, high += first;
-    reach(b, v, n, low, high);
     for (int i = 0; i < n; ++i) {
-        const double w = v[i] - t.v, q = z2 - w * w;
+        const double touched = v[i] - t.across, at_least = touched < t.v_low ? t.v_low : touched, from_v = at_least < t.v_high ? at_least : t.v_high;
+        const double w = v[i] - from_v, q = z2 - w * w;
         const bool near = q > least;
         const double h = std::sqrt(near ? q : 1.0), inverse = 1 / h, sv = w * inverse, sz = t.z * inverse;
-        const double a = sv * t.dv[0] + sz * t.dz[0], c = sv * t.dv[1] + sz * t.dz[1], d = sv * t.dv[2] + sz * t.dz[2];
-        const double a_up = a + t.du[0], c_up = c + t.du[1], d_up = d + t.du[2], a_down = a - t.du[0], c_down = c - t.du[1], d_down = d - t.du[2];
-        const double ac = a_up > c_up ? a_up : c_up, up = ac > d_up ? ac : d_up, ac_d = a_down > c_down ? a_down : c_down,
-                     down = ac_d > d_down ? ac_d : d_down;
-        const double to = t.u + h + up, from = t.u - h - down;
+        double up = -kInfinity, down = kInfinity;
+        for (std::size_t k = 0; k < corners; ++k) {
+            const double a = sv * (t.v[k] - from_v) + sz * t.dz[k], to = t.u[k] + a, from = t.u[k] - a;
+            up = to > up ? to : up;
+            down = from < down ? from : down;
+        }
+        const double to = up + h, from = down - h;
         high[i] = near & (to < high[i]) ? to : high[i];
         low[i] = near & (from > low[i]) ? from : low[i];
     }
+}
+
+}  // namespace
+
+// From a point p the ball's centre is kept away up to p_u + √(r² − (v − p_v)² − (zc − p_z)²) on the line at v, a concave function of p, so no
+// more than what its tangent at any point gives at one of the corners.
+SLABWRIGHT_WIDE std::int64_t facet_out_rows(const BoxTerms& b, const TangentTerms& t, const CoverRows& cover, const double* __restrict v, int first,
+                                            int last, double* __restrict low, double* __restrict high, std::int64_t* __restrict state) {
+    const int n = (last - first) / kLinesStep * kLinesStep;
+    v += first, low += first, high += first;
+    reach(b, v, n, low, high);
+    if (t.corners == 3) narrow<3>(t, v, n, low, high);
+    else narrow<TangentTerms::kMostCorners>(t, v, n, low, high);
     return out(cover, low, high, first, n, state + first);
 }
 

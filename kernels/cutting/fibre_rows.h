@@ -41,11 +41,18 @@ struct BoxTerms {
     double u_low, u_high, v_low, v_high, r2;
 };
 
-/// A facet seen from its middle (u, v) and z under the lines; its corners from there.
+/// What of a facet a ball can meet: corners of a convex polygon, dz over the height at which the ball would touch the facet's plane (or that of
+/// the facet's that is nearest to it), which is z under the lines. There the facet lies in [v_low, v_high]; `across` is how far beside the
+/// line's v the plane is touched.
 struct TangentTerms {
-    double u, v, z, r2;
-    std::array<double, 3> du, dv, dz;
+    static constexpr std::size_t kMostCorners = 5;
+    double v_low, v_high, across, z, r2;
+    std::size_t corners;  ///< 3, or kMostCorners, of which some may be the same
+    std::array<double, kMostCorners> u, v, dz;
 };
+
+/// Both for a facet and lines in direction x (u = 0) or y (1) at height zc.
+void facet_terms(const SolidFacet& facet, std::size_t u, double r, double zc, BoxTerms& box, TangentTerms& tangent);
 
 /// A disc seen from its middle (u, v) and z under the lines: its axis, a unit vector, its radius and half its thickness.
 struct DiscTerms {

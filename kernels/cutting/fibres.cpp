@@ -354,22 +354,23 @@ private:
 
     // Those of these lines on which a facet may.
     LineRange reaches_out(const SolidFacet& f, LineRange lines) {
-        const LineRange steps = in_steps(lines);
-        const auto [ul, uh] = std::minmax({f.p[0][U], f.p[1][U], f.p[2][U]});
-        const auto [vl, vh] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
-        const bool level = f.nz < 0 && f.z_max > zc_;
-        const double dz = level ? 0 : std::max({0.0, f.z_min - zc_, zc_ - f.z_max});
-        const BoxTerms box{ul, uh, vl, vh, r_ * r_ - dz * dz};
-        if (level) {
+        if (f.nz < 0 && f.z_max > zc_) {
+            const LineRange steps = in_steps(lines);
+            const auto [ul, uh] = std::minmax({f.p[0][U], f.p[1][U], f.p[2][U]});
+            const auto [vl, vh] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
+            const BoxTerms box{ul, uh, vl, vh, r_ * r_};
             if (box_out_rows(box, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data()) == 0) return {};
-        } else {
-            TangentTerms t{};
-            for (const Vec3d& p : f.p) t.u += p[U] / 3, t.v += p[V] / 3, t.z += p[2] / 3;
-            for (std::size_t k = 0; k < 3; ++k) t.du[k] = f.p[k][U] - t.u, t.dv[k] = f.p[k][V] - t.v, t.dz[k] = f.p[k][2] - t.z;
-            t.z = zc_ - t.z;
-            t.r2 = r_ * r_;
-            if (facet_out_rows(box, t, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data()) == 0) return {};
+            return narrowed(lines);
         }
+        BoxTerms box;
+        TangentTerms tangent;
+        facet_terms(f, U, r_, zc_, box, tangent);
+        LineRange steps = in_steps(lines);
+        while (steps.any() && at_[steps.first + kLinesStep - 1] <= box.v_low - r_) steps.first += kLinesStep;
+        while (steps.any() && at_[steps.last - kLinesStep] >= box.v_high + r_) steps.last -= kLinesStep;
+        lines = {std::max(lines.first, steps.first), std::min(lines.last, steps.last)};
+        if (!lines.any()) return {};
+        if (facet_out_rows(box, tangent, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data()) == 0) return {};
         return narrowed(lines);
     }
 
@@ -424,6 +425,37 @@ private:
     std::array<std::vector<Crossing>, kLinesTogether> crossings_;
 };
 
+// Where numbers stand among ascending ones, found from where they would stand if those were evenly spaced, as lines mostly are.
+class Among {
+public:
+    explicit Among(std::span<const std::int32_t> lines)
+        : lines_(lines),
+          first_(lines.front()),
+          per_unit_(lines.back() > lines.front() ? static_cast<double>(lines.size() - 1) / (static_cast<double>(lines.back()) - lines.front()) : 0) {}
+    /// As std::lower_bound.
+    template <class T>
+    [[nodiscard]] std::size_t first_from(T value) const {
+        const auto n = static_cast<std::ptrdiff_t>(lines_.size());
+        const double guess = (static_cast<double>(value) - first_) * per_unit_;
+        std::ptrdiff_t at = guess <= 0 ? 0 : guess >= static_cast<double>(n) ? n : static_cast<std::ptrdiff_t>(guess);
+        for (int step = 0; step < kSteps; ++step) {
+            if (at > 0 && !(before(at - 1, value))) --at;
+            else if (at < n && before(at, value)) ++at;
+            else return static_cast<std::size_t>(at);
+        }
+        return static_cast<std::size_t>(std::lower_bound(lines_.begin(), lines_.end(), value) - lines_.begin());
+    }
+
+private:
+    static constexpr int kSteps = 4;
+    template <class T>
+    [[nodiscard]] bool before(std::ptrdiff_t i, T value) const {
+        return lines_[static_cast<std::size_t>(i)] < value;
+    }
+    std::span<const std::int32_t> lines_;
+    double first_, per_unit_;
+};
+
 // What matters to each block of lines at one height.
 template <int V>
 class BlocksOfLevel {
@@ -445,10 +477,7 @@ private:
                      std::size_t blocks) {
         const bool ball = cutter.profile == Cutter::Profile::ball;
         const double r = cutter.radius;
-        auto first_line = [&](double v) {
-            return static_cast<std::size_t>(
-                std::lower_bound(lines.begin(), lines.end(), v * kUnitsPerMm, [](std::int32_t l, double x) { return l < x; }) - lines.begin());
-        };
+        const Among among(lines);
         struct Active {
             std::uint32_t group, first, last;  // blocks [first, last)
         };
@@ -458,7 +487,8 @@ private:
             for (std::size_t g = begin; g < end; ++g) {
                 const FacetGroup& group = solid.groups[g];
                 if (!may_touch(group.z_min, group.z_max, group.overhang, ball, r, zc)) continue;
-                const std::size_t first = first_line(group.low[V] - r), last = first_line(group.high[V] + r);
+                const std::size_t first = among.first_from((group.low[V] - r) * kUnitsPerMm),
+                                  last = among.first_from((group.high[V] + r) * kUnitsPerMm);
                 if (first < last)
                     active[begin / grain].push_back({static_cast<std::uint32_t>(g), static_cast<std::uint32_t>(first / kBlock),
                                                      static_cast<std::uint32_t>((last - 1) / kBlock + 1)});
@@ -478,6 +508,7 @@ private:
 
     void list_segments(const Loops& inside, std::span<const std::int32_t> lines, std::size_t blocks) {
         segments_.resize(blocks);
+        const Among among(lines);
         auto coordinate = [](Point2 p) { return V == 0 ? p.x : p.y; };
         for (std::size_t l = 0; l < inside.size(); ++l) {
             const auto loop = inside.loop(l);
@@ -485,8 +516,8 @@ private:
                 const Point2 a = loop[i], b = loop[i + 1 == loop.size() ? 0 : i + 1];
                 const std::int32_t va = coordinate(a), vb = coordinate(b);
                 if (va == vb) continue;
-                const std::size_t first = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::min(va, vb)) - lines.begin());
-                const std::size_t last = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), std::max(va, vb)) - lines.begin());
+                const std::size_t first = among.first_from(std::min(va, vb));
+                const std::size_t last = among.first_from(std::max(va, vb));
                 if (first >= last) continue;
                 for (std::size_t k = first / kBlock; k <= (last - 1) / kBlock; ++k) segments_[k].push_back({a, b});
             }
