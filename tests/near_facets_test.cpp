@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "tests/support/seed.h"
@@ -60,8 +62,10 @@ TEST(NearFacets, KeepsAllThatAWayMeetsAndLittleElse) {
         NearFacets near;
         near.place(low, high, reach, ball, top, up);
         std::vector<unsigned char> keep;
-        for (const std::size_t lot : {std::size_t{FacetRows::kMost}, std::size_t{37}}) {
-            FacetRows rows;
+        const std::array<std::size_t, 2> sizes{FacetRows::kMost, 37};
+        std::array<FacetRows, 2> lots;
+        for (const std::size_t lot : sizes) {
+            FacetRows& rows = lots[all.empty() ? 0 : 1];
             const std::size_t first = all.size();
             for (std::size_t i = 0; i < lot; ++i) {
                 const double size = std::pow(10, between(-2, 0.7));
@@ -120,18 +124,85 @@ TEST(NearFacets, KeepsAllThatAWayMeetsAndLittleElse) {
                 }
                 kept += by_one[i], kept_closely += by_two[i];
             }
-            // What is kept of them is judged alike.
-            NearFacets fewer;
-            fewer.take(near, once);
-            std::vector<unsigned char> again;
-            fewer.near(asking, true, again);
-            std::size_t left = 0, wanted = 0;
-            for_each_kept(again, [&](std::size_t) { ++left; });
-            for_each_kept(twice, [&](std::size_t) { ++wanted; });
-            EXPECT_EQ(left, wanted);
+            // Added for the way, those are kept that are kept when it is asked for later.
+            NearFacets only;
+            only.place(low, high, reach, ball, top, up);
+            std::vector<std::size_t> added, wanted;
+            for (std::size_t i = 0; i < lots.size(); ++i) {
+                only.add(lots[i], sizes[i], asking, way % 2 == 0, keep);
+                for_each_kept(keep, [&](std::size_t k) { added.push_back(i * FacetRows::kMost + k); });
+            }
+            for_each_kept(way % 2 == 0 ? twice : once, [&](std::size_t k) { wanted.push_back(of[k]); });
+            EXPECT_EQ(added, wanted) << "seed " << seed << " trial " << trial << " way " << way;
         }
     }
     std::printf("met %zu, kept %zu and %zu closely, of those %zu and %zu far\n", met, kept, kept_closely, far, far_closely);
     EXPECT_GT(met, 10000u);
     EXPECT_LT(far_closely, kept_closely / 5);
+}
+
+TEST(NearFacets, EightsKeepAllThatIsAroundAWay) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    auto between = [&](double low, double high) { return low + (high - low) * unit(random); };
+    std::size_t met = 0, kept = 0, all = 0;
+    for (int trial = 0; trial < 600; ++trial) {
+        const bool ball = trial % 2 == 0;
+        const double radius = between(0.5, 7), length = trial % 3 == 0 ? 0.0 : between(0, 8);
+        const P a{between(-600, 600), between(-600, 600), between(-20, 20)};
+        P b = a;
+        for (double& v : b) v += between(-length, length);
+        if (trial % 5 == 0) b[2] = a[2];
+        if (trial % 7 == 0) b[0] = a[0], b[1] = a[1];
+        const double lowest = std::min(a[2], b[2]), top = lowest + between(-radius, 2 * radius), margin = 1e-5 * (620 + radius);
+        const NearWay way{a, b, radius, ball ? lowest - radius : lowest, 0};
+        const WayAround around(way, ball, lowest, top, radius + margin);
+        std::array<EightFacets, ManyEights::kMost> eights;
+        std::array<std::array<P, 3>, 8 * ManyEights::kMost> facets;
+        ManyEights many;
+        const std::size_t count = 1 + static_cast<std::size_t>(trial) % ManyEights::kMost;
+        for (std::size_t i = 0; i < 8 * count; ++i) {
+            const double size = std::pow(10, between(-2, 0.7)), along = unit(random);
+            for (P& p : facets[i]) p = {a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1]), a[2] + along * (b[2] - a[2])};
+            const P off{between(-1.5, 1.5) * radius, between(-1.5, 1.5) * radius, between(-1.5, 1.5) * radius};
+            for (P& p : facets[i])
+                for (std::size_t k = 0; k < 3; ++k) p[k] = static_cast<float>(p[k] + off[k] + between(-size, size));
+            if (i % 16 == 0) facets[i][2] = facets[i][1];
+            EightFacets& e = eights[i / 8];
+            const std::size_t k = i % 8;
+            auto single = [&](std::size_t p, std::size_t axis) { return static_cast<float>(facets[i][p][axis]); };
+            e.x0[k] = single(0, 0), e.y0[k] = single(0, 1), e.z0[k] = single(0, 2);
+            e.x1[k] = single(1, 0), e.y1[k] = single(1, 1), e.z1[k] = single(1, 2);
+            e.x2[k] = single(2, 0), e.y2[k] = single(2, 1), e.z2[k] = single(2, 2);
+        }
+        // Facets that there are none of.
+        constexpr float none = std::numeric_limits<float>::quiet_NaN();
+        EightFacets& last = eights[count - 1];
+        for (auto* row : {&last.x0, &last.y0, &last.z0, &last.x1, &last.y1, &last.z1, &last.x2, &last.y2, &last.z2}) (*row)[7] = none;
+        for (std::size_t i = 0; i < count; ++i) many.eights[many.count++] = &eights[i];
+        std::array<unsigned, ManyEights::kMost> keep;
+        facets_around(many, around, keep);
+        for (std::size_t i = 0; i < count; ++i) {
+            std::vector<std::size_t> bits;
+            for_each_bit(keep[i], [&](std::size_t k) { bits.push_back(k); });
+            EXPECT_TRUE(std::is_sorted(bits.begin(), bits.end()));
+            kept += bits.size(), all += 8;
+            for (std::size_t k = 0; k < 8; ++k) {
+                const bool is_kept = std::find(bits.begin(), bits.end(), k) != bits.end();
+                if (i + 1 == count && k == 7) {
+                    EXPECT_FALSE(is_kept);
+                    continue;
+                }
+                const double d = sampled_distance(facets[8 * i + k], a, b, ball, top, 12);
+                met += d < radius;
+                if (d < radius) {
+                    EXPECT_TRUE(is_kept) << "seed " << seed << " trial " << trial << " facet " << 8 * i + k << " at " << d << " of " << radius;
+                }
+            }
+        }
+    }
+    std::printf("met %zu, kept %zu of %zu\n", met, kept, all);
+    EXPECT_GT(met, 2500u);
+    EXPECT_LT(kept, met + met / 3);
 }

@@ -11,6 +11,25 @@ namespace slabwright {
 namespace {
 
 struct Rows {
+    /// @param row gives the k-th
+    template <class Row>
+    explicit Rows(const Row& row)
+        : nx(row(0)),
+          ny(row(1)),
+          nz(row(2)),
+          offset(row(3)),
+          needs(row(4)),
+          x0(row(5)),
+          y0(row(6)),
+          z0(row(7)),
+          x1(row(8)),
+          y1(row(9)),
+          z1(row(10)),
+          x2(row(11)),
+          y2(row(12)),
+          z2(row(13)),
+          highest(row(15)),
+          wrong(row(14)) {}
     const float *nx, *ny, *nz, *offset;  // signed distance from the facet's plane
     const float* needs;                  // a place so far above the plane, or farther, does not meet the facet
     const float *x0, *y0, *z0, *x1, *y1, *z1, *x2, *y2, *z2, *highest;
@@ -90,7 +109,7 @@ SLABWRIGHT_WIDE static void near_rows(const Rows& r, const Way& w, int n, unsign
         most = most > d2 ? most : d2;
         const float forward = ux * w.dx + uy * w.dy + uz * w.dz, first = -most, last = forward - most, reach = w.reach + w.slack + r.wrong[i];
         const float gap = first < last ? first : last;
-        keep[i] =
+        keep[i] &=
             (above - w.slack < r.needs[i]) & ((gap <= 0.0F) | (gap * gap < reach * reach * (ux * ux + uy * uy + uz * uz))) & (r.highest[i] > w.above);
     }
 }
@@ -179,100 +198,98 @@ SLABWRIGHT_WIDE static void box_rows(const Corners& r, const Box& box, int n, fl
     }
 }
 
-SLABWRIGHT_WIDE static void around_rows(const Corners& r, const WayAround& way, int n, unsigned char* __restrict keep) {
+WayAround::WayAround(const NearWay& way, bool ball, double lowest_z, double top_z, double reach)
+    : ax(static_cast<float>(way.a[0])),
+      ay(static_cast<float>(way.a[1])),
+      az(static_cast<float>(way.a[2])),
+      dx(static_cast<float>(way.b[0] - way.a[0])),
+      dy(static_cast<float>(way.b[1] - way.a[1])),
+      dz(static_cast<float>(way.b[2] - way.a[2])),
+      ux(1),
+      uy(0),
+      length(0),
+      per_length2(0),
+      end(0),
+      lowest(static_cast<float>(lowest_z)),
+      upwards(ball ? 1.0F : 0.0F),
+      above(std::nextafter(static_cast<float>(way.above), -std::numeric_limits<float>::infinity())),
+      top(std::nextafter(static_cast<float>(top_z), std::numeric_limits<float>::infinity())),
+      reach2(static_cast<float>(reach * reach)) {
+    const double x = way.b[0] - way.a[0], y = way.b[1] - way.a[1], length2 = x * x + y * y, l = std::sqrt(length2);
+    if (l > 0) ux = static_cast<float>(x / l), uy = static_cast<float>(y / l), length = static_cast<float>(l);
+    if (length2 > 1e-12) per_length2 = static_cast<float>(1 / length2), end = 1;
+}
+
+// Written with vectors of eight, since compilers take such a short loop apart into smaller ones.
+SLABWRIGHT_WIDE static void around_eights(const ManyEights& many, const WayAround& way, unsigned* __restrict keep) {
+    using Eight [[gnu::vector_size(32)]] = float;
+    using Signs [[gnu::vector_size(32)]] = std::int32_t;
     const WayAround w = way;
-    for (int i = 0; i < n; ++i) {
-        const float x0 = r.x0[i] - w.ax, y0 = r.y0[i] - w.ay, x1 = r.x1[i] - w.ax, y1 = r.y1[i] - w.ay, x2 = r.x2[i] - w.ax, y2 = r.y2[i] - w.ay;
-        const float l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
-        const float c0 = y0 * w.ux - x0 * w.uy, c1 = y1 * w.ux - x1 * w.uy, c2 = y2 * w.ux - x2 * w.uy;
-        const float l_low = min3(l0, l1, l2), l_high = max3(l0, l1, l2), c_low = min3(c0, c1, c2), c_high = max3(c0, c1, c2);
-        const float lowest = min3(r.z0[i], r.z1[i], r.z2[i]), highest = max3(r.z0[i], r.z1[i], r.z2[i]);
-        const float l = max3(0.0F, l_low - w.length, -l_high), c = max3(0.0F, c_low, -c_high);
-        const float under = w.lowest - (highest < w.top ? highest : w.top), u = (under > 0.0F ? under : 0.0F) * w.upwards;
-        keep[i] = static_cast<unsigned char>((lowest < w.top) & (highest > w.above) & (l * l + c * c + u * u < w.reach2));
+    const Eight none{};
+    const auto bits_of = [](const Signs& signs) {
+        const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
+        std::array<std::uint64_t, 4> pairs;
+        std::memcpy(pairs.data(), &bits, sizeof(pairs));
+        const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
+        return static_cast<unsigned>(all | all >> 32);
+    };
+    const float forward_x = w.dx, forward_y = w.dy, forward_z = w.dz * w.upwards;
+    for (std::size_t i = 0; i < many.count; ++i) {
+        const EightFacets& f = *many.eights[i];
+        Eight x0, y0, z0, x1, y1, z1, x2, y2, z2;
+        std::memcpy(&x0, f.x0.data(), sizeof(Eight)), std::memcpy(&y0, f.y0.data(), sizeof(Eight)), std::memcpy(&z0, f.z0.data(), sizeof(Eight));
+        std::memcpy(&x1, f.x1.data(), sizeof(Eight)), std::memcpy(&y1, f.y1.data(), sizeof(Eight)), std::memcpy(&z1, f.z1.data(), sizeof(Eight));
+        std::memcpy(&x2, f.x2.data(), sizeof(Eight)), std::memcpy(&y2, f.y2.data(), sizeof(Eight)), std::memcpy(&z2, f.z2.data(), sizeof(Eight));
+        Eight lowest = z0 < z1 ? z0 : z1, highest = z0 > z1 ? z0 : z1;
+        lowest = lowest < z2 ? lowest : z2, highest = highest > z2 ? highest : z2;
+        x0 -= w.ax, y0 -= w.ay, x1 -= w.ax, y1 -= w.ay, x2 -= w.ax, y2 -= w.ay;
+        const Eight l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
+        const Eight c0 = y0 * w.ux - x0 * w.uy, c1 = y1 * w.ux - x1 * w.uy, c2 = y2 * w.ux - x2 * w.uy;
+        Eight l_low = l0 < l1 ? l0 : l1, l_high = l0 > l1 ? l0 : l1, c_low = c0 < c1 ? c0 : c1, c_high = c0 > c1 ? c0 : c1;
+        l_low = l_low < l2 ? l_low : l2, l_high = l_high > l2 ? l_high : l2, c_low = c_low < c2 ? c_low : c2, c_high = c_high > c2 ? c_high : c2;
+        Eight l = l_low - w.length, c = c_low > -c_high ? c_low : -c_high, under = w.lowest - (highest < w.top ? highest : none + w.top);
+        l = l > -l_high ? l : -l_high, l = l > none ? l : none, c = c > none ? c : none, under = (under > none ? under : none) * w.upwards;
+        const Signs kept = (lowest < w.top) & (highest > w.above) & (l * l + c * c + under * under < w.reach2);
+        if (keep[i] = bits_of(kept); keep[i] != 0) {
+            z0 -= w.az, z1 -= w.az, z2 -= w.az;
+            const Eight mx = (x0 + x1 + x2) * third, my = (y0 + y1 + y2) * third, mz = (z0 + z1 + z2) * third;
+            Eight t = (mx * w.dx + my * w.dy) * w.per_length2;
+            t = t > none ? t : none, t = t < w.end ? t : none + w.end;
+            const Eight ux = t * w.dx - mx, uy = t * w.dy - my, over = (t * w.dz - mz) * w.upwards, uz = over > none ? over : none;
+            const Eight d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1, d2 = ux * x2 + uy * y2 + uz * z2;
+            Eight most = d0 > d1 ? d0 : d1;
+            most = most > d2 ? most : d2;
+            const Eight forward = ux * forward_x + uy * forward_y + uz * forward_z, gap = (forward < none ? forward : none) - most;
+            keep[i] = bits_of(kept & ((gap <= none) | (gap * gap < w.reach2 * (ux * ux + uy * uy + uz * uz))));
+        }
     }
 }
 
-void facets_around(const FacetRows& facets, std::size_t count, const WayAround& way, std::vector<unsigned char>& keep) {
-    keep.assign((count + 7) / 8 * 8, 0);
-    around_rows(Corners(facets), way, static_cast<int>(count), keep.data());
+void facets_around(const ManyEights& eights, const WayAround& way, std::array<unsigned, ManyEights::kMost>& keep) {
+    around_eights(eights, way, keep.data());
 }
 
-void NearFacets::place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball, double top, double up) {
-    for (std::size_t k = 0; k < 3; ++k) middle_[k] = (low[k] + high[k]) / 2, half_[k] = (high[k] - low[k]) / 2;
-    reach_ = reach, top_ = top, up_ = up;
-    ball_ = ball;
-    size_ = 0;
-}
-
-void NearFacets::add(const FacetRows& facets, std::size_t count, std::vector<unsigned char>& keep) {
-    keep.assign((count + 7) / 8 * 8, 0);
-    std::array<std::array<float, FacetRows::kMost>, kRows> values;
-    const Box box{middle_[0],
-                  middle_[1],
-                  middle_[2],
-                  half_[0],
-                  half_[1],
-                  half_[2],
-                  top_ - middle_[2],
-                  up_ - half_[2],
-                  ball_ ? 1.0 : 0.0,
-                  up_,
-                  ball_ ? reach_ : 0.0,
-                  ball_ ? 0.0 : reach_,
-                  reach_ * reach_,
-                  ball_ ? 1e30 : kHair,
-                  half_[0] + half_[1] + half_[2] + reach_ + up_};
-    box_rows(Corners(facets), box, static_cast<int>(count), values[0].data(), keep.data());
-    make_room(size_ + count);
-    for_each_kept(keep, [&](std::size_t i) {
-        for (std::size_t row = 0; row < kRows; ++row) rows_[row][size_] = values[row][i];
-        ++size_;
-    });
-}
-
-void NearFacets::make_room(std::size_t size) {
-    if (size > rows_[0].size())
-        for (auto& row : rows_) row.resize(std::max<std::size_t>(256, 2 * size));
-}
-
-void NearFacets::take(const NearFacets& others, const std::vector<unsigned char>& keep) {
-    middle_ = others.middle_, half_ = others.half_, reach_ = others.reach_, ball_ = others.ball_;
-    size_ = 0;
-    add(others, keep);
-}
-
-void NearFacets::add(const NearFacets& others, const std::vector<unsigned char>& keep) {
-    std::size_t count = size_;
-    for_each_kept(keep, [&](std::size_t) { ++count; });
-    make_room(count);
-    for_each_kept(keep, [&](std::size_t i) {
-        for (std::size_t k = 0; k < kRows; ++k) rows_[k][size_] = others.rows_[k][i];
-        ++size_;
-    });
-}
-
-void NearFacets::near(const NearWay& way, bool closely, std::vector<unsigned char>& keep) const {
-    keep.assign((size_ + 7) / 8 * 8, 0);
-    auto single = [&](double v, std::size_t k) { return static_cast<float>(v - middle_[k]); };
+static Way way_from(const NearWay& way, const std::array<double, 3>& middle, bool ball, double reach) {
+    auto single = [&](double v, std::size_t k) { return static_cast<float>(v - middle[k]); };
     const double dx = way.b[0] - way.a[0], dy = way.b[1] - way.a[1], length2 = dx * dx + dy * dy;
-    const Way w{single(way.a[0], 0),
-                single(way.a[1], 1),
-                single(way.a[2], 2),
-                static_cast<float>(dx),
-                static_cast<float>(dy),
-                static_cast<float>(way.b[2] - way.a[2]),
-                length2 > 1e-12 ? static_cast<float>(1 / length2) : 0.0F,
-                length2 > 1e-12 ? 1.0F : 0.0F,
-                ball_ ? 1.0F : 0.0F,
-                static_cast<float>(way.reach),
-                std::nextafter(single(way.above, 2), -std::numeric_limits<float>::infinity()),
-                static_cast<float>(way.slack),
-                ball_ ? static_cast<float>(reach_ - way.reach) : 0.0F};
-    auto row = [&](std::size_t k) { return rows_[k].data(); };
-    const Rows rows{row(0), row(1), row(2),  row(3),  row(4),  row(5),  row(6),  row(7),
-                    row(8), row(9), row(10), row(11), row(12), row(13), row(15), row(14)};
-    near_rows(rows, w, static_cast<int>(size_), keep.data());
+    return {single(way.a[0], 0),
+            single(way.a[1], 1),
+            single(way.a[2], 2),
+            static_cast<float>(dx),
+            static_cast<float>(dy),
+            static_cast<float>(way.b[2] - way.a[2]),
+            length2 > 1e-12 ? static_cast<float>(1 / length2) : 0.0F,
+            length2 > 1e-12 ? 1.0F : 0.0F,
+            ball ? 1.0F : 0.0F,
+            static_cast<float>(way.reach),
+            std::nextafter(single(way.above, 2), -std::numeric_limits<float>::infinity()),
+            static_cast<float>(way.slack),
+            ball ? static_cast<float>(reach - way.reach) : 0.0F};
+}
+
+/// Keeps of what is kept what the way may meet.
+static void keep_near(const Rows& rows, const Way& w, std::size_t size, bool closely, std::vector<unsigned char>& keep) {
+    near_rows(rows, w, static_cast<int>(size), keep.data());
     if (!closely) return;
     FacetRows chosen;
     std::array<float, FacetRows::kMost> wrong;
@@ -293,6 +310,47 @@ void NearFacets::near(const NearWay& way, bool closely, std::vector<unsigned cha
         if (count == FacetRows::kMost) look();
     });
     if (count > 0) look();
+}
+
+void NearFacets::place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball, double top, double up) {
+    for (std::size_t k = 0; k < 3; ++k) middle_[k] = (low[k] + high[k]) / 2, half_[k] = (high[k] - low[k]) / 2;
+    reach_ = reach, top_ = top, up_ = up;
+    ball_ = ball;
+    size_ = 0;
+}
+
+void NearFacets::add(const FacetRows& facets, std::size_t count, const NearWay* way, bool closely, std::vector<unsigned char>& keep) {
+    keep.assign((count + 7) / 8 * 8, 0);
+    std::array<std::array<float, FacetRows::kMost>, kRows> values;
+    const Box box{middle_[0],
+                  middle_[1],
+                  middle_[2],
+                  half_[0],
+                  half_[1],
+                  half_[2],
+                  top_ - middle_[2],
+                  up_ - half_[2],
+                  ball_ ? 1.0 : 0.0,
+                  up_,
+                  ball_ ? reach_ : 0.0,
+                  ball_ ? 0.0 : reach_,
+                  reach_ * reach_,
+                  ball_ ? 1e30 : kHair,
+                  half_[0] + half_[1] + half_[2] + reach_ + up_};
+    box_rows(Corners(facets), box, static_cast<int>(count), values[0].data(), keep.data());
+    if (way) keep_near(Rows([&](std::size_t k) { return values[k].data(); }), way_from(*way, middle_, ball_, reach_), count, closely, keep);
+    if (size_ + count > rows_[0].size())
+        for (auto& row : rows_) row.resize(std::max<std::size_t>(256, 2 * (size_ + count)));
+    for_each_kept(keep, [&](std::size_t i) {
+        for (std::size_t row = 0; row < kRows; ++row) rows_[row][size_] = values[row][i];
+        ++size_;
+    });
+}
+
+void NearFacets::near(const NearWay& way, bool closely, std::vector<unsigned char>& keep) const {
+    keep.assign((size_ + 7) / 8 * 8, 0);
+    std::fill_n(keep.begin(), size_, static_cast<unsigned char>(1));
+    keep_near(Rows([&](std::size_t k) { return rows_[k].data(); }), way_from(way, middle_, ball_, reach_), size_, closely, keep);
 }
 
 }  // namespace slabwright

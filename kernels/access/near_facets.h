@@ -18,6 +18,11 @@ struct NearWay {
     double slack;  ///< what is meant may be so far from the straight way, mm
 };
 
+/// Corners of eight facets, mm.
+struct EightFacets {
+    std::array<float, 8> x0, y0, z0, x1, y1, z1, x2, y2, z2;
+};
+
 /// Corners of up to kMost facets, mm.
 struct FacetRows {
     static constexpr std::size_t kMost = 64;
@@ -31,36 +36,54 @@ public:
     /// @param up mm that the ways are above the box at least
     void place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball, double top, double up);
     /// Adds those of `count` facets that a way within the box may meet, in their order. @param keep gets 1 for them, else 0, filled up as below
-    void add(const FacetRows& facets, std::size_t count, std::vector<unsigned char>& keep);
+    void add(const FacetRows& facets, std::size_t count, std::vector<unsigned char>& keep) { add(facets, count, nullptr, false, keep); }
     /// keep[i] is 1 where the way may meet facet i, else 0. Its size becomes a multiple of eight, filled with 0.
     /// @param closely looks a second time at what is kept, so that little is that does not meet; not worth it where the slack is more
     void near(const NearWay& way, bool closely, std::vector<unsigned char>& keep) const;
-    /// Adds what is kept of others that were placed alike.
-    void add(const NearFacets& others, const std::vector<unsigned char>& keep);
-    /// Becomes what is kept of others.
-    void take(const NearFacets& others, const std::vector<unsigned char>& keep);
+    /// Adds of them only what near() would keep for this way.
+    void add(const FacetRows& facets, std::size_t count, const NearWay& way, bool closely, std::vector<unsigned char>& keep) {
+        add(facets, count, &way, closely, keep);
+    }
 
 private:
     static constexpr std::size_t kRows = 16;
     std::array<double, 3> middle_{}, half_{};
-    void make_room(std::size_t size);
+    void add(const FacetRows& facets, std::size_t count, const NearWay* way, bool closely, std::vector<unsigned char>& keep);
     double reach_ = 0, top_ = 0, up_ = 0;
     bool ball_ = false;
     std::size_t size_ = 0;
     std::array<std::vector<float>, kRows> rows_;
 };
 
-/// What a straight way may meet by its extent along the way, across it and upwards, in single precision: a first look, before anything is computed of
-/// a facet. The reach holds what the numbers may be wrong by.
+/// What a straight way may meet, in single precision: a first look, before anything is computed of a facet. By extents along the way, across it and
+/// upwards, and by a plane across the line from the facet's middle to the way. The reach holds what the numbers may be wrong by.
 struct WayAround {
-    float ax, ay, ux, uy, length;  ///< where it begins, its direction and its length in plan, mm
+    /// @param lowest of the way, mm @param top what is not below it does not count @param reach mm; what is asked of the way itself does not matter
+    WayAround(const NearWay& way, bool ball, double lowest, double top, double reach);
+
+    float ax, ay, az, dx, dy, dz;  ///< where it begins and what it leads by, mm
+    float ux, uy, length;          ///< its direction and its length in plan, mm
+    float per_length2, end;        ///< 1 / length² and 1, or 0 where it has no length in plan
     float lowest, upwards;         ///< of it, mm, and 1 where heights count as distance, 0 where they do not
     float above, top;              ///< what is no higher, or not below the top, does not count, mm
     float reach2;                  ///< square of the reach, mm²
 };
 
-/// keep[i] is 1 where the way may meet facet i of `count`, else 0, filled up as above.
-void facets_around(const FacetRows& facets, std::size_t count, const WayAround& way, std::vector<unsigned char>& keep);
+/// Eights to look at in one go.
+struct ManyEights {
+    static constexpr std::size_t kMost = 8;
+    std::array<const EightFacets*, kMost> eights;
+    std::size_t count = 0;
+};
+
+/// Bit k of keep[i] is 1 where the way may meet facet k of eight i, else 0.
+void facets_around(const ManyEights& eights, const WayAround& way, std::array<unsigned, ManyEights::kMost>& keep);
+
+/// fn(k) for every bit k that is 1, ascending.
+template <class Fn>
+void for_each_bit(unsigned bits, Fn&& fn) {
+    for (; bits != 0; bits &= bits - 1) fn(static_cast<std::size_t>(std::countr_zero(bits)));
+}
 
 /// fn(i) for all that is kept, ascending.
 template <class Fn>

@@ -265,6 +265,18 @@ Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& tri, double
 
 }  // namespace
 
+void StandingPart::Facets::set(std::size_t i, const Facet& facet) {
+    EightFacets& e = eights_[i / 8];
+    const std::size_t k = i % 8;
+    const auto& [a, b, c] = facet.v;
+    e.x0[k] = a.x, e.y0[k] = a.y, e.z0[k] = a.z, e.x1[k] = b.x, e.y1[k] = b.y, e.z1[k] = b.z, e.x2[k] = c.x, e.y2[k] = c.y, e.z2[k] = c.z;
+}
+
+void StandingPart::Facets::end() {
+    constexpr float none = std::numeric_limits<float>::quiet_NaN();
+    for (std::size_t i = size_; i < 8 * eights_.size(); ++i) set(i, {{Vec3f{none, none, none}, {none, none, none}, {none, none, none}}});
+}
+
 StandingPart::StandingPart(Context& context, MeshView mesh) {
     const std::size_t n = mesh.size();
     box_ = bounds(mesh);
@@ -299,9 +311,10 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
     parallel_for(context, n, 1 << 14, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const Index3& f = mesh.facets[keys[i] & facet_mask];
-            for (int k = 0; k < 3; ++k) facets_[i].v[k] = mesh.vertices[f[k]];
+            facets_.set(i, {{mesh.vertices[f[0]], mesh.vertices[f[1]], mesh.vertices[f[2]]}});
         }
     });
+    facets_.end();
     auto join = [](Node& a, const Node& b) {
         a.x0 = std::min(a.x0, b.x0), a.y0 = std::min(a.y0, b.y0), a.z0 = std::min(a.z0, b.z0);
         a.x1 = std::max(a.x1, b.x1), a.y1 = std::max(a.y1, b.y1), a.z1 = std::max(a.z1, b.z1);
@@ -339,20 +352,24 @@ StandingPart::Within::Within(const Point3& from, const Point3& to) {
 }
 
 // Written with vectors of eight, since compilers take such a short loop apart into smaller ones.
-SLABWRIGHT_WIDE void StandingPart::overlapping(const Nodes& n, const Within& box, Kept& keep) {
+SLABWRIGHT_WIDE unsigned StandingPart::overlapping(const Nodes& n, const Within& box) {
     using Eight [[gnu::vector_size(32)]] = float;
     using Signs [[gnu::vector_size(32)]] = std::int32_t;
-    static_assert(sizeof(Kept) == sizeof(Signs) && sizeof(n.x0) == sizeof(Eight));
+    static_assert(sizeof(n.x0) == sizeof(Eight));
     Eight x0, y0, z0, x1, y1, z1;
     std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
     std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
     const Eight none{}, low_x = none + box.low[0], low_y = none + box.low[1], low_z = none + box.low[2];
     const Eight high_x = none + box.high[0], high_y = none + box.high[1], high_z = none + box.high[2];
     const Signs kept = (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
-    std::memcpy(keep.data(), &kept, sizeof(kept));
+    const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = kept & own;
+    std::array<std::uint64_t, 4> pairs;
+    std::memcpy(pairs.data(), &bits, sizeof(pairs));
+    const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
+    return static_cast<unsigned>(all | all >> 32);
 }
 
-/// Visits, in one fixed order, the facets [first, last) of every node that choose(eight nodes, keep) keeps.
+/// Visits, in one fixed order, the facets [first, last) of every node whose bit is 1 in choose(eight nodes).
 template <class Choose, class Visit>
 void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
     struct Item {
@@ -363,21 +380,19 @@ void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
     std::size_t size = 0;
     if (facets_.empty()) return;
     stack[size++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0};
-    Kept keep;
     while (size > 0) {
         const Item item = stack[--size];
-        choose(levels_[item.level][item.eight], keep);
-        std::array<std::uint64_t, 4> pairs;
-        std::memcpy(pairs.data(), keep.data(), sizeof(pairs));
-        if ((pairs[0] | pairs[1] | pairs[2] | pairs[3]) == 0) continue;
+        unsigned keep = choose(levels_[item.level][item.eight]);
         const std::size_t first = item.eight * kFan;
-        if (item.level > 0) {
-            for (std::size_t k = kFan; k-- > 0;)
-                if (keep[k] != 0) stack[size++] = {item.level - 1, first + k};
+        if (item.level == 0) {
+            for_each_bit(keep, [&](std::size_t k) { visit((first + k) * kFan, std::min(facets_.size(), (first + k + 1) * kFan)); });
             continue;
         }
-        for (std::size_t k = 0; k < kFan; ++k)
-            if (keep[k] != 0) visit((first + k) * kFan, std::min(facets_.size(), (first + k + 1) * kFan));
+        while (keep != 0) {  // the last first, so that the first is on top
+            const unsigned k = static_cast<unsigned>(std::bit_width(keep)) - 1;
+            stack[size++] = {item.level - 1, first + k};
+            keep ^= 1U << k;
+        }
     }
 }
 
@@ -385,8 +400,10 @@ void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
 template <class Enter, class Visit>
 void StandingPart::walk(Enter&& enter, Visit&& visit) const {
     walk_leaves(
-        [&](const Nodes& nodes, Kept& keep) {
-            for (std::size_t k = 0; k < kFan; ++k) keep[k] = nodes.x0[k] <= nodes.x1[k] && enter(nodes[k]);
+        [&](const Nodes& nodes) {
+            unsigned keep = 0;
+            for (unsigned k = 0; k < kFan; ++k) keep |= static_cast<unsigned>(nodes.x0[k] <= nodes.x1[k] && enter(nodes[k])) << k;
+            return keep;
         },
         [&](std::size_t first, std::size_t last) {
             for (std::size_t f = first; f < last; ++f) visit(facets_[f]);
@@ -396,7 +413,7 @@ void StandingPart::walk(Enter&& enter, Visit&& visit) const {
 /// The same of every node whose box has something in common with this.
 template <class Visit>
 void StandingPart::walk_within(const Within& box, Visit&& visit) const {
-    walk_leaves([&](const Nodes& nodes, Kept& keep) { overlapping(nodes, box, keep); },
+    walk_leaves([&](const Nodes& nodes) { return overlapping(nodes, box); },
                 [&](std::size_t first, std::size_t last) {
                     for (std::size_t f = first; f < last; ++f) visit(facets_[f]);
                 });
@@ -538,7 +555,7 @@ Penetration motion_depth(const Cutter& cutter, const Point3& from, const Point3&
 
 }  // namespace
 
-/// Visits the facets of nodes with squared(box) < limit(), the nearer of siblings first, so that the limit falls early. Ties
+/// Visits the facets, and which they are, of nodes with squared(box) < limit(), the nearer of siblings first, so that the limit falls early. Ties
 /// keep the order of the tree.
 template <class Squared, class Limit, class Visit>
 void StandingPart::walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit) const {
@@ -568,7 +585,8 @@ void StandingPart::walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit)
         if (!(item.d < limit())) continue;
         if (item.level > 0) push(item.level - 1, item.index);
         else
-            for (std::size_t k = item.index * kFan; k < std::min(facets_.size(), (item.index + 1) * kFan); ++k) visit(facets_[k]);
+            for (std::size_t k = item.index * kFan; k < std::min(facets_.size(), (item.index + 1) * kFan); ++k)
+                visit(facets_[k], static_cast<std::uint32_t>(k));
     }
 }
 
@@ -630,13 +648,15 @@ struct StandingPart::Stretch {
 };
 
 // Written with vectors of eight, as overlapping() is.
-SLABWRIGHT_WIDE void StandingPart::around(const Nodes& n, const WayAround& w, Kept& keep) {
+SLABWRIGHT_WIDE unsigned StandingPart::around(const Nodes& n, const WayAround& w, const Within& box) {
     using Eight [[gnu::vector_size(32)]] = float;
     using Signs [[gnu::vector_size(32)]] = std::int32_t;
     Eight x0, y0, z0, x1, y1, z1;
     std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
     std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
     const Eight none{}, top = none + w.top;
+    const Signs within = (x0 <= none + box.high[0]) & (none + box.low[0] <= x1) & (y0 <= none + box.high[1]) & (none + box.low[1] <= y1) &
+                         (z0 <= none + box.high[2]) & (none + box.low[2] <= z1);
     const float sx = std::abs(w.ux), sy = std::abs(w.uy);
     const Eight hx = (x1 - x0) * 0.5F, hy = (y1 - y0) * 0.5F, cx = (x1 + x0) * 0.5F - w.ax, cy = (y1 + y0) * 0.5F - w.ay;
     const Eight along = cx * w.ux + cy * w.uy, aside = cy * w.ux - cx * w.uy, across = aside > none ? aside : -aside;
@@ -644,8 +664,12 @@ SLABWRIGHT_WIDE void StandingPart::around(const Nodes& n, const WayAround& w, Ke
     Eight l = before > behind ? before : behind, high = z1 < top ? z1 : top, under = w.lowest - high;
     l = l > none ? l : none, under = under > none ? under : none;
     const Eight c = beside > none ? beside : none, u = under * w.upwards;
-    const Signs kept = (x0 <= x1) & (z0 < top) & (z1 > none + w.above) & (l * l + c * c + u * u < none + w.reach2);
-    std::memcpy(keep.data(), &kept, sizeof(kept));
+    const Signs kept = within & (z0 < top) & (z1 > none + w.above) & (l * l + c * c + u * u < none + w.reach2);
+    const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = kept & own;
+    std::array<std::uint64_t, 4> pairs;
+    std::memcpy(pairs.data(), &bits, sizeof(pairs));
+    const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
+    return static_cast<unsigned>(all | all >> 32);
 }
 
 namespace {
@@ -659,8 +683,7 @@ NearWay asking(const Cutter& cutter, const Point3& from, const Point3& to, doubl
 /// What finding the facets of a stretch needs, and what is known of the row so far.
 struct StandingPart::Search {
     Cutter cutter{};
-    NearFacets some;
-    std::vector<unsigned char> keep, met;
+    std::vector<unsigned char> keep;
     std::size_t many = Stretch::kShort, calm = 0;  // motions that the next stretch takes if they are free; free stretches before it takes more
 };
 
@@ -671,73 +694,51 @@ bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t 
     if (s.high[2] >= cutter.top - depth) s.sink();
     const Point3 &from = s.from, &to = s.to;
     const NearWay way = asking(cutter, from, to, s.low[2], depth, s.slack);
-    const double dx = to[0] - from[0], dy = to[1] - from[1], length = std::sqrt(dx * dx + dy * dy);
+    const double length = std::hypot(to[0] - from[0], to[1] - from[1]);
     double largest = length + std::max({std::abs(from[0]), std::abs(from[1]), std::abs(s.low[2])});
     for (const float v : {box_.min.x, box_.min.y, box_.min.z, box_.max.x, box_.max.y, box_.max.z}) largest = std::max<double>(largest, std::abs(v));
     const double reach = way.reach + s.slack + 1e-5 * (largest + cutter.radius);
-    constexpr float inf = std::numeric_limits<float>::infinity();
-    const WayAround place{static_cast<float>(from[0]),
-                          static_cast<float>(from[1]),
-                          length > 0 ? static_cast<float>(dx / length) : 1.0F,
-                          length > 0 ? static_cast<float>(dy / length) : 0.0F,
-                          static_cast<float>(length),
-                          static_cast<float>(s.low[2] + (cutter.ball() ? cutter.radius : 0)),
-                          cutter.ball() ? 1.0F : 0.0F,
-                          std::nextafter(static_cast<float>(way.above), -inf),
-                          std::nextafter(static_cast<float>(cutter.top), inf),
-                          static_cast<float>(reach * reach)};
+    const WayAround place(way, cutter.ball(), s.low[2] + (cutter.ball() ? cutter.radius : 0), cutter.top, reach);
     const double lowest = s.low[2] + (cutter.ball() ? cutter.radius : depth);
     const Within box({s.low[0] - way.reach, s.low[1] - way.reach, cutter.ball() ? lowest - way.reach : lowest},
                      {s.high[0] + way.reach, s.high[1] + way.reach, cutter.top});
     s.terms.place(s.low, s.high, way.reach, cutter.ball(), cutter.top, cutter.ball() ? cutter.radius : depth);
     s.facets.clear();
-    FacetRows rows, close;
-    std::array<std::uint32_t, FacetRows::kMost> facets, which, kept;
-    std::size_t count = 0, some = 0;
+    ManyEights many;
+    FacetRows close;
+    std::array<std::uint32_t, ManyEights::kMost> first_of;
+    std::array<unsigned, ManyEights::kMost> met;
+    std::array<std::uint32_t, FacetRows::kMost> which;
+    std::size_t some = 0;
     const bool closely = s.slack == 0 || most == Stretch::kFew;
     bool all = true;
     auto look = [&] {
-        search.some.place(s.low, s.high, way.reach, cutter.ball(), cutter.top, cutter.ball() ? cutter.radius : depth);
-        search.some.add(close, some, search.keep);
-        std::size_t n = 0;
-        for_each_kept(search.keep, [&](std::size_t k) { kept[n++] = which[k]; });
+        s.terms.add(close, some, way, closely, search.keep);
+        for_each_kept(search.keep, [&](std::size_t k) { s.facets.push_back(which[k]); });
         some = 0;
-        if (n == 0) return;
-        search.some.near(way, closely, search.keep);
-        s.terms.add(search.some, search.keep);
-        for_each_kept(search.keep, [&](std::size_t k) { s.facets.push_back(kept[k]); });
         all = s.facets.size() <= most;
     };
     auto take = [&] {
-        facets_around(rows, count, place, search.met);
-        for_each_kept(search.met, [&](std::size_t k) {
-            close.x0[some] = rows.x0[k], close.y0[some] = rows.y0[k], close.z0[some] = rows.z0[k];
-            close.x1[some] = rows.x1[k], close.y1[some] = rows.y1[k], close.z1[some] = rows.z1[k];
-            close.x2[some] = rows.x2[k], close.y2[some] = rows.y2[k], close.z2[some] = rows.z2[k];
-            which[some++] = facets[k];
-            if (some == FacetRows::kMost) look();
-        });
-        count = 0;
+        facets_around(many, place, met);
+        for (std::size_t i = 0; i < many.count; ++i)
+            for_each_bit(met[i], [&](std::size_t k) {
+                const EightFacets& e = *many.eights[i];
+                close.x0[some] = e.x0[k], close.y0[some] = e.y0[k], close.z0[some] = e.z0[k];
+                close.x1[some] = e.x1[k], close.y1[some] = e.y1[k], close.z1[some] = e.z1[k];
+                close.x2[some] = e.x2[k], close.y2[some] = e.y2[k], close.z2[some] = e.z2[k];
+                which[some++] = first_of[i] + static_cast<std::uint32_t>(k);
+                if (some == FacetRows::kMost) look();
+            });
+        many.count = 0;
     };
-    walk_leaves(
-        [&](const Nodes& nodes, Kept& keep) {
-            Kept within;
-            overlapping(nodes, box, within);
-            if (all) around(nodes, place, keep);
-            else keep = {};
-            for (std::size_t k = 0; k < kFan; ++k) keep[k] &= within[k];
-        },
-        [&](std::size_t first, std::size_t last) {
-            for (std::size_t f = first; f < last; ++f, ++count) {
-                const auto& [a, b, c] = facets_[f].v;
-                rows.x0[count] = a.x, rows.y0[count] = a.y, rows.z0[count] = a.z;
-                rows.x1[count] = b.x, rows.y1[count] = b.y, rows.z1[count] = b.z;
-                rows.x2[count] = c.x, rows.y2[count] = c.y, rows.z2[count] = c.z;
-                facets[count] = static_cast<std::uint32_t>(f);
-            }
-            if (count + kFan > FacetRows::kMost) take();
-        });
-    if (count > 0 && all) take();
+    walk_leaves([&](const Nodes& nodes) { return all ? around(nodes, place, box) : 0U; },
+                [&](std::size_t first, std::size_t) {
+                    static_assert(kFan == 8);
+                    first_of[many.count] = static_cast<std::uint32_t>(first);
+                    many.eights[many.count++] = &facets_.eight(first / kFan);
+                    if (many.count == ManyEights::kMost) take();
+                });
+    if (many.count > 0 && all) take();
     if (some > 0 && all) look();
     return all;
 }
@@ -787,13 +788,11 @@ bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Moti
 
 StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore,
                                           double tolerance) const {
-    constexpr std::size_t kGroup = 8;
-    constexpr double kGroupSlack = 0.001;
     Found found;
     Search search;
     const Cutter& cutter = search.cutter = {form, radius, z_top - kSheet};
     std::vector<unsigned char>& keep = search.keep;
-    Stretch stretch, group, single;
+    Stretch stretch, single;
     bool whole = true;  // the stretch's facets are known
     Point3 last{};      // the end of one motion is mostly the begin of the next
     bool last_known = false, last_covered = false;
@@ -818,10 +817,7 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
             ++m;
             continue;
         }
-        if (m >= stretch.last) {
-            whole = stretch_from(search, stretch, motions, m, floor);
-            group.last = m;
-        }
+        if (m >= stretch.last) whole = stretch_from(search, stretch, motions, m, floor);
         // Where no facet is near, the cap has no outline either, so that what begins beside it stays there.
         auto free_until = [&](std::size_t end) { m = end, last = motions[end - 1].to, last_covered = false; };
         if (whole && stretch.facets.empty() && !covered_at(from)) {
@@ -829,27 +825,12 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
             continue;
         }
         const bool below = stretch.high[2] < cutter.top - floor;
-        if (whole && below && m >= group.last && stretch.last - m > 1) {
-            for (std::size_t end = std::min(stretch.last, m + kGroup);; end = m + (end - m) / 2) {
-                group.take(motions, m, end, !cutter.ball());
-                if (group.slack <= kGroupSlack) break;
-            }
-            stretch.terms.near(asking(cutter, group.from, group.to, group.low[2], floor, group.slack), true, keep);
-            group.terms.take(stretch.terms, keep);
-            group.facets.clear();
-            for_each_kept(keep, [&](std::size_t k) { group.facets.push_back(stretch.facets[k]); });
-            if (group.facets.empty() && !covered_at(from)) {
-                free_until(group.last);
-                continue;
-            }
-        }
         auto look = [&](const Piece& piece, Penetration& result) {
             if (!whole) {
                 single.take(piece.a, piece.b);
                 gather(search, single, result.depth, std::numeric_limits<std::size_t>::max());
                 for (const std::uint32_t f : single.facets) meet(cutter, piece, facets_[f].v, result);
-            } else if (m < group.last) meet_near(group.terms, group.facets, piece, result);
-            else meet_near(stretch.terms, stretch.facets, piece, result);
+            } else meet_near(stretch.terms, stretch.facets, piece, result);
         };
         Penetration p;
         if (below && !covered_at(from)) {
@@ -965,7 +946,7 @@ StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_
             return xy_distance2(n, point[0], point[1]) + dz * dz;
         },
         [&] { return best.distance * best.distance; },
-        [&](const Facet& f) {
+        [&](const Facet& f, std::uint32_t) {
             const double dz = std::max(0.0, point[2] - std::min<double>(std::max({f.v[0].z, f.v[1].z, f.v[2].z}), top));
             if (xy_distance2(f.v, point[0], point[1]) + dz * dz >= best.distance * best.distance) return;
             below(f.v, top, [&](const Triangle& t) {
@@ -984,7 +965,7 @@ StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, 
     const P2 axis{point[0], point[1]};
     walk_nearest([&](const Node& n) { return n.z0 < top && n.z1 > point[2] ? xy_distance2(n, axis.x, axis.y) : kInfinity; },
                  [&] { return best.distance * best.distance; },
-                 [&](const Facet& f) {
+                 [&](const Facet& f, std::uint32_t) {
                      if (xy_distance2(f.v, axis.x, axis.y) >= best.distance * best.distance) return;
                      if (f.v[0].z >= top && f.v[1].z >= top && f.v[2].z >= top) return;
                      Polygon poly;
@@ -1021,11 +1002,10 @@ StandingPart::Near StandingPart::nearest(const Point3& point, const Near& known,
             return xy_distance2(n, point[0], point[1]) + dz * dz;
         },
         [&] { return best.distance <= enough ? 0.0 : best.distance * best.distance; },
-        [&](const Facet& f) {
+        [&](const Facet& f, std::uint32_t facet) {
             const double dz =
                 std::max({0.0, std::min({f.v[0].z, f.v[1].z, f.v[2].z}) - point[2], point[2] - std::max({f.v[0].z, f.v[1].z, f.v[2].z})});
             if (xy_distance2(f.v, point[0], point[1]) + dz * dz >= best.distance * best.distance) return;
-            const auto facet = static_cast<std::uint32_t>(&f - facets_.data());
             const double d = distance(point, facet);
             if (d < best.distance) best = {d, facet};
         });
@@ -1040,7 +1020,7 @@ double StandingPart::from_facets(const Point3& point, double limit) const {
             return xy_distance2(n, point[0], point[1]) + dz * dz;
         },
         [&] { return best2; },
-        [&](const Facet& f) {
+        [&](const Facet& f, std::uint32_t) {
             const Point3 away = sub(point, closest_on_triangle(point, {to_point(f.v[0]), to_point(f.v[1]), to_point(f.v[2])}));
             best2 = std::min(best2, dot(away, away));
         });

@@ -9,13 +9,13 @@
 #include <span>
 #include <vector>
 
+#include "kernels/access/near_facets.h"
 #include "kernels/mesh/bulk_memory.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 
 namespace slabwright {
 
-struct WayAround;
 using Point3 = std::array<double, 3>;  ///< mm
 
 /// Where a cutter is deepest in the part during a motion.
@@ -94,6 +94,27 @@ private:
     struct Facet {
         std::array<Vec3f, 3> v;
     };
+    /// The facets, eight that follow one another together.
+    class Facets {
+    public:
+        /// Of indeterminate facets.
+        void resize(std::size_t size) { eights_.resize(((size_ = size) + 7) / 8); }
+        void set(std::size_t i, const Facet& facet);
+        /// What the last eight hold beyond the end is not a number then: no facet that is near anything.
+        void end();
+        [[nodiscard]] std::size_t size() const { return size_; }
+        [[nodiscard]] bool empty() const { return size_ == 0; }
+        [[nodiscard]] Facet operator[](std::size_t i) const {
+            const EightFacets& e = eights_[i / 8];
+            const std::size_t k = i % 8;
+            return {{{{e.x0[k], e.y0[k], e.z0[k]}, {e.x1[k], e.y1[k], e.z1[k]}, {e.x2[k], e.y2[k], e.z2[k]}}}};
+        }
+        [[nodiscard]] const EightFacets& eight(std::size_t i) const { return eights_[i]; }
+
+    private:
+        std::size_t size_ = 0;
+        BulkVector<EightFacets> eights_;
+    };
     struct Node {
         float x0, y0, z0, x1, y1, z1;
     };
@@ -107,8 +128,8 @@ private:
         Within(const Point3& low, const Point3& high);
         std::array<float, 3> low, high;
     };
-    using Kept = std::array<std::int32_t, 8>;  ///< not 0 where a node is kept
-    static void overlapping(const Nodes& nodes, const Within& box, Kept& keep);
+    // Bit k is 1 where node k is kept.
+    static unsigned overlapping(const Nodes& nodes, const Within& box);
     template <class Choose, class Visit>
     void walk_leaves(Choose&& choose, Visit&& visit) const;
     template <class Enter, class Visit>
@@ -127,12 +148,12 @@ private:
     [[nodiscard]] double distance(const Point3& point, std::uint32_t facet) const;
     struct Stretch;
     struct Search;
-    static void around(const Nodes& nodes, const WayAround& way, Kept& keep);
+    static unsigned around(const Nodes& nodes, const WayAround& way, const Within& box);
     bool gather(Search& search, Stretch& stretch, double depth, std::size_t most) const;
     bool stretch_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m, double depth) const;
     [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
     friend class RisingEnvelope;
-    BulkVector<Facet> facets_;               ///< in Morton order
+    Facets facets_;                          ///< in Morton order
     std::vector<BulkVector<Nodes>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
     Box3 box_{};
 };
