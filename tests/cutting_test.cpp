@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 #include <tuple>
 
@@ -242,6 +243,11 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
             const Rest rest = index.drop(x, y);
             for (const double z : {-1e9, -r, 0.2 * k, rest.tip_z, std::nextafter(rest.tip_z, -1e9), rest.tip_z + 1e-3, rest.tip_z - 1e-3}) {
                 EXPECT_EQ(index.stands_over(x, y, z), rest.tip_z > z) << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
+                const std::optional<double> within = index.tip_within(x, y, z);
+                EXPECT_EQ(within.has_value(), rest.tip_z <= z) << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
+                if (within) {
+                    EXPECT_EQ(*within, rest.tip_z) << x << ' ' << y << ' ' << z;
+                }
                 const Rest above = index.drop(x, y, z);
                 EXPECT_EQ(above.tip_z, rest.tip_z > z ? rest.tip_z : -std::numeric_limits<double>::infinity()) << x << ' ' << y << ' ' << z;
                 if (rest.tip_z <= z) continue;
@@ -255,6 +261,28 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
             EXPECT_LT(room(mesh, 100, cutter, x, y, rest.tip_z - 1e-4), 0) << x << ' ' << y << " r " << r << " could go lower than " << rest.tip_z;
         }
     }
+}
+
+// What the raster asks of a wider end mill for many places at once.
+TEST(Drops, WhereAWiderEndMillMeetsNothingNorDoesANarrowOneAround) {
+    std::mt19937 random(test::seed());
+    auto uniform = [&](double low, double high) { return low + (high - low) * (static_cast<double>(random()) / 4294967296.0); };
+    Context context;
+    const Mesh mesh = test::height_field(context, 48, 0.25, [&](double x, double y) {
+        return std::abs(x) + std::abs(y) < 2 ? 4.0 : std::max(1.0, 2 * std::sin(1.3 * x) + std::cos(y));
+    });
+    const LayerSolid solid = layer_solid(context, mesh.view(), -20, 3.5);
+    constexpr double r = 0.8, half = 0.6, rounding = 1e-6;
+    const DropIndex narrow(solid, {Cutter::Profile::flat, r}), wide(solid, {Cutter::Profile::flat, r + half + rounding});
+    int free = 0;
+    for (int k = 0; k < 4000; ++k) {
+        const double x = uniform(-7, 7), y = uniform(-7, 7), z = k % 2 ? 1.001 : uniform(0, 4);
+        if (wide.stands_over(x, y, z - rounding)) continue;
+        ++free;
+        for (const double way : {-half, half, uniform(-half, half)})
+            EXPECT_FALSE(narrow.stands_over(x + way, y, z)) << x << ' ' << way << ' ' << y << ' ' << z;
+    }
+    EXPECT_GT(free, 100);
 }
 
 // Where two contacts are equally high, which one is given must not depend on the threads that made the tree.

@@ -1,7 +1,9 @@
 // Finishing by a projected raster: the ball is dropped on the surface along parallel lines wherever its contact lies on
 // a slope under 45°. The step-over is chosen for every pass from the slopes under it (FINISH eq. 9).
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <optional>
 
@@ -19,6 +21,9 @@ namespace {
 
 constexpr double kOverFloor = 1e-3;  // mm: a line this near to a floor's facets, seen from above, passes over them
 constexpr double kOnFloor = 1e-3;    // mm: a flat end mill that meets nothing this far over a floor stands on it
+constexpr double kRounding = 1e-6;   // mm: what is nearer may be found by one question and missed by another
+// Places of a line of which a wider end mill is asked before they are asked one by one.
+constexpr std::array<std::int32_t, 2> kTogether{16, 4};
 
 }  // namespace
 
@@ -145,16 +150,49 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         if (s.reachable) s.z = to_units(s.tip) + 1;
         return s;
     };
-    // A place over a floor on which a flat end mill has stood there, of one that is no narrower than the ball: the ball would rest on that floor as
-    // well (or on something less than kOnFloor higher), and has nothing to cut.
-    auto finished = [&](std::int32_t ux, std::int32_t uy, double floor) -> std::optional<Sample> {
-        const double x = to_mm(ux), y = to_mm(uy);
-        if (std::none_of(flats.begin(), flats.end(),
-                         [&](const auto& one) { return one.second->cutter().radius >= r && !one.second->stands_over(x, y, floor + kOnFloor); }))
-            return std::nullopt;
+    // Where a flat end mill no narrower than the ball has stood on a floor the ball would rest on that floor as well (or on something less than
+    // kOnFloor higher), and has nothing to cut. Where an end mill that is wider yet meets nothing, nor does this one anywhere around.
+    struct FloorMill {
+        const DropIndex* narrow;
+        std::array<std::unique_ptr<DropIndex>, kTogether.size()> wide;
+    };
+    std::vector<FloorMill> floor_mills;
+    for (const auto& [flat_r, flat] : flats) {
+        if (flat->cutter().radius < r) continue;
+        FloorMill& mill = floor_mills.emplace_back(FloorMill{flat.get(), {}});
+        for (std::size_t w = 0; w < kTogether.size(); ++w) {
+            const double wide = flat->cutter().radius + 0.5 * to_mm((kTogether[w] - 1) * step) + kRounding;
+            if (wide <= FacetTree::kWidestCutter) mill.wide[w] = std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, wide});
+        }
+    }
+    struct FloorWalk {
+        double floor = 0;                // mm: the floor that the places before `stood` are finished on
+        std::int32_t stood = INT32_MIN;  // in steps
+        // In steps: where it is worth to ask for so many again.
+        std::array<std::int32_t, kTogether.size()> ask{INT32_MIN, INT32_MIN};
+    };
+    auto flat_stands = [&](FloorWalk& walk, std::int32_t k, std::int32_t uy, double floor) {
+        if (k < walk.stood && floor == walk.floor) return true;
+        const double y = to_mm(uy);
+        for (std::size_t w = 0; w < kTogether.size(); ++w) {
+            if (k < walk.ask[w]) continue;
+            const double middle = to_mm(k * step) + 0.5 * to_mm((kTogether[w] - 1) * step);
+            if (std::any_of(floor_mills.begin(), floor_mills.end(), [&](const FloorMill& mill) {
+                    return mill.wide[w] && !mill.wide[w]->stands_over(middle, y, floor + kOnFloor - kRounding);
+                })) {
+                walk.floor = floor, walk.stood = k + kTogether[w];
+                return true;
+            }
+            walk.ask[w] = k + kTogether[w];
+        }
+        return std::any_of(floor_mills.begin(), floor_mills.end(),
+                           [&](const FloorMill& mill) { return !mill.narrow->stands_over(to_mm(k * step), y, floor + kOnFloor); });
+    };
+    auto finished = [&](FloorWalk& walk, std::int32_t k, std::int32_t uy, double floor) -> std::optional<Sample> {
+        if (!flat_stands(walk, k, uy, floor)) return std::nullopt;
         Sample s;
-        s.x = ux;
-        s.contact = {x, y, floor};
+        s.x = k * step;
+        s.contact = {to_mm(s.x), to_mm(uy), floor};
         s.tip = floor + kOnFloor;
         s.reachable = floor >= cut.layer.floor_below;
         if (s.reachable) s.z = to_units(s.tip) + 1;
@@ -197,6 +235,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         const double low_limit = cut.low(0, r) * kUnitsPerMm, high_limit = cut.high(0, r) * kUnitsPerMm;
         std::int32_t next = INT32_MIN;
         auto floor = floor_spans[l].begin();
+        FloorWalk walk;
         for (const Span& span : spans) {
             const auto first = static_cast<std::int32_t>(std::ceil(std::max(span.low - step, low_limit) / step)),
                        last = static_cast<std::int32_t>(std::floor(std::min(span.high + step, high_limit) / step));
@@ -205,7 +244,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 const double x = to_mm(k * step);
                 while (floor != floor_spans[l].end() && floor->high < x) ++floor;
                 const std::optional<Sample> done =
-                    floor != floor_spans[l].end() && floor->low < x ? finished(k * step, lines[l], floor->z) : std::nullopt;
+                    floor != floor_spans[l].end() && floor->low < x ? finished(walk, k, lines[l], floor->z) : std::nullopt;
                 append_between(append_between, samples[l], done ? *done : sample(k * step, lines[l]), lines[l]);
             }
         }

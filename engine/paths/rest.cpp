@@ -379,8 +379,10 @@ private:
                 moved = false;
                 for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
                     const double at_x = to_mm(x + dx * stride), at_y = to_mm(y + dy * stride), less = tip - 1e-4;
-                    if (!(less < tip) || index_->stands_over(at_x, at_y, just_under(less))) continue;  // under nothing there is no lower
-                    x += dx * stride, y += dy * stride, tip = index_->drop(at_x, at_y).tip_z, moved = true;
+                    if (!(less < tip)) continue;  // under nothing there is no lower
+                    const std::optional<double> lower = index_->tip_within(at_x, at_y, just_under(less));
+                    if (!lower) continue;
+                    x += dx * stride, y += dy * stride, tip = *lower, moved = true;
                     break;
                 }
                 if (tip + under_ < cut_.layer.floor_below) break;

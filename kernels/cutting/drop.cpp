@@ -10,6 +10,7 @@ namespace slabwright {
 
 namespace {
 
+constexpr double kNoEnd = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-6;  // mm: more than rounding takes from a height over a plane, a sliver's too
 
 struct Best {
@@ -108,9 +109,9 @@ void drop_flat(const SolidFacet& f, double r, double x, double y, Best& best) {
     }
 }
 
-// The contact that lifts the cutter most, if that is above what it begins with. @param any whether the first one above that is enough
+// The contact that lifts the cutter most, if that is above what it begins with. @param enough mm: the first one above that will do
 template <bool ball>
-void search(const LayerSolid& solid, const DropProbe& probe, double r, double x, double y, bool any, Best& best) {
+void search(const LayerSolid& solid, const DropProbe& probe, double r, double x, double y, double enough, Best& best) {
     struct Waiting {
         float bound;
         std::uint32_t level, node;
@@ -149,10 +150,9 @@ void search(const LayerSolid& solid, const DropProbe& probe, double r, double x,
             }
             while (n-- > 0 && bounds[order[n]] > best.tip_z) {
                 const SolidFacet& f = solid.facets[facets[order[n]]];
-                const double before = best.tip_z;
                 if (ball) drop_ball(f, r, x, y, best);
                 else drop_flat(f, r, x, y, best);
-                if (any && best.tip_z > before) return;
+                if (best.tip_z > enough) return;
             }
         }
     }
@@ -189,8 +189,8 @@ Rest DropIndex::drop(double x, double y, double above) const {
     if (solid_.cap_cells.inside(x, y)) return {solid_.z_top, 0.0F, 0.0F, 1.0F, true};
     Best best;
     best.tip_z = above;
-    if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, false, best);
-    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, false, best);
+    if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, kNoEnd, best);
+    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, kNoEnd, best);
     if (best.tip_z > above) rest = {best.tip_z, static_cast<float>(best.nx), static_cast<float>(best.ny), static_cast<float>(best.nz), false};
     return rest;
 }
@@ -200,9 +200,19 @@ bool DropIndex::stands_over(double x, double y, double z) const {
     if (solid_.cap_cells.inside(x, y)) return solid_.z_top > z;
     Best best;
     best.tip_z = z;
-    if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, true, best);
-    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, true, best);
+    if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, z, best);
+    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, z, best);
     return best.tip_z > z;
+}
+
+std::optional<double> DropIndex::tip_within(double x, double y, double most) const {
+    Best best;
+    if (nothing_near(x, y)) return best.tip_z;
+    if (solid_.cap_cells.inside(x, y)) best.tip_z = solid_.z_top;
+    else if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, most, best);
+    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, most, best);
+    if (best.tip_z > most) return std::nullopt;
+    return best.tip_z;
 }
 
 }  // namespace slabwright

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 
 #include "kernels/cutting/cutter.h"
 #include "kernels/cutting/layer_solid.h"
@@ -29,6 +30,8 @@ public:
     [[nodiscard]] Rest drop(double x, double y, double above = -std::numeric_limits<double>::infinity()) const;
     /// Whether drop(x, y).tip_z > z, in a fraction of its time.
     [[nodiscard]] bool stands_over(double x, double y, double z) const;
+    /// drop(x, y).tip_z where that is no more than `most`, nothing elsewhere; the latter as soon as that is known.
+    [[nodiscard]] std::optional<double> tip_within(double x, double y, double most) const;
     [[nodiscard]] const Cutter& cutter() const { return cutter_; }
 
 private:
