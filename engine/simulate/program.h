@@ -43,8 +43,8 @@ struct Program {
     double planned_stepdown = 0;  ///< mm, that the plan names for it; 0: none
     double spindle_rpm = 0;       ///< highest
     double dwell_s = 0;           ///< of all G4 together
-    double blend = kJunction;   ///< mm by which the machine may round the corners (G64 P; 0: G61), the least that the program names
-    double strays = kJunction;  ///< mm by which it may leave the path at most: P, and Q for points that it leaves out (P where no Q is given)
+    double blend = kJunction;     ///< mm by which the machine may round the corners (G64 P; 0: G61), the least that the program names
+    double strays = kJunction;    ///< mm by which it may leave the path at most: P, and Q for points that it leaves out (P where no Q is given)
     std::vector<ProgramStep> steps;
     std::vector<ProgramArc> arcs;  ///< in the order of their steps
     double arc_error = 0;          ///< mm: how far any arc is from its chords at most
