@@ -586,9 +586,9 @@ std::string page(const Json& data, bool three_d) {
 
 ReportWork report_work(std::uint64_t steps, std::uint64_t facets) {
     // Fitted to patterns of 1 600 to 1 M facets and programs of 0.14 to 6.4 M steps. The replay's stock has about as many points
-    // whatever its size, and longer programs are those of larger patterns: its time grows as the root of the steps, 1.3 s at a million.
+    // whatever its size, and longer programs are those of larger patterns: its time grows as the root of the steps, 1 s at a million.
     const double shown = static_cast<double>(std::min<std::uint64_t>(facets, kMostFacets)), all = static_cast<double>(facets);
-    return {1300 * std::sqrt(static_cast<double>(steps)), 0.15e6 + 10 * shown + (facets > kMostFacets ? 1e6 + 1.3 * all : 0)};
+    return {1000 * std::sqrt(static_cast<double>(steps)), 0.15e6 + 2.7 * shown + (facets > kMostFacets ? 1e6 + 0.12 * all : 0)};
 }
 
 bool reports_are_built() { return !report_template().empty(); }

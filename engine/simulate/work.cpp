@@ -8,8 +8,8 @@ SimulationWork simulation_work(const SimulationSize& size) {
     // Fitted to plans of six patterns (100 000 to 1 350 000 mm² of stock, 1 600 to 10 M facets, points every 0.25 and 0.5 mm);
     // bench/time_left_bench shows what comes of it. A step is checked against the facets about it; a point of the stock is made and judged once a layer and cut as
     // often as cutters pass over it; the facets are the surface that it is judged by.
-    constexpr double kStep = 1.2, kFacetsAbout = 0.35;                               // checking; the second by the facets of a square millimetre
-    constexpr double kPoint = 0.04, kSwept = 0.004, kStepOver = 0.45, kFacet = 1.1;  // cutting
+    constexpr double kStep = 0.65, kFacetsAbout = 0.32;                                // checking; the second by the facets of a square millimetre
+    constexpr double kPoint = 0.028, kSwept = 0.0027, kStepOver = 0.45, kFacet = 1.1;  // cutting
     const double steps = static_cast<double>(size.steps), facets = static_cast<double>(size.facets), stock = std::max(1.0, size.stock_mm2);
     const double cell_mm2 = std::max(1e-4, size.cell_mm * size.cell_mm);
     return {steps * (kStep + kFacetsAbout * facets / stock),
