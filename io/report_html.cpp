@@ -585,7 +585,7 @@ std::string page(const Json& data, bool three_d) {
 }  // namespace
 
 ReportWork report_work(std::uint64_t steps, std::uint64_t facets) {
-    // Fitted to patterns of 1 600 to 1 M facets and programs of 0.14 to 6.4 M steps. The replay's stock has about as many points
+    // Fitted to the metre pattern of 0.1 to 10 M facets, whose programs have 4 M steps. The replay's stock has about as many points
     // whatever its size, and longer programs are those of larger patterns: its time grows as the root of the steps, 1 s at a million.
     const double shown = static_cast<double>(std::min<std::uint64_t>(facets, kMostFacets)), all = static_cast<double>(facets);
     return {1000 * std::sqrt(static_cast<double>(steps)), 0.15e6 + 2.7 * shown + (facets > kMostFacets ? 1e6 + 0.12 * all : 0)};

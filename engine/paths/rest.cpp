@@ -157,7 +157,7 @@ public:
         op.spare = pass_.allowance;
         if (targets_.count() == 0) return op;
         find_room();
-        index_ = std::make_unique<DropIndex>(cut_.solid, Cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, wide_});
+        index_ = &cut_.drops({ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, wide_});
         lay_lines();
         settle();
         keep_what_lowers();
@@ -458,8 +458,8 @@ private:
     void emit(Operation& op, const std::vector<std::vector<PathPoint>>& runs) const {
         PathBuilder path(op, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed), cut_.layer.z_top + cut_.job.machine.clearance,
                          cut_.layer.z_top + 2);
-        path.know(cut_.around(tool_, index_.get()));
-        const Slide slide{index_.get(), ball_, chord_, cut_.layer.z_top, kBridge, under_};
+        path.know(cut_.around(tool_, index_));
+        const Slide slide{index_, ball_, chord_, cut_.layer.z_top, kBridge, under_};
         if (!pass_.in_steps) {
             cut_.context.throw_if_cancelled();
             follow_nearest(path, chained(runs, slide));
@@ -511,7 +511,7 @@ private:
     double chord_;
     std::int32_t step_, finest_, finest_step_;
     std::int32_t spacing_ = 0;
-    std::unique_ptr<DropIndex> index_;
+    const DropIndex* index_ = nullptr;
     std::vector<Line> lines_;
     std::vector<char> room_;  // by the stock's cells, with a flask only
 };

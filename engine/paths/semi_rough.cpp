@@ -91,8 +91,10 @@ public:
         std::vector<std::vector<std::array<int, 2>>> covered;
         if (!swath.empty()) covered = rows_inside(grid, swath);
         auto within_swath = [&](int i, int j) {
-            return !covered.empty() && std::any_of(covered[static_cast<std::size_t>(j)].begin(), covered[static_cast<std::size_t>(j)].end(),
-                                                   [&](const std::array<int, 2>& s) { return s[0] <= i && i <= s[1]; });
+            if (covered.empty()) return false;
+            const auto& row = covered[static_cast<std::size_t>(j)];
+            const auto span = std::lower_bound(row.begin(), row.end(), i, [](const std::array<int, 2>& s, int cell) { return s[1] < cell; });
+            return span != row.end() && (*span)[0] <= i;
         };
         auto on_floor = [&](std::size_t c) {
             const double z = stock_.z_bottom() + stock_.surface(c);
