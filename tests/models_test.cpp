@@ -316,6 +316,19 @@ TEST(Models, MetrePatternCountsWithinTenPercent) {
     }
 }
 
+TEST(Models, MetrePatternKeepsTheShapeOfItsFacets) {
+    // Under the plate is a fan with one facet to each vertex of its border; it says how many vertices a tile has around, and the count
+    // how many rings. Were one of them to grow alone, times by number of facets would be times of ever longer slivers.
+    for (const std::uint64_t wish : {20'000, 100'000, 200'000, 1'000'000}) {
+        const std::vector<Facet> facets = collect({1160, 300, wish, 1});
+        const auto under = std::count_if(facets.begin(), facets.end(), [](const Facet& f) { return f[0].z == 0 && f[1].z == 0 && f[2].z == 0; });
+        const double tiles = 8, around = static_cast<double>(under) / tiles;
+        const double rings = ((static_cast<double>(facets.size()) / around - 3 * tiles) / (tiles * tiles) - 1) / 2;
+        EXPECT_GT(around / (2 * rings), 0.55) << wish;
+        EXPECT_LT(around / (2 * rings), 1.8) << wish;
+    }
+}
+
 TEST(Models, MetrePatternIsTheSameForTheSameSeed) {
     const MetrePattern pattern{600, 150, 30'000, 5};
     MetrePattern other = pattern;

@@ -3,6 +3,7 @@
 // nothing but one ring is ever held.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -46,15 +47,17 @@ Grid share_out(const MetrePattern& pattern) {
     best.tiles = pattern.facets >= 12'000 ? 8 : pattern.facets >= 3000 ? 4 : pattern.facets >= 800 ? 2 : 1;
     if (pattern.height_mm > 3 * pattern.size_mm / static_cast<double>(best.tiles))
         throw std::invalid_argument("metre_pattern: the height is over 3 × size / tiles, drafted walls do not fit");
-    // About twice as many vertices around as rings; within that, the nearest count that is not below the wish.
+    // Twice as many vertices around as rings, so that facets keep their shape as they grow in number, and hardly more than were wished
+    // for: one per cent too many counts as much as a shape that is a tenth off.
     const double area = static_cast<double>(pattern.facets) / static_cast<double>(best.tiles * best.tiles);
     const std::uint64_t middle = std::max<std::uint64_t>(kFewestRings, static_cast<std::uint64_t>(std::sqrt(area / 4)));
-    bool found = false;
+    double least = std::numeric_limits<double>::infinity();
     for (std::uint64_t rings = std::max(kFewestRings, middle / 2); rings <= middle + middle / 2 + 4; ++rings) {
         Grid grid{best.tiles, 1, rings};
         grid.around = std::max<std::uint64_t>(16, (pattern.facets + 8 * grid.facets() - 1) / (8 * grid.facets()) * 8);
-        if (!found || grid.facets() < best.facets()) best = grid;
-        found = true;
+        const double excess = static_cast<double>(grid.facets()) / static_cast<double>(pattern.facets) - 1;
+        const double shape = std::log(static_cast<double>(grid.around) / static_cast<double>(2 * rings));
+        if (const double cost = excess + 0.1 * std::abs(shape); cost < least) least = cost, best = grid;
     }
     return best;
 }
