@@ -146,6 +146,8 @@ private:
         work_.floor_below = layer_.z_bottom - (ground_.carried_by ? below : board);
         work_.feet = flats_between(work_.floor_below);
         work_.most_minutes = most;
+        work_.last_steps =
+            overhang_ ? last_rough_steps(job, tools.rough, overhang_->largest() + job.bonding.edge_setback, layer_.z_top - layer_.z_bottom) : 0;
         LayerResult result = plan_layer_paths(context_, work_);
         Trial trial;
         Layer& layer = trial.planned.layer = layer_;

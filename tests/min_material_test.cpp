@@ -10,6 +10,7 @@
 #include "engine/forces/min_material.h"
 #include "engine/layers/layers.h"
 #include "engine/planner.h"
+#include "engine/tools/tools.h"
 #include "kernels/forces/deflection.h"
 #include "tests/support/height_field.h"
 
@@ -37,6 +38,21 @@ TEST(LeastMaterial, LuoSpecimensOf12BreakAndOf13Hold) {
     EXPECT_GT(least, 0.12);
     EXPECT_LT(least, 0.13);
     EXPECT_NEAR(least, 0.124, 0.0015);
+}
+
+// Of the wood that hangs over, the last level of roughing meets a sliver: where nothing hangs over, or what does would not bear a whole step
+// anyway, any step will do.
+TEST(LeastMaterial, LastStepsAreShallowWhereThatSavesTheWood) {
+    const Job job = specimen();
+    const Tool& tool = job.tools[0];
+    EXPECT_EQ(last_rough_steps(job, tool, 0, 18), 0);
+    const double steps = last_rough_steps(job, tool, 30, 18);
+    EXPECT_GT(steps, 0);
+    EXPECT_LT(steps, least_slab(tool));
+    EXPECT_EQ(last_rough_steps(job, tool, 30, 1), 0) << "a layer of 1 mm bears no step of 3 mm";
+    const double bears = least_material(job, 500);
+    EXPECT_GT(last_rough_steps(job, tool, 1000, bears + 0.01), 0);
+    EXPECT_EQ(last_rough_steps(job, tool, 1000, bears - 0.01), 0);
 }
 
 TEST(LeastMaterial, GrowsWithOverhangAndForceAndFallsWithStrength) {

@@ -12,6 +12,7 @@
 
 #include "kernels/errors.h"
 #include "kernels/polygons/loops.h"
+#include "kernels/polygons/runs_inside.h"
 
 namespace {
 
@@ -423,6 +424,68 @@ TEST(Polygons, RefusesWhatDoesNotFit) {
     EXPECT_TRUE(simplify(flat).empty());
     EXPECT_TRUE(offset(flat, 1, 0.01).empty());
     EXPECT_TRUE(offset(Loops{}, 1, 0.01).empty());
+}
+
+// Of each line, every place lies in a run exactly when it lies in the region; runs end on its border.
+TEST(Polygons, RunsInsideAreWhatLiesInside) {
+    std::mt19937_64 random(seed_of("RunsInsideAreWhatLiesInside"));
+    auto star = [&](double x, double y, double size, int corners) {
+        std::vector<Point2> points;
+        for (int k = 0; k < corners; ++k) {
+            const double turn = 2 * std::numbers::pi * k / corners, r = size * (0.3 + 0.7 * static_cast<double>(random() % 1000) / 1000);
+            points.push_back({static_cast<std::int32_t>(x + r * std::cos(turn)), static_cast<std::int32_t>(y + r * std::sin(turn))});
+        }
+        return points;
+    };
+    int open_runs = 0, whole = 0;
+    for (int round = 0; round < 60; ++round) {
+        Loops parts, lines;
+        for (int k = 0; k < 8; ++k)
+            add(parts, star(static_cast<double>(random() % 1'000'000), static_cast<double>(random() % 1'000'000), 200'000,
+                            3 + static_cast<int>(random() % 40)));
+        const Loops region = simplify(parts);
+        for (int k = 0; k < 5; ++k)
+            add(lines, star(static_cast<double>(random() % 1'000'000), static_cast<double>(random() % 1'000'000), k % 2 ? 30'000 : 300'000,
+                            3 + static_cast<int>(random() % 60)));
+        const std::vector<RunInside> runs = runs_inside(lines, region);
+        std::vector<double> inside(lines.size(), 0);  // length of runs by line
+        for (const RunInside& run : runs) {
+            ++(run.closed ? whole : open_runs);
+            ASSERT_GE(run.points.size(), 2U);
+            for (std::size_t k = 0; k + 1 < run.points.size(); ++k)
+                inside[run.loop] += std::hypot(static_cast<double>(run.points[k + 1].x) - run.points[k].x,
+                                               static_cast<double>(run.points[k + 1].y) - run.points[k].y);
+            if (run.closed) {
+                inside[run.loop] += std::hypot(static_cast<double>(run.points.front().x) - run.points.back().x,
+                                               static_cast<double>(run.points.front().y) - run.points.back().y);
+                continue;
+            }
+            EXPECT_LT(distance_to_boundary(region, run.points.front()), 2);
+            EXPECT_LT(distance_to_boundary(region, run.points.back()), 2);
+        }
+        for (std::size_t l = 0; l < lines.size(); ++l) {
+            double expected = 0;
+            const auto loop = lines.loop(l);
+            for (std::size_t k = 0; k < loop.size(); ++k) {
+                const Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
+                const double length = std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
+                const int places = 1 + static_cast<int>(length / 500);
+                for (int i = 0; i < places; ++i) {
+                    const double t = (i + 0.5) / places;
+                    if (winding(region, {static_cast<std::int32_t>(a.x + t * (b.x - a.x)), static_cast<std::int32_t>(a.y + t * (b.y - a.y))}) > 0)
+                        expected += length / places;
+                }
+            }
+            EXPECT_NEAR(inside[l], expected, 0.002 * expected + 10'000) << round << " line " << l;
+        }
+    }
+    EXPECT_GT(open_runs, 200);
+    EXPECT_GT(whole, 10);
+    // Along the border itself, and where nothing is.
+    Loops square;
+    add(square, rectangle(0, 0, 1000, 1000));
+    for (const RunInside& run : runs_inside(square, square)) EXPECT_TRUE(run.closed);
+    EXPECT_TRUE(runs_inside(square, Loops{}).empty());
 }
 
 }  // namespace

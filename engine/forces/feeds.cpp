@@ -15,6 +15,7 @@
 
 #include "engine/forces/cuts.h"
 #include "engine/forces/split_cuts.h"
+#include "engine/tools/tools.h"
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
 #include "kernels/forces/hardest.h"
@@ -197,10 +198,6 @@ struct Seen {
     [[nodiscard]] std::array<double, 3> place() const { return {at[0], at[1], at[2]}; }
 };
 
-// The thinnest wood that is called a slab under this tool, mm: its least step; where its range begins at nothing, half of the largest, with which
-// the ranges of Luo's other tools begin.
-double least_slab(const Tool& tool) { return std::max(kLeastDepth, tool.stepdown_min > 0 ? tool.stepdown_min : tool.stepdown_max / 2); }
-
 /// @param parts only these moves; none: all
 std::vector<Seen> run_through(Context& context, StandingSlab& slab, const Operation& op, const Tool& tool, const Layer& layer,
                               const OverhangMap* overhang, double setback, std::span<const MoveRange> parts = {}) {
@@ -218,7 +215,8 @@ std::vector<Seen> run_through(Context& context, StandingSlab& slab, const Operat
             // a sliver that tears off; and what a ball or a wall's finishing has under its tip is not what carries it.
             const bool floor = op.kind == OperationKind::finish && tool.kind == ToolKind::flat && op.stepdown == 0;
             const double under = s.at[2] - layer.z_bottom, wood = roughs(op.kind) ? under + s.high : floor ? under : 0;
-            const double beyond = overhang && wood >= (floor ? kLeastDepth : least_slab(tool)) ? overhang->at(s.at[0], s.at[1]) : 0;
+            const double beyond =
+                overhang && wood >= (floor ? kLeastDepth : std::max(kLeastDepth, least_slab(tool))) ? overhang->at(s.at[0], s.at[1]) : 0;
             if (beyond > 0) now.wood = static_cast<float>(wood), now.overhang = static_cast<float>(beyond + setback);
         }
         seen.push_back(now);

@@ -7,6 +7,7 @@
 
 #include "engine/flask/flask.h"
 #include "engine/forces/cuts.h"
+#include "engine/tools/tools.h"
 #include "kernels/forces/deflection.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/loops.h"
@@ -124,6 +125,11 @@ double least_material(const Job& job, double overhang_mm) {
         least = std::max(least, high);
     }
     return least;
+}
+
+double last_rough_steps(const Job& job, const Tool& tool, double overhang_mm, double layer_mm) {
+    constexpr double kSliver = 0.9;  // of the thinnest slab
+    return overhang_mm > 0 && thickness_at(job, tool, tool.stepdown_max, overhang_mm / 2).least_mm <= layer_mm ? kSliver * least_slab(tool) : 0;
 }
 
 SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {

@@ -18,6 +18,13 @@ namespace slabwright {
 /// @throws Error(usage, "forces.segment") for a tool or material that the force model does not take
 [[nodiscard]] double least_material(const Job& job, double overhang_mm);
 
+/// How far down the last two levels of roughing go where a slab hangs over by up to `overhang_mm`, mm: the last one cuts through no more
+/// than a sliver that tears off (least_slab), for a slab as thin as a whole step would bend, and the one before it meets no more than the
+/// wood then bears. 0, any step, where nothing hangs over, and where the whole layer would not bear a full step even half as far out: what
+/// breaks there breaks anyway.
+/// @throws Error(usage, "forces.segment") as least_material
+[[nodiscard]] double last_rough_steps(const Job& job, const Tool& tool, double overhang_mm, double layer_mm);
+
 /// How far each place of the stock lies from what carries it, on a grid of 1/256 of the stock's longer side.
 struct OverhangMap {
     std::array<double, 2> low{};

@@ -35,7 +35,8 @@ struct LayerJob {
     ProgressPart* progress = nullptr;                               ///< told how far the paths are, up to kPathsShare; the rest is the caller's
     std::vector<Flat> feet;                                         ///< on which walls of this layer may stand: `flats` and those just below
     double most_minutes = std::numeric_limits<double>::infinity();  ///< when its programs so far take longer than this, the layer is given up
-    Spares<StockMemory>* stock_memory = nullptr;                    ///< which layers leave to each other; null: this one has its own
+    double last_steps = 0;                        ///< mm that the last two levels of roughing may go down, for the wood's sake; 0: any step
+    Spares<StockMemory>* stock_memory = nullptr;  ///< which layers leave to each other; null: this one has its own
 };
 
 struct LayerResult {

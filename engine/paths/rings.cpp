@@ -4,17 +4,22 @@
 #include <cmath>
 #include <numbers>
 
+#include "kernels/polygons/runs_inside.h"
+
 namespace slabwright {
 
 namespace {
 
-constexpr double kBeyond = 20;        // mm that the flask's region reaches past the stock
-constexpr double kFineRing = 0.02;    // mm: what a ring may leave its line by, at least
-constexpr double kRingShare = 0.008;  // of the diameter: by what all others may, for they meet nothing but waste
-constexpr double kStepShare = 0.45;   // of the diameter: less than the radius by more than offsets and thinning may add
-constexpr double kBeside = 0.5;       // mm of air between the stock and a cutter that goes down beside it
-constexpr double kOnEdge = 0.1;       // mm
-constexpr double kSlide = 1.2;        // steps along the next ring that the way to it slants
+constexpr double kBeyond = 20;                 // mm that the flask's region reaches past the stock
+constexpr double kFineRing = 0.02;             // mm: what a ring may leave its line by, at least
+constexpr double kRingShare = 0.008;           // of the diameter: by what all others may, for they meet nothing but waste
+constexpr double kStepShare = 0.45;            // of the diameter: less than the radius by more than offsets and thinning may add
+constexpr double kBeside = 0.5;                // mm of air between the stock and a cutter that goes down beside it
+constexpr double kOnEdge = 0.1;                // mm
+constexpr std::size_t kRingsBesideStrips = 2;  // steps from the forbidden region to the farthest ring, where strips lie beyond
+constexpr double kMostBetweenStrips = 0.1;     // of the strips' length: the ways between them
+constexpr double kShortestTerrace = 2;         // mm of a terrace's border ring: shorter ones are corners of walls that need none
+constexpr double kSlide = 1.2;                 // steps along the next ring that the way to it slants
 
 double length(const PathPoint& a, const PathPoint& b) { return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y); }
 
@@ -31,6 +36,13 @@ struct Bound {
     }
 };
 
+void note_box(RingPlan::Piece& piece) {
+    piece.box = {1e300, 1e300, -1e300, -1e300};
+    for (const PathPoint& p : piece.points)
+        piece.box = {std::min<double>(piece.box[0], p.x), std::min<double>(piece.box[1], p.y), std::max<double>(piece.box[2], p.x),
+                     std::max<double>(piece.box[3], p.y)};
+}
+
 // The pieces of one loop of the free area that are no edge of the bound. Outer loops run counter-clockwise and holes clockwise, so
 // the free area is on the left, what stays on the right, and the cutter climbs.
 void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bound, std::size_t region, double tolerance,
@@ -44,11 +56,8 @@ void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bo
     auto point = [&](std::size_t k) { return PathPoint{loop[k % n].x, loop[k % n].y, z}; };
     auto take = [&](std::vector<PathPoint>& points, bool closed) {
         if (points.size() > 1) {
-            RingPlan::Piece piece{simplify(points, tolerance), {1e300, 1e300, -1e300, -1e300}, region, closed};
-            for (const PathPoint& p : piece.points)
-                piece.box = {std::min<double>(piece.box[0], p.x), std::min<double>(piece.box[1], p.y), std::max<double>(piece.box[2], p.x),
-                             std::max<double>(piece.box[3], p.y)};
-            out.push_back(std::move(piece));
+            out.push_back({simplify(points, tolerance), {}, region, closed});
+            note_box(out.back());
         }
         points.clear();
     };
@@ -290,12 +299,87 @@ void cut_frames(PathBuilder& path, const RingPlan& plan) {
     }
 }
 
+Loops rectangle(double x0, double y0, double x1, double y1) {
+    Loops loops;
+    loops.points = {{to_units(x0), to_units(y0)}, {to_units(x1), to_units(y0)}, {to_units(x1), to_units(y1)}, {to_units(x0), to_units(y1)}};
+    loops.close_loop();
+    return loops;
+}
+
+// Where the middle of a cutter of radius `r` is of use on what stands in a rectangle (smallest x and y, largest x and y), mm.
+Loops useful_area(const LayerCut& cut, double r, const std::array<double, 4>& stands) {
+    const double far = r + 2;
+    return intersect(offset(rectangle(stands[0], stands[1], stands[2], stands[3]), r + kBeside, kFineRing),
+                     rectangle(cut.low(0, far), cut.low(1, far), cut.high(0, far), cut.high(1, far)));
+}
+
+// How rings that meet nothing but waste are thinned: chords that leave a curve by no more than the machine may are run as fast as the curve.
+struct Thinning {
+    double fine = 0, loose = 0, turn = 0;  // mm, mm, radians
+    Thinning(const LayerCut& cut, const Tool& tool, double blend)
+        : fine(std::min(ring_tolerance(tool), std::max(kFineRing, blend))),
+          loose(ring_tolerance(tool)),
+          turn(fast_turn(cut.job.machine, std::min(tool.max_feed, cut.job.machine.max_feed), blend)) {}
+    [[nodiscard]] Loops of(const Loops& region) const { return thinned(region, fine * kUnitsPerMm, loose * kUnitsPerMm, turn); }
+};
+
+double distance(Point2 a, Point2 b) { return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y); }
+
+// How far a place lies from a line, 0.1 µm.
+double distance(const PathPoint& p, std::span<const PathPoint> line) {
+    double least = 1e300;
+    for (std::size_t k = 1; k < line.size(); ++k) {
+        const double ax = line[k - 1].x, ay = line[k - 1].y, dx = line[k].x - ax, dy = line[k].y - ay, l2 = dx * dx + dy * dy;
+        const double t = l2 > 0 ? std::clamp(((p.x - ax) * dx + (p.y - ay) * dy) / l2, 0.0, 1.0) : 0;
+        least = std::min(least, std::hypot(p.x - ax - t * dx, p.y - ay - t * dy));
+    }
+    return least;
+}
+
+// Rectangles from `stands` (smallest x and y, largest x and y, mm) inwards, with the stock on their right, as far as they lie outside of the
+// rings next to the forbidden region. False, and none, where these would cut them to pieces.
+bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, const Loops& forbidden, const Loops& useful) {
+    const Loops outside = subtract(useful, offset(forbidden, kRingsBesideStrips * plan.step, kFineRing));
+    Loops around;
+    const double narrow = std::min(stands[2] - stands[0], stands[3] - stands[1]);
+    for (int k = 1; 2 * (k - 1) * plan.step < narrow; ++k) {
+        const double in = k * plan.step - r;
+        const Loops corners = rectangle(stands[0] + in, stands[1] + in, stands[2] - in, stands[3] - in);
+        around.points.insert(around.points.end(), corners.points.rbegin(), corners.points.rend());
+        around.close_loop();
+    }
+    std::vector<RunInside> runs = runs_inside(around, outside);
+    double cut = 0, between = 0;
+    const RunInside* last = nullptr;
+    for (const RunInside& run : runs) {
+        for (std::size_t k = 1; k < run.points.size(); ++k) cut += distance(run.points[k - 1], run.points[k]);
+        if (run.closed) cut += distance(run.points.back(), run.points.front());
+        if (last != nullptr && !last->closed && !run.closed) between += distance(last->points.back(), run.points.front());
+        last = &run;
+    }
+    if (runs.empty() || between > kMostBetweenStrips * cut) return false;
+    for (const RunInside& run : runs) {
+        std::vector<PathPoint> strip;
+        // From the rectangle before, where the cutter has room.
+        const Point2 a = run.points[0], b = run.points[1];
+        const double l = distance(a, b);
+        const Point2 beside{static_cast<std::int32_t>(std::lround(a.x - plan.step * kUnitsPerMm * (static_cast<double>(b.y) - a.y) / l)),
+                            static_cast<std::int32_t>(std::lround(a.y + plan.step * kUnitsPerMm * (static_cast<double>(b.x) - a.x) / l))};
+        if (winding(outside, beside) > 0) strip.push_back({beside.x, beside.y, plan.z});
+        for (const Point2 p : run.points) strip.push_back({p.x, p.y, plan.z});
+        if (run.closed) strip.push_back({a.x, a.y, plan.z});
+        plan.strips.push_back(std::move(strip));
+    }
+    return true;
+}
+
 }  // namespace
 
 double ring_tolerance(const Tool& tool) { return std::max(kFineRing, kRingShare * tool.diameter); }
 
-RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double blend) {
+RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double blend, bool hold) {
     RingPlan plan;
+    plan.hold = hold;
     const double r = tool.diameter / 2;
     plan.step = std::min(kStepShare, tool.stepover) * tool.diameter;
     plan.z = to_units(tip_z);
@@ -311,17 +395,9 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
     bound.reach = (r + kBeside) * kUnitsPerMm;
     const double far = r + 2;
     bound.travel = {cut.low(0, far) * kUnitsPerMm, cut.low(1, far) * kUnitsPerMm, cut.high(0, far) * kUnitsPerMm, cut.high(1, far) * kUnitsPerMm};
-    auto rectangle = [](double x0, double y0, double x1, double y1) {
-        Loops loops;
-        loops.points = {{to_units(x0), to_units(y0)}, {to_units(x1), to_units(y0)}, {to_units(x1), to_units(y1)}, {to_units(x0), to_units(y1)}};
-        loops.close_loop();
-        return loops;
-    };
-    const Loops useful = intersect(offset(rectangle(stands[0], stands[1], stands[2], stands[3]), r + kBeside, kFineRing),
-                                   rectangle(cut.low(0, far), cut.low(1, far), cut.high(0, far), cut.high(1, far)));
-    // Chords that leave a curve by no more than the machine may are run as fast as the curve.
-    const double loose = ring_tolerance(tool), fine = std::min(loose, std::max(kFineRing, blend));
-    const double turn = fast_turn(cut.job.machine, std::min(tool.max_feed, cut.job.machine.max_feed), blend);
+    const Loops useful = useful_area(cut, r, stands);
+    const Thinning thinning(cut, tool, blend);
+    const std::size_t last_ring = !hold && go_round(plan, stands, r, forbidden, useful) ? kRingsBesideStrips : SIZE_MAX;
     Loops nearer_free;
     std::vector<std::size_t> nearer_region;  // by loop of nearer_free; SIZE_MAX for holes
     std::vector<std::array<std::int32_t, 4>> nearer_boxes;
@@ -362,21 +438,71 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
             }
             if (inner.around != SIZE_MAX) ++plan.regions[inner.around].waits_for;
         }
-        if (plan.pieces.size() == first_piece) break;
+        if (plan.pieces.size() == first_piece || ring == last_ring) break;
         nearer_boxes = boxes_of(free);
         nearer_free = std::move(free);
         nearer_region = std::move(region_of);
-        region = thinned(offset(region, plan.step, kFineRing), fine * kUnitsPerMm, loose * kUnitsPerMm, turn);
+        region = thinning.of(offset(region, plan.step, kFineRing));
         cut.context.throw_if_cancelled();
     }
     return plan;
 }
 
-void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan, bool hold) {
+RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbidden, const Loops& border_over, const Loops& over, double tip_z,
+                      double blend) {
+    RingPlan plan;
+    const double r = tool.diameter / 2;
+    plan.step = std::min(kStepShare, tool.stepover) * tool.diameter;
+    plan.z = to_units(tip_z);
+    const Loops useful = useful_area(cut, r, {cut.layer.stock_min[0], cut.layer.stock_min[1], cut.layer.stock_max[0], cut.layer.stock_max[1]});
+    const Thinning thinning(cut, tool, blend);
+    Loops region = simplify(forbidden);
+    std::size_t nearer = 0;  // pieces of the ring before begin here
+    for (std::size_t ring = 0;; ++ring) {
+        cut.context.throw_if_cancelled();
+        // Around the region, so that it is on the right: its loops are turned over.
+        Loops around;
+        for (std::size_t l = 0; l < region.size(); ++l) {
+            const std::span<const Point2> loop = region.loop(l);
+            around.points.insert(around.points.end(), loop.rbegin(), loop.rend());
+            around.close_loop();
+        }
+        const std::size_t first = plan.pieces.size();
+        for (const RunInside& run : runs_inside(around, intersect(useful, ring == 0 ? border_over : over))) {
+            std::vector<PathPoint> points;
+            for (const Point2 p : run.points) points.push_back({p.x, p.y, plan.z});
+            if (run.closed) points.push_back(points.front());
+            if (double whole = 0; ring == 0 && !run.closed) {
+                for (std::size_t k = 1; k < points.size(); ++k) whole += length(points[k - 1], points[k]);
+                if (whole < kShortestTerrace * kUnitsPerMm) continue;
+            }
+            RingPlan::Piece piece{ring == 0 ? simplify(points, kFineRing * kUnitsPerMm) : std::move(points), {}, plan.regions.size(), run.closed};
+            note_box(piece);
+            RingPlan::Region of{ring, SIZE_MAX, 0, {plan.pieces.size()}};
+            // Before the nearest of the ring before it.
+            const PathPoint& middle = piece.points[piece.points.size() / 2];
+            double least = 2 * plan.step * kUnitsPerMm;
+            for (std::size_t p = nearer; p < first; ++p) {
+                const std::array<double, 4>& box = plan.pieces[p].box;
+                if (middle.x < box[0] - least || middle.y < box[1] - least || middle.x > box[2] + least || middle.y > box[3] + least) continue;
+                if (const double d = distance(middle, plan.pieces[p].points); d < least) least = d, of.around = plan.pieces[p].region;
+            }
+            if (of.around != SIZE_MAX) ++plan.regions[of.around].waits_for;
+            plan.regions.push_back(std::move(of));
+            plan.pieces.push_back(std::move(piece));
+        }
+        if (plan.pieces.size() == first && ring > 0) return plan;
+        nearer = first;
+        region = thinning.of(offset(region, plan.step, kFineRing));
+    }
+}
+
+void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
     if (plan.pieces.empty()) return;
     const double step_units = plan.step * kUnitsPerMm;
     const std::int32_t z = plan.z;
     cut_frames(path, plan);
+    for (const std::vector<PathPoint>& strip : plan.strips) path.follow(strip);
     std::vector<std::size_t> left;  // by region: pieces not cut yet
     for (const RingPlan::Region& region : plan.regions) left.push_back(region.pieces.size());
     std::vector<std::size_t> ready;  // pieces that wait for nothing
@@ -403,7 +529,7 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan, bool
         std::size_t far = 0;
         for (const std::size_t k : ready) far = std::max(far, plan.regions[plan.pieces[k].region].ring);
         for (std::size_t k = 0; k < ready.size(); ++k)
-            if ((!hold || plan.regions[plan.pieces[ready[k]].region].ring == far) &&
+            if ((!plan.hold || plan.regions[plan.pieces[ready[k]].region].ring == far) &&
                 nearer(plan.pieces[ready[k]], path.at(), !cut.job.cutting.climb, start))
                 next = k;
         RingPlan::Piece& piece = plan.pieces[ready[next]];

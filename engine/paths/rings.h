@@ -44,12 +44,14 @@ struct RingPlan {
         std::size_t waits_for = 0;                ///< regions within this one
         std::vector<std::size_t> pieces;
     };
-    std::vector<std::array<double, 4>> frames;  ///< rectangles cut before the rings, from the stock's edge inwards: smallest x, y, largest x, y, mm
-    double south = 0;                           ///< mm: y beside the stock, where the first of them is entered
+    std::vector<std::array<double, 4>> frames;   ///< rectangles cut before the rings, from the stock's edge inwards: smallest x, y, largest x, y, mm
+    double south = 0;                            ///< mm: y beside the stock, where the first of them is entered
+    std::vector<std::vector<PathPoint>> strips;  ///< runs along further rectangles, outside of the rings, in the order in which they are cut
     std::vector<Piece> pieces;
     std::vector<Region> regions;
     double step = 0;  ///< mm between rings
     std::int32_t z = 0;
+    bool hold = false;  ///< all rings of one distance are cut before any nearer one
 };
 
 /// Plans to clear everything between `forbidden` and the edge of the stock at one height: first in rectangles from the stock's edge as
@@ -59,13 +61,23 @@ struct RingPlan {
 /// @param forbidden of the tool's middle, outer loops counter-clockwise; the flask's included
 /// @param tip_z mm
 /// @param blend mm by which the machine rounds the rings' corners (Operation::blend): chords are as long as it then takes at full feed
-[[nodiscard]] RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double blend);
+/// @param hold  keeps what hangs over a cavity below, or over the edge of the stack, held to the end: it goes from the middle or from the free edge
+///              inwards, and what still stands hangs on what stays, for from each of its points the shortest way to the forbidden region runs through
+///              standing stock. Without, rectangles go on inwards where what is forbidden is far apart: rings that end at the stock's edge must
+///              all be begun at the same end, rectangles go round.
+[[nodiscard]] RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double blend, bool hold);
 
-/// Cuts rings from the farthest to the forbidden region's border. A ring is cut once all rings within its part of the free
-/// area are; of those whose turn it is the nearest comes next, and from ring to next ring the cutter stays down. With `hold`, all
-/// rings of one distance are cut before any nearer one: the pieces that hang over a cavity below, or over the edge of the stack, go from the
-/// middle or from the free edge inwards, and what still stands hangs on what stays, for from each of its points the shortest way
-/// to the forbidden region runs through standing stock.
-void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan, bool hold);
+/// Plans to clear what stands at one height over slopes and floors, once everything that is free at a lower height has been cleared down to
+/// that: rings around `forbidden`, a step apart, as far as they are of use.
+/// @param forbidden   as for plan_rings()
+/// @param border_over where the ring on the border of `forbidden` is of use: places that are forbidden at the lower height
+/// @param over        the same for all other rings
+/// @param tip_z       mm
+[[nodiscard]] RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbidden, const Loops& border_over, const Loops& over,
+                                    double tip_z, double blend);
+
+/// Cuts frames, strips, and rings from the farthest to the forbidden region's border. A ring is cut once all rings within its part of the free
+/// area are; of those whose turn it is the nearest comes next, and from ring to next ring the cutter stays down.
+void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan);
 
 }  // namespace slabwright

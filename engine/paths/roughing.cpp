@@ -1,5 +1,5 @@
 // Roughing: level by level from the top, in rings around what the shadow forbids or in zigzags and then once along its border. A
-// level lies on every up-facing flat (plus allowance) and on the layer's bottom; between them the stepdowns of section 5. The
+// level or, in rings, a terrace lies on every up-facing flat (plus allowance) and on the layer's bottom; between them the stepdowns of section 5. The
 // last level cuts the slab through where nothing lies under it, so it goes in rings that leave what hangs over held to the end.
 // Where the cutter meets more of its breadth than the job allows, the feed is lowered (engagement.h).
 #include <algorithm>
@@ -17,6 +17,10 @@ namespace slabwright {
 
 namespace {
 
+constexpr double kContourError = 0.03;  // mm by which the contours of two levels may stand apart on a vertical wall
+constexpr double kOffsetError = 0.01;   // mm
+constexpr double kMoreThanStep = 1.0;   // mm that a terrace's border ring may meet beyond the step between rings
+
 // Whether a flat end mill comes down to a floor anywhere, by places a third of its radius apart.
 bool stands_on(const LayerCut& cut, const Tool& tool, double floor) {
     const double r = tool.diameter / 2, step = r / 3;
@@ -32,15 +36,19 @@ bool stands_on(const LayerCut& cut, const Tool& tool, double floor) {
     return false;
 }
 
-}  // namespace
-
-std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, double floor) {
-    const double bottom = cut.layer.z_bottom, top = cut.layer.z_top;
+// Where a level must lie: a floor of the flat end mill, or the bottom of what is cut, from which `floor` is kept (mm).
+std::vector<RoughLevel> fixed_levels(const LayerCut& cut, const Tool& tool, double floor) {
+    const double bottom = cut.layer.z_bottom;
     std::vector<RoughLevel> fixed;
     for (const double z : cut.floors)
-        if (z + floor < top && (!clears_on_contours(cut.job) || stands_on(cut, tool, z))) fixed.push_back({z + floor, z});
+        if (z + floor < cut.layer.z_top && (!clears_on_contours(cut.job) || stands_on(cut, tool, z))) fixed.push_back({z + floor, z});
     fixed.push_back({bottom, bottom});
     std::sort(fixed.begin(), fixed.end(), [](const RoughLevel& a, const RoughLevel& b) { return a.tip > b.tip; });
+    return fixed;
+}
+
+// From `top` down to fixed levels (descending) the steps that slopes and the tool allow.
+std::vector<RoughLevel> stepped(const LayerCut& cut, const Tool& tool, double floor, double top, std::span<const RoughLevel> fixed) {
     std::vector<RoughLevel> levels;
     double z = top;
     for (const RoughLevel& f : fixed) {
@@ -52,13 +60,75 @@ std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, doub
             const double count = std::ceil((z - f.tip) / step - 1e-9);
             if (count <= 1) break;
             z -= (z - f.tip) / count;
-            levels.push_back({z, std::max(bottom, z - floor)});
+            levels.push_back({z, std::max(cut.layer.z_bottom, z - floor)});
         }
         levels.push_back(f);
         z = f.tip;
     }
     return levels;
 }
+
+}  // namespace
+
+std::vector<RoughLevel> rough_levels(const LayerCut& cut, const Tool& tool, double floor) {
+    return stepped(cut, tool, floor, cut.layer.z_top, fixed_levels(cut, tool, floor));
+}
+
+namespace {
+
+// A level, and what has been cleared when it is cut.
+struct RoughStep {
+    RoughLevel level;
+    double above = 0;       // mm: what stands there stands this high
+    std::size_t floor = 0;  // of a terrace: the step that has cleared what is free at a lower height; of others: itself
+};
+
+// Every level clears all that is free at its height.
+std::vector<RoughStep> level_steps(const LayerCut& cut, const Tool& tool, double floor) {
+    std::vector<RoughStep> steps;
+    double above = cut.layer.z_top;
+    for (const RoughLevel& level : rough_levels(cut, tool, floor)) {
+        steps.push_back({level, above, steps.size()});
+        above = level.tip;
+    }
+    return steps;
+}
+
+// Even levels, as deep as the tool may cut (but see LayerJob::last_steps), and over each of them terraces where stepped() puts levels, from
+// below: what is cut there are only the slopes and floors that the level has left standing.
+std::vector<RoughStep> terraced_steps(const LayerCut& cut, const Tool& tool, double floor) {
+    const std::vector<RoughLevel> fixed = fixed_levels(cut, tool, floor);
+    const double top = cut.layer.z_top, bottom = cut.layer.z_bottom;
+    std::vector<double> tips{bottom};
+    if (const double shallow = cut.layer.last_steps; shallow > 0)
+        for (int k = 0; k < 2 && top - tips.back() > 1.5 * shallow; ++k) tips.push_back(tips.back() + shallow);
+    const double rest = top - tips.back();
+    const int count = static_cast<int>(std::ceil(rest / tool.stepdown_max - 1e-9));
+    for (int k = 1; k < count; ++k) tips.push_back(top - rest * (count - k) / count);
+    std::vector<RoughStep> steps;
+    double above = top;
+    for (std::size_t k = tips.size(); k-- > 0;) {
+        const double z = tips[k];
+        std::vector<RoughLevel> between;
+        for (const RoughLevel& f : fixed)
+            if (f.tip < above - 1e-3 && f.tip > z + 1e-3) between.push_back(f);
+        between.push_back({z, std::max(bottom, z - floor)});
+        const std::vector<RoughLevel> levels = stepped(cut, tool, floor, above, between);
+        const std::size_t lowest = steps.size();
+        for (std::size_t i = levels.size(); i-- > 0;) steps.push_back({levels[i], above, lowest});
+        above = z;
+    }
+    return steps;
+}
+
+// How far inside what is forbidden at its floor a terrace's border must lie for a terrace to be of use, mm: on slopes so steep that the whole
+// depth of cut leaves less than the cusp of roughing, it is nearer.
+double least_width(const RoughStep& terrace, const RoughStep& floor, double cusp) {
+    const double share = cusp / (floor.above - floor.level.tip);  // cos α of the steepest slope that needs terraces
+    return kContourError + (share < 1 ? (terrace.level.tip - floor.level.tip) * share / std::sqrt(1 - share * share) : 1e3);
+}
+
+}  // namespace
 
 Operation rough_layer(const LayerCut& cut) {
     const Tool& tool = cut.layer.tools.rough;
@@ -67,9 +137,11 @@ Operation rough_layer(const LayerCut& cut) {
     op.blend = rough_blend(cut.job.cutting);
     const double r = tool.diameter / 2, clearance = cut.layer.z_top + cut.job.machine.clearance;
     const Cutter cutter{Cutter::Profile::flat, r + cut.job.cutting.wall_allowance};
-    const std::vector<RoughLevel> levels = rough_levels(cut, tool, cut.job.cutting.floor_allowance);
+    const double allowance = cut.job.cutting.floor_allowance;
+    const std::vector<RoughStep> steps = contour ? terraced_steps(cut, tool, allowance) : level_steps(cut, tool, allowance);
+    const std::size_t last = steps.back().floor;  // cuts the slab through
     std::vector<double> spare;
-    for (const RoughLevel& l : levels) spare.push_back(l.spare);
+    for (const RoughStep& s : steps) spare.push_back(s.level.spare);
     const std::vector<Section> inside = cut.insides(cutter, spare);
 
     // Lines from edge to edge of the stock, evenly spaced.
@@ -89,40 +161,52 @@ Operation rough_layer(const LayerCut& cut) {
     const bool flask = !cut.layer.opening.empty();
     const Loops room = flask ? flask_room(cut, r) : Loops{};
     std::vector<FibreLevel> heights;
-    for (std::size_t i = 0; i < levels.size(); ++i) heights.push_back({levels[i].spare, &inside[i].loops});
+    for (std::size_t i = 0; i < steps.size(); ++i) heights.push_back({steps[i].level.spare, &inside[i].loops});
     const std::vector<Contours> borders = level_contours(cut.context, cut.solid, heights, cutter, grid);
-    std::vector<Level> cuts(levels.size());
-    parallel_each(cut.context, levels.size(), [&](std::size_t i) {
-        if (i + 1 == levels.size() || contour) {
-            Loops forbidden = forbidden_region(borders[i]);
-            if (flask) forbidden = unite(forbidden, beyond_room(cut, r, room));
-            cuts[i].rings = plan_rings(cut, tool, forbidden, levels[i].tip, op.blend);
+    std::vector<Loops> forbidden_at(steps.size());
+    if (const Loops beyond = flask ? beyond_room(cut, r, room) : Loops{}; true)
+        parallel_each(cut.context, steps.size(), [&](std::size_t i) {
+            forbidden_at[i] = simplify(forbidden_region(borders[i]));
+            if (flask) forbidden_at[i] = unite(forbidden_at[i], beyond);
+        });
+    std::vector<Level> cuts(steps.size());
+    parallel_each(cut.context, steps.size(), [&](std::size_t i) {
+        const double tip = steps[i].level.tip;
+        if (const std::size_t floor = steps[i].floor; floor != i) {
+            const double width = least_width(steps[i], steps[floor], cut.job.tolerances.rough_cusp);
+            cuts[i].rings = plan_terrace(cut, tool, forbidden_at[i], offset(forbidden_at[floor], -width, kOffsetError),
+                                         offset(forbidden_at[i - 1], -kMoreThanStep, kOffsetError), tip, op.blend);
+            return;
+        }
+        if (i == last || contour) {
+            cuts[i].rings = plan_rings(cut, tool, forbidden_at[i], tip, op.blend, i == last);
             if (!cuts[i].rings.pieces.empty()) return;
         }
         const Fibres forbidden =
-            beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::x, lines), Axis::x, lines);
+            beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, steps[i].level.spare, Axis::x, lines), Axis::x, lines);
         for (std::size_t l = 0; l < lines.size(); ++l) cuts[i].free.push_back(free_stretches(forbidden.line(l), from, to, 0.2));
     });
 
     PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance, cut.layer.z_top + 2);
     const DropIndex part(cut.solid, cutter);
     path.know(cut.around(tool, &part));
-    double above = cut.layer.z_top;
-    for (std::size_t i = 0; i < levels.size(); ++i) {
-        op.stepdown = std::max(op.stepdown, above - levels[i].tip);
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+        const double above = steps[i].above, tip = steps[i].level.tip;
         if (!cuts[i].rings.pieces.empty()) {
+            op.stepdown = std::max(op.stepdown, above - tip);
             op.stepover = std::max(op.stepover, cuts[i].rings.step);
-            clear_from_afar(path, cut, std::move(cuts[i].rings), i + 1 == levels.size());
-            above = levels[i].tip;
+            clear_from_afar(path, cut, std::move(cuts[i].rings));
             continue;
         }
+        if (steps[i].floor != i) continue;
+        op.stepdown = std::max(op.stepdown, above - tip);
         op.stepover = std::max(op.stepover, depth / gaps);
-        zigzag(path, cut, tool, lines, cuts[i].free, levels[i].tip, [&](std::span<const std::int32_t> at) {
-            return beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, levels[i].spare, Axis::y, at), Axis::y, at);
+        zigzag(path, cut, tool, lines, cuts[i].free, tip, [&](std::span<const std::int32_t> at) {
+            return beside_flask(cut, room, fibres(cut.context, cut.solid, inside[i].loops, cutter, steps[i].level.spare, Axis::y, at), Axis::y, at);
         });
         // Along the border, begun where a zigzag line ends and the cutter has been already.
         const Contours& border = borders[i];
-        const std::int32_t z = to_units(levels[i].tip);
+        const std::int32_t z = to_units(tip);
         for (std::size_t c = 0; c < border.size(); ++c) {
             const auto points = std::span(border.points).subspan(border.starts[c], border.starts[c + 1] - border.starts[c]);
             if (points.size() < 3) continue;
@@ -162,7 +246,6 @@ Operation rough_layer(const LayerCut& cut) {
             path.go_above({ring[0].x, ring[0].y});
             cut_ring(path, ring, to_units(above), z, cut.job.cutting.ramp_deg);
         }
-        above = levels[i].tip;
     }
     path.finish();
     if (cut.job.cutting.max_engagement < 1 && op.stepdown > 0) {

@@ -24,6 +24,8 @@ bool clears_on_contours(const Job& job) {
     return several(ToolKind::flat) || several(ToolKind::ball);
 }
 
+double least_slab(const Tool& tool) { return tool.stepdown_min > 0 ? tool.stepdown_min : tool.stepdown_max / 2; }
+
 std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter) {
     // What a flat reaches at a corner a smaller one reaches too, and so it is with balls: the smallest of either kind leave no more
     // than all together.

@@ -23,6 +23,10 @@ struct LayerTools {
 /// Whether what cutters leave is cleared on contours (Cutting::rest_pattern).
 [[nodiscard]] bool clears_on_contours(const Job& job);
 
+/// The thinnest wood that is called a slab under this tool, mm: its least step; where its range begins at nothing, half of the largest, with which
+/// the ranges of Luo's other tools begin. Thinner wood that hangs over is a sliver that tears off when it is cut.
+[[nodiscard]] double least_slab(const Tool& tool);
+
 /// The library of LUO table 5.4: flat and ball end mills of 1/8, 1/4, 1/2, 3/4 and 1 in with their stepdowns, numbers 2 … 6 and 12 … 16,
 /// and the default face mill. Their flutes reach through a 19 mm slab; what LUO does not give is ours.
 [[nodiscard]] std::vector<Tool> luo_library();

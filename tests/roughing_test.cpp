@@ -1,0 +1,153 @@
+// Roughing in rings: deep levels first, terraces over slopes and floors after them, rectangles where what stays is far apart. What it
+// leaves is found by cutting its own moves out of a field of cells, one by one.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "engine/paths/layer_cut.h"
+#include "tests/support/height_field.h"
+
+namespace slabwright {
+namespace {
+
+constexpr double kTop = 16, kCell = 0.5;
+
+struct Roughed {
+    Context context;
+    Job job;
+    Mesh mesh;
+    LayerJob layer;
+    std::array<double, 2> low, high;
+    LayerCut cut;
+    Standing standing;
+    Operation op;
+    int nx = 0, ny = 0;
+    std::vector<double> height;  // what is left, by cells
+    double deepest_cut = 0;      // mm over a tip
+
+    // A height field over 60 mm around the origin in a stock.
+    Roughed(const std::function<double(double, double)>& surface, std::array<double, 2> stock_low, std::array<double, 2> stock_high,
+            double last_steps)
+        : mesh(test::height_field(context, 120, 0.5, surface)),
+          low(stock_low),
+          high(stock_high),
+          cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, alpha_map(context, mesh.view(), 0, kTop), nullptr, {}},
+          standing(low, high, kTop) {
+        layer.mesh = mesh.view();
+        layer.job = &job;
+        layer.z_top = layer.slab_thickness = kTop;
+        layer.stock_min = low, layer.stock_max = high;
+        layer.last_steps = last_steps;
+        layer.tools.rough = tool_of_kind(job, ToolKind::flat);
+        layer.tools.finish = tool_of_kind(job, ToolKind::ball);
+        cut.standing = &standing;
+    }
+    void rough() {
+        op = rough_layer(cut);
+        nx = static_cast<int>((high[0] - low[0]) / kCell), ny = static_cast<int>((high[1] - low[1]) / kCell);
+        height.assign(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny), kTop);
+        for (std::size_t k = 1; k < op.moves.size(); ++k) {
+            const Move &a = op.moves[k - 1], &b = op.moves[k];
+            const double ax = to_mm(a.x), ay = to_mm(a.y), bx = to_mm(b.x), by = to_mm(b.y), z = to_mm(std::max(a.z, b.z));
+            if (z >= kTop) continue;
+            const double r = layer.tools.rough.diameter / 2, dx = bx - ax, dy = by - ay, l2 = dx * dx + dy * dy;
+            for (int j = std::max(0, cell(std::min(ay, by) - r, 1)); j <= std::min(ny - 1, cell(std::max(ay, by) + r, 1)); ++j)
+                for (int i = std::max(0, cell(std::min(ax, bx) - r, 0)); i <= std::min(nx - 1, cell(std::max(ax, bx) + r, 0)); ++i) {
+                    const double t = l2 > 0 ? std::clamp(((x(i) - ax) * dx + (y(j) - ay) * dy) / l2, 0.0, 1.0) : 0;
+                    if (std::hypot(x(i) - ax - t * dx, y(j) - ay - t * dy) > r) continue;
+                    deepest_cut = std::max(deepest_cut, at(i, j) - z), at(i, j) = std::min(at(i, j), z);
+                }
+        }
+    }
+    [[nodiscard]] int cell(double v, int axis) const { return static_cast<int>(std::floor((v - low[static_cast<std::size_t>(axis)]) / kCell)); }
+    [[nodiscard]] double x(int i) const { return low[0] + (i + 0.5) * kCell; }
+    [[nodiscard]] double y(int j) const { return low[1] + (j + 0.5) * kCell; }
+    double& at(int i, int j) { return height[static_cast<std::size_t>(j) * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i)]; }
+    // How low the roughing cutter may get over a place at all, with its allowance.
+    [[nodiscard]] double least(int i, int j) const {
+        const double r = layer.tools.rough.diameter / 2;
+        const DropIndex& part = cut.drops({Cutter::Profile::flat, r + job.cutting.wall_allowance});
+        double lowest = kTop;
+        for (double v = -r; v <= r; v += r / 8)
+            for (double u = -r; u <= r; u += r / 8)
+                if (std::hypot(u, v) <= r) lowest = std::min(lowest, part.drop(x(i) + u, y(j) + v).tip_z);
+        return std::max(0.0, lowest);
+    }
+    [[nodiscard]] double way(bool by_feed) const {
+        double sum = 0;
+        for (std::size_t k = 1; k < op.moves.size(); ++k)
+            if ((op.moves[k].feed > 0) == by_feed && op.moves[k].z < to_units(kTop))
+                sum += std::hypot(to_mm(op.moves[k].x - op.moves[k - 1].x), to_mm(op.moves[k].y - op.moves[k - 1].y));
+        return sum;
+    }
+};
+
+// On the west a slope of 45°, on the south one of 65°, on the east a wall with the draft of 2°, on the north a wall and a ledge before it.
+double hill(double x, double y) {
+    const double west = 12 + (x + 12), south = 12 + std::tan(65 * std::numbers::pi / 180) * (y + 12),
+                 east = 12 + (12 - x) / std::tan(2 * std::numbers::pi / 180);
+    return std::clamp(std::min({west, south, east, y > 12 ? 5.3 : 99.0, y > 24 ? 0.5 : 99.0}), 0.5, 14.5);
+}
+
+TEST(Roughing, LeavesStepsOnSlopesAndAllowancesOnFloors) {
+    for (const double last_steps : {0.0, 2.2}) {
+        Roughed r(hill, {-45, -45}, {45, 45}, last_steps);
+        r.cut.floors = {14.5, double{5.3F}, 0.5};
+        r.rough();
+        ASSERT_FALSE(r.op.moves.empty());
+        const Tool& tool = r.layer.tools.rough;
+        EXPECT_LE(r.op.stepdown, tool.stepdown_max + 1e-9);
+        EXPECT_LE(r.deepest_cut, r.op.stepdown + 1e-3) << "what a level clears is clear";
+        double worst = 0, on_ledge = 0, on_slope = 0, deepest = 1e300;
+        for (int j = 0; j < r.ny; j += 2)
+            for (int i = 0; i < r.nx; i += 2) {
+                const double least = r.least(i, j), left = r.at(i, j) - least, x = r.x(i), y = r.y(j);
+                deepest = std::min(deepest, r.at(i, j) - (std::max(std::abs(x), std::abs(y)) < 29.5 ? hill(x, y) : 0));
+                worst = std::max(worst, left);
+                if (std::abs(x) < 10 && y > 15 && y < 21) on_ledge = std::max(on_ledge, left);
+                if (least < kTop - 4 && ((std::abs(y) < 9 && x < -13) || (std::abs(x) < 9 && y < -13))) on_slope = std::max(on_slope, left);
+            }
+        EXPECT_GE(deepest, -1e-6) << "nothing of the part is cut";
+        EXPECT_LE(worst, tool.stepdown_max + r.job.cutting.floor_allowance + 0.05) << "no place is left out";
+        EXPECT_LE(on_ledge, r.job.cutting.floor_allowance + 0.05);
+        EXPECT_LE(on_slope, tool.stepdown_min + r.job.cutting.floor_allowance + 0.1) << "terraces, where a whole level leaves more";
+        EXPECT_GT(on_slope, 1);
+    }
+}
+
+TEST(Roughing, LevelsGoAsDeepAsTheToolMayAndTerracesOnlyWhereTheyCut) {
+    Roughed r(hill, {-45, -45}, {45, 45}, 0);
+    r.cut.floors = {14.5, double{5.3F}, 0.5};
+    r.rough();
+    const Tool& tool = r.layer.tools.rough;
+    const double levels = std::ceil(kTop / tool.stepdown_max), step = 0.45 * tool.diameter, area = 90 * 90;
+    EXPECT_LT(r.way(true), 1.25 * levels * area / step);
+    // The levels that clear everything.
+    std::vector<double> at_level;
+    for (std::size_t k = 1; k < r.op.moves.size(); ++k) at_level.push_back(to_mm(r.op.moves[k].z));
+    for (int k = 1; k < levels; ++k)
+        EXPECT_TRUE(std::any_of(at_level.begin(), at_level.end(), [&](double z) { return std::abs(z - (kTop - kTop * k / levels)) < 1e-3; })) << k;
+}
+
+// One small thing in the corner of a wide stock: rectangles leave only what is next to it to rings, and nothing is left.
+TEST(Roughing, GoesRoundWhereWhatStaysIsFarApart) {
+    const auto boss = [](double x, double y) { return std::max(std::abs(x), std::abs(y)) < 14 ? 14.5 : 0.5; };
+    Roughed r(boss, {-45, -45}, {455, 355}, 0);
+    r.rough();
+    const double levels = std::ceil(kTop / r.layer.tools.rough.stepdown_max);
+    for (int j = 0; j < r.ny; ++j)
+        for (int i = 0; i < r.nx; ++i)
+            if (std::max(std::abs(r.x(i)), std::abs(r.y(j))) > 31) {
+                ASSERT_LE(r.at(i, j), 1e-6) << r.x(i) << " " << r.y(j);
+            }
+    EXPECT_LE(r.deepest_cut, r.op.stepdown + 1e-3) << "nothing was left by a level above";
+    // Of all levels but the last the ways back are short.
+    EXPECT_LT(r.way(false), 1.6 / levels * r.way(true));
+    EXPECT_GT(r.way(true), levels * 500 * 400 / (0.5 * r.layer.tools.rough.diameter));
+}
+
+}  // namespace
+}  // namespace slabwright
