@@ -370,6 +370,74 @@ TEST(Stock, EffectsAreThoseOfTheCells) {
     EXPECT_GT(lowered, 100000U);
 }
 
+// Ways of a disc at one height, taken as one region, leave what they leave one after another, and what they took together is the same.
+TEST(Stock, ARegionIsCutAsItsWaysAre) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-4, 24), uz(0.5, 11), ur(0.1, 9), turn(-3, 3);
+    const CellGrid grid{0.1, 0.2, 0.21, 97, 93};
+    std::size_t deep = 0, cut = 0, unlike = 0, cleared = 0;
+    LevelRegion region(grid);
+    for (int trial = 0; trial < 300; ++trial) {
+        Stock alone(grid), together(grid);
+        for (Stock* const stock : {&alone, &together}) stock->add_slab(0, 5), stock->add_slab(trial % 3 == 0 ? 4 : 5, 6);
+        for (int k = 0; k < 4; ++k) {  // an uneven surface, cut through to the slab below here and there
+            const std::array<double, 3> a{u(random), u(random), uz(random)}, b{u(random), u(random), trial % 2 == 0 ? a[2] : uz(random)};
+            const CutterEnd ball{CutterEnd::Form::ball, ur(random), 0};
+            for (Stock* const stock : {&alone, &together}) stock->cut(ball, a, b);
+        }
+        const double radius = ur(random), z = trial % 10 == 0 ? uz(random) : 5 + uz(random) / 2, most = trial % 4 == 0 ? 2 : 1e300;
+        std::vector<std::array<double, 2>> way{{u(random), u(random)}};
+        double angle = turn(random);
+        for (int k = 0; k < 1 + trial % 40; ++k) {
+            angle += turn(random) / 9;
+            const double length = trial % 5 == 0 ? ur(random) : k % 9 == 2 ? 0 : 0.7;
+            way.push_back({way.back()[0] + length * std::cos(angle), way.back()[1] + length * std::sin(angle)});
+            if (k % 17 == 16) way.push_back({u(random), u(random)});
+        }
+        double removed = 0, deepest = 0, lowest = 1e300;
+        for (std::size_t k = 1; k < way.size(); ++k) {
+            const CutEffect e = alone.cut({CutterEnd::Form::flat, radius, 0}, {way[k - 1][0], way[k - 1][1], z}, {way[k][0], way[k][1], z});
+            removed += e.removed, deepest = std::max(deepest, e.deepest), lowest = std::min(lowest, e.lowest);
+            region.add(way[k - 1], way[k], radius);
+        }
+        std::vector<double> before(grid.count());
+        for (std::size_t c = 0; c < grid.count(); ++c) before[c] = together.surface(1, c);
+        const auto effect = together.cut(region, z, most);
+        const bool whole = z >= (trial % 3 == 0 ? 4 : 5) && deepest <= most;
+        ASSERT_EQ(effect.has_value(), whole) << "seed " << seed << ", trial " << trial;
+        deep += !whole;
+        if (!whole) {
+            for (std::size_t c = 0; c < grid.count(); ++c) EXPECT_EQ(together.surface(1, c), before[c]);
+            continue;
+        }
+        cut += effect->removed > 0;
+        EXPECT_NEAR(effect->removed, removed, 1e-9 * (1 + removed)) << "seed " << seed << ", trial " << trial;
+        EXPECT_EQ(effect->deepest, deepest);
+        EXPECT_EQ(effect->lowest, lowest);
+        double top = -1e300;
+        for (std::size_t c = 0; c < grid.count(); ++c) unlike += together.surface(1, c) != alone.surface(1, c), top = std::max(top, together.top(c));
+        EXPECT_EQ(together.highest(), top);
+        for (int k = 0; k < 8; ++k) {
+            const double x0 = u(random), y0 = u(random), x1 = x0 + ur(random), y1 = y0 + ur(random), over = 5 + uz(random) / 2;
+            double within = -1e300, all = -1e300;
+            for (std::size_t c = 0; c < grid.count(); ++c) {
+                const double x = grid.x(static_cast<int>(c) % grid.nx), y = grid.y(static_cast<int>(c) / grid.nx), stands = together.surface(1, c);
+                all = std::max(all, stands);
+                if (x >= x0 && x <= x1 && y >= y0 && y <= y1) within = std::max(within, stands);
+            }
+            const bool clear = together.clear(x0, x1, y0, y1, over);
+            if (clear) EXPECT_LE(within, over) << "seed " << seed << ", trial " << trial;
+            cleared += clear && all > over;
+            EXPECT_EQ(together.clear(-1e3, 1e3, -1e3, 1e3, over), all <= over) << "seed " << seed << ", trial " << trial;
+        }
+    }
+    EXPECT_EQ(unlike, 0U);
+    EXPECT_GT(cleared, 50U);
+    EXPECT_GT(deep, 10U);
+    EXPECT_GT(cut, 100U);
+}
+
 // Level passes of a ball on a plane at α leave L = R − √(R² − (SD / (2 sin α))²) (method.md section 5).
 TEST(Stock, CuspOfLevelPassesOnAPlane) {
     const double R = 3.175, alpha = 50 * std::numbers::pi / 180, cusp = 0.1;

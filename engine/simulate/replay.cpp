@@ -139,7 +139,13 @@ ReplayedProgram Replay::run(const Program& program) {
             const ProgramStep &from = steps[k - 1], &to = steps[k];
             if (!from.known() || !to.known() || std::min(from.z, to.z) >= top) continue;
             if (std::max(from.y, to.y) < low || std::min(from.y, to.y) > high) continue;
-            const CutEffect effect = stock.cut(end, {from.x, from.y, from.z}, {to.x, to.y, to.z});
+            // What a flat cutter covers where it starts the motion before has taken, whatever that was.
+            ChainedSweep chain;
+            const auto disc = [&](std::size_t m) {  // whether motion m keeps its disc at one height
+                return steps[m - 1].known() && (steps[m - 1].z == steps[m].z || (steps[m - 1].x == steps[m].x && steps[m - 1].y == steps[m].y));
+            };
+            chain.been = end.form == CutterEnd::Form::flat && from.z == to.z && k > 1 && disc(k - 1);
+            const CutEffect effect = stock.cut(end, {from.x, from.y, from.z}, {to.x, to.y, to.z}, 1e300, chain);
             if (!(effect.removed > 0)) continue;
             Taken& piece = taken[b][piece_of(k)];
             piece.volume += effect.removed * g.cell * g.cell;

@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kTileCells = 128;           // a side; a tile of 20 layers is 1.4 MB
 constexpr std::size_t kBlockSteps = 128;  // of a program under one box
+constexpr std::size_t kPartSteps = 16;    // of a block
 constexpr double kTaken = 0.002;          // mm: less is rounding of the text and of the stock's float
 constexpr double kDeeper = 0.05;          // mm by which a roughing cut may pass its planned step
 constexpr double kAbreast = 3;            // fewer cells than this side by side do not tell how wide a cut is
@@ -33,6 +34,11 @@ struct StepBox {
         x0 = std::min(x0, s.x), x1 = std::max(x1, s.x);
         y0 = std::min(y0, s.y), y1 = std::max(y1, s.y);
         z0 = std::min(z0, s.z), z1 = std::max(z1, s.z);
+    }
+    void add(const StepBox& b) {
+        x0 = std::min(x0, b.x0), x1 = std::max(x1, b.x1);
+        y0 = std::min(y0, b.y0), y1 = std::max(y1, b.y1);
+        z0 = std::min(z0, b.z0), z1 = std::max(z1, b.z1);
     }
     [[nodiscard]] bool meets(const CellGrid& g, double margin, double top) const {
         return z0 < top && x0 - margin <= g.x(g.nx - 1) && g.x0 <= x1 + margin && y0 - margin <= g.y(g.ny - 1) && g.y0 <= y1 + margin;
@@ -51,9 +57,8 @@ struct PreparedProgram {
     const Program* program = nullptr;
     const Tool* tool = nullptr;
     CutterEnd end;
-    double widest = 0;  // radius of the widest of cutter, shank and holder
     double cut_mm = 0;  // of feed motions, seen from above
-    std::vector<StepBox> blocks;
+    std::vector<StepBox> blocks, parts;
 };
 
 CutterEnd cutter_end(const Tool& tool) {
@@ -241,25 +246,25 @@ private:
             else if (program.tool != program.planned_tool)
                 violate(report, "tool.wrong", fmt::format("loads tool {} where the plan names tool {}", program.tool, program.planned_tool), &program,
                         0, {}, 0);
-            if (p.tool) {
-                p.end = cutter_end(*p.tool);
-                p.widest = std::max({p.tool->diameter, p.tool->shank_diameter, p.tool->holder_diameter}) / 2;
-            }
+            if (p.tool) p.end = cutter_end(*p.tool);
             prepared_.push_back(std::move(p));
         }
         parallel_each(context_, prepared_.size(), [&](std::size_t i) {
             PreparedProgram& p = prepared_[i];
             const auto& steps = p.program->steps;
             p.blocks.reserve(steps.size() / kBlockSteps + 1);
-            for (std::size_t first = 1; first < steps.size(); first += kBlockSteps) {
+            p.parts.reserve(p.blocks.capacity() * (kBlockSteps / kPartSteps));
+            for (std::size_t first = 1; first < steps.size(); first += kPartSteps) {
                 StepBox box;
-                for (std::size_t k = first; k < std::min(steps.size(), first + kBlockSteps); ++k) {
+                for (std::size_t k = first; k < std::min(steps.size(), first + kPartSteps); ++k) {
                     const ProgramStep &a = steps[k - 1], &b = steps[k];
                     if (!a.known() || !b.known()) continue;
                     box.add(a), box.add(b);
                     if (!b.rapid()) p.cut_mm += std::hypot(b.x - a.x, b.y - a.y);
                 }
-                p.blocks.push_back(box);
+                if (p.parts.size() % (kBlockSteps / kPartSteps) == 0) p.blocks.emplace_back();
+                p.parts.push_back(box);
+                p.blocks.back().add(box);
             }
         });
     }
@@ -400,6 +405,7 @@ private:
         result.layers.resize(input_.layers.size());
         const CellGrid grid{input_.stock_min[0] + (i0 + 0.5) * cell_, input_.stock_min[1] + (j0 + 0.5) * cell_, cell_, nx, ny};
         Stock stock(grid);
+        LevelMotions level(grid);
         std::size_t next = 0;
         for (std::size_t l = 0; l < input_.layers.size(); ++l) {
             const SimulatedLayer& layer = input_.layers[l];
@@ -407,7 +413,7 @@ private:
             double top = layer.z_bottom + layer.slab_thickness;
             for (; next < prepared_.size() && static_cast<std::size_t>(prepared_[next].program->layer) == l; ++next) {
                 result.programs[next].stock_top = top;
-                if (prepared_[next].tool && run_program(prepared_[next], stock, top, result.programs[next])) top = highest(stock);
+                if (prepared_[next].tool && run_program(prepared_[next], stock, top, level, result.programs[next])) top = stock.highest();
             }
         }
         for (std::size_t c = 0; c < grid.count(); ++c) result.board_cut = std::max(result.board_cut, stock.board_cut(c));
@@ -421,14 +427,21 @@ private:
         return result;
     }
 
-    static double highest(const Stock& stock) {
-        double top = -1e300;
-        for (std::size_t c = 0; c < stock.grid().count(); ++c) top = std::max(top, stock.top(c));
-        return top;
-    }
+    /// Straight level motions of a flat cutter at one height that follow one another in a tile. What they take together does not depend on their
+    /// order, so it is taken once for all, unless it is so deep that it must be told of which motion.
+    struct LevelMotions {
+        explicit LevelMotions(const CellGrid& grid) : region(grid) {}
+        struct Motion {
+            std::size_t step;
+            bool been;  // whether the motion before has taken what the cutter covers at the begin
+        };
+        LevelRegion region;
+        std::vector<Motion> motions;
+        double z = 0;
+    };
 
     /// Runs a program over a tile whose highest stock stands at `top`; whether it took anything.
-    bool run_program(const PreparedProgram& p, Stock& stock, double top, TileProgram& out) const {
+    bool run_program(const PreparedProgram& p, Stock& stock, double top, LevelMotions& level, TileProgram& out) const {
         const auto& steps = p.program->steps;
         const CellGrid& grid = stock.grid();
         const Tool& tool = *p.tool;
@@ -437,59 +450,109 @@ private:
         // wall, they do not tell how wide what stood there was: a micrometre at the cutter's rim may hold the centres of a whole row.
         const double deep = p.program->planned_stepdown > 0 ? p.program->planned_stepdown + kDeeper : 1e300;
         const double wide = 0.1 * std::numbers::pi * radius * radius;
+        const double shallow = std::min(deep, tool.flute_length > 0 ? tool.flute_length + kStanding : 1e300) - kTaken;
+        const bool thick_shank = shank > radius && tool.flute_length > 0, thick_nose = nose > radius && tool.stickout > 0;
+        // Shank and holder are wider, but mostly stay above all that stands.
+        const auto meets = [&](const StepBox& box) {
+            double margin = radius + kArcError;
+            if (thick_shank && box.z0 + tool.flute_length < top) margin = std::max(margin, shank);
+            if (thick_nose && box.z0 + tool.stickout < top) margin = std::max(margin, nose);
+            return box.meets(grid, margin, top);
+        };
         const auto& arcs = p.program->arcs;
         std::size_t arc = 0, cut_arcs = 0;  // the arc at hand or next; how many have been cut
         bool any = false;
-        for (std::size_t block = 0; block < p.blocks.size(); ++block) {
-            if (!p.blocks[block].meets(grid, p.widest, top)) continue;
-            const std::size_t begin = 1 + block * kBlockSteps;
-            for (std::size_t i = begin; i < std::min(steps.size(), begin + kBlockSteps); ++i) {
-                const ProgramStep &a = steps[i - 1], &b = steps[i];
-                if (!a.known() || !b.known()) continue;
-                const StepBox box = box_of(a, b);
-                if (!box.meets(grid, p.widest, top)) continue;
-                const Point3 from{a.x, a.y, a.z}, to{b.x, b.y, b.z};
-                const double low = std::min(a.z, b.z);
-                // An arc is cut whole at the first of its chords that comes near; the others then have nothing to do.
-                while (arc < arcs.size() && arcs[arc].end <= i) ++arc;
-                const bool in_arc = arc < arcs.size() && arcs[arc].begin <= i, cut_before = in_arc && arc < cut_arcs;
-                if (box.meets(grid, radius + kArcError, top) && !cut_before) {
-                    // A straight feed motion shares its ends with those beside it; what a rapid takes is all told of the rapid.
-                    const auto chained = [&](std::size_t k) {  // whether motion k, next to this one, is a straight feed motion too
-                        if (b.rapid() || k == 0 || k >= steps.size() || !steps[k - 1].known() || !steps[k].known() || steps[k].rapid()) return false;
-                        const bool last_arc = arc > 0 && arcs[arc - 1].end > k, next_arc = arc < arcs.size() && arcs[arc].begin <= k;
-                        return !last_arc && !next_arc;
-                    };
-                    Point3 before{}, after{};
+        const auto tell = [&](std::size_t i, const CutEffect& e) {
+            if (!(e.removed > 0)) return;
+            const ProgramStep &a = steps[i - 1], &b = steps[i];
+            const double low = std::min(a.z, b.z);
+            any = true;
+            out.removed += e.removed;
+            out.lowest = std::min(out.lowest, e.lowest);
+            out.most = std::max(out.most, e.deepest);
+            const Point3 where{e.where[0], e.where[1], low};
+            if (b.rapid() && e.deepest > kTaken && e.deepest > out.rapid.size) out.rapid = {e.deepest, where}, out.rapid_line = b.line;
+            if (e.deepest > out.deepest.size && static_cast<double>(e.deep_cells) * cell_ * cell_ > wide && e.deep_across >= kAbreast)
+                out.deepest = {e.deepest, where}, out.deepest_line = b.line;
+            const double over = e.highest - low - tool.flute_length;
+            if (tool.flute_length > 0 && over > kStanding && over > out.over_flute.size) out.over_flute = {over, where}, out.over_flute_line = b.line;
+        };
+        const auto cut_level = [&] {
+            if (level.motions.empty()) return;
+            if (const auto e = stock.cut(level.region, level.z, shallow)) {
+                if (e->removed > 0) any = true;
+                out.removed += e->removed;
+                out.lowest = std::min(out.lowest, e->lowest);
+                out.most = std::max(out.most, e->deepest);
+            } else {
+                for (const LevelMotions::Motion& m : level.motions) {
+                    const ProgramStep &a = steps[m.step - 1], &b = steps[m.step];
                     ChainedSweep chain;
-                    if (!in_arc && chained(i - 1)) before = {steps[i - 2].x, steps[i - 2].y, steps[i - 2].z}, chain.before = &before;
-                    if (!in_arc && chained(i + 1)) after = {steps[i + 1].x, steps[i + 1].y, steps[i + 1].z}, chain.after = &after;
-                    const CutEffect e = in_arc ? stock.cut(p.end, arcs[arc].arc, deep) : stock.cut(p.end, from, to, deep, chain);
-                    if (in_arc) cut_arcs = arc + 1;
-                    if (e.removed > 0) {
-                        any = true;
-                        out.removed += e.removed;
-                        out.lowest = std::min(out.lowest, e.lowest);
-                        out.most = std::max(out.most, e.deepest);
-                        const Point3 where{e.where[0], e.where[1], low};
-                        if (b.rapid() && e.deepest > kTaken && e.deepest > out.rapid.size) out.rapid = {e.deepest, where}, out.rapid_line = b.line;
-                        if (e.deepest > out.deepest.size && static_cast<double>(e.deep_cells) * cell_ * cell_ > wide && e.deep_across >= kAbreast)
-                            out.deepest = {e.deepest, where}, out.deepest_line = b.line;
-                        const double over = e.highest - low - tool.flute_length;
-                        if (tool.flute_length > 0 && over > kStanding && over > out.over_flute.size)
-                            out.over_flute = {over, where}, out.over_flute_line = b.line;
-                    }
+                    chain.been = m.been;
+                    tell(m.step, stock.cut(p.end, {a.x, a.y, a.z}, {b.x, b.y, b.z}, deep, chain));
                 }
-                auto follow = [&](double thick, double above, Extreme& extreme, std::uint32_t& line) {
-                    if (thick <= 0 || above <= 0 || low + above >= top) return;
-                    std::array<double, 2> where{};
-                    const double reach = stock.reach(thick, {a.x, a.y, a.z + above}, {b.x, b.y, b.z + above}, where);
-                    if (reach > kStanding && reach > extreme.size) extreme = {reach, {where[0], where[1], low + above}}, line = b.line;
-                };
-                if (shank > radius) follow(shank, tool.flute_length, out.shank, out.shank_line);
-                if (nose > radius) follow(nose, tool.stickout, out.holder, out.holder_line);
+            }
+            level.motions.clear();
+        };
+        const auto run_step = [&](std::size_t i) {
+            const ProgramStep &a = steps[i - 1], &b = steps[i];
+            if (!a.known() || !b.known()) return;
+            const StepBox box = box_of(a, b);
+            if (!meets(box)) return;
+            const Point3 from{a.x, a.y, a.z}, to{b.x, b.y, b.z};
+            const double low = std::min(a.z, b.z);
+            // An arc is cut whole at the first of its chords that comes near; the others then have nothing to do.
+            while (arc < arcs.size() && arcs[arc].end <= i) ++arc;
+            const bool in_arc = arc < arcs.size() && arcs[arc].begin <= i, cut_before = in_arc && arc < cut_arcs;
+            const bool follows = (thick_shank && low + tool.flute_length < top) || (thick_nose && low + tool.stickout < top);
+            const bool near = box.meets(grid, radius + kArcError, top) && !cut_before;
+            if (!near && !follows) return;
+            // A straight feed motion shares its ends with those beside it; what a rapid takes is all told of the rapid.
+            const auto chained = [&](std::size_t k) {  // whether motion k, next to this one, is a straight feed motion too
+                if (b.rapid() || k == 0 || k >= steps.size() || !steps[k - 1].known() || !steps[k].known() || steps[k].rapid()) return false;
+                const bool last_arc = arc > 0 && arcs[arc - 1].end > k, next_arc = arc < arcs.size() && arcs[arc].begin <= k;
+                return !last_arc && !next_arc;
+            };
+            const bool disc = p.end.form == CutterEnd::Form::flat && !b.rapid() && !in_arc && (a.z == b.z || (a.x == b.x && a.y == b.y));
+            if (disc && !follows) {
+                if (low != level.z) cut_level();
+                level.z = low;
+                level.region.add({a.x, a.y}, {b.x, b.y}, radius);
+                level.motions.push_back({i, chained(i - 1)});
+                return;
+            }
+            // Nothing to take, as most of the ways between cuts; what is still to be cut only adds to that.
+            const double aside = radius + kArcError;
+            const bool clear = near && stock.clear(box.x0 - aside, box.x1 + aside, box.y0 - aside, box.y1 + aside, low);
+            if (clear && !in_arc && !follows) return;
+            cut_level();
+            if (near) {
+                Point3 before{}, after{};
+                ChainedSweep chain;
+                if (!in_arc && chained(i - 1)) before = {steps[i - 2].x, steps[i - 2].y, steps[i - 2].z}, chain.before = &before;
+                if (!in_arc && chained(i + 1)) after = {steps[i + 1].x, steps[i + 1].y, steps[i + 1].z}, chain.after = &after;
+                tell(i, in_arc ? stock.cut(p.end, arcs[arc].arc, deep) : stock.cut(p.end, from, to, deep, chain));
+                if (in_arc) cut_arcs = arc + 1;
+            }
+            auto follow = [&](double thick, double above, Extreme& extreme, std::uint32_t& line) {
+                if (low + above >= top) return;
+                std::array<double, 2> where{};
+                const double reach = stock.reach(thick, {a.x, a.y, a.z + above}, {b.x, b.y, b.z + above}, where);
+                if (reach > kStanding && reach > extreme.size) extreme = {reach, {where[0], where[1], low + above}}, line = b.line;
+            };
+            if (thick_shank) follow(shank, tool.flute_length, out.shank, out.shank_line);
+            if (thick_nose) follow(nose, tool.stickout, out.holder, out.holder_line);
+        };
+        for (std::size_t block = 0; block < p.blocks.size(); ++block) {
+            if (!meets(p.blocks[block])) continue;
+            constexpr std::size_t parts = kBlockSteps / kPartSteps;
+            for (std::size_t part = block * parts; part < std::min(p.parts.size(), (block + 1) * parts); ++part) {
+                if (!meets(p.parts[part])) continue;
+                const std::size_t begin = 1 + part * kPartSteps;
+                for (std::size_t i = begin; i < std::min(steps.size(), begin + kPartSteps); ++i) run_step(i);
             }
         }
+        cut_level();
         return any;
     }
 

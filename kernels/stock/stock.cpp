@@ -6,13 +6,26 @@
 
 namespace slabwright {
 
-void Stock::add_slab(double z_bottom, double thickness) {
-    slabs_.push_back({z_bottom, thickness, std::vector<float>(grid_.count(), static_cast<float>(thickness))});
-}
-
 namespace {
 
 constexpr int kLanes = 8;
+constexpr int kBlockCells = 16;  // a side
+
+int blocks_of(int cells) { return (cells + kBlockCells - 1) / kBlockCells; }
+
+}  // namespace
+
+Stock::Stock(const CellGrid& grid)
+    : grid_(grid),
+      board_(grid.count(), 0.0f),
+      block_tops_(static_cast<std::size_t>(blocks_of(grid.nx)) * static_cast<std::size_t>(blocks_of(grid.ny)), 0.0f) {}
+
+void Stock::add_slab(double z_bottom, double thickness) {
+    slabs_.push_back({z_bottom, thickness, std::vector<float>(grid_.count(), static_cast<float>(thickness))});
+    std::fill(block_tops_.begin(), block_tops_.end(), static_cast<float>(thickness));
+}
+
+namespace {
 
 // What cells over a slab's bottom lost, told in eight places, so that a compiler sees that the order of cells does not matter.
 struct Losses {
@@ -70,6 +83,48 @@ SLABWRIGHT_WIDE bool lower_level(float* __restrict height, int n, float left, do
         rest.data(), kLanes, [&](std::size_t) { return left; }, bottom, deep, whole, losses);
     std::copy_n(rest.begin(), n - whole, height + whole);
     return true;
+}
+
+// The greatest of n heights.
+[[gnu::always_inline]] inline float greatest(const float* height, int n) {
+    float most = 0;
+    for (int i = 0; i < n; ++i) most = height[i] > most ? height[i] : most;
+    return most;
+}
+
+// Keeps those intervals of rows, nx cells long, of which something is over `left`; the greatest of all heights, or `left`.
+SLABWRIGHT_WIDE float keep_over(const float* height, std::size_t nx, float left, std::vector<LevelRegion::Interval>& intervals) {
+    float most = left;
+    std::size_t kept = 0;
+    for (const LevelRegion::Interval& i : intervals) {
+        const float here = greatest(height + static_cast<std::size_t>(i.row) * nx + i.first, i.last - i.first + 1);
+        if (!(here > left)) continue;
+        most = here > most ? here : most;
+        intervals[kept++] = i;
+    }
+    intervals.resize(kept);
+    return most;
+}
+
+// Lowers n cells to one height; how much they lost together.
+SLABWRIGHT_WIDE double lower_run(float* __restrict height, int n, float left, double bottom) {
+    std::array<double, kLanes> lost{};
+    const double after = bottom + static_cast<double>(left);
+    int i = 0;
+    for (; i + kLanes <= n; i += kLanes)
+        for (std::size_t k = 0; k < kLanes; ++k) {
+            float& h = height[static_cast<std::size_t>(i) + k];
+            const float stood = h;
+            lost[k] += stood > left ? (bottom + static_cast<double>(stood)) - after : 0.0;
+            h = stood > left ? left : stood;
+        }
+    double sum = 0;
+    for (; i < n; ++i) {
+        const float stood = height[i];
+        if (stood > left) sum += (bottom + static_cast<double>(stood)) - after, height[i] = left;
+    }
+    for (const double of_lane : lost) sum += of_lane;
+    return sum;
 }
 
 // The same of any number of cells.
@@ -232,6 +287,62 @@ CutEffect Stock::cut(const CutterEnd& end, const LevelArc& arc, double deep) {
     Taking taking(*this, deep);
     sweep_above(grid_, end, arc, taking.standing(), taking);
     return taking.effect();
+}
+
+std::optional<LevelEffect> Stock::cut(LevelRegion& region, double z, double most) {
+    std::vector<LevelRegion::Interval>& intervals = region.intervals();
+    if (slabs_.empty() || z < std::max(0.0, slabs_.back().bottom)) return {};
+    Slab& slab = slabs_.back();
+    const auto nx = static_cast<std::size_t>(grid_.nx);
+    const auto left = static_cast<float>(z - slab.bottom);
+    const float highest = keep_over(slab.height.data(), nx, left, intervals);
+    LevelEffect effect;
+    if (!(highest > left)) return effect;
+    effect.lowest = slab.bottom + static_cast<double>(left);
+    effect.deepest = (slab.bottom + static_cast<double>(highest)) - effect.lowest;
+    if (effect.deepest > most) return {};
+    for (const LevelRegion::Interval& i : intervals)
+        effect.removed += lower_run(slab.height.data() + static_cast<std::size_t>(i.row) * nx + i.first, i.last - i.first + 1, left, slab.bottom);
+    return effect;
+}
+
+bool Stock::clear(double x0, double x1, double y0, double y1, double z) {
+    if (slabs_.empty()) return false;
+    const Slab& slab = slabs_.back();
+    const float level = level_over(slab.bottom, z);
+    const double per_mm = 1 / grid_.cell;
+    const int i0 = std::max(0, floor_of(std::max(-1.0, (x0 - grid_.x0) * per_mm))),
+              j0 = std::max(0, floor_of(std::max(-1.0, (y0 - grid_.y0) * per_mm)));
+    const int i1 = std::min(grid_.nx - 1, ceiling(std::min<double>(grid_.nx, (x1 - grid_.x0) * per_mm)));
+    const int j1 = std::min(grid_.ny - 1, ceiling(std::min<double>(grid_.ny, (y1 - grid_.y0) * per_mm)));
+    const auto nx = static_cast<std::size_t>(grid_.nx), row = static_cast<std::size_t>(blocks_of(grid_.nx));
+    for (int j = j0 / kBlockCells; j * kBlockCells <= j1; ++j)
+        for (int i = i0 / kBlockCells; i * kBlockCells <= i1; ++i) {
+            float& top = block_tops_[static_cast<std::size_t>(j) * row + static_cast<std::size_t>(i)];
+            if (!(top > level)) continue;
+            top = highest_of(slab.height.data() + static_cast<std::size_t>(j * kBlockCells) * nx + i * kBlockCells, nx,
+                             std::min(kBlockCells, grid_.nx - i * kBlockCells), std::min(kBlockCells, grid_.ny - j * kBlockCells));
+            if (top > level) return false;
+        }
+    return true;
+}
+
+double Stock::highest() const {
+    double most = -1e300;
+    if (!slabs_.empty()) {
+        const float top = highest_of(slabs_.back().height.data(), 0, static_cast<int>(grid_.count()), 1);
+        if (top > 0) {
+            most = slabs_.back().bottom + static_cast<double>(top);
+            // Only where the topmost slab is cut through does one below it show.
+            bool below = false;
+            for (std::size_t k = 0; k + 1 < slabs_.size() && !below; ++k)
+                below = slabs_[k].bottom + slabs_[k].thickness > most &&
+                        slabs_[k].bottom + static_cast<double>(highest_of(slabs_[k].height.data(), 0, static_cast<int>(grid_.count()), 1)) > most;
+            if (!below) return most;
+        }
+    }
+    for (std::size_t c = 0; c < grid_.count(); ++c) most = std::max(most, top(c));
+    return most;
 }
 
 double Stock::top(std::size_t cell) const {

@@ -3,8 +3,10 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "kernels/stock/level_region.h"
 #include "kernels/stock/sweep.h"
 
 namespace slabwright {
@@ -20,11 +22,17 @@ struct CutEffect {
     double deep_across = 0;         ///< how many cells wide they lie on average: their number over the longer of their rows and the fullest row
 };
 
+/// What a region cut to one height lost.
+struct LevelEffect {
+    double removed = 0, deepest = 0;  ///< as in CutEffect
+    double lowest = 1e300;            ///< z of what was cut
+};
+
 /// The stock over a rectangle of cells. Slabs are added from below; a column that is cut through a slab's bottom shows what
 /// stands below it, and is cut there too. Under the first slab lies the base board, whose cuts are kept as well.
 class Stock {
 public:
-    explicit Stock(const CellGrid& grid) : grid_(grid), board_(grid.count(), 0.0f) {}
+    explicit Stock(const CellGrid& grid);
 
     /// Bonds a slab of `thickness` mm with its bottom at z_bottom, at or above what was added before.
     void add_slab(double z_bottom, double thickness);
@@ -35,6 +43,13 @@ public:
                   const ChainedSweep& chain = {});
     /// The same along a level arc.
     CutEffect cut(const CutterEnd& end, const LevelArc& arc, double deep = 1e300);
+    /// The same down to z in a whole region of this stock's grid, at once; nothing at all where a cell would lose more than `most` mm, or more than
+    /// the topmost slab.
+    std::optional<LevelEffect> cut(LevelRegion& region, double z, double most);
+
+    /// Whether nothing of the topmost slab stands higher than z over the cells within [x0, x1] × [y0, y1]. Told from blocks of cells whose
+    /// highest is known, or was when they stood higher; one that does not tell is looked at again.
+    [[nodiscard]] bool clear(double x0, double x1, double y0, double y1, double z);
 
     /// Largest height by which stock stands above the lower face of an upright cylinder (shank or holder) anywhere on its way;
     /// 0 when it is free. `where` gets the place.
@@ -44,6 +59,8 @@ public:
     [[nodiscard]] double surface(std::size_t slab, std::size_t cell) const { return slabs_[slab].bottom + slabs_[slab].height[cell]; }
     /// z of the highest stock in a column, 0 or less on the bare board.
     [[nodiscard]] double top(std::size_t cell) const;
+    /// The same of all columns.
+    [[nodiscard]] double highest() const;
     /// mm cut into the base board.
     [[nodiscard]] double board_cut(std::size_t cell) const { return board_[cell]; }
     [[nodiscard]] std::size_t slabs() const { return slabs_.size(); }
@@ -59,6 +76,7 @@ private:
     CellGrid grid_;
     std::vector<Slab> slabs_;
     std::vector<float> board_;
+    std::vector<float> block_tops_;  ///< of the topmost slab, no less than the highest of each block of cells, rows of blocks
 };
 
 }  // namespace slabwright

@@ -223,13 +223,17 @@ void take_level(Fn& fn, std::size_t first, int n, double z, const StandingHeight
             if (standing(c) > z) fn(c, z);
 }
 
+/// The first and the last row whose centres lie within [y_low, y_high]; first > last: none.
+inline std::pair<int, int> rows_between(const CellGrid& grid, double y_low, double y_high) {
+    return {std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - grid.y0) / grid.cell)))),
+            std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high - grid.y0) / grid.cell))))};
+}
+
 /// A disc at one height: see sweep_above.
 template <class Fn>
 void sweep_level_disc(const CellGrid& grid, double radius, const std::array<double, 2>& from, const std::array<double, 2>& to, double z, bool been,
                       const StandingHeights& standing, Fn&& fn) {
-    const double y_low = std::min(from[1], to[1]) - radius, y_high = std::max(from[1], to[1]) + radius;
-    const int j0 = std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - grid.y0) / grid.cell))));
-    const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high - grid.y0) / grid.cell))));
+    const auto [j0, j1] = rows_between(grid, std::min(from[1], to[1]) - radius, std::max(from[1], to[1]) + radius);
     RowSpans spans;
     const float level = level_over(standing.bottom, z);
     for (int j = j0; j <= j1; j += RowSpans::kRows) {
