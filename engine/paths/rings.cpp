@@ -360,12 +360,18 @@ bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, con
     if (runs.empty() || between > kMostBetweenStrips * cut) return false;
     for (const RunInside& run : runs) {
         std::vector<PathPoint> strip;
-        // From the rectangle before, where the cutter has room.
+        // From the rectangle before, where the cutter has room; farther along where that begins later. So near to its beginning, which is two
+        // steps from what is forbidden, the way is free.
         const Point2 a = run.points[0], b = run.points[1];
-        const double l = distance(a, b);
-        const Point2 beside{static_cast<std::int32_t>(std::lround(a.x - plan.step * kUnitsPerMm * (static_cast<double>(b.y) - a.y) / l)),
-                            static_cast<std::int32_t>(std::lround(a.y + plan.step * kUnitsPerMm * (static_cast<double>(b.x) - a.x) / l))};
-        if (winding(outside, beside) > 0) strip.push_back({beside.x, beside.y, plan.z});
+        const double l = distance(a, b), ux = (static_cast<double>(b.x) - a.x) / l, uy = (static_cast<double>(b.y) - a.y) / l;
+        for (const double along : {0.0, 0.5, 1.0, 1.5}) {
+            const double step = plan.step * kUnitsPerMm;
+            const Point2 beside{static_cast<std::int32_t>(std::lround(a.x + step * (along * ux - uy))),
+                                static_cast<std::int32_t>(std::lround(a.y + step * (along * uy + ux)))};
+            if (winding(outside, beside) <= 0) continue;
+            strip.push_back({beside.x, beside.y, plan.z});
+            break;
+        }
         for (const Point2 p : run.points) strip.push_back({p.x, p.y, plan.z});
         if (run.closed) strip.push_back({a.x, a.y, plan.z});
         plan.strips.push_back(std::move(strip));
