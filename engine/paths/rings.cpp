@@ -19,6 +19,7 @@ constexpr double kOnEdge = 0.1;                // mm
 constexpr std::size_t kRingsBesideStrips = 2;  // steps from the forbidden region to the farthest ring, where strips lie beyond
 constexpr double kMostBetweenStrips = 0.1;     // of the strips' length: the ways between them
 constexpr double kShortestTerrace = 2;         // mm of a terrace's border ring: shorter ones are corners of walls that need none
+constexpr double kBesideSteps = 1.2;           // steps between rings that lie next to each other, at most, where they are nearest
 constexpr double kSlide = 1.2;                 // steps along the next ring that the way to it slants
 
 double length(const PathPoint& a, const PathPoint& b) { return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y); }
@@ -463,7 +464,6 @@ RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbid
     const Loops useful = useful_area(cut, r, {cut.layer.stock_min[0], cut.layer.stock_min[1], cut.layer.stock_max[0], cut.layer.stock_max[1]});
     const Thinning thinning(cut, tool, blend);
     Loops region = simplify(forbidden);
-    std::size_t nearer = 0;  // pieces of the ring before begin here
     for (std::size_t ring = 0;; ++ring) {
         cut.context.throw_if_cancelled();
         // Around the region, so that it is on the right: its loops are turned over.
@@ -484,24 +484,95 @@ RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbid
             }
             RingPlan::Piece piece{ring == 0 ? simplify(points, kFineRing * kUnitsPerMm) : std::move(points), {}, plan.regions.size(), run.closed};
             note_box(piece);
-            RingPlan::Region of{ring, SIZE_MAX, 0, {plan.pieces.size()}};
-            // Before the nearest of the ring before it.
-            const PathPoint& middle = piece.points[piece.points.size() / 2];
-            double least = 2 * plan.step * kUnitsPerMm;
-            for (std::size_t p = nearer; p < first; ++p) {
-                const std::array<double, 4>& box = plan.pieces[p].box;
-                if (middle.x < box[0] - least || middle.y < box[1] - least || middle.x > box[2] + least || middle.y > box[3] + least) continue;
-                if (const double d = distance(middle, plan.pieces[p].points); d < least) least = d, of.around = plan.pieces[p].region;
-            }
-            if (of.around != SIZE_MAX) ++plan.regions[of.around].waits_for;
-            plan.regions.push_back(std::move(of));
+            plan.regions.push_back({ring, SIZE_MAX, 0, {plan.pieces.size()}});
             plan.pieces.push_back(std::move(piece));
         }
         if (plan.pieces.size() == first && ring > 0) return plan;
-        nearer = first;
         region = thinning.of(offset(region, plan.step, kFineRing));
     }
 }
+
+namespace {
+
+// Whose turn it is: pieces that wait for nothing. With RingPlan::hold a piece waits for all regions within its own, without it for the pieces
+// beside it that lie a step farther off: so one place is finished before the next is gone to.
+class Turns {
+public:
+    std::vector<std::size_t> ready;
+
+    explicit Turns(RingPlan& plan) : plan_(plan) {
+        if (!plan.hold) {
+            wait_for_neighbours();
+            return;
+        }
+        for (const RingPlan::Region& region : plan.regions) left_.push_back(region.pieces.size());
+        // Regions without a region within them; the others follow from these.
+        std::vector<std::size_t> farthest;
+        for (std::size_t k = 0; k < plan.regions.size(); ++k)
+            if (plan.regions[k].waits_for == 0) farthest.push_back(k);
+        for (const std::size_t k : farthest) release(k);
+    }
+
+    /// To be called when a piece has been cut; its points may have been put in another order.
+    void cut(std::size_t piece) {
+        if (!plan_.hold) {
+            for (const std::size_t k : waiting_[piece])
+                if (--waits_for_[k] == 0) ready.push_back(k);
+            return;
+        }
+        const std::size_t region = plan_.pieces[piece].region, around = plan_.regions[region].around;
+        if (--left_[region] > 0 || around == SIZE_MAX) return;
+        --plan_.regions[around].waits_for;
+        release(around);
+    }
+
+private:
+    void release(std::size_t region) {
+        RingPlan::Region& of = plan_.regions[region];
+        if (of.waits_for > 0) return;
+        if (left_[region] > 0) {
+            ready.insert(ready.end(), of.pieces.begin(), of.pieces.end());
+        } else if (of.around != SIZE_MAX) {
+            --plan_.regions[of.around].waits_for;
+            release(of.around);
+        }
+    }
+
+    void wait_for_neighbours() {
+        const std::size_t n = plan_.pieces.size();
+        waits_for_.assign(n, 0), waiting_.resize(n);
+        auto ring = [&](std::size_t k) { return plan_.regions[plan_.pieces[k].region].ring; };
+        for (std::size_t first = 0, farther = 0, end = 0; first < n; first = farther) {  // pieces lie in the order of their rings
+            for (farther = first; farther < n && ring(farther) == ring(first);) ++farther;
+            for (end = farther; end < n && ring(end) == ring(first) + 1;) ++end;
+            for (std::size_t k = first; k < farther; ++k)
+                for (std::size_t m = farther; m < end; ++m)
+                    if (beside(plan_.pieces[k], plan_.pieces[m])) ++waits_for_[k], waiting_[m].push_back(k);
+        }
+        for (std::size_t k = 0; k < n; ++k)
+            if (waits_for_[k] == 0) ready.push_back(k);
+    }
+
+    [[nodiscard]] bool beside(const RingPlan::Piece& a, const RingPlan::Piece& b) const {
+        const double reach = kBesideSteps * plan_.step * kUnitsPerMm;
+        for (int axis = 0; axis < 2; ++axis)
+            if (a.box[axis] > b.box[axis + 2] + reach || b.box[axis] > a.box[axis + 2] + reach) return false;
+        auto near = [&](const RingPlan::Piece& from, const RingPlan::Piece& to) {
+            return std::any_of(from.points.begin(), from.points.end(), [&](const PathPoint& p) {
+                return p.x >= to.box[0] - reach && p.x <= to.box[2] + reach && p.y >= to.box[1] - reach && p.y <= to.box[3] + reach &&
+                       distance(p, to.points) < reach;
+            });
+        };
+        return near(a, b) || near(b, a);
+    }
+
+    RingPlan& plan_;
+    std::vector<std::size_t> left_;                  // by region: pieces not cut yet; with hold
+    std::vector<std::size_t> waits_for_;             // by piece, without it: how many others
+    std::vector<std::vector<std::size_t>> waiting_;  // and who waits for it
+};
+
+}  // namespace
 
 void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
     if (plan.pieces.empty()) return;
@@ -509,37 +580,21 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
     const std::int32_t z = plan.z;
     cut_frames(path, plan);
     for (const std::vector<PathPoint>& strip : plan.strips) path.follow(strip);
-    std::vector<std::size_t> left;  // by region: pieces not cut yet
-    for (const RingPlan::Region& region : plan.regions) left.push_back(region.pieces.size());
-    std::vector<std::size_t> ready;  // pieces that wait for nothing
-    auto release = [&](auto&& self, std::size_t region) -> void {
-        RingPlan::Region& of = plan.regions[region];
-        if (of.waits_for > 0) return;
-        if (left[region] > 0) {
-            ready.insert(ready.end(), of.pieces.begin(), of.pieces.end());
-        } else if (of.around != SIZE_MAX) {
-            --plan.regions[of.around].waits_for;
-            self(self, of.around);
-        }
-    };
-    // Regions without a region within them; the others follow from these.
-    std::vector<std::size_t> farthest;
-    for (std::size_t k = 0; k < plan.regions.size(); ++k)
-        if (plan.regions[k].waits_for == 0) farthest.push_back(k);
-    for (const std::size_t k : farthest) release(release, k);
+    Turns turns(plan);
     std::size_t ring = 0;  // that the tool is on, while it is down; none yet
-    while (!ready.empty()) {
+    while (!turns.ready.empty()) {
         cut.context.throw_if_cancelled();
         std::size_t next = SIZE_MAX;
         Start start;
         std::size_t far = 0;
-        for (const std::size_t k : ready) far = std::max(far, plan.regions[plan.pieces[k].region].ring);
-        for (std::size_t k = 0; k < ready.size(); ++k)
-            if ((!plan.hold || plan.regions[plan.pieces[ready[k]].region].ring == far) &&
-                nearer(plan.pieces[ready[k]], path.at(), !cut.job.cutting.climb, start))
+        for (const std::size_t k : turns.ready) far = std::max(far, plan.regions[plan.pieces[k].region].ring);
+        for (std::size_t k = 0; k < turns.ready.size(); ++k)
+            if ((!plan.hold || plan.regions[plan.pieces[turns.ready[k]].region].ring == far) &&
+                nearer(plan.pieces[turns.ready[k]], path.at(), !cut.job.cutting.climb, start))
                 next = k;
-        RingPlan::Piece& piece = plan.pieces[ready[next]];
-        ready.erase(ready.begin() + static_cast<std::ptrdiff_t>(next));
+        const std::size_t chosen = turns.ready[next];
+        RingPlan::Piece& piece = plan.pieces[chosen];
+        turns.ready.erase(turns.ready.begin() + static_cast<std::ptrdiff_t>(next));
         const std::size_t on = plan.regions[piece.region].ring;
         // From ring to ring straight: a place `ring` steps from the forbidden region has that much room on all sides. Slantwise,
         // so that the cutter slides into the next ring, where there is room for the longer way too.
@@ -553,11 +608,7 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
             for (const PathPoint& p : piece.points) path.cut({p.x, p.y}, z);
         else path.follow(piece.points);
         ring = on;
-        if (--left[piece.region] == 0 && plan.regions[piece.region].around != SIZE_MAX) {
-            const std::size_t around = plan.regions[piece.region].around;
-            --plan.regions[around].waits_for;
-            release(release, around);
-        }
+        turns.cut(chosen);
     }
     path.retract();
 }

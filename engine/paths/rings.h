@@ -76,8 +76,9 @@ struct RingPlan {
 [[nodiscard]] RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbidden, const Loops& border_over, const Loops& over,
                                     double tip_z, double blend);
 
-/// Cuts frames, strips, and rings from the farthest to the forbidden region's border. A ring is cut once all rings within its part of the free
-/// area are; of those whose turn it is the nearest comes next, and from ring to next ring the cutter stays down.
+/// Cuts frames, strips, and rings from the farthest to the forbidden region's border. A ring is cut once those a step farther off beside it are (with
+/// RingPlan::hold, all rings within its part of the free area); of those whose turn it is the nearest comes next, and from ring to next ring the
+/// cutter stays down.
 void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan);
 
 }  // namespace slabwright
