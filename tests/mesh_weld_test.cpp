@@ -14,6 +14,7 @@
 #include <tuple>
 
 #include "kernels/errors.h"
+#include "kernels/mesh/edges.h"
 #include "kernels/mesh/morton.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/seed.h"
@@ -136,6 +137,28 @@ TEST(MeshWeld, EqualsBruteForceOnRandomSoup) {
             check_pairs(first);
         }
     }
+}
+
+TEST(MeshWeld, FansOfAnySizeAreSorted) {
+    std::mt19937_64 random(test::seed());
+    const std::uint32_t origin = 7, width = 400;
+    std::vector<EdgeUse> uses;
+    for (std::uint32_t v = 0; v < width; ++v)
+        for (std::size_t n = random() % 30; n > 0; --n)  // few upper ends, so that some are equal, and up to the largest number
+            uses.push_back({origin + v,
+                            random() % 2 == 0 ? 0xFFFFFFFFu - static_cast<std::uint32_t>(random() % 4) : static_cast<std::uint32_t>(random() % 9),
+                            0});
+    for (std::size_t i = 0; i < uses.size(); ++i) uses[i].code = static_cast<std::uint32_t>(7919 * i % uses.size());
+    std::shuffle(uses.begin(), uses.end(), random);
+    std::vector<std::array<std::uint32_t, 3>> expected, sorted;
+    for (const EdgeUse& use : uses) expected.push_back({use.low, use.high, use.code});
+    std::sort(expected.begin(), expected.end());
+    std::set<std::uint32_t> seen;
+    sort_fans(uses, origin, width, [&](std::span<const EdgeUse> fan) {
+        EXPECT_TRUE(seen.insert(fan[0].low).second) << "one fan a vertex";
+        for (const EdgeUse& use : fan) sorted.push_back({use.low, use.high, use.code});
+    });
+    EXPECT_EQ(sorted, expected);
 }
 
 TEST(MeshWeld, RecordsAreScaledLoweredAndNotAligned) {

@@ -100,13 +100,20 @@ void pair_around_edge(Mesh& mesh, std::span<const EdgeUse> uses) {
     }
 }
 
-/// Whether something about a fan needs a closer look than its adjacency gives: an edge that is not shared by just two facets which run
-/// along it in opposite directions; two facets that share two edges, as duplicates do; or so many uses that this is not asked.
-bool is_odd(std::span<const EdgeUse> fan) {
-    if (fan.size() > kPlainFan || fan.size() % 2 != 0) return true;
-    for (std::size_t i = 0; i < fan.size(); i += 2) {
-        if (fan[i].high != fan[i + 1].high || fan[i].reversed() == fan[i + 1].reversed()) return true;
-        if (i > 0 && fan[i].high == fan[i - 1].high) return true;
+/// Whether every edge of a fan is shared by just two facets, which run along it in opposite directions.
+bool is_plain(std::span<const EdgeUse> fan) {
+    if (fan.size() % 2 != 0) return false;
+    bool plain = true;
+    for (std::size_t i = 0; i < fan.size(); i += 2)
+        plain &= (fan[i].high == fan[i + 1].high) & (fan[i].reversed() != fan[i + 1].reversed()) & (i == 0 || fan[i].high != fan[i - 1].high);
+    return plain;
+}
+
+/// Whether something about a fan needs a closer look than its adjacency gives: it is not plain; two facets share two edges, as duplicates do; or it has
+/// so many uses that this is not asked.
+bool is_odd(std::span<const EdgeUse> fan, bool plain) {
+    if (fan.size() > kPlainFan || !plain) return true;
+    for (std::size_t i = 2; i < fan.size(); i += 2) {
         const std::uint32_t a = fan[i].facet(), b = fan[i + 1].facet();
         for (std::size_t j = 0; j < i; j += 2)
             if (fan[j].facet() == a && fan[j + 1].facet() == b) return true;
@@ -181,10 +188,12 @@ T reduce_own_fans(Context& context, const Mesh& mesh, const OwnVertices& own, st
                 for (std::size_t f = block; f < std::min(end, block + kBlockFacets); ++f) {
                     const Index3 v = mesh.facets[f];
                     for (std::uint32_t k = 0; k < 3; ++k) {
-                        const std::uint32_t a = v[k], b = v[k == 2 ? 0 : k + 1], low = std::min(a, b);
+                        const std::uint32_t a = v[k], b = v[k == 2 ? 0 : k + 1];
                         if (a == b) continue;
-                        const EdgeUse use{low, std::max(a, b), 2 * (3 * static_cast<std::uint32_t>(f) + k) + (a > b ? 1u : 0u)};
-                        if (low < origin || own.is_shared(low)) other.push_back(use);
+                        // In a mesh without order no branch foretells which end is the lower one.
+                        const std::uint32_t reversed = a > b ? 1u : 0u, turned = (a ^ b) & (0u - reversed);
+                        const EdgeUse use{a ^ turned, b ^ turned, 2 * (3 * static_cast<std::uint32_t>(f) + k) + reversed};
+                        if (own.is_shared(use.low)) other.push_back(use);
                         else uses[count++] = use;
                     }
                 }
@@ -205,7 +214,12 @@ void pair_edges(Context& context, Mesh& mesh, EdgeScratch& scratch, std::vector<
     });
     using Vertices = std::vector<std::uint32_t>;
     auto pair_fan = [&](Vertices& part, std::span<const EdgeUse> fan) {
-        if (odd != nullptr && is_odd(fan)) part.push_back(fan[0].low);
+        const bool plain = is_plain(fan);
+        if (odd != nullptr && is_odd(fan, plain)) part.push_back(fan[0].low);
+        if (plain) {
+            for (std::size_t i = 0; i < fan.size(); i += 2) link(mesh, fan[i], fan[i + 1]);
+            return;
+        }
         each_edge(fan, [&](std::span<const EdgeUse> uses) {
             if (uses.size() == 2) {
                 if (uses[0].reversed() != uses[1].reversed()) link(mesh, uses[0], uses[1]);

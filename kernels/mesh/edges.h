@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -39,28 +40,66 @@ inline constexpr std::size_t kMaxFacets = 0xFFFFFFFFu / 6;
 /// Fans of more uses are sorted by other means, and not searched for what is odd about them.
 inline constexpr std::size_t kPlainFan = 24;
 
+/// Sorts eight numbers by comparisons that do not depend on one another's outcome: in a mesh without order a branch would be foretold wrongly half of
+/// the time.
+inline void sort_eight(std::array<std::uint64_t, 8>& k) {
+    const auto order = [&](std::size_t i, std::size_t j) {
+        const std::uint64_t a = k[i], b = k[j];
+        k[i] = a < b ? a : b;
+        k[j] = a < b ? b : a;
+    };
+    order(0, 2), order(1, 3), order(4, 6), order(5, 7);
+    order(0, 4), order(1, 5), order(2, 6), order(3, 7);
+    order(0, 1), order(2, 3), order(4, 5), order(6, 7);
+    order(2, 4), order(3, 5);
+    order(1, 4), order(3, 6);
+    order(1, 2), order(3, 4), order(5, 6);
+}
+
 /// Sorts the uses of one block, whose low vertices are [origin, origin + width), and hands out fan after fan (see reduce_fans).
 template <class OnFan>
 void sort_fans(std::span<const EdgeUse> uses, std::uint32_t origin, std::size_t width, OnFan&& on_fan) {
-    auto key = [](const EdgeUse& use) { return std::uint64_t{use.high} << 32 | use.code; };
+    constexpr std::size_t few = 8;
     std::vector<std::uint32_t> place(width + 1, 0);
     for (const EdgeUse& use : uses) ++place[use.low - origin + 1];
     for (std::size_t v = 0; v < width; ++v) place[v + 1] += place[v];
-    RawArray<EdgeUse> sorted(uses.size());
-    for (const EdgeUse& use : uses) sorted[place[use.low - origin]++] = use;
-    for (std::size_t begin = 0, end = 0; begin < sorted.size(); begin = end) {
-        while (end < sorted.size() && sorted[end].low == sorted[begin].low) ++end;
-        if (end - begin <= kPlainFan) {
-            for (std::size_t i = begin + 1; i < end; ++i) {
-                const EdgeUse use = sorted[i];
-                std::size_t j = i;
-                for (; j > begin && key(use) < key(sorted[j - 1]); --j) sorted[j] = sorted[j - 1];
-                sorted[j] = use;
-            }
-        } else {
-            std::sort(sorted.data() + begin, sorted.data() + end, [&](const EdgeUse& a, const EdgeUse& b) { return key(a) < key(b); });
+    // Of a use the upper end and the code, which is what they are sorted by; and some more to be read behind the last ones.
+    RawArray<std::uint64_t> keys(uses.size() + few);
+    for (const EdgeUse& use : uses) keys[place[use.low - origin]++] = std::uint64_t{use.high} << 32 | use.code;
+    std::fill_n(keys.data() + uses.size(), few, 0);
+    std::array<EdgeUse, kPlainFan> plain;
+    std::vector<EdgeUse> many;
+    for (std::size_t v = 0, begin = 0, end = 0; v < width; ++v, begin = end) {
+        end = place[v];
+        const std::size_t n = end - begin;
+        if (n == 0) continue;
+        std::uint64_t* const mine = keys.data() + begin;
+        const auto use_of = [&](std::uint64_t key) {
+            return EdgeUse{origin + static_cast<std::uint32_t>(v), static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)};
+        };
+        if (n <= few) {
+            std::array<std::uint64_t, few> sorted;
+            for (std::size_t i = 0; i < few; ++i) sorted[i] = i < n ? mine[i] : ~std::uint64_t{0};
+            sort_eight(sorted);
+            for (std::size_t i = 0; i < few; ++i) plain[i] = use_of(sorted[i]);
+            on_fan(std::span<const EdgeUse>(plain.data(), n));
+            continue;
         }
-        on_fan(std::span<const EdgeUse>(sorted.data() + begin, end - begin));
+        if (n <= kPlainFan) {
+            for (std::size_t i = 1; i < n; ++i) {
+                const std::uint64_t key = mine[i];
+                std::size_t j = i;
+                for (; j > 0 && key < mine[j - 1]; --j) mine[j] = mine[j - 1];
+                mine[j] = key;
+            }
+            std::transform(mine, mine + n, plain.begin(), use_of);
+            on_fan(std::span<const EdgeUse>(plain.data(), n));
+            continue;
+        }
+        std::sort(mine, mine + n);
+        many.resize(n);
+        std::transform(mine, mine + n, many.begin(), use_of);
+        on_fan(std::span<const EdgeUse>(many));
     }
 }
 

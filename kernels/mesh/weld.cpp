@@ -48,32 +48,37 @@ constexpr std::uint16_t kFree = 0xFFFF;
 /// Finds equal corners within a block of facets.
 class BlockTable {
 public:
-    BlockTable() : table_(kSlots) { keys_.reserve(3 * kBlockFacets); }
+    BlockTable() : table_(kSlots), keys_(3 * kBlockFacets + 1) {}
     /// slots[c] becomes the first corner of the block that has the same point as c. @return how many points are different
     std::size_t find_firsts(const FacetRecords& facets, std::size_t begin, std::size_t end, std::span<std::uint32_t> slots) {
         std::fill(table_.begin(), table_.end(), kFree);
-        keys_.clear();
+        std::size_t different = 0;
         for (std::size_t f = begin; f < end; ++f) {
             for (std::size_t k = 0; k < 3; ++k) {
                 const Key key = key_of(facets.corner(f, k), 3 * f + k);
                 std::size_t slot = hash_of(key) % kSlots;
-                while (table_[slot] != kFree && !same_point(keys_[table_[slot]], key)) slot = (slot + 1) % kSlots;
-                if (table_[slot] == kFree) {
-                    table_[slot] = static_cast<std::uint16_t>(keys_.size());
-                    keys_.push_back(key);
+                // As if the point was a new one, so that a free slot leads to an equal key too: whether it is new takes no branch.
+                keys_[different] = key;
+                std::size_t at = table_[slot] == kFree ? different : table_[slot];
+                while (!same_point(keys_[at], key)) {
+                    slot = (slot + 1) % kSlots;
+                    at = table_[slot] == kFree ? different : table_[slot];
                 }
-                slots[key.corner] = keys_[table_[slot]].corner;
+                table_[slot] = static_cast<std::uint16_t>(at);
+                slots[key.corner] = keys_[at].corner;
+                different += at == different ? 1 : 0;
             }
         }
-        return keys_.size();
+        return different_ = different;
     }
     /// The different points that were found.
-    [[nodiscard]] std::span<const Key> firsts() const { return keys_; }
+    [[nodiscard]] std::span<const Key> firsts() const { return {keys_.data(), different_}; }
 
 private:
     static constexpr std::size_t kSlots = std::size_t{1} << 15;
     std::vector<std::uint16_t> table_;
     std::vector<Key> keys_;
+    std::size_t different_ = 0;
 };
 
 }  // namespace

@@ -21,6 +21,7 @@ struct FacetRecords {
     [[nodiscard]] Vec3f corner(std::size_t facet, std::size_t k) const noexcept {
         std::array<float, 3> p;
         std::memcpy(p.data(), data + facet * stride_bytes + 12 * k, sizeof p);
+        if (mm_per_unit == 1 && lowest_mm == 0) return {p[0], p[1], p[2]};  // what follows would change nothing
         return {static_cast<float>(p[0] * mm_per_unit), static_cast<float>(p[1] * mm_per_unit), static_cast<float>(p[2] * mm_per_unit - lowest_mm)};
     }
 };
