@@ -104,6 +104,12 @@ struct Bent {
     double x_n = 0, y_n = 0, z_n = 0;  ///< peaks
 };
 
+/// A feed that a class of cuts may have, with what it bears there once that was asked.
+struct FeedStep {
+    std::uint32_t feed = 0;
+    const Bent* bent = nullptr;
+};
+
 class BentCutter {
 public:
     BentCutter(const Job& job, const Operation& operation, const Tool& tool) : job_(job), tool_(tool), idle_(idle_cut(job, tool)) {
@@ -195,6 +201,9 @@ struct Seen {
     float height = 0;              ///< of the cut's middle above the joint, mm
     float wood = 0, overhang = 0;  ///< what carries the cut, and how far from what carries it; 0 where nothing hangs over
     std::array<float, 3> at{};
+    std::uint32_t feed = 0;      ///< that was chosen for it; 0: none yet
+    const Bent* bent = nullptr;  ///< what it bears at that feed, of its coarse class; null where nothing is cut
+    double wood_load = 0;        ///< and the wood, as a share of what there is
     [[nodiscard]] std::array<double, 3> place() const { return {at[0], at[1], at[2]}; }
 };
 
@@ -277,7 +286,8 @@ struct Load {
 };
 
 /// In how many passes the wood holds, from `least` on; 0 where it holds in none.
-int passes_for_wood(const Seen& s, int least, const std::function<Load(const Seen&, int)>& load) {
+template <class LoadOf>
+int passes_for_wood(const Seen& s, int least, LoadOf&& load) {
     if (s.depth >= 4 * kLeastDepth)
         for (int n = std::max(2, least); n <= kMostPasses; ++n)
             if (load(s, n).wood <= 1) return n;
@@ -286,8 +296,8 @@ int passes_for_wood(const Seen& s, int least, const std::function<Load(const See
 
 /// Runs of stretches that no feed makes light enough and that several passes would.
 /// @param load what a stretch bears in so many passes, in the lowest of them, which the least wood carries
-std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, double diameter, int round,
-                               const std::function<Load(const Seen&, int)>& load) {
+template <class LoadOf>
+std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, double diameter, int round, LoadOf&& load) {
     // Wood that no passes save, as over a wide cavity, is not worth their time: neither where it breaks nor, on levels above, where it will.
     const auto column = [&](const Seen& s) {
         return std::pair{static_cast<int>(std::floor(s.at[0] / diameter)), static_cast<int>(std::floor(s.at[1] / diameter))};
@@ -371,75 +381,94 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             const double wall = bent.wall_mm / limit;
             return tool.strength_mpa > 0 ? std::max(wall, bent.stress_mpa / tool.strength_mpa) : wall;
         };
+        const auto wood_load = [&](const Seen& s, const Bent& bent) {
+            return s.overhang > 0 ? cutting.needed_wood(bent, s.height, s.overhang) / s.wood : 0;
+        };
         const auto load_of = [&](const Seen& s, const Bent& bent) {
             if (++looked_at % 128 == 0) context.throw_if_cancelled();
-            Load l{cutter_share(bent), 0};
-            if (s.overhang > 0) l.wood = cutting.needed_wood(bent, s.height, s.overhang) / s.wood;
-            return l;
+            return Load{cutter_share(bent), wood_load(s, bent)};
         };
-        const auto load = [&](const Seen& s, double feed, int passes = 1) {
-            if (passes == 1) return load_of(s, cutting.at(s.coarse, feed));
+        // Of a cut whose feed is chosen.
+        const auto load = [&](const Seen& s, int passes) {
+            if (passes == 1) return Load{cutter_share(*s.bent), s.wood_load};
             Seen lowest = s;
             const float off = s.depth * static_cast<float>(passes - 1) / static_cast<float>(passes);
             lowest.coarse = shallower(s.coarse, passes);
             lowest.wood -= off, lowest.height = std::max(0.F, lowest.height - off / 2);
-            return load_of(lowest, cutting.at(lowest.coarse, feed));
+            return load_of(lowest, cutting.at(lowest.coarse, s.feed));
         };
 
         const auto fastest = static_cast<std::uint32_t>(std::floor(std::min(tool.max_feed, job.machine.max_feed)));
         // The fastest step that all limits bear. Where none does: the slowest that is allowed, when it is the cutter that bears too
         // much; as planned, when it is the wood.
-        // The steps of a class, fastest first, are the same wherever it is met; with what they bear, where that was asked.
-        struct FeedStep {
-            std::uint32_t feed = 0;
-            const Bent* bent = nullptr;
+        // The steps of a class, fastest first, are the same wherever it is met.
+        struct ClassFeeds {
+            std::vector<FeedStep> steps;
+            FeedStep* chosen = nullptr;  // where nothing hangs over
         };
-        ByClassAndFeed<std::vector<FeedStep>> steps_of;
-        const auto slow_enough = [&](const Seen& s, std::uint32_t planned, double chip) {
-            const auto [it, fresh] = steps_of.try_emplace(ClassAndFeed{s.coarse, static_cast<double>(planned)});
-            std::vector<FeedStep>& steps = it->second;
+        ByClassAndFeed<ClassFeeds> known;
+        ClassAndFeed last_key;
+        ClassFeeds* last = nullptr;
+        const auto feeds_of = [&](const Seen& s, std::uint32_t planned) -> ClassFeeds& {
+            const ClassAndFeed key{s.coarse, static_cast<double>(planned)};
+            if (last != nullptr && key == last_key) return *last;
+            const auto [it, fresh] = known.try_emplace(key);
             if (fresh) {
+                // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
+                const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
+                const double chip = std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.coarse)));
+                std::vector<FeedStep>& steps = it->second.steps;
                 // What is planned is a step too, so that a cut that needs no other feed keeps its own.
                 steps.push_back({planned, nullptr});
                 for (int k = 1; k <= kFeedSteps; ++k) steps.push_back({fastest * static_cast<std::uint32_t>(k) / kFeedSteps, nullptr});
                 std::erase_if(steps, [&](const FeedStep& f) { return f.feed > chip || f.feed < 1 || f.feed < kLeastShare * planned; });
+                if (steps.empty()) steps.push_back({planned, nullptr});
                 std::sort(steps.begin(), steps.end(), [](const FeedStep& x, const FeedStep& y) { return x.feed > y.feed; });
             }
-            std::uint32_t slowest = planned, for_cutter = 0;
+            last_key = key, last = &it->second;
+            return *last;
+        };
+        const auto bent_at = [&](const Seen& s, FeedStep& step) -> const Bent& {
+            if (step.bent == nullptr) step.bent = &cutting.at(s.coarse, step.feed);
+            return *step.bent;
+        };
+        const auto slow_enough = [&](const Seen& s, std::vector<FeedStep>& steps) {
+            FeedStep* for_cutter = nullptr;
             for (FeedStep& step : steps) {
-                if (!step.bent) step.bent = &cutting.at(s.coarse, step.feed);
-                const Load l = load_of(s, *step.bent);
-                if (l.worst() <= 1) return step.feed;
-                if (l.cutter <= 1 && for_cutter == 0) for_cutter = step.feed;
-                slowest = step.feed;
+                const Load l = load_of(s, bent_at(s, step));
+                if (l.worst() <= 1) return &step;
+                if (l.cutter <= 1 && for_cutter == nullptr) for_cutter = &step;
             }
-            return for_cutter > 0 ? for_cutter : slowest;
+            return for_cutter != nullptr ? for_cutter : &steps.back();
         };
         // A coarse class may bear a little less than a cut of it does: near the limit, what the plan will state decides.
-        const auto as_stated = [&](const Seen& s, std::uint32_t planned, std::uint32_t feed) {
-            const double bears = cutter_share(cutting.at(s.coarse, feed));
-            if (bears < kClassSlack || bears > 1) return feed;
-            for (const FeedStep& step : steps_of.at({s.coarse, static_cast<double>(planned)})) {
-                if (step.feed > feed) continue;
-                feed = step.feed;
-                if (cutter_share(cutting.stated(s.fine, feed)) <= 1) break;
-            }
-            return feed;
+        const auto as_stated = [&](const Seen& s, std::vector<FeedStep>& steps, FeedStep* step) {
+            const double bears = cutter_share(bent_at(s, *step));
+            if (bears < kClassSlack || bears > 1) return step;
+            while (cutter_share(cutting.stated(s.fine, step->feed)) > 1 && step != &steps.back()) ++step;
+            return step;
         };
-        ByClassAndFeed<std::uint32_t> chosen;
-        const auto choose = [&](const Seen& s, std::uint32_t planned) -> std::uint32_t {
-            // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
-            const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
-            if (!s.cuts) return static_cast<std::uint32_t>(most);
-            const auto thin = [&] { return std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.coarse))); };
-            if (s.overhang > 0) return as_stated(s, planned, slow_enough(s, planned, thin()));
-            const auto [it, fresh] = chosen.try_emplace(ClassAndFeed{s.coarse, static_cast<double>(planned)}, planned);
-            if (fresh) it->second = slow_enough(s, planned, thin());
-            return as_stated(s, planned, it->second);
+        const auto choose = [&](Seen& s) {
+            const std::uint32_t planned = op.moves[s.last].feed;
+            if (!s.cuts) {
+                const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
+                s.feed = job.cutting.adapt_feed ? static_cast<std::uint32_t>(most) : planned;
+                return;
+            }
+            if (!job.cutting.adapt_feed) {
+                s.feed = planned, s.bent = &cutting.at(s.coarse, planned);
+            } else {
+                ClassFeeds& of = feeds_of(s, planned);
+                FeedStep* step = of.chosen;
+                if (s.overhang > 0 || step == nullptr) step = slow_enough(s, of.steps);
+                if (!(s.overhang > 0)) of.chosen = step;
+                step = as_stated(s, of.steps, step);
+                s.feed = step->feed, s.bent = &bent_at(s, *step);
+            }
+            s.wood_load = wood_load(s, *s.bent);
         };
 
         std::vector<Seen> seen;
-        std::vector<std::uint32_t> feeds;  // of each stretch
         std::size_t divided = 0;
         double divided_way = 0, deepest = 0;
         int passes = 0;
@@ -447,15 +476,13 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         const StandingSlab before = slab;
         seen = run_through(context, slab, op, tool, layer, overhang, job.bonding.edge_setback);
         for (int round = 0;; ++round) {
-            feeds.clear();
-            for (const Seen& s : seen) {
-                if (feeds.size() % 64 == 0) context.throw_if_cancelled();
-                const std::uint32_t planned = op.moves[s.last].feed;
-                feeds.push_back(job.cutting.adapt_feed ? choose(s, planned) : planned);
+            std::size_t asked = 0;
+            for (Seen& s : seen) {
+                if (++asked % 64 == 0) context.throw_if_cancelled();
+                if (s.feed == 0) choose(s);
             }
             if (!job.cutting.adapt_stepdown || round == kMostRounds) break;
-            const std::vector<DeepRun> runs = deep_runs(
-                seen, op, tool.diameter, round, [&](const Seen& s, int n) { return load(s, feeds[static_cast<std::size_t>(&s - seen.data())], n); });
+            const std::vector<DeepRun> runs = deep_runs(seen, op, tool.diameter, round, load);
             context.throw_if_cancelled();
             if (runs.empty()) break;
             for (const DeepRun& run : runs) {
@@ -490,9 +517,8 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             std::vector<char> level(op.moves.size(), 0);
             double lowest_share = 1, way = 0;
             const Seen* worst = nullptr;
-            for (std::size_t i = 0; i < seen.size(); ++i) {
-                const Seen& s = seen[i];
-                const std::uint32_t planned = op.moves[s.last].feed, feed = feeds[i];
+            for (const Seen& s : seen) {
+                const std::uint32_t planned = op.moves[s.last].feed, feed = s.feed;
                 for (std::uint32_t k = s.first; k <= s.last; ++k) {
                     wanted[k] = wanted[k] == 0 ? feed : std::min(wanted[k], feed);
                     level[k] = 1;
@@ -524,7 +550,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             std::uint32_t feed = 0;
             for (std::uint32_t k = s.first; k <= s.last; ++k) feed = std::max(feed, op.moves[k].feed);
             if (s.overhang > 0)
-                if (const double wood = load(s, feed).wood; wood > 1) {
+                if (const double wood = feed == s.feed ? s.wood_load : wood_load(s, cutting.at(s.coarse, feed)); wood > 1) {
                     ++broken;
                     if (wood > most) most = wood, breaks = &s, needed = wood * s.wood;
                 }
