@@ -173,6 +173,21 @@ TEST(Planner, RapidsAreAFractionOfTheCuts) {
     EXPECT_LT(rapid, 0.2 * cutting);
 }
 
+// The ball crosses the floors that no flat end mill finishes, and those only.
+TEST(Planner, TheRasterCutsFloorsWhereNoFlatEndMillStands) {
+    for (const double wide : {5.0, 40.0}) {
+        Context context;
+        const Mesh mesh =
+            test::height_field(context, 121, 0.5, [&](double x, double y) { return std::abs(x) < wide && std::abs(y) < 20 ? 6.0 : 10.0; });
+        double cutting = 0;
+        for (const Layer& layer : make_plan(context, mesh, {}, Job{}).layers)
+            for (const Operation& op : layer.operations)
+                if (op.purpose == "projected raster") cutting += op.cutting_mm;
+        if (wide < 6) EXPECT_GT(cutting, 40.0) << "a floor 10 mm wide";
+        else EXPECT_EQ(cutting, 0.0) << "a floor as wide as the part";
+    }
+}
+
 // The models as files, planned, written, read back and simulated.
 TEST(Planner, NoProgramTouchesTheOwnModels) {
     for (const char* name : {"pump-cover", "half-sphere", "luo-tool-sample", "luo-layer-sample"}) {

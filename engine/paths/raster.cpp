@@ -91,6 +91,10 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const double chord = safe_chord_mm(r, gouge);
     // Samples stand on multiples of one step, so that those of neighbouring lines are neighbours.
     const auto step = static_cast<std::int32_t>(0.75 * chord * kUnitsPerMm);
+    auto is_floor = [&](const SolidFacet& f) {  // as floor_facets has them
+        return f.normal[2] >= 0.9999 &&
+               std::any_of(cut.floors.begin(), cut.floors.end(), [&](double z) { return f.z_min >= z - kSameFloor && f.z_max <= z; });
+    };
     auto floor_done = [&](double z) {
         for (const double floor : cut.floors)
             if (z <= floor + 1e-6 && z >= floor - kSameFloor) return true;
@@ -225,14 +229,40 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         line.push_back(b);
     };
 
-    std::vector<Line> samples(lines.size());
-    const Fibres reach = covering(cut.context, shallow, r, Axis::x, lines);
+    // What the ball may make: the shallow surface, but for floors. Of these it makes the places where no flat end mill stood.
+    std::vector<SolidFacet> made;
+    for (const SolidFacet& f : shallow)
+        if (f.z_min < top && !is_floor(f)) made.push_back(f);
+    const Fibres reach = covering(cut.context, made, r, Axis::x, lines);
+    const double low_limit = cut.low(0, r) * kUnitsPerMm, high_limit = cut.high(0, r) * kUnitsPerMm;
+    std::vector<std::vector<std::array<std::int32_t, 2>>> unfinished(lines.size());  // places on floors, in steps, first and last of a row
     parallel_each(cut.context, lines.size(), [&](std::size_t l) {
-        // The surface within reach of the ball, with one step around.
+        FloorWalk walk;
+        std::int32_t next = INT32_MIN;
+        for (const FloorSpan& span : floor_spans[l]) {
+            const auto first = static_cast<std::int32_t>(std::ceil(std::max(span.low * kUnitsPerMm, low_limit) / step)),
+                       last = static_cast<std::int32_t>(std::floor(std::min(span.high * kUnitsPerMm, high_limit) / step));
+            for (std::int32_t k = std::max(first, next); k <= last; ++k) {
+                next = k + 1;
+                if (flat_stands(walk, k, lines[l], span.z) || flat_covers(to_mm(k * step), to_mm(lines[l]), span.z) ||
+                    !sample(k * step, lines[l]).wanted)
+                    continue;
+                if (!unfinished[l].empty() && unfinished[l].back()[1] + 1 == k) unfinished[l].back()[1] = k;
+                else unfinished[l].push_back({k, k});
+            }
+        }
+    });
+
+    std::vector<Line> samples(lines.size());
+    parallel_each(cut.context, lines.size(), [&](std::size_t l) {
+        // What the ball may make within its reach, with one step around.
         std::vector<Span> spans;
         for (const Forbidden& f : reach.line(l)) spans.push_back({f.low * kUnitsPerMm, f.high * kUnitsPerMm});
+        const double reaches = r * kUnitsPerMm;
+        auto near = std::lower_bound(lines.begin(), lines.end(), lines[l] - to_units(r)) - lines.begin();
+        for (auto n = static_cast<std::size_t>(near); n < lines.size() && lines[n] <= lines[l] + to_units(r); ++n)
+            for (const auto& [from, to] : unfinished[n]) spans.push_back({from * step - reaches, to * step + reaches});
         std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
-        const double low_limit = cut.low(0, r) * kUnitsPerMm, high_limit = cut.high(0, r) * kUnitsPerMm;
         std::int32_t next = INT32_MIN;
         auto floor = floor_spans[l].begin();
         FloorWalk walk;
