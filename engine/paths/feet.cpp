@@ -1,7 +1,6 @@
 #include "engine/paths/feet.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -54,10 +53,12 @@ void append_foot_runs(const LayerCut& cut, const Tool& tool, double floor, const
     const std::vector<SolidFacet> facets = floor_facets(cut, floor);
     const NearFloor near(cut, facets, r, grid);
     const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(grid.pitch)));
-    for (const double above : heights) {
-        const double tip = floor + above;
-        const std::array<double, 1> tips{tip};
-        const Contours foot = level_contours(cut.context, around, cut.insides(cutter, tips).front().loops, cutter, tip, grid);
+    std::vector<double> tips;
+    for (const double above : heights) tips.push_back(floor + above);
+    const std::vector<Section> inside = cut.insides(cutter, tips);
+    for (std::size_t i = 0; i < tips.size(); ++i) {
+        const double tip = tips[i];
+        const Contours foot = level_contours(cut.context, around, inside[i].loops, cutter, tip, grid);
         levels.emplace_back();
         for (std::size_t c = 0; c < foot.size(); ++c) {
             const std::size_t first = foot.starts[c], n = foot.starts[c + 1] - first;

@@ -197,18 +197,30 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         double tip;
         std::vector<LevelRun> runs;
     };
-    std::vector<FootLevel> feet;
-    for (const double floor : foot_floors(cut)) {
+    struct Foot {
+        std::vector<SolidFacet> facets;  // of the floor
         std::vector<double> close;
+        std::size_t first;  // of its sections
+    };
+    std::vector<Foot> on_floors;
+    std::vector<double> foot_tips;
+    for (const double floor : foot_floors(cut)) {
+        Foot foot{floor_facets(cut, floor), {}, foot_tips.size()};
         for (double above = tool.stepdown_max / 4; above > 0.02; above /= 2)
-            if (floor + above < high && floor + above > lowest) close.push_back(floor + above);
-        const std::vector<SolidFacet> facets = floor_facets(cut, floor);
-        if (close.empty() || facets.empty()) continue;
+            if (floor + above < high && floor + above > lowest) foot.close.push_back(floor + above);
+        if (foot.close.empty() || foot.facets.empty()) continue;
+        foot_tips.insert(foot_tips.end(), foot.close.begin(), foot.close.end());
+        on_floors.push_back(std::move(foot));
+    }
+    const std::vector<Section> foot_inside = cut.insides(cutter, foot_tips);  // in one look at the mesh
+    std::vector<FootLevel> feet;
+    for (const Foot& foot : on_floors) {
+        const std::vector<SolidFacet>& facets = foot.facets;
+        const std::vector<double>& close = foot.close;
         const NearFloor near(cut, facets, r, grid);
         const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(grid.pitch)));
-        const std::vector<Section> inside = cut.insides(cutter, close);
         std::vector<FibreLevel> levels;
-        for (std::size_t i = 0; i < close.size(); ++i) levels.push_back({close[i], &inside[i].loops});
+        for (std::size_t i = 0; i < close.size(); ++i) levels.push_back({close[i], &foot_inside[foot.first + i].loops});
         const std::vector<Contours> level = level_contours(cut.context, around, levels, cutter, grid);
         const std::size_t begin = feet.size();
         for (const double tip : close) feet.push_back({tip, {}});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "engine/paths/feet.h"
 #include "engine/paths/rings.h"
@@ -201,7 +202,11 @@ public:
         const bool flask = !cut_.layer.opening.empty();
         const Loops room = flask ? flask_room(cut_, r_ + pass_.allowance) : Loops{};
         const Loops beyond = flask ? beyond_room(cut_, r_ + pass_.allowance, room) : Loops{};
-        const double gouge = cut_.job.tolerances.gouge;
+        // A floor is finished with its level, so there a flat end mill goes up to the walls.
+        const auto on_floor = [&](double tip) { return !ball_ && std::find(cut_.floors.begin(), cut_.floors.end(), tip) != cut_.floors.end(); };
+        std::vector<double> allowances;
+        for (const double tip : tips) allowances.push_back(on_floor(tip) ? 0 : pass_.allowance);
+        std::vector<std::optional<Contours>> borders(tips.size());
         const Tool& rough = cut_.layer.tools.rough;
         const std::array<std::pair<const DropIndex*, double>, 1> wider{
             std::pair{&cut_.drops({Cutter::Profile::flat, rough.diameter / 2}), rough.diameter / 2}};
@@ -213,13 +218,12 @@ public:
             const double depth = above - tips[i];
             above = tips[i];
             if (targets.few()) continue;
-            // A floor is finished with its level, so there the cutter goes up to the walls.
-            const bool floor = !ball_ && std::find(cut_.floors.begin(), cut_.floors.end(), tips[i]) != cut_.floors.end();
-            const double allowance = floor ? 0 : pass_.allowance;
-            const Cutter cutter{ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_ + allowance};
-            const FibreGrid grid = fibre_grid(cut_.solid, cutter, safe_pitch(r_, allowance > 0 ? std::max(gouge, 0.2 * allowance) : gouge));
-            const std::array<double, 1> tip{ball_ ? tips[i] - allowance : tips[i]};  // of the wider ball
-            Loops border = forbidden_region(level_contours(cut_.context, cut_.solid, cut_.insides(cutter, tip).front().loops, cutter, tip[0], grid));
+            const bool floor = on_floor(tips[i]);
+            const double allowance = allowances[i];
+            const FibreGrid grid = grid_of(allowance);
+            if (!borders[i]) borders_from(i, tips, allowances, grid, borders);
+            Loops border = forbidden_region(*borders[i]);
+            borders[i].reset();
             if (flask) border = unite(border, beyond);
             const std::size_t first = runs.size();
             cut_rings(targets, border, tips[i], allowance > 0, runs);
@@ -259,6 +263,32 @@ private:
         // Walls that go on below the layer are met by its lower half too.
         if (const double under = std::max(cut_.layer.z_bottom - r_ + pass_.limit, deepest); under < bottom - kStands) levels.push_back({under});
         return levels;
+    }
+
+    [[nodiscard]] Cutter wider_by(double allowance) const { return {ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_ + allowance}; }
+    [[nodiscard]] FibreGrid grid_of(double allowance) const {
+        const double gouge = cut_.job.tolerances.gouge;
+        return fibre_grid(cut_.solid, wider_by(allowance), safe_pitch(r_, allowance > 0 ? std::max(gouge, 0.2 * allowance) : gouge));
+    }
+
+    // What the wider cutter must not enter, on this level and those of the same allowance that follow: each is found from the one above. Nearly all
+    // that follow a level with something to cut have something too.
+    void borders_from(std::size_t first, std::span<const double> tips, std::span<const double> allowances, const FibreGrid& grid,
+                      std::vector<std::optional<Contours>>& borders) const {
+        const double allowance = allowances[first];
+        const Cutter cutter = wider_by(allowance);
+        std::vector<std::size_t> which;
+        std::vector<double> at;  // of the wider cutter's tip
+        for (std::size_t i = first; i < tips.size(); ++i) {
+            if (allowances[i] != allowance || borders[i]) continue;
+            which.push_back(i);
+            at.push_back(ball_ ? tips[i] - allowance : tips[i]);
+        }
+        const std::vector<Section> inside = cut_.insides(cutter, at);
+        std::vector<FibreLevel> levels;
+        for (std::size_t k = 0; k < at.size(); ++k) levels.push_back({at[k], &inside[k].loops});
+        std::vector<Contours> contours = level_contours(cut_.context, cut_.solid, levels, cutter, grid);
+        for (std::size_t k = 0; k < which.size(); ++k) borders[which[k]] = std::move(contours[k]);
     }
 
     // From the farthest ring whose cutter meets a target inwards; what a ring cuts the next need not.
