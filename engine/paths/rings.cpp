@@ -380,6 +380,43 @@ bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, con
     return true;
 }
 
+// Where rings around a region are of use.
+struct Use {
+    Loops border, others;  // of the ring on the region's border, and of all others
+    double shortest = 0;   // mm of the border: shorter pieces are left out
+};
+
+// Rings around a region, a step apart, as far as they are of use; no farther than `last` steps.
+void append_rings(RingPlan& plan, const LayerCut& cut, const Thinning& thinning, Loops region, const Use& use, std::size_t last) {
+    for (std::size_t ring = 0; ring <= last; ++ring) {
+        cut.context.throw_if_cancelled();
+        // Around the region, so that it is on the right: its loops are turned over.
+        Loops around;
+        for (std::size_t l = 0; l < region.size(); ++l) {
+            const std::span<const Point2> loop = region.loop(l);
+            around.points.insert(around.points.end(), loop.rbegin(), loop.rend());
+            around.close_loop();
+        }
+        const std::size_t first = plan.pieces.size();
+        for (const RunInside& run : runs_inside(around, ring == 0 ? use.border : use.others)) {
+            std::vector<PathPoint> points;
+            for (const Point2 p : run.points) points.push_back({p.x, p.y, plan.z});
+            if (run.closed) points.push_back(points.front());
+            if (double whole = 0; ring == 0 && !run.closed) {
+                for (std::size_t k = 1; k < points.size(); ++k) whole += length(points[k - 1], points[k]);
+                if (whole < use.shortest * kUnitsPerMm) continue;
+            }
+            RingPlan::Piece piece{ring == 0 ? simplify(points, kFineRing * kUnitsPerMm) : std::move(points), {}, plan.regions.size(), run.closed};
+            note_box(piece);
+            plan.regions.push_back({ring, SIZE_MAX, 0, {plan.pieces.size()}});
+            plan.pieces.push_back(std::move(piece));
+        }
+        if (plan.pieces.size() == first && ring > 0) return;
+        cut.context.throw_if_cancelled();
+        region = thinning.of(offset(region, plan.step, kFineRing));
+    }
+}
+
 }  // namespace
 
 double ring_tolerance(const Tool& tool) { return std::max(kFineRing, kRingShare * tool.diameter); }
@@ -404,12 +441,16 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
     bound.travel = {cut.low(0, far) * kUnitsPerMm, cut.low(1, far) * kUnitsPerMm, cut.high(0, far) * kUnitsPerMm, cut.high(1, far) * kUnitsPerMm};
     const Loops useful = useful_area(cut, r, stands);
     const Thinning thinning(cut, tool, blend);
-    const std::size_t last_ring = !hold && go_round(plan, stands, r, forbidden, useful) ? kRingsBesideStrips : SIZE_MAX;
+    if (!hold) {
+        const bool round = go_round(plan, stands, r, forbidden, useful);
+        append_rings(plan, cut, thinning, forbidden, {useful, useful, 0}, round ? kRingsBesideStrips : SIZE_MAX);
+        return plan;
+    }
     Loops nearer_free;
     std::vector<std::size_t> nearer_region;  // by loop of nearer_free; SIZE_MAX for holes
     std::vector<std::array<std::int32_t, 4>> nearer_boxes;
     std::size_t ring = 0;
-    for (Loops region = simplify(forbidden);; ++ring) {
+    for (Loops region = forbidden;; ++ring) {
         cut.context.throw_if_cancelled();
         Loops free = subtract(useful, region);
         cut.context.throw_if_cancelled();
@@ -445,7 +486,7 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
             }
             if (inner.around != SIZE_MAX) ++plan.regions[inner.around].waits_for;
         }
-        if (plan.pieces.size() == first_piece || ring == last_ring) break;
+        if (plan.pieces.size() == first_piece) break;
         nearer_boxes = boxes_of(free);
         nearer_free = std::move(free);
         nearer_region = std::move(region_of);
@@ -463,33 +504,8 @@ RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbid
     plan.z = to_units(tip_z);
     const Loops useful = useful_area(cut, r, {cut.layer.stock_min[0], cut.layer.stock_min[1], cut.layer.stock_max[0], cut.layer.stock_max[1]});
     const Thinning thinning(cut, tool, blend);
-    Loops region = simplify(forbidden);
-    for (std::size_t ring = 0;; ++ring) {
-        cut.context.throw_if_cancelled();
-        // Around the region, so that it is on the right: its loops are turned over.
-        Loops around;
-        for (std::size_t l = 0; l < region.size(); ++l) {
-            const std::span<const Point2> loop = region.loop(l);
-            around.points.insert(around.points.end(), loop.rbegin(), loop.rend());
-            around.close_loop();
-        }
-        const std::size_t first = plan.pieces.size();
-        for (const RunInside& run : runs_inside(around, intersect(useful, ring == 0 ? border_over : over))) {
-            std::vector<PathPoint> points;
-            for (const Point2 p : run.points) points.push_back({p.x, p.y, plan.z});
-            if (run.closed) points.push_back(points.front());
-            if (double whole = 0; ring == 0 && !run.closed) {
-                for (std::size_t k = 1; k < points.size(); ++k) whole += length(points[k - 1], points[k]);
-                if (whole < kShortestTerrace * kUnitsPerMm) continue;
-            }
-            RingPlan::Piece piece{ring == 0 ? simplify(points, kFineRing * kUnitsPerMm) : std::move(points), {}, plan.regions.size(), run.closed};
-            note_box(piece);
-            plan.regions.push_back({ring, SIZE_MAX, 0, {plan.pieces.size()}});
-            plan.pieces.push_back(std::move(piece));
-        }
-        if (plan.pieces.size() == first && ring > 0) return plan;
-        region = thinning.of(offset(region, plan.step, kFineRing));
-    }
+    append_rings(plan, cut, thinning, forbidden, {intersect(useful, border_over), intersect(useful, over), kShortestTerrace}, SIZE_MAX);
+    return plan;
 }
 
 namespace {

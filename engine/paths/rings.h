@@ -58,7 +58,7 @@ struct RingPlan {
 /// far as these surround the forbidden region, then in rings around that region. The forbidden region is on the right of every ring (but see
 /// Cutting::climb), so the cutter climbs. Neighbouring rings are at most 0.45 of the tool's diameter, ring_tolerance() and 0.04 mm apart; the
 /// ring next to the forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region is nowhere near the stock.
-/// @param forbidden of the tool's middle, outer loops counter-clockwise; the flask's included
+/// @param forbidden of the tool's middle, as simplify() or unite() give it; the flask's included
 /// @param tip_z mm
 /// @param blend mm by which the machine rounds the rings' corners (Operation::blend): chords are as long as it then takes at full feed
 /// @param hold  keeps what hangs over a cavity below, or over the edge of the stack, held to the end: it goes from the middle or from the free edge
