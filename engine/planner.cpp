@@ -81,7 +81,7 @@ struct LayerShare {
 /// The work of a square millimetre of surface, by how steep it is, and of a facet, against one of slab that is roughed away. Fitted to the
 /// processor time of 44 layers of six patterns; of each pattern's shares nearly all are met within a third.
 struct PathWork {
-    static constexpr double kFlat = 3, kSlope = 14, kUpright = 2, kFacet = 60;
+    static constexpr double kFlat = 4, kSlope = 24, kUpright = 4, kFacet = 100;
     static constexpr double kFlatNz = 0.9998, kUprightNz = 0.05;  ///< from here on up, and from here on down
 
     static double of_area(double nz) { return nz > kFlatNz ? kFlat : nz > kUprightNz ? kSlope : kUpright; }

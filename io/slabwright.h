@@ -67,7 +67,7 @@ SLABWRIGHT_API void report(Context& context, const std::string& directory, const
 
 /// Of the time that plan() and write_verified() take together, that of plan() and of the writing: 0.55 to 0.75. A caller
 /// that shows progress begins with `context.share_progress(0, kPlanningShare)`; write_verified() goes on from there.
-inline constexpr double kPlanningShare = 0.65;
+inline constexpr double kPlanningShare = 0.67;
 
 /// What the simulation of a folder's programs found.
 struct VerifyResult {
