@@ -164,11 +164,11 @@ Operation rough_layer(const LayerCut& cut) {
     for (std::size_t i = 0; i < steps.size(); ++i) heights.push_back({steps[i].level.spare, &inside[i].loops});
     const std::vector<Contours> borders = level_contours(cut.context, cut.solid, heights, cutter, grid);
     std::vector<Loops> forbidden_at(steps.size());
-    if (const Loops beyond = flask ? beyond_room(cut, r, room) : Loops{}; true)
-        parallel_each(cut.context, steps.size(), [&](std::size_t i) {
-            forbidden_at[i] = simplify(forbidden_region(borders[i]));
-            if (flask) forbidden_at[i] = unite(forbidden_at[i], beyond);
-        });
+    const Loops beyond = flask ? beyond_room(cut, r, room) : Loops{};
+    parallel_each(cut.context, steps.size(), [&](std::size_t i) {
+        forbidden_at[i] = simplify(forbidden_region(borders[i]));
+        if (flask) forbidden_at[i] = unite(forbidden_at[i], beyond);
+    });
     std::vector<Level> cuts(steps.size());
     parallel_each(cut.context, steps.size(), [&](std::size_t i) {
         const double tip = steps[i].level.tip;
