@@ -78,8 +78,8 @@ struct LayerShare {
     double work = 0;           ///< of its paths, against a square millimetre of slab that is roughed away
 };
 
-/// The work of a square millimetre of surface, by how steep it is, and of a facet, against one of slab that is roughed away. Fitted to the
-/// processor time of 44 layers of six patterns; of each pattern's shares nearly all are met within a third.
+/// The work of a square millimetre of surface, by how steep it is, and of a facet, against one of slab that is roughed away. First fitted to
+/// the processor time of 44 layers of six patterns; since roughing costs less, set by what bench/time_left_bench says of seven.
 struct PathWork {
     static constexpr double kFlat = 4, kSlope = 24, kUpright = 4, kFacet = 100;
     static constexpr double kFlatNz = 0.9998, kUprightNz = 0.05;  ///< from here on up, and from here on down

@@ -105,8 +105,7 @@ TEST(Rings, KeepTheirStep) {
         for (const Point2 p : hollow.points) rings[0].push_back({p.x, p.y, 0});
         rings[0].push_back(rings[0].front());
         for (const RingPlan::Piece& piece : plan.pieces)
-            if (piece.closed && rings.size() < 5 && plan.regions[piece.region].ring + 1 == rings.size() && piece.box[0] > to_units(-25))
-                rings.push_back(piece.points);
+            if (piece.closed && rings.size() < 5 && piece.ring + 1 == rings.size() && piece.box[0] > to_units(-25)) rings.push_back(piece.points);
         ASSERT_EQ(rings.size(), 5U) << waves;
         for (const PathPoint& p : rings[1]) EXPECT_LE(away(p, rings[0]), 0.0201);
         for (std::size_t k = 2; k < rings.size(); ++k)

@@ -16,10 +16,12 @@ constexpr double kMostFeet = 6;
 
 }  // namespace
 
+bool lies_on_floor(const SolidFacet& facet, double z) { return facet.z_min >= z - kSameFloor && facet.z_max <= z && facet.normal[2] >= 0.9999; }
+
 std::vector<SolidFacet> floor_facets(const LayerCut& cut, double z) {
     std::vector<SolidFacet> facets;
     for (const SolidFacet& f : cut.solid.facets)
-        if (f.z_min >= z - kSameFloor && f.z_max <= z && f.normal[2] >= 0.9999) facets.push_back(f);
+        if (lies_on_floor(f, z)) facets.push_back(f);
     return facets;
 }
 
@@ -56,9 +58,12 @@ void append_foot_runs(const LayerCut& cut, const Tool& tool, double floor, const
     std::vector<double> tips;
     for (const double above : heights) tips.push_back(floor + above);
     const std::vector<Section> inside = cut.insides(cutter, tips);
+    std::vector<FibreLevel> at;
+    for (std::size_t i = 0; i < tips.size(); ++i) at.push_back({tips[i], &inside[i].loops});
+    const std::vector<Contours> contours = level_contours(cut.context, around, at, cutter, grid);
     for (std::size_t i = 0; i < tips.size(); ++i) {
         const double tip = tips[i];
-        const Contours foot = level_contours(cut.context, around, inside[i].loops, cutter, tip, grid);
+        const Contours& foot = contours[i];
         levels.emplace_back();
         for (std::size_t c = 0; c < foot.size(); ++c) {
             const std::size_t first = foot.starts[c], n = foot.starts[c + 1] - first;

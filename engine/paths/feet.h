@@ -9,7 +9,9 @@
 
 namespace slabwright {
 
-/// The upward facets of a floor at height z (of cut.floors).
+/// Whether a facet is an upward one of a floor at height z (of cut.floors).
+[[nodiscard]] bool lies_on_floor(const SolidFacet& facet, double z);
+/// All of them.
 [[nodiscard]] std::vector<SolidFacet> floor_facets(const LayerCut& cut, double z);
 
 /// Which points of a level's contours, on the fibres of `grid`, belong to a cutter (radius r mm) that stands over some of these facets.

@@ -91,9 +91,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const double chord = safe_chord_mm(r, gouge);
     // Samples stand on multiples of one step, so that those of neighbouring lines are neighbours.
     const auto step = static_cast<std::int32_t>(0.75 * chord * kUnitsPerMm);
-    auto is_floor = [&](const SolidFacet& f) {  // as floor_facets has them
-        return f.normal[2] >= 0.9999 &&
-               std::any_of(cut.floors.begin(), cut.floors.end(), [&](double z) { return f.z_min >= z - kSameFloor && f.z_max <= z; });
+    auto is_floor = [&](const SolidFacet& f) {
+        return std::any_of(cut.floors.begin(), cut.floors.end(), [&](double z) { return lies_on_floor(f, z); });
     };
     auto floor_done = [&](double z) {
         for (const double floor : cut.floors)

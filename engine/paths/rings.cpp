@@ -22,7 +22,17 @@ constexpr double kShortestTerrace = 2;         // mm of a terrace's border ring:
 constexpr double kBesideSteps = 1.2;           // steps between rings that lie next to each other, at most, where they are nearest
 constexpr double kSlide = 1.2;                 // steps along the next ring that the way to it slants
 
-double length(const PathPoint& a, const PathPoint& b) { return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y); }
+// Of a segment of Point2 or PathPoint, seen from above, and of a line of them; 0.1 µm.
+template <class Point>
+double length(const Point& a, const Point& b) {
+    return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
+}
+template <class Point>
+double length(const std::vector<Point>& line) {
+    double sum = 0;
+    for (std::size_t k = 1; k < line.size(); ++k) sum += length(line[k - 1], line[k]);
+    return sum;
+}
 
 // Where the middle of a cutter may be of use: the stock grown by `reach`, its corners rounded, as far as the machine travels.
 struct Bound {
@@ -46,7 +56,7 @@ void note_box(RingPlan::Piece& piece) {
 
 // The pieces of one loop of the free area that are no edge of the bound. Outer loops run counter-clockwise and holes clockwise, so
 // the free area is on the left, what stays on the right, and the cutter climbs.
-void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bound, std::size_t region, double tolerance,
+void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bound, std::size_t ring, std::size_t region, double tolerance,
                    std::vector<RingPlan::Piece>& out) {
     const std::size_t n = loop.size();
     auto on_edge = [&](std::size_t k) {
@@ -57,7 +67,7 @@ void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bo
     auto point = [&](std::size_t k) { return PathPoint{loop[k % n].x, loop[k % n].y, z}; };
     auto take = [&](std::vector<PathPoint>& points, bool closed) {
         if (points.size() > 1) {
-            out.push_back({simplify(points, tolerance), {}, region, closed});
+            out.push_back({simplify(points, tolerance), {}, ring, region, closed});
             note_box(out.back());
         }
         points.clear();
@@ -142,17 +152,18 @@ std::vector<PathPoint> started_at(const std::vector<PathPoint>& ring, std::size_
     return result;
 }
 
+Loops rectangle(double x0, double y0, double x1, double y1) {
+    Loops loops;
+    loops.points = {{to_units(x0), to_units(y0)}, {to_units(x1), to_units(y0)}, {to_units(x1), to_units(y1)}, {to_units(x0), to_units(y1)}};
+    loops.close_loop();
+    return loops;
+}
+
 // A rectangle well past the stock and the tool's reach.
 Loops around_stock(const LayerCut& cut, double r) {
     const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
     const double beyond = 2 * r + kBeyond;
-    Loops around;
-    around.points = {{to_units(lo[0] - beyond), to_units(lo[1] - beyond)},
-                     {to_units(hi[0] + beyond), to_units(lo[1] - beyond)},
-                     {to_units(hi[0] + beyond), to_units(hi[1] + beyond)},
-                     {to_units(lo[0] - beyond), to_units(hi[1] + beyond)}};
-    around.close_loop();
-    return around;
+    return rectangle(lo[0] - beyond, lo[1] - beyond, hi[0] + beyond, hi[1] + beyond);
 }
 
 }  // namespace
@@ -210,8 +221,7 @@ Fibres beside_flask(const LayerCut& cut, const Loops& room, Fibres forbidden, Ax
 }
 
 void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_t above, std::int32_t z, double ramp_deg) {
-    double around = 0;
-    for (std::size_t k = 1; k < ring.size(); ++k) around += length(ring[k - 1], ring[k]);
+    const double around = length(ring);
     const double drop = static_cast<double>(above) - z;
     if (around < 1) return;
     path.sink(above);
@@ -300,13 +310,6 @@ void cut_frames(PathBuilder& path, const RingPlan& plan) {
     }
 }
 
-Loops rectangle(double x0, double y0, double x1, double y1) {
-    Loops loops;
-    loops.points = {{to_units(x0), to_units(y0)}, {to_units(x1), to_units(y0)}, {to_units(x1), to_units(y1)}, {to_units(x0), to_units(y1)}};
-    loops.close_loop();
-    return loops;
-}
-
 // Where the middle of a cutter of radius `r` is of use on what stands in a rectangle (smallest x and y, largest x and y), mm.
 Loops useful_area(const LayerCut& cut, double r, const std::array<double, 4>& stands) {
     const double far = r + 2;
@@ -323,8 +326,6 @@ struct Thinning {
           turn(fast_turn(cut.job.machine, std::min(tool.max_feed, cut.job.machine.max_feed), blend)) {}
     [[nodiscard]] Loops of(const Loops& region) const { return thinned(region, fine * kUnitsPerMm, loose * kUnitsPerMm, turn); }
 };
-
-double distance(Point2 a, Point2 b) { return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y); }
 
 // How far a place lies from a line, 0.1 µm.
 double distance(const PathPoint& p, std::span<const PathPoint> line) {
@@ -353,9 +354,8 @@ bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, con
     double cut = 0, between = 0;
     const RunInside* last = nullptr;
     for (const RunInside& run : runs) {
-        for (std::size_t k = 1; k < run.points.size(); ++k) cut += distance(run.points[k - 1], run.points[k]);
-        if (run.closed) cut += distance(run.points.back(), run.points.front());
-        if (last != nullptr && !last->closed && !run.closed) between += distance(last->points.back(), run.points.front());
+        cut += length(run.points) + (run.closed ? length(run.points.back(), run.points.front()) : 0);
+        if (last != nullptr && !last->closed && !run.closed) between += length(last->points.back(), run.points.front());
         last = &run;
     }
     if (runs.empty() || between > kMostBetweenStrips * cut) return false;
@@ -364,7 +364,7 @@ bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, con
         // From the rectangle before, where the cutter has room; farther along where that begins later. So near to its beginning, which is two
         // steps from what is forbidden, the way is free.
         const Point2 a = run.points[0], b = run.points[1];
-        const double l = distance(a, b), ux = (static_cast<double>(b.x) - a.x) / l, uy = (static_cast<double>(b.y) - a.y) / l;
+        const double l = length(a, b), ux = (static_cast<double>(b.x) - a.x) / l, uy = (static_cast<double>(b.y) - a.y) / l;
         for (const double along : {0.0, 0.5, 1.0, 1.5}) {
             const double step = plan.step * kUnitsPerMm;
             const Point2 beside{static_cast<std::int32_t>(std::lround(a.x + step * (along * ux - uy))),
@@ -402,14 +402,9 @@ void append_rings(RingPlan& plan, const LayerCut& cut, const Thinning& thinning,
             std::vector<PathPoint> points;
             for (const Point2 p : run.points) points.push_back({p.x, p.y, plan.z});
             if (run.closed) points.push_back(points.front());
-            if (double whole = 0; ring == 0 && !run.closed) {
-                for (std::size_t k = 1; k < points.size(); ++k) whole += length(points[k - 1], points[k]);
-                if (whole < use.shortest * kUnitsPerMm) continue;
-            }
-            RingPlan::Piece piece{ring == 0 ? simplify(points, kFineRing * kUnitsPerMm) : std::move(points), {}, plan.regions.size(), run.closed};
-            note_box(piece);
-            plan.regions.push_back({ring, SIZE_MAX, 0, {plan.pieces.size()}});
-            plan.pieces.push_back(std::move(piece));
+            if (ring == 0 && !run.closed && length(points) < use.shortest * kUnitsPerMm) continue;
+            plan.pieces.push_back({ring == 0 ? simplify(points, kFineRing * kUnitsPerMm) : std::move(points), {}, ring, 0, run.closed});
+            note_box(plan.pieces.back());
         }
         if (plan.pieces.size() == first && ring > 0) return;
         cut.context.throw_if_cancelled();
@@ -462,12 +457,12 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
                 if ((signed_area(free.loop(l)) < 0) != holes) continue;
                 if (!holes) {
                     region_of[l] = plan.regions.size();
-                    plan.regions.push_back({ring, SIZE_MAX, 0, {}});
+                    plan.regions.emplace_back();
                 } else if (free.parents[l] < 0) {
                     continue;
                 }
                 const std::size_t of = holes ? region_of[static_cast<std::size_t>(free.parents[l])] : region_of[l];
-                if (of != SIZE_MAX) append_pieces(free.loop(l), plan.z, bound, of, ring == 0 ? kFineRing * kUnitsPerMm : 0, plan.pieces);
+                if (of != SIZE_MAX) append_pieces(free.loop(l), plan.z, bound, ring, of, ring == 0 ? kFineRing * kUnitsPerMm : 0, plan.pieces);
             }
         for (std::size_t p = first_piece; p < plan.pieces.size(); ++p) plan.regions[plan.pieces[p].region].pieces.push_back(p);
         // Which nearer region holds each of these: by a point off the bound's edge, which both may share.
@@ -557,7 +552,7 @@ private:
     void wait_for_neighbours() {
         const std::size_t n = plan_.pieces.size();
         waits_for_.assign(n, 0), waiting_.resize(n);
-        auto ring = [&](std::size_t k) { return plan_.regions[plan_.pieces[k].region].ring; };
+        auto ring = [&](std::size_t k) { return plan_.pieces[k].ring; };
         for (std::size_t first = 0, farther = 0, end = 0; first < n; first = farther) {  // pieces lie in the order of their rings
             for (farther = first; farther < n && ring(farther) == ring(first);) ++farther;
             for (end = farther; end < n && ring(end) == ring(first) + 1;) ++end;
@@ -603,15 +598,15 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
         std::size_t next = SIZE_MAX;
         Start start;
         std::size_t far = 0;
-        for (const std::size_t k : turns.ready) far = std::max(far, plan.regions[plan.pieces[k].region].ring);
+        for (const std::size_t k : turns.ready) far = std::max(far, plan.pieces[k].ring);
         for (std::size_t k = 0; k < turns.ready.size(); ++k)
-            if ((!plan.hold || plan.regions[plan.pieces[turns.ready[k]].region].ring == far) &&
+            if ((!plan.hold || plan.pieces[turns.ready[k]].ring == far) &&
                 nearer(plan.pieces[turns.ready[k]], path.at(), !cut.job.cutting.climb, start))
                 next = k;
         const std::size_t chosen = turns.ready[next];
         RingPlan::Piece& piece = plan.pieces[chosen];
         turns.ready.erase(turns.ready.begin() + static_cast<std::ptrdiff_t>(next));
-        const std::size_t on = plan.regions[piece.region].ring;
+        const std::size_t on = piece.ring;
         // From ring to ring straight: a place `ring` steps from the forbidden region has that much room on all sides. Slantwise,
         // so that the cutter slides into the next ring, where there is room for the longer way too.
         const bool along = path.is_down() && path.z() == z && piece.closed && start.way <= 1.02 * step_units &&

@@ -35,21 +35,22 @@ struct RingPlan {
     struct Piece {
         std::vector<PathPoint> points;  ///< closed ones repeat their first point
         std::array<double, 4> box{};    ///< 0.1 µm: smallest x and y, largest x and y
-        std::size_t region = 0;
+        std::size_t ring = 0;           ///< how many steps off the forbidden region
+        std::size_t region = 0;         ///< with hold
         bool closed = false;
     };
     /// A connected part of what is free at one distance from the forbidden region. Within it, farther off, lie others.
     struct Region {
-        std::size_t ring = 0, around = SIZE_MAX;  ///< how many steps off; the region one step nearer that holds this one
-        std::size_t waits_for = 0;                ///< regions within this one
+        std::size_t around = SIZE_MAX;  ///< the region one step nearer that holds this one
+        std::size_t waits_for = 0;      ///< regions within this one
         std::vector<std::size_t> pieces;
     };
     std::vector<std::array<double, 4>> frames;   ///< rectangles cut before the rings, from the stock's edge inwards: smallest x, y, largest x, y, mm
     double south = 0;                            ///< mm: y beside the stock, where the first of them is entered
     std::vector<std::vector<PathPoint>> strips;  ///< runs along further rectangles, outside of the rings, in the order in which they are cut
     std::vector<Piece> pieces;
-    std::vector<Region> regions;
-    double step = 0;  ///< mm between rings
+    std::vector<Region> regions;  ///< with hold
+    double step = 0;              ///< mm between rings
     std::int32_t z = 0;
     bool hold = false;  ///< all rings of one distance are cut before any nearer one
 };

@@ -523,8 +523,7 @@ private:
             }
             // Nothing to take, as most of the ways between cuts; what is still to be cut only adds to that.
             const double aside = radius + kArcError;
-            const bool clear = near && stock.clear(box.x0 - aside, box.x1 + aside, box.y0 - aside, box.y1 + aside, low);
-            if (clear && !in_arc && !follows) return;
+            if (!in_arc && !follows && stock.clear(box.x0 - aside, box.x1 + aside, box.y0 - aside, box.y1 + aside, low)) return;
             cut_level();
             if (near) {
                 Point3 before{}, after{};
