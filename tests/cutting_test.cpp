@@ -248,6 +248,11 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
                 if (within) {
                     EXPECT_EQ(*within, rest.tip_z) << x << ' ' << y << ' ' << z;
                 }
+                const std::optional<Rest> told = index.drop_within(x, y, -1e9, z);
+                EXPECT_EQ(told.has_value(), rest.tip_z <= z) << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
+                if (told) {
+                    EXPECT_TRUE(told->tip_z == rest.tip_z && told->nx == rest.nx && told->ny == rest.ny && told->nz == rest.nz) << x << ' ' << y;
+                }
                 const Rest above = index.drop(x, y, z);
                 EXPECT_EQ(above.tip_z, rest.tip_z > z ? rest.tip_z : -std::numeric_limits<double>::infinity()) << x << ' ' << y << ' ' << z;
                 if (rest.tip_z <= z) continue;

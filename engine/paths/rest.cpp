@@ -1,5 +1,6 @@
-// A raster of drops over what is left, refined where the cutter's rest jumps; of all places only those are kept that lower the
-// stock, in the order coarse before fine. So a wide rest is cleared by an even raster, and a corner by the few places along it.
+// A raster of drops over what is left, refined where the cutter's rest jumps and something stands that could be lowered there; of all places
+// only those are kept that lower the stock, and finer lines are laid over what coarser ones leave. So a wide rest is cleared by an even raster,
+// and a corner by the few places along it.
 #include "engine/paths/rest.h"
 
 #include <algorithm>
@@ -25,6 +26,7 @@ constexpr double kJump = 0.05;    // mm by which a flat end mill's tip may step 
 constexpr double kSettle = 0.01;  // mm by which a low point of a line lies under its neighbours
 constexpr float kRise = 0.5F;     // mm: a wall that is lower than what stands beside it by less is as high
 constexpr double kPlaces = 0.75;  // of the longest chord, between places of a line
+constexpr double kOver = 0.5;     // mm over all that stands for it: how much higher a place lies is not asked
 constexpr double kBridge = 3.0;   // mm between two useful stretches that are travelled along the surface
 
 // The greatest number under a height: what stands over it is as high or higher.
@@ -34,8 +36,8 @@ double just_under(double z) { return std::nextafter(z, -std::numeric_limits<doub
 struct Place {
     std::int32_t x = 0, y = 0, z = 0;  // 0.1 µm
     double tip = 0;                    // mm
-    std::array<double, 3> contact{};
-    bool reachable = false, useful = false, cut = false;
+    std::array<double, 3> contact{};   // mm, where `touches`: a point of the surface
+    bool reachable = false, touches = false, useful = false, cut = false;
 };
 
 struct Line {
@@ -49,7 +51,8 @@ using Spans = std::vector<std::array<std::int32_t, 2>>;  // 0.1 µm, ascending a
 class Targets {
 public:
     /// @param probe a flat cutter as wide as the limit, or less: where its rest is as high as what stands, that is as near to a wall beside it
-    Targets(Context& context, const LayerStock& stock, const RestPass& pass, double steep, const DropIndex* probe)
+    /// @param reach of the cutter, mm
+    Targets(Context& context, const LayerStock& stock, const RestPass& pass, double steep, const DropIndex* probe, double reach_mm)
         : stock_(stock), rows_(static_cast<std::size_t>(stock.grid().ny)) {
         const CellGrid& grid = stock.grid();
         // Places around a cell, the nearest first.
@@ -87,8 +90,17 @@ public:
                 return count;
             },
             std::plus<>());
+        find_highest(reach_mm);
     }
     [[nodiscard]] std::size_t count() const { return count_; }
+    /// No cell that is marked within the cutter's reach stands higher, mm above the layer's bottom; −infinity where none is.
+    [[nodiscard]] float highest_near(double x, double y) const {
+        const CellGrid& grid = stock_.grid();
+        const auto tile = [&](double at, double from, int n) {
+            return std::clamp(static_cast<int>((at - from) / grid.cell + 0.5), 0, n - 1) / kTile;
+        };
+        return highest_[static_cast<std::size_t>(tile(y, grid.y0, grid.ny)) * tiles_x_ + static_cast<std::size_t>(tile(x, grid.x0, grid.nx))];
+    }
     /// Calls fn(first, last) for the marked stretches of row j within [i0, i1], until one returns true; whether one did.
     template <class Fn>
     [[nodiscard]] bool any_in_row(int j, int i0, int i1, Fn&& fn) const {
@@ -125,9 +137,39 @@ public:
     }
 
 private:
+    void find_highest(double reach) {
+        if (count_ == 0) return;
+        const CellGrid& grid = stock_.grid();
+        const int nx = (grid.nx + kTile - 1) / kTile, ny = (grid.ny + kTile - 1) / kTile;
+        tiles_x_ = static_cast<std::size_t>(nx);
+        constexpr float none = -std::numeric_limits<float>::infinity();
+        std::vector<float> own(tiles_x_ * static_cast<std::size_t>(ny), none);
+        for (std::size_t j = 0; j < rows_.size(); ++j)
+            for (const auto& [first, last] : rows_[j])
+                for (int i = first; i <= last; ++i) {
+                    float& tile = own[j / kTile * tiles_x_ + static_cast<std::size_t>(i / kTile)];
+                    tile = std::max(tile, stock_.height(grid.index(i, static_cast<int>(j))));
+                }
+        highest_.assign(own.size(), none);
+        const double far = reach / grid.cell;  // cells
+        const int tiles = static_cast<int>(far / kTile) + 1;
+        for (int j = 0; j < ny; ++j)
+            for (int i = 0; i < nx; ++i) {
+                const float here = own[static_cast<std::size_t>(j) * tiles_x_ + static_cast<std::size_t>(i)];
+                if (here == none) continue;
+                for (int dj = -std::min(tiles, j); dj <= std::min(tiles, ny - 1 - j); ++dj)
+                    for (int di = -std::min(tiles, i); di <= std::min(tiles, nx - 1 - i); ++di) {
+                        float& there = highest_[static_cast<std::size_t>(j + dj) * tiles_x_ + static_cast<std::size_t>(i + di)];
+                        there = std::max(there, here);
+                    }
+            }
+    }
+
+    static constexpr int kTile = 8;  // cells
     const LayerStock& stock_;
     std::vector<std::vector<std::array<int, 2>>> rows_;
-    std::size_t count_ = 0;
+    std::size_t count_ = 0, tiles_x_ = 0;
+    std::vector<float> highest_;  // by tile
 };
 
 class Rester {
@@ -145,7 +187,8 @@ public:
           targets_(cut.context, stock, pass, finish_slopes(cut.job.cutting).levels_from,
                    (pass.in_steps ? pass.skin > 0 : clears_on_contours(cut.job))
                        ? &cut.drops({Cutter::Profile::flat, pass.in_steps ? std::min(pass.limit, r_ / 2) : pass.limit})
-                       : nullptr),
+                       : nullptr,
+                   r_),
           tolerance_(std::max(cut.job.tolerances.gouge, pass.allowance)),
           chord_(safe_chord_mm(wide_, tolerance_)),
           step_(static_cast<std::int32_t>(kPlaces * chord_ * kUnitsPerMm)),
@@ -158,9 +201,12 @@ public:
         if (targets_.count() == 0) return op;
         find_room();
         index_ = &cut_.drops({ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, wide_});
-        lay_lines();
-        settle();
-        keep_what_lowers();
+        {
+            LayerStock::Trial places(stock_);  // the stock stands as before when its lines are known
+            lay_lines();
+            settle();
+            places.undo();
+        }
         std::vector<std::vector<PathPoint>> runs;
         for (const Line& line : lines_) {
             cut_.context.throw_if_cancelled();
@@ -234,14 +280,18 @@ private:
         const double x = to_mm(ux), y = to_mm(uy);
         // How far a flat end mill would go under the layer's bottom does not matter.
         const double matters = ball_ ? -std::numeric_limits<double>::infinity() : std::max(cut_.layer.z_bottom, cut_.layer.floor_below);
-        const Rest rest = index_->drop(x, y, matters);
-        const double on_surface = rest.tip_z + under_;
         Place p;
         p.x = ux;
         p.y = uy;
+        p.tip = stock_.z_bottom() + std::max(0.0, static_cast<double>(targets_.highest_near(x, y))) + kOver;
+        const std::optional<Rest> found = index_->drop_within(x, y, matters, p.tip - under_);
+        if (!found) return p;
+        const Rest& rest = *found;
+        const double on_surface = rest.tip_z + under_;
         // A flat end mill stands on the layer's bottom; a ball may pass it where its shape needs it, over waste it does not.
         const double lowest = ball_ && on_surface > cut_.layer.z_bottom - r_ ? cut_.layer.floor_below : cut_.layer.z_bottom;
         p.tip = std::max(on_surface, std::max(lowest, cut_.layer.floor_below));
+        p.touches = p.tip == on_surface;
         p.contact = {x - wide_ * rest.nx, y - wide_ * rest.ny, p.tip - under_ + wide_ * (1 - rest.nz)};
         p.reachable = !rest.on_cap && p.tip < cut_.layer.z_top - 1e-3 && beside_flask(x, y);
         if (p.reachable) {
@@ -251,18 +301,40 @@ private:
         return p;
     }
 
-    [[nodiscard]] bool too_far(const Place& a, const Place& b) const {
+    // No higher than a ball's tip anywhere in the rectangle between two places and `beside` (mm) to their sides: where it touched at either
+    // of them keeps it up, the less the farther away it is, and nothing of a rectangle is farther away than one of its corners.
+    [[nodiscard]] double lowest_between(const Place& a, const Place& b, double beside) const {
+        double lowest = std::max(cut_.layer.floor_below, -std::numeric_limits<double>::max());
+        const double along_x = a.y < b.y ? beside : 0, along_y = a.y < b.y ? 0 : beside;
+        const double x0 = to_mm(std::min(a.x, b.x)) - along_x, x1 = to_mm(std::max(a.x, b.x)) + along_x, y0 = to_mm(std::min(a.y, b.y)) - along_y,
+                     y1 = to_mm(std::max(a.y, b.y)) + along_y;
+        for (const Place* p : {&a, &b}) {
+            if (!p->touches) continue;
+            const double dx = std::max(std::abs(x0 - p->contact[0]), std::abs(x1 - p->contact[0])),
+                         dy = std::max(std::abs(y0 - p->contact[1]), std::abs(y1 - p->contact[1])), over2 = wide_ * wide_ - dx * dx - dy * dy;
+            if (over2 > 0) lowest = std::max(lowest, p->contact[2] + std::sqrt(over2) - wide_ + under_);
+        }
+        return lowest;
+    }
+
+    // Whether places between these two are worth a look, and `beside` (mm) to their sides.
+    [[nodiscard]] bool too_far(const Place& a, const Place& b, double beside) const {
         if (!a.reachable && !b.reachable) return false;
-        if (!ball_ || !a.reachable || !b.reachable) {
+        const double apart = to_mm(std::max(std::abs(b.x - a.x), std::abs(b.y - a.y)));
+        if (!ball_) {
             if (std::abs(a.tip - b.tip) <= kJump) return false;
             if (a.useful || b.useful) return true;
             // Neither place helps, but one between them may, where the lower of them is stopped by a wall.
             const Place& low = a.tip < b.tip ? a : b;
-            return lowers(to_mm(low.x), to_mm(low.y), low.tip, to_mm(std::max(std::abs(b.x - a.x), std::abs(b.y - a.y))));
+            return lowers(to_mm(low.x), to_mm(low.y), low.tip, apart);
         }
-        const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
-        const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(a.y) - to_mm(b.y), a.tip - b.tip);
-        return c * d > 8 * wide_ * (pass_.in_steps ? pass_.limit / 2 : cut_.job.tolerances.cusp);
+        if (a.reachable && b.reachable) {
+            const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
+            const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(a.y) - to_mm(b.y), a.tip - b.tip);
+            if (c * d <= 8 * wide_ * (pass_.in_steps ? pass_.limit / 2 : cut_.job.tolerances.cusp)) return false;
+        }
+        if (a.useful || b.useful) return true;
+        return lowers((to_mm(a.x) + to_mm(b.x)) / 2, (to_mm(a.y) + to_mm(b.y)) / 2, lowest_between(a, b, beside), std::hypot(apart / 2, beside));
     }
 
     // Whether a ball would go over a corner from one place to the next (append) although places between them may do without.
@@ -273,7 +345,7 @@ private:
 
     void append_between(std::vector<Place>& line, std::int32_t y, Place b) const {
         if (!line.empty() && b.x - line.back().x <= step_ && b.x - line.back().x > 2 * finest_ &&
-            (too_far(line.back(), b) || too_steep(line.back(), b))) {
+            (too_far(line.back(), b, 0) || too_steep(line.back(), b))) {
             append_between(line, y, place(line.back().x + (b.x - line.back().x) / 2, y));
             append_between(line, y, b);
             return;
@@ -309,28 +381,39 @@ private:
                 }
             }
         });
-        std::vector<std::vector<Line>> between(even.size());
-        parallel_each(cut_.context, even.empty() ? 0 : even.size() - 1, [&](std::size_t l) {
-            auto refine = [&](auto&& self, const Line& a, const Line& b) -> void {
-                if (b.y - a.y < 2 * finest_) return;
-                Line middle{a.y + (b.y - a.y) / 2, {}};
-                for (const Place& p : a.places) {
-                    if (p.x % step_ != 0) continue;
-                    const Place* other = at(b, p.x);
-                    if (!other || !too_far(p, *other)) continue;
-                    for (const std::int32_t x : {p.x - step_, p.x, p.x + step_})
-                        if (middle.places.empty() || x > middle.places.back().x) append_between(middle.places, middle.y, place(x, middle.y));
-                }
-                if (middle.places.empty()) return;
-                self(self, a, middle);
-                between[l].push_back(middle);
-                self(self, middle, b);
-            };
-            refine(refine, even[l], even[l + 1]);
-        });
+        keep_what_lowers(even);
         lines_ = std::move(even);
-        for (std::vector<Line>& group : between)
-            for (Line& line : group) lines_.push_back(std::move(line));
+        // What the lines so far leave decides where the next ones go.
+        std::vector<std::array<std::size_t, 2>> neighbours;
+        for (std::size_t l = 0; l + 1 < lines_.size(); ++l) neighbours.push_back({l, l + 1});
+        while (!neighbours.empty()) {
+            std::vector<Line> middles(neighbours.size());
+            parallel_each(cut_.context, neighbours.size(),
+                          [&](std::size_t n) { middles[n] = middle(lines_[neighbours[n][0]], lines_[neighbours[n][1]]); });
+            keep_what_lowers(middles);
+            std::vector<std::array<std::size_t, 2>> next;
+            for (std::size_t n = 0; n < neighbours.size(); ++n) {
+                if (middles[n].places.empty()) continue;
+                next.push_back({neighbours[n][0], lines_.size()});
+                next.push_back({lines_.size(), neighbours[n][1]});
+                lines_.push_back(std::move(middles[n]));
+            }
+            neighbours = std::move(next);
+        }
+    }
+
+    // A line between two, over what is too far from one to the other; without places where nothing is.
+    [[nodiscard]] Line middle(const Line& a, const Line& b) const {
+        Line line{a.y + (b.y - a.y) / 2, {}};
+        if (b.y - a.y < 2 * finest_) return line;
+        for (const Place& p : a.places) {
+            if (p.x % step_ != 0) continue;
+            const Place* other = at(b, p.x);
+            if (!other || !too_far(p, *other, to_mm(step_) / 2)) continue;
+            for (const std::int32_t x : {p.x - step_, p.x, p.x + step_})
+                if (line.places.empty() || x > line.places.back().x) append_between(line.places, line.y, place(x, line.y));
+        }
+        return line;
     }
 
     // Where the cutter sinks deepest between walls (a slot hardly wider than itself, a hole narrower, the meeting of three faces)
@@ -367,8 +450,11 @@ private:
                 else lines.push_back({low.y, {low}});
             }
         });
+        std::vector<Line> all;
         for (std::size_t rank = 0; rank < by_y.size(); ++rank)
-            for (Line& line : found[by_y[rank]]) lines_.push_back(std::move(line));
+            for (Line& line : found[by_y[rank]]) all.push_back(std::move(line));
+        keep_what_lowers(all);
+        for (Line& line : all) lines_.push_back(std::move(line));
     }
 
     [[nodiscard]] Place slide(const Place& from) const {
@@ -392,18 +478,18 @@ private:
 
     static double apart(const Place& a, const Place& b) { return std::hypot(static_cast<double>(a.x) - b.x, static_cast<double>(a.y) - b.y); }
 
-    // Coarse lines before fine ones: what a place no longer lowers after those before it is not visited. The stock stands as before.
-    void keep_what_lowers() {
-        LayerStock::Trial places(stock_);
-        for (Line& line : lines_) {
+    // What a place no longer lowers after those before it is not visited.
+    void keep_what_lowers(std::vector<Line>& lines) {
+        for (Line& line : lines) {
             cut_.context.throw_if_cancelled();
             for (Place& p : line.places) {
-                if (!p.useful || !lowers(to_mm(p.x), to_mm(p.y), p.tip)) continue;
+                if (!p.useful) continue;
+                p.useful = false;
+                if (!lowers(to_mm(p.x), to_mm(p.y), p.tip)) continue;
                 p.cut = true;
                 stock_.cut_at(end_, to_mm(p.x), to_mm(p.y), p.tip);
             }
         }
-        places.undo();
     }
 
     // Straight up is always free, and so is a level chord of safe length at the height of the higher rest.

@@ -182,16 +182,21 @@ DropProbe DropIndex::probe_at(double x, double y) const {
     return probe;
 }
 
-Rest DropIndex::drop(double x, double y, double above) const {
+Rest DropIndex::drop(double x, double y, double above) const { return *drop_within(x, y, above, kNoEnd); }
+
+std::optional<Rest> DropIndex::drop_within(double x, double y, double above, double most) const {
     Rest rest;
     rest.tip_z = -std::numeric_limits<double>::infinity();
     if (nothing_near(x, y)) return rest;
-    if (solid_.cap_cells.inside(x, y)) return {solid_.z_top, 0.0F, 0.0F, 1.0F, true};
     Best best;
     best.tip_z = above;
-    if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, kNoEnd, best);
-    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, kNoEnd, best);
-    if (best.tip_z > above) rest = {best.tip_z, static_cast<float>(best.nx), static_cast<float>(best.ny), static_cast<float>(best.nz), false};
+    if (solid_.cap_cells.inside(x, y)) rest = {solid_.z_top, 0.0F, 0.0F, 1.0F, true};
+    else {
+        if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, most, best);
+        else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, most, best);
+        if (best.tip_z > above) rest = {best.tip_z, static_cast<float>(best.nx), static_cast<float>(best.ny), static_cast<float>(best.nz), false};
+    }
+    if (rest.tip_z > most) return std::nullopt;
     return rest;
 }
 

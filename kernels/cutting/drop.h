@@ -28,6 +28,8 @@ public:
     /// high the one is given that the solid's tree leads to first.
     /// @param above mm: a tip that is no higher need not be told, but may be given as −infinity
     [[nodiscard]] Rest drop(double x, double y, double above = -std::numeric_limits<double>::infinity()) const;
+    /// The same where the tip is no higher than `most`, nothing elsewhere; the latter as soon as that is known.
+    [[nodiscard]] std::optional<Rest> drop_within(double x, double y, double above, double most) const;
     /// Whether drop(x, y).tip_z > z, in a fraction of its time.
     [[nodiscard]] bool stands_over(double x, double y, double z) const;
     /// drop(x, y).tip_z where that is no more than `most`, nothing elsewhere; the latter as soon as that is known.
