@@ -190,6 +190,30 @@ TEST(Sweep, SpansAgreeWithTheirCells) {
 }
 
 // What is told of many cells at once is what each of them says.
+TEST(Rows, SayOnWhichCellsMoreThanALimitIsLeft) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(0, 1);
+    for (int trial = 0; trial < 2000; ++trial) {
+        const auto n = 1 + static_cast<std::size_t>(random() % 64);
+        // At its end: past the last nothing may be read.
+        std::vector<float> stands(n), surface(n);
+        std::vector<std::uint8_t> nz(n);
+        const double wide = trial % 3 == 0 ? 0.01 : 1;
+        for (std::size_t k = 0; k < n; ++k) {
+            surface[k] = static_cast<float>(3 * u(random));
+            stands[k] = random() % 3 == 0 ? surface[k] : surface[k] + static_cast<float>(wide * (u(random) - 0.2));
+            nz[k] = static_cast<std::uint8_t>(1 + random() % 255);
+        }
+        // Often what one cell has left, to the last bit.
+        const float one = (stands[0] - surface[0]) * (static_cast<float>(nz[0]) / 255.0F);
+        const float most = trial % 2 == 0 && one >= 0 ? one : static_cast<float>(0.5 * wide * u(random));
+        std::uint64_t expected = 0;
+        for (std::size_t k = 0; k < n; ++k) expected |= std::uint64_t{(stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F) > most} << k;
+        ASSERT_EQ(cells_left(stands.data(), surface.data(), nz.data(), static_cast<int>(n), most), expected) << "seed " << seed << " trial " << trial;
+    }
+}
+
 TEST(Sweep, RowsAgreeWithTheirCells) {
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> u(0, 1);

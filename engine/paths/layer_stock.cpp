@@ -318,10 +318,10 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
 
 double LayerStock::area_over(Context& context, double limit) const {
     const auto cells = parallel_reduce(
-        context, grid_.count(), std::size_t{1} << 16, std::size_t{0},
+        context, static_cast<std::size_t>(grid_.ny), std::size_t{16}, std::size_t{0},
         [&](std::size_t begin, std::size_t end) {
             std::size_t over = 0;
-            for (std::size_t c = begin; c < end; ++c) over += left(c) > limit;
+            for (std::size_t j = begin; j < end; ++j) each_left(static_cast<int>(j), limit, [&](int) { ++over; });
             return over;
         },
         std::plus<>());

@@ -1,6 +1,8 @@
 // What stands of one layer while it is planned: the slab, cut by the operations planned so far, over the finished surface.
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -122,6 +124,19 @@ public:
     [[nodiscard]] float nz(std::size_t cell) const { return static_cast<float>(memory_.nz[cell]) / 255.0F; }
     /// What is left over in a cell, mm along the normal of the facet below.
     [[nodiscard]] float left(std::size_t cell) const { return (height(cell) - surface(cell)) * nz(cell); }
+
+    /// Calls fn(i) for the cells of row j on which more than `limit` is left over.
+    template <class Fn>
+    void each_left(int j, double limit, Fn&& fn) const {
+        const float most = level_over(0, limit);
+        for (int i = 0; i < grid_.nx; i += 64) {
+            const std::size_t first = grid_.index(i, j);
+            for (std::uint64_t bits = cells_left(memory_.height.data() + first, memory_.surface.data() + first, memory_.nz.data() + first,
+                                                 std::min(64, grid_.nx - i), most);
+                 bits != 0; bits &= bits - 1)
+                fn(i + std::countr_zero(bits));
+        }
+    }
 
     /// mm² on which more than `limit` (mm along the normal) is left over.
     [[nodiscard]] double area_over(Context& context, double limit) const;

@@ -79,14 +79,14 @@ public:
             [&](std::size_t begin, std::size_t end) {
                 std::size_t count = 0;
                 for (std::size_t r = begin; r < end; ++r)
-                    for (int i = 0, j = static_cast<int>(r); i < grid.nx; ++i) {
-                        const std::size_t c = grid.index(i, j);
-                        if (stock.left(c) <= pass.limit || (reach > 0 && beside_wall(i, j))) continue;
-                        if (probe && probe->stands_over(grid.x(i), grid.y(j), just_under(stock.z_bottom() + stock.height(c) - 1e-3))) continue;
+                    stock.each_left(static_cast<int>(r), pass.limit, [&, j = static_cast<int>(r)](int i) {
+                        if (reach > 0 && beside_wall(i, j)) return;
+                        const double stands = stock.z_bottom() + stock.height(grid.index(i, j));
+                        if (probe && probe->stands_over(grid.x(i), grid.y(j), just_under(stands - 1e-3))) return;
                         ++count;
                         if (!rows_[r].empty() && rows_[r].back()[1] + 1 == i) rows_[r].back()[1] = i;
                         else rows_[r].push_back({i, i});
-                    }
+                    });
                 return count;
             },
             std::plus<>());

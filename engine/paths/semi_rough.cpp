@@ -61,18 +61,20 @@ std::vector<std::vector<std::array<int, 2>>> rows_inside(const CellGrid& grid, c
 // The cells that are worth a visit, level by level.
 class LevelTargets {
 public:
-    LevelTargets(Context& context, const LayerStock& stock, double limit)
+    /// @param radius of the cutter, mm
+    LevelTargets(Context& context, const LayerStock& stock, double limit, double radius)
         : stock_(stock),
           limit_(limit),
+          reach_(1 + (static_cast<int>(radius / stock.grid().cell) + 1) / kTile),
           tiles_x_((stock.grid().nx + kTile - 1) / kTile),
           marked_(stock.grid().count(), 0),
-          tiles_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>((stock.grid().ny + kTile - 1) / kTile), 0) {
+          tiles_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>((stock.grid().ny + kTile - 1) / kTile), 0),
+          near_(tiles_.size(), 0) {
         // What is not left over now will not be on any level.
         const CellGrid& grid = stock.grid();
         std::vector<std::vector<std::array<int, 2>>> rows(static_cast<std::size_t>(grid.ny));
         parallel_each(context, rows.size(), [&](std::size_t j) {
-            for (int i = 0; i < grid.nx; ++i)
-                if (stock.left(grid.index(i, static_cast<int>(j))) > limit) rows[j].push_back({i, static_cast<int>(j)});
+            stock.each_left(static_cast<int>(j), limit, [&, row = static_cast<int>(j)](int i) { rows[j].push_back({i, row}); });
         });
         for (const auto& row : rows) left_over_.insert(left_over_.end(), row.begin(), row.end());
     }
@@ -86,7 +88,8 @@ public:
     void mark(double tip, double over, const Loops& swath, std::span<const double> floors) {
         const CellGrid& grid = stock_.grid();
         for (const auto& [i, j] : cells_) marked_[grid.index(i, j)] = 0, tiles_[tile(i, j)] = 0;
-        cells_.clear();
+        for (const std::size_t t : near_tiles_) near_[t] = 0;
+        cells_.clear(), near_tiles_.clear();
         tip_ = static_cast<float>(tip);
         std::erase_if(left_over_, [&](const std::array<int, 2>& c) { return stock_.left(grid.index(c[0], c[1])) <= limit_; });
         std::vector<std::vector<std::array<int, 2>>> covered;
@@ -107,6 +110,7 @@ public:
                 continue;
             if (within_swath(i, j) && !on_floor(c)) continue;
             marked_[c] = 1;
+            if (!tiles_[tile(i, j)]) come_near(i / kTile, j / kTile);
             tiles_[tile(i, j)] = 1;
             cells_.push_back({i, j});
         }
@@ -117,6 +121,8 @@ public:
     // Whether a cutter whose middle is here meets some that still stand; a ball, some that it lowers by enough.
     [[nodiscard]] bool met(double x, double y, double radius, bool ball) const {
         const CellGrid& grid = stock_.grid();
+        const auto cell = [&](double at, double from, int n) { return static_cast<int>(std::clamp((at - from) / grid.cell + 0.5, 0.0, n - 1.0)); };
+        if (!near_[tile(cell(x, grid.x0, grid.nx), cell(y, grid.y0, grid.ny))]) return false;
         const double r = std::max(radius - kEdge, radius / 2);
         const int j0 = std::max(0, static_cast<int>(std::ceil((y - r - grid.y0) / grid.cell)));
         const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + r - grid.y0) / grid.cell)));
@@ -148,11 +154,21 @@ private:
     [[nodiscard]] std::size_t tile(int i, int j) const {
         return static_cast<std::size_t>(j / kTile) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(i / kTile);
     }
+    // A cutter whose middle is in one of the tiles around may meet what is in this one.
+    void come_near(int ti, int tj) {
+        const int tiles_y = static_cast<int>(tiles_.size()) / tiles_x_;
+        for (int j = std::max(0, tj - reach_); j <= std::min(tiles_y - 1, tj + reach_); ++j)
+            for (int i = std::max(0, ti - reach_); i <= std::min(tiles_x_ - 1, ti + reach_); ++i)
+                if (const std::size_t t = tile(i * kTile, j * kTile); !near_[t]) near_[t] = 1, near_tiles_.push_back(t);
+    }
     const LayerStock& stock_;
     double limit_;
+    int reach_;  // of the cutter, tiles
     float tip_ = 0;
     int tiles_x_;
     std::vector<char> marked_, tiles_;
+    std::vector<char> near_;  // tiles within reach of some that hold targets
+    std::vector<std::size_t> near_tiles_;
     std::vector<std::array<int, 2>> left_over_, cells_;  // row after row; `cells_` of the level
 };
 
@@ -187,7 +203,7 @@ public:
     Operation run() {
         Operation op = cut_.operation(OperationKind::semi_rough, pass_.purpose, tool_);
         op.spare = pass_.allowance;
-        LevelTargets targets(cut_.context, stock_, pass_.limit);
+        LevelTargets targets(cut_.context, stock_, pass_.limit, r_);
         if (targets.none()) return op;
         const MemoryCharge memory(cut_.context, targets.bytes(), "what semi-roughing is to cut");
         LayerStock::Trial rings(stock_);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/stock/sweep.h"
+
 namespace slabwright {
 
 namespace {
@@ -45,36 +47,18 @@ Standing::BallTable Standing::ball_table(double radius) const {
     return table;
 }
 
-// Calls row(j, first, last) for the cells whose centres lie within `radius` of the segment from a to b. The capsule is
-// convex: on a row it is one interval, whose ends lie on a disc or on one of the strip's long edges.
+// Calls row(j, first, last) for the cells whose centres lie within `radius` of the segment from a to b.
 template <class Row>
 void Standing::rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, Row&& row) const {
     if (radius <= 0) return;
-    double dx = b[0] - a[0], dy = b[1] - a[1];
-    const double length = std::hypot(dx, dy);
-    if (length > 1e-9) dx *= radius / length, dy *= radius / length;
-    const double first_row = std::ceil((std::min(a[1], b[1]) - radius - y0_) / cell_),
-                 last_row = std::floor((std::max(a[1], b[1]) + radius - y0_) / cell_);
-    if (first_row >= ny_ || last_row < 0) return;
-    for (int j = static_cast<int>(std::max(0.0, first_row)), end = static_cast<int>(std::min(ny_ - 1.0, last_row)); j <= end; ++j) {
-        const double y = y0_ + j * cell_;
-        double low = 1e300, high = -1e300;
-        for (const auto* p : {&a, &b}) {
-            const double w2 = radius * radius - (y - (*p)[1]) * (y - (*p)[1]);
-            if (w2 < 0) continue;
-            const double w = std::sqrt(w2);
-            low = std::min(low, (*p)[0] - w), high = std::max(high, (*p)[0] + w);
-        }
-        if (length > 1e-9)
-            for (const double side : {-1.0, 1.0}) {
-                const double ax = a[0] - side * dy, ay = a[1] + side * dx, bx = b[0] - side * dy, by = b[1] + side * dx;
-                if ((ay <= y) == (by <= y)) continue;
-                const double x = ax + (y - ay) / (by - ay) * (bx - ax);
-                low = std::min(low, x), high = std::max(high, x);
-            }
-        const double i0 = std::ceil((low - x0_) / cell_), i1 = std::floor((high - x0_) / cell_);
-        if (i0 > i1 || i1 < 0 || i0 >= nx_) continue;
-        row(j, static_cast<int>(std::max(0.0, i0)), static_cast<int>(std::min(nx_ - 1.0, i1)));
+    const CellGrid grid{x0_, y0_, cell_, nx_, ny_};
+    const auto [first, last] = rows_between(grid, std::min(a[1], b[1]) - radius, std::max(a[1], b[1]) + radius);
+    RowSpans spans;
+    for (int j = first; j <= last; j += RowSpans::kRows) {
+        const int together = std::min(RowSpans::kRows, last - j + 1);
+        spans_of_rows(grid, j, together, a, b, radius, false, spans);
+        for (std::size_t k = 0; k < static_cast<std::size_t>(together); ++k)
+            if (spans.low[k] <= spans.left[k]) row(j + static_cast<int>(k), spans.low[k], spans.left[k]);
     }
 }
 

@@ -103,6 +103,16 @@ SLABWRIGHT_WIDE std::uint64_t cells_over(const float* stands, int n, double h, d
 SLABWRIGHT_WIDE bool any_over(const float* stands, double bottom, int n, double level) { return some_over(stands, bottom, n, level); }
 SLABWRIGHT_WIDE bool keep_lower(const float* stands, double bottom, int n, double* h) { return some_lower(stands, bottom, n, h); }
 
+SLABWRIGHT_WIDE std::uint64_t cells_left(const float* __restrict stands, const float* __restrict surface, const std::uint8_t* __restrict nz, int n,
+                                         float most) {
+    std::int32_t any = 0;
+    for (int k = 0; k < n; ++k) any |= stands[k] - surface[k] > most ? 1 : 0;
+    if (any == 0) return 0;
+    std::uint64_t bits = 0;
+    for (int k = 0; k < n; ++k) bits |= std::uint64_t{(stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F) > most} << k;
+    return bits;
+}
+
 // The loops hold no branch, so that a compiler does several cells in one step; what does not depend on the cell is decided outside. Whole eights
 // of cells: what is past the last is not asked for.
 SLABWRIGHT_WIDE bool row_heights(const RowWay& way, int i0, int n, double py, const float* __restrict stands, double bottom, double* __restrict h) {
