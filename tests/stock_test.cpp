@@ -451,7 +451,9 @@ TEST(Stock, ARegionIsCutAsItsWaysAre) {
                 if (x >= x0 && x <= x1 && y >= y0 && y <= y1) within = std::max(within, stands);
             }
             const bool clear = together.clear(x0, x1, y0, y1, over);
-            if (clear) EXPECT_LE(within, over) << "seed " << seed << ", trial " << trial;
+            if (clear) {
+                EXPECT_LE(within, over) << "seed " << seed << ", trial " << trial;
+            }
             cleared += clear && all > over;
             EXPECT_EQ(together.clear(-1e3, 1e3, -1e3, 1e3, over), all <= over) << "seed " << seed << ", trial " << trial;
         }

@@ -19,7 +19,6 @@ constexpr double kMostCells = 4e6;
 
 // What one cell's piece holds, at its root.
 struct Piece {
-    std::uint32_t parent = kNever;  // not there yet
     std::uint32_t cells = 0;
     bool held = false;
     bool cut_at_all = true;  // whether all of its cells are cut through some time
@@ -34,7 +33,7 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
     if (!(cell > 0)) cell = std::max(1.0, std::sqrt(width * depth / kMostCells));
     const CellGrid grid{slab.min[0] + cell / 2, slab.min[1] + cell / 2, cell, std::max(1, static_cast<int>(std::ceil(width / cell - 0.5))),
                         std::max(1, static_cast<int>(std::ceil(depth / cell - 0.5)))};
-    const MemoryCharge memory(context, grid.count() * (sizeof(Piece) + 2 * sizeof(std::uint32_t) + 1), "loose pieces");
+    const MemoryCharge memory(context, grid.count() * (sizeof(Piece) + 3 * sizeof(std::uint32_t) + 1), "loose pieces");
 
     // When each cell is cut through: by moves, counted through all operations.
     std::vector<std::uint32_t> when(grid.count(), kNever);
@@ -82,16 +81,18 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
         for (std::size_t c = 0; c < when.size(); ++c) order[begins[turn(when[c])]++] = static_cast<std::uint32_t>(c);
     }
 
+    // Apart from what a piece holds, which is asked at its root only.
+    std::vector<std::uint32_t> parent(grid.count(), kNever);  // kNever: not there yet
     std::vector<Piece> pieces(grid.count());
     auto root = [&](std::uint32_t c) {
-        while (pieces[c].parent != c) c = pieces[c].parent = pieces[pieces[c].parent].parent;
+        while (parent[c] != c) c = parent[c] = parent[parent[c]];
         return c;
     };
     auto join = [&](std::uint32_t a, std::uint32_t b) {
         a = root(a), b = root(b);
         if (a == b) return;
         if (pieces[a].cells < pieces[b].cells || (pieces[a].cells == pieces[b].cells && b < a)) std::swap(a, b);
-        pieces[b].parent = a;
+        parent[b] = a;
         pieces[a].cells += pieces[b].cells;
         pieces[a].held |= pieces[b].held;
         pieces[a].cut_at_all &= pieces[b].cut_at_all;
@@ -114,7 +115,7 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
         beside.clear();
         for (std::size_t k = first; k < last; ++k)
             each_neighbour(order[k], [&](std::uint32_t n) {
-                if (pieces[n].parent == kNever) return;
+                if (parent[n] == kNever) return;
                 if (const std::uint32_t r = root(n); !pieces[r].held) beside.push_back(r);
             });
         std::sort(beside.begin(), beside.end());
@@ -124,11 +125,12 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
         for (std::size_t k = first; k < last; ++k) {
             const std::uint32_t c = order[k];
             const int i = static_cast<int>(c % static_cast<std::uint32_t>(grid.nx)), j = static_cast<int>(c / static_cast<std::uint32_t>(grid.nx));
-            pieces[c] = {c, 1, holds[c] != 0, now != kNever, grid.x(i), grid.y(j)};
+            parent[c] = c;
+            pieces[c] = {1, holds[c] != 0, now != kNever, grid.x(i), grid.y(j)};
         }
         for (std::size_t k = first; k < last; ++k)
             each_neighbour(order[k], [&](std::uint32_t n) {
-                if (pieces[n].parent != kNever) join(order[k], n);
+                if (parent[n] != kNever) join(order[k], n);
             });
         for (std::size_t k = 0; k < beside.size(); ++k) {
             const double area = before[k].cells * cell * cell;
