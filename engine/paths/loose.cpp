@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "engine/paths/layer_stock.h"
+#include "kernels/mesh/bulk_memory.h"
 #include "kernels/stock/sweep.h"
 
 namespace slabwright {
@@ -36,7 +37,7 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
     const MemoryCharge memory(context, grid.count() * (sizeof(Piece) + 3 * sizeof(std::uint32_t) + 1), "loose pieces");
 
     // When each cell is cut through: by moves, counted through all operations.
-    std::vector<std::uint32_t> when(grid.count(), kNever);
+    BulkVector<std::uint32_t> when(grid.count(), kNever);
     std::vector<std::pair<std::size_t, std::size_t>> place;  // of each counted move
     double web = slab.z_top - slab.z_bottom;                 // how thick the slab still is when the last level begins
     for (std::size_t o = 0; o < operations.size(); ++o) {
@@ -71,7 +72,7 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
     }
 
     // Cells in the order in which they are put back: those that are never cut through, then the last move's first; of one move's by number.
-    std::vector<std::uint32_t> order(grid.count());
+    BulkVector<std::uint32_t> order(grid.count());
     {
         const std::size_t count = place.size();
         const auto turn = [&](std::uint32_t move) { return move == kNever ? 0 : count - move; };
@@ -82,8 +83,8 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
     }
 
     // Apart from what a piece holds, which is asked at its root only.
-    std::vector<std::uint32_t> parent(grid.count(), kNever);  // kNever: not there yet
-    std::vector<Piece> pieces(grid.count());
+    BulkVector<std::uint32_t> parent(grid.count(), kNever);  // kNever: not there yet
+    BulkVector<Piece> pieces(grid.count());                  // of cells that are there
     auto root = [&](std::uint32_t c) {
         while (parent[c] != c) c = parent[c] = parent[parent[c]];
         return c;
