@@ -550,6 +550,7 @@ Mesh load_mesh(Context& context, std::string_view bytes, double mm_per_unit, con
     const auto at = [&](const std::array<double, 3>& p) {
         return Vec3f{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2] - corners.min[2])};
     };
+    const KeptMemory kept;
     const MemoryCharge together(context, corners.facets.count * sizeof(std::array<Vec3f, 3>), "bringing facets together");
     return weld_and_let_go(context, in_space(context, corners.facets, {at(corners.min), at(corners.max)}), odd);
 }

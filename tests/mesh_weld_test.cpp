@@ -11,6 +11,7 @@
 #include <random>
 #include <set>
 #include <string>
+#include <thread>
 #include <tuple>
 
 #include "kernels/errors.h"
@@ -159,6 +160,96 @@ TEST(MeshWeld, FansOfAnySizeAreSorted) {
         for (const EdgeUse& use : fan) sorted.push_back({use.low, use.high, use.code});
     });
     EXPECT_EQ(sorted, expected);
+}
+
+TEST(MeshWeld, EdgesArePairedWhereFansArePlain) {
+    std::mt19937_64 random(test::seed() + 1);
+    const std::uint32_t origin = 7, width = 1000;
+    std::vector<EdgeUse> uses;
+    std::uint32_t facets = 0;
+    for (std::uint32_t v = 0; v < width; ++v) {
+        const std::uint32_t edges = static_cast<std::uint32_t>(random() % 10), fault = static_cast<std::uint32_t>(random() % 8);
+        const std::size_t begin = uses.size();
+        const auto use = [&](std::uint32_t high, std::uint32_t facet, bool reversed) {
+            uses.push_back({origin + v, high, 2 * (3 * facet + static_cast<std::uint32_t>(random() % 3)) + (reversed ? 1u : 0u)});
+        };
+        std::uint32_t high = origin + v;
+        for (std::uint32_t e = 0; e < edges; ++e, facets += 2) {
+            high += 1 + static_cast<std::uint32_t>(random() % 3);
+            use(high, facets, random() % 2 == 0);
+            use(high, facets + 1, !uses.back().reversed());
+        }
+        if (edges == 0) continue;
+        // One of what makes a fan odd, or none.
+        EdgeUse& any = uses[begin + random() % (uses.size() - begin)];
+        if (fault == 0) any.code ^= 1;
+        if (fault == 1) any.high += 1;
+        if (fault == 2) use(any.high, facets++, any.reversed());
+        if (fault == 3) use(any.high, facets++, true), use(any.high, facets++, false);
+        if (fault == 4 && edges > 1)
+            uses[begin + 2].code = uses[begin].code ^ 1, uses[begin + 3].code = uses[begin + 1].code ^ 1;  // two facets share two edges
+    }
+    std::map<std::uint32_t, std::vector<EdgeUse>> fans;  // by brute force
+    for (const EdgeUse& use : uses) fans[use.low].push_back(use);
+    std::set<std::pair<std::uint32_t, std::uint32_t>> expected, found;
+    std::vector<std::uint32_t> odd, handed_out;
+    for (auto& [low, fan] : fans) {
+        std::sort(fan.begin(), fan.end(), [](const EdgeUse& a, const EdgeUse& b) { return a.high != b.high ? a.high < b.high : a.code < b.code; });
+        bool plain = fan.size() <= 16 && fan.size() % 2 == 0;
+        std::set<std::pair<std::uint32_t, std::uint32_t>> pairs, of_facets;
+        for (const EdgeUse& use : fan) {
+            std::vector<EdgeUse> same;
+            for (const EdgeUse& other : fan)
+                if (other.high == use.high) same.push_back(other);
+            plain &= same.size() == 2 && same[0].reversed() != same[1].reversed();
+            if (!plain) break;
+            pairs.insert({same[0].code, same[1].code});
+            of_facets.insert({same[0].facet(), same[1].facet()});
+        }
+        if (plain && of_facets.size() == fan.size() / 2) expected.insert(pairs.begin(), pairs.end());
+        else odd.push_back(low);
+    }
+    std::shuffle(uses.begin(), uses.end(), random);
+    pair_fans(
+        uses, origin, width,
+        [&](std::uint32_t a, std::uint32_t b) {
+            EXPECT_TRUE(found.insert({a, b}).second);
+        },
+        [&](std::span<const EdgeUse> fan) {
+            handed_out.push_back(fan[0].low);
+            const std::vector<EdgeUse>& same = fans[fan[0].low];
+            ASSERT_EQ(fan.size(), same.size());
+            for (std::size_t i = 0; i < fan.size(); ++i)
+                EXPECT_TRUE(fan[i].low == same[i].low && fan[i].high == same[i].high && fan[i].code == same[i].code);
+        });
+    EXPECT_EQ(found, expected);
+    EXPECT_EQ(handed_out, odd);
+    EXPECT_GT(odd.size(), width / 4);
+    EXPECT_GT(expected.size(), width);
+}
+
+TEST(MeshWeld, MemoryThatIsKeptIsUsedAgain) {
+    constexpr std::size_t large = std::size_t{1} << 24;
+    const KeptMemory kept;
+    char* const first = static_cast<char*>(take_bulk(large));
+    std::fill_n(first, large, 'a');
+    char* outside = nullptr;
+    std::thread([&] { outside = static_cast<char*>(take_bulk(large)); }).join();  // of a thread that keeps nothing
+    release_bulk(first, large);
+    std::vector<std::pair<char*, std::size_t>> pieces;
+    for (const std::size_t bytes : {large / 4, large / 3 + 1, std::size_t{1000}, large, large / 4 + 12345}) {
+        pieces.emplace_back(static_cast<char*>(take_bulk(bytes)), bytes);
+        std::fill_n(pieces.back().first, bytes, static_cast<char>('b' + pieces.size()));
+    }
+    const auto within = [&](const char* p) { return p >= first && p < first + large; };
+    EXPECT_TRUE(within(pieces[0].first) && within(pieces[1].first) && within(pieces[4].first));
+    EXPECT_FALSE(within(pieces[3].first));
+    for (std::size_t i = 0; i < pieces.size(); ++i)
+        EXPECT_EQ(std::count(pieces[i].first, pieces[i].first + pieces[i].second, static_cast<char>('b' + i + 1)),
+                  static_cast<std::ptrdiff_t>(pieces[i].second));
+    std::thread([&] { release_bulk(pieces[0].first, pieces[0].second); }).join();
+    for (std::size_t i = 1; i < pieces.size(); ++i) release_bulk(pieces[i].first, pieces[i].second);
+    release_bulk(outside, large);
 }
 
 TEST(MeshWeld, RecordsAreScaledLoweredAndNotAligned) {

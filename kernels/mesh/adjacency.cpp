@@ -173,9 +173,9 @@ OwnVertices own_vertices(Context& context, const Mesh& mesh) {
 /// Calls on_fan(T& part, uses) as reduce_fans() does, for the vertices that only one block uses. Such a block is at hand as a whole, so
 /// that its edges need not be dealt first. @param others for each chunk of kBlocksTogether blocks the uses that are left
 constexpr std::size_t kBlocksTogether = 8;
-template <class T, class OnFan, class Join>
-T reduce_own_fans(Context& context, const Mesh& mesh, const OwnVertices& own, std::span<BulkVector<EdgeUse>> others, T identity, OnFan&& on_fan,
-                  Join&& join) {
+template <class T, class OnPair, class OnFan, class Join>
+T reduce_own_fans(Context& context, const Mesh& mesh, const OwnVertices& own, std::span<BulkVector<EdgeUse>> others, T identity, OnPair&& on_pair,
+                  OnFan&& on_fan, Join&& join) {
     return parallel_reduce(
         context, mesh.facets.size(), kBlocksTogether * kBlockFacets, identity,
         [&](std::size_t begin, std::size_t end) {
@@ -197,7 +197,7 @@ T reduce_own_fans(Context& context, const Mesh& mesh, const OwnVertices& own, st
                         else uses[count++] = use;
                     }
                 }
-                sort_fans(std::span<const EdgeUse>(uses.data(), count), origin, past - origin,
+                pair_fans(std::span<const EdgeUse>(uses.data(), count), origin, past - origin, on_pair,
                           [&](std::span<const EdgeUse> fan) { on_fan(part, fan); });
             }
             return part;
@@ -238,7 +238,12 @@ void pair_edges(Context& context, Mesh& mesh, EdgeScratch& scratch, std::vector<
     if (own.many) {
         constexpr std::size_t chunk = kBlocksTogether * kBlockFacets;
         std::vector<BulkVector<EdgeUse>> uses((mesh.facets.size() + chunk - 1) / chunk);
-        found = reduce_own_fans(context, mesh, own, uses, Vertices{}, pair_fan, join);
+        std::uint32_t* const neighbours = mesh.neighbours.front().data();  // by facet and corner, as codes count
+        auto pair = [&](std::uint32_t a, std::uint32_t b) {
+            neighbours[a / 2] = b / 6;
+            neighbours[b / 2] = a / 6;
+        };
+        found = reduce_own_fans(context, mesh, own, uses, Vertices{}, pair, pair_fan, join);
         std::size_t total = 0;
         for (const auto& part : uses) total += part.size();
         const MemoryCharge charge(context, total * sizeof(EdgeUse), "the edges of the mesh");

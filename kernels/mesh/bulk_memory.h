@@ -16,6 +16,19 @@ namespace slabwright {
 /// `bytes` as they were asked for.
 SLABWRIGHT_API void release_bulk(void* data, std::size_t bytes) noexcept;
 
+/// While one lives, bulk memory that its thread gives back is kept for what that thread takes next, so that the system clears those pages once; what is
+/// left goes back to the system with it. Inside another it does nothing.
+class SLABWRIGHT_API KeptMemory {
+public:
+    KeptMemory();
+    ~KeptMemory();
+    KeptMemory(const KeptMemory&) = delete;
+    KeptMemory& operator=(const KeptMemory&) = delete;
+
+private:
+    bool outermost_;
+};
+
 /// Elements that are made without arguments keep indeterminate values: whoever sizes the array writes all of it.
 template <class T>
 struct BulkAllocator {

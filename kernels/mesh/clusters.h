@@ -69,17 +69,25 @@ std::uint32_t number_by_first(Context& context, std::span<std::uint32_t> first, 
     for (std::size_t c = 0; c < chunks; ++c) base[c + 1] += base[c];
     on_count(base[chunks]);
     parallel_for(context, words, grain, [&](std::size_t begin, std::size_t end) {
-        auto number_of = [&](std::uint32_t i) {
-            const std::uint64_t lower = is_first[i >> 6] & ((std::uint64_t{1} << (i & 63)) - 1);
-            return base[(i >> 6) / grain] + before[i >> 6] + static_cast<std::uint32_t>(std::popcount(lower));
-        };
-        const std::size_t last = std::min(n, 64 * end);
-        for (std::size_t i = 64 * begin; i < last; ++i) {
-            // In the same chunk and before i, that member has its number already, and it stands where the index stood.
-            const std::uint32_t mine = first[i];
-            const std::uint32_t number = mine >= 64 * begin && mine != i ? first[mine] : number_of(mine);
-            if (mine == i) on_first(i, number);
-            first[i] = number;
+        // The firsts' own numbers follow one another.
+        const std::size_t begin_index = 64 * begin, end_index = std::min(n, 64 * end);
+        std::uint32_t next = base[begin / grain];
+        for (std::size_t w = begin; w < end; ++w) {
+            for (std::uint64_t bits = is_first[w]; bits != 0; bits &= bits - 1, ++next) {
+                const std::size_t i = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
+                on_first(i, next);
+                first[i] = next;
+            }
+        }
+        for (std::size_t i = begin_index; i < end_index; ++i) {
+            // In the same chunk that member has its number already, and it stands where the index stood.
+            const std::uint32_t mine = (is_first[i >> 6] >> (i & 63) & 1) != 0 ? static_cast<std::uint32_t>(i) : first[i];
+            if (mine >= begin_index) {
+                first[i] = first[mine];
+                continue;
+            }
+            const std::uint64_t lower = is_first[mine >> 6] & ((std::uint64_t{1} << (mine & 63)) - 1);
+            first[i] = base[(mine >> 6) / grain] + before[mine >> 6] + static_cast<std::uint32_t>(std::popcount(lower));
         }
     });
     return base[chunks];

@@ -8,6 +8,8 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -42,7 +44,7 @@ inline constexpr std::size_t kPlainFan = 24;
 
 /// Sorts eight numbers by comparisons that do not depend on one another's outcome: in a mesh without order a branch would be foretold wrongly half of
 /// the time.
-inline void sort_eight(std::array<std::uint64_t, 8>& k) {
+inline void sort_eight(std::span<std::uint64_t, 8> k) {
     const auto order = [&](std::size_t i, std::size_t j) {
         const std::uint64_t a = k[i], b = k[j];
         k[i] = a < b ? a : b;
@@ -54,6 +56,21 @@ inline void sort_eight(std::array<std::uint64_t, 8>& k) {
     order(2, 4), order(3, 5);
     order(1, 4), order(3, 6);
     order(1, 2), order(3, 4), order(5, 6);
+}
+
+/// Likewise sixteen: the halves, which then are merged.
+inline void sort_sixteen(std::span<std::uint64_t, 16> k) {
+    const auto order = [&](std::size_t i, std::size_t j) {
+        const std::uint64_t a = k[i], b = k[j];
+        k[i] = a < b ? a : b;
+        k[j] = a < b ? b : a;
+    };
+    sort_eight(k.first<8>());
+    sort_eight(k.last<8>());
+    for (std::size_t i = 0; i < 8; ++i) order(i, 15 - i);
+    for (const std::size_t step : {4, 2, 1})
+        for (std::size_t i = 0; i < 16; ++i)
+            if ((i & step) == 0) order(i, i + step);
 }
 
 /// Sorts the uses of one block, whose low vertices are [origin, origin + width), and hands out fan after fan (see reduce_fans).
@@ -101,6 +118,78 @@ void sort_fans(std::span<const EdgeUse> uses, std::uint32_t origin, std::size_t 
         std::transform(mine, mine + n, many.begin(), use_of);
         on_fan(std::span<const EdgeUse>(many));
     }
+}
+
+/// Sorts the uses of one block as sort_fans() does. Where every edge of a fan is shared by just two facets, which run along it in opposite directions and share
+/// no other edge of the fan, calls on_pair(code, code) for each, and on_fan(uses) for the fans that are left, ascending. No branch depends on what
+/// most fans look like.
+template <class OnPair, class OnFan>
+void pair_fans(std::span<const EdgeUse> uses, std::uint32_t origin, std::size_t width, OnPair&& on_pair, OnFan&& on_fan) {
+    constexpr std::size_t few = 8, some = 16;
+    std::vector<std::uint32_t> place(width + 1, 0);
+    for (const EdgeUse& use : uses) ++place[use.low - origin + 1];
+    for (std::size_t v = 0; v < width; ++v) place[v + 1] += place[v];
+    RawArray<std::uint64_t> keys(uses.size() + some);  // as in sort_fans()
+    for (const EdgeUse& use : uses) keys[place[use.low - origin]++] = std::uint64_t{use.high} << 32 | use.code;
+    std::fill_n(keys.data() + uses.size(), some, 0);
+    // Behind a fan's own keys follow some that are above them and look like those of a plain fan.
+    constexpr auto behind = [] {
+        std::array<std::uint64_t, some> keys_behind{};
+        for (std::uint64_t i = 0; i < some; ++i) keys_behind[i] = (0xFFFFFF00u + i / 2) << 32 | (12 * i + i % 2);
+        return keys_behind;
+    }();
+    const auto sorted = [&](std::size_t begin, std::size_t n, auto&& sort, auto& k) {
+        for (std::size_t i = 0; i < k.size(); ++i) k[i] = i < n ? keys[begin + i] : behind[i];
+        sort(std::span(k));
+        bool plain = true;
+        for (std::size_t i = 0; i < k.size(); i += 2) plain &= ((k[i] ^ k[i + 1]) >> 32 == 0) & (((k[i] ^ k[i + 1]) & 1) != 0);
+        for (std::size_t i = 2; i < k.size(); i += 2) plain &= (k[i] ^ k[i - 1]) >> 32 != 0;
+        std::array<std::uint64_t, std::tuple_size_v<std::remove_reference_t<decltype(k)>> / 2> facets;
+        for (std::size_t i = 0; i < facets.size(); ++i)
+            facets[i] = std::uint64_t{static_cast<std::uint32_t>(k[2 * i]) / 6} << 32 | static_cast<std::uint32_t>(k[2 * i + 1]) / 6;
+        for (std::size_t i = 1; i < facets.size(); ++i)
+            for (std::size_t j = 0; j < i; ++j) plain &= facets[i] != facets[j];
+        return plain;
+    };
+    std::vector<std::uint32_t> larger(width + 1), odd(width + 1);
+    std::size_t larger_count = 0, odd_count = 0;
+    for (std::size_t v = 0, begin = 0, end = 0; v < width; ++v, begin = end) {
+        end = place[v];
+        const std::size_t n = end - begin;
+        std::array<std::uint64_t, few> k;
+        const bool plain = sorted(begin, n, sort_eight, k);
+        const bool is_few = n <= few;
+        for (std::size_t i = 0; i < few; ++i) keys[begin + i] = i < n && is_few ? k[i] : keys[begin + i];
+        larger[larger_count] = static_cast<std::uint32_t>(v);
+        larger_count += is_few ? 0 : 1;
+        odd[odd_count] = static_cast<std::uint32_t>(v);
+        odd_count += is_few && !plain ? 1 : 0;
+    }
+    const std::size_t odd_few = odd_count;
+    for (std::size_t i = 0; i < larger_count; ++i) {
+        const std::size_t v = larger[i], begin = v == 0 ? 0 : place[v - 1], n = place[v] - begin;
+        std::array<std::uint64_t, some> k;
+        if (n <= some && sorted(begin, n, sort_sixteen, k)) std::copy_n(k.begin(), n, keys.data() + begin);
+        else odd[odd_count++] = static_cast<std::uint32_t>(v);
+    }
+    std::inplace_merge(odd.begin(), odd.begin() + static_cast<std::ptrdiff_t>(odd_few), odd.begin() + static_cast<std::ptrdiff_t>(odd_count));
+    std::size_t at = 0;
+    const auto pairs_to = [&](std::size_t end) {
+        for (; at < end; at += 2) on_pair(static_cast<std::uint32_t>(keys[at]), static_cast<std::uint32_t>(keys[at + 1]));
+    };
+    std::vector<EdgeUse> fan;
+    for (std::size_t i = 0; i < odd_count; ++i) {
+        const std::size_t v = odd[i], begin = v == 0 ? 0 : place[v - 1], end = place[v];
+        pairs_to(begin);
+        at = end;
+        std::sort(keys.data() + begin, keys.data() + end);
+        fan.resize(end - begin);
+        std::transform(keys.data() + begin, keys.data() + end, fan.begin(), [&](std::uint64_t key) {
+            return EdgeUse{origin + static_cast<std::uint32_t>(v), static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)};
+        });
+        on_fan(std::span<const EdgeUse>(fan));
+    }
+    pairs_to(uses.size());
 }
 
 /// Memory that one step after the other may use, so that the system clears its pages only once.

@@ -175,17 +175,17 @@ Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<s
         std::optional<MemoryCharge> charge;
         EdgeScratch scratch;
         std::vector<BulkVector<Key>> firsts(blockwise ? (facets.count + grain - 1) / grain : 0);  // of each chunk: the keys that it deals
+        std::vector<const Key*> first_of_block(blockwise ? blocks : 0);
         auto counted = [&](std::size_t begin, std::size_t end, auto&& take) {
             if (blockwise) {
                 BlockTable table;
                 BulkVector<Key>& mine = firsts[begin / grain];
-                mine.reserve((end - begin) * 3 / 4);  // what is not needed is never touched
+                mine.reserve((end - begin) * 3);  // what is not needed is never touched
                 for (std::size_t f = begin; f < end; f += kBlockFacets) {
                     table.find_firsts(facets, f, std::min(end, f + kBlockFacets), slots);
-                    for (const Key& key : table.firsts()) {
-                        take(part_of(key));
-                        mine.push_back(key);
-                    }
+                    first_of_block[f / kBlockFacets] = mine.data() + mine.size();
+                    for (const Key& key : table.firsts()) take(part_of(key));
+                    mine.insert(mine.end(), table.firsts().begin(), table.firsts().end());
                 }
                 return;
             }
@@ -206,6 +206,7 @@ Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<s
         };
         // To bound memory, no more than about half of all corners are dealt at a time.
         auto room = [&](std::uint64_t total, std::uint64_t largest) {
+            if (blockwise) let_go();  // what the blocks found tells all
             const std::uint64_t most = std::min(total, std::max<std::uint64_t>(n / 2 + 1, largest) + largest);
             charge.emplace(context, (most + (blockwise ? total : 0)) * sizeof(Key), "welding the facets");
             scratch = EdgeScratch(most * sizeof(Key));
@@ -230,14 +231,21 @@ Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<s
             });
         };
         deal(context, facets.count, grain, parts, counted, keys, room, weld_parts);
-        firsts.clear();
         number_by_first(
             context, slots, [&](std::uint32_t count) { mesh.vertices.resize(count); },
             [&](std::size_t c, std::uint32_t number) {
+                if (blockwise) {
+                    // Asked for by ascending corner, chunk by chunk of whole blocks.
+                    const Key*& at = first_of_block[c / (3 * kBlockFacets)];
+                    while (at->corner != c) ++at;
+                    mesh.vertices[number] = {std::bit_cast<float>(at->x), std::bit_cast<float>(at->y), std::bit_cast<float>(at->z)};
+                    return;
+                }
                 const Vec3f p = facets.corner(c / 3, c % 3);
                 mesh.vertices[number] = {p.x + 0.0f, p.y + 0.0f, p.z + 0.0f};
             });
-        let_go();
+        firsts.clear();
+        if (!blockwise) let_go();
         pair_edges(context, mesh, scratch, odd);
     }
     return mesh;
@@ -256,7 +264,7 @@ Mesh weld(Context& context, std::span<const std::array<Vec3f, 3>> corners, std::
 }
 
 Mesh weld_and_let_go(Context& context, BulkVector<std::array<Vec3f, 3>>&& corners, std::vector<std::uint32_t>* odd) {
-    return weld_letting_go(context, records_of(corners), odd, [&] { corners = {}; });
+    return weld_letting_go(context, records_of(corners), odd, [&] { BulkVector<std::array<Vec3f, 3>>().swap(corners); });
 }
 
 }  // namespace slabwright

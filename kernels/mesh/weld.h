@@ -46,7 +46,7 @@ struct FacetRecords {
 /// @throws Error(input, "mesh.too_large") over 715 827 882 facets
 [[nodiscard]] Mesh weld_records(Context& context, const FacetRecords& facets, std::vector<std::uint32_t>* odd = nullptr);
 [[nodiscard]] Mesh weld(Context& context, std::span<const std::array<Vec3f, 3>> corners, std::vector<std::uint32_t>* odd = nullptr);
-/// The same; the corners are let go as soon as the vertices are known.
+/// The same; the corners are let go as soon as they are not needed any more: where neighbours follow each other, once each block's are compared.
 [[nodiscard]] Mesh weld_and_let_go(Context& context, BulkVector<std::array<Vec3f, 3>>&& corners, std::vector<std::uint32_t>* odd = nullptr);
 
 /// Merges vertices nearer than `tolerance_mm` (each to the lowest index of its cluster; clusters are chained) and pairs
