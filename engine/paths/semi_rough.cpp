@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <optional>
 
@@ -61,15 +62,16 @@ std::vector<std::vector<std::array<int, 2>>> rows_inside(const CellGrid& grid, c
 // The cells that are worth a visit, level by level.
 class LevelTargets {
 public:
-    /// @param radius of the cutter, mm
-    LevelTargets(Context& context, const LayerStock& stock, double limit, double radius)
+    LevelTargets(Context& context, const LayerStock& stock, double limit, const Tool& tool)
         : stock_(stock),
           limit_(limit),
-          reach_(1 + (static_cast<int>(radius / stock.grid().cell) + 1) / kTile),
+          radius_(tool.diameter / 2),
+          ball_(tool.kind == ToolKind::ball),
+          reach_(1 + (static_cast<int>(radius_ / stock.grid().cell) + 1) / kTile),
           tiles_x_((stock.grid().nx + kTile - 1) / kTile),
-          marked_(stock.grid().count(), 0),
           tiles_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>((stock.grid().ny + kTile - 1) / kTile), 0),
-          near_(tiles_.size(), 0) {
+          near_(tiles_.size(), 0),
+          marked_(tiles_.size() * kTile, 0) {
         // What is not left over now will not be on any level.
         const CellGrid& grid = stock.grid();
         std::vector<std::vector<std::array<int, 2>>> rows(static_cast<std::size_t>(grid.ny));
@@ -79,7 +81,7 @@ public:
         for (const auto& row : rows) left_over_.insert(left_over_.end(), row.begin(), row.end());
     }
     [[nodiscard]] bool none() const { return left_over_.empty(); }
-    [[nodiscard]] std::uint64_t bytes() const { return marked_.size() + 2 * left_over_.size() * sizeof(left_over_[0]); }
+    [[nodiscard]] std::uint64_t bytes() const { return marked_.size() * sizeof(marked_[0]) + 2 * left_over_.size() * sizeof(left_over_[0]); }
 
     /// Marks the cells of a level.
     /// @param tip    mm above the layer's bottom
@@ -87,7 +89,7 @@ public:
     /// @param floors mm; what stands on one of them is a target even within the swath, for no ball makes a floor
     void mark(double tip, double over, const Loops& swath, std::span<const double> floors) {
         const CellGrid& grid = stock_.grid();
-        for (const auto& [i, j] : cells_) marked_[grid.index(i, j)] = 0, tiles_[tile(i, j)] = 0;
+        for (const auto& [i, j] : cells_) marked_[row_of(i, j)] = 0, tiles_[tile(i, j)] = 0;
         for (const std::size_t t : near_tiles_) near_[t] = 0;
         cells_.clear(), near_tiles_.clear();
         tip_ = static_cast<float>(tip);
@@ -108,8 +110,9 @@ public:
             const std::size_t c = grid.index(i, j);
             if (stock_.height(c) <= tip_ + kStands || stock_.surface(c) > std::max(tip_, 0.0F) + kStands || stock_.surface(c) <= over + kStands)
                 continue;
+            if (ball_ && !lowers_enough(c, 0)) continue;
             if (within_swath(i, j) && !on_floor(c)) continue;
-            marked_[c] = 1;
+            marked_[row_of(i, j)] |= static_cast<std::uint16_t>(1U << (i % kTile));
             if (!tiles_[tile(i, j)]) come_near(i / kTile, j / kTile);
             tiles_[tile(i, j)] = 1;
             cells_.push_back({i, j});
@@ -119,11 +122,11 @@ public:
     [[nodiscard]] const std::vector<std::array<int, 2>>& cells() const { return cells_; }
 
     // Whether a cutter whose middle is here meets some that still stand; a ball, some that it lowers by enough.
-    [[nodiscard]] bool met(double x, double y, double radius, bool ball) const {
+    [[nodiscard]] bool met(double x, double y) const {
         const CellGrid& grid = stock_.grid();
         const auto cell = [&](double at, double from, int n) { return static_cast<int>(std::clamp((at - from) / grid.cell + 0.5, 0.0, n - 1.0)); };
         if (!near_[tile(cell(x, grid.x0, grid.nx), cell(y, grid.y0, grid.ny))]) return false;
-        const double r = std::max(radius - kEdge, radius / 2);
+        const double r = std::max(radius_ - kEdge, radius_ / 2);
         const int j0 = std::max(0, static_cast<int>(std::ceil((y - r - grid.y0) / grid.cell)));
         const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + r - grid.y0) / grid.cell)));
         const int i0 = std::max(0, static_cast<int>(std::ceil((x - r - grid.x0) / grid.cell)));
@@ -132,17 +135,19 @@ public:
         for (int tj = j0 / kTile; tj <= j1 / kTile && j0 <= j1; ++tj)
             for (int ti = i0 / kTile; ti <= i1 / kTile && i0 <= i1; ++ti) {
                 if (!tiles_[static_cast<std::size_t>(tj) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(ti)]) continue;
+                const std::uint16_t* const rows = &marked_[row_of(ti * kTile, tj * kTile)];
                 for (int j = std::max(j0, tj * kTile); j <= std::min(j1, tj * kTile + kTile - 1); ++j) {
+                    if (rows[j % kTile] == 0) continue;
                     const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, r * r - dy * dy));
                     const int first = std::max(ti * kTile, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
                     const int last = std::min({ti * kTile + kTile - 1, grid.nx - 1, static_cast<int>(std::floor((x + w - grid.x0) / grid.cell))});
-                    for (int i = first; i <= last; ++i) {
+                    if (first > last) continue;
+                    const std::uint32_t asked = ((2U << (last % kTile)) - 1U) & ~((1U << (first % kTile)) - 1U);
+                    for (std::uint32_t left = rows[j % kTile] & asked; left != 0; left &= left - 1) {
+                        const int i = ti * kTile + std::countr_zero(left);
                         const std::size_t c = grid.index(i, j);
-                        if (!marked_[c] || stock_.height(c) <= tip_ + kStands) continue;
-                        if (ball) {
-                            const double dx = grid.x(i) - x, flank = radius - std::sqrt(std::max(0.0, radius * radius - dx * dx - dy * dy));
-                            if (stock_.height(c) - std::max(tip_ + flank, static_cast<double>(stock_.surface(c))) <= kWorthOfBall) continue;
-                        }
+                        if (stock_.height(c) <= tip_ + kStands) continue;
+                        if (ball_ && !lowers_enough(c, (grid.x(i) - x) * (grid.x(i) - x) + dy * dy)) continue;
                         if (++found >= kFewCells) return true;
                     }
                 }
@@ -154,6 +159,14 @@ private:
     [[nodiscard]] std::size_t tile(int i, int j) const {
         return static_cast<std::size_t>(j / kTile) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(i / kTile);
     }
+    // Of a cell's tile, the row that it is in.
+    [[nodiscard]] std::size_t row_of(int i, int j) const { return tile(i, j) * kTile + static_cast<std::size_t>(j % kTile); }
+    // Whether a ball at the level's height, its axis so far from a cell's middle (mm²), lowers it by what is worth it.
+    [[nodiscard]] bool lowers_enough(std::size_t c, double away2) const {
+        const double most = stock_.height(c) - kWorthOfBall;
+        if (stock_.surface(c) >= most || tip_ >= most) return false;
+        return tip_ + radius_ - std::sqrt(std::max(0.0, radius_ * radius_ - away2)) < most;
+    }
     // A cutter whose middle is in one of the tiles around may meet what is in this one.
     void come_near(int ti, int tj) {
         const int tiles_y = static_cast<int>(tiles_.size()) / tiles_x_;
@@ -162,12 +175,14 @@ private:
                 if (const std::size_t t = tile(i * kTile, j * kTile); !near_[t]) near_[t] = 1, near_tiles_.push_back(t);
     }
     const LayerStock& stock_;
-    double limit_;
+    double limit_, radius_;
+    bool ball_;
     int reach_;  // of the cutter, tiles
     float tip_ = 0;
     int tiles_x_;
-    std::vector<char> marked_, tiles_;
-    std::vector<char> near_;  // tiles within reach of some that hold targets
+    std::vector<char> tiles_;            // that hold targets
+    std::vector<char> near_;             // within reach of such
+    std::vector<std::uint16_t> marked_;  // tile after tile, row after row, a bit for each cell
     std::vector<std::size_t> near_tiles_;
     std::vector<std::array<int, 2>> left_over_, cells_;  // row after row; `cells_` of the level
 };
@@ -203,7 +218,7 @@ public:
     Operation run() {
         Operation op = cut_.operation(OperationKind::semi_rough, pass_.purpose, tool_);
         op.spare = pass_.allowance;
-        LevelTargets targets(cut_.context, stock_, pass_.limit, r_);
+        LevelTargets targets(cut_.context, stock_, pass_.limit, tool_);
         if (targets.none()) return op;
         const MemoryCharge memory(cut_.context, targets.bytes(), "what semi-roughing is to cut");
         LayerStock::Trial rings(stock_);
@@ -332,7 +347,7 @@ private:
             const double most = k > 0 ? loose * kUnitsPerMm : tolerance;
             for (std::size_t l = 0; l < rings[k].size(); ++l) {
                 std::vector<RingPlace> places = places_of(rings[k].loop(l), z);
-                for (RingPlace& p : places) p.useful = within_travel(p.at) && targets.met(to_mm(p.at.x), to_mm(p.at.y), r_, ball_);
+                for (RingPlace& p : places) p.useful = within_travel(p.at) && targets.met(to_mm(p.at.x), to_mm(p.at.y));
                 append_useful(places, tolerance, most, runs.back());
             }
             for (const LevelRun& run : runs.back())
