@@ -12,6 +12,7 @@
 #include "engine/schedule/motion_time.h"
 #include "engine/tools/reach_ratio.h"
 #include "engine/tools/select.h"
+#include "kernels/mesh/part.h"
 
 namespace slabwright {
 
@@ -57,7 +58,8 @@ public:
           overrun_(overrun_of(ground.plan.job)),
           progress_(progress) {
         const Plan& plan = ground.plan;
-        work_.mesh = ground.mesh;
+        near_ = part_between(context, ground.mesh, layer_.z_bottom - std::max(overrun_.below, overrun_.board), layer_.z_top);
+        work_.mesh = near_.view();
         work_.job = &fitted_;
         work_.z_bottom = layer_.z_bottom;
         work_.z_top = layer_.z_top;
@@ -195,6 +197,7 @@ private:
     Job fitted_;  // a layer may be taller than the shortest tools make; the others make it then
     const Overrun overrun_;
     ProgressPart& progress_;
+    Mesh near_;  // what of the ground the layer's cutters may meet
     LayerJob work_;
     std::optional<OverhangMap> overhang_;
     std::vector<NamedSet> sets_;

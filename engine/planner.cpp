@@ -205,7 +205,7 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan, const std
     std::sort(reach.begin(), reach.end(), std::greater<>());
     const std::size_t at_once = std::min<std::size_t>(reach.size(), context.threads());
     const std::uint64_t held = std::accumulate(reach.begin(), reach.begin() + static_cast<std::ptrdiff_t>(at_once), std::uint64_t{0});
-    return held * (sizeof(SolidFacet) + 16) + static_cast<std::uint64_t>(3 * plan_view_mm2(plan)) * (sizeof(Move) + 64) +
+    return held * (sizeof(SolidFacet) + 16 + 3 * sizeof(Index3)) + static_cast<std::uint64_t>(3 * plan_view_mm2(plan)) * (sizeof(Move) + 64) +
            (Standing::bytes(plan.stock_min, plan.stock_max) + LayerStock::bytes(plan.job, plan_view_mm2(plan))) * at_once;
 }
 

@@ -16,6 +16,7 @@
 
 #include "io/stl.h"
 #include "kernels/errors.h"
+#include "kernels/mesh/part.h"
 #include "kernels/slicing/slicing.h"
 
 namespace {
@@ -394,6 +395,50 @@ TEST(Slicing, SameBitsOnAnyNumberOfThreads) {
         std::vector<Plane> single{planes[13]};
         EXPECT_TRUE(same({reference[13]}, slice(one, mesh.view(), single, {.close_gap_mm = 0.5})));
     }
+}
+
+// Facets in the planes that bound the part, and meshes that are open, included.
+TEST(PartBetween, HasTheSameSectionsAndNeighboursBetweenItsHeights) {
+    auto random = random_of(23);
+    Context context({.threads = 2});
+    std::size_t smaller = 0;
+    for (int round = 0; round < 40; ++round) {
+        Mesh mesh = round % 2 ? random_relief(random, 10 + 2 * round, 1.7, -3) : random_tetrahedra(random, 1 + 3 * round, 100);
+        if (round % 5 == 0) {
+            std::erase_if(mesh.facets, [&](const Index3&) { return random() % 7 == 0; });
+            pair_by_brute_force(mesh);
+        }
+        const double low = 0.25 * static_cast<double>(random() % 12), high = low + 0.25 * static_cast<double>(random() % 6);
+        const Mesh part = part_between(context, mesh.view(), low, high);
+        smaller += part.facets.size() < mesh.facets.size();
+        std::vector<Plane> planes{{low, Side::below}, {low, Side::above}, {high, Side::below}, {high, Side::above}};
+        for (int i = 0; i < 8; ++i)
+            planes.push_back({low + (high - low) * static_cast<double>(random() % 100) / 100, i % 2 ? Side::above : Side::below});
+        EXPECT_TRUE(same(slice(context, mesh.view(), planes), slice(context, part.view(), planes))) << round;
+
+        const auto corners = [](const Mesh& of, std::uint32_t f) {
+            return std::array{of.vertices[of.facets[f][0]], of.vertices[of.facets[f][1]], of.vertices[of.facets[f][2]]};
+        };
+        std::uint32_t at = 0;
+        for (std::uint32_t f = 0; f < mesh.facets.size(); ++f) {
+            const auto p = corners(mesh, f);
+            const bool reaches = std::max({p[0].z, p[1].z, p[2].z}) >= low && std::min({p[0].z, p[1].z, p[2].z}) <= high;
+            if (at == part.facets.size() || corners(part, at) != p) {
+                EXPECT_FALSE(reaches) << round << ": facet " << f << " is missing or out of order";
+                continue;
+            }
+            for (std::size_t k = 0; k < 3 && reaches; ++k) {
+                const std::uint32_t across = mesh.neighbours[f][k], found = part.neighbours[at][k];
+                ASSERT_EQ(across == kNoFacet, found == kNoFacet) << round << ": facet " << f;
+                if (across != kNoFacet) {
+                    EXPECT_EQ(corners(mesh, across), corners(part, found)) << round << ": facet " << f;
+                }
+            }
+            ++at;
+        }
+        EXPECT_EQ(at, part.facets.size()) << round;
+    }
+    EXPECT_GT(smaller, 20U);
 }
 
 TEST(Slicing, LoopsStartAtTheirLowestFacet) {

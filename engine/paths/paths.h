@@ -23,7 +23,9 @@ struct Flat {
 
 /// A layer's work is a value in and a value out.
 struct LayerJob {
-    MeshView mesh;  ///< the whole pattern, pattern-base, or a lighter one that lies as near to it as the job's `gouge` leaves room for
+    /// The pattern, pattern-base, or a lighter one that lies as near to it as the job's `gouge` leaves room for; the whole of it, or what of it
+    /// the layer's cutters may meet (part_between).
+    MeshView mesh;
     const Job* job = nullptr;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
     double floor_below = 0;                          ///< the lowest z that a tip may reach: z_bottom less what may be cut under it

@@ -1,0 +1,85 @@
+#include "kernels/mesh/part.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+/// Some of many things, and how many of them come before each.
+struct Chosen {
+    std::vector<std::uint64_t> words;
+    std::vector<std::uint32_t> before;  // by word
+
+    explicit Chosen(std::size_t n) : words((n + 63) / 64, 0) {}
+    [[nodiscard]] bool has(std::uint32_t i) const { return (words[i >> 6] >> (i & 63) & 1) != 0; }
+    void add(std::uint32_t i) { words[i >> 6] |= std::uint64_t{1} << (i & 63); }
+    std::size_t count() {
+        before.resize(words.size());
+        std::uint32_t sum = 0;
+        for (std::size_t w = 0; w < words.size(); ++w) before[w] = sum, sum += static_cast<std::uint32_t>(std::popcount(words[w]));
+        return sum;
+    }
+    [[nodiscard]] std::uint32_t rank(std::uint32_t i) const {
+        return before[i >> 6] + static_cast<std::uint32_t>(std::popcount(words[i >> 6] & ((std::uint64_t{1} << (i & 63)) - 1)));
+    }
+    /// Calls fn(i) for those in words [begin, end), ascending.
+    template <class Fn>
+    void each(std::size_t begin, std::size_t end, Fn&& fn) const {
+        for (std::size_t w = begin; w < end; ++w)
+            for (std::uint64_t bits = words[w]; bits != 0; bits &= bits - 1)
+                fn(static_cast<std::uint32_t>(64 * w + static_cast<std::size_t>(std::countr_zero(bits))));
+    }
+};
+
+constexpr std::size_t kGrain = std::size_t{1} << 10;  // words
+
+}  // namespace
+
+Mesh part_between(Context& context, MeshView mesh, double low, double high) {
+    Chosen within(mesh.size()), facets(mesh.size()), vertices(mesh.vertices.size());
+    // By whole words, so that no two threads write one.
+    auto choose = [&](Chosen& chosen, auto&& wanted) {
+        parallel_for(context, chosen.words.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t f = 64 * begin; f < std::min(mesh.size(), 64 * end); ++f)
+                if (wanted(f)) chosen.add(static_cast<std::uint32_t>(f));
+        });
+    };
+    choose(within, [&](std::size_t f) {
+        const float a = mesh.vertices[mesh.facets[f][0]].z, b = mesh.vertices[mesh.facets[f][1]].z, c = mesh.vertices[mesh.facets[f][2]].z;
+        return std::max({a, b, c}) >= low && std::min({a, b, c}) <= high;
+    });
+    choose(facets, [&](std::size_t f) {
+        const Index3& beside = mesh.neighbours[f];
+        return within.has(static_cast<std::uint32_t>(f)) ||
+               std::any_of(beside.begin(), beside.end(), [&](std::uint32_t g) { return g != kNoFacet && within.has(g); });
+    });
+    Mesh part;
+    part.facets.resize(facets.count());
+    part.neighbours.resize(part.facets.size());
+    facets.each(0, facets.words.size(), [&](std::uint32_t f) {
+        for (const std::uint32_t v : mesh.facets[f]) vertices.add(v);
+    });
+    part.vertices.resize(vertices.count());
+    parallel_for(context, vertices.words.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        vertices.each(begin, end, [&](std::uint32_t v) { part.vertices[vertices.rank(v)] = mesh.vertices[v]; });
+    });
+    parallel_for(context, facets.words.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        facets.each(begin, end, [&](std::uint32_t f) {
+            const std::uint32_t at = facets.rank(f);
+            for (std::size_t k = 0; k < 3; ++k) {
+                const std::uint32_t g = mesh.neighbours[f][k];
+                part.facets[at][k] = vertices.rank(mesh.facets[f][k]);
+                part.neighbours[at][k] = g != kNoFacet && facets.has(g) ? facets.rank(g) : kNoFacet;
+            }
+        });
+    });
+    return part;
+}
+
+}  // namespace slabwright
