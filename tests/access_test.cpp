@@ -411,6 +411,43 @@ TEST(StandingPart, EnvelopeByPointsAndByGrid) {
     }
 }
 
+// Whether the facets are known to close, or share no vertices, or do not close.
+TEST(StandingPart, EnvelopeByGridOfFacetsThatDoNotClose) {
+    Context context;
+    const Mesh closed = relief(12, bumpy);
+    auto apart = [&](auto&& keep) {
+        Mesh m;
+        for (std::size_t f = 0; f < closed.facets.size(); ++f) {
+            if (!keep(f)) continue;
+            const auto first = static_cast<std::uint32_t>(m.vertices.size());
+            for (const std::uint32_t v : closed.facets[f]) m.vertices.push_back(closed.vertices[v]);
+            m.facets.push_back({first, first + 1, first + 2});
+        }
+        return m;
+    };
+    const Mesh same = apart([](std::size_t) { return true; }), open = apart([](std::size_t f) { return f % 7 != 3; });
+    Mesh torn = closed;
+    torn.facets.erase(torn.facets.begin() + 50);
+    const int nx = 53, ny = 41;
+    const auto grid_of = [&](const Mesh& m, const StandingPart& part, double z_top) {
+        std::vector<float> grid(static_cast<std::size_t>(nx) * ny);
+        RisingEnvelope rising(part, -1, -0.5, 0.3, nx, ny);
+        if (z_top > 3) rising.at(3, -1, grid.data());
+        rising.at(z_top, -1, grid.data());
+        for (int j = 0; j < ny; ++j)
+            for (int i = 0; i < nx; ++i)
+                EXPECT_NEAR(grid[static_cast<std::size_t>(j) * nx + i], part.envelope(-1 + 0.3 * i, -0.5 + 0.3 * j, z_top, -1), 1e-6)
+                    << m.facets.size();
+        return grid;
+    };
+    const StandingPart of_closed(context, closed.view()), of_same(context, same.view()), of_open(context, open.view()), of_torn(context, torn.view());
+    for (const double z_top : {2.0, 6.5, 100.0}) {
+        EXPECT_EQ(grid_of(closed, of_closed, z_top), grid_of(same, of_same, z_top));
+        grid_of(open, of_open, z_top);
+        grid_of(torn, of_torn, z_top);
+    }
+}
+
 TEST(StandingPart, DistanceFromShadow) {
     Context context;
     Mesh m;

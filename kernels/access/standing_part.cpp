@@ -263,6 +263,32 @@ Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& tri, double
     return result;
 }
 
+/// Whether every edge is gone along as often one way as the other, so that the facets together wind around nothing. The sum of random numbers for
+/// edges, added one way and taken off the other, is 0 then, and hardly ever else.
+bool edges_cancel(Context& context, MeshView mesh) {
+    const auto mixed = [](std::uint64_t v) {
+        v = (v ^ (v >> 30)) * 0xBF58476D1CE4E5B9u;
+        v = (v ^ (v >> 27)) * 0x94D049BB133111EBu;
+        return v ^ (v >> 31);
+    };
+    const auto edge = [&](std::uint32_t a, std::uint32_t b) {
+        if (a == b) return std::uint64_t{0};
+        const std::uint64_t number = mixed((std::uint64_t{std::min(a, b)} << 32 | std::max(a, b)) + 0x9E3779B97F4A7C15u);
+        return a < b ? number : ~number + 1;
+    };
+    return parallel_reduce(
+               context, mesh.size(), 1 << 14, std::uint64_t{0},
+               [&](std::size_t begin, std::size_t end) {
+                   std::uint64_t sum = 0;
+                   for (std::size_t i = begin; i < end; ++i) {
+                       const Index3& f = mesh.facets[i];
+                       sum += edge(f[0], f[1]) + edge(f[1], f[2]) + edge(f[2], f[0]);
+                   }
+                   return sum;
+               },
+               [](std::uint64_t a, std::uint64_t b) { return a + b; }) == 0;
+}
+
 }  // namespace
 
 void StandingPart::Facets::set(std::size_t i, const Facet& facet) {
@@ -280,6 +306,7 @@ void StandingPart::Facets::end() {
 StandingPart::StandingPart(Context& context, MeshView mesh) {
     const std::size_t n = mesh.size();
     box_ = bounds(mesh);
+    closed_ = edges_cancel(context, mesh);
     const MortonGrid grid(box_);
     // A key is as much of the Morton number as fits beside the facet's own.
     const unsigned facet_bits = static_cast<unsigned>(std::bit_width(std::max<std::size_t>(n, 1))), drop = facet_bits - 1;  // of the number's 63 bits
@@ -877,28 +904,32 @@ double StandingPart::envelope(double x, double y, double z_top, double none) con
 // fn(point, winding, height) for all points that facets come over which may be as high as z_low and lower than z_high.
 template <class Fn>
 void RisingEnvelope::for_each_point(double z_low, double z_high, Fn&& fn) const {
-    const double x1 = x0_ + cell_ * (nx_ - 1), y1 = y0_ + cell_ * (ny_ - 1);
+    const double x1 = x0_ + cell_ * (nx_ - 1), y1 = y0_ + cell_ * (ny_ - 1), per_cell = 1 / cell_;
+    // Points from `low` to `high`, and one beside them where rounding does not tell: facet_winding() decides, this only saves asking it.
+    constexpr double hair = 1e-6;
+    const auto first_of = [](double low) { return low > 0 ? static_cast<int>(low + (1 - hair)) : 0; };
+    const auto last_of = [](double high, int n) { return high < -hair ? -1 : high < n - 1 ? static_cast<int>(high + hair) : n - 1; };
     part_->walk_within(StandingPart::Within({x0_, y0_, z_low}, {x1, y1, z_high}), [&](const auto& facet) {
         const auto& [a, b, c] = facet.v;
         if (std::max({a.z, b.z, c.z}) < z_low || std::min({a.z, b.z, c.z}) >= z_high) return;
-        const double fx0 = std::min({a.x, b.x, c.x}), fx1 = std::max({a.x, b.x, c.x});
-        const double fy0 = std::min({a.y, b.y, c.y}), fy1 = std::max({a.y, b.y, c.y});
-        const int j0 = static_cast<int>(std::max(0.0, std::ceil((fy0 - y0_) / cell_) - 1)),
-                  j1 = static_cast<int>(std::min<double>(ny_ - 1, std::floor((fy1 - y0_) / cell_) + 1));
+        const double fx0 = (std::min({a.x, b.x, c.x}) - x0_) * per_cell, fx1 = (std::max({a.x, b.x, c.x}) - x0_) * per_cell;
+        const double fy0 = (std::min({a.y, b.y, c.y}) - y0_) * per_cell, fy1 = (std::max({a.y, b.y, c.y}) - y0_) * per_cell;
+        if (fx0 > nx_ || fy0 > ny_) return;
+        const int i0 = first_of(fx0), i1 = last_of(fx1, nx_), j0 = first_of(fy0), j1 = last_of(fy1, ny_);
         for (int j = j0; j <= j1; ++j) {
             const double y = y0_ + j * cell_;
-            if (y < fy0 || y > fy1) continue;
-            // Where the row crosses the outline, a cell wider: facet_winding() decides, this only saves asking it.
-            double low = fx1, high = fx0;
-            for (int k = 0; k < 3; ++k) {
-                const Vec3f &p = facet.v[static_cast<std::size_t>(k)], &q = facet.v[static_cast<std::size_t>((k + 1) % 3)];
-                if ((p.y <= y) == (q.y <= y)) continue;
-                const double x = p.x + (y - p.y) / (static_cast<double>(q.y) - p.y) * (static_cast<double>(q.x) - p.x);
-                low = std::min(low, x), high = std::max(high, x);
+            int begin = i0, last = i1;
+            if (constexpr int few = 3; last - begin >= few) {  // where the row crosses the outline
+                double low = fx1, high = fx0;
+                for (int k = 0; k < 3; ++k) {
+                    const Vec3f &p = facet.v[static_cast<std::size_t>(k)], &q = facet.v[static_cast<std::size_t>((k + 1) % 3)];
+                    if ((p.y <= y) == (q.y <= y)) continue;
+                    const double x = p.x + (y - p.y) / (static_cast<double>(q.y) - p.y) * (static_cast<double>(q.x) - p.x);
+                    low = std::min(low, (x - x0_) * per_cell), high = std::max(high, (x - x0_) * per_cell);
+                }
+                begin = first_of(low), last = last_of(high, nx_);
             }
-            const int i0 = static_cast<int>(std::clamp(std::floor((low - x0_) / cell_), 0.0, static_cast<double>(nx_)));
-            const int i1 = static_cast<int>(std::clamp(std::ceil((high - x0_) / cell_), -1.0, nx_ - 1.0));
-            for (int i = i0; i <= i1; ++i) {
+            for (int i = begin; i <= last; ++i) {
                 const double x = x0_ + i * cell_;
                 if (const int w = facet_winding(facet.v, x, y); w != 0)
                     fn(static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i), w, facet_height(facet.v, x, y));
@@ -917,7 +948,8 @@ RisingEnvelope::RisingEnvelope(const StandingPart& part, double x0, double y0, d
       passed_(-kInfinity),
       above_(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny), 0),
       below_(above_.size(), -std::numeric_limits<float>::infinity()) {
-    for_each_point(-kInfinity, kInfinity, [&](std::size_t k, int w, double) { above_[k] += w; });
+    // Over a closed mesh what is at all heights together winds around nothing.
+    if (!part.closed_) for_each_point(-kInfinity, kInfinity, [&](std::size_t k, int w, double) { above_[k] += w; });
 }
 
 void RisingEnvelope::at(double z_top, float none, float* out) {
