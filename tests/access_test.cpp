@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <random>
 #include <span>
 
@@ -360,6 +363,52 @@ TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
     EXPECT_GT(deep, 2000U);
 }
 
+// Rows that are checked together, in whichever order, find what one row of all finds: of equal depths the first.
+TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
+    Context context;
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    const Mesh m = relief(40, bumpy);
+    const StandingPart part(context, m.view());
+    for (int trial = 0; trial < 40; ++trial) {
+        const auto form = StandingPart::Form::ball;
+        const double radius = 0.5 + 2 * unit(random);
+        std::vector<StandingPart::Motion> motions;
+        Point3 at{40 * unit(random), 40 * unit(random), 7};
+        for (int i = 0; i < 400; ++i) {
+            const Point3 to{at[0] + 2 * unit(random) - 1, at[1] + 2 * unit(random) - 1, 5.5 + 2.5 * unit(random)};
+            motions.push_back({at, to});
+            at = to;
+        }
+        for (std::size_t i = 0; i < 200; ++i) motions[i + 200] = motions[i];  // every depth twice
+        const double tolerance = trial % 3 == 0 ? 0.05 : 10;
+        const StandingPart::Found all = part.deepest(form, 100, motions, radius, 1e-5, tolerance);
+        ASSERT_TRUE(all.most.found);
+        std::vector<std::size_t> order{0, 1, 2, 3, 4, 5, 6, 7};
+        std::shuffle(order.begin(), order.end(), random);
+        std::array<StandingPart::Found, 8> found;
+        std::atomic<double> known = 0;
+        for (const std::size_t row : order)
+            found[row] = part.deepest(form, 100, std::span(motions).subspan(50 * row, 50), radius, 1e-5, tolerance, &known);
+        Penetration most;
+        std::size_t motion = 0, beyond = 0, beyond_alone = 0;
+        for (std::size_t row = 0; row < found.size(); ++row) {
+            if (found[row].most.depth > most.depth) most = found[row].most, motion = 50 * row + found[row].motion;
+            if (tolerance < 1) {
+                beyond += found[row].beyond.size();
+                beyond_alone += part.deepest(form, 100, std::span(motions).subspan(50 * row, 50), radius, 1e-5, tolerance).beyond.size();
+            }
+        }
+        EXPECT_EQ(most.depth, all.most.depth) << "seed " << seed << " trial " << trial;
+        EXPECT_EQ(most.tip, all.most.tip) << "seed " << seed << " trial " << trial;
+        EXPECT_EQ(motion, all.motion) << "seed " << seed << " trial " << trial;
+        EXPECT_EQ(known, most.depth);
+        EXPECT_EQ(beyond, beyond_alone);
+        EXPECT_EQ(beyond, all.beyond.size());
+    }
+}
+
 // A motion that comes down from high above the part's outline meets nothing but the top sheet.
 TEST(StandingPart, RowsThatComeDownWithinTheOutlineMeetTheTop) {
     Context context;
@@ -414,7 +463,19 @@ TEST(StandingPart, EnvelopeByPointsAndByGrid) {
 // Whether the facets are known to close, or share no vertices, or do not close.
 TEST(StandingPart, EnvelopeByGridOfFacetsThatDoNotClose) {
     Context context;
-    const Mesh closed = relief(12, bumpy);
+    Mesh closed;
+    std::map<std::array<float, 3>, std::uint32_t> known;
+    const Mesh same = relief(12, bumpy);  // whose facets share no vertices
+    for (const Index3& f : same.facets) {
+        Index3 g{};
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Vec3f& v = same.vertices[f[k]];
+            const auto [at, added] = known.try_emplace({v.x, v.y, v.z}, static_cast<std::uint32_t>(closed.vertices.size()));
+            if (added) closed.vertices.push_back(v);
+            g[k] = at->second;
+        }
+        closed.facets.push_back(g);
+    }
     auto apart = [&](auto&& keep) {
         Mesh m;
         for (std::size_t f = 0; f < closed.facets.size(); ++f) {
@@ -425,7 +486,7 @@ TEST(StandingPart, EnvelopeByGridOfFacetsThatDoNotClose) {
         }
         return m;
     };
-    const Mesh same = apart([](std::size_t) { return true; }), open = apart([](std::size_t f) { return f % 7 != 3; });
+    const Mesh open = apart([](std::size_t f) { return f % 7 != 3; });
     Mesh torn = closed;
     torn.facets.erase(torn.facets.begin() + 50);
     const int nx = 53, ny = 41;

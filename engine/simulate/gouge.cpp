@@ -1,6 +1,7 @@
 #include "engine/simulate/gouge.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "kernels/parallel/parallel.h"
@@ -30,6 +31,7 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
     const std::size_t n = program.steps.size();
     if (n < 2) return {};
     const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
+    std::atomic<double> deepest = 0;  // of the whole program, so far
     return parallel_reduce(
         context, n - 1, 2048, GougeReport{},
         [&](std::size_t begin, std::size_t end) {
@@ -46,18 +48,19 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 motions.push_back({a, b});
                 lines.push_back(to.line);
             }
-            auto check = [&](StandingPart::Form form, double thick, GougePlace& place) {
-                StandingPart::Found found = part.deepest(form, z_top, motions, thick, options.ignore, options.tolerance);
+            auto check = [&](StandingPart::Form form, double thick, GougePlace& place, std::atomic<double>* known) {
+                StandingPart::Found found = part.deepest(form, z_top, motions, thick, options.ignore, options.tolerance, known);
                 if (found.most.found) place = {found.most.depth, lines[found.motion], found.most.tip};
                 return std::move(found.beyond);
             };
-            r.gouges = check(tool.kind == ToolKind::ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter).size();
+            const bool ball = tool.kind == ToolKind::ball;
+            r.gouges = check(ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter, ball ? &deepest : nullptr).size();
             std::vector<std::uint32_t> touched;
             double raised = 0;
             auto follow = [&](GougePlace& place, double thick, double above) {
                 for (StandingPart::Motion& m : motions) m.from[2] += above - raised, m.to[2] += above - raised;
                 raised = above;
-                const auto beyond = check(StandingPart::Form::cylinder, thick, place);
+                const auto beyond = check(StandingPart::Form::cylinder, thick, place, nullptr);
                 touched.insert(touched.end(), beyond.begin(), beyond.end());
             };
             if (shank > radius) follow(r.shank, shank, tool.flute_length);

@@ -20,7 +20,8 @@ namespace {
 
 constexpr std::size_t kFan = 8;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kHair = 1e-9;  // mm: rounding of a bound
+constexpr double kHair = 1e-9;   // mm: rounding of a bound
+constexpr double kEqual = 1e-6;  // mm: depths that differ by less may be the same
 
 struct P2 {
     double x, y;
@@ -813,8 +814,8 @@ bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Moti
     return true;
 }
 
-StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore,
-                                          double tolerance) const {
+StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore, double tolerance,
+                                          std::atomic<double>* known) const {
     Found found;
     Search search;
     const Cutter& cutter = search.cutter = {form, radius, z_top - kSheet};
@@ -838,7 +839,9 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
     };
     for (std::size_t m = 0; m < motions.size();) {
         // Only what is deeper than all before can change the maximum; but every motion beyond the tolerance is to be found.
-        const double floor = std::max(ignore, std::min(found.most.depth, tolerance));
+        // Of equal ones in other rows this may be the first.
+        const double deep = std::max(found.most.depth, known ? known->load(std::memory_order_relaxed) - kEqual : 0.0);
+        const double floor = std::max(ignore, std::min(deep, tolerance));
         const auto& [from, to] = motions[m];
         if (radius <= floor || std::min(from[2], to[2]) >= cutter.top - floor) {
             ++m;
@@ -869,7 +872,12 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
             }
         }
         p = motion_depth(cutter, from, to, floor, covered_at, look);
-        if (p.found && p.depth > found.most.depth) found.most = p, found.motion = m;
+        if (p.found && p.depth > found.most.depth) {
+            found.most = p, found.motion = m;
+            if (known)
+                for (double most = known->load(std::memory_order_relaxed); p.depth > most;)
+                    if (known->compare_exchange_weak(most, p.depth, std::memory_order_relaxed)) break;
+        }
         if (p.found && p.depth > tolerance) found.beyond.push_back(static_cast<std::uint32_t>(m));
         ++m;
     }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -63,7 +64,10 @@ public:
     /// The same for a row of motions, best for such as follow one another closely: what of the part is near is looked for once for many.
     /// @param ignore depths up to this are not looked for (0 or more), mm
     /// @param tolerance every motion deeper than this is found, of the others only those that are deeper than all before, mm
-    [[nodiscard]] Found deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore, double tolerance) const;
+    /// @param known of a ball: the greatest depth of rows that are checked together, each with this. Only what may be the greatest of all is found
+    ///        then, and is the same in whichever order they are. (A cylinder's depth differs in its last digits with what is known.)
+    [[nodiscard]] Found deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore, double tolerance,
+                                std::atomic<double>* known = nullptr) const;
 
     /// Whether there is part just under the plane z at (x, y).
     [[nodiscard]] bool covered(double x, double y, double z) const;
