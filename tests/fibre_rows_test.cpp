@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <random>
 
 #include "kernels/parallel/context.h"
@@ -39,7 +40,7 @@ void meet(const SolidFacet& f, double r, double zc, const Row& v, HullRows& hull
         capsule_rows({a[0], a[1], zc - a[2], b[0], b[1], zc - b[2], r}, v.data(), kLinesTogether, hull.low.data(), hull.high.data(),
                      hull.nz_low.data(), hull.nz_high.data());
     }
-    prism_rows(prism, v.data(), kLinesTogether, hull.low.data(), hull.high.data(), hull.nz_low.data(), hull.nz_high.data());
+    if (n != Vec3d{0, 0, 0}) prism_rows(prism, v.data(), kLinesTogether, hull.low.data(), hull.high.data(), hull.nz_low.data(), hull.nz_high.data());
 }
 
 TEST(FibreRows, FacetsAndGroupsForbidNoMoreThanIsSaid) {
@@ -111,6 +112,90 @@ TEST(FibreRows, FacetsAndGroupsForbidNoMoreThanIsSaid) {
     EXPECT_GT(met, 100'000U);
     EXPECT_GT(narrowed, met / 4);
     EXPECT_GT(clipped, 1000U);
+}
+
+// All facets of a group at once, against what each of them forbids; some overhang, and the last group has fewer.
+TEST(FibreRows, FacetsOfAGroupForbidNoMoreThanIsSaid) {
+    std::mt19937 random(test::seed());
+    auto within = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+    Context context;
+    std::size_t met = 0, covered = 0, left_out = 0;
+    auto rows = std::make_unique<GroupRows>();
+    for (int round = 0; round < 3000; ++round) {
+        const double r = within(0.5, 5), size = r * std::pow(10, within(-2, 1)), steep = within(0, 3), away = within(-800, 800);
+        const double zc = within(-1.2, 1.2) * r;
+        const std::array<double, 2> slope{within(-1, 1) * steep, within(-1, 1) * steep};
+        std::vector<SolidFacet> facets(round % 3 == 0 ? 5 : FacetGroup::kFacets);
+        for (SolidFacet& f : facets) {
+            for (Vec3d& p : f.p) {
+                p = {away + size * within(-1, 1), size * within(-1, 1), 0};
+                p[2] = slope[0] * (p[0] - away) + slope[1] * p[1] + 0.1 * size * within(-1, 1);
+            }
+            if (random() % 8 == 0) f.p[1][2] = f.p[0][2];
+            if (random() % 16 == 0) f.p[2] = f.p[1];
+            const Vec3d a{f.p[1][0] - f.p[0][0], f.p[1][1] - f.p[0][1], f.p[1][2] - f.p[0][2]},
+                b{f.p[2][0] - f.p[0][0], f.p[2][1] - f.p[0][1], f.p[2][2] - f.p[0][2]};
+            f.normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+            const double length = std::hypot(f.normal[0], f.normal[1], f.normal[2]);
+            if (length > 0)
+                for (double& n : f.normal) n /= length;
+            f.nz = static_cast<float>(f.normal[2]);
+            f.z_min = std::min({f.p[0][2], f.p[1][2], f.p[2][2]});
+            f.z_max = std::max({f.p[0][2], f.p[1][2], f.p[2][2]});
+        }
+        const std::size_t u = random() % 2, axis = 1 - u;
+        const double middle_v = axis == 0 ? away : 0;
+        Row v{};
+        for (std::size_t i = 0; i < v.size(); ++i) v[i] = middle_v + (static_cast<double>(i) - 31.5) * 1.2 * (r + size) / 32;
+        CoverRows cover = nothing_covered();
+        if (round % 2 == 1)
+            for (std::size_t i = 0; i < v.size(); ++i) {
+                cover.low[i] = (u == 0 ? away : 0) - within(0, 1.5) * r;
+                cover.high[i] = cover.low[i] + within(0, 3) * r;
+            }
+        alignas(64) std::array<std::int64_t, kLinesTogether> state{};
+        for (std::int64_t& s : state) s = random() % 8 == 0 ? 0 : kReachesOut;
+        const std::vector<FacetGroup> groups = facet_groups(context, facets);
+        const std::vector<GroupCorners> corners = group_corners(context, facets, groups);
+        group_out_rows(corners.front(), groups.front(), u, r, zc, cover, v.data(), 3, 61, state.data(), *rows);
+        for (std::size_t k = facets.size(); k < FacetGroup::kFacets; ++k) ASSERT_GE(rows->first[k], rows->last[k]);
+        for (std::size_t k = 0; k < facets.size(); ++k) {
+            SolidFacet f = facets[k];
+            left_out += rows->first[k] >= rows->last[k];
+            if (u == 1) {  // meet() is for lines along x
+                for (Vec3d& p : f.p) std::swap(p[0], p[1]);
+                std::swap(f.normal[0], f.normal[1]);
+            }
+            HullRows hull{};
+            hull.low.fill(kInfinity);
+            hull.high.fill(-kInfinity);
+            if (f.z_max > zc - r && f.z_min <= zc) meet(f, r, zc, v, hull);
+            if (f.nz < 0 && f.z_max > zc) {  // its shadow: here of its corners and edges that lie above
+                for (std::size_t c = 0; c < 3; ++c) {
+                    const Vec3d &a = f.p[c], &b = f.p[(c + 1) % 3];
+                    if (a[2] > zc && b[2] > zc)
+                        capsule_rows({a[0], a[1], 0, b[0], b[1], 0, r, f.nz}, v.data(), kLinesTogether, hull.low.data(), hull.high.data(),
+                                     hull.nz_low.data(), hull.nz_high.data());
+                }
+            }
+            const double middle_u = groups.front().middle[u];
+            for (std::size_t i = 3; i < 61; ++i) {
+                if (state[i] == 0 || !(hull.low[i] < hull.high[i])) continue;
+                ++met;
+                ASSERT_LE(rows->low[i][k] + middle_u, hull.low[i]) << "round " << round;
+                ASSERT_GE(rows->high[i][k] + middle_u, hull.high[i]) << "round " << round;
+                if (cover.low[i] <= hull.low[i] && hull.high[i] <= cover.high[i]) {
+                    ++covered;
+                    continue;
+                }
+                ASSERT_LE(rows->first[k], static_cast<int>(i)) << "round " << round;
+                ASSERT_GT(rows->last[k], static_cast<int>(i)) << "round " << round;
+            }
+        }
+    }
+    EXPECT_GT(met, 100'000U);
+    EXPECT_GT(covered, 1000U);
+    EXPECT_GT(left_out, 1000U);
 }
 
 TEST(FibreRows, WhatReachesOutOfTheCoverIsTold) {

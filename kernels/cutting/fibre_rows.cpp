@@ -263,4 +263,79 @@ SLABWRIGHT_WIDE std::int64_t disc_out_rows(const BoxTerms& b, const DiscTerms& t
     return out(cover, low, high, first, n, state + first);
 }
 
+// In floats, about the group's middle. What they round is less than a few of their last digits of r and of the facets' sizes, times ten where a
+// tangent is steep; a distance across is taken as so much less, and what is said as so much wider.
+SLABWRIGHT_WIDE void group_out_rows(const GroupCorners& g, const FacetGroup& group, std::size_t u_axis, double radius, double zc,
+                                    const CoverRows& cover, const double* v, int first, int last, const std::int64_t* state, GroupRows& rows) {
+    constexpr std::size_t n = GroupRows::kFacets;
+    constexpr auto inf = std::numeric_limits<float>::infinity();
+    using Each = std::array<float, n>;
+    const std::size_t v_axis = 1 - u_axis;
+    const double mu = group.middle[u_axis], mv = group.middle[v_axis];
+    const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]), r2 = r * r;
+    const float wider = 3e-5F * (r + group.radius + group.thickness), least = static_cast<float>(kTangentLeast) * r2, more = r2 * 1e-5F;
+    const auto &ua = g.p[0][u_axis], &ub = g.p[1][u_axis], &uc = g.p[2][u_axis];
+    const auto &va = g.p[0][v_axis], &vb = g.p[1][v_axis], &vc = g.p[2][v_axis];
+    alignas(32) Each u_low, u_high, v_low, v_high, box2, t_low, t_high, across, tz, tz2, da, db, dc;
+    for (std::size_t i = 0; i < n; ++i) {
+        const auto min = [](float a, float b) { return a < b ? a : b; };
+        const auto max = [](float a, float b) { return a > b ? a : b; };
+        const float za = g.p[0][2][i], zb = g.p[1][2][i], zd = g.p[2][2][i], low = min(za, min(zb, zd)), high = max(za, max(zb, zd));
+        const float at = z - r * g.normal[2][i], at_least = at > low ? at : low, touched = at_least < high ? at_least : high;
+        const bool level = (g.nz[i] < 0) & (high + wider > z), active = level | ((high + wider > z - r) & (low - wider <= z));
+        u_low[i] = min(ua[i], min(ub[i], uc[i])), u_high[i] = max(ua[i], max(ub[i], uc[i]));
+        v_low[i] = min(va[i], min(vb[i], vc[i])), v_high[i] = max(va[i], max(vb[i], vc[i]));
+        const float dz = max(0.0F, max(low - z, z - high)), over2 = level ? 0.0F : dz * dz;
+        box2[i] = active ? r2 - over2 + more : -1.0F;
+        // Where the facet's height is `touched`, at one of two edges at least.
+        float from = inf, to = -inf;
+        const auto edge = [&](float a, float b, float wa, float wb) {
+            const float d = b - a, s = (touched - a) / (d == 0 ? 1.0F : d), cut = wa + s * (wb - wa);
+            const bool meets = (min(a, b) <= touched) & (touched <= max(a, b));
+            from = meets & (cut < from) ? cut : from;
+            to = meets & (cut > to) ? cut : to;
+        };
+        edge(za, zb, va[i], vb[i]);
+        edge(zb, zd, vb[i], vc[i]);
+        edge(zd, za, vc[i], va[i]);
+        t_low[i] = from, t_high[i] = to;
+        across[i] = r * g.normal[v_axis][i];
+        tz[i] = z - touched;
+        tz2[i] = active & !level ? r2 - tz[i] * tz[i] : -1.0F;
+        da[i] = za - touched, db[i] = zb - touched, dc[i] = zd - touched;
+    }
+    alignas(32) std::array<std::int32_t, n> from_line, to_line;
+    from_line.fill(last), to_line.fill(first);
+    for (int l = first; l < last; ++l) {
+        if (state[l] == 0) {
+            rows.low[static_cast<std::size_t>(l)].fill(inf), rows.high[static_cast<std::size_t>(l)].fill(-inf);
+            continue;
+        }
+        const auto at = static_cast<float>(v[l] - mv), covered_from = static_cast<float>(cover.low[l] - mu),
+                   covered_to = static_cast<float>(cover.high[l] - mu);
+        float *const row_low = rows.low[static_cast<std::size_t>(l)].data(), *const row_high = rows.high[static_cast<std::size_t>(l)].data();
+        for (std::size_t i = 0; i < n; ++i) {
+            const float under = v_low[i] - at, over = at - v_high[i], off = under > over ? under : over, d = off > 0 ? off : 0;
+            const float reach2 = box2[i] - d * d, reach = std::sqrt(std::abs(reach2));
+            const float box_low = reach2 > 0 ? u_low[i] - reach : inf, box_high = reach2 > 0 ? u_high[i] + reach : -inf;
+            const float touched = at - across[i], at_least = touched < t_low[i] ? t_low[i] : touched,
+                        from = at_least < t_high[i] ? at_least : t_high[i];
+            const float w = at - from, q = tz2[i] - w * w;
+            const bool near = q > least;
+            const float h = std::sqrt(near ? q : 1.0F), inverse = 1 / h, sv = w * inverse, sz = tz[i] * inverse;
+            const float a = sv * (va[i] - from) + sz * da[i], b = sv * (vb[i] - from) + sz * db[i], c = sv * (vc[i] - from) + sz * dc[i];
+            float up = ua[i] + a, down = ua[i] - a;
+            up = ub[i] + b > up ? ub[i] + b : up, down = ub[i] - b < down ? ub[i] - b : down;
+            up = uc[i] + c > up ? uc[i] + c : up, down = uc[i] - c < down ? uc[i] - c : down;
+            const float high = (near & (up + h < box_high) ? up + h : box_high) + wider,
+                        low = (near & (down - h > box_low) ? down - h : box_low) - wider;
+            row_low[i] = low, row_high[i] = high;
+            const bool out = (low < high) & ((low < covered_from) | (high > covered_to));
+            from_line[i] = out & (l < from_line[i]) ? l : from_line[i];
+            to_line[i] = out ? l + 1 : to_line[i];
+        }
+    }
+    rows.first = from_line, rows.last = to_line;
+}
+
 }  // namespace slabwright

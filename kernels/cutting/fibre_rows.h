@@ -77,4 +77,16 @@ std::int64_t facet_out_rows(const BoxTerms& box, const TangentTerms& facet, cons
 std::int64_t disc_out_rows(const BoxTerms& box, const DiscTerms& disc, const CoverRows& cover, const double* v, int first, int last, double* low,
                            double* high, std::int64_t* state);
 
+/// How far the facets of a group may reach on each line, relative to the group's middle and rounded outward (low > high where one does not), and
+/// of each facet the lines, from the first to the last, on which that is out of what is covered.
+struct GroupRows {
+    static constexpr std::size_t kFacets = FacetGroup::kFacets;
+    alignas(64) std::array<std::array<float, kFacets>, kLinesTogether> low, high;
+    alignas(64) std::array<std::int32_t, kFacets> first, last;
+};
+/// For those of the lines [first, last) whose `state` is not 0: facet_out_rows() of all of a group's facets that a ball of radius r at height zc can
+/// touch, with box_out_rows() for those that overhang it.
+void group_out_rows(const GroupCorners& corners, const FacetGroup& group, std::size_t u, double r, double zc, const CoverRows& cover, const double* v,
+                    int first, int last, const std::int64_t* state, GroupRows& rows);
+
 }  // namespace slabwright

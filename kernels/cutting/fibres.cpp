@@ -150,13 +150,20 @@ public:
     void meet(std::span<const std::uint32_t> groups) {
         if (!ball_) return meet_disc(groups);
         for (std::size_t g = groups.size(); g-- > 0;) {  // of a wall the upper ones come first, which reach farthest
-            const LineRange lines = group_reaches_out(solid_.groups[groups[g]]);
+            const FacetGroup& group = solid_.groups[groups[g]];
+            const LineRange lines = group_reaches_out(group);
             if (!lines.any()) continue;
             const auto [first, last] = facets_of(groups[g]);
-            for (std::size_t i = first; i < last; ++i) {
-                const SolidFacet& f = solid_.facets[i];
-                if (active(f)) meet_facet(f, reaches_out(f, lines));
+            if (solid_.corners.empty()) {
+                for (std::size_t i = first; i < last; ++i) {
+                    const SolidFacet& f = solid_.facets[i];
+                    if (active(f)) meet_facet(f, reaches_out(f, lines));
+                }
+                continue;
             }
+            look_amid(lines);
+            group_out_rows(solid_.corners[groups[g]], group, U, r_, zc_, cover_, at_.data(), lines.first, lines.last, state_.data(), rows_);
+            for (std::size_t i = first; i < last; ++i) meet_facet(solid_.facets[i], still_out(i - first, group.middle[U]));
         }
     }
 
@@ -245,6 +252,26 @@ private:
 
     // Of these lines those, from the first to the last, on which [low_, high_] does.
     LineRange narrowed(LineRange lines) {
+        while (lines.any() && !out(lines.first)) ++lines.first;
+        while (lines.any() && !out(lines.last - 1)) --lines.last;
+        return lines;
+    }
+
+    // Where [low_, high_] reaches out, looks at the stretch that its middle may lie in: a group's facets mostly forbid what joins that.
+    void look_amid(LineRange lines) {
+        for (int l = lines.first; l < lines.last; ++l) {
+            const double middle = 0.5 * (low_[l] + high_[l]);
+            if (state_[l] != 0 && !(cover_.low[l] <= middle && middle < cover_.next[l])) look_at(l, middle);
+        }
+    }
+
+    // Of the lines on which one of a group's facets was said to reach out those, from the first to the last, on which it still does, now that
+    // others of the group are met. `middle` is the group's.
+    [[nodiscard]] LineRange still_out(std::size_t i, double middle) const {
+        LineRange lines{rows_.first[i], rows_.last[i]};
+        const auto out = [&](int l) {
+            return rows_.low[l][i] < static_cast<float>(cover_.low[l] - middle) || rows_.high[l][i] > static_cast<float>(cover_.high[l] - middle);
+        };
         while (lines.any() && !out(lines.first)) ++lines.first;
         while (lines.any() && !out(lines.last - 1)) --lines.last;
         return lines;
@@ -417,6 +444,7 @@ private:
     const int n_;
     alignas(64) std::array<double, kLinesTogether> at_{}, low_{}, high_{};
     HullRows hulls_;
+    GroupRows rows_;
     alignas(64) std::array<std::int64_t, kLinesTogether> state_{};
     std::array<std::vector<Forbidden>, kLinesTogether> found_;  // a ball's: ascending and disjoint
     CoverRows cover_;                                           // of a ball

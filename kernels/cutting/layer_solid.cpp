@@ -220,6 +220,25 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
     return groups;
 }
 
+std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups) {
+    constexpr float far_below = -1e15F;
+    std::vector<GroupCorners> corners(groups.size());
+    parallel_for(context, groups.size(), 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t g = begin; g < end; ++g) {
+            GroupCorners& to = corners[g];
+            for (std::size_t i = 0; i < FacetGroup::kFacets; ++i) {
+                const std::size_t f = g * FacetGroup::kFacets + i;
+                for (std::size_t k = 0; k < 3; ++k)
+                    for (std::size_t c = 0; c < 3; ++c)
+                        to.p[c][k][i] = f < facets.size() ? static_cast<float>(facets[f].p[c][k] - groups[g].middle[k]) : (k == 2 ? far_below : 0.0F);
+                for (std::size_t k = 0; k < 3; ++k) to.normal[k][i] = f < facets.size() ? static_cast<float>(facets[f].normal[k]) : 0.0F;
+                to.nz[i] = f < facets.size() ? facets[f].nz : 0.0F;
+            }
+        }
+    });
+    return corners;
+}
+
 LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_top) {
     LayerSolid solid;
     solid.z_low = z_low;
@@ -262,6 +281,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     solid.min = {extent[0], extent[1]};
     solid.max = {extent[2], extent[3]};
     solid.groups = facet_groups(context, solid.facets);
+    solid.corners = group_corners(context, solid.facets, solid.groups);
     solid.tree = facet_tree(context, solid.facets, solid.min, solid.max);
     return solid;
 }
@@ -303,6 +323,7 @@ LayerSolid solid_near(Context& context, const LayerSolid& solid, std::span<const
                            solid.facets.begin() + static_cast<std::ptrdiff_t>(last));
     }
     near.groups = facet_groups(context, near.facets);
+    near.corners = group_corners(context, near.facets, near.groups);
     return near;
 }
 

@@ -40,12 +40,24 @@ struct FacetGroup {
 /// Of each eight facets, in their order; the last may have fewer.
 [[nodiscard]] std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets);
 
+/// The same facets side by side, for tests of all of them at once: corners, each an x, y and z relative to the group's middle, and normals. Where
+/// a group has fewer facets, the others lie far below everything.
+struct GroupCorners {
+    template <class T>
+    using Each = std::array<T, FacetGroup::kFacets>;
+    alignas(32) std::array<std::array<Each<float>, 3>, 3> p;
+    alignas(32) std::array<Each<float>, 3> normal;
+    alignas(32) Each<float> nz;
+};
+[[nodiscard]] std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups);
+
 struct LayerSolid {
     double z_low = 0, z_top = 0;         ///< facets wholly below z_low are left out
     std::vector<SolidFacet> facets;      ///< in Morton order of the mesh's facets: neighbours in space are near in memory
     Loops cap;                           ///< the section kTopSheet below z_top: the solid's flat upper end
     std::array<double, 2> min{}, max{};  ///< of the facets, in x and y
     std::vector<FacetGroup> groups;      ///< of the facets, for fibres
+    std::vector<GroupCorners> corners;   ///< of the groups; none: fibres look at each facet by itself
     FacetTree tree;                      ///< of the facets, for drops
     CapCells cap_cells;                  ///< of the cap
 };
