@@ -12,6 +12,7 @@
 
 #include "kernels/access/closest_point.h"
 #include "kernels/access/standing_part.h"
+#include "kernels/mesh/weld.h"
 #include "tests/support/seed.h"
 
 using namespace slabwright;
@@ -489,6 +490,7 @@ TEST(StandingPart, EnvelopeByGridOfFacetsThatDoNotClose) {
     const Mesh open = apart([](std::size_t f) { return f % 7 != 3; });
     Mesh torn = closed;
     torn.facets.erase(torn.facets.begin() + 50);
+    pair_edges(context, torn);
     const int nx = 53, ny = 41;
     const auto grid_of = [&](const Mesh& m, const StandingPart& part, double z_top) {
         std::vector<float> grid(static_cast<std::size_t>(nx) * ny);

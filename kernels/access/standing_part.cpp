@@ -264,30 +264,18 @@ Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& tri, double
     return result;
 }
 
-/// Whether every edge is gone along as often one way as the other, so that the facets together wind around nothing. The sum of random numbers for
-/// edges, added one way and taken off the other, is 0 then, and hardly ever else.
-bool edges_cancel(Context& context, MeshView mesh) {
-    const auto mixed = [](std::uint64_t v) {
-        v = (v ^ (v >> 30)) * 0xBF58476D1CE4E5B9u;
-        v = (v ^ (v >> 27)) * 0x94D049BB133111EBu;
-        return v ^ (v >> 31);
-    };
-    const auto edge = [&](std::uint32_t a, std::uint32_t b) {
-        if (a == b) return std::uint64_t{0};
-        const std::uint64_t number = mixed((std::uint64_t{std::min(a, b)} << 32 | std::max(a, b)) + 0x9E3779B97F4A7C15u);
-        return a < b ? number : ~number + 1;
-    };
+/// Whether the mesh is known to close: every edge is gone along as often one way as the other, so that the facets together wind around nothing.
+bool closes(Context& context, MeshView mesh) {
+    if (mesh.neighbours.size() != mesh.size()) return false;
     return parallel_reduce(
-               context, mesh.size(), 1 << 14, std::uint64_t{0},
-               [&](std::size_t begin, std::size_t end) {
-                   std::uint64_t sum = 0;
-                   for (std::size_t i = begin; i < end; ++i) {
-                       const Index3& f = mesh.facets[i];
-                       sum += edge(f[0], f[1]) + edge(f[1], f[2]) + edge(f[2], f[0]);
-                   }
-                   return sum;
-               },
-               [](std::uint64_t a, std::uint64_t b) { return a + b; }) == 0;
+        context, mesh.size(), 1 << 14, true,
+        [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i)
+                for (std::size_t k = 0; k < 3; ++k)
+                    if (mesh.neighbours[i][k] == kNoFacet && mesh.facets[i][k] != mesh.facets[i][(k + 1) % 3]) return false;
+            return true;
+        },
+        [](bool a, bool b) { return a && b; });
 }
 
 }  // namespace
@@ -307,7 +295,7 @@ void StandingPart::Facets::end() {
 StandingPart::StandingPart(Context& context, MeshView mesh) {
     const std::size_t n = mesh.size();
     box_ = bounds(mesh);
-    closed_ = edges_cancel(context, mesh);
+    closed_ = closes(context, mesh);
     const MortonGrid grid(box_);
     // A key is as much of the Morton number as fits beside the facet's own.
     const unsigned facet_bits = static_cast<unsigned>(std::bit_width(std::max<std::size_t>(n, 1))), drop = facet_bits - 1;  // of the number's 63 bits

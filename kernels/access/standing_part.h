@@ -160,7 +160,7 @@ private:
     Facets facets_;                          ///< in Morton order
     std::vector<BulkVector<Nodes>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
     Box3 box_{};
-    bool closed_ = false;  ///< every edge is gone along as often one way as the other
+    bool closed_ = false;  ///< by its neighbours: every edge is gone along as often one way as the other
 };
 
 /// The envelope (StandingPart::envelope) over a grid of nx × ny points (x0 + i·cell, y0 + j·cell), row j after row j − 1, for planes that
