@@ -84,34 +84,102 @@ int half_width(double radius_cells, int dy) {
     return rest < 0 ? -1 : static_cast<int>(std::floor(std::sqrt(rest) + 1e-9));
 }
 
-// Every cell whose middle lies within the radius of some cell's middle; rows and cells from 0, as many as before.
+// The cells of one row, a bit each.
+class RowBits {
+public:
+    void clear(int cells) { words_.assign(slot(cells) / 64 + 1, 0); }
+    void set(std::int32_t low, std::int32_t high) {
+        const std::size_t first = slot(low) / 64, last = slot(high) / 64;
+        const std::uint64_t from = ~std::uint64_t{0} << (low % 64), to = ~std::uint64_t{0} >> (63 - high % 64);
+        if (first == last) {
+            words_[first] |= from & to;
+            return;
+        }
+        words_[first] |= from;
+        for (std::size_t w = first + 1; w < last; ++w) words_[w] = ~std::uint64_t{0};
+        words_[last] |= to;
+    }
+    void append_spans(std::vector<std::array<std::int32_t, 2>>& out) const {
+        for (std::int32_t begin = next(0, 0); begin >= 0;) {
+            const std::int32_t end = next(begin, ~std::uint64_t{0});  // the last bit is never set
+            out.push_back({begin, end - 1});
+            begin = next(end, 0);
+        }
+    }
+
+private:
+    // The first cell from i on that is not as `same` has them; −1 where there is none.
+    [[nodiscard]] std::int32_t next(std::int32_t i, std::uint64_t same) const {
+        std::size_t w = slot(i) / 64;
+        std::uint64_t other = (words_[w] ^ same) & (~std::uint64_t{0} << (i % 64));
+        while (other == 0)
+            if (++w == words_.size()) return -1;
+            else other = words_[w] ^ same;
+        return static_cast<std::int32_t>(w * 64) + std::countr_zero(other);
+    }
+    std::vector<std::uint64_t> words_;
+};
+
+// What each row holds beyond the row before it (`step` −1) or behind it (1).
+struct FreshRows {
+    struct Run {
+        std::int32_t low, high;
+        std::int32_t lead;  // no cell is farther from the nearest one of the other row, if that has cells right beside the run
+    };
+    std::vector<std::uint32_t> starts{0};
+    std::vector<Run> runs;
+    [[nodiscard]] std::span<const Run> row(std::size_t j) const { return std::span(runs).subspan(starts[j], starts[j + 1] - starts[j]); }
+};
+
+FreshRows fresh_rows(const CellRows& rows, int step) {
+    FreshRows fresh;
+    fresh.starts.reserve(rows.rows() + 1);
+    std::vector<std::array<std::int32_t, 2>> rest;
+    for (std::size_t j = 0; j < rows.rows(); ++j) {
+        const bool outermost = step < 0 ? j == 0 : j + 1 == rows.rows();
+        const Spans nearer = outermost ? Spans{} : rows.row(step < 0 ? j - 1 : j + 1);
+        std::size_t from = 0;
+        for (const auto& s : rows.row(j)) {
+            while (from < nearer.size() && nearer[from][1] < s[0] - 1) ++from;
+            rest.clear();
+            append_rest(nearer.subspan(from), s[0], s[1], rest);
+            std::size_t at = from;
+            for (const auto& r : rest) {
+                while (at < nearer.size() && nearer[at][1] < r[0] - 1) ++at;
+                const bool before = at < nearer.size() && nearer[at][1] == r[0] - 1;
+                const std::size_t next = before ? at + 1 : at;
+                const bool behind = next < nearer.size() && nearer[next][0] == r[1] + 1;
+                fresh.runs.push_back({r[0], r[1], before || behind ? r[1] - r[0] + 1 : INT32_MAX});
+            }
+        }
+        fresh.starts.push_back(static_cast<std::uint32_t>(fresh.runs.size()));
+    }
+    return fresh;
+}
+
+// Every cell whose middle lies within the radius of some cell's middle; rows and cells from 0, as many as before. A cell that the next nearer row
+// holds as well reaches no farther than that one, nor does one that leads it by no more than the disc is narrower here.
 CellRows grown(Context& context, const CellRows& rows, double radius_cells, int nx) {
     const int reach = static_cast<int>(std::floor(radius_cells + 1e-9)), n = static_cast<int>(rows.rows());
     std::vector<int> width;
     for (int dy = 0; dy <= reach; ++dy) width.push_back(half_width(radius_cells, dy));
+    const FreshRows upwards = fresh_rows(rows, 1), downwards = fresh_rows(rows, -1);
     return make_rows(context, rows.rows(), [&](std::size_t row, std::vector<std::array<std::int32_t, 2>>& out) {
         const int j = static_cast<int>(row);
-        static thread_local std::vector<std::int32_t> change;
-        change.assign(static_cast<std::size_t>(nx) + 1, 0);
-        bool any = false;
-        for (int dy = -reach; dy <= reach; ++dy) {
-            if (j + dy < 0 || j + dy >= n) continue;
-            const int w = width[static_cast<std::size_t>(std::abs(dy))];
-            for (const auto& s : rows.row(slot(j + dy))) {
-                ++change[static_cast<std::size_t>(std::max(0, s[0] - w))];
-                --change[static_cast<std::size_t>(std::min(nx, s[1] + w + 1))];
-                any = true;
-            }
+        static thread_local RowBits bits;
+        bits.clear(nx);
+        const auto add = [&](std::int32_t low, std::int32_t high, int w) { bits.set(std::max(0, low - w), std::min(nx - 1, high + w)); };
+        for (const auto& s : rows.row(row)) add(s[0], s[1], width[0]);
+        for (int dy = 1; dy <= reach; ++dy) {
+            const int w = width[slot(dy)], narrower = width[slot(dy - 1)] - w;
+            const auto grow = [&](std::span<const FreshRows::Run> runs) {
+                for (const FreshRows::Run& r : runs)
+                    if (r.lead > narrower) add(r.low, r.high, w);
+            };
+            if (j - dy >= 0) grow(upwards.row(slot(j - dy)));
+            if (j + dy < n) grow(downwards.row(slot(j + dy)));
         }
-        if (!any) return;
-        std::int32_t depth = 0, begin = 0;
-        for (std::int32_t i = 0; i <= nx; ++i) {
-            const std::int32_t before = depth;
-            depth += change[static_cast<std::size_t>(i)];
-            if (before == 0 && depth > 0) begin = i;
-            else if (before > 0 && depth == 0) out.push_back({begin, i - 1});
-        }
-        if (depth > 0) out.push_back({begin, nx - 1});
+        bits.append_spans(out);
     });
 }
 
