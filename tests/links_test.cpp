@@ -239,6 +239,24 @@ TEST(Links, AHelixLeadsIntoStockOnTheFreeSideOnly) {
     EXPECT_TRUE(bench.cut.no_way_in.empty());
 }
 
+// A ball that keeps an allowance asks a wider one, whose tip lies lower by what it is wider.
+TEST(Links, ABallKeepsItsAllowanceOverWhatLiesFlat) {
+    constexpr double kAllowance = 0.3;
+    for (const double over : {0.2, 0.25, 0.35}) {
+        Bench bench;
+        bench.tool.kind = ToolKind::ball;
+        const DropIndex wider(bench.cut.solid, {Cutter::Profile::ball, 5 + kAllowance});
+        PathBuilder path(bench.operation, bench.tool, 3000, kClearance, kLink);
+        path.know(bench.cut.around(bench.tool, &wider));
+        path.follow(line(-9, 10, -8, 10, kTop + over));
+        const std::size_t before = bench.operation.moves.size();
+        path.follow(line(28, 11, 29, 12, kTop + over));
+        const double highest = bench.highest(before, bench.operation.moves.size());
+        if (over > kAllowance) EXPECT_EQ(highest, kTop + over);
+        else EXPECT_GT(highest, kTop + kAllowance) << over;
+    }
+}
+
 TEST(Links, ARunWithoutRoomIsLeftByAToolThatDoesNotPlunge) {
     for (const bool plunges : {false, true}) {
         Bench bench;
