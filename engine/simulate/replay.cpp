@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kBandRows = 24;          // of the stock: bands are cut in parallel, and joined in their order
 constexpr double kLeastVolume = 1e-6;  // mm³ that a piece must take to count as cutting
+constexpr double kForceShare = 1e-4;   // of a piece's force that it may be wrong by: it is drawn, and read to a hundredth of a newton
 
 CutterEnd cutter_end(const Tool& tool) {
     const double radius = tool.diameter / 2;
@@ -48,7 +49,7 @@ void rate(ReplayPiece& piece, const Tool& tool, const Material& m, double feed, 
     // A ball that cuts less deep than its radius is as wide as its circle at that depth.
     const bool cap = s.profile == CutterProfile::ball && s.high_mm < radius;
     s.arc = engagement_arc(cap ? std::sqrt(s.high_mm * (2 * radius - s.high_mm)) : radius, piece.width_mm, MillingSense::up);
-    const CutForce force = peak_force(s);
+    const CutForce force = peak_force(s, kForceShare);
     piece.force_n = force.peak_resultant_n;
     piece.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, tool.diameter);
 }

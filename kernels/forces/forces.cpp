@@ -23,8 +23,7 @@ EngagementArc engagement_arc(double radius, double width, MillingSense sense) {
     return {std::numbers::pi - arc, std::numbers::pi};
 }
 
-CutForce peak_force(const CutSegment& segment) {
-    constexpr double accuracy = 1e-5;
+CutForce peak_force(const CutSegment& segment, double accuracy) {
     const SegmentForces f = segment.profile == CutterProfile::flat ? closed_form_forces(segment, accuracy) : reference_forces(segment, accuracy);
     return {f.peak_resultant_n, f.peak_z_n, f.peak_torque_nmm, f.mean_power_w, f.peak_in_plane_n};
 }

@@ -105,8 +105,9 @@ struct CutForce {
     double peak_in_plane_n = 0;
 };
 
-/// From the closed form (flat) or the reference (ball), to 1e-5: the same digits on every device.
-[[nodiscard]] CutForce peak_force(const CutSegment& segment);
+/// From the closed form (flat) or the reference (ball): the same digits on every device.
+/// @param accuracy share of themselves to which peaks are found; time grows as one over its root
+[[nodiscard]] CutForce peak_force(const CutSegment& segment, double accuracy = 1e-5);
 
 /// Forces of many cuts, on an OpenCL device where there is one that passes a self-test, else by reference and closed form
 /// on the context's threads. The device's single precision differs from the reference by less than 1e-4 of a segment's
