@@ -103,7 +103,7 @@ TEST(Loose, AgreesWithFillingAfterEveryMove) {
         const double gx = at() + 0.03, gy = at() + 0.03;
         slab.glued = rectangle(gx, gy, gx + 6, gy + 6);
         Tool tool;
-        tool.number = 1, tool.diameter = 3;
+        tool.number = 1, tool.diameter = 3.0137;  // no border through the middle of a cell either
         Operation op;
         op.kind = OperationKind::rough, op.tool = 1;
         for (int k = 0; k < 40; ++k) {
