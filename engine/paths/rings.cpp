@@ -117,6 +117,8 @@ bool nearer(const RingPlan::Piece& piece, Point2 from, bool either_end, Start& b
         const PathPoint &a = piece.points[k], &b = piece.points[k + 1];
         const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y, l2 = dx * dx + dy * dy;
         const double t = l2 > 0 ? std::clamp(((static_cast<double>(q.x) - a.x) * dx + (static_cast<double>(q.y) - a.y) * dy) / l2, 0.0, 1.0) : 0;
+        const double ex = a.x + t * dx - q.x, ey = a.y + t * dy - q.y, reach = best.way + 1;  // a unit more: the place is rounded
+        if (ex * ex + ey * ey > reach * reach) continue;
         offer(k, {static_cast<std::int32_t>(std::lround(a.x + t * dx)), static_cast<std::int32_t>(std::lround(a.y + t * dy)), a.z}, false);
     }
     return found;
@@ -248,15 +250,32 @@ void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_
 
 namespace {
 
+// The point of a loop at which it turns most: where a loop is thinned, its first point stays.
+std::size_t sharpest(std::span<const Point2> loop) {
+    std::size_t best = 0;
+    double least = 2;  // cosine of the turn
+    const Point2 *a = &loop[loop.size() - 1], *b = &loop[0];
+    double ux = static_cast<double>(b->x) - a->x, uy = static_cast<double>(b->y) - a->y, u2 = ux * ux + uy * uy;
+    for (std::size_t k = 0; k < loop.size(); ++k) {
+        const Point2& c = loop[k + 1 < loop.size() ? k + 1 : 0];
+        const double vx = static_cast<double>(c.x) - b->x, vy = static_cast<double>(c.y) - b->y, v2 = vx * vx + vy * vy;
+        if (u2 > 0 && v2 > 0)
+            if (const double cosine = (ux * vx + uy * vy) / std::sqrt(u2 * v2); cosine < least) least = cosine, best = k;
+        b = &c, ux = vx, uy = vy, u2 = v2;
+    }
+    return best;
+}
+
 // The region's loops with fewer points (0.1 µm). Small loops stay as they are.
 Loops thinned(const Loops& region, double fine, double loose, double turn) {
     Loops result;
     std::vector<PathPoint> line;
     for (std::size_t l = 0; l < region.size(); ++l) {
+        const std::span<const Point2> loop = region.loop(l);
+        if (loop.empty()) continue;
         line.clear();
-        for (const Point2 p : region.loop(l)) line.push_back({p.x, p.y, 0});
-        if (line.empty()) continue;
-        line.push_back(line.front());
+        const std::size_t first = sharpest(loop);
+        for (std::size_t k = 0; k <= loop.size(); ++k) line.push_back({loop[(first + k) % loop.size()].x, loop[(first + k) % loop.size()].y, 0});
         if (std::vector<PathPoint> fewer = simplify(line, fine, loose, turn); fewer.size() > 3) line = std::move(fewer);
         for (std::size_t k = 0; k + 1 < line.size(); ++k) result.points.push_back({line[k].x, line[k].y});
         result.close_loop();
@@ -313,7 +332,7 @@ void cut_frames(PathBuilder& path, const RingPlan& plan) {
 // Where the middle of a cutter of radius `r` is of use on what stands in a rectangle (smallest x and y, largest x and y), mm.
 Loops useful_area(const LayerCut& cut, double r, const std::array<double, 4>& stands) {
     const double far = r + 2;
-    return intersect(offset(rectangle(stands[0], stands[1], stands[2], stands[3]), r + kBeside, kFineRing),
+    return intersect(offset_outline(rectangle(stands[0], stands[1], stands[2], stands[3]), r + kBeside, kFineRing),
                      rectangle(cut.low(0, far), cut.low(1, far), cut.high(0, far), cut.high(1, far)));
 }
 
@@ -327,21 +346,21 @@ struct Thinning {
     [[nodiscard]] Loops of(const Loops& region) const { return thinned(region, fine * kUnitsPerMm, loose * kUnitsPerMm, turn); }
 };
 
-// How far a place lies from a line, 0.1 µm.
-double distance(const PathPoint& p, std::span<const PathPoint> line) {
-    double least = 1e300;
+// Whether a place lies nearer to a line than `reach`, 0.1 µm.
+bool near_line(const PathPoint& p, std::span<const PathPoint> line, double reach) {
     for (std::size_t k = 1; k < line.size(); ++k) {
         const double ax = line[k - 1].x, ay = line[k - 1].y, dx = line[k].x - ax, dy = line[k].y - ay, l2 = dx * dx + dy * dy;
         const double t = l2 > 0 ? std::clamp(((p.x - ax) * dx + (p.y - ay) * dy) / l2, 0.0, 1.0) : 0;
-        least = std::min(least, std::hypot(p.x - ax - t * dx, p.y - ay - t * dy));
+        const double ex = p.x - ax - t * dx, ey = p.y - ay - t * dy;
+        if (ex * ex + ey * ey < reach * reach) return true;
     }
-    return least;
+    return false;
 }
 
 // Rectangles from `stands` (smallest x and y, largest x and y, mm) inwards, with the stock on their right, as far as they lie outside of the
 // rings next to the forbidden region. False, and none, where these would cut them to pieces.
 bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, const Loops& forbidden, const Loops& useful) {
-    const Loops outside = subtract(useful, offset(forbidden, kRingsBesideStrips * plan.step, kFineRing));
+    const Loops outside = subtract(useful, offset_outline(forbidden, kRingsBesideStrips * plan.step, kFineRing));
     Loops around;
     const double narrow = std::min(stands[2] - stands[0], stands[3] - stands[1]);
     for (int k = 1; 2 * (k - 1) * plan.step < narrow; ++k) {
@@ -408,7 +427,7 @@ void append_rings(RingPlan& plan, const LayerCut& cut, const Thinning& thinning,
         }
         if (plan.pieces.size() == first && ring > 0) return;
         cut.context.throw_if_cancelled();
-        region = thinning.of(offset(region, plan.step, kFineRing));
+        region = thinning.of(offset_outline(region, plan.step, kFineRing));
     }
 }
 
@@ -485,7 +504,7 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
         nearer_boxes = boxes_of(free);
         nearer_free = std::move(free);
         nearer_region = std::move(region_of);
-        region = thinning.of(offset(region, plan.step, kFineRing));
+        region = thinning.of(offset_outline(region, plan.step, kFineRing));
         cut.context.throw_if_cancelled();
     }
     return plan;
@@ -571,7 +590,7 @@ private:
         auto near = [&](const RingPlan::Piece& from, const RingPlan::Piece& to) {
             return std::any_of(from.points.begin(), from.points.end(), [&](const PathPoint& p) {
                 return p.x >= to.box[0] - reach && p.x <= to.box[2] + reach && p.y >= to.box[1] - reach && p.y <= to.box[3] + reach &&
-                       distance(p, to.points) < reach;
+                       near_line(p, to.points, reach);
             });
         };
         return near(a, b) || near(b, a);

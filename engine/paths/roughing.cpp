@@ -174,8 +174,8 @@ Operation rough_layer(const LayerCut& cut) {
         const double tip = steps[i].level.tip;
         if (const std::size_t floor = steps[i].floor; floor != i) {
             const double width = least_width(steps[i], steps[floor], cut.job.tolerances.rough_cusp);
-            cuts[i].rings = plan_terrace(cut, tool, forbidden_at[i], offset(forbidden_at[floor], -width, kOffsetError),
-                                         offset(forbidden_at[i - 1], -kMoreThanStep, kOffsetError), tip, op.blend);
+            cuts[i].rings = plan_terrace(cut, tool, forbidden_at[i], offset_outline(forbidden_at[floor], -width, kOffsetError),
+                                         offset_outline(forbidden_at[i - 1], -kMoreThanStep, kOffsetError), tip, op.blend);
             return;
         }
         if (i == last || contour) {

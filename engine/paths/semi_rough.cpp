@@ -122,20 +122,22 @@ public:
     [[nodiscard]] const std::vector<std::array<int, 2>>& cells() const { return cells_; }
 
     // Whether a cutter whose middle is here meets some that still stand; a ball, some that it lowers by enough.
-    [[nodiscard]] bool met(double x, double y) const {
+    [[nodiscard]] bool met(double x, double y) {
         const CellGrid& grid = stock_.grid();
         const auto cell = [&](double at, double from, int n) { return static_cast<int>(std::clamp((at - from) / grid.cell + 0.5, 0.0, n - 1.0)); };
         if (!near_[tile(cell(x, grid.x0, grid.nx), cell(y, grid.y0, grid.ny))]) return false;
         const double r = std::max(radius_ - kEdge, radius_ / 2);
+        if (meets_as_before(x, y, r)) return true;
         const int j0 = std::max(0, static_cast<int>(std::ceil((y - r - grid.y0) / grid.cell)));
         const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + r - grid.y0) / grid.cell)));
         const int i0 = std::max(0, static_cast<int>(std::ceil((x - r - grid.x0) / grid.cell)));
         const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + r - grid.x0) / grid.cell)));
         int found = 0;
+        std::array<std::array<int, 2>, kFewCells> cells;
         for (int tj = j0 / kTile; tj <= j1 / kTile && j0 <= j1; ++tj)
             for (int ti = i0 / kTile; ti <= i1 / kTile && i0 <= i1; ++ti) {
                 if (!tiles_[static_cast<std::size_t>(tj) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(ti)]) continue;
-                const std::uint16_t* const rows = &marked_[row_of(ti * kTile, tj * kTile)];
+                std::uint16_t* const rows = &marked_[row_of(ti * kTile, tj * kTile)];
                 for (int j = std::max(j0, tj * kTile); j <= std::min(j1, tj * kTile + kTile - 1); ++j) {
                     if (rows[j % kTile] == 0) continue;
                     const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, r * r - dy * dy));
@@ -146,9 +148,15 @@ public:
                     for (std::uint32_t left = rows[j % kTile] & asked; left != 0; left &= left - 1) {
                         const int i = ti * kTile + std::countr_zero(left);
                         const std::size_t c = grid.index(i, j);
-                        if (stock_.height(c) <= tip_ + kStands) continue;
+                        if (stock_.height(c) <= tip_ + kStands || (ball_ && !lowers_enough(c, 0))) {
+                            rows[j % kTile] &= static_cast<std::uint16_t>(~(left & -left));  // nor does any place of the level lower it
+                            continue;
+                        }
                         if (ball_ && !lowers_enough(c, (grid.x(i) - x) * (grid.x(i) - x) + dy * dy)) continue;
-                        if (++found >= kFewCells) return true;
+                        cells[static_cast<std::size_t>(found)] = {i, j};
+                        if (++found < kFewCells) continue;
+                        met_ = cells;
+                        return true;
                     }
                 }
             }
@@ -167,6 +175,19 @@ private:
         if (stock_.surface(c) >= most || tip_ >= most) return false;
         return tip_ + radius_ - std::sqrt(std::max(0.0, radius_ * radius_ - away2)) < most;
     }
+    // Whether those that were met last are met here too: places follow each other along a ring.
+    [[nodiscard]] bool meets_as_before(double x, double y, double r) const {
+        const CellGrid& grid = stock_.grid();
+        const double within = r - 1e-6;  // mm: what rounding decides is left to met()
+        return std::all_of(met_.begin(), met_.end(), [&](const std::array<int, 2>& cell) {
+            const auto [i, j] = cell;
+            if (i < 0 || (marked_[row_of(i, j)] >> (i % kTile) & 1) == 0) return false;
+            const double dx = grid.x(i) - x, dy = grid.y(j) - y, away2 = dx * dx + dy * dy;
+            if (away2 > within * within) return false;
+            const std::size_t c = grid.index(i, j);
+            return stock_.height(c) > tip_ + kStands && (!ball_ || lowers_enough(c, away2));
+        });
+    }
     // A cutter whose middle is in one of the tiles around may meet what is in this one.
     void come_near(int ti, int tj) {
         const int tiles_y = static_cast<int>(tiles_.size()) / tiles_x_;
@@ -184,7 +205,8 @@ private:
     std::vector<char> near_;             // within reach of such
     std::vector<std::uint16_t> marked_;  // tile after tile, row after row, a bit for each cell
     std::vector<std::size_t> near_tiles_;
-    std::vector<std::array<int, 2>> left_over_, cells_;  // row after row; `cells_` of the level
+    std::array<std::array<int, 2>, kFewCells> met_{{{-1, 0}, {-1, 0}, {-1, 0}, {-1, 0}}};  // at the last place that met enough
+    std::vector<std::array<int, 2>> left_over_, cells_;                                    // row after row; `cells_` of the level
 };
 
 // A place of the cutter on a ring; corners of the ring, and places between them that are looked at.
@@ -323,7 +345,7 @@ private:
     }
 
     // From the farthest ring whose cutter meets a target inwards; what a ring cuts the next need not.
-    void cut_rings(const LevelTargets& targets, const Loops& border, double tip, bool keeps_off, std::vector<std::vector<LevelRun>>& runs) {
+    void cut_rings(LevelTargets& targets, const Loops& border, double tip, bool keeps_off, std::vector<std::vector<LevelRun>>& runs) {
         const CellGrid& grid = stock_.grid();
         const double step = kStepShare * tool_.diameter;
         std::vector<Loops> rings{border};
@@ -337,7 +359,7 @@ private:
                 return std::any_of(row.begin(), row.end(), [&](const std::array<int, 2>& s) { return s[0] <= c[0] && c[0] <= s[1]; });
             });
             if (outside.empty()) break;
-            rings.push_back(offset(thin, k * step, loose));
+            rings.push_back(offset_outline(thin, k * step, loose));
         }
         const std::int32_t z = to_units(tip) + 1;
         const CutterEnd end = cutter_end(tool_);

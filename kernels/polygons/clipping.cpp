@@ -113,7 +113,7 @@ Path moved(const Path& loop, double delta, double tolerance) {
     const std::size_t n = loop.size();
     const double radius = std::abs(delta);
     const double largest = delta > 0 ? 2 * std::acos(radius / (radius + tolerance)) : 2 * std::acos(std::max(0.0, 1 - tolerance / radius));
-    const double largest_step = std::min(largest, std::numbers::pi / 2);
+    const double largest_step = std::min(largest, std::numbers::pi / 2), one_step = std::cos(largest_step);
     auto rounded = [](double x, double y) { return IntPoint(static_cast<cInt>(std::llround(x)), static_cast<cInt>(std::llround(y))); };
 
     Path path;
@@ -123,32 +123,72 @@ Path moved(const Path& loop, double delta, double tolerance) {
         const double x = static_cast<double>(b.X), y = static_cast<double>(b.Y);
         double ux = x - static_cast<double>(a.X), uy = y - static_cast<double>(a.Y);
         double vx = static_cast<double>(c.X) - x, vy = static_cast<double>(c.Y) - y;
-        const double u = std::hypot(ux, uy), v = std::hypot(vx, vy);
+        const double u = std::sqrt(ux * ux + uy * uy), v = std::sqrt(vx * vx + vy * vy);
         ux /= u, uy /= u, vx /= v, vy /= v;
-        const double turn = std::atan2(ux * vy - uy * vx, ux * vx + uy * vy);
+        const double sine = ux * vy - uy * vx, cosine = ux * vx + uy * vy;
+        // Where the moved edges, or the lines that they lie on, meet: 1 + cos is twice the square of the half turn's cosine.
+        const auto meeting = [&] { return rounded(x + delta * (uy + vy) / (1 + cosine), y - delta * (ux + vx) / (1 + cosine)); };
         // Outward normals are (uy, −ux) and (vy, −vx); delta < 0 turns them inward.
-        if (turn * delta <= 0) {
+        if (sine * delta <= 0 || cosine == -1) {
+            // Edges that both reach beyond where they cross, and by more than half of their length so that the one at their other end
+            // leaves them something, need not go there: what they would sweep beside it the two of them sweep anyway.
+            if (2 * radius * std::abs(sine) < (1 + cosine) * std::min(u, v)) {
+                path.push_back(meeting());
+                continue;
+            }
             path.push_back(rounded(x + delta * uy, y - delta * ux));
             path.push_back(b);
             path.push_back(rounded(x + delta * vy, y - delta * vx));
             continue;
         }
+        if (cosine >= one_step) {
+            if (delta > 0) {
+                path.push_back(meeting());
+            } else {
+                path.push_back(rounded(x + delta * uy, y - delta * ux));
+                path.push_back(rounded(x + delta * vy, y - delta * vx));
+            }
+            continue;
+        }
+        const double turn = std::atan2(sine, cosine);
         const auto steps = static_cast<std::size_t>(std::max(1.0, std::ceil(std::abs(turn) / largest_step)));
         const double step = turn / static_cast<double>(steps);
         if (delta > 0) {
             const double reach = delta / std::cos(step / 2);
             for (std::size_t k = 0; k < steps; ++k) {
-                const double angle = (static_cast<double>(k) + 0.5) * step, cosine = std::cos(angle), sine = std::sin(angle);
-                path.push_back(rounded(x + reach * (uy * cosine + ux * sine), y + reach * (uy * sine - ux * cosine)));
+                const double angle = (static_cast<double>(k) + 0.5) * step, across = std::cos(angle), along = std::sin(angle);
+                path.push_back(rounded(x + reach * (uy * across + ux * along), y + reach * (uy * along - ux * across)));
             }
         } else {
             for (std::size_t k = 0; k <= steps; ++k) {
-                const double angle = static_cast<double>(k) * step, cosine = std::cos(angle), sine = std::sin(angle);
-                path.push_back(rounded(x + delta * (uy * cosine + ux * sine), y + delta * (uy * sine - ux * cosine)));
+                const double angle = static_cast<double>(k) * step, across = std::cos(angle), along = std::sin(angle);
+                path.push_back(rounded(x + delta * (uy * across + ux * along), y + delta * (uy * along - ux * across)));
             }
         }
     }
     return path;
+}
+
+void check_offset(double delta_mm, double tolerance_mm) {
+    if (!std::isfinite(delta_mm) || std::abs(delta_mm) * kUnitsPerMm > std::numeric_limits<std::int32_t>::max()) {
+        throw Error(ErrorKind::usage, "polygons.offset", "an offset must be finite and under 214 m", {}, "check the tool's diameter");
+    }
+    if (!(tolerance_mm * kUnitsPerMm >= 1) || !std::isfinite(tolerance_mm)) {
+        throw Error(ErrorKind::usage, "polygons.tolerance", "the tolerance of an offset must be 0.0001 mm or more");
+    }
+}
+
+// An outline moved and freed of what is swept too far.
+Loops moved(Paths outline, double delta_mm, double tolerance_mm) {
+    const double delta = delta_mm * kUnitsPerMm;
+    if (delta == 0) return to_loops(outline);
+    Paths raw;
+    raw.reserve(outline.size());
+    for (Path& loop : outline) {
+        drop_straight(loop);
+        if (!loop.empty()) raw.push_back(moved(loop, delta, tolerance_mm * kUnitsPerMm));
+    }
+    return to_loops(execute(ClipperLib::ctUnion, raw, {}, ClipperLib::pftPositive));
 }
 
 }  // namespace
@@ -159,23 +199,14 @@ Loops subtract(const Loops& a, const Loops& b) { return combine(ClipperLib::ctDi
 Loops simplify(const Loops& loops) { return combine(ClipperLib::ctUnion, loops, {}); }
 
 Loops offset(const Loops& region, double delta_mm, double tolerance_mm) {
-    if (!std::isfinite(delta_mm) || std::abs(delta_mm) * kUnitsPerMm > std::numeric_limits<std::int32_t>::max()) {
-        throw Error(ErrorKind::usage, "polygons.offset", "an offset must be finite and under 214 m", {}, "check the tool's diameter");
-    }
-    if (!(tolerance_mm * kUnitsPerMm >= 1) || !std::isfinite(tolerance_mm)) {
-        throw Error(ErrorKind::usage, "polygons.tolerance", "the tolerance of an offset must be 0.0001 mm or more");
-    }
+    check_offset(delta_mm, tolerance_mm);
     // Regions may overlap themselves; only the outline of what they cover may be moved.
-    Paths outline = execute(ClipperLib::ctUnion, to_paths(region), {}, ClipperLib::pftNonZero);
-    const double delta = delta_mm * kUnitsPerMm;
-    if (delta == 0) return to_loops(outline);
-    Paths raw;
-    raw.reserve(outline.size());
-    for (Path& loop : outline) {
-        drop_straight(loop);
-        if (!loop.empty()) raw.push_back(moved(loop, delta, tolerance_mm * kUnitsPerMm));
-    }
-    return to_loops(execute(ClipperLib::ctUnion, raw, {}, ClipperLib::pftPositive));
+    return moved(execute(ClipperLib::ctUnion, to_paths(region), {}, ClipperLib::pftNonZero), delta_mm, tolerance_mm);
+}
+
+Loops offset_outline(const Loops& outline, double delta_mm, double tolerance_mm) {
+    check_offset(delta_mm, tolerance_mm);
+    return moved(to_paths(outline), delta_mm, tolerance_mm);
 }
 
 }  // namespace slabwright

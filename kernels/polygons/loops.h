@@ -66,5 +66,8 @@ void nest(Loops& loops);
 /// most `tolerance_mm` (0.0001 or more), always to the side of the *larger* region, so that what is kept clear is never
 /// understated.
 [[nodiscard]] Loops offset(const Loops& region, double delta_mm, double tolerance_mm);
+/// The same of a region whose loops neither cross nor overlap and are turned as these functions turn them, which is not looked for. A region that
+/// grows may also be thinned: where its loops then cross by far less than it grows, the result is the same.
+[[nodiscard]] Loops offset_outline(const Loops& outline, double delta_mm, double tolerance_mm);
 
 }  // namespace slabwright
