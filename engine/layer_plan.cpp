@@ -163,7 +163,8 @@ private:
         trial.minutes = minutes_of(layer, job.machine);
         trial.whole = !result.given_up && trial.minutes <= most;
         if (!trial.whole || trial.leaves_more || job.cutting.engagement != Engagement::simulated) return trial;
-        trial.planned.cuts = adapt_layer(context_, layer, ground_.plan, overhang_ ? &*overhang_ : nullptr, trial.planned.diagnostics);
+        trial.planned.cuts =
+            adapt_layer(context_, layer, ground_.plan, overhang_ ? &*overhang_ : nullptr, trial.planned.diagnostics, ground_.known_cuts);
         trial.minutes = minutes_of(layer, job.machine);
         return trial;
     }

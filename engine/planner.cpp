@@ -259,12 +259,13 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
     std::stable_sort(largest_first.begin(), largest_first.end(), [&](std::size_t a, std::size_t b) { return steps[a] > steps[b]; });
     const std::size_t half = (plan.layers.size() + 1) / 2;
     Spares<StockMemory> stock_memory;
+    KnownCuts known_cuts;
     parallel_each(context, plan.layers.size(), [&](std::size_t task) {
         const std::size_t i = largest_first[task < half ? 2 * task : 2 * (task - half) + 1];
         ProgressPart progress(context, steps[i]);
         const Loops* const carried_by = i > 0 ? &joints[i] : nullptr;
-        planned[i] =
-            plan_layer(context, {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr, carried_by, &stock_memory}, i, progress);
+        planned[i] = plan_layer(
+            context, {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr, carried_by, &stock_memory, &known_cuts}, i, progress);
     });
     std::vector<LayerCuts> cuts;
     for (std::size_t i = 0; i < planned.size(); ++i) {

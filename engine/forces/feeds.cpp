@@ -4,9 +4,12 @@
 #include <bit>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <mutex>
 #include <numbers>
 #include <optional>
 #include <set>
+#include <shared_mutex>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -110,16 +113,48 @@ struct FeedStep {
     const Bent* bent = nullptr;
 };
 
+}  // namespace
+
+struct KnownCuts::Impl {
+    /// A tool at a speed, whose cuts are classed finely or coarsely.
+    struct Of {
+        int tool = 0;
+        double spindle_rpm = 0;
+        bool fine = false;
+        auto operator<=>(const Of&) const = default;
+    };
+    std::shared_mutex mutex;
+    std::map<Of, ByClassAndFeed<Bent>> known;
+
+    std::optional<Bent> find(const Of& of, const ClassAndFeed& key) {
+        const std::shared_lock lock(mutex);
+        const auto cuts = known.find(of);
+        if (cuts == known.end()) return std::nullopt;
+        const auto cut = cuts->second.find(key);
+        return cut == cuts->second.end() ? std::nullopt : std::optional(cut->second);
+    }
+    void add(const Of& of, const ClassAndFeed& key, const Bent& bent) {
+        const std::lock_guard lock(mutex);
+        known[of].try_emplace(key, bent);
+    }
+};
+
+KnownCuts::KnownCuts() : impl_(std::make_unique<Impl>()) {}
+KnownCuts::~KnownCuts() = default;
+
+namespace {
+
 class BentCutter {
 public:
-    BentCutter(const Job& job, const Operation& operation, const Tool& tool) : job_(job), tool_(tool), idle_(idle_cut(job, tool)) {
+    BentCutter(const Job& job, const Operation& operation, const Tool& tool, KnownCuts* shared)
+        : job_(job), tool_(tool), shared_(shared), idle_(idle_cut(job, tool)) {
         idle_.spindle_rpm = operation.spindle_rpm;
     }
     [[nodiscard]] const CutSegment& idle() const { return idle_; }
 
-    const Bent& at(const CutClass& c, double feed) { return find(known_, c, feed, kCoarse, kAccuracy); }
+    const Bent& at(const CutClass& c, double feed) { return find(known_, c, feed, false); }
     /// Of a fine class, as the plan will state it.
-    const Bent& stated(const CutClass& c, double feed) { return find(stated_, c, feed, kFine, kStatedAccuracy); }
+    const Bent& stated(const CutClass& c, double feed) { return find(stated_, c, feed, true); }
 
     /// How thick the wood must be that carries a cut at this height above the joint, so far from what carries the wood, mm.
     [[nodiscard]] double needed_wood(const Bent& b, double height, double overhang) const {
@@ -136,19 +171,26 @@ public:
 private:
     using Known = ByClassAndFeed<Bent>;
 
-    const Bent& find(Known& known, const CutClass& c, double feed, ClassSteps steps, double accuracy) {
-        const auto [it, fresh] = known.try_emplace(ClassAndFeed{c, feed});
-        if (fresh) {
-            const CutSegment cut = segment_of(c, idle_, tool_, feed, steps);
-            const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut, accuracy) : reference_forces(cut, accuracy);
-            it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter),
-                          cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter), f.peak_x_n, f.peak_y_n, f.peak_z_n};
-        }
+    const Bent& find(Known& known, const CutClass& c, double feed, bool fine) {
+        const ClassAndFeed key{c, feed};
+        const auto [it, fresh] = known.try_emplace(key);
+        if (!fresh) return it->second;
+        // What others tell is what would be found here.
+        const KnownCuts::Impl::Of of{tool_.number, idle_.spindle_rpm, fine};
+        if (shared_ != nullptr)
+            if (const std::optional<Bent> told = shared_->impl().find(of, key)) return it->second = *told;
+        const CutSegment cut = segment_of(c, idle_, tool_, feed, fine ? kFine : kCoarse);
+        const double accuracy = fine ? kStatedAccuracy : kAccuracy;
+        const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut, accuracy) : reference_forces(cut, accuracy);
+        it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter), cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter),
+                      f.peak_x_n, f.peak_y_n, f.peak_z_n};
+        if (shared_ != nullptr) shared_->impl().add(of, key, it->second);
         return it->second;
     }
 
     const Job& job_;
     const Tool& tool_;
+    KnownCuts* shared_;
     CutSegment idle_;
     Known known_, stated_;
 };
@@ -358,7 +400,8 @@ double bending_limit(const Operation& operation, const Job& job) {
     }
 }
 
-LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const OverhangMap* overhang, std::vector<Diagnostic>& diagnostics) {
+LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const OverhangMap* overhang, std::vector<Diagnostic>& diagnostics,
+                      KnownCuts* known_cuts) {
     const Job& job = plan.job;
     StandingSlab slab(plan.stock_min, plan.stock_max, layer.z_bottom, layer.z_bottom + layer.slab_thickness,
                       StandingSlab::cell_for(job, plan.stock_min, plan.stock_max));
@@ -374,7 +417,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         if (tool.kind == ToolKind::drill) continue;
         if (!(op.spindle_rpm > 0))
             throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest", op.purpose, "give the tool a speed");
-        BentCutter cutting(job, op, tool);
+        BentCutter cutting(job, op, tool, known_cuts);
         const double limit = bending_limit(op, job);
         std::size_t looked_at = 0;
         const auto cutter_share = [&](const Bent& bent) {

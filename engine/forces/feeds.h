@@ -1,6 +1,7 @@
 // The forces of every stretch of a layer's programs, and feeds that fit them (method.md sections 8 and 9).
 #pragma once
 
+#include <memory>
 #include <span>
 
 #include "engine/forces/min_material.h"
@@ -32,6 +33,21 @@ struct LayerCuts {
     std::vector<std::size_t> starts;           ///< of each operation's, and their end
 };
 
+/// What the cuts of a plan's tools bear, for the layers of one plan to tell each other: most of a layer's cuts are met in others too. Several threads
+/// may use it at once.
+class KnownCuts {
+public:
+    KnownCuts();
+    ~KnownCuts();
+    KnownCuts(const KnownCuts&) = delete;
+    KnownCuts& operator=(const KnownCuts&) = delete;
+    struct Impl;
+    [[nodiscard]] Impl& impl() { return *impl_; }
+
+private:
+    std::unique_ptr<Impl> impl_;
+};
+
 /// Runs a layer's operations, in their order, through a standing slab. Three things are looked at for every stretch: what the bending cutter leaves on
 /// a wall against the operation's limit, the cutter's stress against its strength where the job states one, and, where the slab hangs
 /// over, the wood against what the cut needs (section 9): roughing is carried by what stands, floors by what stays under them.
@@ -43,11 +59,12 @@ struct LayerCuts {
 ///     breaks it all the same.
 /// Drills are left alone.
 /// @param overhang    how far each place lies from what carries this slab; null: nothing hangs over
+/// @param known of this very plan, or null
 /// @param diagnostics gets, per operation, "stepdown.lowered" (how many, how long, the deepest), "feed.lowered" (where and how far), and
 ///                    "cut.overhang" where the wood would break all the same
 /// @throws Error(usage, "forces.spindle") when an operation mills with its spindle at rest; Error(usage, "forces.segment"); Error(cancelled)
 [[nodiscard]] LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const OverhangMap* overhang,
-                                    std::vector<Diagnostic>& diagnostics);
+                                    std::vector<Diagnostic>& diagnostics, KnownCuts* known = nullptr);
 
 /// Sets of every operation peak_force_n (resultant), deflection_mm (of the tip, in the plane), wall_error_mm (normal to the way), peak_at and
 /// peak_move, from the closed form or the double reference; many cuts are screened on the context's device (hardest.h), and the plan says so when there
