@@ -410,6 +410,73 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
     }
 }
 
+// Chords of circles, of which it is told that they are: what is found is the same, down to the last digit but for the top sheet, under which many
+// motions are as deep as one another.
+TEST(StandingPart, ChordsOfCirclesAgreeWithSingleQuestions) {
+    Context context;
+    const Mesh m = relief(24, bumpy);
+    const StandingPart part(context, m.view());
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    auto between = [&](double low, double high) { return low + (high - low) * unit(random); };
+    std::size_t just = 0, deep = 0, shallow = 0;
+    for (int trial = 0; trial < 300; ++trial) {
+        const double z_top = trial % 4 == 0 ? 6.5 : 100.0, R = between(0.4, 4);
+        std::vector<StandingPart::Motion> motions;
+        std::vector<StandingPart::Chords> chords;
+        Point3 at{between(-3, 27), between(-3, 27), between(3, 9)};
+        for (int arc = 0; arc < 6; ++arc) {
+            // Sometimes a line first; then an arc whose chords miss it by up to some micrometres.
+            if (unit(random) < 0.5) {
+                const Point3 to{at[0] + between(-2, 2), at[1] + between(-2, 2), unit(random) < 0.5 ? at[2] : between(3, 9)};
+                motions.push_back({at, to});
+                at = to;
+            }
+            const double radius = std::pow(10, between(-1, 2)), start = between(-4, 4), step = 2 * std::sqrt(2 * 0.0005 / radius);
+            const double x = at[0] - radius * std::cos(start), y = at[1] - radius * std::sin(start), way = unit(random) < 0.5 ? -step : step;
+            const std::size_t first = motions.size(), count = static_cast<std::size_t>(between(1, std::min(60.0, 6.2 / step)));
+            for (std::size_t i = 1; i <= count; ++i) {
+                const double angle = start + way * static_cast<double>(i), off = trial % 3 == 0 ? between(-0.001, 0.001) : 0;
+                const Point3 to{x + (radius + off) * std::cos(angle), y + (radius + off) * std::sin(angle), at[2]};
+                motions.push_back({at, to});
+                at = to;
+            }
+            chords.push_back({first, motions.size(), x, y, radius});
+        }
+        // Raised until it is just within or just beside the part, mostly.
+        if (trial % 5 != 0)
+            for (int round = 0; round < 4; ++round) {
+                double most = 0;
+                for (const auto& [from, to] : motions) most = std::max(most, part.ball(z_top, from, to, R, 0).depth);
+                for (auto& [from, to] : motions) from[2] += most - 0.003, to[2] += most - 0.003;
+            }
+        const double tolerance = trial % 2 == 0 ? 0.01 : 10;
+        const StandingPart::Found alone = part.deepest(StandingPart::Form::ball, z_top, motions, R, 1e-5, tolerance);
+        const StandingPart::Found found = part.deepest(StandingPart::Form::ball, z_top, motions, R, 1e-5, tolerance, nullptr, chords);
+        if (z_top == 100.0) {
+            EXPECT_EQ(found.most.depth, alone.most.depth) << "seed " << seed << " trial " << trial;
+            EXPECT_EQ(found.motion, alone.motion) << "seed " << seed << " trial " << trial;
+            EXPECT_EQ(found.most.tip, alone.most.tip) << "seed " << seed << " trial " << trial;
+        }
+        EXPECT_EQ(found.beyond, alone.beyond) << "seed " << seed << " trial " << trial;
+        double most = 0;
+        for (std::size_t i = 0; i < motions.size(); ++i) {
+            const double depth = part.ball(z_top, motions[i].from, motions[i].to, R, 1e-5).depth;
+            most = std::max(most, depth);
+            if (std::abs(depth - tolerance) < 1e-6) continue;
+            EXPECT_EQ(std::binary_search(found.beyond.begin(), found.beyond.end(), static_cast<std::uint32_t>(i)), depth > tolerance)
+                << "seed " << seed << " trial " << trial << " motion " << i << " depth " << depth;
+            ++(depth > tolerance ? deep : shallow);
+        }
+        EXPECT_NEAR(found.most.depth, most, 1e-6) << "seed " << seed << " trial " << trial;
+        just += most > 0 && most < 0.01;
+    }
+    EXPECT_GT(just, 20U);
+    EXPECT_GT(deep, 500U);
+    EXPECT_GT(shallow, 5000U);
+}
+
 // A motion that comes down from high above the part's outline meets nothing but the top sheet.
 TEST(StandingPart, RowsThatComeDownWithinTheOutlineMeetTheTop) {
     Context context;

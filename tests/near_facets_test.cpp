@@ -206,3 +206,83 @@ TEST(NearFacets, EightsKeepAllThatIsAroundAWay) {
     EXPECT_GT(met, 2500u);
     EXPECT_LT(kept, met + met / 3);
 }
+
+// Level ways, straight and along circles of all sizes: down to a reach that is just enough, a facet is kept.
+TEST(NearFacets, LevelWaysKeepAllThatIsNearAndLittleElse) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    auto between = [&](double low, double high) { return low + (high - low) * unit(random); };
+    std::size_t met = 0, kept = 0, far = 0, all = 0;
+    for (int trial = 0; trial < 800; ++trial) {
+        const double reach = between(0.5, 7);
+        const bool arc = trial % 2 == 0;
+        constexpr int kSteps = 60;
+        std::vector<P> way;
+        P centre{between(-600, 600), between(-600, 600), between(-20, 20)};
+        const double radius = std::pow(10, between(-1, 3)), start = between(-4, 4), turn = std::min(6.3, between(0, 8) / radius);
+        if (arc) {
+            for (int i = 0; i <= kSteps; ++i) {
+                const double at = start + turn * i / kSteps;
+                way.push_back({centre[0] + radius * std::cos(at), centre[1] + radius * std::sin(at), centre[2]});
+            }
+        } else {
+            const double length = trial % 6 == 1 ? 0.0 : between(0, 8);
+            for (int i = 0; i <= kSteps; ++i)
+                way.push_back({centre[0] + length * std::cos(start) * i / kSteps, centre[1] + length * std::sin(start) * i / kSteps, centre[2]});
+        }
+        const double top = centre[2] + between(-reach / 2, 2 * reach);
+        auto within = [&](double limit) {
+            if (!arc) return LevelWay(way.front(), way.back(), top, limit);
+            const double middle = start + turn * unit(random), tx = -std::sin(middle), ty = std::cos(middle);
+            const P about{centre[0] + radius * std::cos(middle), centre[1] + radius * std::sin(middle), centre[2]};
+            double before = 0, after = 0, bow = 0;
+            for (const P& p : way) {
+                const double x = p[0] - about[0], y = p[1] - about[1], along = x * tx + y * ty;
+                before = std::max(before, -along), after = std::max(after, along), bow = std::max(bow, y * tx - x * ty);
+            }
+            return LevelWay(centre[0], centre[1], radius, about, before, after, bow, top, limit);
+        };
+        EightFacets e;
+        std::array<std::array<P, 3>, 8> facets;
+        for (std::size_t i = 0; i < 8; ++i) {
+            const double size = std::pow(10, between(-2, trial % 4 < 2 ? 0 : 1));
+            const P& from = way[static_cast<std::size_t>(unit(random) * kSteps)];
+            // About as far away as the reach is, on any side but above.
+            const double side = between(0, 6.3), steep = between(-1.6, 0.3), distance = reach * between(0.85, 1.15);
+            const P middle{from[0] + distance * std::cos(steep) * std::cos(side), from[1] + distance * std::cos(steep) * std::sin(side),
+                           from[2] + distance * std::sin(steep)};
+            for (P& p : facets[i])
+                for (std::size_t k = 0; k < 3; ++k) p[k] = static_cast<float>(middle[k] + between(-size, size));
+            if (i == 5) facets[i][2] = facets[i][1];
+            auto single = [&](std::size_t p, std::size_t axis) { return static_cast<float>(facets[i][p][axis]); };
+            e.x0[i] = single(0, 0), e.y0[i] = single(0, 1), e.z0[i] = single(0, 2);
+            e.x1[i] = single(1, 0), e.y1[i] = single(1, 1), e.z1[i] = single(1, 2);
+            e.x2[i] = single(2, 0), e.y2[i] = single(2, 1), e.z2[i] = single(2, 2);
+        }
+        constexpr float none = std::numeric_limits<float>::quiet_NaN();
+        for (auto* row : {&e.x0, &e.y0, &e.z0, &e.x1, &e.y1, &e.z1, &e.x2, &e.y2, &e.z2}) (*row)[7] = none;
+        ManyEights many;
+        many.eights[many.count++] = &e;
+        std::array<unsigned, ManyEights::kMost> keep;
+        facets_along(many, within(reach), keep);
+        EXPECT_EQ(keep[0] >> 7, 0U);
+        for (std::size_t i = 0; i < 7; ++i) {
+            double d = 1e300;
+            for (const P& p : way) d = std::min(d, sampled_distance(facets[i], p, p, true, top, 12));
+            const bool is_kept = (keep[0] >> i & 1) != 0;
+            kept += is_kept, ++all;
+            if (d < reach) {
+                ++met;
+                EXPECT_TRUE(is_kept) << "seed " << seed << " trial " << trial << " facet " << i << " at " << d << " of " << reach;
+            } else far += is_kept && d > 1.02 * reach;
+            if (d > 1e100) continue;
+            std::array<unsigned, ManyEights::kMost> just;
+            facets_along(many, within(d + 1e-9), just);
+            EXPECT_TRUE((just[0] >> i & 1) != 0) << "seed " << seed << " trial " << trial << " facet " << i << " at " << d;
+        }
+    }
+    std::printf("met %zu, kept %zu of %zu, of those %zu far\n", met, kept, all, far);
+    EXPECT_GT(met, 1000U);
+    EXPECT_LT(far, kept / 10);
+}

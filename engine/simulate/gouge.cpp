@@ -38,6 +38,9 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
             GougeReport r;
             std::vector<StandingPart::Motion> motions;
             std::vector<std::uint32_t> lines;
+            std::vector<StandingPart::Chords> chords;
+            auto arc = std::partition_point(program.arcs.begin(), program.arcs.end(), [&](const ProgramArc& a) { return a.end <= begin + 1; });
+            bool in_arc = false;
             for (std::size_t i = begin; i < end; ++i) {
                 const ProgramStep &from = program.steps[i], &to = program.steps[i + 1];
                 if (!from.known() || !to.known()) continue;
@@ -45,11 +48,17 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 ++r.motions;
                 r.length_mm += std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
                 if (std::min(a[2], b[2]) >= z_top) continue;
+                for (; arc != program.arcs.end() && arc->end <= i + 1; ++arc) in_arc = false;
+                if (arc != program.arcs.end() && arc->begin <= i + 1) {
+                    if (!in_arc) chords.push_back({motions.size(), motions.size(), arc->arc.x, arc->arc.y, arc->arc.radius});
+                    chords.back().last = motions.size() + 1;
+                    in_arc = true;
+                }
                 motions.push_back({a, b});
                 lines.push_back(to.line);
             }
             auto check = [&](StandingPart::Form form, double thick, GougePlace& place, std::atomic<double>* known) {
-                StandingPart::Found found = part.deepest(form, z_top, motions, thick, options.ignore, options.tolerance, known);
+                StandingPart::Found found = part.deepest(form, z_top, motions, thick, options.ignore, options.tolerance, known, chords);
                 if (found.most.found) place = {found.most.depth, lines[found.motion], found.most.tip};
                 return std::move(found.beyond);
             };

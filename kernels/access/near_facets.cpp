@@ -269,6 +269,131 @@ void facets_around(const ManyEights& eights, const WayAround& way, std::array<un
     around_eights(eights, way, keep.data());
 }
 
+namespace {
+float upwards_of(double v) { return std::nextafter(static_cast<float>(v), std::numeric_limits<float>::infinity()); }
+
+/// A number in single precision and what is left of it. Not inline: of three in a row g++ 12 takes what is left to be zero (-O2, -ftree-slp-vectorize).
+struct Split {
+    float near, rest;
+};
+[[gnu::noinline]] Split split(double v) {
+    const auto near = static_cast<float>(v);
+    return {near, static_cast<float>(v - near)};
+}
+}  // namespace
+
+LevelWay::LevelWay(const std::array<double, 3>& a, const std::array<double, 3>& b, double top_z, double within)
+    : ux(1), uy(0), before(0), after(0), bow(0), curvature(0), top(upwards_of(top_z)), reach(upwards_of(within)) {
+    const double x = (a[0] + b[0]) / 2, y = (a[1] + b[1]) / 2, dx = b[0] - a[0], dy = b[1] - a[1], length = std::sqrt(dx * dx + dy * dy);
+    if (length > 0) ux = static_cast<float>(dx / length), uy = static_cast<float>(dy / length), before = after = upwards_of(length / 2);
+    begin_at(x, y, a[2]);
+}
+
+LevelWay::LevelWay(double x, double y, double radius, const std::array<double, 3>& about, double length_before, double length_after, double aside,
+                   double top_z, double within)
+    : before(upwards_of(length_before)),
+      after(upwards_of(length_after)),
+      bow(upwards_of(aside)),
+      curvature(static_cast<float>(1 / radius)),
+      top(upwards_of(top_z)),
+      reach(upwards_of(within)) {
+    const double px = about[0] - x, py = about[1] - y, per = 1 / std::max(std::sqrt(px * px + py * py), 1e-12);
+    ux = static_cast<float>(-py * per), uy = static_cast<float>(px * per);
+    begin_at(x + radius * px * per, y + radius * py * per, about[2]);
+}
+
+void LevelWay::begin_at(double x, double y, double z) {
+    const Split sx = split(x), sy = split(y), sz = split(z);
+    ox = sx.near, oy = sy.near, oz = sz.near, rest_x = sx.rest, rest_y = sy.rest, rest_z = sz.rest;
+}
+
+// In the plane across the way an upward ray begins at the way, and each facet becomes a triangle between its corners. Around a circle what is between
+// them is truly nearer to the axis, by no more than the distance from the axis bends over the facet. Ray and triangle are parted by a line across the way
+// to a corner, or along an edge, if at all; what is below such a line stays so upwards. No branch differs from facet to facet.
+SLABWRIGHT_WIDE static void along_eights(const ManyEights& many, const LevelWay& way, unsigned* __restrict keep) {
+    using Eight [[gnu::vector_size(32)]] = float;
+    using Signs [[gnu::vector_size(32)]] = std::int32_t;
+    const LevelWay w = way;
+    const Eight none{}, one = none + 1.0F;
+    const auto bits_of = [](const Signs& signs) {
+        const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
+        std::array<std::uint64_t, 4> pairs;
+        std::memcpy(pairs.data(), &bits, sizeof(pairs));
+        const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
+        return static_cast<unsigned>(all | all >> 32);
+    };
+    // (What a function gives back as a vector depends on the instruction set.)
+    const auto root = [](Eight& v) {
+        for (std::size_t k = 0; k < 8; ++k) v[k] = std::sqrt(v[k]);
+    };
+    const auto least_of = [](const Eight& a, const Eight& b, const Eight& c, Eight& least) { least = a < b ? a : b, least = least < c ? least : c; };
+    const auto most_of = [](const Eight& a, const Eight& b, const Eight& c, Eight& most) { most = a > b ? a : b, most = most > c ? most : c; };
+    const float straight = w.curvature == 0 ? 1.0F : 0.0F;
+    constexpr float rounding = 2e-6F;  // of a length
+    for (std::size_t i = 0; i < many.count; ++i) {
+        const EightFacets& f = *many.eights[i];
+        Eight x0, y0, z0, x1, y1, z1, x2, y2, z2;
+        std::memcpy(&x0, f.x0.data(), sizeof(Eight)), std::memcpy(&y0, f.y0.data(), sizeof(Eight)), std::memcpy(&z0, f.z0.data(), sizeof(Eight));
+        std::memcpy(&x1, f.x1.data(), sizeof(Eight)), std::memcpy(&y1, f.y1.data(), sizeof(Eight)), std::memcpy(&z1, f.z1.data(), sizeof(Eight));
+        std::memcpy(&x2, f.x2.data(), sizeof(Eight)), std::memcpy(&y2, f.y2.data(), sizeof(Eight)), std::memcpy(&z2, f.z2.data(), sizeof(Eight));
+        Eight lowest, l_low, l_high, c_low, c_high, h_low, h_high;
+        least_of(z0, z1, z2, lowest);
+        x0 = x0 - w.ox - w.rest_x, y0 = y0 - w.oy - w.rest_y, z0 = z0 - w.oz - w.rest_z;
+        x1 = x1 - w.ox - w.rest_x, y1 = y1 - w.oy - w.rest_y, z1 = z1 - w.oz - w.rest_z;
+        x2 = x2 - w.ox - w.rest_x, y2 = y2 - w.oy - w.rest_y, z2 = z2 - w.oz - w.rest_z;
+        const Eight l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
+        const Eight c0 = x0 * w.uy - y0 * w.ux, c1 = x1 * w.uy - y1 * w.ux, c2 = x2 * w.uy - y2 * w.ux;
+        least_of(l0, l1, l2, l_low), most_of(l0, l1, l2, l_high), least_of(c0, c1, c2, c_low), most_of(c0, c1, c2, c_high);
+        least_of(z0, z1, z2, h_low), most_of(z0, z1, z2, h_high);
+        const Eight far_l = l_high > -l_low ? l_high : -l_low, far_c = c_high > -c_low ? c_high : -c_low, far_h = h_high > -h_low ? h_high : -h_low;
+        const Eight far = far_l + far_c + far_h, reach = w.reach + rounding * (far + w.curvature * far * far);
+        Eight l = l_low - w.after > -l_high - w.before ? l_low - w.after : -l_high - w.before;
+        l = l > none ? l : none;
+        Eight c = c_low > -c_high - w.bow ? c_low : -c_high - w.bow, under = -h_high > none ? -h_high : none, reach2 = reach * reach;
+        c = c > none ? c : none;
+        const Signs within = (lowest < w.top) & (l * l + c * c + under * under < reach2);
+        keep[i] = bits_of(within);
+        if (keep[i] == 0) continue;
+        reach2 -= straight * (l * l);
+        // Distance from the circle in plan, outwards.
+        Eight a0 = c0, a1 = c1, a2 = c2, bend = none;
+        if (straight == 0) {
+            const auto outwards = [&](const Eight& along, Eight& across) {
+                const Eight a = w.curvature * along, b = one + w.curvature * across,
+                            twice = across + across + w.curvature * (along * along + across * across);
+                Eight from_axis = a * a + b * b;
+                root(from_axis);
+                across = twice / (from_axis + one);
+            };
+            outwards(l0, a0), outwards(l1, a1), outwards(l2, a2);
+            const Eight e0 = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0), e1 = (x2 - x1) * (x2 - x1) + (y2 - y1) * (y2 - y1),
+                        e2 = (x0 - x2) * (x0 - x2) + (y0 - y2) * (y0 - y2), least = none + 1e-3F;
+            Eight edge2, edge, outmost;
+            most_of(e0, e1, e2, edge2), most_of(a0, a1, a2, outmost);
+            edge = edge2, root(edge);
+            const Eight inmost = one + w.curvature * (outmost - edge);
+            // A second derivative of 1 / radius at most, over a circle of the longest edge / √3 that holds the facet.
+            bend = w.curvature * edge2 / (6.0F * (inmost > least ? inmost : least));
+        }
+        Signs parted{};
+        const auto part = [&](const Eight& ua, const Eight& uh) {
+            Eight gap;
+            least_of(ua * a0 + uh * z0, ua * a1 + uh * z1, ua * a2 + uh * z2, gap);
+            gap -= (ua > none ? ua : none) * bend;
+            parted |= (gap > none) & (gap * gap >= reach2 * (ua * ua + uh * uh));
+        };
+        const auto to_corner = [&](const Eight& a, const Eight& h) { part(a, h < none ? h : none); };
+        const auto by_edge = [&](const Eight& a, const Eight& h) { part(a > none ? h : -h, a > none ? -a : a); };
+        to_corner(a0, z0), to_corner(a1, z1), to_corner(a2, z2);
+        by_edge(a1 - a0, z1 - z0), by_edge(a2 - a1, z2 - z1), by_edge(a0 - a2, z0 - z2);
+        keep[i] = bits_of(within & ~parted);
+    }
+}
+
+void facets_along(const ManyEights& eights, const LevelWay& way, std::array<unsigned, ManyEights::kMost>& keep) {
+    along_eights(eights, way, keep.data());
+}
+
 static Way way_from(const NearWay& way, const std::array<double, 3>& middle, bool ball, double reach) {
     auto single = [&](double v, std::size_t k) { return static_cast<float>(v - middle[k]); };
     const double dx = way.b[0] - way.a[0], dy = way.b[1] - way.a[1], length2 = dx * dx + dy * dy;

@@ -79,6 +79,29 @@ struct ManyEights {
 /// Bit k of keep[i] is 1 where the way may meet facet k of eight i, else 0.
 void facets_around(const ManyEights& eights, const WayAround& way, std::array<unsigned, ManyEights::kMost>& keep);
 
+/// A level way of a ball's centre, straight or along a circle, with all that is above it: a closer look than WayAround's. In the plane across the way it
+/// is one point, and facets are told from it there. The reach is what it is for numbers without error.
+struct LevelWay {
+    /// From a to b, both at one height. @param top what is not below it does not count @param reach mm
+    LevelWay(const std::array<double, 3>& a, const std::array<double, 3>& b, double top, double reach);
+    /// Around (x, y) at a radius, near a point of it that the way is about @param before, after, bow mm that it reaches back and on along
+    /// the tangent there, and inwards
+    LevelWay(double x, double y, double radius, const std::array<double, 3>& about, double before, double after, double bow, double top,
+             double reach);
+
+    float ox, oy, oz, rest_x, rest_y, rest_z;  ///< a point of it, mm, and what is left of that in single precision
+    float ux, uy;                              ///< its direction there; a circle's centre lies to the left
+    float before, after, bow;                  ///< how far it reaches back, on and to the left, mm
+    float curvature;                           ///< 1 / mm; 0 of a straight way
+    float top, reach;                          ///< what is not below the top, or not within reach, does not count, mm
+
+private:
+    void begin_at(double x, double y, double z);
+};
+
+/// As facets_around().
+void facets_along(const ManyEights& eights, const LevelWay& way, std::array<unsigned, ManyEights::kMost>& keep);
+
 /// fn(k) for every bit k that is 1, ascending.
 template <class Fn>
 void for_each_bit(unsigned bits, Fn&& fn) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 #include "kernels/access/near_facets.h"
 #include "kernels/access/triangle.h"
@@ -628,6 +629,7 @@ Penetration StandingPart::depth_of(Form form, double z_top, const Point3& from, 
 struct StandingPart::Stretch {
     static constexpr std::size_t kLong = 512, kShort = 12, kCalm = 8;  // motions; stretches
     static constexpr double kLength = 2.5, kSlack = 0.2;               // mm: of short ones
+    static constexpr double kBow = 0.5;                                // mm: of what runs along a circle
     static constexpr std::size_t kFew = 32;                            // facets: a long one that meets more is taken in parts
 
     std::size_t first = 0, last = 0;
@@ -636,9 +638,11 @@ struct StandingPart::Stretch {
     double slack = 0;      // mm: nothing is farther from the way
     NearFacets terms;
     std::vector<std::uint32_t> facets;  // in the order of the tree
+    std::optional<LevelWay> arc;        // along a circle
 
     void take(const Point3& a, const Point3& b) {
         from = a, to = b;
+        arc.reset();
         slack = 0;
         for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(a[k], b[k]), high[k] = std::max(a[k], b[k]);
     }
@@ -701,6 +705,7 @@ struct StandingPart::Search {
     Cutter cutter{};
     std::vector<unsigned char> keep;
     std::size_t many = Stretch::kShort, calm = 0;  // motions that the next stretch takes if they are free; free stretches before it takes more
+    std::span<const Chords> arcs;                  // that have not ended
 };
 
 /// Finds the facets that a stretch may be deeper than `depth` in. @return false when they would be more than `most`: they are not all found then
@@ -715,6 +720,8 @@ bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t 
     for (const float v : {box_.min.x, box_.min.y, box_.min.z, box_.max.x, box_.max.y, box_.max.z}) largest = std::max<double>(largest, std::abs(v));
     const double reach = way.reach + s.slack + 1e-5 * (largest + cutter.radius);
     const WayAround place(way, cutter.ball(), s.low[2] + (cutter.ball() ? cutter.radius : 0), cutter.top, reach);
+    std::optional<LevelWay> level = s.arc;
+    if (!level && cutter.ball() && way.a[2] == way.b[2]) level.emplace(way.a, way.b, cutter.top, way.reach + s.slack);
     const double lowest = s.low[2] + (cutter.ball() ? cutter.radius : depth);
     const Within box({s.low[0] - way.reach, s.low[1] - way.reach, cutter.ball() ? lowest - way.reach : lowest},
                      {s.high[0] + way.reach, s.high[1] + way.reach, cutter.top});
@@ -729,13 +736,15 @@ bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t 
     const bool closely = s.slack == 0 || most == Stretch::kFew;
     bool all = true;
     auto look = [&] {
-        s.terms.add(close, some, way, closely, search.keep);
+        if (level) s.terms.add(close, some, search.keep);
+        else s.terms.add(close, some, way, closely, search.keep);
         for_each_kept(search.keep, [&](std::size_t k) { s.facets.push_back(which[k]); });
         some = 0;
         all = s.facets.size() <= most;
     };
     auto take = [&] {
-        facets_around(many, place, met);
+        if (level) facets_along(many, *level, met);
+        else facets_around(many, place, met);
         for (std::size_t i = 0; i < many.count; ++i)
             for_each_bit(met[i], [&](std::size_t k) {
                 const EightFacets& e = *many.eights[i];
@@ -759,14 +768,54 @@ bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t 
     return all;
 }
 
+/// Finds a stretch of chords of one circle that begins with a motion, and its facets. @return false when there is none
+bool StandingPart::arc_from(Search& search, Stretch& s, std::span<const Motion> motions, std::size_t m, double depth) const {
+    while (!search.arcs.empty() && search.arcs.front().last <= m) search.arcs = search.arcs.subspan(1);
+    if (search.arcs.empty() || search.arcs.front().first > m) return false;
+    const Chords& arc = search.arcs.front();
+    const Point3& from = motions[m].from;
+    const double z = from[2], chord = std::hypot(motions[m].to[0] - from[0], motions[m].to[1] - from[1]);
+    // Parts of about one length that are not too far from straight.
+    const double most = std::sqrt(8 * Stretch::kBow * arc.radius) / std::max(chord, kHair);
+    const std::size_t left = arc.last - m, parts = static_cast<std::size_t>(std::ceil(static_cast<double>(left) / std::clamp(most, 2.0, 1e6)));
+    const std::size_t last = m + (left + parts - 1) / parts;
+    // Where the ends of a chord are from the centre, all of it is no farther than the one and no nearer than the other, less what the chord bows.
+    double nearest = std::hypot(from[0] - arc.x, from[1] - arc.y), farthest = nearest, longest2 = 0;
+    for (std::size_t k = m; k < last; ++k) {
+        const Point3 &a = motions[k].from, &b = motions[k].to;
+        if (b[2] != z || (k > m && a != motions[k - 1].to)) return false;
+        const double dx = b[0] - a[0], dy = b[1] - a[1], x = b[0] - arc.x, y = b[1] - arc.y, r = std::sqrt(x * x + y * y);
+        nearest = std::min(nearest, r), farthest = std::max(farthest, r), longest2 = std::max(longest2, dx * dx + dy * dy);
+    }
+    nearest = std::sqrt(std::max(0.0, nearest * nearest - longest2 / 4));
+    const double off = std::max(farthest - arc.radius, arc.radius - nearest);
+    if (!(off < Stretch::kBow && nearest > 0)) return false;
+    s.take(motions, m, last, false);
+    Point3 about = motions[(m + last) / 2].from;
+    const double r = std::hypot(about[0] - arc.x, about[1] - arc.y), tx = (arc.y - about[1]) / r, ty = (about[0] - arc.x) / r;
+    double before = 0, after = 0, bow = off;
+    const auto extend = [&](const Point3& p) {
+        const double x = p[0] - about[0], y = p[1] - about[1], along = x * tx + y * ty;
+        before = std::max(before, -along), after = std::max(after, along), bow = std::max(bow, y * tx - x * ty + off);
+    };
+    for (std::size_t k = m; k < last; ++k) extend(motions[k].to);
+    extend(from);
+    about[2] += search.cutter.radius;
+    s.arc.emplace(arc.x, arc.y, arc.radius, about, before, after, bow, search.cutter.top, search.cutter.radius - depth + off + kHair);
+    gather(search, s, depth, std::numeric_limits<std::size_t>::max());
+    return true;
+}
+
 /// Finds a stretch that begins with a motion: as many as are free of the part, or a short one and its facets; or one motion whose pieces are to be
 /// looked at one by one, and returns false.
 bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Motion> motions, std::size_t m, double depth) const {
+    if (arc_from(search, s, motions, m, depth)) return true;
     const double top = search.cutter.top - depth;
     const bool flat = !search.cutter.ball();
+    const std::size_t end = search.arcs.empty() ? motions.size() : std::max(m + 1, search.arcs.front().first);
     std::size_t last = m, short_last = m + 1;
     double length = 0;
-    for (; last < motions.size() && last - m < std::max(search.many, Stretch::kShort); ++last) {
+    for (; last < end && last - m < std::max(search.many, Stretch::kShort); ++last) {
         const Motion& next = motions[last];
         if (std::min(next.from[2], next.to[2]) >= top || (last > m && next.from != motions[last - 1].to)) break;
         const Point3 way = sub(next.to, next.from);
@@ -803,9 +852,10 @@ bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Moti
 }
 
 StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore, double tolerance,
-                                          std::atomic<double>* known) const {
+                                          std::atomic<double>* known, std::span<const Chords> chords) const {
     Found found;
     Search search;
+    if (form == Form::ball) search.arcs = chords;
     const Cutter& cutter = search.cutter = {form, radius, z_top - kSheet};
     std::vector<unsigned char>& keep = search.keep;
     Stretch stretch, single;

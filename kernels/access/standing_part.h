@@ -55,6 +55,11 @@ public:
     struct Motion {
         Point3 from, to;
     };
+    /// Motions [first, last) of a row that run along a level circle: their ends lie on it, mm.
+    struct Chords {
+        std::size_t first, last;
+        double x, y, radius;
+    };
     /// What motions that are checked together have in common.
     struct Found {
         Penetration most;                   ///< of equals the first
@@ -66,8 +71,9 @@ public:
     /// @param tolerance every motion deeper than this is found, of the others only those that are deeper than all before, mm
     /// @param known of a ball: the greatest depth of rows that are checked together, each with this. Only what may be the greatest of all is found
     ///        then, and is the same in whichever order they are. (A cylinder's depth differs in its last digits with what is known.)
+    /// @param chords of the motions that run along circles, in their order: what is found is the same, but sooner
     [[nodiscard]] Found deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore, double tolerance,
-                                std::atomic<double>* known = nullptr) const;
+                                std::atomic<double>* known = nullptr, std::span<const Chords> chords = {}) const;
 
     /// Whether there is part just under the plane z at (x, y).
     [[nodiscard]] bool covered(double x, double y, double z) const;
@@ -154,6 +160,7 @@ private:
     struct Search;
     static unsigned around(const Nodes& nodes, const WayAround& way, const Within& box);
     bool gather(Search& search, Stretch& stretch, double depth, std::size_t most) const;
+    bool arc_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m, double depth) const;
     bool stretch_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m, double depth) const;
     [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
     friend class RisingEnvelope;
