@@ -160,12 +160,13 @@ private:
         if (!best_) allowed_left_ = kMore * result.left_mm2 + kFew;
         if (!result.given_up) trial.left_mm2 = result.left_mm2;
         trial.leaves_more = best_ && !result.given_up && result.left_mm2 > allowed_left_;
-        trial.minutes = minutes_of(layer, job.machine);
+        const bool compared = selection_ || sets_.size() > 1;  // else nobody asks for its time
+        if (compared) trial.minutes = minutes_of(layer, job.machine);
         trial.whole = !result.given_up && trial.minutes <= most;
         if (!trial.whole || trial.leaves_more || job.cutting.engagement != Engagement::simulated) return trial;
         trial.planned.cuts =
             adapt_layer(context_, layer, ground_.plan, overhang_ ? &*overhang_ : nullptr, trial.planned.diagnostics, ground_.known_cuts);
-        trial.minutes = minutes_of(layer, job.machine);
+        if (compared) trial.minutes = minutes_of(layer, job.machine);
         return trial;
     }
 

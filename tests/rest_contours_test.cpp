@@ -104,8 +104,18 @@ TEST(LayerStock, StandsAsBeforeWhenATrialIsUndone) {
         stock.cut(n.cut, op, tool);
     };
     const auto heights = [&] { return std::vector<float>(stock.heights().begin(), stock.heights().end()); };
+    // Whatever was asked before, on whatever stood then.
+    const auto expect_left = [&] {
+        for (const double limit : {1.0, 5.0, 0.06}) {
+            std::size_t cells = 0;
+            for (std::size_t c = 0; c < stock.grid().count(); ++c) cells += stock.left(c) > limit;
+            const double cell = stock.grid().cell;
+            EXPECT_NEAR(stock.area_over(n.context, limit), static_cast<double>(cells) * cell * cell, 1e-6) << limit;
+        }
+    };
     for (int round = 0; round < 4; ++round) {
         cut();
+        expect_left();
         const std::vector<float> first = heights();
         {
             LayerStock::Trial outer(stock);
@@ -115,8 +125,10 @@ TEST(LayerStock, StandsAsBeforeWhenATrialIsUndone) {
                 LayerStock::Trial undone(stock);
                 cut();
                 ASSERT_NE(heights(), second);
+                expect_left();
                 undone.undo();
                 ASSERT_EQ(heights(), second);
+                expect_left();
             }
             {
                 const LayerStock::Trial stays(stock);
@@ -126,6 +138,7 @@ TEST(LayerStock, StandsAsBeforeWhenATrialIsUndone) {
             if (round < 2) {
                 outer.undo();
                 ASSERT_EQ(heights(), first);
+                expect_left();
             }
         }
         if (round >= 2) {

@@ -211,6 +211,9 @@ TEST(Rows, SayOnWhichCellsMoreThanALimitIsLeft) {
         std::uint64_t expected = 0;
         for (std::size_t k = 0; k < n; ++k) expected |= std::uint64_t{(stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F) > most} << k;
         ASSERT_EQ(cells_left(stands.data(), surface.data(), nz.data(), static_cast<int>(n), most), expected) << "seed " << seed << " trial " << trial;
+        float greatest = 0;
+        for (std::size_t k = 0; k < n; ++k) greatest = std::max(greatest, (stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F));
+        ASSERT_EQ(most_left(stands.data(), surface.data(), nz.data(), static_cast<int>(n)), greatest) << "seed " << seed << " trial " << trial;
     }
 }
 

@@ -249,10 +249,11 @@ struct Seen {
     [[nodiscard]] std::array<double, 3> place() const { return {at[0], at[1], at[2]}; }
 };
 
+/// @param seen  gets all stretches
 /// @param parts only these moves; none: all
-std::vector<Seen> run_through(Context& context, StandingSlab& slab, const Operation& op, const Tool& tool, const Layer& layer,
-                              const OverhangMap* overhang, double setback, std::span<const MoveRange> parts = {}) {
-    std::vector<Seen> seen;
+void run_through(Context& context, StandingSlab& slab, const Operation& op, const Tool& tool, const Layer& layer, const OverhangMap* overhang,
+                 double setback, std::vector<Seen>& seen, std::span<const MoveRange> parts = {}) {
+    seen.clear();
     const auto see = [&](const CutStretch& s) {
         if (seen.size() % 1024 == 0) context.throw_if_cancelled();
         Seen now;
@@ -274,7 +275,6 @@ std::vector<Seen> run_through(Context& context, StandingSlab& slab, const Operat
     };
     if (parts.empty()) slab.run(op, tool, see);
     else slab.run_parts(op, tool, parts, see);
-    return seen;
 }
 
 /// Where runs lie when they are split (split_runs).
@@ -301,9 +301,9 @@ bool any_halved(const std::vector<Seen>& seen, std::span<const DeepRun> runs) {
 
 /// What was seen before runs were split, with `anew` in place of what was seen of the runs.
 /// @param parts where the runs lie now
-std::vector<Seen> replaced(const std::vector<Seen>& seen, std::span<const DeepRun> runs, std::span<const MoveRange> parts,
-                           const std::vector<Seen>& anew) {
-    std::vector<Seen> all;
+void replaced(const std::vector<Seen>& seen, std::span<const DeepRun> runs, std::span<const MoveRange> parts, const std::vector<Seen>& anew,
+              std::vector<Seen>& all) {
+    all.clear();
     all.reserve(seen.size() + anew.size());
     std::size_t r = 0, next = 0;  // runs passed, and of what was seen anew
     const auto take = [&] {
@@ -318,7 +318,6 @@ std::vector<Seen> replaced(const std::vector<Seen>& seen, std::span<const DeepRu
         all.push_back(s);
     }
     while (r < runs.size()) take();
-    return all;
 }
 
 /// By how much a cut passes what it may do: its wall error, the cutter's stress and the wood's, the largest as a share of its limit.
@@ -407,6 +406,9 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                       StandingSlab::cell_for(job, plan.stock_min, plan.stock_max));
     const MemoryCharge memory(context, 3 * slab.bytes(), "the stock that forces are computed from");
     LayerCuts result;
+    // What one operation leaves to the next, for its memory only.
+    StandingSlab before = slab, again = slab;
+    std::vector<Seen> seen, anew, all;
     for (Operation& op : layer.operations) {
         context.throw_if_cancelled();
         op.peak_force_n = op.deflection_mm = op.wall_error_mm = 0;
@@ -511,13 +513,12 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             s.wood_load = wood_load(s, *s.bent);
         };
 
-        std::vector<Seen> seen;
         std::size_t divided = 0;
         double divided_way = 0, deepest = 0;
         int passes = 0;
         std::optional<std::array<double, 3>> divided_at;
-        const StandingSlab before = slab;
-        seen = run_through(context, slab, op, tool, layer, overhang, job.bonding.edge_setback);
+        before = slab;
+        run_through(context, slab, op, tool, layer, overhang, job.bonding.edge_setback, seen);
         for (int round = 0;; ++round) {
             std::size_t asked = 0;
             for (Seen& s : seen) {
@@ -539,12 +540,14 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             }
             op.moves = split_runs(op.moves, runs, static_cast<std::uint32_t>(std::max(1.0, std::min(tool.plunge_feed, job.machine.max_feed))));
             // After a run there stands what stood after it before, so only the runs themselves are looked at anew.
-            StandingSlab again = before;
+            again = before;
             if (any_halved(seen, runs)) {
-                seen = run_through(context, again, op, tool, layer, overhang, job.bonding.edge_setback);
+                run_through(context, again, op, tool, layer, overhang, job.bonding.edge_setback, seen);
             } else {
                 const std::vector<MoveRange> parts = split_parts(runs);
-                seen = replaced(seen, runs, parts, run_through(context, again, op, tool, layer, overhang, job.bonding.edge_setback, parts));
+                run_through(context, again, op, tool, layer, overhang, job.bonding.edge_setback, anew, parts);
+                replaced(seen, runs, parts, anew, all);
+                seen.swap(all);
             }
         }
         if (divided > 0)

@@ -189,6 +189,8 @@ LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory) : z
     memory_.nz.clear(), memory_.nz.resize(grid_.count());
     float* const surface = memory_.surface.data();
     std::uint8_t* const nz = memory_.nz.data();
+    words_ = static_cast<std::size_t>((grid_.nx + kWord - 1) / kWord);
+    most_left_.assign(words_ * static_cast<std::size_t>(grid_.ny), std::numeric_limits<float>::infinity());
     // Facets by the bands of rows that they meet, so that bands can be drawn in parallel.
     const int bands = (grid_.ny + kBand - 1) / kBand;
     auto band_of = [&](double y) { return std::clamp(static_cast<int>((y - grid_.y0) / cell) / kBand, 0, bands - 1); };

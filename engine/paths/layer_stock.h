@@ -125,16 +125,22 @@ public:
     /// What is left over in a cell, mm along the normal of the facet below.
     [[nodiscard]] float left(std::size_t cell) const { return (height(cell) - surface(cell)) * nz(cell); }
 
-    /// Calls fn(i) for the cells of row j on which more than `limit` is left over.
+    /// Calls fn(i) for the cells of row j on which more than `limit` is left over. A row is for one thread at a time.
     template <class Fn>
     void each_left(int j, double limit, Fn&& fn) const {
         const float most = level_over(0, limit);
-        for (int i = 0; i < grid_.nx; i += 64) {
+        float* const known = most_left_.data() + static_cast<std::size_t>(j) * words_;
+        for (int i = 0; i < grid_.nx; i += kWord) {
+            float& most_here = known[i / kWord];
+            if (most_here <= most) continue;
             const std::size_t first = grid_.index(i, j);
-            for (std::uint64_t bits = cells_left(memory_.height.data() + first, memory_.surface.data() + first, memory_.nz.data() + first,
-                                                 std::min(64, grid_.nx - i), most);
-                 bits != 0; bits &= bits - 1)
-                fn(i + std::countr_zero(bits));
+            const float *const stands = memory_.height.data() + first, *const surface = memory_.surface.data() + first;
+            const std::uint8_t* const nz = memory_.nz.data() + first;
+            const int n = std::min(kWord, grid_.nx - i);
+            std::uint64_t bits = cells_left(stands, surface, nz, n, most);
+            // What a trial cuts may come back.
+            if (bits == 0 && trial_ == nullptr) most_here = most_left(stands, surface, nz, n);
+            for (; bits != 0; bits &= bits - 1) fn(i + std::countr_zero(bits));
         }
     }
 
@@ -145,10 +151,14 @@ public:
     [[nodiscard]] static std::uint64_t bytes(const Job& job, double plane_mm2);
 
 private:
+    static constexpr int kWord = 64;  // cells that are asked together
+
     CellGrid grid_;
     double z_bottom_ = 0;
     StockMemory memory_;
-    Trial* trial_ = nullptr;  // the innermost
+    std::size_t words_ = 0;                 // of a row
+    mutable std::vector<float> most_left_;  // by word: no more than that is left over, now or later; what each_left() has found
+    Trial* trial_ = nullptr;                // the innermost
 };
 
 /// Cells that resolve what passes of the layer's finest ball leave: a quarter of their distance, coarser where the layer would

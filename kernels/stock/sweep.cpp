@@ -113,6 +113,23 @@ SLABWRIGHT_WIDE std::uint64_t cells_left(const float* __restrict stands, const f
     return bits;
 }
 
+SLABWRIGHT_WIDE float most_left(const float* stands, const float* surface, const std::uint8_t* nz, int n) {
+    using Bytes [[gnu::vector_size(kLanes)]] = std::uint8_t;
+    Floats most{};
+    float of_rest = 0;
+    int k = 0;
+    for (; k + kLanes <= n; k += kLanes) {
+        Floats high, low;
+        Bytes share;
+        load(stands + k, high), load(surface + k, low), load(nz + k, share);
+        const Floats left = (high - low) * (__builtin_convertvector(share, Floats) / 255.0F);
+        most = left > most ? left : most;
+    }
+    for (; k < n; ++k) of_rest = std::max(of_rest, (stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F));
+    for (int i = 0; i < kLanes; ++i) of_rest = std::max(of_rest, most[i]);
+    return of_rest;
+}
+
 // The loops hold no branch, so that a compiler does several cells in one step; what does not depend on the cell is decided outside. Whole eights
 // of cells: what is past the last is not asked for.
 SLABWRIGHT_WIDE bool row_heights(const RowWay& way, int i0, int n, double py, const float* __restrict stands, double bottom, double* __restrict h) {

@@ -129,6 +129,8 @@ bool keep_lower(const float* stands, double bottom, int n, double* h);
 /// Of which of n ≤ 64 cells more than `most` is left: of what stands over a surface, mm, the share nz / 255. A bit for each, the first one's lowest.
 /// @pre most ≥ 0
 [[nodiscard]] std::uint64_t cells_left(const float* stands, const float* surface, const std::uint8_t* nz, int n, float most);
+/// The most that is left of any of n cells, as cells_left() compares it; 0 at least.
+[[nodiscard]] float most_left(const float* stands, const float* surface, const std::uint8_t* nz, int n);
 
 /// The cells of some rows that a level disc comes over on its way, but for those that it has been over where it starts: [low, left] and
 /// [right, high] along each row; low > left, right > high: none.
