@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <random>
 #include <tuple>
@@ -364,6 +365,71 @@ TEST(Fibres, AFlangeThatBeginsAtTheTopIsNoneOfTheLayer) {
 }
 
 // Beside some of its facets a solid's contours are those of what lies near them alone.
+// What only the facets that a ball can touch say, against what each of them forbids.
+TEST(Fibres, WhatABallCanTouchEndsAllThatIsForbidden) {
+    std::mt19937 random(test::seed());
+    Context context;
+    std::size_t compared = 0, turned = 0;
+    for (int trial = 0; trial < 24; ++trial) {
+        const double size = trial % 4 == 1 ? 0.4 : trial % 4 == 2 ? 1.0 : 3.0, high = trial % 2 ? 3.0 : 12.0;
+        const Mesh mesh = trial % 6 == 5 ? weld(context, shapes::torus(static_cast<int>(20 + random() % 60), 9, 4))
+                                         : test::random_height_field(context, static_cast<int>(24 / size), size, high, high < 4 ? 0.25 : 2.0,
+                                                                     static_cast<std::uint32_t>(random()));
+        const LayerSolid solid = layer_solid(context, mesh.view(), -5, trial % 3 == 0 ? 2.5 : 12.5);
+        LayerSolid each = solid;
+        each.corners.clear();
+        for (const SolidFacet& f : solid.facets) turned += f.turn != SolidFacet::kAnyTurn;
+        const Cutter cutter{Cutter::Profile::ball, trial % 5 == 0 ? 0.7 : 3.0};
+        std::vector<double> tips;
+        for (int k = 0; k < 10; ++k) tips.push_back(static_cast<double>(random() % 12000) / 1000 - 4);
+        std::vector<Section> inside;
+        for (const double tip : tips) {
+            const Plane plane = inside_plane(solid, cutter, tip);
+            inside.push_back(std::move(slice(context, mesh.view(), {&plane, 1}).front()));
+        }
+        std::vector<FibreLevel> levels;
+        for (std::size_t i = 0; i < tips.size(); ++i) levels.push_back({tips[i], &inside[i].loops});
+        std::vector<std::int32_t> lines;
+        for (std::int32_t v = -170000; v < 170000; v += 1 + static_cast<std::int32_t>(random() % 5000)) lines.push_back(v);
+        for (const Axis axis : {Axis::x, Axis::y}) {
+            const std::vector<Fibres> some = fibres(context, solid, levels, cutter, axis, lines),
+                                      all = fibres(context, each, levels, cutter, axis, lines);
+            for (std::size_t i = 0; i < levels.size(); ++i) {
+                ASSERT_EQ(some[i].starts, all[i].starts) << "trial " << trial << " tip " << tips[i];
+                for (std::size_t k = 0; k < all[i].intervals.size(); ++k, ++compared) {
+                    ASSERT_NEAR(some[i].intervals[k].low, all[i].intervals[k].low, 1e-9) << "trial " << trial << " tip " << tips[i];
+                    ASSERT_NEAR(some[i].intervals[k].high, all[i].intervals[k].high, 1e-9) << "trial " << trial << " tip " << tips[i];
+                }
+            }
+        }
+    }
+    EXPECT_GT(compared, 20'000U);
+    EXPECT_GT(turned, 10'000U);
+}
+
+TEST(LayerSolid, TurnsHoldTheNormalsAroundEveryCorner) {
+    std::mt19937 random(test::seed());
+    Context context;
+    std::size_t known = 0;
+    for (int trial = 0; trial < 6; ++trial) {
+        const Mesh mesh = test::random_height_field(context, 12, 2.0, 5, trial % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
+        const LayerSolid solid = layer_solid(context, mesh.view(), -5, 100);
+        std::map<Vec3d, std::vector<const SolidFacet*>> around;
+        for (const SolidFacet& f : solid.facets)
+            for (const Vec3d& p : f.p) around[p].push_back(&f);
+        for (const SolidFacet& f : solid.facets) {
+            if (f.turn == SolidFacet::kAnyTurn) continue;
+            ++known;
+            for (const Vec3d& p : f.p)
+                for (const SolidFacet* other : around[p]) {
+                    const Vec3d &m = other->normal, &n = f.normal;
+                    EXPECT_LE(std::hypot(m[0] - n[0], m[1] - n[1], m[2] - n[2]), f.turn * SolidFacet::kTurn + 1e-12);
+                }
+        }
+    }
+    EXPECT_GT(known, 1000U);
+}
+
 TEST(LayerSolid, WhatIsNearSufficesForTheContoursThere) {
     std::mt19937 random(test::seed());
     Context context;

@@ -198,6 +198,57 @@ TEST(FibreRows, FacetsOfAGroupForbidNoMoreThanIsSaid) {
     EXPECT_GT(left_out, 1000U);
 }
 
+// Balls are laid against facets with the normals that may be around them, and each must be told.
+TEST(FibreRows, WhereABallCanTouchIsTold) {
+    Context context;
+    std::mt19937 random(test::seed());
+    const auto within = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    const auto unit = [](Vec3d v) {
+        const double l = std::hypot(v[0], v[1], v[2]);
+        return Vec3d{v[0] / l, v[1] / l, v[2] / l};
+    };
+    std::size_t told = 0, elsewhere = 0;
+    for (int round = 0; round < 3000; ++round) {
+        const double size = round % 3 == 0 ? 0.3 : 4, r = within(0.5, 8), away = round % 4 == 0 ? 900 : 0;
+        std::vector<SolidFacet> facets(1 + random() % FacetGroup::kFacets);
+        for (SolidFacet& f : facets) {
+            for (Vec3d& p : f.p) p = {away + within(-size, size), away + within(-size, size), within(-size, size)};
+            f.normal = unit({within(-1, 1), within(-1, 1), within(-0.4, 1)});
+            f.nz = static_cast<float>(f.normal[2]);
+            f.turn = random() % 5 == 0 ? SolidFacet::kAnyTurn : static_cast<std::uint8_t>(2 + random() % 160);
+            f.top = random() % 4 == 0;
+            f.z_min = std::min({f.p[0][2], f.p[1][2], f.p[2][2]});
+            f.z_max = std::max({f.p[0][2], f.p[1][2], f.p[2][2]});
+        }
+        const std::vector<FacetGroup> groups = facet_groups(context, facets);
+        const std::vector<GroupCorners> corners = group_corners(context, facets, groups);
+        const std::size_t k = random() % facets.size(), v = random() % 2;
+        const SolidFacet& f = facets[k];
+        Vec3d d = unit({within(-1, 1), within(-1, 1), within(-1, 1)});
+        if (f.turn != SolidFacet::kAnyTurn) {
+            const Vec3d& n = f.normal;
+            while (std::hypot(d[0] - n[0], d[1] - n[1], d[2] - n[2]) > f.turn * SolidFacet::kTurn) d = unit({d[0] + n[0], d[1] + n[1], d[2] + n[2]});
+        }
+        if (f.top && random() % 2 == 0) {
+            const double up = within(0, 2);
+            d = unit({d[0], d[1], d[2] + up});
+        }
+        double a = within(0, 1), b = within(0, 1);
+        if (a + b > 1) a = 1 - a, b = 1 - b;
+        Vec3d centre;
+        for (std::size_t c = 0; c < 3; ++c) centre[c] = f.p[0][c] + a * (f.p[1][c] - f.p[0][c]) + b * (f.p[2][c] - f.p[0][c]) + r * d[c];
+        GroupTouched touched;
+        group_touched(corners.front(), groups.front(), v, r, centre[2], touched);
+        const double at = centre[v] - groups.front().middle[v];
+        ASSERT_LE(touched.low[k], at) << "round " << round;
+        ASSERT_GE(touched.high[k], at) << "round " << round;
+        for (std::size_t i = 0; i < facets.size(); ++i) ++(touched.low[i] <= touched.high[i] ? told : elsewhere);
+        for (std::size_t i = facets.size(); i < FacetGroup::kFacets; ++i) ASSERT_GT(touched.low[i], touched.high[i]);
+    }
+    EXPECT_GT(told, 3000U);
+    EXPECT_GT(elsewhere, 2000U);
+}
+
 TEST(FibreRows, WhatReachesOutOfTheCoverIsTold) {
     std::mt19937 random(test::seed());
     std::uniform_int_distribution<int> draw(0, 6);  // few values, so that ends often meet

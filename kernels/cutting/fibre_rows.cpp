@@ -40,6 +40,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Near the rim of its reach the tangent is steep, and says nothing: what is left of r² there at least, as a share.
 constexpr double kTangentLeast = 0.01;
 
+constexpr float kTouchMargin = 1e-4F;  // mm
+
 }  // namespace
 
 // The loops hold no branch that differs from line to line, so that a compiler can do several lines in one step; what does not depend on
@@ -336,6 +338,24 @@ SLABWRIGHT_WIDE void group_out_rows(const GroupCorners& g, const FacetGroup& gro
         }
     }
     rows.first = from_line, rows.last = to_line;
+}
+
+// A ball touches with the normal d at its centre less r·d.
+SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& group, std::size_t v, double radius, double zc, GroupTouched& touched) {
+    constexpr auto inf = std::numeric_limits<float>::infinity();
+    const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]);
+    const float wider = kTouchMargin + 1e-6F * (r + std::abs(z) + group.radius + group.thickness);
+    const auto &za = g.p[0][2], &zb = g.p[1][2], &zd = g.p[2][2], &va = g.p[0][v], &vb = g.p[1][v], &vc = g.p[2][v];
+    const auto &from_z = g.facing_low[2], &to_z = g.facing_high[2], &from_v = g.facing_low[v], &to_v = g.facing_high[v];
+    const auto min = [](float a, float b) { return a < b ? a : b; };
+    const auto max = [](float a, float b) { return a > b ? a : b; };
+    for (std::size_t i = 0; i < GroupRows::kFacets; ++i) {
+        const float low = min(za[i], min(zb[i], zd[i])) - wider, high = max(za[i], max(zb[i], zd[i])) + wider;
+        const bool can = (z - r * to_z[i] <= high) & (z - r * from_z[i] >= low);
+        const float at_least = min(va[i], min(vb[i], vc[i])) + r * from_v[i] - wider, at_most = max(va[i], max(vb[i], vc[i])) + r * to_v[i] + wider;
+        touched.low[i] = can ? at_least : inf;
+        touched.high[i] = can ? at_most : -inf;
+    }
 }
 
 }  // namespace slabwright

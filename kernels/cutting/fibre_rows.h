@@ -89,4 +89,11 @@ struct GroupRows {
 void group_out_rows(const GroupCorners& corners, const FacetGroup& group, std::size_t u, double r, double zc, const CoverRows& cover, const double* v,
                     int first, int last, const std::int64_t* state, GroupRows& rows);
 
+/// Of each of a group's facets the places across the lines, relative to the group's middle, at which a ball of radius r at height zc can touch it
+/// from outside the solid, rounded outward; low > high: it cannot.
+struct GroupTouched {
+    alignas(32) GroupCorners::Each<float> low, high;
+};
+void group_touched(const GroupCorners& corners, const FacetGroup& group, std::size_t v, double r, double zc, GroupTouched& touched);
+
 }  // namespace slabwright

@@ -17,6 +17,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kBlock = kLinesTogether;  // lines that share one pass over their facets
 constexpr double kFarAway = 1e30;               // mm; where lines are that fill up a block's last step
+constexpr double kTouchMargin = 1e-4;           // mm
 constexpr double kMergeGap = 1e-6;              // mm; gaps this small are rounding between neighbouring elements
 
 // A segment met by lines in direction U at height zc.
@@ -96,11 +97,17 @@ bool covered(const std::vector<Stretch>& cover, std::uint32_t& at, double low, d
 // sorted in the end, and what reaches out is told from two states of them.
 template <int U, int V>
 class BlockOfLines {
+    struct LineRange {
+        int first = 0, last = 0;
+        [[nodiscard]] bool any() const { return first < last; }
+    };
+
 public:
     BlockOfLines(const LayerSolid& solid, const Cutter& cutter, double zc, std::span<const std::int32_t> lines)
         : solid_(solid), ball_(cutter.profile == Cutter::Profile::ball), r_(cutter.radius), zc_(zc), n_(static_cast<int>(lines.size())) {
         at_.fill(kFarAway);
         for (int l = 0; l < n_; ++l) at_[l] = to_mm(lines[static_cast<std::size_t>(l)]);
+        if (n_ > 1) per_mm_ = (n_ - 1) / (at_[n_ - 1] - at_[0]);
         cover_.low.fill(-kInfinity);
         cover_.high.fill(-kInfinity);
         cover_.next.fill(kInfinity);
@@ -149,6 +156,52 @@ public:
     // the lines where they could.
     void meet(std::span<const std::uint32_t> groups) {
         if (!ball_) return meet_disc(groups);
+        if (!solid_.corners.empty()) {
+            meet_touched(groups);
+            amid_gaps_ = true;
+            for (int l = 0; l < n_; ++l) look(l, found_[l].begin() + (found_[l].empty() ? 0 : 1));
+        }
+        meet_all(groups);
+    }
+
+    // What a ball can touch without being in the solid, on the lines where it can: there every end of what is forbidden is found.
+    void meet_touched(std::span<const std::uint32_t> groups) {
+        for (std::size_t g = groups.size(); g-- > 0;) {
+            const FacetGroup& group = solid_.groups[groups[g]];
+            const bool level = group.overhang > zc_;
+            if (!level && !can_touch(group)) continue;
+            const auto [first, last] = facets_of(groups[g]);
+            group_touched(solid_.corners[groups[g]], group, V, r_, zc_, touched_);
+            for (std::size_t i = first; i < last; ++i) {
+                const SolidFacet& f = solid_.facets[i];
+                if (level && f.nz < 0 && f.z_max > zc_) {
+                    const auto [v_low, v_high] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
+                    meet_facet(f, reaches_out(f, lines_between(v_low, v_high)));
+                } else if (touched_.low[i - first] <= touched_.high[i - first]) {
+                    meet_facet(f, {first_line_from(group.middle[V] + static_cast<double>(touched_.low[i - first])),
+                                   first_line_from(group.middle[V] + static_cast<double>(touched_.high[i - first]))});
+                }
+            }
+        }
+    }
+
+    // Whether a ball can touch a group's facets, and on some line.
+    [[nodiscard]] bool can_touch(const FacetGroup& group) const {
+        const Facing& facing = group.facing;
+        return zc_ - r_ * facing.high[2] <= group.z_max + kTouchMargin && zc_ - r_ * facing.low[2] >= group.z_min - kTouchMargin &&
+               group.low[V] + r_ * facing.low[V] <= at_[n_ - 1] + kTouchMargin && group.high[V] + r_ * facing.high[V] >= at_[0] - kTouchMargin;
+    }
+
+    // As std::lower_bound among the lines, which mostly are evenly spaced.
+    [[nodiscard]] int first_line_from(double v) const {
+        const double guess = (v - at_[0]) * per_mm_;
+        int l = guess <= 0 ? 0 : guess >= n_ ? n_ : static_cast<int>(guess);
+        while (l > 0 && at_[l - 1] >= v) --l;
+        while (l < n_ && at_[l] < v) ++l;
+        return l;
+    }
+
+    void meet_all(std::span<const std::uint32_t> groups) {
         for (std::size_t g = groups.size(); g-- > 0;) {  // of a wall the upper ones come first, which reach farthest
             const FacetGroup& group = solid_.groups[groups[g]];
             const LineRange lines = group_reaches_out(group);
@@ -214,11 +267,6 @@ public:
     }
 
 private:
-    struct LineRange {
-        int first = 0, last = 0;
-        [[nodiscard]] bool any() const { return first < last; }
-    };
-
     [[nodiscard]] bool active(const SolidFacet& f) const { return may_touch(f.z_min, f.z_max, f.nz < 0 ? f.z_max : -kInfinity, ball_, r_, zc_); }
 
     // Those within the radius of [low, high].
@@ -228,16 +276,25 @@ private:
     }
     // The kernels' steps that hold them.
     [[nodiscard]] static LineRange in_steps(LineRange a) {
-        return {a.first / kLinesStep * kLinesStep, (a.last + kLinesStep - 1) / kLinesStep * kLinesStep};
+        const int n = (a.last - a.first + kLinesStep - 1) / kLinesStep * kLinesStep, first = std::min(a.first, kLinesTogether - n);
+        return {first, first + n};
     }
 
     // Looks at the last stretch that begins no later than `low`.
     void look_at(int l, double low) {
         const std::vector<Forbidden>& on_line = found_[l];
-        look(l, std::upper_bound(on_line.begin(), on_line.end(), low, [](double v, const Forbidden& f) { return v < f.low; }));
+        auto next = std::upper_bound(on_line.begin(), on_line.end(), low, [](double v, const Forbidden& f) { return v < f.low; });
+        if (amid_gaps_ && next != on_line.end() && (next == on_line.begin() || low >= 0.5 * (std::prev(next)->high + next->low))) ++next;
+        look(l, next);
     }
     void look(int l, std::vector<Forbidden>::const_iterator next) {
         const std::vector<Forbidden>& on_line = found_[l];
+        if (amid_gaps_) {
+            const bool none = next == on_line.begin(), first = none || next - 1 == on_line.begin(), last = none || next == on_line.end();
+            cover_.low[l] = first ? -kInfinity : 0.5 * ((next - 2)->high + (next - 1)->low);
+            cover_.high[l] = cover_.next[l] = last ? kInfinity : 0.5 * ((next - 1)->high + next->low);
+            return;
+        }
         cover_.next[l] = next == on_line.end() ? kInfinity : next->low;
         cover_.low[l] = next == on_line.begin() ? -kInfinity : std::prev(next)->low;
         cover_.high[l] = next == on_line.begin() ? -kInfinity : std::prev(next)->high;
@@ -279,6 +336,7 @@ private:
 
     // Adds to what is forbidden on a line, which stays ascending and disjoint.
     void forbid(int l, const Forbidden& h) {
+        if (amid_gaps_) return fill(l, h);
         std::vector<Forbidden>& on_line = found_[l];
         auto at = std::lower_bound(on_line.begin(), on_line.end(), h.low, [](const Forbidden& f, double v) { return f.high < v; });
         if (at == on_line.end() || at->low > h.high) at = on_line.insert(at, h);
@@ -300,6 +358,19 @@ private:
             }
         }
         look(l, at + 1);
+    }
+
+    // A gap between what can be touched is forbidden as a whole where its middle is.
+    void fill(int l, const Forbidden& h) {
+        std::vector<Forbidden>& on_line = found_[l];
+        std::size_t at = 0;
+        while (at + 1 < on_line.size() && 0.5 * (on_line[at].high + on_line[at + 1].low) <= h.low) ++at;
+        while (at + 1 < on_line.size() && 0.5 * (on_line[at].high + on_line[at + 1].low) < h.high) {
+            on_line[at].high = on_line[at + 1].high;
+            on_line[at].nz_high = on_line[at + 1].nz_high;
+            on_line.erase(on_line.begin() + static_cast<std::ptrdiff_t>(at) + 1);
+        }
+        look(l, on_line.empty() ? on_line.begin() : on_line.begin() + static_cast<std::ptrdiff_t>(at) + 1);
     }
 
     [[nodiscard]] std::array<std::size_t, 2> facets_of(std::uint32_t group) const {
@@ -438,6 +509,7 @@ private:
         }
     }
 
+    bool amid_gaps_ = false;
     const LayerSolid& solid_;
     const bool ball_;
     const double r_, zc_;
@@ -445,6 +517,8 @@ private:
     alignas(64) std::array<double, kLinesTogether> at_{}, low_{}, high_{};
     HullRows hulls_;
     GroupRows rows_;
+    GroupTouched touched_;
+    double per_mm_ = 0;  // lines
     alignas(64) std::array<std::int64_t, kLinesTogether> state_{};
     std::array<std::vector<Forbidden>, kLinesTogether> found_;  // a ball's: ascending and disjoint
     CoverRows cover_;                                           // of a ball

@@ -14,6 +14,8 @@ namespace slabwright {
 
 namespace {
 
+constexpr double kMostDown = 0.5;    // z of a normal next to the top, below which nothing is said of how it may be touched there
+constexpr int kMostTurn = 170;       // in SolidFacet::kTurn: short of a right angle, within which a cone of normals holds all between them
 constexpr double kMostTiles = 1024;  // along x and along y, of solid_near
 
 Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
@@ -52,7 +54,7 @@ bool edge_matters(MeshView mesh, std::uint32_t f, int k, const Vec3d& a, const V
 }
 
 // Writes the facets that it makes to `out`, as many as pieces() says, and moves that on.
-void append_facet(MeshView mesh, std::uint32_t f, double z_top, SolidFacet*& out) {
+void append_facet(MeshView mesh, std::uint32_t f, std::uint8_t turn, double z_top, SolidFacet*& out) {
     std::array<Vec3d, 3> p;
     for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     const Vec3d n = unit_normal(p[0], p[1], p[2]);
@@ -87,6 +89,8 @@ void append_facet(MeshView mesh, std::uint32_t f, double z_top, SolidFacet*& out
         s.edges = static_cast<std::uint8_t>((ij ? 1 : 0) | (jk ? 2 : 0) | (ki ? 4 : 0));
         s.z_min = std::min({s.p[0][2], s.p[1][2], s.p[2][2]});
         s.z_max = std::max({s.p[0][2], s.p[1][2], s.p[2][2]});
+        s.top = s.z_max >= z_top;
+        s.turn = turn;
         *out++ = s;
     };
     if (corners == 3) emit(0, 1, 2, edge[0], edge[1], edge[2]);
@@ -94,6 +98,57 @@ void append_facet(MeshView mesh, std::uint32_t f, double z_top, SolidFacet*& out
         emit(0, 1, 2, edge[0], edge[1], false);
         emit(0, 2, 3, false, edge[2], edge[3]);
     }
+}
+
+// Between which x, y and z the normals of the facets around a vertex lie, in SolidFacet::kTurn.
+struct NormalsAround {
+    std::array<std::int8_t, 3> low{127, 127, 127}, high{-127, -127, -127};
+};
+
+// For the facets, SolidFacet::turn. What the solid has no part of is left out: it is far below, or cut off.
+std::vector<std::uint8_t> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets) {
+    constexpr std::size_t grain = 4096;
+    std::vector<Vec3d> normals(facets.size());
+    parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const Index3& v = mesh.facets[facets[i]];
+            const Index3& across = mesh.neighbours[facets[i]];
+            normals[i] = unit_normal(to_double(mesh.vertices[v[0]]), to_double(mesh.vertices[v[1]]), to_double(mesh.vertices[v[2]]));
+            if (across[0] == kNoFacet || across[1] == kNoFacet || across[2] == kNoFacet) normals[i] = {0, 0, 0};
+        }
+    });
+    std::vector<NormalsAround> around(mesh.vertices.size());
+    for (std::size_t i = 0; i < facets.size(); ++i) {
+        const Vec3d& n = normals[i];
+        const bool any = n == Vec3d{0, 0, 0};
+        std::array<std::int8_t, 3> low, high;
+        for (std::size_t k = 0; k < 3; ++k) {
+            low[k] = any ? std::int8_t{-127} : static_cast<std::int8_t>(std::max(-127.0, std::floor(n[k] / SolidFacet::kTurn)));
+            high[k] = any ? std::int8_t{127} : static_cast<std::int8_t>(std::min(127.0, std::ceil(n[k] / SolidFacet::kTurn)));
+        }
+        for (const std::uint32_t v : mesh.facets[facets[i]])
+            for (std::size_t k = 0; k < 3; ++k) {
+                around[v].low[k] = std::min(around[v].low[k], low[k]);
+                around[v].high[k] = std::max(around[v].high[k], high[k]);
+            }
+    }
+    std::vector<std::uint8_t> turns(facets.size(), SolidFacet::kAnyTurn);
+    parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            if (normals[i] == Vec3d{0, 0, 0}) continue;
+            double most2 = 0;
+            for (const std::uint32_t v : mesh.facets[facets[i]]) {
+                double turn2 = 0;
+                for (std::size_t k = 0; k < 3; ++k) {
+                    const double n = normals[i][k] / SolidFacet::kTurn, d = std::max(around[v].high[k] - n, n - around[v].low[k]);
+                    turn2 += d * d;
+                }
+                most2 = std::max(most2, turn2);
+            }
+            if (most2 <= kMostTurn * kMostTurn) turns[i] = static_cast<std::uint8_t>(std::ceil(std::sqrt(most2)));
+        }
+    });
+    return turns;
 }
 
 // How many facets append_facet makes of one.
@@ -193,6 +248,26 @@ void lay_disc(std::span<const SolidFacet> facets, FacetGroup& group) {
 
 }  // namespace
 
+Facing facing_of(const SolidFacet& facet) {
+    constexpr Facing any{{-1, -1, -1}, {1, 1, 1}};
+    if (facet.turn == SolidFacet::kAnyTurn) return any;
+    constexpr double rounding = 1e-6;
+    const double turn = facet.turn * SolidFacet::kTurn + rounding;
+    std::array<double, 3> low, high;
+    for (std::size_t k = 0; k < 3; ++k) low[k] = facet.normal[k] - turn, high[k] = facet.normal[k] + turn;
+    if (facet.top) {
+        // Of a·n + b·up with unit length a is no more than 1, unless n points down: then it is 1 / √(1 − n_z²).
+        if (low[2] < -kMostDown) return any;
+        const double most = low[2] < 0 ? 1 / std::sqrt(1 - low[2] * low[2]) : 1;
+        for (std::size_t k = 0; k < 2; ++k) low[k] = std::min(0.0, most * low[k]), high[k] = std::max(0.0, most * high[k]);
+        low[2] = std::min(low[2], most * low[2]), high[2] = 1;
+    }
+    Facing facing{};
+    for (std::size_t k = 0; k < 3; ++k)
+        facing.low[k] = static_cast<float>(std::max(-1.0, low[k]) - rounding), facing.high[k] = static_cast<float>(std::min(1.0, high[k]) + rounding);
+    return facing;
+}
+
 std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets) {
     constexpr float inf = std::numeric_limits<float>::infinity();
     auto down = [](double v) { return std::nextafter(static_cast<float>(v), -inf); };
@@ -200,7 +275,7 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
     std::vector<FacetGroup> groups((facets.size() + FacetGroup::kFacets - 1) / FacetGroup::kFacets);
     parallel_for(context, groups.size(), 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t g = begin; g < end; ++g) {
-            FacetGroup group{{inf, inf}, {-inf, -inf}, inf, -inf, -inf, {}, {}, 0, 0};
+            FacetGroup group{{inf, inf}, {-inf, -inf}, inf, -inf, -inf, {}, {}, 0, 0, {}};
             const std::span<const SolidFacet> own =
                 facets.subspan(g * FacetGroup::kFacets, std::min(FacetGroup::kFacets, facets.size() - g * FacetGroup::kFacets));
             for (const SolidFacet& f : own) {
@@ -214,6 +289,14 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
                 if (f.nz < 0) group.overhang = std::max(group.overhang, up(f.z_max));
             }
             lay_disc(own, group);
+            group.facing = {{1, 1, 1}, {-1, -1, -1}};
+            for (const SolidFacet& f : own) {
+                const Facing facing = facing_of(f);
+                for (std::size_t k = 0; k < 3; ++k) {
+                    group.facing.low[k] = std::min(group.facing.low[k], facing.low[k]);
+                    group.facing.high[k] = std::max(group.facing.high[k], facing.high[k]);
+                }
+            }
             groups[g] = group;
         }
     });
@@ -233,6 +316,8 @@ std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidF
                         to.p[c][k][i] = f < facets.size() ? static_cast<float>(facets[f].p[c][k] - groups[g].middle[k]) : (k == 2 ? far_below : 0.0F);
                 for (std::size_t k = 0; k < 3; ++k) to.normal[k][i] = f < facets.size() ? static_cast<float>(facets[f].normal[k]) : 0.0F;
                 to.nz[i] = f < facets.size() ? facets[f].nz : 0.0F;
+                const Facing facing = f < facets.size() ? facing_of(facets[f]) : Facing{};
+                for (std::size_t k = 0; k < 3; ++k) to.facing_low[k][i] = facing.low[k], to.facing_high[k][i] = facing.high[k];
             }
         }
     });
@@ -245,6 +330,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     solid.z_top = z_top;
     const double cut_off = z_top - kTopSheet;  // the part is cut off here, facets and cap alike
     const BulkVector<std::uint32_t> facets = facets_between(context, mesh, z_low, cut_off);
+    const std::vector<std::uint8_t> turn = turns(context, mesh, facets);
     std::vector<std::size_t> starts((facets.size() + kGrain - 1) / kGrain + 1, 0);
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         std::size_t count = 0;
@@ -264,7 +350,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     });
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         SolidFacet* to = solid.facets.data() + starts[begin / kGrain];
-        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], cut_off, to);
+        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], turn[i], cut_off, to);
     });
     using Extent = std::array<double, 4>;  // least x, y; greatest x, y
     const Extent extent = parallel_reduce(

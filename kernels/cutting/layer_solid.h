@@ -23,8 +23,20 @@ struct SolidFacet {
     Vec3d normal{};  ///< unit, outward; zero for a facet without area
     double z_min = 0, z_max = 0;
     std::uint8_t edges = 0;  ///< bit k: the edge (p[k], p[k + 1]) is not concave, and this facet is the one to test it
-    float nz = 0;            ///< of the facet before cutting
+    bool top = false;        ///< it reaches up to where the solid is cut off
+    /// How far from `normal` the unit normals end of all facets that share a corner with it, at most, in kTurn; kAnyTurn: nothing is known.
+    std::uint8_t turn = kAnyTurn;
+    float nz = 0;  ///< of the facet before cutting
+    static constexpr std::uint8_t kAnyTurn = 255;
+    static constexpr double kTurn = 1.0 / 127;
 };
+
+/// Between which x, y and z the outward normals lie with which a ball outside the solid can touch a facet, its edges and its corners: within the
+/// cone of the normals around it, and where the solid is cut off between them and upright.
+struct Facing {
+    std::array<float, 3> low, high;
+};
+[[nodiscard]] Facing facing_of(const SolidFacet& facet);
 
 /// What FacetGroup::kFacets facets that follow one another have in common, mm, rounded outward.
 struct FacetGroup {
@@ -36,11 +48,12 @@ struct FacetGroup {
     /// nor than `thickness` from the plane square to it.
     std::array<float, 3> middle{}, axis{};
     float radius = 0, thickness = 0;
+    Facing facing{};
 };
 /// Of each eight facets, in their order; the last may have fewer.
 [[nodiscard]] std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets);
 
-/// The same facets side by side, for tests of all of them at once: corners, each an x, y and z relative to the group's middle, and normals. Where
+/// The same facets side by side, for tests of all of them at once: corners, each an x, y and z relative to the group's middle, normals and facings. Where
 /// a group has fewer facets, the others lie far below everything.
 struct GroupCorners {
     template <class T>
@@ -48,6 +61,7 @@ struct GroupCorners {
     alignas(32) std::array<std::array<Each<float>, 3>, 3> p;
     alignas(32) std::array<Each<float>, 3> normal;
     alignas(32) Each<float> nz;
+    alignas(32) std::array<Each<float>, 3> facing_low, facing_high;
 };
 [[nodiscard]] std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups);
 
