@@ -156,7 +156,7 @@ public:
     // the lines where they could.
     void meet(std::span<const std::uint32_t> groups) {
         if (!ball_) return meet_disc(groups);
-        if (!solid_.corners.empty()) {
+        if (!solid_.part && !solid_.corners.empty()) {
             meet_touched(groups);
             amid_gaps_ = true;
             for (int l = 0; l < n_; ++l) look(l, found_[l].begin() + (found_[l].empty() ? 0 : 1));

@@ -374,6 +374,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
 
 LayerSolid solid_near(Context& context, const LayerSolid& solid, std::span<const SolidFacet> facets, double reach) {
     LayerSolid near;
+    near.part = true;
     near.z_low = solid.z_low, near.z_top = solid.z_top, near.min = solid.min, near.max = solid.max;
     if (facets.empty() || solid.facets.empty()) return near;
     // Square tiles over the solid; those that come near are marked, by their middles.

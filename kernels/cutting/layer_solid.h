@@ -74,6 +74,7 @@ struct LayerSolid {
     std::vector<GroupCorners> corners;   ///< of the groups; none: fibres look at each facet by itself
     FacetTree tree;                      ///< of the facets, for drops
     CapCells cap_cells;                  ///< of the cap
+    bool part = false;                   ///< of a solid: where its facets end it may be touched with any normal
 };
 
 /// Material thinner than this under the layer's top is not counted, mm: a facet that lies in the top plane to within rounding belongs to
