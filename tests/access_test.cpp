@@ -372,6 +372,7 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
     std::uniform_real_distribution<double> unit(0, 1);
     const Mesh m = relief(40, bumpy);
     const StandingPart part(context, m.view());
+    int met = 0;
     for (int trial = 0; trial < 40; ++trial) {
         const auto form = StandingPart::Form::ball;
         const double radius = 0.5 + 2 * unit(random);
@@ -385,7 +386,12 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
         for (std::size_t i = 0; i < 200; ++i) motions[i + 200] = motions[i];  // every depth twice
         const double tolerance = trial % 3 == 0 ? 0.05 : 10;
         const StandingPart::Found all = part.deepest(form, 100, motions, radius, 1e-5, tolerance);
-        ASSERT_TRUE(all.most.found);
+        if (!all.most.found) {  // a way off the relief
+            for (const auto& [from, to] : motions)
+                ASSERT_LT(part.ball(100, from, to, radius, 0).depth, 2e-5) << "seed " << seed << " trial " << trial;
+            continue;
+        }
+        ++met;
         std::vector<std::size_t> order{0, 1, 2, 3, 4, 5, 6, 7};
         std::shuffle(order.begin(), order.end(), random);
         std::array<StandingPart::Found, 8> found;
@@ -408,6 +414,7 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
         EXPECT_EQ(beyond, beyond_alone);
         EXPECT_EQ(beyond, all.beyond.size());
     }
+    EXPECT_GT(met, 30);
 }
 
 // Chords of circles, of which it is told that they are: what is found is the same, down to the last digit but for the top sheet, under which many

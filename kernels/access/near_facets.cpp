@@ -372,8 +372,8 @@ SLABWRIGHT_WIDE static void along_eights(const ManyEights& many, const LevelWay&
             most_of(e0, e1, e2, edge2), most_of(a0, a1, a2, outmost);
             edge = edge2, root(edge);
             const Eight inmost = one + w.curvature * (outmost - edge);
-            // A second derivative of 1 / radius at most, over a circle of the longest edge / √3 that holds the facet.
-            bend = w.curvature * edge2 / (6.0F * (inmost > least ? inmost : least));
+            // A second derivative of 1 / radius at most, over a circle of the longest edge / √3 that holds the facet; near the axis, no more than an edge.
+            bend = inmost > least ? w.curvature * edge2 / (6.0F * inmost) : edge;
         }
         Signs parted{};
         const auto part = [&](const Eight& ua, const Eight& uh) {
