@@ -607,6 +607,40 @@ TEST(StandingPart, DistanceFromShadow) {
     EXPECT_NEAR(part.beside({34, 5, 2}, 5, 50).distance, 24, 1e-6);
 }
 
+// The nearest of many facets is the nearest of what each alone is; all face down, so that nothing is covered.
+TEST(StandingPart, NearestOfManyFacets) {
+    Context context;
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> place(0, 40), size(-3, 3), level(-1, 42);
+    for (const std::size_t count : {1U, 7U, 8U, 65U, 300U}) {
+        Mesh all;
+        std::vector<StandingPart> each;
+        for (std::size_t i = 0; i < count; ++i) {
+            const Point3 a{place(random), place(random), place(random)};
+            const auto beside = [&] { return Point3{a[0] + size(random), a[1] + size(random), a[2] + size(random)}; };
+            Point3 b = beside(), c = beside();
+            if ((b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0])) std::swap(b, c);
+            Mesh one;
+            facet(all, a, b, c), facet(one, a, b, c);
+            each.emplace_back(context, one.view());
+        }
+        const StandingPart part(context, all.view());
+        for (int i = 0; i < 300; ++i) {
+            const Point3 p{level(random), level(random), level(random)};
+            const double top = level(random), limit = i % 3 == 0 ? 4 : 100;
+            double facets = limit, shadow = limit, aside = limit;
+            for (const StandingPart& one : each) {
+                facets = std::min(facets, one.from_facets(p, limit));
+                shadow = std::min(shadow, one.from_shadow(p, top, limit).distance);
+                aside = std::min(aside, one.beside(p, top, limit).distance);
+            }
+            ASSERT_NEAR(part.from_facets(p, limit), facets, 1e-9);
+            ASSERT_NEAR(part.from_shadow(p, top, limit).distance, shadow, 1e-9);
+            ASSERT_NEAR(part.beside(p, top, limit).distance, aside, 1e-9);
+        }
+    }
+}
+
 TEST(ClosestPoint, AgreesWithBruteForce) {
     Context context;
     const Mesh m = relief(12, bumpy);

@@ -157,9 +157,8 @@ TEST(Deviation, IsTheDistanceOfShiftedPlanes) {
 TEST(Deviation, AgreesWithClosestPoints) {
     Context context;
     const Mesh mesh = welded(context, pump_cover());
-    const Mesh few = decimate(context, mesh.view(), 900);
-    double most = 0;
-    const auto measure = [&](const Mesh& from, const Mesh& to) {
+    const auto farthest = [&](const Mesh& from, const Mesh& to) {
+        double most = 0;
         const ClosestPoint closest(context, to.view());
         for (const Index3& f : from.facets) {
             Point3 middle{};
@@ -170,11 +169,20 @@ TEST(Deviation, AgreesWithClosestPoints) {
             }
             most = std::max(most, closest.query_unsigned(middle, 1e9).distance);
         }
+        return most;
     };
-    measure(mesh, few);
-    measure(few, mesh);
-    EXPECT_GT(most, 0.01);
-    EXPECT_NEAR(surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view())), most, 1e-9);
+    for (const std::size_t count : {200U, 900U, 3000U}) {
+        const Mesh few = decimate(context, mesh.view(), count);
+        const StandingPart a(context, mesh.view()), b(context, few.view());
+        const double there = farthest(mesh, few), back = farthest(few, mesh);
+        EXPECT_GT(there, 1e-4);
+        EXPECT_NEAR(a.farthest_from(context, b, 0), there, 1e-9);
+        EXPECT_NEAR(b.farthest_from(context, a, 0), back, 1e-9);
+        EXPECT_NEAR(a.farthest_from(context, b, 0.9 * there), there, 1e-9);
+        EXPECT_EQ(a.farthest_from(context, b, 1.1 * there), 1.1 * there);
+        EXPECT_NEAR(surface_deviation(context, a, b), std::max(there, back), 1e-9);
+        EXPECT_NEAR(surface_deviation(context, b, a), std::max(there, back), 1e-9);
+    }
 }
 
 TEST(Slopes, OfACone) {

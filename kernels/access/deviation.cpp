@@ -37,6 +37,17 @@ public:
         const auto over = [&](const std::array<double, 4>& side) { return side[0] * p[0] + side[1] * p[1] + side[2] * p[2] + side[3]; };
         return (over(sides_[0]) >= 0) & (over(sides_[1]) >= 0) & (over(sides_[2]) >= 0) & (std::abs(over(plane_)) <= distance);
     }
+    /// Whether all places of a box are, by its middle and half its extent: the prism is convex.
+    [[nodiscard]] bool within(const Point3& middle, const Point3& half, double distance) const {
+        const auto over = [&](const std::array<double, 4>& side) {
+            return side[0] * middle[0] + side[1] * middle[1] + side[2] * middle[2] + side[3];
+        };
+        const auto span = [&](const std::array<double, 4>& side) {
+            return std::abs(side[0]) * half[0] + std::abs(side[1]) * half[1] + std::abs(side[2]) * half[2];
+        };
+        return (over(sides_[0]) >= span(sides_[0])) & (over(sides_[1]) >= span(sides_[1])) & (over(sides_[2]) >= span(sides_[2])) &
+               (std::abs(over(plane_)) + span(plane_) <= distance);
+    }
 
 private:
     std::array<std::array<double, 4>, 3> sides_{};
@@ -49,11 +60,12 @@ public:
     explicit NearLately(const std::array<Vec3f, 3>& first) : prisms_{Prism(first), Prism(first), Prism(first), Prism(first)} {}
     /// The last one that a place was within or that was taken.
     [[nodiscard]] std::uint32_t facet() const { return facets_[0]; }
-    /// Whether a place is in the prism of one of them and no farther from the facet than this.
-    [[nodiscard]] bool within(const Point3& p, double distance) {
-        if (prisms_[0].within(p, distance)) return true;
+    /// Whether a place, or all of a box, is in the prism of one of them and no farther from the facet than this.
+    template <class... Place>
+    [[nodiscard]] bool within(const Place&... place) {
+        if (prisms_[0].within(place...)) return true;
         for (std::size_t k = 1; k < kMany; ++k)
-            if (prisms_[k].within(p, distance)) {
+            if (prisms_[k].within(place...)) {
                 std::swap(prisms_[0], prisms_[k]);
                 std::swap(facets_[0], facets_[k]);
                 return true;
@@ -99,15 +111,16 @@ private:
 // Only the greatest distance matters. A facet of the other part bounds the distance of all that is near it, so most of the tree is done with
 // after one look at eight nodes or at one; a place whose bound is beyond the greatest known distance is measured. A sample of places is
 // measured before, so that the greatest known is near the greatest from the start. The result is exact, so it depends on no order.
-double StandingPart::farthest_from(Context& context, const StandingPart& other) const {
-    if (facets_.empty() || other.facets_.empty()) return 0;
+double StandingPart::farthest_from(Context& context, const StandingPart& other, double known) const {
+    if (facets_.empty() || other.facets_.empty()) return known;
     constexpr std::size_t kFan = std::tuple_size_v<decltype(Nodes::x0)>, kSample = 509;
     const auto corner = [](const Vec3f& v) { return Point3{v.x, v.y, v.z}; };
     const auto larger = [](double a, double b) { return std::max(a, b); };
+    const std::size_t samples = known > 0 ? 0 : (facets_.size() + kSample - 1) / kSample;
     const double sampled = parallel_reduce(
-        context, (facets_.size() + kSample - 1) / kSample, 64, 0.0,
+        context, samples, 64, known,
         [&](std::size_t begin, std::size_t end) {
-            double most = 0;
+            double most = known;
             for (std::size_t i = begin; i < end; ++i)
                 for (const Vec3f& v : facets_[i * kSample].v)
                     most = std::max(most, other.nearest(corner(v), {std::numeric_limits<double>::infinity(), 0}, most).distance);
@@ -115,7 +128,7 @@ double StandingPart::farthest_from(Context& context, const StandingPart& other) 
         },
         larger);
     return parallel_reduce(
-        context, levels_[0].size(), 64, 0.0,
+        context, levels_[0].size(), 64, sampled,
         [&](std::size_t begin, std::size_t end) {
             double most = sampled;
             NearLately near_lately(other.facets_[0].v);
@@ -124,6 +137,7 @@ double StandingPart::farthest_from(Context& context, const StandingPart& other) 
             const auto may_be_farther = [&](const Node& box, bool search) {
                 const Point3 middle{(double{box.x0} + box.x1) / 2, (double{box.y0} + box.y1) / 2, (double{box.z0} + box.z1) / 2};
                 const double x = double{box.x1} - box.x0, y = double{box.y1} - box.y0, z = double{box.z1} - box.z0;
+                if (near_lately.within(middle, Point3{x / 2, y / 2, z / 2}, most)) return false;
                 const double half = std::sqrt(x * x + y * y + z * z) / 2;
                 if (half > most) return true;  // whatever is near the middle
                 Near near{other.distance(middle, near_lately.facet()), near_lately.facet()};
@@ -172,7 +186,10 @@ double StandingPart::farthest_from(Context& context, const StandingPart& other) 
 }
 
 double surface_deviation(Context& context, const StandingPart& a, const StandingPart& b) {
-    return std::max(a.farthest_from(context, b), b.farthest_from(context, a));
+    // What has fewer facets first: of the other, only places that are farther still are looked for.
+    const bool in_order = a.facet_count() <= b.facet_count();
+    const StandingPart &few = in_order ? a : b, &many = in_order ? b : a;
+    return many.farthest_from(context, few, few.farthest_from(context, many, 0));
 }
 
 }  // namespace slabwright

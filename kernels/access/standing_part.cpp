@@ -437,18 +437,6 @@ void StandingPart::walk_within(const Within& box, Visit&& visit) const {
 }
 
 namespace {
-template <class NodeT>
-double xy_distance2(const NodeT& n, double x, double y) {
-    const double dx = std::max({0.0, n.x0 - x, x - n.x1}), dy = std::max({0.0, n.y0 - y, y - n.y1});
-    return dx * dx + dy * dy;
-}
-/// Square of a lower bound of the distance between (x, y) and a facet.
-double xy_distance2(const std::array<Vec3f, 3>& v, double x, double y) {
-    const double x0 = std::min({v[0].x, v[1].x, v[2].x}), x1 = std::max({v[0].x, v[1].x, v[2].x});
-    const double y0 = std::min({v[0].y, v[1].y, v[2].y}), y1 = std::max({v[0].y, v[1].y, v[2].y});
-    const double dx = std::max({0.0, x0 - x, x - x1}), dy = std::max({0.0, y0 - y, y - y1});
-    return dx * dx + dy * dy;
-}
 /// A straight motion seen from above. Boxes and facets are measured in the frame of its direction, where their extents bound their distance.
 class WayInPlan {
 public:
@@ -572,38 +560,89 @@ Penetration motion_depth(const Cutter& cutter, const Point3& from, const Point3&
 
 }  // namespace
 
-/// Visits the facets, and which they are, of nodes with squared(box) < limit(), the nearer of siblings first, so that the limit falls early. Ties
-/// keep the order of the tree.
-template <class Squared, class Limit, class Visit>
-void StandingPart::walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit) const {
+// Written with vectors of eight, as overlapping() is.
+SLABWRIGHT_WIDE void StandingPart::squares(const Nodes& n, const Away& from, std::array<double, 8>& squares) {
+    using Eight [[gnu::vector_size(64)]] = double;
+    using Floats [[gnu::vector_size(32)]] = float;
+    const auto wide = [](const std::array<float, 8>& row, Eight& to) {
+        Floats values;
+        std::memcpy(&values, row.data(), sizeof(values));
+        to = __builtin_convertvector(values, Eight);
+    };
+    const auto gap = [](const Eight& below, const Eight& above, Eight& most) {
+        const Eight none{};
+        most = below > above ? below : above;
+        most = most > none ? most : none;
+    };
+    Eight x0, y0, z0, x1, y1, z1, dx, dy, dz{};
+    wide(n.x0, x0), wide(n.y0, y0), wide(n.z0, z0), wide(n.x1, x1), wide(n.y1, y1), wide(n.z1, z1);
+    const Eight none{};
+    gap(x0 - from.point[0], from.point[0] - x1, dx), gap(y0 - from.point[1], from.point[1] - y1, dy);
+    Eight square = dx * dx + dy * dy;
+    if (from.kind == Away::Kind::facets) {
+        gap(z0 - from.point[2], from.point[2] - z1, dz);
+        square += dz * dz;
+    } else {
+        const Eight infinite = none + kInfinity, top = none + from.top;
+        if (from.kind == Away::Kind::shadow) {
+            gap(none, from.point[2] - (z1 < top ? z1 : top), dz);
+            square += dz * dz;
+        } else square = z1 > none + from.point[2] ? square : infinite;
+        square = z0 < top ? square : infinite;
+    }
+    std::memcpy(squares.data(), &square, sizeof(square));
+}
+
+SLABWRIGHT_WIDE void StandingPart::boxes(const EightFacets& f, Nodes& boxes) {
+    using Floats [[gnu::vector_size(32)]] = float;
+    const auto extent = [](const std::array<float, 8>& a, const std::array<float, 8>& b, const std::array<float, 8>& c, std::array<float, 8>& low,
+                           std::array<float, 8>& high) {
+        Floats u, v, w;
+        std::memcpy(&u, a.data(), sizeof(u)), std::memcpy(&v, b.data(), sizeof(v)), std::memcpy(&w, c.data(), sizeof(w));
+        Floats least = u < v ? u : v, most = u > v ? u : v;
+        least = least < w ? least : w, most = most > w ? most : w;
+        std::memcpy(low.data(), &least, sizeof(least)), std::memcpy(high.data(), &most, sizeof(most));
+    };
+    extent(f.x0, f.x1, f.x2, boxes.x0, boxes.x1), extent(f.y0, f.y1, f.y2, boxes.y0, boxes.y1), extent(f.z0, f.z1, f.z2, boxes.z0, boxes.z1);
+}
+
+/// Visits the facets, and which they are, whose box is nearer than limit(), a square, the nearer of sibling nodes first, so that the limit falls
+/// early. Ties keep the order of the tree.
+template <class Limit, class Visit>
+void StandingPart::walk_nearest(const Away& from, Limit&& limit, Visit&& visit) const {
     struct Item {
         std::uint32_t level;
         std::size_t index;
         double d;
     };
     std::array<Item, 128> stack;
+    std::array<double, 8> d;
     std::size_t size = 0;
     if (facets_.empty()) return;
     const auto push = [&](std::uint32_t level, std::size_t eight) {
-        const Nodes& nodes = levels_[level][eight];
+        squares(levels_[level][eight], from, d);  // infinite where there is no node
         const std::size_t first = size;
+        const double most = limit();
         for (std::size_t k = kFan; k-- > 0;) {
-            if (!(nodes.x0[k] <= nodes.x1[k])) continue;
-            const double d = squared(nodes[k]);
-            if (!(d < limit())) continue;
+            if (!(d[k] < most)) continue;
             std::size_t at = size++;
-            for (; at > first && stack[at - 1].d < d; --at) stack[at] = stack[at - 1];
-            stack[at] = {level, eight * kFan + k, d};
+            for (; at > first && stack[at - 1].d < d[k]; --at) stack[at] = stack[at - 1];
+            stack[at] = {level, eight * kFan + k, d[k]};
         }
     };
     push(static_cast<std::uint32_t>(levels_.size() - 1), 0);
     while (size > 0) {
         const Item item = stack[--size];
         if (!(item.d < limit())) continue;
-        if (item.level > 0) push(item.level - 1, item.index);
-        else
-            for (std::size_t k = item.index * kFan; k < std::min(facets_.size(), (item.index + 1) * kFan); ++k)
-                visit(facets_[k], static_cast<std::uint32_t>(k));
+        if (item.level > 0) {
+            push(item.level - 1, item.index);
+            continue;
+        }
+        Nodes around;
+        boxes(facets_.eight(item.index), around);
+        squares(around, from, d);
+        for (std::size_t first = item.index * kFan, k = 0; first + k < std::min(facets_.size(), first + kFan); ++k)
+            if (d[k] < limit()) visit(facets_[first + k], static_cast<std::uint32_t>(first + k));
     }
 }
 
@@ -1018,15 +1057,8 @@ StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_
         best = {over, {0, 0, over}};
     }
     walk_nearest(
-        [&](const Node& n) {
-            if (n.z0 >= top) return kInfinity;
-            const double dz = std::max(0.0, point[2] - std::min<double>(n.z1, top));
-            return xy_distance2(n, point[0], point[1]) + dz * dz;
-        },
-        [&] { return best.distance * best.distance; },
+        {Away::Kind::shadow, point, top}, [&] { return best.distance * best.distance; },
         [&](const Facet& f, std::uint32_t) {
-            const double dz = std::max(0.0, point[2] - std::min<double>(std::max({f.v[0].z, f.v[1].z, f.v[2].z}), top));
-            if (xy_distance2(f.v, point[0], point[1]) + dz * dz >= best.distance * best.distance) return;
             below(f.v, top, [&](const Triangle& t) {
                 const RayDistance r = ray_distance(point, t);
                 if (r.d < best.distance) best = {r.d, r.vector};
@@ -1041,28 +1073,26 @@ StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, 
     if (point[2] >= top) return best;
     if (covered(point[0], point[1], top)) return {0, {0, 0, 0}};
     const P2 axis{point[0], point[1]};
-    walk_nearest([&](const Node& n) { return n.z0 < top && n.z1 > point[2] ? xy_distance2(n, axis.x, axis.y) : kInfinity; },
-                 [&] { return best.distance * best.distance; },
-                 [&](const Facet& f, std::uint32_t) {
-                     if (xy_distance2(f.v, axis.x, axis.y) >= best.distance * best.distance) return;
-                     if (f.v[0].z >= top && f.v[1].z >= top && f.v[2].z >= top) return;
-                     Polygon poly;
-                     poly.n = 3;
-                     for (int k = 0; k < 3; ++k) poly.p[k] = to_point(f.v[k]);
-                     poly = clip_z(clip_z(poly, top, false), point[2], true);
-                     if (poly.n == 0) return;
-                     if (distance_2d(poly, axis, axis) == 0) {
-                         best = {0, {0, 0, 0}};
-                         return;
-                     }
-                     for (int i = 0; i < poly.n; ++i) {
-                         Point3 s = poly.p[i], e = poly.p[(i + 1) % poly.n], from = point;
-                         s[2] = e[2] = from[2] = 0;
-                         const Point3 w = sub(from, closest_on_segment(from, s, e));
-                         const double d = std::sqrt(dot(w, w));
-                         if (d < best.distance) best = {d, w};
-                     }
-                 });
+    walk_nearest(
+        {Away::Kind::beside, point, top}, [&] { return best.distance * best.distance; },
+        [&](const Facet& f, std::uint32_t) {
+            Polygon poly;
+            poly.n = 3;
+            for (int k = 0; k < 3; ++k) poly.p[k] = to_point(f.v[k]);
+            poly = clip_z(clip_z(poly, top, false), point[2], true);
+            if (poly.n == 0) return;
+            if (distance_2d(poly, axis, axis) == 0) {
+                best = {0, {0, 0, 0}};
+                return;
+            }
+            for (int i = 0; i < poly.n; ++i) {
+                Point3 s = poly.p[i], e = poly.p[(i + 1) % poly.n], from = point;
+                s[2] = e[2] = from[2] = 0;
+                const Point3 w = sub(from, closest_on_segment(from, s, e));
+                const double d = std::sqrt(dot(w, w));
+                if (d < best.distance) best = {d, w};
+            }
+        });
     return best;
 }
 
@@ -1075,15 +1105,8 @@ double StandingPart::distance(const Point3& point, std::uint32_t facet) const {
 StandingPart::Near StandingPart::nearest(const Point3& point, const Near& known, double enough) const {
     Near best = known;
     walk_nearest(
-        [&](const Node& n) {
-            const double dz = std::max({0.0, n.z0 - point[2], point[2] - n.z1});
-            return xy_distance2(n, point[0], point[1]) + dz * dz;
-        },
-        [&] { return best.distance <= enough ? 0.0 : best.distance * best.distance; },
-        [&](const Facet& f, std::uint32_t facet) {
-            const double dz =
-                std::max({0.0, std::min({f.v[0].z, f.v[1].z, f.v[2].z}) - point[2], point[2] - std::max({f.v[0].z, f.v[1].z, f.v[2].z})});
-            if (xy_distance2(f.v, point[0], point[1]) + dz * dz >= best.distance * best.distance) return;
+        {Away::Kind::facets, point, 0}, [&] { return best.distance <= enough ? 0.0 : best.distance * best.distance; },
+        [&](const Facet&, std::uint32_t facet) {
             const double d = distance(point, facet);
             if (d < best.distance) best = {d, facet};
         });
@@ -1093,11 +1116,7 @@ StandingPart::Near StandingPart::nearest(const Point3& point, const Near& known,
 double StandingPart::from_facets(const Point3& point, double limit) const {
     double best2 = limit * limit;
     walk_nearest(
-        [&](const Node& n) {
-            const double dz = std::max({0.0, n.z0 - point[2], point[2] - n.z1});
-            return xy_distance2(n, point[0], point[1]) + dz * dz;
-        },
-        [&] { return best2; },
+        {Away::Kind::facets, point, 0}, [&] { return best2; },
         [&](const Facet& f, std::uint32_t) {
             const Point3 away = sub(point, closest_on_triangle(point, {to_point(f.v[0]), to_point(f.v[1]), to_point(f.v[2])}));
             best2 = std::min(best2, dot(away, away));

@@ -94,8 +94,10 @@ public:
     /// From a point to the nearest facet, whatever its height; the limit when none is nearer.
     [[nodiscard]] double from_facets(const Point3& point, double limit) const;
 
-    /// The greatest distance from a corner or middle of its facets to the nearest facet of another part, mm; 0 when either has none.
-    [[nodiscard]] double farthest_from(Context& context, const StandingPart& other) const;
+    /// The greatest distance from a corner or middle of its facets to the nearest facet of another part, mm; `known` when none is greater or
+    /// either has none.
+    [[nodiscard]] double farthest_from(Context& context, const StandingPart& other, double known) const;
+    [[nodiscard]] std::size_t facet_count() const { return facets_.size(); }
 
     /// Lowest and highest z, and the extent in x and y, of the facets.
     [[nodiscard]] Box3 box() const { return box_; }
@@ -146,8 +148,18 @@ private:
     void walk(Enter&& enter, Visit&& visit) const;
     template <class Visit>
     void walk_within(const Within& box, Visit&& visit) const;
-    template <class Squared, class Limit, class Visit>
-    void walk_nearest(Squared&& squared, Limit&& limit, Visit&& visit) const;
+    /// What is asked of boxes: how far a point is from the facets in them, or from the shadow of these below the top; or how far, horizontally,
+    /// from what is higher than it.
+    struct Away {
+        enum class Kind : char { facets, shadow, beside } kind;
+        Point3 point;
+        double top;
+    };
+    /// Squares of the distances from a point to eight boxes, mm²; infinite where a box holds nothing that is asked for.
+    static void squares(const Nodes& nodes, const Away& from, std::array<double, 8>& squares);
+    static void boxes(const EightFacets& facets, Nodes& boxes);
+    template <class Limit, class Visit>
+    void walk_nearest(const Away& from, Limit&& limit, Visit&& visit) const;
     /// A facet and how far it is from a place.
     struct Near {
         double distance;  ///< mm
