@@ -365,12 +365,12 @@ TEST(Fibres, AFlangeThatBeginsAtTheTopIsNoneOfTheLayer) {
     }
 }
 
-// What only the facets that a ball can touch say, against what each of them forbids.
-TEST(Fibres, WhatABallCanTouchEndsAllThatIsForbidden) {
+// What only the facets that a cutter can touch say, against what each of them forbids.
+TEST(Fibres, WhatACutterCanTouchEndsAllThatIsForbidden) {
     std::mt19937 random(test::seed());
     Context context;
     std::size_t compared = 0, turned = 0;
-    for (int trial = 0; trial < 24; ++trial) {
+    for (int trial = 0; trial < 48; ++trial) {
         const double size = trial % 4 == 1 ? 0.4 : trial % 4 == 2 ? 1.0 : 3.0, high = trial % 2 ? 3.0 : 12.0;
         const Mesh mesh = trial % 6 == 5 ? weld(context, shapes::torus(static_cast<int>(20 + random() % 60), 9, 4))
                                          : test::random_height_field(context, static_cast<int>(24 / size), size, high, high < 4 ? 0.25 : 2.0,
@@ -378,10 +378,11 @@ TEST(Fibres, WhatABallCanTouchEndsAllThatIsForbidden) {
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, trial % 3 == 0 ? 2.5 : 12.5);
         LayerSolid each = solid;
         each.corners.clear();
-        for (const SolidFacet& f : solid.facets) turned += f.turn != SolidFacet::kAnyTurn;
-        const Cutter cutter{Cutter::Profile::ball, trial % 5 == 0 ? 0.7 : 3.0};
+        for (const SolidFacet& f : solid.facets) turned += *std::max_element(f.turn.begin(), f.turn.end()) != SolidFacet::kAnyTurn;
+        const Cutter cutter{trial < 24 ? Cutter::Profile::ball : Cutter::Profile::flat, trial % 5 == 0 ? 0.7 : 3.0};
         std::vector<double> tips;
         for (int k = 0; k < 10; ++k) tips.push_back(static_cast<double>(random() % 12000) / 1000 - 4);
+        if (const float corner = mesh.vertices[random() % mesh.vertices.size()].z; corner < solid.z_top) tips.push_back(corner);
         std::vector<Section> inside;
         for (const double tip : tips) {
             const Plane plane = inside_plane(solid, cutter, tip);
@@ -403,14 +404,14 @@ TEST(Fibres, WhatABallCanTouchEndsAllThatIsForbidden) {
             }
         }
     }
-    EXPECT_GT(compared, 20'000U);
-    EXPECT_GT(turned, 10'000U);
+    EXPECT_GT(compared, 40'000U);
+    EXPECT_GT(turned, 20'000U);
 }
 
 TEST(LayerSolid, TurnsHoldTheNormalsAroundEveryCorner) {
     std::mt19937 random(test::seed());
     Context context;
-    std::size_t known = 0;
+    std::size_t known = 0, known_aside = 0;
     for (int trial = 0; trial < 6; ++trial) {
         const Mesh mesh = test::random_height_field(context, 12, 2.0, 5, trial % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, 100);
@@ -418,16 +419,30 @@ TEST(LayerSolid, TurnsHoldTheNormalsAroundEveryCorner) {
         for (const SolidFacet& f : solid.facets)
             for (const Vec3d& p : f.p) around[p].push_back(&f);
         for (const SolidFacet& f : solid.facets) {
-            if (f.turn == SolidFacet::kAnyTurn) continue;
-            ++known;
-            for (const Vec3d& p : f.p)
-                for (const SolidFacet* other : around[p]) {
+            for (std::size_t c = 0; c < 3; ++c) {
+                if (f.turn[c] == SolidFacet::kAnyTurn) continue;
+                ++known;
+                for (const SolidFacet* other : around[f.p[c]]) {
                     const Vec3d &m = other->normal, &n = f.normal;
-                    EXPECT_LE(std::hypot(m[0] - n[0], m[1] - n[1], m[2] - n[2]), f.turn * SolidFacet::kTurn + 1e-12);
+                    EXPECT_LE(std::hypot(m[0] - n[0], m[1] - n[1], m[2] - n[2]), f.turn[c] * SolidFacet::kTurn + 1e-12);
                 }
+            }
+            for (std::size_t c = 0; c < 3; ++c) {
+                if (f.aside[c] == SolidFacet::kAnyTurn) continue;
+                ++known_aside;
+                for (const SolidFacet* other : around[f.p[c]]) {
+                    const Vec3d &m = other->normal, &n = f.normal;
+                    const double m_across = std::hypot(m[0], m[1]), n_across = std::hypot(n[0], n[1]);
+                    if (m_across > 0) {
+                        EXPECT_LE(std::hypot(m[0] / m_across - n[0] / n_across, m[1] / m_across - n[1] / n_across),
+                                  f.aside[c] * SolidFacet::kTurn + 1e-12);
+                    }
+                }
+            }
         }
     }
     EXPECT_GT(known, 1000U);
+    EXPECT_GT(known_aside, 500U);
 }
 
 // Beside some of its facets a solid's contours are those of what lies near them alone.

@@ -215,35 +215,48 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
             for (Vec3d& p : f.p) p = {away + within(-size, size), away + within(-size, size), within(-size, size)};
             f.normal = unit({within(-1, 1), within(-1, 1), within(-0.4, 1)});
             f.nz = static_cast<float>(f.normal[2]);
-            f.turn = random() % 5 == 0 ? SolidFacet::kAnyTurn : static_cast<std::uint8_t>(2 + random() % 160);
+            for (std::uint8_t& turn : f.turn) turn = random() % 5 == 0 ? SolidFacet::kAnyTurn : static_cast<std::uint8_t>(2 + random() % 160);
             f.top = random() % 4 == 0;
+            if (f.top && random() % 2 == 0) f.p[0][2] = f.p[1][2] = size;
+            f.edges = random() & 7;
             f.z_min = std::min({f.p[0][2], f.p[1][2], f.p[2][2]});
             f.z_max = std::max({f.p[0][2], f.p[1][2], f.p[2][2]});
         }
+        const std::size_t k = random() % facets.size(), v = random() % 2;
+        SolidFacet& f = facets[k];
+        // On the face, on an edge that is to be tested, or on an end of one: place and normal.
+        const std::size_t part = random() % 4, edge = random() % 3, next = (edge + 1) % 3;
+        if (part > 0) f.edges = f.edges | (1U << edge & 7U);
+        const bool on_end = part == 3;
+        const auto cut = [&](std::size_t c) { return f.top && f.p[c][2] == f.z_max; };
+        const auto turn = [&](std::size_t c) { return f.turn[c] == SolidFacet::kAnyTurn ? 2.1 : f.turn[c] * SolidFacet::kTurn; };
+        const Vec3d& n = f.normal;
+        Vec3d place, d = n;
+        if (part == 0) {
+            double a = within(0, 1), b = within(0, 1);
+            if (a + b > 1) a = 1 - a, b = 1 - b;
+            for (std::size_t c = 0; c < 3; ++c) place[c] = f.p[0][c] + a * (f.p[1][c] - f.p[0][c]) + b * (f.p[2][c] - f.p[0][c]);
+        } else {
+            const double most = on_end ? turn(edge) : std::min(turn(edge), turn(next)), a = on_end ? 0 : within(0, 1);
+            d = unit({within(-1, 1), within(-1, 1), within(-1, 1)});
+            while (std::hypot(d[0] - n[0], d[1] - n[1], d[2] - n[2]) > most) d = unit({d[0] + n[0], d[1] + n[1], d[2] + n[2]});
+            if (cut(edge) && (on_end || cut(next)) && random() % 2 == 0) d = unit({d[0], d[1], d[2] + within(0, 2)});
+            for (std::size_t c = 0; c < 3; ++c) place[c] = f.p[edge][c] + a * (f.p[next][c] - f.p[edge][c]);
+        }
         const std::vector<FacetGroup> groups = facet_groups(context, facets);
         const std::vector<GroupCorners> corners = group_corners(context, facets, groups);
-        const std::size_t k = random() % facets.size(), v = random() % 2;
-        const SolidFacet& f = facets[k];
-        Vec3d d = unit({within(-1, 1), within(-1, 1), within(-1, 1)});
-        if (f.turn != SolidFacet::kAnyTurn) {
-            const Vec3d& n = f.normal;
-            while (std::hypot(d[0] - n[0], d[1] - n[1], d[2] - n[2]) > f.turn * SolidFacet::kTurn) d = unit({d[0] + n[0], d[1] + n[1], d[2] + n[2]});
-        }
-        if (f.top && random() % 2 == 0) {
-            const double up = within(0, 2);
-            d = unit({d[0], d[1], d[2] + up});
-        }
-        double a = within(0, 1), b = within(0, 1);
-        if (a + b > 1) a = 1 - a, b = 1 - b;
         Vec3d centre;
-        for (std::size_t c = 0; c < 3; ++c) centre[c] = f.p[0][c] + a * (f.p[1][c] - f.p[0][c]) + b * (f.p[2][c] - f.p[0][c]) + r * d[c];
+        for (std::size_t c = 0; c < 3; ++c) centre[c] = place[c] + r * d[c];
         GroupTouched touched;
         group_touched(corners.front(), groups.front(), v, r, centre[2], touched);
         const double at = centre[v] - groups.front().middle[v];
-        ASSERT_LE(touched.low[k], at) << "round " << round;
-        ASSERT_GE(touched.high[k], at) << "round " << round;
-        for (std::size_t i = 0; i < facets.size(); ++i) ++(touched.low[i] <= touched.high[i] ? told : elsewhere);
-        for (std::size_t i = facets.size(); i < FacetGroup::kFacets; ++i) ASSERT_GT(touched.low[i], touched.high[i]);
+        const GroupTouched::Range& range = part == 0 ? touched.face : touched.edge[edge];
+        ASSERT_LE(range.low[k], at) << "round " << round << " part " << part;
+        ASSERT_GE(range.high[k], at) << "round " << round << " part " << part;
+        for (const GroupTouched::Range& each : {touched.face, touched.edge[0], touched.edge[1], touched.edge[2]}) {
+            for (std::size_t i = 0; i < facets.size(); ++i) ++(each.low[i] <= each.high[i] ? told : elsewhere);
+            for (std::size_t i = facets.size(); i < FacetGroup::kFacets; ++i) ASSERT_GT(each.low[i], each.high[i]);
+        }
     }
     EXPECT_GT(told, 3000U);
     EXPECT_GT(elsewhere, 2000U);

@@ -81,7 +81,8 @@ TEST(LayerStock, StandsAsAfterOneMoveAfterAnother) {
             one.moves = {op.moves[i - 1], op.moves[i]};
             singly.cut(n.cut, one, tool);
         }
-        EXPECT_TRUE(std::ranges::equal(together.heights(), singly.heights()));
+        // But for rounding, which the way that several moves are laid together may change near nothing.
+        EXPECT_TRUE(std::ranges::equal(together.heights(), singly.heights(), [](float a, float b) { return std::abs(a - b) < 1e-9F; }));
         std::size_t cells = 0;
         for (std::size_t c = 0; c < whole.size(); ++c) cells += whole[c] - together.height(c) > kEmpty;
         EXPECT_EQ(taken.cells, cells);

@@ -1,6 +1,7 @@
 #include "kernels/cutting/fibre_rows.h"
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "kernels/wide.h"
@@ -41,14 +42,18 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTangentLeast = 0.01;
 
 constexpr float kTouchMargin = 1e-4F;  // mm
+constexpr double kOnPlane = 1 - 1e-6;  // of r: nearer to a plane is not at r
 
 }  // namespace
 
 // The loops hold no branch that differs from line to line, so that a compiler can do several lines in one step; what does not depend on
 // the line is decided outside of them.
 
-SLABWRIGHT_WIDE void prism_rows(const PrismTerms& p, const double* __restrict v, int lines, double* __restrict low, double* __restrict high,
-                                double* __restrict nz_low, double* __restrict nz_high) {
+namespace {
+
+template <bool marked>
+[[gnu::always_inline]] inline void prism_on(const PrismTerms& p, const double* __restrict v, int lines, double* __restrict low,
+                                            double* __restrict high, double* __restrict nz_low, double* __restrict nz_high) {
     alignas(64) double l[kLinesTogether], h[kLinesTogether], k[kLinesTogether];
     const int n = lines / kLinesStep * kLinesStep;
     const double r = p.r, nu = p.nu;
@@ -84,12 +89,24 @@ SLABWRIGHT_WIDE void prism_rows(const PrismTerms& p, const double* __restrict v,
     }
     for (int i = 0; i < n; ++i) {
         const bool met = l[i] < h[i], lower = met & (l[i] < low[i]), higher = met & (h[i] > high[i]);
-        const double nz_l = (nu * l[i] + k[i]) / r * p.nz, nz_h = (nu * h[i] + k[i]) / r * p.nz;
+        const double share_l = (nu * l[i] + k[i]) / r, share_h = (nu * h[i] + k[i]) / r;
+        const double mark_l = marked & (std::abs(share_l) < kOnPlane) ? kWithin : 0.0,
+                     mark_h = marked & (std::abs(share_h) < kOnPlane) ? kWithin : 0.0;
+        const double nz_l = share_l * p.nz + mark_l, nz_h = share_h * p.nz + mark_h;
         low[i] = lower ? l[i] : low[i];
         nz_low[i] = lower ? nz_l : nz_low[i];
         high[i] = higher ? h[i] : high[i];
         nz_high[i] = higher ? nz_h : nz_high[i];
     }
+}
+
+}  // namespace
+
+SLABWRIGHT_WIDE void prism_rows(const PrismTerms& p, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+    prism_on<false>(p, v, lines, low, high, nz_low, nz_high);
+}
+SLABWRIGHT_WIDE void marked_prism_rows(const PrismTerms& p, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+    prism_on<true>(p, v, lines, low, high, nz_low, nz_high);
 }
 
 SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restrict v, int lines, double* __restrict low, double* __restrict high,
@@ -340,22 +357,124 @@ SLABWRIGHT_WIDE void group_out_rows(const GroupCorners& g, const FacetGroup& gro
     rows.first = from_line, rows.last = to_line;
 }
 
-// A ball touches with the normal d at its centre less r·d.
+namespace {
+
+constexpr int kLanes = static_cast<int>(GroupRows::kFacets);
+using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
+using Bits [[gnu::vector_size(kLanes * sizeof(std::int32_t))]] = std::int32_t;
+
+// (Vectors are handed on by reference: how one is passed by value depends on the instruction set.)
+template <class T, class Vector>
+[[gnu::always_inline]] inline void load(const GroupCorners::Each<T>& from, Vector& v) {
+    std::memcpy(&v, from.data(), sizeof v);
+}
+[[gnu::always_inline]] inline void lower(Floats& a, const Floats& b) { a = b < a ? b : a; }
+[[gnu::always_inline]] inline void raise(Floats& a, const Floats& b) { a = b > a ? b : a; }
+[[gnu::always_inline]] inline void stretch(Floats& from, Floats& to, const Bits& meets, const Floats& at) {
+    from = (meets & (at < from)) ? at : from;
+    to = (meets & (at > to)) ? at : to;
+}
+
+}  // namespace
+
+// A ball touches with the normal d at its centre less r·d: a facet with its own, an edge with one that is near enough at both ends, and each on
+// the part that is as high as that. `wider` is more than what floats round, of the heights and of where an edge crosses one of them.
 SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& group, std::size_t v, double radius, double zc, GroupTouched& touched) {
-    constexpr auto inf = std::numeric_limits<float>::infinity();
+    const Floats none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
     const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]);
     const float wider = kTouchMargin + 1e-6F * (r + std::abs(z) + group.radius + group.thickness);
-    const auto &za = g.p[0][2], &zb = g.p[1][2], &zd = g.p[2][2], &va = g.p[0][v], &vb = g.p[1][v], &vc = g.p[2][v];
-    const auto &from_z = g.facing_low[2], &to_z = g.facing_high[2], &from_v = g.facing_low[v], &to_v = g.facing_high[v];
-    const auto min = [](float a, float b) { return a < b ? a : b; };
-    const auto max = [](float a, float b) { return a > b ? a : b; };
-    for (std::size_t i = 0; i < GroupRows::kFacets; ++i) {
-        const float low = min(za[i], min(zb[i], zd[i])) - wider, high = max(za[i], max(zb[i], zd[i])) + wider;
-        const bool can = (z - r * to_z[i] <= high) & (z - r * from_z[i] >= low);
-        const float at_least = min(va[i], min(vb[i], vc[i])) + r * from_v[i] - wider, at_most = max(va[i], max(vb[i], vc[i])) + r * to_v[i] + wider;
-        touched.low[i] = can ? at_least : inf;
-        touched.high[i] = can ? at_most : -inf;
+    Floats nz, nv;
+    load(g.normal[2], nz), load(g.normal[v], nv);
+    // Of each corner the normals, and where a ball touches it; of each edge what it is wide for each mm that it is high.
+    std::array<Floats, 3> pz, pv, z_least, z_most, v_least, v_most, from, to, wide, least, most;
+    for (std::size_t c = 0; c < 3; ++c) {
+        Floats turn;
+        load(g.turn[c], turn), load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]);
+        const Bits cut = turn < 0;
+        turn = cut ? -1 - turn : turn;
+        z_least[c] = nz - turn, z_most[c] = nz + turn, v_least[c] = nv - turn, v_most[c] = nv + turn;
+        raise(z_least[c], -one), lower(z_most[c], one), raise(v_least[c], -one), lower(v_most[c], one);
+        z_most[c] = cut ? one : z_most[c];
+        v_least[c] = (cut & (v_least[c] > 0)) ? none : v_least[c], v_most[c] = (cut & (v_most[c] < 0)) ? none : v_most[c];
+        const Bits meets = (pz[c] >= z - r * z_most[c] - wider) & (pz[c] <= z - r * z_least[c] + wider);
+        from[c] = meets ? pv[c] + r * v_least[c] - wider : inf;
+        to[c] = meets ? pv[c] + r * v_most[c] + wider : -inf;
     }
+    for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t next = k == 2 ? 0 : k + 1;
+        const Floats rise = pz[next] - pz[k];
+        wide[k] = (pv[next] - pv[k]) / (rise == 0 ? one : rise);
+        least[k] = most[k] = pz[k];
+        lower(least[k], pz[next]), raise(most[k], pz[next]);
+    }
+    // Where an edge crosses a height.
+    const auto cross = [&](Floats& low, Floats& high, std::size_t k, const Floats& height) {
+        stretch(low, high, (least[k] <= height) & (height <= most[k]), pv[k] + (height - pz[k]) * wide[k]);
+    };
+    const auto store = [](const Floats& low, const Floats& high, GroupTouched::Range& range) {
+        std::memcpy(range.low.data(), &low, sizeof low), std::memcpy(range.high.data(), &high, sizeof high);
+    };
+    const Floats at = z - r * nz, under = at - wider, over = at + wider;
+    Floats low = inf, high = -inf;
+    for (std::size_t k = 0; k < 3; ++k) {
+        stretch(low, high, (pz[k] >= under) & (pz[k] <= over), pv[k]);
+        cross(low, high, k, under), cross(low, high, k, over);
+    }
+    Floats all_low = low + r * nv - wider, all_high = high + r * nv + wider;
+    store(all_low, all_high, touched.face);
+    Bits edges;
+    load(g.edges, edges);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t next = k == 2 ? 0 : k + 1;
+        Floats up = z_most[k], down = z_least[k], left = v_least[k], right = v_most[k];
+        lower(up, z_most[next]), raise(down, z_least[next]), raise(left, v_least[next]), lower(right, v_most[next]);
+        const Floats lowest = z - r * up - wider, highest = z - r * down + wider;
+        low = inf, high = -inf;
+        stretch(low, high, (pz[k] >= lowest) & (pz[k] <= highest), pv[k]);
+        stretch(low, high, (pz[next] >= lowest) & (pz[next] <= highest), pv[next]);
+        cross(low, high, k, lowest), cross(low, high, k, highest);
+        low += r * left - wider, high += r * right + wider;
+        lower(low, from[k]), lower(low, from[next]), raise(high, to[k]), raise(high, to[next]);
+        const Bits tests = (edges & (1 << k)) != 0;
+        low = tests ? low : inf, high = tests ? high : -inf;
+        store(low, high, touched.edge[k]);
+        lower(all_low, low), raise(all_high, high);
+    }
+    store(all_low, all_high, touched.all);
+}
+
+// Seen from above, a disc touches a facet's section in the direction in which that faces, and where it ends in one that is near enough.
+SLABWRIGHT_WIDE void group_touched_by_disc(const GroupCorners& g, const FacetGroup& group, std::size_t v, double radius, double zc,
+                                           GroupTouched::Range& touched) {
+    const Floats none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
+    const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]);
+    const float wider = kTouchMargin + 1e-6F * (r + std::abs(z) + group.radius + group.thickness), under = z - wider, over = z + wider;
+    Floats nu, nv, across;
+    load(g.normal[1 - v], nu), load(g.normal[v], nv);
+    across = nu * nu + nv * nv;
+    for (int i = 0; i < kLanes; ++i) across[i] = std::sqrt(across[i]);
+    nv /= (across > 0) ? across : one;
+    std::array<Floats, 3> pz, pv, aside;
+    for (std::size_t c = 0; c < 3; ++c) load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]), load(g.aside[c], aside[c]);
+    Floats low = inf, high = -inf;
+    const auto add = [&](const Bits& meets, const Floats& at, const Floats& turn) {
+        Floats least = nv - turn, most = nv + turn;
+        raise(least, -one), lower(most, one);
+        const Floats from = at + r * least, to = at + r * most;
+        low = (meets & (from < low)) ? from : low;
+        high = (meets & (to > high)) ? to : high;
+    };
+    for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t next = k == 2 ? 0 : k + 1;
+        const Floats rise = pz[next] - pz[k], wide = (pv[next] - pv[k]) / (rise == 0 ? one : rise);
+        Floats least = pz[k], most = pz[k], turn = aside[k];
+        lower(least, pz[next]), raise(most, pz[next]), lower(turn, aside[next]);
+        add((pz[k] >= under) & (pz[k] <= over), pv[k], aside[k]);
+        add((least <= under) & (under <= most), pv[k] + (under - pz[k]) * wide, turn);
+        add((least <= over) & (over <= most), pv[k] + (over - pz[k]) * wide, turn);
+    }
+    low -= wider, high += wider;
+    std::memcpy(touched.low.data(), &low, sizeof low), std::memcpy(touched.high.data(), &high, sizeof high);
 }
 
 }  // namespace slabwright

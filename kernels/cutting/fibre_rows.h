@@ -24,6 +24,9 @@ struct PrismTerms {
 };
 /// Adds the prism to the hulls of lines [0, n) at v.
 void prism_rows(const PrismTerms& prism, const double* v, int n, double* low, double* high, double* nz_low, double* nz_high);
+/// The same; kWithin is added to an end's nz where it lies nearer to the plane than r, and so is no place where a ball touches the facet from outside.
+void marked_prism_rows(const PrismTerms& prism, const double* v, int n, double* low, double* high, double* nz_low, double* nz_high);
+inline constexpr double kWithin = 4;
 
 /// A segment from (au, av) to (bu, bv) with the ball of radius r around each of its points; za and zb are the line's height over its ends.
 struct CapsuleTerms {
@@ -89,11 +92,17 @@ struct GroupRows {
 void group_out_rows(const GroupCorners& corners, const FacetGroup& group, std::size_t u, double r, double zc, const CoverRows& cover, const double* v,
                     int first, int last, const std::int64_t* state, GroupRows& rows);
 
-/// Of each of a group's facets the places across the lines, relative to the group's middle, at which a ball of radius r at height zc can touch it
-/// from outside the solid, rounded outward; low > high: it cannot.
+/// Of each of a group's facets, and of each of its edges that it is to test with both of their ends, the places across the lines, relative to the
+/// group's middle, at which a ball of radius r at height zc can touch it from outside the solid, rounded outward; low > high: it cannot.
 struct GroupTouched {
-    alignas(32) GroupCorners::Each<float> low, high;
+    struct Range {
+        alignas(32) GroupCorners::Each<float> low, high;
+    };
+    Range face, all;  ///< of all: of the face and the edges together
+    std::array<Range, 3> edge;
 };
 void group_touched(const GroupCorners& corners, const FacetGroup& group, std::size_t v, double r, double zc, GroupTouched& touched);
+/// The same for a level disc and the section of each facet at its height zc. @pre no facet is counted that faces down
+void group_touched_by_disc(const GroupCorners& corners, const FacetGroup& group, std::size_t v, double r, double zc, GroupTouched::Range& touched);
 
 }  // namespace slabwright

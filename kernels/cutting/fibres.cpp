@@ -17,7 +17,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kBlock = kLinesTogether;  // lines that share one pass over their facets
 constexpr double kFarAway = 1e30;               // mm; where lines are that fill up a block's last step
-constexpr double kTouchMargin = 1e-4;           // mm
+constexpr float kTouchMargin = 1e-4F;           // mm
+constexpr double kTurnMargin = 1e-3;            // of a unit vector
 constexpr double kMergeGap = 1e-6;              // mm; gaps this small are rounding between neighbouring elements
 
 // A segment met by lines in direction U at height zc.
@@ -105,6 +106,9 @@ class BlockOfLines {
 public:
     BlockOfLines(const LayerSolid& solid, const Cutter& cutter, double zc, std::span<const std::int32_t> lines)
         : solid_(solid), ball_(cutter.profile == Cutter::Profile::ball), r_(cutter.radius), zc_(zc), n_(static_cast<int>(lines.size())) {
+        // Where a section's border lies, the centre is no farther from the solid than it is over the plane.
+        const double over_plane = ball_ ? std::max(0.0, zc - (solid.z_top - kTopSheet)) : 0;
+        if (by_touch() && over_plane < r_ - kTouchMargin) inside_nz_ = static_cast<float>(kWithin);
         at_.fill(kFarAway);
         for (int l = 0; l < n_; ++l) at_[l] = to_mm(lines[static_cast<std::size_t>(l)]);
         if (n_ > 1) per_mm_ = (n_ - 1) / (at_[n_ - 1] - at_[0]);
@@ -144,8 +148,8 @@ public:
             for (const Crossing& c : crossings) {
                 if (depth <= 0 && depth + c.turn > 0) entered = c.u;
                 if (depth > 0 && depth + c.turn <= 0 && c.u > entered) {
-                    if (ball_) forbid(static_cast<int>(l), {entered, c.u, 0, 0});
-                    else found_[l].push_back({entered, c.u, 0, 0});
+                    if (ball_) forbid(static_cast<int>(l), {entered, c.u, inside_nz_, inside_nz_});
+                    else found_[l].push_back({entered, c.u, inside_nz_, inside_nz_});
                 }
                 depth += c.turn;
             }
@@ -155,14 +159,20 @@ public:
     // Most facets only forbid what others around them forbid as well, or what is forbidden already: those are met that could reach past it, on
     // the lines where they could.
     void meet(std::span<const std::uint32_t> groups) {
-        if (!ball_) return meet_disc(groups);
-        if (!solid_.part && !solid_.corners.empty()) {
-            meet_touched(groups);
+        if (by_touch()) {
+            if (ball_) meet_touched(groups);
+            else meet_touched_by_disc(groups);
+            for (int l = 0; l < n_; ++l) close_within(found_[l]);
             amid_gaps_ = true;
             for (int l = 0; l < n_; ++l) look(l, found_[l].begin() + (found_[l].empty() ? 0 : 1));
         }
-        meet_all(groups);
+        if (ball_) meet_all(groups);
+        else if (by_touch()) meet_amid(groups);
+        else meet_disc(groups);
     }
+
+    // Whether all ends are found where a ball can touch the solid from outside.
+    [[nodiscard]] bool by_touch() const { return !solid_.part && !solid_.corners.empty(); }
 
     // What a ball can touch without being in the solid, on the lines where it can: there every end of what is forbidden is found.
     void meet_touched(std::span<const std::uint32_t> groups) {
@@ -172,17 +182,139 @@ public:
             if (!level && !can_touch(group)) continue;
             const auto [first, last] = facets_of(groups[g]);
             group_touched(solid_.corners[groups[g]], group, V, r_, zc_, touched_);
+            const auto from = static_cast<float>(at_[0] - group.middle[V]) - kTouchMargin,
+                       to = static_cast<float>(at_[n_ - 1] - group.middle[V]) + kTouchMargin;
+            const auto lines = [&](const GroupTouched::Range& range, std::size_t i) -> LineRange {
+                if (!(range.low[i] <= range.high[i])) return {};
+                return {first_line_from(group.middle[V] + static_cast<double>(range.low[i])),
+                        first_line_from(group.middle[V] + static_cast<double>(range.high[i]))};
+            };
             for (std::size_t i = first; i < last; ++i) {
                 const SolidFacet& f = solid_.facets[i];
                 if (level && f.nz < 0 && f.z_max > zc_) {
                     const auto [v_low, v_high] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
                     meet_facet(f, reaches_out(f, lines_between(v_low, v_high)));
-                } else if (touched_.low[i - first] <= touched_.high[i - first]) {
-                    meet_facet(f, {first_line_from(group.middle[V] + static_cast<double>(touched_.low[i - first])),
-                                   first_line_from(group.middle[V] + static_cast<double>(touched_.high[i - first]))});
+                    continue;
+                }
+                if (!(touched_.all.low[i - first] <= to && touched_.all.high[i - first] >= from)) continue;
+                if (!(f.z_max > zc_ - r_ && f.z_min <= zc_)) continue;
+                if (const LineRange met = lines(touched_.face, i - first); met.any() && f.normal != Vec3d{0, 0, 0})
+                    meet_part(met, [&](const double* v, int n, double* low, double* high, double* nz_low, double* nz_high) {
+                        marked_prism_rows(prism<U, V>(f, r_, zc_), v, n, low, high, nz_low, nz_high);
+                    });
+                for (std::size_t k = 0; k < 3; ++k)
+                    if (const LineRange met = lines(touched_.edge[k], i - first); met.any())
+                        meet_part(met, [&](const double* v, int n, double* low, double* high, double* nz_low, double* nz_high) {
+                            capsule_rows(capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r_, zc_), v, n, low, high, nz_low, nz_high);
+                        });
+            }
+        }
+    }
+
+    // The same for a disc: it touches the sections of facets that do not face down, and what overhangs it anywhere.
+    void meet_touched_by_disc(std::span<const std::uint32_t> groups) {
+        for (const std::uint32_t g : groups) {
+            const FacetGroup& group = solid_.groups[g];
+            const bool level = group.overhang > zc_;
+            if (!level && (group.z_max <= zc_ || group.z_min > zc_)) continue;
+            const auto [first, last] = facets_of(g);
+            group_touched_by_disc(solid_.corners[g], group, V, r_, zc_, touched_.face);
+            for (std::size_t i = first; i < last; ++i) {
+                const SolidFacet& f = solid_.facets[i];
+                if (f.z_max <= zc_) continue;
+                if (f.nz < 0) {
+                    const auto [v_low, v_high] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
+                    meet_facet(f, lines_between(v_low, v_high));
+                } else if (f.z_min <= zc_ && touched_.face.low[i - first] <= touched_.face.high[i - first]) {
+                    meet_section(f, {first_line_from(group.middle[V] + static_cast<double>(touched_.face.low[i - first])),
+                                     first_line_from(group.middle[V] + static_cast<double>(touched_.face.high[i - first]))});
                 }
             }
         }
+        for (int l = 0; l < n_; ++l) join(found_[l]);
+    }
+
+    // Adds what a facet's section keeps a disc away from. An end at which it lies where the disc cannot touch it from outside is marked.
+    void meet_section(const SolidFacet& f, LineRange lines) {
+        std::array<Vec3d, 2> cut;
+        if (!lines.any() || !cut_segment(f, zc_, cut)) return;
+        const std::uint8_t most = *std::max_element(f.aside.begin(), f.aside.end());
+        const double across = std::hypot(f.normal[0], f.normal[1]), du = cut[1][U] - cut[0][U], dv = cut[1][V] - cut[0][V],
+                     length2 = du * du + dv * dv;
+        const bool known = most != SolidFacet::kAnyTurn && across > 0;
+        const double turn = most * SolidFacet::kTurn + kTurnMargin;
+        const auto within = [&](double u, double v) {
+            if (!known) return false;
+            const double s = length2 > 0 ? std::clamp(((u - cut[0][U]) * du + (v - cut[0][V]) * dv) / length2, 0.0, 1.0) : 0.0;
+            const double off_u = (u - cut[0][U] - s * du) / r_ - f.normal[U] / across, off_v = (v - cut[0][V] - s * dv) / r_ - f.normal[V] / across;
+            return off_u * off_u + off_v * off_v > turn * turn;
+        };
+        const LineRange steps = in_steps(lines);
+        const int skip = steps.first, n = steps.last - steps.first;
+        double *const low = hulls_.low.data() + skip, *const high = hulls_.high.data() + skip;
+        std::fill(low, low + n, kInfinity);
+        std::fill(high, high + n, -kInfinity);
+        capsule_rows(capsule<U, V>(cut[0], cut[1], r_, zc_, f.nz), at_.data() + skip, n, low, high, hulls_.nz_low.data() + skip,
+                     hulls_.nz_high.data() + skip);
+        for (int l = lines.first; l < lines.last; ++l) {
+            if (!(hulls_.low[l] < hulls_.high[l])) continue;
+            Forbidden h = found(l);
+            if (within(h.low, at_[l])) h.nz_low += static_cast<float>(kWithin);
+            if (within(h.high, at_[l])) h.nz_high += static_cast<float>(kWithin);
+            append(found_[l], h);
+        }
+    }
+
+    // For a disc, all facets that may reach over a gap's middle.
+    void meet_amid(std::span<const std::uint32_t> groups) {
+        for (const std::uint32_t g : groups) {
+            const FacetGroup& group = solid_.groups[g];
+            if (group.z_max <= zc_ || (group.overhang <= zc_ && group.z_min > zc_)) continue;
+            if (!box_reaches_out(group.low[U], group.high[U], group.low[V], group.high[V]).any()) continue;
+            const auto [first, last] = facets_of(g);
+            for (std::size_t i = first; i < last; ++i) {
+                const SolidFacet& f = solid_.facets[i];
+                if (f.z_max <= zc_ || (f.nz >= 0 && f.z_min > zc_)) continue;
+                std::array<Vec3d, 2> cut;
+                if (f.nz >= 0 && !cut_segment(f, zc_, cut)) continue;
+                const Vec3d &a = f.nz >= 0 ? cut[0] : f.p[0], &b = f.nz >= 0 ? cut[1] : f.p[1], &c = f.nz >= 0 ? cut[1] : f.p[2];
+                const auto [u_low, u_high] = std::minmax({a[U], b[U], c[U]});
+                const auto [v_low, v_high] = std::minmax({a[V], b[V], c[V]});
+                meet_facet(f, box_reaches_out(u_low, u_high, v_low, v_high));
+            }
+        }
+    }
+
+    // Adds what a face or an edge forbids on some lines.
+    template <class Rows>
+    void meet_part(LineRange lines, Rows&& rows) {
+        const LineRange steps = in_steps(lines);
+        const int skip = steps.first, n = steps.last - steps.first;
+        double *const low = hulls_.low.data() + skip, *const high = hulls_.high.data() + skip;
+        std::fill(low, low + n, kInfinity);
+        std::fill(high, high + n, -kInfinity);
+        rows(at_.data() + skip, n, low, high, hulls_.nz_low.data() + skip, hulls_.nz_high.data() + skip);
+        for (int l = lines.first; l < lines.last; ++l)
+            if (hulls_.low[l] < hulls_.high[l] && !(cover_.low[l] <= hulls_.low[l] && hulls_.high[l] <= cover_.high[l])) forbid(l, found(l));
+    }
+    [[nodiscard]] Forbidden found(int l) const {
+        return {hulls_.low[l], hulls_.high[l], static_cast<float>(hulls_.nz_low[l]), static_cast<float>(hulls_.nz_high[l])};
+    }
+
+    // All ends of what is forbidden are known, and are at r from what a ball touches there: a gap at an end that is nearer to something is none.
+    static void close_within(std::vector<Forbidden>& on_line) {
+        constexpr auto within = static_cast<float>(kWithin);
+        const auto is = [](float nz) { return nz > within / 2; };
+        std::size_t kept = 0;
+        for (std::size_t i = 1; i < on_line.size(); ++i) {
+            Forbidden& last = on_line[kept];
+            if (is(last.nz_high) || is(on_line[i].nz_low)) last.high = on_line[i].high, last.nz_high = on_line[i].nz_high;
+            else on_line[++kept] = on_line[i];
+        }
+        if (on_line.empty()) return;
+        on_line.resize(kept + 1);
+        if (is(on_line.front().nz_low)) on_line.front().nz_low -= within;
+        if (is(on_line.back().nz_high)) on_line.back().nz_high -= within;
     }
 
     // Whether a ball can touch a group's facets, and on some line.
@@ -245,22 +377,29 @@ public:
         }
     }
 
+    // Makes one of intervals that meet; a disc's come in any order.
+    void join(std::vector<Forbidden>& on_line) const {
+        if (!ball_)
+            std::sort(on_line.begin(), on_line.end(),
+                      [](const Forbidden& a, const Forbidden& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
+        std::size_t kept = 0;
+        for (const Forbidden& f : on_line) {
+            if (kept == 0 || f.low > on_line[kept - 1].high + kMergeGap) {
+                on_line[kept++] = f;
+                continue;
+            }
+            Forbidden& last = on_line[kept - 1];
+            if (f.high > last.high) last.high = f.high, last.nz_high = f.nz_high;
+        }
+        on_line.resize(kept);
+    }
+
     // What is forbidden in the end, line by line.
     [[nodiscard]] Fibres merged() {
         Fibres part;
         for (int l = 0; l < n_; ++l) {
-            if (!ball_)
-                std::sort(found_[l].begin(), found_[l].end(),
-                          [](const Forbidden& a, const Forbidden& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
-            for (const Forbidden& f : found_[l]) {
-                if (part.intervals.size() > part.starts.back() && f.low <= part.intervals.back().high + kMergeGap) {
-                    Forbidden& last = part.intervals.back();
-                    if (f.high > last.high) {
-                        last.high = f.high;
-                        last.nz_high = f.nz_high;
-                    }
-                } else part.intervals.push_back(f);
-            }
+            join(found_[l]);
+            part.intervals.insert(part.intervals.end(), found_[l].begin(), found_[l].end());
             part.starts.push_back(static_cast<std::uint32_t>(part.intervals.size()));
         }
         return part;
@@ -270,10 +409,7 @@ private:
     [[nodiscard]] bool active(const SolidFacet& f) const { return may_touch(f.z_min, f.z_max, f.nz < 0 ? f.z_max : -kInfinity, ball_, r_, zc_); }
 
     // Those within the radius of [low, high].
-    [[nodiscard]] LineRange lines_between(double low, double high) const {
-        const double *begin = at_.data(), *end = begin + n_;
-        return {static_cast<int>(std::lower_bound(begin, end, low - r_) - begin), static_cast<int>(std::lower_bound(begin, end, high + r_) - begin)};
-    }
+    [[nodiscard]] LineRange lines_between(double low, double high) const { return {first_line_from(low - r_), first_line_from(high + r_)}; }
     // The kernels' steps that hold them.
     [[nodiscard]] static LineRange in_steps(LineRange a) {
         const int n = (a.last - a.first + kLinesStep - 1) / kLinesStep * kLinesStep, first = std::min(a.first, kLinesTogether - n);
@@ -450,15 +586,23 @@ private:
         return narrowed(lines);
     }
 
+    // The lines on which what lies in a box may, at any height.
+    LineRange box_reaches_out(double u_low, double u_high, double v_low, double v_high) {
+        return box_reaches_out(u_low, u_high, v_low, v_high, lines_between(v_low, v_high));
+    }
+    LineRange box_reaches_out(double u_low, double u_high, double v_low, double v_high, LineRange lines) {
+        const LineRange steps = in_steps(lines);
+        const BoxTerms box{u_low, u_high, v_low, v_high, r_ * r_};
+        if (box_out_rows(box, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data()) == 0) return {};
+        return narrowed(lines);
+    }
+
     // Those of these lines on which a facet may.
     LineRange reaches_out(const SolidFacet& f, LineRange lines) {
         if (f.nz < 0 && f.z_max > zc_) {
-            const LineRange steps = in_steps(lines);
             const auto [ul, uh] = std::minmax({f.p[0][U], f.p[1][U], f.p[2][U]});
             const auto [vl, vh] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
-            const BoxTerms box{ul, uh, vl, vh, r_ * r_};
-            if (box_out_rows(box, cover_, at_.data(), steps.first, steps.last, low_.data(), high_.data(), state_.data()) == 0) return {};
-            return narrowed(lines);
+            return box_reaches_out(ul, uh, vl, vh, lines);
         }
         BoxTerms box;
         TangentTerms tangent;
@@ -497,10 +641,7 @@ private:
                 if (cut_segment(f, zc_, cut)) meet_capsule(capsule<U, V>(cut[0], cut[1], r_, zc_, f.nz));
             }
         }
-        const auto found = [&](int l) {
-            return Forbidden{hulls_.low[l], hulls_.high[l], static_cast<float>(hulls_.nz_low[l]), static_cast<float>(hulls_.nz_high[l])};
-        };
-        if (!ball_) {
+        if (!ball_ && !amid_gaps_) {
             for (int l = lines.first; l < lines.last; ++l)
                 if (hulls_.low[l] < hulls_.high[l]) append(found_[l], found(l));
         } else if (cover_rows(cover_, hulls_.low.data(), hulls_.high.data(), steps.first, steps.last, state_.data()) != 0) {
@@ -510,6 +651,7 @@ private:
     }
 
     bool amid_gaps_ = false;
+    float inside_nz_ = 0;
     const LayerSolid& solid_;
     const bool ball_;
     const double r_, zc_;

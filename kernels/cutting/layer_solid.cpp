@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kMostDown = 0.5;    // z of a normal next to the top, below which nothing is said of how it may be touched there
 constexpr int kMostTurn = 170;       // in SolidFacet::kTurn: short of a right angle, within which a cone of normals holds all between them
+constexpr int kMostAside = 240;      // the same in a plane: short of straight back
 constexpr double kMostTiles = 1024;  // along x and along y, of solid_near
 
 Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
@@ -53,8 +54,13 @@ bool edge_matters(MeshView mesh, std::uint32_t f, int k, const Vec3d& a, const V
     return true;
 }
 
+// Of a facet's corners, SolidFacet::turn and SolidFacet::aside.
+struct Turns {
+    std::array<std::uint8_t, 3> turn{SolidFacet::kAnyTurn, SolidFacet::kAnyTurn, SolidFacet::kAnyTurn}, aside = turn;
+};
+
 // Writes the facets that it makes to `out`, as many as pieces() says, and moves that on.
-void append_facet(MeshView mesh, std::uint32_t f, std::uint8_t turn, double z_top, SolidFacet*& out) {
+void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_top, SolidFacet*& out) {
     std::array<Vec3d, 3> p;
     for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     const Vec3d n = unit_normal(p[0], p[1], p[2]);
@@ -64,17 +70,22 @@ void append_facet(MeshView mesh, std::uint32_t f, std::uint8_t turn, double z_to
     // Clip at z_top; corner[i] is followed by an edge that matters[i] (the new edge along the top always does).
     std::array<Vec3d, 4> corner;
     std::array<bool, 4> edge{};
+    std::array<std::array<std::uint8_t, 2>, 4> turns{};
+    const std::array<std::uint8_t, 2> most_turn{*std::max_element(turn.turn.begin(), turn.turn.end()),
+                                                *std::max_element(turn.aside.begin(), turn.aside.end())};
     int corners = 0;
     for (int k = 0; k < 3; ++k) {
         const Vec3d &a = p[k], &b = p[(k + 1) % 3];
         const bool a_in = a[2] <= z_top, b_in = b[2] <= z_top;
         if (a_in) {
             corner[corners] = a;
+            turns[corners] = a[2] == z_top ? most_turn : std::array{turn.turn[k], turn.aside[k]};
             // What lies beyond an edge in the top is not there to test it.
             edge[corners++] = matters[k] || (a[2] == z_top && b[2] == z_top);
         }
         if (a_in != b_in && a[2] != z_top && b[2] != z_top) {
             corner[corners] = cross_plane(a, b, z_top);
+            turns[corners] = most_turn;
             edge[corners++] = a_in ? true : matters[k];
         } else if (a_in && !b_in) {
             edge[corners - 1] = true;  // a lies on the top itself: what follows it is the top edge
@@ -86,11 +97,11 @@ void append_facet(MeshView mesh, std::uint32_t f, std::uint8_t turn, double z_to
         s.p = {corner[i], corner[j], corner[k]};
         s.normal = n;
         s.nz = static_cast<float>(n[2]);
-        s.edges = static_cast<std::uint8_t>((ij ? 1 : 0) | (jk ? 2 : 0) | (ki ? 4 : 0));
+        s.edges = static_cast<std::uint8_t>((ij ? 1 : 0) | (jk ? 2 : 0) | (ki ? 4 : 0)) & 7;
         s.z_min = std::min({s.p[0][2], s.p[1][2], s.p[2][2]});
         s.z_max = std::max({s.p[0][2], s.p[1][2], s.p[2][2]});
         s.top = s.z_max >= z_top;
-        s.turn = turn;
+        s.turn = {turns[i][0], turns[j][0], turns[k][0]}, s.aside = {turns[i][1], turns[j][1], turns[k][1]};
         *out++ = s;
     };
     if (corners == 3) emit(0, 1, 2, edge[0], edge[1], edge[2]);
@@ -100,13 +111,45 @@ void append_facet(MeshView mesh, std::uint32_t f, std::uint8_t turn, double z_to
     }
 }
 
-// Between which x, y and z the normals of the facets around a vertex lie, in SolidFacet::kTurn.
-struct NormalsAround {
-    std::array<std::int8_t, 3> low{127, 127, 127}, high{-127, -127, -127};
+// Between which values of each coordinate unit vectors lie, in SolidFacet::kTurn.
+template <std::size_t n>
+struct Directions {
+    std::array<std::int8_t, n> low, high;
+    Directions() { low.fill(127), high.fill(-127); }
+    void add(const std::array<double, n>& d) {
+        for (std::size_t k = 0; k < n; ++k) {
+            low[k] = std::min(low[k], static_cast<std::int8_t>(std::max(-127.0, std::floor(d[k] / SolidFacet::kTurn))));
+            high[k] = std::max(high[k], static_cast<std::int8_t>(std::min(127.0, std::ceil(d[k] / SolidFacet::kTurn))));
+        }
+    }
+    void add_all() { low.fill(-127), high.fill(127); }
+    void add(const Directions& other) {
+        for (std::size_t k = 0; k < n; ++k) low[k] = std::min(low[k], other.low[k]), high[k] = std::max(high[k], other.high[k]);
+    }
+    // How far from d they end at most.
+    [[nodiscard]] std::uint8_t turn_from(const std::array<double, n>& d, double most) const {
+        double turn2 = 0;
+        for (std::size_t k = 0; k < n; ++k) {
+            const double at = d[k] / SolidFacet::kTurn, off = std::max(high[k] - at, at - low[k]);
+            turn2 += off * off;
+        }
+        return turn2 <= most * most ? static_cast<std::uint8_t>(std::ceil(std::sqrt(turn2))) : SolidFacet::kAnyTurn;
+    }
 };
 
-// For the facets, SolidFacet::turn. What the solid has no part of is left out: it is far below, or cut off.
-std::vector<std::uint8_t> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets) {
+// The normal's direction seen from above; none for a level facet, and all where it is nearly that.
+enum class Seen { none, direction, all };
+Seen seen_from_above(const Vec3d& n, std::array<double, 2>& direction) {
+    constexpr double least = 1e-3;
+    const double across = std::hypot(n[0], n[1]);
+    if (across == 0) return Seen::none;
+    if (across < least) return Seen::all;
+    direction = {n[0] / across, n[1] / across};
+    return Seen::direction;
+}
+
+// For the facets. What the solid has no part of is left out: it is far below, or cut off.
+std::vector<Turns> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets) {
     constexpr std::size_t grain = 4096;
     std::vector<Vec3d> normals(facets.size());
     parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -117,35 +160,34 @@ std::vector<std::uint8_t> turns(Context& context, MeshView mesh, std::span<const
             if (across[0] == kNoFacet || across[1] == kNoFacet || across[2] == kNoFacet) normals[i] = {0, 0, 0};
         }
     });
-    std::vector<NormalsAround> around(mesh.vertices.size());
+    struct Around {
+        Directions<3> normals;
+        Directions<2> aside;
+    };
+    std::vector<Around> around(mesh.vertices.size());
     for (std::size_t i = 0; i < facets.size(); ++i) {
-        const Vec3d& n = normals[i];
-        const bool any = n == Vec3d{0, 0, 0};
-        std::array<std::int8_t, 3> low, high;
-        for (std::size_t k = 0; k < 3; ++k) {
-            low[k] = any ? std::int8_t{-127} : static_cast<std::int8_t>(std::max(-127.0, std::floor(n[k] / SolidFacet::kTurn)));
-            high[k] = any ? std::int8_t{127} : static_cast<std::int8_t>(std::min(127.0, std::ceil(n[k] / SolidFacet::kTurn)));
+        const bool any = normals[i] == Vec3d{0, 0, 0};
+        Around own;
+        std::array<double, 2> aside{};
+        if (any) own.normals.add_all(), own.aside.add_all();
+        else {
+            own.normals.add(normals[i]);
+            if (const Seen seen = seen_from_above(normals[i], aside); seen == Seen::all) own.aside.add_all();
+            else if (seen == Seen::direction) own.aside.add(aside);
         }
-        for (const std::uint32_t v : mesh.facets[facets[i]])
-            for (std::size_t k = 0; k < 3; ++k) {
-                around[v].low[k] = std::min(around[v].low[k], low[k]);
-                around[v].high[k] = std::max(around[v].high[k], high[k]);
-            }
+        for (const std::uint32_t v : mesh.facets[facets[i]]) around[v].normals.add(own.normals), around[v].aside.add(own.aside);
     }
-    std::vector<std::uint8_t> turns(facets.size(), SolidFacet::kAnyTurn);
+    std::vector<Turns> turns(facets.size());
     parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (normals[i] == Vec3d{0, 0, 0}) continue;
-            double most2 = 0;
-            for (const std::uint32_t v : mesh.facets[facets[i]]) {
-                double turn2 = 0;
-                for (std::size_t k = 0; k < 3; ++k) {
-                    const double n = normals[i][k] / SolidFacet::kTurn, d = std::max(around[v].high[k] - n, n - around[v].low[k]);
-                    turn2 += d * d;
-                }
-                most2 = std::max(most2, turn2);
+            std::array<double, 2> aside{};
+            const bool faces = seen_from_above(normals[i], aside) == Seen::direction;
+            for (std::size_t c = 0; c < 3; ++c) {
+                const Around& at = around[mesh.facets[facets[i]][c]];
+                turns[i].turn[c] = at.normals.turn_from(normals[i], kMostTurn);
+                if (faces) turns[i].aside[c] = at.aside.turn_from(aside, kMostAside);
             }
-            if (most2 <= kMostTurn * kMostTurn) turns[i] = static_cast<std::uint8_t>(std::ceil(std::sqrt(most2)));
         }
     });
     return turns;
@@ -250,9 +292,10 @@ void lay_disc(std::span<const SolidFacet> facets, FacetGroup& group) {
 
 Facing facing_of(const SolidFacet& facet) {
     constexpr Facing any{{-1, -1, -1}, {1, 1, 1}};
-    if (facet.turn == SolidFacet::kAnyTurn) return any;
+    const std::uint8_t most_turn = *std::max_element(facet.turn.begin(), facet.turn.end());
+    if (most_turn == SolidFacet::kAnyTurn) return any;
     constexpr double rounding = 1e-6;
-    const double turn = facet.turn * SolidFacet::kTurn + rounding;
+    const double turn = most_turn * SolidFacet::kTurn + rounding;
     std::array<double, 3> low, high;
     for (std::size_t k = 0; k < 3; ++k) low[k] = facet.normal[k] - turn, high[k] = facet.normal[k] + turn;
     if (facet.top) {
@@ -303,6 +346,24 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
     return groups;
 }
 
+namespace {
+
+// GroupCorners::turn.
+float turn_at(const SolidFacet& facet, std::size_t corner) {
+    if (facet.turn[corner] == SolidFacet::kAnyTurn) return GroupCorners::kAny;
+    constexpr double rounding = 2e-6;
+    const double turn = facet.turn[corner] * SolidFacet::kTurn + rounding;
+    if (!facet.top || facet.p[corner][2] < facet.z_max) return static_cast<float>(turn);
+    return facet.normal[2] - turn < 0 ? GroupCorners::kAny : static_cast<float>(-1 - turn);
+}
+
+float aside_at(const SolidFacet& facet, std::size_t corner) {
+    constexpr double rounding = 2e-6;
+    return facet.aside[corner] == SolidFacet::kAnyTurn ? GroupCorners::kAny : static_cast<float>(facet.aside[corner] * SolidFacet::kTurn + rounding);
+}
+
+}  // namespace
+
 std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups) {
     constexpr float far_below = -1e15F;
     std::vector<GroupCorners> corners(groups.size());
@@ -316,8 +377,11 @@ std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidF
                         to.p[c][k][i] = f < facets.size() ? static_cast<float>(facets[f].p[c][k] - groups[g].middle[k]) : (k == 2 ? far_below : 0.0F);
                 for (std::size_t k = 0; k < 3; ++k) to.normal[k][i] = f < facets.size() ? static_cast<float>(facets[f].normal[k]) : 0.0F;
                 to.nz[i] = f < facets.size() ? facets[f].nz : 0.0F;
-                const Facing facing = f < facets.size() ? facing_of(facets[f]) : Facing{};
-                for (std::size_t k = 0; k < 3; ++k) to.facing_low[k][i] = facing.low[k], to.facing_high[k][i] = facing.high[k];
+                for (std::size_t c = 0; c < 3; ++c) {
+                    to.turn[c][i] = f < facets.size() ? turn_at(facets[f], c) : 0.0F;
+                    to.aside[c][i] = f < facets.size() ? aside_at(facets[f], c) : 0.0F;
+                }
+                to.edges[i] = f < facets.size() ? facets[f].edges : 0;
             }
         }
     });
@@ -330,7 +394,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     solid.z_top = z_top;
     const double cut_off = z_top - kTopSheet;  // the part is cut off here, facets and cap alike
     const BulkVector<std::uint32_t> facets = facets_between(context, mesh, z_low, cut_off);
-    const std::vector<std::uint8_t> turn = turns(context, mesh, facets);
+    const std::vector<Turns> turn = turns(context, mesh, facets);
     std::vector<std::size_t> starts((facets.size() + kGrain - 1) / kGrain + 1, 0);
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         std::size_t count = 0;

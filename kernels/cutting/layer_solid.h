@@ -22,13 +22,16 @@ struct SolidFacet {
     std::array<Vec3d, 3> p;
     Vec3d normal{};  ///< unit, outward; zero for a facet without area
     double z_min = 0, z_max = 0;
-    std::uint8_t edges = 0;  ///< bit k: the edge (p[k], p[k + 1]) is not concave, and this facet is the one to test it
-    bool top = false;        ///< it reaches up to where the solid is cut off
-    /// How far from `normal` the unit normals end of all facets that share a corner with it, at most, in kTurn; kAnyTurn: nothing is known.
-    std::uint8_t turn = kAnyTurn;
-    float nz = 0;  ///< of the facet before cutting
+    std::uint8_t edges : 3 = 0;  ///< bit k: the edge (p[k], p[k + 1]) is not concave, and this facet is the one to test it
+    bool top : 1 = false;        ///< it reaches up to where the solid is cut off
     static constexpr std::uint8_t kAnyTurn = 255;
     static constexpr double kTurn = 1.0 / 127;
+    /// How far from `normal` the unit normals end of all facets that share this corner, at most, in kTurn; kAnyTurn: nothing is known. Where the
+    /// solid is cut off what is known of all of the facet's corners.
+    std::array<std::uint8_t, 3> turn{kAnyTurn, kAnyTurn, kAnyTurn};
+    /// The same of the directions in which those of them face, seen from above, that are not level.
+    std::array<std::uint8_t, 3> aside{kAnyTurn, kAnyTurn, kAnyTurn};
+    float nz = 0;  ///< of the facet before cutting
 };
 
 /// Between which x, y and z the outward normals lie with which a ball outside the solid can touch a facet, its edges and its corners: within the
@@ -53,15 +56,20 @@ struct FacetGroup {
 /// Of each eight facets, in their order; the last may have fewer.
 [[nodiscard]] std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets);
 
-/// The same facets side by side, for tests of all of them at once: corners, each an x, y and z relative to the group's middle, normals and facings. Where
-/// a group has fewer facets, the others lie far below everything.
+/// The same facets side by side, for tests of all of them at once: corners, each an x, y and z relative to the group's middle, and normals. Where a
+/// group has fewer facets, the others lie far below everything.
 struct GroupCorners {
     template <class T>
     using Each = std::array<T, FacetGroup::kFacets>;
     alignas(32) std::array<std::array<Each<float>, 3>, 3> p;
     alignas(32) std::array<Each<float>, 3> normal;
     alignas(32) Each<float> nz;
-    alignas(32) std::array<Each<float>, 3> facing_low, facing_high;
+    /// How far from a facet's normal a ball's may end that touches a corner from outside, kAny: nowhere in particular. Less one and negative where the
+    /// solid is cut off: there it may also lie between such a normal and the upright one.
+    alignas(32) std::array<Each<float>, 3> turn;
+    alignas(32) std::array<Each<float>, 3> aside;  ///< the same of a disc's, seen from above
+    alignas(32) Each<std::int32_t> edges;          ///< SolidFacet::edges
+    static constexpr float kAny = 3;
 };
 [[nodiscard]] std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups);
 
