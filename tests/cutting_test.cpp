@@ -9,6 +9,7 @@
 #include <random>
 #include <tuple>
 
+#include "engine/paths/feet.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/cutting/level_contours.h"
 #include "kernels/mesh/weld.h"
@@ -449,7 +450,7 @@ TEST(LayerSolid, TurnsHoldTheNormalsAroundEveryCorner) {
 TEST(LayerSolid, WhatIsNearSufficesForTheContoursThere) {
     std::mt19937 random(test::seed());
     Context context;
-    std::size_t compared = 0, left_out = 0;
+    std::size_t compared = 0, left_out = 0, contours_left_out = 0;
     for (int trial = 0; trial < 8; ++trial) {
         const Mesh mesh = test::random_height_field(context, 24, 3.0, 12, trial % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, 12.5);
@@ -471,8 +472,7 @@ TEST(LayerSolid, WhatIsNearSufficesForTheContoursThere) {
             }
             return nearest < cutter.radius;
         };
-        auto points = [&](const LayerSolid& of, const Loops& inside, double tip) {
-            const Contours contours = level_contours(context, of, inside, cutter, tip, grid);
+        auto points = [&](const Contours& contours) {
             std::vector<std::tuple<std::int32_t, std::int32_t, float>> found;
             for (std::size_t k = 0; k < contours.points.size(); ++k)
                 if (beside(contours.points[k])) found.emplace_back(contours.points[k].x, contours.points[k].y, ball ? contours.nz[k] : 0);
@@ -482,13 +482,18 @@ TEST(LayerSolid, WhatIsNearSufficesForTheContoursThere) {
         for (const double tip : {1.0, 3.0, 5.0, 8.0}) {
             const Plane plane = inside_plane(solid, cutter, tip);
             const std::vector<Section> inside = slice(context, mesh.view(), {&plane, 1});
-            const auto whole = points(solid, inside[0].loops, tip);
-            EXPECT_EQ(points(near, inside[0].loops, tip), whole) << "trial " << trial << " tip " << tip;
-            compared += whole.size();
+            const Contours whole = level_contours(context, solid, inside[0].loops, cutter, tip, grid),
+                           beside_all = level_contours(context, near, inside[0].loops, cutter, tip, grid),
+                           beside_near = contours_near(context, near, {&tip, 1}, inside, cutter, grid)[0];
+            EXPECT_EQ(points(beside_all), points(whole)) << "trial " << trial << " tip " << tip;
+            EXPECT_EQ(points(beside_near), points(whole)) << "trial " << trial << " tip " << tip;
+            compared += points(whole).size();
+            contours_left_out += beside_all.points.size() - beside_near.points.size();
         }
     }
     EXPECT_GT(compared, 500U);
     EXPECT_GT(left_out, 4000U);
+    EXPECT_GT(contours_left_out, 1000U);
 }
 
 TEST(Fibres, SameBytesOnAnyNumberOfThreads) {

@@ -24,7 +24,7 @@ struct Vector {
 };
 double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y; }
 double cross(Vector a, Vector b) { return a.x * b.y - a.y * b.x; }
-double length(Vector a) { return std::hypot(a.x, a.y); }
+double length(Vector a) { return std::sqrt(dot(a, a)); }  // of whole numbers of 0.1 µm: their squares add up exactly
 
 /// The arc through the first and the last point that lies within the tolerance of all chords between, if there is one.
 /// Its centre lies on the chord's bisector at the height h that is best in the least squares of |q − c|² − r², taken along the

@@ -1,7 +1,9 @@
 #include "engine/paths/feet.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 #include "kernels/cutting/cusp.h"
@@ -36,6 +38,86 @@ bool NearFloor::operator()(Point2 p) const {
     return std::any_of(near.begin(), near.end(), [&](const Forbidden& f) { return f.low < along && along < f.high; });
 }
 
+namespace {
+
+// A box in the plane, mm.
+struct Box2 {
+    std::array<double, 2> low{1e300, 1e300}, high{-1e300, -1e300};
+    void add(const Box2& other) {
+        for (std::size_t k = 0; k < 2; ++k) low[k] = std::min(low[k], other.low[k]), high[k] = std::max(high[k], other.high[k]);
+    }
+};
+
+// Where facets lie, in tiles.
+class Occupied {
+public:
+    explicit Occupied(std::span<const FacetGroup> groups) : before_((kTiles + 1) * (kTiles + 1), 0) {
+        for (const FacetGroup& g : groups) all_.add({{g.low[0], g.low[1]}, {g.high[0], g.high[1]}});
+        for (const FacetGroup& g : groups)
+            for (std::size_t j = tile(g.low[1], 1); j <= tile(g.high[1], 1); ++j)
+                for (std::size_t i = tile(g.low[0], 0); i <= tile(g.high[0], 0); ++i) before_[(j + 1) * (kTiles + 1) + i + 1] = 1;
+        for (std::size_t j = 1; j <= kTiles; ++j)
+            for (std::size_t i = 1; i <= kTiles; ++i) before_[at(i, j)] += before_[at(i - 1, j)] + before_[at(i, j - 1)] - before_[at(i - 1, j - 1)];
+    }
+    [[nodiscard]] const Box2& box() const { return all_; }
+    [[nodiscard]] bool meets(const Box2& b) const {
+        for (std::size_t k = 0; k < 2; ++k)
+            if (b.low[k] > all_.high[k] || b.high[k] < all_.low[k]) return false;
+        const std::size_t i0 = tile(b.low[0], 0), i1 = tile(b.high[0], 0) + 1, j0 = tile(b.low[1], 1), j1 = tile(b.high[1], 1) + 1;
+        return before_[at(i1, j1)] - before_[at(i0, j1)] - before_[at(i1, j0)] + before_[at(i0, j0)] != 0;
+    }
+
+private:
+    static constexpr std::size_t kTiles = 256;  // along x and along y
+    [[nodiscard]] static std::size_t at(std::size_t i, std::size_t j) { return j * (kTiles + 1) + i; }
+    [[nodiscard]] std::size_t tile(double v, std::size_t axis) const {
+        const double extent = all_.high[axis] - all_.low[axis];
+        return extent > 0 ? static_cast<std::size_t>(std::clamp((v - all_.low[axis]) / extent * kTiles, 0.0, kTiles - 1.0)) : 0;
+    }
+    Box2 all_;
+    std::vector<std::uint32_t> before_;  // occupied tiles before a corner
+};
+
+// The loops that come where facets lie or are around some; `all` grows by theirs.
+Loops loops_at(const Loops& loops, const Occupied& occupied, Box2& all) {
+    Loops kept;
+    for (std::size_t l = 0; l < loops.size(); ++l) {
+        Box2 box;
+        for (const Point2 p : loops.loop(l)) box.add({{to_mm(p.x), to_mm(p.y)}, {to_mm(p.x), to_mm(p.y)}});
+        if (!occupied.meets(box)) continue;
+        all.add(box);
+        kept.points.insert(kept.points.end(), loops.loop(l).begin(), loops.loop(l).end());
+        kept.close_loop();
+    }
+    return kept;
+}
+
+// Those of ascending lines that lie between, and one more on either side.
+std::vector<std::int32_t> lines_between(const std::vector<std::int32_t>& lines, double low, double high) {
+    auto first = std::lower_bound(lines.begin(), lines.end(), low * kUnitsPerMm),
+         last = std::upper_bound(lines.begin(), lines.end(), high * kUnitsPerMm);
+    if (first != lines.begin()) --first;
+    if (last != lines.end()) ++last;
+    return first < last ? std::vector<std::int32_t>(first, last) : std::vector<std::int32_t>();
+}
+
+}  // namespace
+
+std::vector<Contours> contours_near(Context& context, const LayerSolid& around, std::span<const double> tips, std::span<const Section> inside,
+                                    const Cutter& cutter, const FibreGrid& grid) {
+    if (around.groups.empty()) return std::vector<Contours>(tips.size());
+    const Occupied occupied(around.groups);
+    Box2 all = occupied.box();
+    std::vector<Loops> loops;
+    for (std::size_t i = 0; i < tips.size(); ++i) loops.push_back(loops_at(inside[i].loops, occupied, all));
+    std::vector<FibreLevel> levels;
+    for (std::size_t i = 0; i < tips.size(); ++i) levels.push_back({tips[i], &loops[i]});
+    const double reach = cutter.radius + 2 * to_mm(grid.pitch);
+    const FibreGrid part{grid.pitch, lines_between(grid.x, all.low[0] - reach, all.high[0] + reach),
+                         lines_between(grid.y, all.low[1] - reach, all.high[1] + reach)};
+    return level_contours(context, around, levels, cutter, part);
+}
+
 std::vector<double> foot_heights(const LayerCut& cut, double floor) {
     const double cusp = cut.job.tolerances.cusp, r = cut.layer.tools.finish.diameter / 2, alpha = cut.least_slope(floor, floor + r, kSteepFoot);
     if (alpha >= cut.job.cutting.vertical_deg * kDegree) return {};
@@ -58,9 +140,7 @@ void append_foot_runs(const LayerCut& cut, const Tool& tool, double floor, const
     std::vector<double> tips;
     for (const double above : heights) tips.push_back(floor + above);
     const std::vector<Section> inside = cut.insides(cutter, tips);
-    std::vector<FibreLevel> at;
-    for (std::size_t i = 0; i < tips.size(); ++i) at.push_back({tips[i], &inside[i].loops});
-    const std::vector<Contours> contours = level_contours(cut.context, around, at, cutter, grid);
+    const std::vector<Contours> contours = contours_near(cut.context, around, tips, inside, cutter, grid);
     for (std::size_t i = 0; i < tips.size(); ++i) {
         const double tip = tips[i];
         const Contours& foot = contours[i];

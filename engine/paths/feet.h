@@ -25,6 +25,11 @@ private:
     Fibres x_, y_;
 };
 
+/// Contours at these tips as they are near the facets of `around`, which comes of solid_near(): what lies elsewhere is left out.
+/// @param inside  the sections for the tips  @param grid  of the whole solid
+[[nodiscard]] std::vector<Contours> contours_near(Context& context, const LayerSolid& around, std::span<const double> tips,
+                                                  std::span<const Section> inside, const Cutter& cutter, const FibreGrid& grid);
+
 /// Heights over a floor, descending, at which a flat end mill goes around the steep walls that stand on it: as high as the layer's ball leaves
 /// more than a cusp, in steps that leave no more than one. None where that would take more than a few.
 [[nodiscard]] std::vector<double> foot_heights(const LayerCut& cut, double floor);

@@ -219,9 +219,8 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         const std::vector<double>& close = foot.close;
         const NearFloor near(cut, facets, r, grid);
         const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(grid.pitch)));
-        std::vector<FibreLevel> levels;
-        for (std::size_t i = 0; i < close.size(); ++i) levels.push_back({close[i], &foot_inside[foot.first + i].loops});
-        const std::vector<Contours> level = level_contours(cut.context, around, levels, cutter, grid);
+        const std::vector<Contours> level =
+            contours_near(cut.context, around, close, std::span(foot_inside).subspan(foot.first, close.size()), cutter, grid);
         const std::size_t begin = feet.size();
         for (const double tip : close) feet.push_back({tip, {}});
         parallel_each(cut.context, close.size(),
