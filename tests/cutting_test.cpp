@@ -235,6 +235,31 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
     for (Vec3f& v : mesh.vertices) v.x += away.x, v.y += away.y;
     const LayerSolid solid = layer_solid(context, mesh.view(), -20, 100);
     EXPECT_EQ(solid.tree.tiers.size() > 1, number % 2 == 0);
+    // What was met at the places before changes nothing.
+    int nearly = 0;
+    for (const double r : {0.4, 3.0, 12.0}) {
+        const DropIndex index(solid, {profile, r});
+        MetPoints met;
+        double x = away.x, y = away.y;
+        for (int k = 0; k < 200; ++k) {
+            if (k % 20 == 0) x = away.x + uniform(-8, 8), y = away.y + uniform(-8, 8);
+            else x += uniform(-0.1 * r, 0.1 * r), y += uniform(-0.1 * r, 0.1 * r);
+            const Rest rest = index.drop(x, y);
+            for (const double z : {rest.tip_z - uniform(0, r), rest.tip_z - 1e-6, rest.tip_z, rest.tip_z + 1e-6, rest.tip_z + uniform(0, r)}) {
+                SCOPED_TRACE(testing::Message() << "r " << r << " at " << x << ' ' << y << ' ' << z << " tip " << rest.tip_z);
+                EXPECT_EQ(index.stands_over(x, y, z, &met), rest.tip_z > z);
+                EXPECT_EQ(index.tip_within(x, y, z, &met), index.tip_within(x, y, z));
+                const std::optional<Rest> told = index.drop_within(x, y, -1e9, z, &met);
+                ASSERT_EQ(told.has_value(), rest.tip_z <= z);
+                for (const Rest& other : {told.value_or(rest), index.drop(x, y, -1e9, &met)})
+                    EXPECT_TRUE(other.tip_z == rest.tip_z && other.nx == rest.nx && other.ny == rest.ny && other.nz == rest.nz);
+            }
+            const double kept_up = met.keep_up(index.cutter(), x, y);
+            EXPECT_LE(kept_up, rest.tip_z);
+            nearly += kept_up > rest.tip_z - 1e-4;
+        }
+    }
+    EXPECT_GT(nearly, 100);
     for (const double r : {0.4, 3.0, 12.0}) {
         const Cutter cutter{profile, r};
         const DropIndex index(solid, cutter);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -104,12 +105,12 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const double top = cut.layer.z_top - 1.5 * kTopSheet;
 
     // Whether the flat end mill finishes a floor's place: from right over it, or with its rim from beside a wall.
-    auto flat_covers = [&](double x, double y, double z) {
+    auto flat_covers = [&](double x, double y, double z, MetPoints& met) {
         for (const auto& [flat_r, flat] : flats) {
-            if (!flat->stands_over(x, y, z + kOnFloor)) return true;
+            if (!flat->stands_over(x, y, z + kOnFloor, &met)) return true;
             for (int k = 0; k < 8; ++k) {
                 const double turn = k * std::numbers::pi / 4, beside = 0.95 * flat_r;
-                if (!flat->stands_over(x + beside * std::cos(turn), y + beside * std::sin(turn), z + kOnFloor)) return true;
+                if (!flat->stands_over(x + beside * std::cos(turn), y + beside * std::sin(turn), z + kOnFloor, &met)) return true;
             }
         }
         return false;
@@ -137,9 +138,13 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         bool steep = false;  // the level contours keep the cusp here
     };
     using Line = std::vector<Sample>;
-    auto sample = [&](std::int32_t ux, std::int32_t uy) {
+    // What the cutters met along a line.
+    struct Met {
+        MetPoints ball, flat;
+    };
+    auto sample = [&](std::int32_t ux, std::int32_t uy, Met& met) {
         const double x = to_mm(ux), y = to_mm(uy);
-        const Rest rest = ball.drop(x, y);
+        const Rest rest = ball.drop(x, y, -std::numeric_limits<double>::infinity(), &met.ball);
         Sample s;
         s.x = ux;
         s.steep = steeper && rest.nz < step_nz;
@@ -147,7 +152,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         const double contact = s.contact[2];
         s.wanted = rest.nz >= keep_nz && !rest.on_cap && contact >= cut.layer.z_bottom - 0.02 && contact < top && rest.tip_z >= cut.layer.floor_below;
         // Nor is the rim of a finished floor worth a visit: floor and wall make it.
-        if (s.wanted && floor_done(contact) && flat_covers(s.contact[0], s.contact[1], contact)) s.wanted = false;
+        if (s.wanted && floor_done(contact) && flat_covers(s.contact[0], s.contact[1], contact, met.flat)) s.wanted = false;
         s.tip = rest.tip_z;
         s.reachable = s.tip >= cut.layer.floor_below && !rest.on_cap;
         if (s.reachable) s.z = to_units(s.tip) + 1;
@@ -173,6 +178,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         std::int32_t stood = INT32_MIN;  // in steps
         // In steps: where it is worth to ask for so many again.
         std::array<std::int32_t, kTogether.size()> ask{INT32_MIN, INT32_MIN};
+        Met met{};
     };
     auto flat_stands = [&](FloorWalk& walk, std::int32_t k, std::int32_t uy, double floor) {
         if (k < walk.stood && floor == walk.floor) return true;
@@ -181,7 +187,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             if (k < walk.ask[w]) continue;
             const double middle = to_mm(k * step) + 0.5 * to_mm((kTogether[w] - 1) * step);
             if (std::any_of(floor_mills.begin(), floor_mills.end(), [&](const FloorMill& mill) {
-                    return mill.wide[w] && !mill.wide[w]->stands_over(middle, y, floor + kOnFloor - kRounding);
+                    return mill.wide[w] && !mill.wide[w]->stands_over(middle, y, floor + kOnFloor - kRounding, &walk.met.flat);
                 })) {
                 walk.floor = floor, walk.stood = k + kTogether[w];
                 return true;
@@ -189,7 +195,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             walk.ask[w] = k + kTogether[w];
         }
         return std::any_of(floor_mills.begin(), floor_mills.end(),
-                           [&](const FloorMill& mill) { return !mill.narrow->stands_over(to_mm(k * step), y, floor + kOnFloor); });
+                           [&](const FloorMill& mill) { return !mill.narrow->stands_over(to_mm(k * step), y, floor + kOnFloor, &walk.met.flat); });
     };
     auto finished = [&](FloorWalk& walk, std::int32_t k, std::int32_t uy, double floor) -> std::optional<Sample> {
         if (!flat_stands(walk, k, uy, floor)) return std::nullopt;
@@ -217,12 +223,12 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         if (!a.reachable || !b.reachable) return a.reachable != b.reachable;
         return std::hypot(to_mm(a.x) - to_mm(b.x), a.tip - b.tip) > chord;
     };
-    auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t y) -> void {
+    auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t y, Met& met) -> void {
         if (!line.empty() && b.x - line.back().x <= step && b.x - line.back().x > 2 * finest &&
             (too_far(line.back(), y, b, y) || (walls && apart(line.back(), b)))) {
-            const Sample middle = sample(line.back().x + (b.x - line.back().x) / 2, y);
-            self(self, line, middle, y);
-            self(self, line, b, y);
+            const Sample middle = sample(line.back().x + (b.x - line.back().x) / 2, y, met);
+            self(self, line, middle, y, met);
+            self(self, line, b, y, met);
             return;
         }
         line.push_back(b);
@@ -243,8 +249,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                        last = static_cast<std::int32_t>(std::floor(std::min(span.high * kUnitsPerMm, high_limit) / step));
             for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                 next = k + 1;
-                if (flat_stands(walk, k, lines[l], span.z) || flat_covers(to_mm(k * step), to_mm(lines[l]), span.z) ||
-                    !sample(k * step, lines[l]).wanted)
+                if (flat_stands(walk, k, lines[l], span.z) || flat_covers(to_mm(k * step), to_mm(lines[l]), span.z, walk.met.flat) ||
+                    !sample(k * step, lines[l], walk.met).wanted)
                     continue;
                 if (!unfinished[l].empty() && unfinished[l].back()[1] + 1 == k) unfinished[l].back()[1] = k;
                 else unfinished[l].push_back({k, k});
@@ -274,7 +280,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 while (floor != floor_spans[l].end() && floor->high < x) ++floor;
                 const std::optional<Sample> done =
                     floor != floor_spans[l].end() && floor->low < x ? finished(walk, k, lines[l], floor->z) : std::nullopt;
-                append_between(append_between, samples[l], done ? *done : sample(k * step, lines[l]), lines[l]);
+                append_between(append_between, samples[l], done ? *done : sample(k * step, lines[l], walk.met), lines[l], walk.met);
             }
         }
     });
@@ -308,6 +314,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             if (yb - ya < 2 * finest) return;
             const std::int32_t y = ya + (yb - ya) / 2;
             Line middle;
+            Met met;
             std::int32_t done = INT32_MIN;
             for (const Sample& s : a) {
                 if (s.x % step != 0) continue;
@@ -315,7 +322,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 if (!other || !too_far(s, ya, *other, yb)) continue;
                 for (const std::int32_t x : {s.x - step, s.x, s.x + step}) {
                     if (x <= done) continue;
-                    append_between(append_between, middle, sample(x, y), y);
+                    append_between(append_between, middle, sample(x, y, met), y, met);
                     done = x;
                 }
             }

@@ -4,6 +4,7 @@
 #include "engine/paths/rest.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -101,13 +102,28 @@ public:
         };
         return highest_[static_cast<std::size_t>(tile(y, grid.y0, grid.ny)) * tiles_x_ + static_cast<std::size_t>(tile(x, grid.x0, grid.nx))];
     }
-    /// Calls fn(first, last) for the marked stretches of row j within [i0, i1], until one returns true; whether one did.
+    /// Calls fn(i, j) for marked cells within `reach` mm of a place, all that stand over `above` mm among them, until one returns true; whether one did.
     template <class Fn>
-    [[nodiscard]] bool any_in_row(int j, int i0, int i1, Fn&& fn) const {
-        const auto& row = rows_[static_cast<std::size_t>(j)];
-        auto it = std::lower_bound(row.begin(), row.end(), i0, [](const std::array<int, 2>& run, int i) { return run[1] < i; });
-        for (; it != row.end() && (*it)[0] <= i1; ++it)
-            if (fn(std::max(i0, (*it)[0]), std::min(i1, (*it)[1]))) return true;
+    [[nodiscard]] bool any_near(double x, double y, double reach, double above, Fn&& fn) const {
+        const CellGrid& grid = stock_.grid();
+        const int i0 = std::max(0, static_cast<int>(std::ceil((x - reach - grid.x0) / grid.cell))),
+                  i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + reach - grid.x0) / grid.cell))),
+                  j0 = std::max(0, static_cast<int>(std::ceil((y - reach - grid.y0) / grid.cell))),
+                  j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + reach - grid.y0) / grid.cell)));
+        for (int tj = j0 / kTile; tj * kTile <= j1; ++tj)
+            for (int ti = i0 / kTile; ti * kTile <= i1; ++ti) {
+                const Tile& tile = tiles_[static_cast<std::size_t>(tj) * tiles_x_ + static_cast<std::size_t>(ti)];
+                if (tile.highest <= above) continue;
+                for (int j = std::max(j0, tj * kTile); j <= std::min(j1, tj * kTile + kTile - 1); ++j) {
+                    auto marked = static_cast<std::uint8_t>(tile.marked >> kTile * (j % kTile));
+                    if (marked == 0) continue;
+                    const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, reach * reach - dy * dy));
+                    const int first = static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)),
+                              last = static_cast<int>(std::floor((x + w - grid.x0) / grid.cell));
+                    for (; marked != 0; marked &= static_cast<std::uint8_t>(marked - 1))
+                        if (const int i = ti * kTile + std::countr_zero(marked); i >= first && i <= last && fn(i, j)) return true;
+                }
+            }
         return false;
     }
     [[nodiscard]] std::array<int, 2> rows() const {
@@ -142,21 +158,21 @@ private:
         const CellGrid& grid = stock_.grid();
         const int nx = (grid.nx + kTile - 1) / kTile, ny = (grid.ny + kTile - 1) / kTile;
         tiles_x_ = static_cast<std::size_t>(nx);
-        constexpr float none = -std::numeric_limits<float>::infinity();
-        std::vector<float> own(tiles_x_ * static_cast<std::size_t>(ny), none);
+        tiles_.assign(tiles_x_ * static_cast<std::size_t>(ny), {});
         for (std::size_t j = 0; j < rows_.size(); ++j)
             for (const auto& [first, last] : rows_[j])
                 for (int i = first; i <= last; ++i) {
-                    float& tile = own[j / kTile * tiles_x_ + static_cast<std::size_t>(i / kTile)];
-                    tile = std::max(tile, stock_.height(grid.index(i, static_cast<int>(j))));
+                    Tile& tile = tiles_[j / kTile * tiles_x_ + static_cast<std::size_t>(i / kTile)];
+                    tile.highest = std::max(tile.highest, stock_.height(grid.index(i, static_cast<int>(j))));
+                    tile.marked |= std::uint64_t{1} << (kTile * (j % kTile) + static_cast<std::size_t>(i % kTile));
                 }
-        highest_.assign(own.size(), none);
+        highest_.assign(tiles_.size(), kNone);
         const double far = reach / grid.cell;  // cells
         const int tiles = static_cast<int>(far / kTile) + 1;
         for (int j = 0; j < ny; ++j)
             for (int i = 0; i < nx; ++i) {
-                const float here = own[static_cast<std::size_t>(j) * tiles_x_ + static_cast<std::size_t>(i)];
-                if (here == none) continue;
+                const float here = tiles_[static_cast<std::size_t>(j) * tiles_x_ + static_cast<std::size_t>(i)].highest;
+                if (here == kNone) continue;
                 for (int dj = -std::min(tiles, j); dj <= std::min(tiles, ny - 1 - j); ++dj)
                     for (int di = -std::min(tiles, i); di <= std::min(tiles, nx - 1 - i); ++di) {
                         float& there = highest_[static_cast<std::size_t>(j + dj) * tiles_x_ + static_cast<std::size_t>(i + di)];
@@ -166,9 +182,16 @@ private:
     }
 
     static constexpr int kTile = 8;  // cells
+    static constexpr float kNone = -std::numeric_limits<float>::infinity();
+    // Of the cells that are marked.
+    struct Tile {
+        std::uint64_t marked = 0;  // a bit each, eight a row
+        float highest = kNone;     // when they were marked: cutting only lowers them
+    };
     const LayerStock& stock_;
     std::vector<std::vector<std::array<int, 2>>> rows_;
     std::size_t count_ = 0, tiles_x_ = 0;
+    std::vector<Tile> tiles_;
     std::vector<float> highest_;  // by tile
 };
 
@@ -229,31 +252,19 @@ private:
     // Whether the cutter, here or up to `slack` mm beside, lowers a cell that is worth it.
     [[nodiscard]] bool lowers(double x, double y, double tip, double slack = 0) const {
         const CellGrid& grid = stock_.grid();
-        const double core = r_ - pass_.skin, reach = core + slack;
-        const int j0 = std::max(0, static_cast<int>(std::ceil((y - reach - grid.y0) / grid.cell)));
-        const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + reach - grid.y0) / grid.cell)));
+        const double core = r_ - pass_.skin;
         const double above = tip + (ball_ ? pass_.skin : 0) - stock_.z_bottom();
-        for (int j = j0; j <= j1; ++j) {
-            const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, reach * reach - dy * dy));
-            const int i0 = std::max(0, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
-            const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + w - grid.x0) / grid.cell)));
-            const bool found = targets_.any_in_row(j, i0, i1, [&](int first, int last) {
-                for (int i = first; i <= last; ++i) {
-                    const std::size_t c = grid.index(i, j);
-                    if (stock_.height(c) <= above) continue;
-                    double z = above;
-                    if (ball_) {
-                        const double dx = grid.x(i) - x, from_axis = std::max(0.0, std::sqrt(dx * dx + dy * dy) - slack);
-                        z += core - std::sqrt(std::max(0.0, core * core - from_axis * from_axis));
-                    }
-                    z = std::max(z, static_cast<double>(stock_.surface(c)));
-                    if ((stock_.height(c) - z) * stock_.nz(c) > worth(c)) return true;
-                }
-                return false;
-            });
-            if (found) return true;
-        }
-        return false;
+        return targets_.any_near(x, y, core + slack, above, [&](int i, int j) {
+            const std::size_t c = grid.index(i, j);
+            if (stock_.height(c) <= above) return false;
+            double z = above;
+            if (ball_) {
+                const double dx = grid.x(i) - x, dy = grid.y(j) - y, from_axis = std::max(0.0, std::sqrt(dx * dx + dy * dy) - slack);
+                z += core - std::sqrt(std::max(0.0, core * core - from_axis * from_axis));
+            }
+            z = std::max(z, static_cast<double>(stock_.surface(c)));
+            return (stock_.height(c) - z) * stock_.nz(c) > worth(c);
+        });
     }
 
     // Whether the cutter stands clear of the flask, by the cell that its middle is in.
@@ -276,7 +287,7 @@ private:
                     if (const double x = grid.x(i) * kUnitsPerMm; x >= s.low && x <= s.high) room_[grid.index(i, j)] = 1;
     }
 
-    [[nodiscard]] Place place(std::int32_t ux, std::int32_t uy) const {
+    [[nodiscard]] Place place(std::int32_t ux, std::int32_t uy, MetPoints& met) const {
         const double x = to_mm(ux), y = to_mm(uy);
         // How far a flat end mill would go under the layer's bottom does not matter.
         const double matters = ball_ ? -std::numeric_limits<double>::infinity() : std::max(cut_.layer.z_bottom, cut_.layer.floor_below);
@@ -284,7 +295,7 @@ private:
         p.x = ux;
         p.y = uy;
         p.tip = stock_.z_bottom() + std::max(0.0, static_cast<double>(targets_.highest_near(x, y))) + kOver;
-        const std::optional<Rest> found = index_->drop_within(x, y, matters, p.tip - under_);
+        const std::optional<Rest> found = index_->drop_within(x, y, matters, p.tip - under_, &met);
         if (!found) return p;
         const Rest& rest = *found;
         const double on_surface = rest.tip_z + under_;
@@ -343,11 +354,11 @@ private:
         return std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(a.y) - to_mm(b.y), a.tip - b.tip) > chord_;
     }
 
-    void append_between(std::vector<Place>& line, std::int32_t y, Place b) const {
+    void append_between(std::vector<Place>& line, std::int32_t y, Place b, MetPoints& met) const {
         if (!line.empty() && b.x - line.back().x <= step_ && b.x - line.back().x > 2 * finest_ &&
             (too_far(line.back(), b, 0) || too_steep(line.back(), b))) {
-            append_between(line, y, place(line.back().x + (b.x - line.back().x) / 2, y));
-            append_between(line, y, b);
+            append_between(line, y, place(line.back().x + (b.x - line.back().x) / 2, y, met), met);
+            append_between(line, y, b, met);
             return;
         }
         line.push_back(b);
@@ -373,11 +384,12 @@ private:
         // A place that helps may lie between the last line that covers a target and the next, which is looked at only where both have places.
         const double covers = pass_.in_steps ? r_ : r_ + to_mm(spacing_);
         parallel_each(cut_.context, even.size(), [&](std::size_t l) {
+            MetPoints met;
             for (const auto& span : targets_.around(to_mm(even[l].y), covers, x_low, x_high)) {
                 const std::int32_t from = (span[0] >= 0 ? span[0] / step_ : -((-span[0] + step_ - 1) / step_)), to = span[1] / step_ + 1;
                 for (std::int32_t k = from; k <= to; ++k) {
                     if (!even[l].places.empty() && k * step_ <= even[l].places.back().x) continue;
-                    append_between(even[l].places, even[l].y, place(k * step_, even[l].y));
+                    append_between(even[l].places, even[l].y, place(k * step_, even[l].y, met), met);
                 }
             }
         });
@@ -406,12 +418,13 @@ private:
     [[nodiscard]] Line middle(const Line& a, const Line& b) const {
         Line line{a.y + (b.y - a.y) / 2, {}};
         if (b.y - a.y < 2 * finest_) return line;
+        MetPoints met;
         for (const Place& p : a.places) {
             if (p.x % step_ != 0) continue;
             const Place* other = at(b, p.x);
             if (!other || !too_far(p, *other, to_mm(step_) / 2)) continue;
             for (const std::int32_t x : {p.x - step_, p.x, p.x + step_})
-                if (line.places.empty() || x > line.places.back().x) append_between(line.places, line.y, place(x, line.y));
+                if (line.places.empty() || x > line.places.back().x) append_between(line.places, line.y, place(x, line.y, met), met);
         }
         return line;
     }
@@ -460,20 +473,21 @@ private:
     [[nodiscard]] Place slide(const Place& from) const {
         std::int32_t x = from.x, y = from.y;
         double tip = from.tip - under_;  // of the cutter that is dropped
+        MetPoints met;
         for (std::int32_t stride = to_units(0.1); stride >= to_units(0.0005); stride /= 2)
             for (bool moved = true; moved;) {
                 moved = false;
                 for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
                     const double at_x = to_mm(x + dx * stride), at_y = to_mm(y + dy * stride), less = tip - 1e-4;
                     if (!(less < tip)) continue;  // under nothing there is no lower
-                    const std::optional<double> lower = index_->tip_within(at_x, at_y, just_under(less));
+                    const std::optional<double> lower = index_->tip_within(at_x, at_y, just_under(less), &met);
                     if (!lower) continue;
                     x += dx * stride, y += dy * stride, tip = *lower, moved = true;
                     break;
                 }
                 if (tip + under_ < cut_.layer.floor_below) break;
             }
-        return place(x, y);
+        return place(x, y, met);
     }
 
     static double apart(const Place& a, const Place& b) { return std::hypot(static_cast<double>(a.x) - b.x, static_cast<double>(a.y) - b.y); }

@@ -1,7 +1,10 @@
 #include "kernels/cutting/drop.h"
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "kernels/errors.h"
@@ -12,16 +15,26 @@ namespace {
 
 constexpr double kNoEnd = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-6;  // mm: more than rounding takes from a height over a plane, a sliver's too
+constexpr double kSurely = 1e-5;    // mm: less than this is not said of what a point that was met keeps up
 
 struct Best {
     double tip_z = -std::numeric_limits<double>::infinity();
-    double nx = 0, ny = 0, nz = 0;
-    void offer(double z, double up, double east = 0, double north = 0) {
+    double nx = 0, ny = 0, nz = 0;  // of a ball
+    double x = 0, y = 0;            // where a flat cutter touches
+    void offer(double z, double up, double east, double north) {
         if (z > tip_z) {
             tip_z = z;
             nx = east;
             ny = north;
             nz = up;
+        }
+    }
+    void offer_flat(double z, double up, double at_x, double at_y) {
+        if (z > tip_z) {
+            tip_z = z;
+            nz = up;
+            x = at_x;
+            y = at_y;
         }
     }
 };
@@ -92,21 +105,27 @@ void drop_flat(const SolidFacet& f, double r, double x, double y, Best& best) {
         const double slope = std::sqrt(n[0] * n[0] + n[1] * n[1]), up = n[2] > 0 ? -1.0 : 1.0;
         const double px = slope > 1e-12 ? x + up * r * n[0] / slope : x, py = slope > 1e-12 ? y + up * r * n[1] / slope : y;
         const double z = f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2];
-        if (z > best.tip_z && in_triangle(px, py)) best.offer(z, f.nz);
+        if (z > best.tip_z && in_triangle(px, py)) best.offer_flat(z, f.nz, px, py);
     }
     for (int k = 0; k < 3; ++k) {
         const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
         if (a[2] <= best.tip_z && b[2] <= best.tip_z) continue;
         const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy, wx = a[0] - x, wy = a[1] - y;
-        if (wx * wx + wy * wy < r * r) best.offer(a[2], f.nz);
+        if (wx * wx + wy * wy < r * r) best.offer_flat(a[2], f.nz, a[0], a[1]);
         if (l2 < 1e-18) continue;
         // Where the edge crosses the disc's rim.
         const double half = dx * wx + dy * wy, discriminant = half * half - l2 * (wx * wx + wy * wy - r * r);
         if (discriminant <= 0) continue;
         const double root = std::sqrt(discriminant);
         for (const double t : {(-half - root) / l2, (-half + root) / l2})
-            if (t >= 0 && t <= 1) best.offer(a[2] + t * (b[2] - a[2]), f.nz);
+            if (t >= 0 && t <= 1) best.offer_flat(a[2] + t * (b[2] - a[2]), f.nz, a[0] + t * dx, a[1] + t * dy);
     }
+}
+
+// The greatest float that is no more: floats over the one are over the other.
+float rounded_down(double v) {
+    const auto f = static_cast<float>(v);
+    return static_cast<double>(f) > v ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
 }
 
 // The contact that lifts the cutter most, if that is above what it begins with. @param enough mm: the first one above that will do
@@ -118,27 +137,26 @@ void search(const LayerSolid& solid, const DropProbe& probe, double r, double x,
     };
     constexpr int most_levels = 12, k_all = FacetTree::kTogether;
     std::array<Waiting, most_levels * k_all> waiting;  // the highest bound of each level last
+    float least = rounded_down(best.tip_z);
     for (const FacetTree::Tier& tier : solid.tree.tiers) {
         std::size_t count = 0;
-        waiting[count++] = {std::numeric_limits<float>::infinity(), static_cast<std::uint32_t>(tier.starts.size() - 2), 0};
-        while (count > 0) {
-            const Waiting now = waiting[--count];
-            if (now.bound <= best.tip_z) continue;
+        Waiting now{std::numeric_limits<float>::infinity(), static_cast<std::uint32_t>(tier.starts.size() - 2), 0};
+        while (true) {
             alignas(64) std::array<float, k_all> bounds;
             const FacetTree::Node& node = tier.nodes[tier.starts[now.level] + now.node];
-            if (ball) ball_bounds(node, probe, bounds.data());
-            else flat_bounds(node, probe, bounds.data());
+            std::uint32_t over = ball ? ball_bounds(node, probe, least, bounds.data()) : flat_bounds(node, probe, least, bounds.data());
             // The children worth a look, ascending.
             std::array<std::uint32_t, k_all> order;
             std::size_t n = 0;
-            for (std::uint32_t k = 0; k < k_all; ++k) {
-                if (bounds[k] <= best.tip_z) continue;
+            for (; over != 0; over &= over - 1) {
+                const auto k = static_cast<std::uint32_t>(std::countr_zero(over));
                 std::size_t at = n++;
                 for (; at > 0 && bounds[order[at - 1]] > bounds[k]; --at) order[at] = order[at - 1];
                 order[at] = k;
             }
-            if (now.level > 0) {
-                for (std::size_t i = 0; i < n; ++i) waiting[count++] = {bounds[order[i]], now.level - 1, k_all * now.node + order[i]};
+            if (now.level > 0 && n > 0) {
+                for (std::size_t i = 0; i + 1 < n; ++i) waiting[count++] = {bounds[order[i]], now.level - 1, k_all * now.node + order[i]};
+                now = {bounds[order[n - 1]], now.level - 1, k_all * now.node + order[n - 1]};
                 continue;
             }
             // Most of them are looked at, and far apart in memory.
@@ -148,17 +166,49 @@ void search(const LayerSolid& solid, const DropProbe& probe, double r, double x,
                 __builtin_prefetch(&f);
                 __builtin_prefetch(&f.z_max);
             }
-            while (n-- > 0 && bounds[order[n]] > best.tip_z) {
+            while (n-- > 0 && bounds[order[n]] > least) {
                 const SolidFacet& f = solid.facets[facets[order[n]]];
+                const double before = best.tip_z;
                 if (ball) drop_ball(f, r, x, y, best);
                 else drop_flat(f, r, x, y, best);
                 if (best.tip_z > enough) return;
+                if (best.tip_z > before) least = rounded_down(best.tip_z);
             }
+            while (count > 0 && !(waiting[count - 1].bound > least)) --count;
+            if (count == 0) break;
+            now = waiting[--count];
         }
     }
 }
 
+// The same, and what was met there before spares most of it; `best` begins with what need not be found.
+void search(const LayerSolid& solid, const DropProbe& probe, const Cutter& cutter, double x, double y, double enough, double kept_up, Best& best,
+            MetPoints* met) {
+    const double above = best.tip_z, r = cutter.radius;
+    const bool ball = cutter.profile == Cutter::Profile::ball;
+    auto found_over = [&](double from) {
+        best.tip_z = from;
+        if (ball) search<true>(solid, probe, r, x, y, enough, best);
+        else search<false>(solid, probe, r, x, y, enough, best);
+        return best.tip_z > from;
+    };
+    if (!(kept_up > above && found_over(kept_up)) && !found_over(above)) return;
+    if (met == nullptr) return;
+    if (ball) met->add({x - r * best.nx, y - r * best.ny, best.tip_z + r * (1 - best.nz)});
+    else met->add({best.x, best.y, best.tip_z});
+}
+
 }  // namespace
+
+double MetPoints::keep_up(const Cutter& cutter, double x, double y) const {
+    const double reach = cutter.radius - kSurely;
+    double most = -kNoEnd;
+    for (const Vec3d& p : points_) {
+        const double dx = x - p[0], dy = y - p[1], room2 = reach * reach - dx * dx - dy * dy;
+        if (room2 > 0) most = std::max(most, p[2] + (cutter.profile == Cutter::Profile::ball ? std::sqrt(room2) - cutter.radius : 0));
+    }
+    return most - kSurely;
+}
 
 DropIndex::DropIndex(const LayerSolid& solid, const Cutter& cutter) : solid_(solid), cutter_(cutter) {
     if (!(cutter.radius > 0 && cutter.radius <= FacetTree::kWidestCutter))
@@ -182,40 +232,46 @@ DropProbe DropIndex::probe_at(double x, double y) const {
     return probe;
 }
 
-Rest DropIndex::drop(double x, double y, double above) const { return *drop_within(x, y, above, kNoEnd); }
+Rest DropIndex::drop(double x, double y, double above, MetPoints* met) const { return *drop_within(x, y, above, kNoEnd, met); }
 
-std::optional<Rest> DropIndex::drop_within(double x, double y, double above, double most) const {
+std::optional<Rest> DropIndex::drop_within(double x, double y, double above, double most, MetPoints* met) const {
     Rest rest;
-    rest.tip_z = -std::numeric_limits<double>::infinity();
+    rest.tip_z = -kNoEnd;
     if (nothing_near(x, y)) return rest;
-    Best best;
-    best.tip_z = above;
+    const double kept_up = met != nullptr ? met->keep_up(cutter_, x, y) : -kNoEnd;
+    if (kept_up > most) return std::nullopt;
     if (solid_.cap_cells.inside(x, y)) rest = {solid_.z_top, 0.0F, 0.0F, 1.0F, true};
     else {
-        if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, most, best);
-        else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, most, best);
-        if (best.tip_z > above) rest = {best.tip_z, static_cast<float>(best.nx), static_cast<float>(best.ny), static_cast<float>(best.nz), false};
+        Best best;
+        best.tip_z = above;
+        search(solid_, probe_at(x, y), cutter_, x, y, most, kept_up, best, met);
+        if (best.tip_z > above) {
+            const bool ball = cutter_.profile == Cutter::Profile::ball;
+            rest = {best.tip_z, ball ? static_cast<float>(best.nx) : 0.0F, ball ? static_cast<float>(best.ny) : 0.0F, static_cast<float>(best.nz),
+                    false};
+        }
     }
     if (rest.tip_z > most) return std::nullopt;
     return rest;
 }
 
-bool DropIndex::stands_over(double x, double y, double z) const {
+bool DropIndex::stands_over(double x, double y, double z, MetPoints* met) const {
     if (nothing_near(x, y)) return false;
+    if (met != nullptr && met->keep_up(cutter_, x, y) > z) return true;
     if (solid_.cap_cells.inside(x, y)) return solid_.z_top > z;
     Best best;
     best.tip_z = z;
-    if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, z, best);
-    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, z, best);
+    search(solid_, probe_at(x, y), cutter_, x, y, z, -kNoEnd, best, met);
     return best.tip_z > z;
 }
 
-std::optional<double> DropIndex::tip_within(double x, double y, double most) const {
+std::optional<double> DropIndex::tip_within(double x, double y, double most, MetPoints* met) const {
     Best best;
     if (nothing_near(x, y)) return best.tip_z;
+    const double kept_up = met != nullptr ? met->keep_up(cutter_, x, y) : -kNoEnd;
+    if (kept_up > most) return std::nullopt;
     if (solid_.cap_cells.inside(x, y)) best.tip_z = solid_.z_top;
-    else if (cutter_.profile == Cutter::Profile::ball) search<true>(solid_, probe_at(x, y), cutter_.radius, x, y, most, best);
-    else search<false>(solid_, probe_at(x, y), cutter_.radius, x, y, most, best);
+    else search(solid_, probe_at(x, y), cutter_, x, y, most, kept_up, best, met);
     if (best.tip_z > most) return std::nullopt;
     return best.tip_z;
 }

@@ -165,7 +165,8 @@ FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const
 
 // Every step is the same for all eight, so that a compiler does them at once. Distances are shortened and heights raised by more than
 // float takes from them.
-SLABWRIGHT_WIDE void ball_bounds(const FacetTree::Node& node, const DropProbe& probe, float* __restrict bounds) {
+SLABWRIGHT_WIDE std::uint32_t ball_bounds(const FacetTree::Node& node, const DropProbe& probe, float least, float* __restrict bounds) {
+    std::uint32_t over = 0;
     const float r = probe.radius, r2 = r * r, unit = probe.unit, bend = probe.inverse * unit * unit;
     for (int k = 0; k < FacetTree::kTogether; ++k) {
         const auto i = static_cast<std::size_t>(k);
@@ -186,10 +187,13 @@ SLABWRIGHT_WIDE void ball_bounds(const FacetTree::Node& node, const DropProbe& p
         const float over_plane = node.z_mid[i] + (gx * mx + gy * my + r * (w - 1) + 1e-6F * far) * unit - (ex * ex + ey * ey) * bend;
         const float bound = (over_box < over_plane ? over_box : over_plane) + probe.spare;
         bounds[i] = room2 > 0 ? bound : kNowhere;
+        over |= bounds[i] > least ? std::uint32_t{1} << k : 0;
     }
+    return over;
 }
 
-SLABWRIGHT_WIDE void flat_bounds(const FacetTree::Node& node, const DropProbe& probe, float* __restrict bounds) {
+SLABWRIGHT_WIDE std::uint32_t flat_bounds(const FacetTree::Node& node, const DropProbe& probe, float least, float* __restrict bounds) {
+    std::uint32_t over = 0;
     const float r = probe.radius, r2 = r * r, unit = probe.unit;
     for (int k = 0; k < FacetTree::kTogether; ++k) {
         const auto i = static_cast<std::size_t>(k);
@@ -204,7 +208,9 @@ SLABWRIGHT_WIDE void flat_bounds(const FacetTree::Node& node, const DropProbe& p
         const float rim = node.z_mid[i] + (gx * mx + gy * my + r * std::sqrt(gx * gx + gy * gy) + 1e-6F * far) * unit + probe.spare;
         const float bound = node.z_max[i] < rim ? node.z_max[i] : rim;
         bounds[i] = dx * dx + dy * dy < r2 * 1.000001F ? bound : kNowhere;
+        over |= bounds[i] > least ? std::uint32_t{1} << k : 0;
     }
+    return over;
 }
 
 }  // namespace slabwright

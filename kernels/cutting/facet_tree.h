@@ -54,8 +54,9 @@ struct DropProbe {
 /// With u the way from the axis to a point of the facet in the plane, the tip over that point of a plane z0 + g·u is
 ///     f(u) = z0 + g·u + √(r² − u²) − r,  greatest at u* = r·g / √(1 + g²), with f(u) ≤ f(u*) − |u − u*|² / 2r,
 /// so the distance of u* from the box bounds it, as does the distance of the axis with g = 0 and z_max.
-void ball_bounds(const FacetTree::Node& node, const DropProbe& probe, float* bounds);
+/// @return bit k: the bound of child k is over `least`
+[[nodiscard]] std::uint32_t ball_bounds(const FacetTree::Node& node, const DropProbe& probe, float least, float* bounds);
 /// The same for a flat cutter: z_max of what is in reach, and no more than the plane at the disc's uphill rim.
-void flat_bounds(const FacetTree::Node& node, const DropProbe& probe, float* bounds);
+[[nodiscard]] std::uint32_t flat_bounds(const FacetTree::Node& node, const DropProbe& probe, float least, float* bounds);
 
 }  // namespace slabwright
