@@ -386,6 +386,14 @@ SLABWRIGHT_WIDE unsigned StandingPart::overlapping(const Nodes& n, const Within&
     return static_cast<unsigned>(all | all >> 32);
 }
 
+namespace {
+/// Asks for what is looked at soon.
+template <class T>
+void expect(const T& what) {
+    for (std::size_t byte = 0; byte < sizeof(T); byte += 64) __builtin_prefetch(static_cast<const char*>(static_cast<const void*>(&what)) + byte);
+}
+}  // namespace
+
 /// Visits, in one fixed order, the facets [first, last) of every node whose bit is 1 in choose(eight nodes).
 template <class Choose, class Visit>
 void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
@@ -407,6 +415,7 @@ void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
         }
         while (keep != 0) {  // the last first, so that the first is on top
             const unsigned k = static_cast<unsigned>(std::bit_width(keep)) - 1;
+            expect(levels_[item.level - 1][first + k]);
             stack[size++] = {item.level - 1, first + k};
             keep ^= 1U << k;
         }
@@ -799,6 +808,7 @@ bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t 
                 [&](std::size_t first, std::size_t) {
                     static_assert(kFan == 8);
                     first_of[many.count] = static_cast<std::uint32_t>(first);
+                    expect(facets_.eight(first / kFan));
                     many.eights[many.count++] = &facets_.eight(first / kFan);
                     if (many.count == ManyEights::kMost) take();
                 });
