@@ -189,6 +189,67 @@ TEST(Sweep, SpansAgreeWithTheirCells) {
     EXPECT_EQ(level_over(1e300, 5), -std::numeric_limits<float>::infinity());
 }
 
+// Of rows beside a point those cells are named whose centres lie in both strips, and within the radius if it is about the point.
+TEST(Sweep, StripsOfRowsHoldTheirCells) {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-4, 14), turn(-std::numbers::pi, std::numbers::pi), wide(-3, 5), length(0.2, 8);
+    std::size_t inside = 0, about = 0;
+    for (int trial = 0; trial < 1000; ++trial) {
+        const CellGrid grid{0.1, 0.2, 0.31, 1 + trial % 40, 75};
+        const std::array<double, 2> from{u(random), u(random)};
+        const auto strips = [&] {
+            const auto strip = [&](double& rise) {
+                const double angle = trial % 5 == 0 ? std::numbers::pi / 2 * std::round(turn(random)) : turn(random), least = wide(random) - 3;
+                rise = std::sin(angle);
+                return Strip(std::cos(angle), least, least + wide(random) + 2);
+            };
+            double a_rise = 0, b_rise = 0;
+            const Strip a = strip(a_rise), b = strip(b_rise);
+            return CrossedStrips{a, b, a_rise, b_rise};
+        };
+        const CrossedStrips way = strips(), near = strips();
+        const double low = -length(random), high = length(random), radius = length(random);
+        // How far a centre lies within strips, mm at least; negative: outside of one.
+        const auto within = [](const CrossedStrips& s, double px, double py) {
+            const auto one = [&](const Strip& strip, double rise) {
+                const double value = (strip.inverse == 0 ? 0 : px / strip.inverse) + py * rise;
+                return std::min(value - strip.least, strip.most - value);
+            };
+            return std::min(one(s.a, s.a_rise), one(s.b, s.b_rise));
+        };
+        RowSpans spans;
+        const bool has_near = trial % 3 != 0;
+        const int first_row = trial % 12, rows = 1 + trial % RowSpans::kRows;
+        strips_of_rows(grid, first_row, rows, from, way, low, high, has_near ? &near : nullptr, radius, spans);
+        for (int k = 0; k < rows; ++k) {
+            const auto at = static_cast<std::size_t>(k);
+            if (spans.low[at] <= spans.left[at]) {
+                EXPECT_TRUE(spans.low[at] >= 0 && spans.left[at] < grid.nx);
+            }
+            if (spans.right[at] <= spans.high[at]) {
+                EXPECT_TRUE(spans.right[at] >= 0 && spans.high[at] < grid.nx);
+            }
+            for (int i = 0; i < grid.nx; ++i) {
+                constexpr double hair = 1e-6;
+                const double px = grid.x(i) - from[0], py = grid.y(first_row + k) - from[1];
+                const double in = std::min({within(way, px, py), px - low, high - px});
+                const double in_near = has_near ? std::min(within(near, px, py), radius - std::hypot(px, py)) : -1;
+                const bool named = i >= spans.low[at] && i <= spans.left[at], named_near = i >= spans.right[at] && i <= spans.high[at];
+                inside += named, about += named_near;
+                if (std::abs(in) > hair) {
+                    EXPECT_EQ(named, in > 0) << "trial " << trial << ", row " << k << ", cell " << i;
+                }
+                if (std::abs(in_near) > hair) {
+                    EXPECT_EQ(named_near, in_near > 0) << "trial " << trial << ", row " << k << ", cell " << i;
+                }
+            }
+        }
+    }
+    EXPECT_GT(inside, 10000U);
+    EXPECT_GT(about, 1000U);
+}
+
 // What is told of many cells at once is what each of them says.
 TEST(Rows, SayOnWhichCellsMoreThanALimitIsLeft) {
     const unsigned seed = test::seed();

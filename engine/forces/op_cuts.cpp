@@ -48,18 +48,24 @@ struct Meeting {
         edge_parts(way, grid.x(static_cast<int>(first % nx)) - from[0], grid.cell, grid.y(static_cast<int>(first / nx)) - from[1],
                    64 - std::countl_zero(cells), part.data(), across.data());
         const double area = grid.cell * grid.cell;
+        std::int32_t p = part[static_cast<std::size_t>(std::countr_zero(cells))];
+        Met m = parts[static_cast<std::size_t>(p)];
+        double low = std::min(tip + rise * p, tip + rise * (p + 1));
         for (; cells != 0; cells &= cells - 1) {
             const auto k = static_cast<std::size_t>(std::countr_zero(cells));
             const double stood = height[first + k], left = left_of(k);
             height[first + k] = static_cast<float>(left);
-            const std::int32_t p = part[k];
-            Met& m = parts[static_cast<std::size_t>(p)];
-            const double low = std::min(tip + rise * p, tip + rise * (p + 1));
+            if (part[k] != p) {
+                parts[static_cast<std::size_t>(p)] = m;
+                p = part[k], m = parts[static_cast<std::size_t>(p)];
+                low = std::min(tip + rise * p, tip + rise * (p + 1));
+            }
             m.volume += (stood - left) * area;
             m.low = std::min(m.low, left - low);
             m.high = std::max(m.high, stood - low);
             m.side += (stood - left) * across[k];
         }
+        parts[static_cast<std::size_t>(p)] = m;
     }
 };
 

@@ -43,7 +43,8 @@ struct Taking {
         const auto nx = static_cast<std::size_t>(grid.nx);
         const double py = grid.y(static_cast<int>(first / nx)) - from[1];
         const auto level = static_cast<float>(z);
-        std::array<std::int32_t, kSweptTogether> part{};
+        std::array<std::int32_t, kSweptTogether> part;
+        if (way.count <= 1) part.fill(0);
         std::array<double, kSweptTogether> across;
         for (int begin = 0; begin < n; begin += kSweptTogether) {
             const int cells = std::min(kSweptTogether, n - begin);
@@ -54,11 +55,18 @@ struct Taking {
             if (way.count > 1)
                 edge_parts(way, grid.x(static_cast<int>(first % nx) + begin) - from[0], grid.cell, py, 64 - std::countl_zero(over), part.data(),
                            across.data());
+            std::int32_t p = part[static_cast<std::size_t>(std::countr_zero(over))];
+            double sum = sums[static_cast<std::size_t>(p)];
             for (; over != 0; over &= over - 1) {
                 const int k = std::countr_zero(over);
-                sums[static_cast<std::size_t>(part[static_cast<std::size_t>(k)])] += static_cast<double>(row[k]) - z;
+                if (const std::int32_t here = part[static_cast<std::size_t>(k)]; here != p) {
+                    sums[static_cast<std::size_t>(p)] = sum;
+                    p = here, sum = sums[static_cast<std::size_t>(p)];
+                }
+                sum += static_cast<double>(row[k]) - z;
                 row[k] = level;
             }
+            sums[static_cast<std::size_t>(p)] = sum;
         }
     }
 };

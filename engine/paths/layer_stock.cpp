@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kBand = KeptTiles::kTile;  // rows of cells that one task cuts
 constexpr std::size_t kBlock = 128;      // moves that share one box
+constexpr std::size_t kPart = 16;        // of those
 
 struct Box {
     double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300, z0 = 1e300;
@@ -22,6 +23,11 @@ struct Box {
         x0 = std::min(x0, to_mm(m.x)), x1 = std::max(x1, to_mm(m.x));
         y0 = std::min(y0, to_mm(m.y)), y1 = std::max(y1, to_mm(m.y));
         z0 = std::min(z0, to_mm(m.z));
+    }
+    void add(const Box& b) {
+        x0 = std::min(x0, b.x0), x1 = std::max(x1, b.x1);
+        y0 = std::min(y0, b.y0), y1 = std::max(y1, b.y1);
+        z0 = std::min(z0, b.z0);
     }
 };
 
@@ -50,9 +56,7 @@ public:
         const int i0 = tile((x0 - band_.x0) / band_.cell, band_.nx), i1 = tile((x1 - band_.x0) / band_.cell, band_.nx);
         const int j0 = tile((y0 - band_.y0) / band_.cell, band_.ny), j1 = tile((y1 - band_.y0) / band_.cell, band_.ny);
         first = i0 * kTile, last = std::min((i1 + 1) * kTile, band_.nx) - 1;
-        bool over = false;
-        for (int j = j0; j <= j1 && !over; ++j)
-            for (int i = i0; i <= i1 && !over; ++i) over = stands_over(i, j, level);
+        const bool over = any_over(i0, i1, j0, j1, level);
         for (int j = j0; j <= j1 && over; ++j)
             for (int i = i0; i <= i1; ++i) {
                 std::uint8_t& cuts = cuts_[index(i, j)];
@@ -60,10 +64,22 @@ public:
             }
         return over;
     }
+    // Whether anything may stand over a level where a cutter comes that stays within a box.
+    [[nodiscard]] bool any_over(const Box& box, double radius, double level) {
+        return any_over(tile((box.x0 - radius - band_.x0) / band_.cell, band_.nx), tile((box.x1 + radius - band_.x0) / band_.cell, band_.nx),
+                        tile((box.y0 - radius - band_.y0) / band_.cell, band_.ny), tile((box.y1 + radius - band_.y0) / band_.cell, band_.ny), level);
+    }
 
 private:
     static constexpr int kTile = 16;  // cells
     static constexpr std::uint8_t kStale = 4;
+
+    [[nodiscard]] bool any_over(int i0, int i1, int j0, int j1, double level) {
+        for (int j = j0; j <= j1; ++j)
+            for (int i = i0; i <= i1; ++i)
+                if (stands_over(i, j, level)) return true;
+        return false;
+    }
 
     static int tile(double cell, int cells) { return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(cells - 1))) / kTile; }
     [[nodiscard]] std::size_t index(int i, int j) const {
@@ -267,11 +283,12 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
     const CutterEnd end = cutter_end(tool);
     const double r = end.radius, top = cut.layer.z_top;
     auto over_bottom = [&](const Move& m) { return std::array<double, 3>{to_mm(m.x), to_mm(m.y), to_mm(m.z) - z_bottom_}; };
-    std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock);
+    std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock), parts((moves.size() + kPart - 1) / kPart);
     for (std::size_t i = 0; i < moves.size(); ++i) {
-        boxes[i / kBlock].add(moves[i]);
-        if (i % kBlock == 0 && i > 0) boxes[i / kBlock].add(moves[i - 1]);
+        parts[i / kPart].add(moves[i]);
+        if (i % kPart == 0 && i > 0) parts[i / kPart].add(moves[i - 1]);
     }
+    for (std::size_t i = 0; i < parts.size(); ++i) boxes[i / (kBlock / kPart)].add(parts[i]);
     // The lowest first, whatever their order is: of what they leave a cell keeps the least, and over places cut low the higher levels of a
     // roughing need not be looked at cell by cell.
     std::vector<std::uint32_t> upwards(boxes.size());
@@ -288,9 +305,17 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         Lowering lowering{height, static_cast<std::size_t>(grid_.nx)};
         KeptTiles before(part);  // of what the operation comes to
         TileTops tops(height, part);
+        const auto misses = [&](const Box& box) { return box.y1 < y0 || box.y0 > y1 || box.z0 >= top; };
         for (const std::uint32_t b : upwards) {
-            if (boxes[b].y1 < y0 || boxes[b].y0 > y1 || boxes[b].z0 >= top) continue;
+            if (misses(boxes[b])) continue;
             for (std::size_t i = std::max<std::size_t>(1, b * kBlock); i < std::min(moves.size(), (b + 1) * kBlock); ++i) {
+                if (i == 1 || i % kPart == 0) {
+                    const Box& part_box = parts[i / kPart];
+                    if (misses(part_box) || !tops.any_over(part_box, r, part_box.z0 - z_bottom_)) {
+                        i = (i / kPart + 1) * kPart - 1;
+                        continue;
+                    }
+                }
                 const Move &p = moves[i - 1], &q = moves[i];
                 if (q.feed == 0) continue;
                 const double py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
@@ -342,7 +367,17 @@ void LayerStock::cut_along(const CutterEnd& end, const std::array<double, 3>& fr
             height, cell(std::min(from[0], to[0]) - end.radius, grid_.x0, grid_.nx), cell(std::max(from[0], to[0]) + end.radius, grid_.x0, grid_.nx),
             cell(std::min(from[1], to[1]) - end.radius, grid_.y0, grid_.ny), cell(std::max(from[1], to[1]) + end.radius, grid_.y0, grid_.ny));
     }
-    sweep(grid_, end, from, to, [&](std::size_t c, double z) { height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_))); });
+    const auto lower = [&](std::size_t c, double z) { height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_))); };
+    if (end.form != CutterEnd::Form::ball) return sweep(grid_, end, from, to, lower);
+    // What stands a hair higher is asked too: heights over this bottom are compared, not z.
+    constexpr double hair = 1e-3;
+    struct LoweringTo {
+        float* height;
+        double bottom;
+        void operator()(std::size_t cell, double z) { height[cell] = std::min(height[cell], static_cast<float>(std::max(0.0, z - bottom))); }
+        void row(std::size_t first, int n, const double* h, double /*lowest*/) { lower_to(height + first, n, h, bottom); }
+    } lowering{height, z_bottom_};
+    sweep_above(grid_, end, from, to, StandingHeights{height, z_bottom_ + hair}, lowering);
 }
 
 }  // namespace slabwright

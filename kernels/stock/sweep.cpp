@@ -193,6 +193,70 @@ SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows
     }
 }
 
+namespace {
+
+// Narrows [low, high] of eight lines to a strip, as Strip does.
+[[gnu::always_inline]] inline void narrow(const Strip& strip, const Doubles& value, Doubles& low, Doubles& high) {
+    if (strip.everywhere_or_nowhere()) {
+        high = (value >= strip.least) & (value <= strip.most) ? high : Doubles{} - 1e300;
+        return;
+    }
+    const Doubles a = (strip.least - value) * strip.inverse, b = (strip.most - value) * strip.inverse;
+    const Doubles from = b < a ? b : a, to = a < b ? b : a;
+    low = low < from ? from : low, high = to < high ? to : high;
+}
+[[gnu::always_inline]] inline void narrow(const CrossedStrips& strips, const Doubles& py, Doubles& low, Doubles& high) {
+    narrow(strips.a, py * strips.a_rise, low, high);
+    narrow(strips.b, py * strips.b_rise, low, high);
+}
+
+// The whole numbers next to those of what an int holds.
+[[gnu::always_inline]] inline void whole(Doubles& v, bool up) {
+    const Doubles cut = __builtin_convertvector(__builtin_convertvector(v, Bits), Doubles);
+    const Doubles one = Doubles{} + 1.0;
+    v = up ? (cut < v ? cut + one : cut) : (cut > v ? cut - one : cut);
+}
+
+// The cells between low and high of eight rows, mm from fx; none where low > high.
+[[gnu::always_inline]] inline void cells_between(const CellGrid& grid, double fx, const Doubles& low, const Doubles& high, std::int32_t* first,
+                                                 std::int32_t* last) {
+    const double per_mm = 1 / grid.cell, beyond = grid.nx + 1.0, most = grid.nx - 1.0;
+    Doubles a = (low + fx - grid.x0) * per_mm, b = (high + fx - grid.x0) * per_mm;
+    a = a < -1.0 ? Doubles{} - 1.0 : a > beyond ? Doubles{} + beyond : a;
+    b = b < -1.0 ? Doubles{} - 1.0 : b > beyond ? Doubles{} + beyond : b;
+    whole(a, true), whole(b, false);
+    a = a > 0.0 ? a : Doubles{};
+    b = low <= high ? (b < most ? b : Doubles{} + most) : Doubles{} - 1.0;
+    const Bits i0 = __builtin_convertvector(a, Bits), i1 = __builtin_convertvector(b, Bits);
+    std::memcpy(first, &i0, sizeof i0), std::memcpy(last, &i1, sizeof i1);
+}
+
+}  // namespace
+
+SLABWRIGHT_WIDE void strips_of_rows(const CellGrid& grid, int first_row, int rows, const std::array<double, 2>& from, const CrossedStrips& strips,
+                                    double low, double high, const CrossedStrips* near, double radius, RowSpans& spans) {
+    constexpr Doubles lane{0, 1, 2, 3, 4, 5, 6, 7};
+    const double r2 = radius * radius;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rows); k += kLanes) {
+        const Doubles py = grid.y0 + (first_row + static_cast<double>(k) + lane) * grid.cell - from[1];
+        Doubles from_x = Doubles{} + low, to_x = Doubles{} + high;
+        narrow(strips, py, from_x, to_x);
+        cells_between(grid, from[0], from_x, to_x, spans.low.data() + k, spans.left.data() + k);
+        if (near == nullptr) {
+            for (std::size_t i = k; i < k + kLanes; ++i) spans.right[i] = 0, spans.high[i] = -1;
+            continue;
+        }
+        const Doubles w2 = r2 - py * py;
+        std::array<double, kLanes> w;
+        std::memcpy(w.data(), &w2, sizeof w2);
+        for (double& v : w) v = std::sqrt(v > 0 ? v : 0.0);
+        load(w.data(), to_x);
+        from_x = -to_x, to_x = w2 < 0.0 ? Doubles{} - 1e300 : to_x;
+        narrow(*near, py, from_x, to_x);
+        cells_between(grid, from[0], from_x, to_x, spans.right.data() + k, spans.high.data() + k);
+    }
+}
+
 float level_over(double bottom, double level) {
     const auto under = [&](float h) { return bottom + static_cast<double>(h) <= level; };
     constexpr float inf = std::numeric_limits<float>::infinity();
@@ -279,6 +343,14 @@ SLABWRIGHT_WIDE void lower_spans(float* height, std::size_t nx, int rows, const 
 SLABWRIGHT_WIDE void lower_to(float* __restrict height, int n, const double* __restrict h) {
     for (int k = 0; k < n; ++k) {
         const auto left = static_cast<float>(h[k] > 0 ? h[k] : 0.0);
+        height[k] = left < height[k] ? left : height[k];
+    }
+}
+
+SLABWRIGHT_WIDE void lower_to(float* __restrict height, int n, const double* __restrict h, double bottom) {
+    for (int k = 0; k < n; ++k) {
+        const double over = h[k] - bottom;
+        const auto left = static_cast<float>(over > 0 ? over : 0.0);
         height[k] = left < height[k] ? left : height[k];
     }
 }

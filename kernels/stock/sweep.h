@@ -97,6 +97,8 @@ bool row_heights(const RowWay& way, int i0, int n, double py, const float* stand
 /// Lowers n heights to max(0, z), or to max(0, h), where they are over it.
 void lower_to(float* height, int n, double z);
 void lower_to(float* height, int n, const double* h);
+/// The same to max(0, h − bottom).
+void lower_to(float* height, int n, const double* h, double bottom);
 
 /// The highest of heights in `rows` rows, n of each, that begin nx apart; 0 at least.
 [[nodiscard]] float highest_of(const float* height, std::size_t nx, int n, int rows);
@@ -182,24 +184,37 @@ struct StraightWay {
 inline constexpr int kSweptTogether = 64;  ///< cells of a row
 
 /// The places of a line at which a value that grows by `step` a mm lies within [least, most], a hair more.
-class Strip {
-public:
-    Strip(double step, double least, double most)
-        : inverse_(std::abs(step) < 1e-9 ? 0 : 1 / step), least_(least <= most ? least - kHair : kUncovered), most_(most + kHair) {}
+struct Strip {
+    static constexpr double kHair = 1e-7;
+    double inverse, least, most;  ///< inverse 0: the value is the same everywhere
+
+    Strip(double step, double least_value, double most_value)
+        : inverse(std::abs(step) < 1e-9 ? 0 : 1 / step),
+          least(least_value <= most_value ? least_value - kHair : kUncovered),
+          most(most_value + kHair) {}
+    /// Whether the line is within everywhere or nowhere.
+    [[nodiscard]] bool everywhere_or_nowhere() const { return inverse == 0 || least > most; }
     /// Narrows [low, high] to them, on a line whose value is `value` at 0; to nothing where there are none.
     void narrow(double value, double& low, double& high) const {
-        if (inverse_ == 0 || least_ > most_) {
-            if (!(value >= least_ && value <= most_)) high = -1e300;
+        if (everywhere_or_nowhere()) {
+            if (!(value >= least && value <= most)) high = -1e300;
             return;
         }
-        const double a = (least_ - value) * inverse_, b = (most_ - value) * inverse_;
+        const double a = (least - value) * inverse, b = (most - value) * inverse;
         low = std::max(low, std::min(a, b)), high = std::min(high, std::max(a, b));
     }
-
-private:
-    static constexpr double kHair = 1e-7;
-    double inverse_, least_, most_;
 };
+
+/// What lies in two strips at once, on lines along x beside a point: the strips' values at the point's x grow by a_rise and b_rise a mm of y.
+struct CrossedStrips {
+    Strip a, b;
+    double a_rise = 0, b_rise = 0;
+};
+/// The cells of some rows in crossed strips about `from`: between low and high, mm from there, as spans.low and spans.left; within a radius of it as
+/// spans.right and spans.high, or none there for a null.
+/// @param rows at most RowSpans::kRows, from first_row on
+void strips_of_rows(const CellGrid& grid, int first_row, int rows, const std::array<double, 2>& from, const CrossedStrips& strips, double low,
+                    double high, const CrossedStrips* near, double radius, RowSpans& spans);
 
 /// ⌈v⌉ and ⌊v⌋ of what an int holds.
 inline int ceiling(double v) {
@@ -311,106 +326,96 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
     const double per_mm = 1 / grid.cell, beyond = grid.nx + 1.0;
     auto first_cell = [&](double low) { return std::max(0, ceiling(std::clamp((low + from[0] - grid.x0) * per_mm, -1.0, beyond))); };
     auto last_cell = [&](double high) { return std::min(grid.nx - 1, floor_of(std::clamp((high + from[0] - grid.x0) * per_mm, -1.0, beyond))); };
-    const Strip along(dx, s0_least, s0_most), across(-dy, -R, R);
+    const CrossedStrips strips{{dx, s0_least, s0_most}, {-dy, -R, R}, dy, dx};
     const Strip along_within(dx, std::max(0.0, R * lead) + wide, run + std::min(0.0, R * lead) - wide), across_within(-dy, wide - R, R - wide);
     // Around the begin, where neither motion has its least within: beyond the end of the one before and before the begin of this.
     const double before_lead = end.form == Form::ball ? before.ball_lead : 0;
-    const Strip until_begin(dx, -2 * R, std::max(0.0, R * lead)), since_begin(before.dx, std::min(0.0, R * before_lead), 2 * R);
-    for (int j = j0; j <= j1; ++j) {
+    const CrossedStrips near_begin{{dx, -2 * R, std::max(0.0, R * lead)}, {before.dx, std::min(0.0, R * before_lead), 2 * R}, dy, before.dy};
+    const auto cells = [&](std::size_t row, int i0, int i1, auto&& each) {
+        for (int i = i0; i <= i1; ++i) each(row + static_cast<std::size_t>(i), grid.x(i) - from[0]);
+    };
+    const auto along_row = [&](int j, int i0, int i1) {
         const double py = grid.y(j) - from[1];
         const std::size_t row = grid.index(0, j);
-        auto cells = [&](int i0, int i1, auto&& each) {
-            for (int i = i0; i <= i1; ++i) each(row + static_cast<std::size_t>(i), grid.x(i) - from[0]);
+        auto one = [&](std::size_t cell, double px) {
+            const double stands = standing(cell);
+            if (stands <= lowest) return;
+            const double s0 = px * dx + py * dy, q2 = std::max(0.0, px * px + py * py - s0 * s0), w2 = R2 - q2;
+            if (w2 < 0) return;
+            const double w = std::sqrt(w2), s_low = std::max(0.0, s0 - w), s_high = std::min(run, s0 + w);
+            if (s_low > s_high) return;
+            double s = slope >= 0 ? s_low : s_high;
+            if (end.slope > std::abs(slope)) s = std::clamp(s0 - std::sqrt(q2) * cone_lead, s_low, s_high);
+            const double height = end.slope * std::sqrt(q2 + (s - s0) * (s - s0)) + (z + slope * s);
+            if (stands > height) fn(cell, height);
         };
-        {
+        auto together = [&](int left, int right) {
+            if (end.form == Form::cone) {
+                cells(row, left, right, one);
+                return;
+            }
+            constexpr int few = 4;  // not worth to be done together
+            if (right - left < few) {
+                cells(row, left, right, [&](std::size_t cell, double px) {
+                    const double stands = standing(cell);
+                    if (stands <= lowest) return;
+                    if (const double height = height_over(row_way, px, py); stands > height) fn(cell, height);
+                });
+                return;
+            }
+            std::array<double, kSweptTogether> h;
+            for (int k = left; k <= right; k += kSweptTogether) {
+                const int n = std::min(kSweptTogether, right + 1 - k);
+                const std::size_t first = row + static_cast<std::size_t>(k);
+                if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>) {
+                    if (row_heights(row_way, k, n, py, standing.height + first, standing.bottom, h.data())) take_row(fn, first, n, h.data(), lowest);
+                } else {
+                    if (!row_heights(row_way, k, n, py, nullptr, 0, h.data())) continue;
+                    for (int i = 0; i < n; ++i)
+                        if (const double z_cell = h[static_cast<std::size_t>(i)];
+                            z_cell < kUncovered && standing(first + static_cast<std::size_t>(i)) > z_cell)
+                            fn(first + static_cast<std::size_t>(i), z_cell);
+                }
+            }
+        };
+        int k0 = i1 + 1, k1 = i1;  // the cells whose least lies within the way for certain
+        if (rows) {
             double low = x_low - from[0], high = x_high - from[0];
-            along.narrow(py * dy, low, high);
-            across.narrow(py * dx, low, high);
-            auto one = [&](std::size_t cell, double px) {
-                const double stands = standing(cell);
-                if (stands <= lowest) return;
-                const double s0 = px * dx + py * dy, q2 = std::max(0.0, px * px + py * py - s0 * s0), w2 = R2 - q2;
-                if (w2 < 0) return;
-                const double w = std::sqrt(w2), s_low = std::max(0.0, s0 - w), s_high = std::min(run, s0 + w);
-                if (s_low > s_high) return;
-                double s = slope >= 0 ? s_low : s_high;
-                if (end.slope > std::abs(slope)) s = std::clamp(s0 - std::sqrt(q2) * cone_lead, s_low, s_high);
-                const double height = end.slope * std::sqrt(q2 + (s - s0) * (s - s0)) + (z + slope * s);
-                if (stands > height) fn(cell, height);
-            };
-            auto together = [&](int i0, int i1) {
-                if (end.form == Form::cone) {
-                    cells(i0, i1, one);
+            strips.a.narrow(py * dy, low, high);
+            strips.b.narrow(py * dx, low, high);
+            along_within.narrow(py * dy, low, high);
+            across_within.narrow(py * dx, low, high);
+            if (low <= high) k0 = std::clamp(first_cell(low), i0, i1 + 1), k1 = std::clamp(last_cell(high), k0 - 1, i1);
+        }
+        together(i0, k0 - 1);
+        for (int k = k0; k <= k1; k += kSweptTogether) {
+            const int n = std::min(kSweptTogether, k1 + 1 - k);
+            const std::size_t first = row + static_cast<std::size_t>(k);
+            std::array<double, kSweptTogether> h;
+            const auto rest_of_row = [&] {
+                if (end.form == Form::flat) {
+                    std::fill_n(h.begin(), n, lowest);
                     return;
                 }
-                constexpr int few = 4;  // not worth to be done together
-                if (i1 - i0 < few) {
-                    cells(i0, i1, [&](std::size_t cell, double px) {
-                        const double stands = standing(cell);
-                        if (stands <= lowest) return;
-                        if (const double height = height_over(row_way, px, py); stands > height) fn(cell, height);
-                    });
-                    return;
-                }
-                std::array<double, kSweptTogether> h;
-                for (int k = i0; k <= i1; k += kSweptTogether) {
-                    const int n = std::min(kSweptTogether, i1 + 1 - k);
-                    const std::size_t first = row + static_cast<std::size_t>(k);
-                    if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>) {
-                        if (row_heights(row_way, k, n, py, standing.height + first, standing.bottom, h.data()))
-                            take_row(fn, first, n, h.data(), lowest);
-                    } else {
-                        if (!row_heights(row_way, k, n, py, nullptr, 0, h.data())) continue;
-                        for (int i = 0; i < n; ++i)
-                            if (const double z_cell = h[static_cast<std::size_t>(i)];
-                                z_cell < kUncovered && standing(first + static_cast<std::size_t>(i)) > z_cell)
-                                fn(first + static_cast<std::size_t>(i), z_cell);
-                    }
-                }
+                const double px = grid.x(k) - from[0];
+                ball_row(z + R + slope * (px * dx + py * dy), slope * dx * grid.cell, steep, R2, py * dx - px * dy, -dy * grid.cell, n, h.data());
             };
-            if (low <= high) {
-                const int i0 = first_cell(low), i1 = last_cell(high);
-                int k0 = i1 + 1, k1 = i1;  // the cells whose least lies within the way for certain
-                if (rows) {
-                    along_within.narrow(py * dy, low, high);
-                    across_within.narrow(py * dx, low, high);
-                    if (low <= high) k0 = std::clamp(first_cell(low), i0, i1 + 1), k1 = std::clamp(last_cell(high), k0 - 1, i1);
-                }
-                together(i0, k0 - 1);
-                for (int k = k0; k <= k1; k += kSweptTogether) {
-                    const int n = std::min(kSweptTogether, k1 + 1 - k);
-                    const std::size_t first = row + static_cast<std::size_t>(k);
-                    std::array<double, kSweptTogether> h;
-                    const auto rest_of_row = [&] {
-                        if (end.form == Form::flat) {
-                            std::fill_n(h.begin(), n, lowest);
-                            return;
-                        }
-                        const double px = grid.x(k) - from[0];
-                        ball_row(z + R + slope * (px * dx + py * dy), slope * dx * grid.cell, steep, R2, py * dx - px * dy, -dy * grid.cell, n,
-                                 h.data());
-                    };
-                    if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>) {
-                        if (!any_over(standing.height + first, standing.bottom, n, lowest)) continue;
-                        rest_of_row();
-                        if (keep_lower(standing.height + first, standing.bottom, n, h.data())) take_row(fn, first, n, h.data(), lowest);
-                    } else {
-                        rest_of_row();
-                        for (int i = 0; i < n; ++i)
-                            if (const double z_cell = h[static_cast<std::size_t>(i)]; standing(first + static_cast<std::size_t>(i)) > z_cell)
-                                fn(first + static_cast<std::size_t>(i), z_cell);
-                    }
-                }
-                together(k1 + 1, i1);
+            if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>) {
+                if (!any_over(standing.height + first, standing.bottom, n, lowest)) continue;
+                rest_of_row();
+                if (keep_lower(standing.height + first, standing.bottom, n, h.data())) take_row(fn, first, n, h.data(), lowest);
+            } else {
+                rest_of_row();
+                for (int i = 0; i < n; ++i)
+                    if (const double z_cell = h[static_cast<std::size_t>(i)]; standing(first + static_cast<std::size_t>(i)) > z_cell)
+                        fn(first + static_cast<std::size_t>(i), z_cell);
             }
         }
-        if (!wedge || py * py > R2) continue;
-        const double w_row = std::sqrt(R2 - py * py);
-        double low = -w_row, high = w_row;
-        until_begin.narrow(py * dy, low, high);
-        since_begin.narrow(py * before.dy, low, high);
-        if (!(low <= high)) continue;
-        cells(first_cell(low), last_cell(high), [&](std::size_t cell, double px) {
+        together(k1 + 1, i1);
+    };
+    const auto round_begin = [&](int j, int i0, int i1) {
+        const double py = grid.y(j) - from[1];
+        cells(grid.index(0, j), i0, i1, [&](std::size_t cell, double px) {
             const double stands = standing(cell);
             if (stands <= from[2]) return;
             const double d2 = px * px + py * py;
@@ -423,6 +428,23 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
             const double height = end.form == Form::ball ? from[2] + R - std::sqrt(R2 - d2) : from[2];
             if (stands > height) fn(cell, height);
         });
+    };
+    // Most rows hold nothing as high as the way's lowest place; of several at once that is soon known.
+    RowSpans spans;
+    float level = 0;
+    if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>) level = level_over(standing.bottom, lowest);
+    for (int j = j0; j <= j1; j += RowSpans::kRows) {
+        const int count = std::min(RowSpans::kRows, j1 - j + 1);
+        strips_of_rows(grid, j, count, {from[0], from[1]}, strips, x_low - from[0], x_high - from[0], wedge ? &near_begin : nullptr, R, spans);
+        OverSpans over{~std::uint64_t{0}, ~std::uint64_t{0}};
+        if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>)
+            over = spans_over(standing.height + grid.index(0, j), static_cast<std::size_t>(grid.nx), count, spans, level);
+        else if (count < RowSpans::kRows) over.left = over.right = (std::uint64_t{1} << count) - 1;
+        for (std::uint64_t left = over.left | over.right; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::size_t>(std::countr_zero(left));
+            if ((over.left >> k & 1) != 0) along_row(j + static_cast<int>(k), spans.low[k], spans.left[k]);
+            if ((over.right >> k & 1) != 0) round_begin(j + static_cast<int>(k), spans.right[k], spans.high[k]);
+        }
     }
 }
 
