@@ -19,23 +19,12 @@ constexpr double kSurely = 1e-5;    // mm: less than this is not said of what a 
 
 struct Best {
     double tip_z = -std::numeric_limits<double>::infinity();
-    double nx = 0, ny = 0, nz = 0;  // of a ball
-    double x = 0, y = 0;            // where a flat cutter touches
-    void offer(double z, double up, double east, double north) {
-        if (z > tip_z) {
-            tip_z = z;
-            nx = east;
-            ny = north;
-            nz = up;
-        }
-    }
-    void offer_flat(double z, double up, double at_x, double at_y) {
-        if (z > tip_z) {
-            tip_z = z;
-            nz = up;
-            x = at_x;
-            y = at_y;
-        }
+    double nz = 0;
+    double x = 0, y = 0;  // of the normal for a ball, of the contact for a flat cutter
+    void offer(double z, double up, double to_x, double to_y) {
+        if (!(z > tip_z)) return;
+        tip_z = z, nz = up;
+        x = to_x, y = to_y;
     }
 };
 
@@ -105,20 +94,20 @@ void drop_flat(const SolidFacet& f, double r, double x, double y, Best& best) {
         const double slope = std::sqrt(n[0] * n[0] + n[1] * n[1]), up = n[2] > 0 ? -1.0 : 1.0;
         const double px = slope > 1e-12 ? x + up * r * n[0] / slope : x, py = slope > 1e-12 ? y + up * r * n[1] / slope : y;
         const double z = f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2];
-        if (z > best.tip_z && in_triangle(px, py)) best.offer_flat(z, f.nz, px, py);
+        if (z > best.tip_z && in_triangle(px, py)) best.offer(z, f.nz, px, py);
     }
     for (int k = 0; k < 3; ++k) {
         const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
         if (a[2] <= best.tip_z && b[2] <= best.tip_z) continue;
         const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy, wx = a[0] - x, wy = a[1] - y;
-        if (wx * wx + wy * wy < r * r) best.offer_flat(a[2], f.nz, a[0], a[1]);
+        if (wx * wx + wy * wy < r * r) best.offer(a[2], f.nz, a[0], a[1]);
         if (l2 < 1e-18) continue;
         // Where the edge crosses the disc's rim.
         const double half = dx * wx + dy * wy, discriminant = half * half - l2 * (wx * wx + wy * wy - r * r);
         if (discriminant <= 0) continue;
         const double root = std::sqrt(discriminant);
         for (const double t : {(-half - root) / l2, (-half + root) / l2})
-            if (t >= 0 && t <= 1) best.offer_flat(a[2] + t * (b[2] - a[2]), f.nz, a[0] + t * dx, a[1] + t * dy);
+            if (t >= 0 && t <= 1) best.offer(a[2] + t * (b[2] - a[2]), f.nz, a[0] + t * dx, a[1] + t * dy);
     }
 }
 
@@ -194,7 +183,7 @@ void search(const LayerSolid& solid, const DropProbe& probe, const Cutter& cutte
     };
     if (!(kept_up > above && found_over(kept_up)) && !found_over(above)) return;
     if (met == nullptr) return;
-    if (ball) met->add({x - r * best.nx, y - r * best.ny, best.tip_z + r * (1 - best.nz)});
+    if (ball) met->add({x - r * best.x, y - r * best.y, best.tip_z + r * (1 - best.nz)});
     else met->add({best.x, best.y, best.tip_z});
 }
 
@@ -247,7 +236,7 @@ std::optional<Rest> DropIndex::drop_within(double x, double y, double above, dou
         search(solid_, probe_at(x, y), cutter_, x, y, most, kept_up, best, met);
         if (best.tip_z > above) {
             const bool ball = cutter_.profile == Cutter::Profile::ball;
-            rest = {best.tip_z, ball ? static_cast<float>(best.nx) : 0.0F, ball ? static_cast<float>(best.ny) : 0.0F, static_cast<float>(best.nz),
+            rest = {best.tip_z, ball ? static_cast<float>(best.x) : 0.0F, ball ? static_cast<float>(best.y) : 0.0F, static_cast<float>(best.nz),
                     false};
         }
     }

@@ -171,7 +171,7 @@ public:
         else meet_disc(groups);
     }
 
-    // Whether all ends are found where a ball can touch the solid from outside.
+    // Whether all ends are found where the cutter can touch the solid from outside.
     [[nodiscard]] bool by_touch() const { return !solid_.part && !solid_.corners.empty(); }
 
     // What a ball can touch without being in the solid, on the lines where it can: there every end of what is forbidden is found.
@@ -249,13 +249,9 @@ public:
             const double off_u = (u - cut[0][U] - s * du) / r_ - f.normal[U] / across, off_v = (v - cut[0][V] - s * dv) / r_ - f.normal[V] / across;
             return off_u * off_u + off_v * off_v > turn * turn;
         };
-        const LineRange steps = in_steps(lines);
-        const int skip = steps.first, n = steps.last - steps.first;
-        double *const low = hulls_.low.data() + skip, *const high = hulls_.high.data() + skip;
-        std::fill(low, low + n, kInfinity);
-        std::fill(high, high + n, -kInfinity);
-        capsule_rows(capsule<U, V>(cut[0], cut[1], r_, zc_, f.nz), at_.data() + skip, n, low, high, hulls_.nz_low.data() + skip,
-                     hulls_.nz_high.data() + skip);
+        lay(lines, [&](const double* v, int n, double* low, double* high, double* nz_low, double* nz_high) {
+            capsule_rows(capsule<U, V>(cut[0], cut[1], r_, zc_, f.nz), v, n, low, high, nz_low, nz_high);
+        });
         for (int l = lines.first; l < lines.last; ++l) {
             if (!(hulls_.low[l] < hulls_.high[l])) continue;
             Forbidden h = found(l);
@@ -285,15 +281,21 @@ public:
         }
     }
 
-    // Adds what a face or an edge forbids on some lines.
+    // Makes hulls_ that of what rows(v, n, low, high, nz_low, nz_high) adds on some lines. @returns the steps that hold these
     template <class Rows>
-    void meet_part(LineRange lines, Rows&& rows) {
+    LineRange lay(LineRange lines, Rows&& rows) {
         const LineRange steps = in_steps(lines);
         const int skip = steps.first, n = steps.last - steps.first;
         double *const low = hulls_.low.data() + skip, *const high = hulls_.high.data() + skip;
         std::fill(low, low + n, kInfinity);
         std::fill(high, high + n, -kInfinity);
         rows(at_.data() + skip, n, low, high, hulls_.nz_low.data() + skip, hulls_.nz_high.data() + skip);
+        return steps;
+    }
+    // Adds what a face or an edge forbids on some lines.
+    template <class Rows>
+    void meet_part(LineRange lines, Rows&& rows) {
+        lay(lines, rows);
         for (int l = lines.first; l < lines.last; ++l)
             if (hulls_.low[l] < hulls_.high[l] && !(cover_.low[l] <= hulls_.low[l] && hulls_.high[l] <= cover_.high[l])) forbid(l, found(l));
     }
@@ -352,7 +354,7 @@ public:
         }
     }
 
-    // One facet of each group shows about where others forbid nothing more.
+    // For a disc where not all of the solid is there: one facet of each group shows about where others forbid nothing more.
     void meet_disc(std::span<const std::uint32_t> groups) {
         constexpr std::uint32_t none = UINT32_MAX;  // the group reaches out of nothing
         cover();
@@ -618,20 +620,14 @@ private:
 
     void meet_facet(const SolidFacet& f, LineRange lines) {
         if (!lines.any()) return;
-        const LineRange steps = in_steps(lines);
-        const int skip = steps.first, n = steps.last - steps.first;
-        double *const low = hulls_.low.data() + skip, *const high = hulls_.high.data() + skip;
-        double *const nz_low = hulls_.nz_low.data() + skip, *const nz_high = hulls_.nz_high.data() + skip;
-        std::fill(low, low + n, kInfinity);
-        std::fill(high, high + n, -kInfinity);
-        auto meet_prism = [&](const PrismTerms& p) { prism_rows(p, at_.data() + skip, n, low, high, nz_low, nz_high); };
-        auto meet_capsule = [&](const CapsuleTerms& c) { capsule_rows(c, at_.data() + skip, n, low, high, nz_low, nz_high); };
-        if (ball_ && f.z_max > zc_ - r_ && f.z_min <= zc_) {
-            if (f.normal != Vec3d{0, 0, 0}) meet_prism(prism<U, V>(f, r_, zc_));
-            for (int k = 0; k < 3; ++k)
-                if (f.edges >> k & 1) meet_capsule(capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r_, zc_));
-        }
-        if (f.z_max > zc_) {
+        const LineRange steps = lay(lines, [&](const double* v, int n, double* low, double* high, double* nz_low, double* nz_high) {
+            auto meet_capsule = [&](const CapsuleTerms& c) { capsule_rows(c, v, n, low, high, nz_low, nz_high); };
+            if (ball_ && f.z_max > zc_ - r_ && f.z_min <= zc_) {
+                if (f.normal != Vec3d{0, 0, 0}) prism_rows(prism<U, V>(f, r_, zc_), v, n, low, high, nz_low, nz_high);
+                for (int k = 0; k < 3; ++k)
+                    if (f.edges >> k & 1) meet_capsule(capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r_, zc_));
+            }
+            if (f.z_max <= zc_) return;
             if (f.nz < 0) {
                 std::array<Vec3d, 4> polygon;
                 const int corners = part_above(f, zc_, polygon);
@@ -640,7 +636,7 @@ private:
                 std::array<Vec3d, 2> cut;
                 if (cut_segment(f, zc_, cut)) meet_capsule(capsule<U, V>(cut[0], cut[1], r_, zc_, f.nz));
             }
-        }
+        });
         if (!ball_ && !amid_gaps_) {
             for (int l = lines.first; l < lines.last; ++l)
                 if (hulls_.low[l] < hulls_.high[l]) append(found_[l], found(l));

@@ -288,8 +288,7 @@ void lay_disc(std::span<const SolidFacet> facets, FacetGroup& group) {
     group.thickness = static_cast<float>(thickness + rounding);
 }
 
-}  // namespace
-
+// What SolidFacet::turn says of all of a facet's corners.
 Facing facing_of(const SolidFacet& facet) {
     constexpr Facing any{{-1, -1, -1}, {1, 1, 1}};
     const std::uint8_t most_turn = *std::max_element(facet.turn.begin(), facet.turn.end());
@@ -310,6 +309,8 @@ Facing facing_of(const SolidFacet& facet) {
         facing.low[k] = static_cast<float>(std::max(-1.0, low[k]) - rounding), facing.high[k] = static_cast<float>(std::min(1.0, high[k]) + rounding);
     return facing;
 }
+
+}  // namespace
 
 std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets) {
     constexpr float inf = std::numeric_limits<float>::infinity();

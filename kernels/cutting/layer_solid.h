@@ -39,7 +39,6 @@ struct SolidFacet {
 struct Facing {
     std::array<float, 3> low, high;
 };
-[[nodiscard]] Facing facing_of(const SolidFacet& facet);
 
 /// What FacetGroup::kFacets facets that follow one another have in common, mm, rounded outward.
 struct FacetGroup {

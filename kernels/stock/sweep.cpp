@@ -340,13 +340,6 @@ SLABWRIGHT_WIDE void lower_spans(float* height, std::size_t nx, int rows, const 
     }
 }
 
-SLABWRIGHT_WIDE void lower_to(float* __restrict height, int n, const double* __restrict h) {
-    for (int k = 0; k < n; ++k) {
-        const auto left = static_cast<float>(h[k] > 0 ? h[k] : 0.0);
-        height[k] = left < height[k] ? left : height[k];
-    }
-}
-
 SLABWRIGHT_WIDE void lower_to(float* __restrict height, int n, const double* __restrict h, double bottom) {
     for (int k = 0; k < n; ++k) {
         const double over = h[k] - bottom;

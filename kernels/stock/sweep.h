@@ -94,11 +94,9 @@ inline double height_over(const RowWay& way, double px, double py) {
 /// cell is not asked, or `stands` (unless null) over `bottom` is not higher. h has room for whole eights of cells. @returns whether any is finite
 bool row_heights(const RowWay& way, int i0, int n, double py, const float* stands, double bottom, double* h);
 
-/// Lowers n heights to max(0, z), or to max(0, h), where they are over it.
+/// Lowers n heights to max(0, z), or to max(0, h − bottom), where they are over it.
 void lower_to(float* height, int n, double z);
-void lower_to(float* height, int n, const double* h);
-/// The same to max(0, h − bottom).
-void lower_to(float* height, int n, const double* h, double bottom);
+void lower_to(float* height, int n, const double* h, double bottom = 0);
 
 /// The highest of heights in `rows` rows, n of each, that begin nx apart; 0 at least.
 [[nodiscard]] float highest_of(const float* height, std::size_t nx, int n, int rows);
