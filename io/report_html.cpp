@@ -658,10 +658,12 @@ std::string report_html(Context& context, const std::string& directory, const Re
     }
     figures.data["left_over"] = {{"layers", figures.replay}};
     context.begin_phase("report's model and paths", replayed, 1.0, 3);
-    Json model = model_json(context, mesh, std::move(decimated), *pattern->part, folder);
-    context.advance();
-    Json paths = paths_json(context, figures.drawn, folder, points);
-    context.advance();
+    Json model, paths;
+    parallel_each(context, 2, [&](std::size_t i) {
+        if (i > 0) paths = paths_json(context, figures.drawn, folder, points);
+        else model = model_json(context, mesh, std::move(decimated), *pattern->part, folder);
+        context.advance();
+    });
     for (;;) {
         figures.data["model"] = model;
         figures.data["paths"] = paths;
