@@ -22,6 +22,7 @@
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
 #include "kernels/forces/hardest.h"
+#include "kernels/parallel/spares.h"
 
 namespace slabwright {
 
@@ -113,6 +114,26 @@ struct FeedStep {
     const Bent* bent = nullptr;
 };
 
+/// A stretch of an operation's way, as far as its feed and its forces depend on it.
+struct Seen {
+    CutClass coarse, fine;
+    std::uint32_t first = 0, last = 0;
+    bool cuts = false;
+    float depth = 0;               ///< over the tip, mm
+    float height = 0;              ///< of the cut's middle above the joint, mm
+    float wood = 0, overhang = 0;  ///< what carries the cut, and how far from what carries it; 0 where nothing hangs over
+    std::array<float, 3> at{};
+    std::uint32_t feed = 0;      ///< that was chosen for it; 0: none yet
+    const Bent* bent = nullptr;  ///< what it bears at that feed, of its coarse class; null where nothing is cut
+    double wood_load = 0;        ///< and the wood, as a share of what there is
+    [[nodiscard]] std::array<double, 3> place() const { return {at[0], at[1], at[2]}; }
+};
+
+/// What a layer's stretches are kept in while they are looked at, of any content.
+struct SeenMemory {
+    std::vector<Seen> seen, anew, all;
+};
+
 }  // namespace
 
 struct KnownCuts::Impl {
@@ -125,6 +146,7 @@ struct KnownCuts::Impl {
     };
     std::shared_mutex mutex;
     std::map<Of, ByClassAndFeed<Bent>> known;
+    Spares<SeenMemory> memory;  // which layers leave to each other: to fill it is little against what new memory of that size costs
 
     std::optional<Bent> find(const Of& of, const ClassAndFeed& key) {
         const std::shared_lock lock(mutex);
@@ -233,21 +255,6 @@ void set_feeds(Context& context, Operation& op, std::vector<std::uint32_t> wante
     for (std::size_t k = 1; k < n; ++k)
         if (level[k]) op.moves[k].feed = wanted[k];
 }
-
-/// A stretch of an operation's way, as far as its feed and its forces depend on it.
-struct Seen {
-    CutClass coarse, fine;
-    std::uint32_t first = 0, last = 0;
-    bool cuts = false;
-    float depth = 0;               ///< over the tip, mm
-    float height = 0;              ///< of the cut's middle above the joint, mm
-    float wood = 0, overhang = 0;  ///< what carries the cut, and how far from what carries it; 0 where nothing hangs over
-    std::array<float, 3> at{};
-    std::uint32_t feed = 0;      ///< that was chosen for it; 0: none yet
-    const Bent* bent = nullptr;  ///< what it bears at that feed, of its coarse class; null where nothing is cut
-    double wood_load = 0;        ///< and the wood, as a share of what there is
-    [[nodiscard]] std::array<double, 3> place() const { return {at[0], at[1], at[2]}; }
-};
 
 /// @param seen  gets all stretches
 /// @param parts only these moves; none: all
@@ -408,7 +415,8 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
     LayerCuts result;
     // What one operation leaves to the next, for its memory only.
     StandingSlab before = slab, again = slab;
-    std::vector<Seen> seen, anew, all;
+    const Lent<SeenMemory> lent(known_cuts != nullptr ? &known_cuts->impl().memory : nullptr);
+    auto& [seen, anew, all] = *lent;
     for (Operation& op : layer.operations) {
         context.throw_if_cancelled();
         op.peak_force_n = op.deflection_mm = op.wall_error_mm = 0;

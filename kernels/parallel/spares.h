@@ -35,4 +35,22 @@ private:
     std::vector<std::unique_ptr<T>> spare_;
 };
 
+/// One that is lent while this lives; without spares, one of its own.
+template <class T>
+class Lent {
+public:
+    explicit Lent(Spares<T>* spares)
+        : spares_(spares), one_(spares != nullptr ? spares->take([] { return std::make_unique<T>(); }) : std::make_unique<T>()) {}
+    ~Lent() {
+        if (spares_ != nullptr) spares_->give(std::move(one_));
+    }
+    Lent(const Lent&) = delete;
+    Lent& operator=(const Lent&) = delete;
+    [[nodiscard]] T& operator*() const { return *one_; }
+
+private:
+    Spares<T>* spares_;
+    std::unique_ptr<T> one_;
+};
+
 }  // namespace slabwright
