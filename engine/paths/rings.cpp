@@ -336,6 +336,53 @@ Loops useful_area(const LayerCut& cut, double r, const std::array<double, 4>& st
                      rectangle(cut.low(0, far), cut.low(1, far), cut.high(0, far), cut.high(1, far)));
 }
 
+// Loops, none of which crosses another, told by whether a convex region of one loop holds them for certain.
+struct ToldLoops {
+    Loops within, others;
+    ToldLoops(const Loops& convex, const Loops& loops) {
+        const std::vector<std::array<std::int32_t, 4>> boxes = boxes_of(loops);
+        for (std::size_t l = 0; l < loops.size(); ++l) {
+            Loops& to = convex.size() == 1 && holds(convex, boxes[l]) ? within : others;
+            to.points.insert(to.points.end(), loops.loop(l).begin(), loops.loop(l).end());
+            to.close_loop();
+        }
+    }
+
+private:
+    // Whether all corners of a box lie on the left of all edges.
+    static bool holds(const Loops& convex, const std::array<std::int32_t, 4>& box) {
+        for (std::size_t k = 0; k < convex.points.size(); ++k) {
+            const Point2 a = convex.points[k], b = convex.points[k + 1 < convex.points.size() ? k + 1 : 0];
+            const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y;
+            for (const std::int32_t x : {box[0], box[2]})
+                for (const std::int32_t y : {box[1], box[3]})
+                    if (dx * (static_cast<double>(y) - a.y) - dy * (static_cast<double>(x) - a.x) <= 0) return false;
+        }
+        return true;
+    }
+};
+
+// Loops followed by others, which may be turned over.
+Loops joined(Loops loops, const Loops& others, bool turned) {
+    for (std::size_t l = 0; l < others.size(); ++l) {
+        const std::span<const Point2> loop = others.loop(l);
+        if (turned) loops.points.insert(loops.points.end(), loop.rbegin(), loop.rend());
+        else loops.points.insert(loops.points.end(), loop.begin(), loop.end());
+        loops.close_loop();
+    }
+    return loops;
+}
+
+// What of disjoint loops lies in a convex region, and what of that region beside them. What the region holds need not be clipped: nearly all.
+Loops inside_convex(const Loops& convex, const Loops& loops) {
+    const ToldLoops told(convex, loops);
+    return joined(told.others.empty() ? Loops{} : intersect(convex, told.others), told.within, false);
+}
+Loops beside_in_convex(const Loops& convex, const Loops& loops) {
+    const ToldLoops told(convex, loops);
+    return joined(told.others.empty() ? convex : subtract(convex, told.others), told.within, true);
+}
+
 // How rings that meet nothing but waste are thinned: chords that leave a curve by no more than the machine may are run as fast as the curve.
 struct Thinning {
     double fine = 0, loose = 0, turn = 0;  // mm, mm, radians
@@ -360,7 +407,7 @@ bool near_line(const PathPoint& p, std::span<const PathPoint> line, double reach
 // Rectangles from `stands` (smallest x and y, largest x and y, mm) inwards, with the stock on their right, as far as they lie outside of the
 // rings next to the forbidden region. False, and none, where these would cut them to pieces.
 bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, const Loops& forbidden, const Loops& useful) {
-    const Loops outside = subtract(useful, offset_outline(forbidden, kRingsBesideStrips * plan.step, kFineRing));
+    const Loops outside = beside_in_convex(useful, offset_outline(forbidden, kRingsBesideStrips * plan.step, kFineRing));
     Loops around;
     const double narrow = std::min(stands[2] - stands[0], stands[3] - stands[1]);
     for (int k = 1; 2 * (k - 1) * plan.step < narrow; ++k) {
@@ -518,7 +565,7 @@ RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbid
     plan.z = to_units(tip_z);
     const Loops useful = useful_area(cut, r, {cut.layer.stock_min[0], cut.layer.stock_min[1], cut.layer.stock_max[0], cut.layer.stock_max[1]});
     const Thinning thinning(cut, tool, blend);
-    append_rings(plan, cut, thinning, forbidden, {intersect(useful, border_over), intersect(useful, over), kShortestTerrace}, SIZE_MAX);
+    append_rings(plan, cut, thinning, forbidden, {inside_convex(useful, border_over), inside_convex(useful, over), kShortestTerrace}, SIZE_MAX);
     return plan;
 }
 
