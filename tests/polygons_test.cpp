@@ -11,6 +11,7 @@
 #include <random>
 
 #include "kernels/errors.h"
+#include "kernels/polygons/farthest.h"
 #include "kernels/polygons/loops.h"
 #include "kernels/polygons/runs_inside.h"
 
@@ -54,6 +55,33 @@ double distance_to_boundary(const Loops& loops, Point2 p) {
         for (std::size_t k = 0; k < loop.size(); ++k) best = std::min(best, distance_to_segment(p.x, p.y, loop[k], loop[(k + 1) % loop.size()]));
     }
     return best;
+}
+
+// Of several that are as far the first, in lines of any length; of a segment that is a point as well.
+TEST(Farthest, IsThatOfOnePointAfterAnother) {
+    std::mt19937_64 random(seed_of("farthest"));
+    for (int trial = 0; trial < 2000; ++trial) {
+        const std::size_t n = 2 + random() % 70;
+        const int range = trial % 3 == 0 ? 3 : 2000000;
+        PointRows points;
+        for (std::size_t i = 0; i < n; ++i)
+            for (std::vector<double>* row : {&points.x, &points.y, &points.z})
+                row->push_back(static_cast<double>(static_cast<int>(random() % static_cast<unsigned>(2 * range + 1)) - range));
+        const std::size_t first = random() % (n - 1), last = first + 1 + random() % (n - 1 - first);
+        if (trial % 5 == 0) points.x[last] = points.x[first], points.y[last] = points.y[first], points.z[last] = points.z[first];
+        Farthest expected{-1, first};
+        const double ax = points.x[first], ay = points.y[first], az = points.z[first];
+        const double dx = points.x[last] - ax, dy = points.y[last] - ay, dz = points.z[last] - az, l2 = dx * dx + dy * dy + dz * dz;
+        for (std::size_t i = first + 1; i < last; ++i) {
+            const double wx = points.x[i] - ax, wy = points.y[i] - ay, wz = points.z[i] - az;
+            const double t = l2 > 0 ? std::clamp((wx * dx + wy * dy + wz * dz) / l2, 0.0, 1.0) : 0.0;
+            const double ex = wx - t * dx, ey = wy - t * dy, ez = wz - t * dz, d2 = ex * ex + ey * ey + ez * ez;
+            if (d2 > expected.distance2) expected = {d2, i};
+        }
+        const Farthest found = farthest_between(points, first, last);
+        EXPECT_EQ(found.distance2, expected.distance2) << "trial " << trial;
+        EXPECT_EQ(found.at, expected.at) << "trial " << trial;
+    }
 }
 
 TEST(Polygons, AreaAndWindingOfKnownShapes) {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "engine/schedule/motion_time.h"
+#include "kernels/polygons/farthest.h"
 
 namespace slabwright {
 
@@ -328,29 +329,20 @@ namespace {
 std::vector<char> kept_within(std::span<const PathPoint> line, double tolerance) {
     std::vector<char> keep(line.size(), 0);
     keep.front() = keep.back() = 1;
+    PointRows rows;
+    for (std::vector<double>* row : {&rows.x, &rows.y, &rows.z}) row->reserve(line.size());
+    for (const PathPoint& p : line) rows.x.push_back(p.x), rows.y.push_back(p.y), rows.z.push_back(p.z);
     std::vector<std::pair<std::size_t, std::size_t>> open{{0, line.size() - 1}};
     const double tolerance2 = tolerance * tolerance;
     while (!open.empty()) {
         const auto [first, last] = open.back();
         open.pop_back();
         if (last - first < 2) continue;
-        const double ax = line[first].x, ay = line[first].y, az = line[first].z;
-        const double dx = line[last].x - ax, dy = line[last].y - ay, dz = line[last].z - az, l2 = dx * dx + dy * dy + dz * dz;
-        double worst = -1;
-        std::size_t at = first;
-        for (std::size_t i = first + 1; i < last; ++i) {
-            const double wx = line[i].x - ax, wy = line[i].y - ay, wz = line[i].z - az;
-            const double t = l2 > 0 ? std::clamp((wx * dx + wy * dy + wz * dz) / l2, 0.0, 1.0) : 0.0;
-            const double ex = wx - t * dx, ey = wy - t * dy, ez = wz - t * dz, d2 = ex * ex + ey * ey + ez * ez;
-            if (d2 > worst) {
-                worst = d2;
-                at = i;
-            }
-        }
-        if (worst <= tolerance2) continue;
-        keep[at] = 1;
-        open.push_back({first, at});
-        open.push_back({at, last});
+        const Farthest farthest = farthest_between(rows, first, last);
+        if (farthest.distance2 <= tolerance2) continue;
+        keep[farthest.at] = 1;
+        open.push_back({first, farthest.at});
+        open.push_back({farthest.at, last});
     }
     return keep;
 }
