@@ -1,9 +1,11 @@
 // The bound of what stands against the exact stock, and what it knows about ways that were cut.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "engine/paths/standing.h"
 #include "kernels/stock/stock.h"
@@ -62,6 +64,37 @@ TEST(Standing, IsNeverBelowTheExactStockAnywhere) {
             sweep(grid, {CutterEnd::Form::flat, r, 0}, {a[0], a[1], 0}, {b[0], b[1], 0},
                   [&](std::size_t c, double) { ASSERT_GE(top, stock.top(c)) << "trial " << trial; });
         }
+    }
+}
+
+// What a chain of level ways leaves out, because the way before has been there, makes no difference.
+TEST(Standing, StandsAsAfterTheSameWaysInAnyOrder) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> place(-5, 65), step(-9, 9);
+    for (int trial = 0; trial < 20; ++trial) {
+        const std::array<double, 2> min{0, 0}, max{60, 50};
+        const Cutter flat{Cutter::Profile::flat, trial % 2 == 0 ? 5.0 : 6.35}, other{Cutter::Profile::flat, 3};
+        struct Way {
+            Cutter cutter;
+            std::array<double, 3> from, to;
+        };
+        std::vector<Way> ways;
+        std::array<double, 3> at{place(random), place(random), 15};
+        for (int k = 0; k < 60; ++k) {
+            std::array<double, 3> to{at[0] + step(random), at[1] + step(random), at[2]};
+            if (k % 7 == 3) to[2] -= 0.5;                             // down a ramp
+            if (k % 11 == 5) to = {at[0], at[1], at[2]};              // nowhere
+            if (k % 13 == 6) at = {place(random), place(random), 9};  // from elsewhere
+            ways.push_back({k % 17 == 9 ? other : flat, at, to});
+            at = to;
+        }
+        Standing chained(min, max, kTop), shuffled(min, max, kTop);
+        for (const Way& w : ways) chained.cut(w.cutter, w.from, w.to);
+        std::shuffle(ways.begin(), ways.end(), random);
+        for (const Way& w : ways) shuffled.cut(w.cutter, w.from, w.to);
+        for (double y = 0.1; y < 50; y += 0.5)
+            for (double x = 0.1; x < 60; x += 0.5)
+                ASSERT_EQ(cell_bound(chained, x, y), cell_bound(shuffled, x, y)) << "trial " << trial << " at " << x << ' ' << y;
     }
 }
 

@@ -168,8 +168,10 @@ TEST(Sweep, SpansAgreeWithTheirCells) {
         for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k)
             some_span(spans.low[k], spans.left[k]), some_span(spans.right[k], spans.high[k]);
         const OverSpans over = spans_over(heights.data(), static_cast<std::size_t>(nx), rows, spans, level);
-        std::vector<float> lowered = heights, expected = heights;
+        std::vector<float> lowered = heights, expected = heights, deep = heights, expected_deep = heights;
         lower_spans(lowered.data(), static_cast<std::size_t>(nx), rows, spans, level_z);
+        const auto under = static_cast<float>(2 * u(random) - 1);  // of a level itself, under 0 too
+        lower_spans(deep.data(), static_cast<std::size_t>(nx), rows, spans, under);
         for (int k = 0; k < rows; ++k) {
             const auto row = static_cast<std::size_t>(k);
             const auto any = [&](std::int32_t first, std::int32_t last) {
@@ -178,12 +180,14 @@ TEST(Sweep, SpansAgreeWithTheirCells) {
                     const std::size_t c = row * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i);
                     found = found || bottom + static_cast<double>(heights[c]) > level_z;
                     expected[c] = std::min(expected[c], static_cast<float>(std::max(0.0, level_z)));
+                    expected_deep[c] = std::min(expected_deep[c], under);
                 }
                 return found;
             };
             EXPECT_EQ((over.left >> row & 1) != 0, any(spans.low[row], spans.left[row])) << "trial " << trial << " row " << k;
             EXPECT_EQ((over.right >> row & 1) != 0, any(spans.right[row], spans.high[row])) << "trial " << trial << " row " << k;
         }
+        EXPECT_EQ(deep, expected_deep) << "trial " << trial;
         EXPECT_EQ(lowered, expected) << "trial " << trial;
     }
     EXPECT_EQ(level_over(1e300, 5), -std::numeric_limits<float>::infinity());

@@ -13,9 +13,9 @@ namespace slabwright {
 
 namespace {
 
-constexpr int kBand = KeptTiles::kTile;  // rows of cells that one task cuts
-constexpr std::size_t kBlock = 128;      // moves that share one box
-constexpr std::size_t kPart = 16;        // of those
+constexpr int kBand = 2 * KeptTiles::kTile;  // rows of cells that one task cuts
+constexpr std::size_t kBlock = 128;          // moves that share one box
+constexpr std::size_t kPart = 16;            // of those
 
 struct Box {
     double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300, z0 = 1e300;
@@ -47,15 +47,15 @@ public:
         : height_(height),
           band_(band),
           nx_((band.nx + kTile - 1) / kTile),
-          tops_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>((band.ny + kTile - 1) / kTile)),
+          tops_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>((band.ny + kTile - 1) / kTile), std::numeric_limits<float>::infinity()),
           cuts_(tops_.size(), kStale) {}
 
-    // Whether anything may stand over a level within a rectangle, mm, of the band; if so it counts as cut. `first` and `last` get the columns of
-    // its cells.
-    [[nodiscard]] bool cut_over(double x0, double x1, double y0, double y1, double level, int& first, int& last) {
+    // Whether anything may stand over a level within a rectangle, mm, of the band; if so it counts as cut. `cells` gets the columns and
+    // the rows of its cells.
+    [[nodiscard]] bool cut_over(double x0, double x1, double y0, double y1, double level, std::array<int, 4>& cells) {
         const int i0 = tile((x0 - band_.x0) / band_.cell, band_.nx), i1 = tile((x1 - band_.x0) / band_.cell, band_.nx);
         const int j0 = tile((y0 - band_.y0) / band_.cell, band_.ny), j1 = tile((y1 - band_.y0) / band_.cell, band_.ny);
-        first = i0 * kTile, last = std::min((i1 + 1) * kTile, band_.nx) - 1;
+        cells = {i0 * kTile, std::min((i1 + 1) * kTile, band_.nx) - 1, j0 * kTile, std::min((j1 + 1) * kTile, band_.ny) - 1};
         const bool over = any_over(i0, i1, j0, j1, level);
         for (int j = j0; j <= j1 && over; ++j)
             for (int i = i0; i <= i1; ++i) {
@@ -75,9 +75,15 @@ private:
     static constexpr std::uint8_t kStale = 4;
 
     [[nodiscard]] bool any_over(int i0, int i1, int j0, int j1, double level) {
-        for (int j = j0; j <= j1; ++j)
-            for (int i = i0; i <= i1; ++i)
-                if (stands_over(i, j, level)) return true;
+        const float most = std::max(0.0F, static_cast<float>(level));  // no height that is lowered to it gets under this
+        for (int j = j0; j <= j1; ++j) {
+            // By what was known last, which nothing has come to stand over since: many tiles at once.
+            const float* const known = tops_.data() + index(0, j);
+            int over = 0;
+            for (int i = i0; i <= i1; ++i) over |= static_cast<int>(known[i] > most);
+            for (int i = i0; i <= i1 && over != 0; ++i)
+                if (known[i] > most && stands_over(i, j, most)) return true;
+        }
         return false;
     }
 
@@ -85,7 +91,7 @@ private:
     [[nodiscard]] std::size_t index(int i, int j) const {
         return static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i);
     }
-    [[nodiscard]] bool stands_over(int i, int j, double level) {
+    [[nodiscard]] bool stands_over(int i, int j, float level) {
         float& top = tops_[index(i, j)];
         std::uint8_t& cuts = cuts_[index(i, j)];
         if (cuts == kStale) {
@@ -306,6 +312,16 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         KeptTiles before(part);  // of what the operation comes to
         TileTops tops(height, part);
         const auto misses = [&](const Box& box) { return box.y1 < y0 || box.y0 > y1 || box.z0 >= top; };
+        // A unit more than may count: rounding.
+        const auto y_low = static_cast<std::int64_t>(std::floor(y0 * kUnitsPerMm)) - 1,
+                   y_high = static_cast<std::int64_t>(std::ceil(y1 * kUnitsPerMm)) + 1;
+        Lost lost;
+        const auto count_lost = [&] {
+            lost = {};
+            before.rows([&](const float* kept, std::size_t cell, int n) { add_lost(kept, height + cell, n, kEmpty, lost); });
+        };
+        bool keeps = true;    // what the operation comes to, for a trial or until so much is taken that more is not asked for
+        unsigned looked = 0;  // moves that were cut until then
         for (const std::uint32_t b : upwards) {
             if (misses(boxes[b])) continue;
             for (std::size_t i = std::max<std::size_t>(1, b * kBlock); i < std::min(moves.size(), (b + 1) * kBlock); ++i) {
@@ -318,25 +334,27 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 }
                 const Move &p = moves[i - 1], &q = moves[i];
                 if (q.feed == 0) continue;
-                const double py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
-                if (std::max(py, qy) < y0 || std::min(py, qy) > y1 || std::min(pz, qz) >= top) continue;
-                const double px = to_mm(p.x), qx = to_mm(q.x);
-                int left = 0, right = 0;
+                if (std::max(p.y, q.y) < y_low || std::min(p.y, q.y) > y_high) continue;
+                const double px = to_mm(p.x), qx = to_mm(q.x), py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
+                if (std::min(pz, qz) >= top) continue;
+                std::array<int, 4> cells{};
                 if (!tops.cut_over(std::min(px, qx) - r, std::max(px, qx) + r, std::min(py, qy) - r, std::max(py, qy) + r,
-                                   std::min(pz, qz) - z_bottom_, left, right))
+                                   std::min(pz, qz) - z_bottom_, cells))
                     continue;
-                before.keep(height, left, right, 0, 0);
+                if (keeps) before.keep(height, cells[0], cells[1], cells[2], cells[3]);
                 std::array<double, 3> previous{}, next{};
                 ChainedSweep chain;
                 if (p.feed != 0 && i > 1) previous = over_bottom(moves[i - 2]), chain.before = &previous;
                 if (i + 1 < moves.size() && moves[i + 1].feed != 0) next = over_bottom(moves[i + 1]), chain.after = &next;
                 sweep_above(part, end, over_bottom(p), over_bottom(q), StandingHeights{height, 0}, lowering, chain);
+                if (!keeps || trial_ != nullptr || !std::has_single_bit(++looked)) continue;
+                count_lost();
+                keeps = lost.cells < Taken::kFew;
             }
         }
-        Lost lost;
-        before.rows([&](const float* kept, std::size_t cell, int n) { add_lost(kept, height + cell, n, kEmpty, lost); });
+        if (keeps) count_lost();
         taken[band] = {lost.most, lost.cells};
-        if (trial_ != nullptr) trial_->kept_.add(static_cast<int>(band), before);
+        if (trial_ != nullptr) trial_->kept_.add(first / KeptTiles::kTile, before);
     });
     Taken all;
     for (const Taken& t : taken) all.most = std::max(all.most, t.most), all.cells += t.cells;

@@ -22,12 +22,13 @@ namespace slabwright {
 inline constexpr float kEmpty = 0.01F;
 
 /// What an operation took off a stock. A cell's centre that lies on a wall to within rounding may stand in one stock and not in another,
-/// so a few cells alone are no reason to go there.
+/// so a few cells alone are no reason to go there. Where many lost something, no more than that need be counted.
 struct Taken {
+    static constexpr std::size_t kFew = 4;
     float most = 0;         ///< mm that one cell lost
     std::size_t cells = 0;  ///< that lost more than kEmpty
-    [[nodiscard]] bool nothing() const { return cells < 4 && most < 0.4F; }
-    [[nodiscard]] bool few() const { return cells < 4; }
+    [[nodiscard]] bool nothing() const { return few() && most < 0.4F; }
+    [[nodiscard]] bool few() const { return cells < kFew; }
 };
 
 /// What a layer's stock is kept in, of any content; one layer leaves it to the next, for new memory of that size costs more than filling it.

@@ -35,7 +35,7 @@ Standing::Standing(std::array<double, 2> min, std::array<double, 2> max, double 
       ny_(std::max(1, static_cast<int>(std::ceil((max[1] - min[1]) / cell_)))),
       height_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), static_cast<float>(kRounding)) {}
 
-Standing::BallTable Standing::ball_table(double radius) const {
+Standing::BallTable Standing::made_table(double radius) const {
     BallTable table{radius, 0, std::vector<float>(kTable + 1)};
     const double reach = radius - d_;
     if (reach <= 0) return table;
@@ -45,6 +45,11 @@ Standing::BallTable Standing::ball_table(double radius) const {
         table.height[k] = static_cast<float>(radius - std::sqrt(radius * radius - rho * rho));
     }
     return table;
+}
+
+const Standing::BallTable& Standing::ball_table(double radius) const {
+    const auto found = std::find_if(tables_.begin(), tables_.end(), [&](const BallTable& t) { return t.radius == radius; });
+    return found != tables_.end() ? *found : tables_.emplace_back(made_table(radius));
 }
 
 // Calls row(j, first, last) for the cells whose centres lie within `radius` of the segment from a to b.
@@ -70,16 +75,22 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
     if (cutter.profile == Cutter::Profile::flat) {
         // Each covered cell was covered at some place of the way, and no place is higher than its higher end.
         const auto z = static_cast<float>((l2 > 0 ? high : low) - top_ + kRounding);
-        rows(cutter.radius - d_, a, b, [&](int j, int first, int last) {
-            float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
-            for (int i = first; i <= last; ++i) h[i] = std::min(h[i], z);
-        });
+        const bool level = from[2] == to[2], been = level && from == last_ && cutter.radius == last_radius_;
+        const CellGrid grid{x0_, y0_, cell_, nx_, ny_};
+        const double radius = cutter.radius - d_;
+        const auto [first, last] = rows_between(grid, std::min(a[1], b[1]) - radius, std::max(a[1], b[1]) + radius);
+        RowSpans spans;
+        for (int j = first; j <= last; j += RowSpans::kRows) {
+            const int together = std::min(RowSpans::kRows, last - j + 1);
+            spans_of_rows(grid, j, together, a, b, radius, been, spans);
+            lower_spans(height_.data() + grid.index(0, j), static_cast<std::size_t>(nx_), together, spans, z);
+        }
+        if (level) last_ = to, last_radius_ = cutter.radius;
         return;
     }
-    auto found = std::find_if(tables_.begin(), tables_.end(), [&](const BallTable& t) { return t.radius == cutter.radius; });
-    if (found == tables_.end()) found = tables_.insert(tables_.end(), ball_table(cutter.radius));
-    const float* const profile = found->height.data();
-    const double scale = found->scale;
+    const BallTable& table = ball_table(cutter.radius);
+    const float* const profile = table.height.data();
+    const double scale = table.scale;
     // The place of the way nearest to the cell's centre: on steep ways others may be lower, but this one is sure.
     const double z0 = (l2 > 0 ? from[2] : low) - top_ + kRounding, rise = l2 > 0 ? to[2] - from[2] : 0.0, fx = l2 > 0 ? dx / l2 : 0.0,
                  fy = l2 > 0 ? dy / l2 : 0.0;
@@ -106,9 +117,7 @@ double Standing::top(double radius, const std::array<double, 2>& a, const std::a
 
 double Standing::free_tip(const Cutter& cutter, const std::array<double, 2>& a, const std::array<double, 2>& b) const {
     if (cutter.profile == Cutter::Profile::flat) return top(cutter.radius - 2 * d_, a, b);
-    const auto found = std::find_if(tables_.begin(), tables_.end(), [&](const BallTable& t) { return t.radius == cutter.radius; });
-    const BallTable made = found == tables_.end() ? ball_table(cutter.radius) : BallTable{};
-    const BallTable& table = found == tables_.end() ? made : *found;
+    const BallTable& table = ball_table(cutter.radius);
     const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
     double most = -std::numeric_limits<double>::infinity();
     rows(cutter.radius - d_, a, b, [&](int j, int first, int last) {

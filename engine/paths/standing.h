@@ -39,13 +39,15 @@ public:
     static constexpr std::uint64_t kMostCells = std::uint64_t{1} << 21;  ///< 8 MiB
 
 private:
-    // R − √(R² − (ρ + d)²) by ρ², of the ball used last; every entry is that of the upper end of its bin.
+    // R − √(R² − (ρ + d)²) by ρ², of a ball; every entry is that of the upper end of its bin.
     struct BallTable {
         double radius = 0, scale = 0;
         std::vector<float> height;
     };
     static double cell_size(std::array<double, 2> min, std::array<double, 2> max);
-    [[nodiscard]] BallTable ball_table(double radius) const;
+    [[nodiscard]] BallTable made_table(double radius) const;
+    /// The table of this radius, made when it is first asked for; until the next call.
+    [[nodiscard]] const BallTable& ball_table(double radius) const;
     template <class Row>
     void rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, Row&& row) const;
 
@@ -53,7 +55,10 @@ private:
     double top_;                 // heights are kept relative to it
     int nx_, ny_;
     std::vector<float> height_;
-    std::vector<BallTable> tables_;
+    mutable std::vector<BallTable> tables_;
+    // Where a flat cutter went last, level: what it covers there is no higher.
+    std::array<double, 3> last_{1e300, 1e300, 1e300};
+    double last_radius_ = 0;
 };
 
 }  // namespace slabwright

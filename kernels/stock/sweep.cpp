@@ -332,8 +332,11 @@ SLABWRIGHT_WIDE OverSpans spans_over(const float* height, std::size_t nx, int ro
     return over;
 }
 
-SLABWRIGHT_WIDE void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, double z) {
-    const auto level = static_cast<float>(z > 0 ? z : 0.0);
+void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, double z) {
+    lower_spans(height, nx, rows, spans, static_cast<float>(z > 0 ? z : 0.0));
+}
+
+SLABWRIGHT_WIDE void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, float level) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k, height += nx) {
         lower_in(height, spans.low[k], spans.left[k], level);
         lower_in(height, spans.right[k], spans.high[k], level);

@@ -150,7 +150,8 @@ struct OverSpans {
 };
 /// @param height of the first row's first cell; rows lie nx apart
 [[nodiscard]] OverSpans spans_over(const float* height, std::size_t nx, int rows, const RowSpans& spans, float level);
-/// Lowers the heights in all spans to max(0, z), where they are over it.
+/// Lowers the heights in all spans to a level, or to max(0, z), where they are over it.
+void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, float level);
 void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, double z);
 
 /// What else of a chain of straight motions is swept, so that no cell is asked twice about the place where two of them meet.
@@ -244,8 +245,9 @@ void take_level(Fn& fn, std::size_t first, int n, double z, const StandingHeight
 
 /// The first and the last row whose centres lie within [y_low, y_high]; first > last: none.
 inline std::pair<int, int> rows_between(const CellGrid& grid, double y_low, double y_high) {
-    return {std::max(0, static_cast<int>(std::ceil(std::max(-1.0, (y_low - grid.y0) / grid.cell)))),
-            std::min(grid.ny - 1, static_cast<int>(std::floor(std::min<double>(grid.ny, (y_high - grid.y0) / grid.cell))))};
+    const double beyond = grid.ny + 1.0;
+    return {std::max(0, ceiling(std::clamp((y_low - grid.y0) / grid.cell, -1.0, beyond))),
+            std::min(grid.ny - 1, floor_of(std::clamp((y_high - grid.y0) / grid.cell, -2.0, static_cast<double>(grid.ny))))};
 }
 
 /// A disc at one height: see sweep_above.
@@ -254,7 +256,6 @@ void sweep_level_disc(const CellGrid& grid, double radius, const std::array<doub
                       const StandingHeights& standing, Fn&& fn) {
     const auto [j0, j1] = rows_between(grid, std::min(from[1], to[1]) - radius, std::max(from[1], to[1]) + radius);
     RowSpans spans;
-    const float level = level_over(standing.bottom, z);
     for (int j = j0; j <= j1; j += RowSpans::kRows) {
         const int rows = std::min(RowSpans::kRows, j1 - j + 1);
         const std::size_t row = grid.index(0, j), nx = static_cast<std::size_t>(grid.nx);
@@ -263,7 +264,7 @@ void sweep_level_disc(const CellGrid& grid, double radius, const std::array<doub
             fn.spans(row, rows, spans, z);
             continue;
         }
-        const OverSpans over = spans_over(standing.height + row, nx, rows, spans, level);
+        const OverSpans over = spans_over(standing.height + row, nx, rows, spans, level_over(standing.bottom, z));
         for (std::uint64_t left = over.left | over.right; left != 0; left &= left - 1) {
             const auto k = static_cast<std::size_t>(std::countr_zero(left));
             const std::size_t at = row + k * nx;
@@ -294,6 +295,13 @@ void sweep_above(const CellGrid& grid, const CutterEnd& end, const std::array<do
     using Form = CutterEnd::Form;
     constexpr double hair = 1e-9;
     const double R = end.radius, R2 = R * R;
+    if constexpr (std::is_same_v<std::remove_cvref_t<Standing>, StandingHeights>)
+        if (end.form == Form::flat && from[2] == to[2]) {
+            const double x = to[0] - from[0], y = to[1] - from[1];
+            const bool moves = std::sqrt(x * x + y * y) > 1e-9;
+            return sweep_level_disc(grid, R, {from[0], from[1]}, {to[0], to[1]}, from[2], moves && (chain.before != nullptr || chain.been), standing,
+                                    fn);
+        }
     const StraightWay way(from, to);
     const double dx = way.dx, dy = way.dy, run = way.run, slope = way.slope, z = way.z, lowest = std::min(from[2], to[2]);
     const bool shares = way.shares_ends(end);
