@@ -472,6 +472,54 @@ TEST(LayerSolid, TurnsHoldTheNormalsAroundEveryCorner) {
     EXPECT_GT(known_aside, 500U);
 }
 
+// The normals beside an edge and all between them are told, and a corner in which edges end that are tested is tested by one of its facets.
+TEST(LayerSolid, EdgesHoldTheNormalsBetweenTheirFacets) {
+    std::mt19937 random(test::seed());
+    Context context;
+    std::size_t edges = 0, corners = 0, narrow = 0;
+    for (int trial = 0; trial < 6; ++trial) {
+        const Mesh mesh = test::random_height_field(context, 12, 2.0, 5, trial % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
+        const double z_top = trial < 3 ? 100 : 2.5;
+        const LayerSolid solid = layer_solid(context, mesh.view(), -5, z_top);
+        std::map<std::pair<Vec3d, Vec3d>, const SolidFacet*> by_edge;
+        std::map<Vec3d, int> ends;  // how many facets are to test a corner
+        for (const SolidFacet& f : solid.facets)
+            for (std::size_t c = 0; c < 3; ++c) by_edge[{f.p[c], f.p[(c + 1) % 3]}] = &f, ends[f.p[c]] += f.ends >> c & 1;
+        for (std::size_t i = 0; i < solid.facets.size(); ++i) {
+            const SolidFacet& f = solid.facets[i];
+            const GroupCorners& group = solid.corners[i / FacetGroup::kFacets];
+            for (std::size_t c = 0; c < 3; ++c) {
+                if ((f.edges >> c & 1) == 0) continue;
+                const Vec3d &a = f.p[c], &b = f.p[(c + 1) % 3];
+                EXPECT_GE(ends[a], 1);
+                EXPECT_GE(ends[b], 1);
+                if (a[2] < z_top - 0.1) {
+                    EXPECT_EQ(ends[a], 1);
+                    ++corners;
+                }
+                const auto other = by_edge.find({b, a});
+                if (other == by_edge.end() && a[2] < z_top - 0.1) continue;
+                const Vec3d m = f.normal, n = other == by_edge.end() ? Vec3d{0, 0, 1} : other->second->normal;
+                ++edges;
+                for (int step = 0; step <= 20; ++step) {
+                    const double s = 0.05 * step;
+                    const Vec3d sum{m[0] + s * (n[0] - m[0]), m[1] + s * (n[1] - m[1]), m[2] + s * (n[2] - m[2])};
+                    const double length = std::hypot(sum[0], sum[1], sum[2]);
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        const int least = group.least[c][k][i % FacetGroup::kFacets], most = group.most[c][k][i % FacetGroup::kFacets];
+                        EXPECT_LE(least * SolidFacet::kTurn, sum[k] / length + 1e-9);
+                        EXPECT_GE(most * SolidFacet::kTurn, sum[k] / length - 1e-9);
+                        narrow += most - least < 60;
+                    }
+                }
+            }
+        }
+    }
+    EXPECT_GT(edges, 300U);
+    EXPECT_GT(corners, 300U);
+    EXPECT_GT(narrow, 3000U);
+}
+
 // Beside some of its facets a solid's contours are those of what lies near them alone.
 TEST(LayerSolid, WhatIsNearSufficesForTheContoursThere) {
     std::mt19937 random(test::seed());

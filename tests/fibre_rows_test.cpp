@@ -219,17 +219,18 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
             f.top = random() % 4 == 0;
             if (f.top && random() % 2 == 0) f.p[0][2] = f.p[1][2] = size;
             f.edges = random() & 7;
+            f.ends = random() & 7;
             f.z_min = std::min({f.p[0][2], f.p[1][2], f.p[2][2]});
             f.z_max = std::max({f.p[0][2], f.p[1][2], f.p[2][2]});
         }
         const std::size_t k = random() % facets.size(), v = random() % 2;
         SolidFacet& f = facets[k];
         // On the face, on an edge that is to be tested, or on an end of one: place and normal.
-        const std::size_t part = random() % 4, edge = random() % 3, next = (edge + 1) % 3;
-        if (part > 0) f.edges = f.edges | (1U << edge & 7U);
-        const bool on_end = part == 3;
-        const auto cut = [&](std::size_t c) { return f.top && f.p[c][2] == f.z_max; };
-        const auto turn = [&](std::size_t c) { return f.turn[c] == SolidFacet::kAnyTurn ? 2.1 : f.turn[c] * SolidFacet::kTurn; };
+        const std::size_t part = random() % 3, edge = random() % 3, next = (edge + 1) % 3;
+        const bool on_end = part == 2;
+        if (part == 1) f.edges = f.edges | (1U << edge & 7U);
+        if (on_end) f.ends = f.ends | (1U << edge & 7U);
+        std::vector<EdgeNormals> normals(random() % 4 == 0 ? 0 : facets.size());
         const Vec3d& n = f.normal;
         Vec3d place, d = n;
         if (part == 0) {
@@ -237,23 +238,34 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
             if (a + b > 1) a = 1 - a, b = 1 - b;
             for (std::size_t c = 0; c < 3; ++c) place[c] = f.p[0][c] + a * (f.p[1][c] - f.p[0][c]) + b * (f.p[2][c] - f.p[0][c]);
         } else {
-            const double most = on_end ? turn(edge) : std::min(turn(edge), turn(next)), a = on_end ? 0 : within(0, 1);
+            const double most = f.turn[edge] == SolidFacet::kAnyTurn ? 2.1 : f.turn[edge] * SolidFacet::kTurn, a = on_end ? 0 : within(0, 1);
             d = unit({within(-1, 1), within(-1, 1), within(-1, 1)});
-            while (std::hypot(d[0] - n[0], d[1] - n[1], d[2] - n[2]) > most) d = unit({d[0] + n[0], d[1] + n[1], d[2] + n[2]});
-            if (cut(edge) && (on_end || cut(next)) && random() % 2 == 0) d = unit({d[0], d[1], d[2] + within(0, 2)});
+            while (on_end && std::hypot(d[0] - n[0], d[1] - n[1], d[2] - n[2]) > most) d = unit({d[0] + n[0], d[1] + n[1], d[2] + n[2]});
+            if (on_end && f.top && f.p[edge][2] == f.z_max && random() % 2 == 0) d = unit({d[0], d[1], d[2] + within(0, 2)});
+            for (std::size_t c = 0; c < 3 && !normals.empty(); ++c) {
+                normals[k].low[edge][c] = static_cast<std::int8_t>(std::max(-127.0, std::floor(d[c] / SolidFacet::kTurn - within(0, 20))));
+                normals[k].high[edge][c] = static_cast<std::int8_t>(std::min(127.0, std::ceil(d[c] / SolidFacet::kTurn + within(0, 20))));
+            }
             for (std::size_t c = 0; c < 3; ++c) place[c] = f.p[edge][c] + a * (f.p[next][c] - f.p[edge][c]);
         }
-        const std::vector<FacetGroup> groups = facet_groups(context, facets);
-        const std::vector<GroupCorners> corners = group_corners(context, facets, groups);
+        const std::vector<FacetGroup> groups = facet_groups(context, facets, normals);
+        const std::vector<GroupCorners> corners = group_corners(context, facets, groups, normals);
+        for (std::size_t c = 0; c < 3; ++c) {
+            ASSERT_LE(groups.front().facing.low[c], d[c]) << "round " << round << " part " << part;
+            ASSERT_GE(groups.front().facing.high[c], d[c]) << "round " << round << " part " << part;
+        }
         Vec3d centre;
         for (std::size_t c = 0; c < 3; ++c) centre[c] = place[c] + r * d[c];
         GroupTouched touched;
         group_touched(corners.front(), groups.front(), v, r, centre[2], touched);
         const double at = centre[v] - groups.front().middle[v];
-        const GroupTouched::Range& range = part == 0 ? touched.face : touched.edge[edge];
+        const GroupTouched::Range& range = part == 0 ? touched.face : part == 1 ? touched.edge[edge] : touched.end[edge];
         ASSERT_LE(range.low[k], at) << "round " << round << " part " << part;
         ASSERT_GE(range.high[k], at) << "round " << round << " part " << part;
-        for (const GroupTouched::Range& each : {touched.face, touched.edge[0], touched.edge[1], touched.edge[2]}) {
+        ASSERT_LE(touched.all.low[k], range.low[k]);
+        ASSERT_GE(touched.all.high[k], range.high[k]);
+        for (const GroupTouched::Range& each :
+             {touched.face, touched.edge[0], touched.edge[1], touched.edge[2], touched.end[0], touched.end[1], touched.end[2]}) {
             for (std::size_t i = 0; i < facets.size(); ++i) ++(each.low[i] <= each.high[i] ? told : elsewhere);
             for (std::size_t i = facets.size(); i < FacetGroup::kFacets; ++i) ASSERT_GT(each.low[i], each.high[i]);
         }

@@ -109,12 +109,14 @@ SLABWRIGHT_WIDE void marked_prism_rows(const PrismTerms& p, const double* v, int
     prism_on<true>(p, v, lines, low, high, nz_low, nz_high);
 }
 
-SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restrict v, int lines, double* __restrict low, double* __restrict high,
-                                  double* __restrict nz_low, double* __restrict nz_high) {
+namespace {
+
+// The balls around the first ends.
+[[gnu::always_inline]] inline void ends_on(const CapsuleTerms& t, int ends, const double* __restrict v, int lines, double* __restrict low,
+                                           double* __restrict high, double* __restrict nz_low, double* __restrict nz_high) {
     const double r2 = t.r * t.r;
     const int n = lines / kLinesStep * kLinesStep;
-    // The balls around both ends.
-    for (int end = 0; end < 2; ++end) {
+    for (int end = 0; end < ends; ++end) {
         const double centre = end == 0 ? t.au : t.bu, cv = end == 0 ? t.av : t.bv, wz = end == 0 ? t.za : t.zb, over = r2 - wz * wz;
         if (over <= 0) continue;
         const double nz = t.nz > -1.5 ? t.nz : wz / t.r;
@@ -129,9 +131,16 @@ SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restric
             nz_high[i] = higher ? nz : nz_high[i];
         }
     }
+}
+
+// What is between them.
+[[gnu::always_inline]] inline void cylinder_on(const CapsuleTerms& t, const double* __restrict v, int lines, double* __restrict low,
+                                               double* __restrict high, double* __restrict nz_low, double* __restrict nz_high) {
+    const double r2 = t.r * t.r;
+    const int n = lines / kLinesStep * kLinesStep;
     const double du = t.bu - t.au, dv = t.bv - t.av, dz = t.za - t.zb, length2 = du * du + dv * dv + dz * dz;
     if (length2 <= 0) return;
-    // Between them: with w = c − a and u = c_U − a_U, |w|² − (w·d)²/|d|² < r² and 0 ≤ w·d ≤ |d|².
+    // With w = c − a and u = c_U − a_U, |w|² − (w·d)²/|d|² < r² and 0 ≤ w·d ≤ |d|².
     const double qa = 1 - du * du / length2;
     const bool along = qa < 1e-12;  // the segment lies along the lines
     alignas(64) double s[kLinesTogether], l[kLinesTogether], h[kLinesTogether];
@@ -178,6 +187,19 @@ SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* __restric
         high[i] = higher ? to : high[i];
         nz_high[i] = higher ? nz_h : nz_high[i];
     }
+}
+
+}  // namespace
+
+SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+    ends_on(t, 2, v, lines, low, high, nz_low, nz_high);
+    cylinder_on(t, v, lines, low, high, nz_low, nz_high);
+}
+SLABWRIGHT_WIDE void cylinder_rows(const CapsuleTerms& t, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+    cylinder_on(t, v, lines, low, high, nz_low, nz_high);
+}
+SLABWRIGHT_WIDE void end_rows(const CapsuleTerms& t, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+    ends_on(t, 1, v, lines, low, high, nz_low, nz_high);
 }
 
 SLABWRIGHT_WIDE std::int64_t cover_rows(const CoverRows& cover, const double* low, const double* high, int first, int last, std::int64_t* state) {
@@ -368,6 +390,12 @@ template <class T, class Vector>
 [[gnu::always_inline]] inline void load(const GroupCorners::Each<T>& from, Vector& v) {
     std::memcpy(&v, from.data(), sizeof v);
 }
+[[gnu::always_inline]] inline void load_small(const GroupCorners::Each<std::int8_t>& from, Floats& v) {
+    using Small [[gnu::vector_size(kLanes)]] = std::int8_t;
+    Small small;
+    std::memcpy(&small, from.data(), sizeof small);
+    v = __builtin_convertvector(small, Floats);
+}
 [[gnu::always_inline]] inline void lower(Floats& a, const Floats& b) { a = b < a ? b : a; }
 [[gnu::always_inline]] inline void raise(Floats& a, const Floats& b) { a = b > a ? b : a; }
 [[gnu::always_inline]] inline void stretch(Floats& from, Floats& to, const Bits& meets, const Floats& at) {
@@ -377,28 +405,35 @@ template <class T, class Vector>
 
 }  // namespace
 
-// A ball touches with the normal d at its centre less r·d: a facet with its own, an edge with one that is near enough at both ends, and each on
-// the part that is as high as that. `wider` is more than what floats round, of the heights and of where an edge crosses one of them.
+// A ball touches with the normal d at its centre less r·d: a facet with its own, an edge with one between those beside it, a corner with one that
+// is near enough, and each on the part that is as high as that. `wider` is more than what floats round, of the heights and of where an edge crosses
+// one of them.
 SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& group, std::size_t v, double radius, double zc, GroupTouched& touched) {
     const Floats none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
-    const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]);
+    const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]), step = r * static_cast<float>(SolidFacet::kTurn);
     const float wider = kTouchMargin + 1e-6F * (r + std::abs(z) + group.radius + group.thickness);
     Floats nz, nv;
-    load(g.normal[2], nz), load(g.normal[v], nv);
+    Bits edges;
+    load(g.normal[2], nz), load(g.normal[v], nv), load(g.edges, edges);
+    const auto store = [](const Floats& low, const Floats& high, GroupTouched::Range& range) {
+        std::memcpy(range.low.data(), &low, sizeof low), std::memcpy(range.high.data(), &high, sizeof high);
+    };
+    Floats all_low = inf, all_high = -inf;
     // Of each corner the normals, and where a ball touches it; of each edge what it is wide for each mm that it is high.
-    std::array<Floats, 3> pz, pv, z_least, z_most, v_least, v_most, from, to, wide, least, most;
+    std::array<Floats, 3> pz, pv, wide, least, most;
     for (std::size_t c = 0; c < 3; ++c) {
         Floats turn;
         load(g.turn[c], turn), load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]);
         const Bits cut = turn < 0;
         turn = cut ? -1 - turn : turn;
-        z_least[c] = nz - turn, z_most[c] = nz + turn, v_least[c] = nv - turn, v_most[c] = nv + turn;
-        raise(z_least[c], -one), lower(z_most[c], one), raise(v_least[c], -one), lower(v_most[c], one);
-        z_most[c] = cut ? one : z_most[c];
-        v_least[c] = (cut & (v_least[c] > 0)) ? none : v_least[c], v_most[c] = (cut & (v_most[c] < 0)) ? none : v_most[c];
-        const Bits meets = (pz[c] >= z - r * z_most[c] - wider) & (pz[c] <= z - r * z_least[c] + wider);
-        from[c] = meets ? pv[c] + r * v_least[c] - wider : inf;
-        to[c] = meets ? pv[c] + r * v_most[c] + wider : -inf;
+        Floats z_least = nz - turn, z_most = nz + turn, v_least = nv - turn, v_most = nv + turn;
+        raise(z_least, -one), lower(z_most, one), raise(v_least, -one), lower(v_most, one);
+        z_most = cut ? one : z_most;
+        v_least = (cut & (v_least > 0)) ? none : v_least, v_most = (cut & (v_most < 0)) ? none : v_most;
+        const Bits meets = ((edges & (8 << c)) != 0) & (pz[c] >= z - r * z_most - wider) & (pz[c] <= z - r * z_least + wider);
+        const Floats low = meets ? pv[c] + r * v_least - wider : inf, high = meets ? pv[c] + r * v_most + wider : -inf;
+        store(low, high, touched.end[c]);
+        lower(all_low, low), raise(all_high, high);
     }
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t next = k == 2 ? 0 : k + 1;
@@ -411,30 +446,25 @@ SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& grou
     const auto cross = [&](Floats& low, Floats& high, std::size_t k, const Floats& height) {
         stretch(low, high, (least[k] <= height) & (height <= most[k]), pv[k] + (height - pz[k]) * wide[k]);
     };
-    const auto store = [](const Floats& low, const Floats& high, GroupTouched::Range& range) {
-        std::memcpy(range.low.data(), &low, sizeof low), std::memcpy(range.high.data(), &high, sizeof high);
-    };
     const Floats at = z - r * nz, under = at - wider, over = at + wider;
     Floats low = inf, high = -inf;
     for (std::size_t k = 0; k < 3; ++k) {
         stretch(low, high, (pz[k] >= under) & (pz[k] <= over), pv[k]);
         cross(low, high, k, under), cross(low, high, k, over);
     }
-    Floats all_low = low + r * nv - wider, all_high = high + r * nv + wider;
-    store(all_low, all_high, touched.face);
-    Bits edges;
-    load(g.edges, edges);
+    low += r * nv - wider, high += r * nv + wider;
+    store(low, high, touched.face);
+    lower(all_low, low), raise(all_high, high);
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t next = k == 2 ? 0 : k + 1;
-        Floats up = z_most[k], down = z_least[k], left = v_least[k], right = v_most[k];
-        lower(up, z_most[next]), raise(down, z_least[next]), raise(left, v_least[next]), lower(right, v_most[next]);
-        const Floats lowest = z - r * up - wider, highest = z - r * down + wider;
+        Floats down, up, left, right;
+        load_small(g.least[k][2], down), load_small(g.most[k][2], up), load_small(g.least[k][v], left), load_small(g.most[k][v], right);
+        const Floats lowest = z - step * up - wider, highest = z - step * down + wider;
         low = inf, high = -inf;
         stretch(low, high, (pz[k] >= lowest) & (pz[k] <= highest), pv[k]);
         stretch(low, high, (pz[next] >= lowest) & (pz[next] <= highest), pv[next]);
         cross(low, high, k, lowest), cross(low, high, k, highest);
-        low += r * left - wider, high += r * right + wider;
-        lower(low, from[k]), lower(low, from[next]), raise(high, to[k]), raise(high, to[next]);
+        low += step * left - wider, high += step * right + wider;
         const Bits tests = (edges & (1 << k)) != 0;
         low = tests ? low : inf, high = tests ? high : -inf;
         store(low, high, touched.edge[k]);

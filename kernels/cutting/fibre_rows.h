@@ -34,6 +34,9 @@ struct CapsuleTerms {
     double nz = -2;  ///< at all contacts; below −1: the contact's own
 };
 void capsule_rows(const CapsuleTerms& capsule, const double* v, int n, double* low, double* high, double* nz_low, double* nz_high);
+/// The same of what projects onto the segment alone, and of the ball around its first end alone.
+void cylinder_rows(const CapsuleTerms& capsule, const double* v, int n, double* low, double* high, double* nz_low, double* nz_high);
+void end_rows(const CapsuleTerms& capsule, const double* v, int n, double* low, double* high, double* nz_low, double* nz_high);
 
 /// Lines are met in steps of so many: where lines are numbered from `first`, that and their count are multiples of it, so that no loop has
 /// an odd end.
@@ -92,14 +95,14 @@ struct GroupRows {
 void group_out_rows(const GroupCorners& corners, const FacetGroup& group, std::size_t u, double r, double zc, const CoverRows& cover, const double* v,
                     int first, int last, const std::int64_t* state, GroupRows& rows);
 
-/// Of each of a group's facets, and of each of its edges that it is to test with both of their ends, the places across the lines, relative to the
+/// Of each of a group's facets, and of each of its edges and ends of edges that it is to test, the places across the lines, relative to the
 /// group's middle, at which a ball of radius r at height zc can touch it from outside the solid, rounded outward; low > high: it cannot.
 struct GroupTouched {
     struct Range {
         alignas(32) GroupCorners::Each<float> low, high;
     };
-    Range face, all;  ///< of all: of the face and the edges together
-    std::array<Range, 3> edge;
+    Range face, all;  ///< of all: of them together
+    std::array<Range, 3> edge, end;
 };
 void group_touched(const GroupCorners& corners, const FacetGroup& group, std::size_t v, double r, double zc, GroupTouched& touched);
 /// The same for a level disc and the section of each facet at its height zc. @pre no facet is counted that faces down

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -104,25 +105,26 @@ class BlockOfLines {
     };
 
 public:
-    BlockOfLines(const LayerSolid& solid, const Cutter& cutter, double zc, std::span<const std::int32_t> lines)
-        : solid_(solid), ball_(cutter.profile == Cutter::Profile::ball), r_(cutter.radius), zc_(zc), n_(static_cast<int>(lines.size())) {
-        // Where a section's border lies, the centre is no farther from the solid than it is over the plane.
-        const double over_plane = ball_ ? std::max(0.0, zc - (solid.z_top - kTopSheet)) : 0;
-        if (by_touch() && over_plane < r_ - kTouchMargin) inside_nz_ = static_cast<float>(kWithin);
+    BlockOfLines(const LayerSolid& solid, const Cutter& cutter, std::span<const std::int32_t> lines)
+        : solid_(solid), ball_(cutter.profile == Cutter::Profile::ball), r_(cutter.radius), n_(static_cast<int>(lines.size())) {
         at_.fill(kFarAway);
         for (int l = 0; l < n_; ++l) at_[l] = to_mm(lines[static_cast<std::size_t>(l)]);
         if (n_ > 1) per_mm_ = (n_ - 1) / (at_[n_ - 1] - at_[0]);
+    }
+
+    // Goes down to a level: what those above it forbid, which are merged(), it forbids too.
+    void begin(double zc) {
+        zc_ = zc;
+        amid_gaps_ = false;
+        // Where a section's border lies, the centre is no farther from the solid than it is over the plane.
+        const double over_plane = ball_ ? std::max(0.0, zc - (solid_.z_top - kTopSheet)) : 0;
+        inside_nz_ = by_touch() && over_plane < r_ - kTouchMargin ? static_cast<float>(kWithin) : 0.0F;
         cover_.low.fill(-kInfinity);
         cover_.high.fill(-kInfinity);
         cover_.next.fill(kInfinity);
-    }
-
-    // Forbids what a higher level forbids.
-    void begin_with(const Fibres& above) {
         for (int l = 0; l < n_; ++l) {
-            const auto line = above.line(static_cast<std::size_t>(l));
-            found_[l].assign(line.begin(), line.end());
-            if (!line.empty()) cover_.next[l] = line.front().low;
+            crossings_[l].clear();
+            if (!found_[l].empty()) cover_.next[l] = found_[l].front().low;
         }
     }
 
@@ -165,6 +167,7 @@ public:
             for (int l = 0; l < n_; ++l) close_within(found_[l]);
             amid_gaps_ = true;
             for (int l = 0; l < n_; ++l) look(l, found_[l].begin() + (found_[l].empty() ? 0 : 1));
+            find_gaps();
         }
         if (ball_) meet_all(groups);
         else if (by_touch()) meet_amid(groups);
@@ -174,63 +177,99 @@ public:
     // Whether all ends are found where the cutter can touch the solid from outside.
     [[nodiscard]] bool by_touch() const { return !solid_.part && !solid_.corners.empty(); }
 
+    // Calls meet(facet, group, touched, i), group by group, for those facets that can be touched, and where something overhangs the cutter also for those
+    // that face down. Groups lie far apart in memory, and so do their facets: several are looked at together, each step asking for what the next one reads.
+    template <class Group, class CanTouch, class Touch, class Meet>
+    void look_together(Group g, Group end, CanTouch&& can, Touch&& touch, Meet&& meet) {
+        constexpr std::size_t ahead = 2 * kTogether;
+        while (g != end) {
+            std::array<std::uint32_t, kTogether> some;
+            std::size_t n = 0;
+            for (; g != end && n < kTogether; ++g) {
+                if (end - g > static_cast<std::ptrdiff_t>(ahead)) prefetch(solid_.groups[g[ahead]]);
+                const FacetGroup& group = solid_.groups[*g];
+                if (!(group.overhang > zc_) && !can(group)) continue;
+                some[n++] = *g;
+                prefetch(solid_.corners[*g]);
+            }
+            std::array<std::uint32_t, kTogether> wanted{};  // a bit a facet
+            for (std::size_t k = 0; k < n; ++k) {
+                const FacetGroup& group = solid_.groups[some[k]];
+                const GroupCorners& corners = solid_.corners[some[k]];
+                touch(some[k], touched_[k]);
+                const auto from = static_cast<float>(at_[0] - group.middle[V]) - kTouchMargin,
+                           to = static_cast<float>(at_[n_ - 1] - group.middle[V]) + kTouchMargin;
+                const auto [first, last] = facets_of(some[k]);
+                for (std::size_t i = 0; i < last - first; ++i) {
+                    const GroupTouched::Range& all = touched_[k].all;
+                    const bool here = all.low[i] <= all.high[i] && all.low[i] <= to && all.high[i] >= from;
+                    if (!here && !(group.overhang > zc_ && corners.nz[i] < 0)) continue;
+                    wanted[k] |= 1U << i;
+                    prefetch(solid_.facets[first + i]);
+                }
+            }
+            for (std::size_t k = 0; k < n; ++k)
+                for (std::uint32_t left = wanted[k]; left != 0; left &= left - 1) {
+                    const auto i = static_cast<std::size_t>(std::countr_zero(left));
+                    meet(solid_.facets[facets_of(some[k])[0] + i], solid_.groups[some[k]], touched_[k], i);
+                }
+        }
+    }
+    template <class T>
+    static void prefetch(const T& what) {
+        constexpr std::size_t line = 64;
+        for (std::size_t at = 0; at < sizeof(T); at += line) __builtin_prefetch(reinterpret_cast<const char*>(&what) + at);
+    }
+    // The lines in which the places of one of a group's facets lie.
+    [[nodiscard]] LineRange lines_in(const GroupTouched::Range& range, std::size_t i, const FacetGroup& group) const {
+        if (!(range.low[i] <= range.high[i])) return {};
+        return {first_line_from(group.middle[V] + static_cast<double>(range.low[i])),
+                first_line_from(group.middle[V] + static_cast<double>(range.high[i]))};
+    }
+
     // What a ball can touch without being in the solid, on the lines where it can: there every end of what is forbidden is found.
     void meet_touched(std::span<const std::uint32_t> groups) {
-        for (std::size_t g = groups.size(); g-- > 0;) {
-            const FacetGroup& group = solid_.groups[groups[g]];
-            const bool level = group.overhang > zc_;
-            if (!level && !can_touch(group)) continue;
-            const auto [first, last] = facets_of(groups[g]);
-            group_touched(solid_.corners[groups[g]], group, V, r_, zc_, touched_);
-            const auto from = static_cast<float>(at_[0] - group.middle[V]) - kTouchMargin,
-                       to = static_cast<float>(at_[n_ - 1] - group.middle[V]) + kTouchMargin;
-            const auto lines = [&](const GroupTouched::Range& range, std::size_t i) -> LineRange {
-                if (!(range.low[i] <= range.high[i])) return {};
-                return {first_line_from(group.middle[V] + static_cast<double>(range.low[i])),
-                        first_line_from(group.middle[V] + static_cast<double>(range.high[i]))};
-            };
-            for (std::size_t i = first; i < last; ++i) {
-                const SolidFacet& f = solid_.facets[i];
-                if (level && f.nz < 0 && f.z_max > zc_) {
+        look_together(
+            groups.rbegin(), groups.rend(), [&](const FacetGroup& group) { return can_touch(group); },
+            [&](std::uint32_t g, GroupTouched& touched) { group_touched(solid_.corners[g], solid_.groups[g], V, r_, zc_, touched); },
+            [&](const SolidFacet& f, const FacetGroup& group, const GroupTouched& touched, std::size_t i) {
+                if (group.overhang > zc_ && f.nz < 0 && f.z_max > zc_) {
                     const auto [v_low, v_high] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
                     meet_facet(f, reaches_out(f, lines_between(v_low, v_high)));
-                    continue;
+                    return;
                 }
-                if (!(touched_.all.low[i - first] <= to && touched_.all.high[i - first] >= from)) continue;
-                if (!(f.z_max > zc_ - r_ && f.z_min <= zc_)) continue;
-                if (const LineRange met = lines(touched_.face, i - first); met.any() && f.normal != Vec3d{0, 0, 0})
+                if (!(f.z_max > zc_ - r_ && f.z_min <= zc_)) return;
+                if (const LineRange met = lines_in(touched.face, i, group); met.any() && f.normal != Vec3d{0, 0, 0})
                     meet_part(met, [&](const double* v, int n, double* low, double* high, double* nz_low, double* nz_high) {
                         marked_prism_rows(prism<U, V>(f, r_, zc_), v, n, low, high, nz_low, nz_high);
                     });
                 for (std::size_t k = 0; k < 3; ++k)
-                    if (const LineRange met = lines(touched_.edge[k], i - first); met.any())
+                    if (const LineRange met = lines_in(touched.edge[k], i, group); met.any())
                         meet_part(met, [&](const double* v, int n, double* low, double* high, double* nz_low, double* nz_high) {
-                            capsule_rows(capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r_, zc_), v, n, low, high, nz_low, nz_high);
+                            cylinder_rows(capsule<U, V>(f.p[k], f.p[(k + 1) % 3], r_, zc_), v, n, low, high, nz_low, nz_high);
                         });
-            }
-        }
+                for (std::size_t k = 0; k < 3; ++k)
+                    if (const LineRange met = lines_in(touched.end[k], i, group); met.any())
+                        meet_part(met, [&](const double* v, int n, double* low, double* high, double* nz_low, double* nz_high) {
+                            end_rows(capsule<U, V>(f.p[k], f.p[k], r_, zc_), v, n, low, high, nz_low, nz_high);
+                        });
+            });
     }
 
     // The same for a disc: it touches the sections of facets that do not face down, and what overhangs it anywhere.
     void meet_touched_by_disc(std::span<const std::uint32_t> groups) {
-        for (const std::uint32_t g : groups) {
-            const FacetGroup& group = solid_.groups[g];
-            const bool level = group.overhang > zc_;
-            if (!level && (group.z_max <= zc_ || group.z_min > zc_)) continue;
-            const auto [first, last] = facets_of(g);
-            group_touched_by_disc(solid_.corners[g], group, V, r_, zc_, touched_.face);
-            for (std::size_t i = first; i < last; ++i) {
-                const SolidFacet& f = solid_.facets[i];
-                if (f.z_max <= zc_) continue;
+        look_together(
+            groups.begin(), groups.end(), [&](const FacetGroup& group) { return group.z_max > zc_ && group.z_min <= zc_; },
+            [&](std::uint32_t g, GroupTouched& touched) { group_touched_by_disc(solid_.corners[g], solid_.groups[g], V, r_, zc_, touched.all); },
+            [&](const SolidFacet& f, const FacetGroup& group, const GroupTouched& touched, std::size_t i) {
+                if (f.z_max <= zc_) return;
                 if (f.nz < 0) {
                     const auto [v_low, v_high] = std::minmax({f.p[0][V], f.p[1][V], f.p[2][V]});
                     meet_facet(f, lines_between(v_low, v_high));
-                } else if (f.z_min <= zc_ && touched_.face.low[i - first] <= touched_.face.high[i - first]) {
-                    meet_section(f, {first_line_from(group.middle[V] + static_cast<double>(touched_.face.low[i - first])),
-                                     first_line_from(group.middle[V] + static_cast<double>(touched_.face.high[i - first]))});
+                } else if (f.z_min <= zc_) {
+                    meet_section(f, lines_in(touched.all, i, group));
                 }
-            }
-        }
+            });
         for (int l = 0; l < n_; ++l) join(found_[l]);
     }
 
@@ -239,8 +278,8 @@ public:
         std::array<Vec3d, 2> cut;
         if (!lines.any() || !cut_segment(f, zc_, cut)) return;
         const std::uint8_t most = *std::max_element(f.aside.begin(), f.aside.end());
-        const double across = std::hypot(f.normal[0], f.normal[1]), du = cut[1][U] - cut[0][U], dv = cut[1][V] - cut[0][V],
-                     length2 = du * du + dv * dv;
+        const double across = std::sqrt(f.normal[0] * f.normal[0] + f.normal[1] * f.normal[1]), du = cut[1][U] - cut[0][U],
+                     dv = cut[1][V] - cut[0][V], length2 = du * du + dv * dv;
         const bool known = most != SolidFacet::kAnyTurn && across > 0;
         const double turn = most * SolidFacet::kTurn + kTurnMargin;
         const auto within = [&](double u, double v) {
@@ -266,6 +305,7 @@ public:
         for (const std::uint32_t g : groups) {
             const FacetGroup& group = solid_.groups[g];
             if (group.z_max <= zc_ || (group.overhang <= zc_ && group.z_min > zc_)) continue;
+            if (!near_gap(group.low[U], group.high[U], group.low[V], group.high[V])) continue;
             if (!box_reaches_out(group.low[U], group.high[U], group.low[V], group.high[V]).any()) continue;
             const auto [first, last] = facets_of(g);
             for (std::size_t i = first; i < last; ++i) {
@@ -303,6 +343,28 @@ public:
         return {hulls_.low[l], hulls_.high[l], static_cast<float>(hulls_.nz_low[l]), static_cast<float>(hulls_.nz_high[l])};
     }
 
+    // Notes where the middles of gaps lie.
+    void find_gaps() {
+        const double extent = solid_.max[U] - solid_.min[U] + 2 * r_;
+        stretches_per_mm_ = extent > 0 ? kStretches / extent : 0;
+        gaps_.fill(0);
+        for (int l = 0; l < n_; ++l)
+            for (std::size_t i = 1; i < found_[l].size(); ++i)
+                gaps_[stretch_of(0.5 * (found_[l][i - 1].high + found_[l][i].low))] |= std::uint64_t{1} << l;
+    }
+    [[nodiscard]] std::size_t stretch_of(double u) const {
+        return static_cast<std::size_t>(std::clamp((u - (solid_.min[U] - r_)) * stretches_per_mm_, 0.0, kStretches - 1.0));
+    }
+    // Whether the middle of a gap may lie within the radius of a box.
+    [[nodiscard]] bool near_gap(double u_low, double u_high, double v_low, double v_high) const {
+        std::uint64_t lines = 0;
+        for (std::size_t i = stretch_of(u_low - r_), last = stretch_of(u_high + r_); i <= last; ++i) lines |= gaps_[i];
+        if (lines == 0) return false;
+        const LineRange near = lines_between(v_low, v_high);
+        if (!near.any()) return false;
+        return (lines >> near.first & ~std::uint64_t{0} >> (kLinesTogether - (near.last - near.first))) != 0;
+    }
+
     // All ends of what is forbidden are known, and are at r from what a ball touches there: a gap at an end that is nearer to something is none.
     static void close_within(std::vector<Forbidden>& on_line) {
         constexpr auto within = static_cast<float>(kWithin);
@@ -338,6 +400,7 @@ public:
     void meet_all(std::span<const std::uint32_t> groups) {
         for (std::size_t g = groups.size(); g-- > 0;) {  // of a wall the upper ones come first, which reach farthest
             const FacetGroup& group = solid_.groups[groups[g]];
+            if (amid_gaps_ && !near_gap(group.low[U], group.high[U], group.low[V], group.high[V])) continue;
             const LineRange lines = group_reaches_out(group);
             if (!lines.any()) continue;
             const auto [first, last] = facets_of(groups[g]);
@@ -399,8 +462,14 @@ public:
     // What is forbidden in the end, line by line.
     [[nodiscard]] Fibres merged() {
         Fibres part;
+        std::size_t count = 0;
         for (int l = 0; l < n_; ++l) {
             join(found_[l]);
+            count += found_[l].size();
+        }
+        part.intervals.reserve(count);
+        part.starts.reserve(static_cast<std::size_t>(n_) + 1);
+        for (int l = 0; l < n_; ++l) {
             part.intervals.insert(part.intervals.end(), found_[l].begin(), found_[l].end());
             part.starts.push_back(static_cast<std::uint32_t>(part.intervals.size()));
         }
@@ -646,16 +715,21 @@ private:
         }
     }
 
+    static constexpr double kStretches = 1024;  // of the solid's extent along the lines
     bool amid_gaps_ = false;
+    double stretches_per_mm_ = 0;
+    std::array<std::uint64_t, static_cast<std::size_t>(kStretches)> gaps_{};  // by stretch the lines that have a gap's middle there
     float inside_nz_ = 0;
     const LayerSolid& solid_;
     const bool ball_;
-    const double r_, zc_;
+    const double r_;
+    double zc_ = 0;
     const int n_;
     alignas(64) std::array<double, kLinesTogether> at_{}, low_{}, high_{};
     HullRows hulls_;
     GroupRows rows_;
-    GroupTouched touched_;
+    static constexpr std::size_t kTogether = 8;
+    std::array<GroupTouched, kTogether> touched_;
     double per_mm_ = 0;  // lines
     alignas(64) std::array<std::int64_t, kLinesTogether> state_{};
     std::array<std::vector<Forbidden>, kLinesTogether> found_;  // a ball's: ascending and disjoint
@@ -803,14 +877,12 @@ std::vector<Fibres> fibres_along(Context& context, const LayerSolid& solid, std:
     std::vector<std::vector<Fibres>> parts(levels.size(), std::vector<Fibres>(blocks));
     parallel_each(context, blocks, [&](std::size_t b) {
         const std::span<const std::int32_t> own = lines.subspan(b * kBlock, std::min(kBlock, lines.size() - b * kBlock));
-        const Fibres* above = nullptr;
+        BlockOfLines<U, V> block(solid, cutter, own);
         for (const std::size_t i : downwards) {
-            BlockOfLines<U, V> block(solid, cutter, centre(levels[i]), own);
-            if (above != nullptr) block.begin_with(*above);
+            block.begin(centre(levels[i]));
             block.meet_inside(of_level[i]->segments(b), own);
             block.meet(of_level[i]->groups(b));
             parts[i][b] = block.merged();
-            above = &parts[i][b];
         }
     });
     parallel_each(context, levels.size(), [&](std::size_t i) {

@@ -31,6 +31,11 @@ Vec3d unit_normal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
     return {n[0] / length, n[1] / length, n[2] / length};
 }
 
+Vec3d normal_of(MeshView mesh, std::uint32_t f) {
+    const Index3& v = mesh.facets[f];
+    return unit_normal(to_double(mesh.vertices[v[0]]), to_double(mesh.vertices[v[1]]), to_double(mesh.vertices[v[2]]));
+}
+
 // The crossing is computed from the lower end to the upper one, so that both facets of an edge get the same point.
 Vec3d cross_plane(const Vec3d& a, const Vec3d& b, double z) {
     const Vec3d& low = a[2] <= b[2] ? a : b;
@@ -54,22 +59,46 @@ bool edge_matters(MeshView mesh, std::uint32_t f, int k, const Vec3d& a, const V
     return true;
 }
 
-// Of a facet's corners, SolidFacet::turn and SolidFacet::aside.
+// Of a whole facet's corners and edges, SolidFacet::turn, aside, edges and ends.
 struct Turns {
     std::array<std::uint8_t, 3> turn{SolidFacet::kAnyTurn, SolidFacet::kAnyTurn, SolidFacet::kAnyTurn}, aside = turn;
+    std::uint8_t edges = 0, ends = 0;
+    EdgeNormals normals;
 };
 
-// Writes the facets that it makes to `out`, as many as pieces() says, and moves that on.
-void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_top, SolidFacet*& out) {
+// Makes those of an edge what lies between the normals beside it: along the way from one to the other, no farther than in a half turn.
+void lay_between(const Vec3d& m, const Vec3d& n, std::size_t edge, EdgeNormals& normals) {
+    constexpr double most_turn = -0.99, no_turn = 1 - 1e-12, rounding = 1e-6;
+    const double along = dot(m, n);
+    if (dot(m, m) == 0 || dot(n, n) == 0 || along < most_turn) return;
+    const Vec3d axis = cross(m, n);
+    const double across2 = dot(axis, axis);
+    for (std::size_t k = 0; k < 3; ++k) {
+        double low = std::min(m[k], n[k]), high = std::max(m[k], n[k]);
+        if (along < no_turn) {
+            // Where both ends lead on, the way turns back between them.
+            const double from_m = n[k] - along * m[k], from_n = m[k] - along * n[k], turn = std::sqrt(std::max(0.0, 1 - axis[k] * axis[k] / across2));
+            if (from_m > 0 && from_n > 0) high = turn;
+            if (from_m < 0 && from_n < 0) low = -turn;
+        }
+        normals.low[edge][k] = static_cast<std::int8_t>(std::max(-127.0, std::floor((low - rounding) / SolidFacet::kTurn)));
+        normals.high[edge][k] = static_cast<std::int8_t>(std::min(127.0, std::ceil((high + rounding) / SolidFacet::kTurn)));
+    }
+}
+
+// Writes the facets that it makes to `out` and `normals`, as many as pieces() says, and moves these on.
+void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_top, SolidFacet*& out, EdgeNormals*& normals) {
     std::array<Vec3d, 3> p;
     for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     const Vec3d n = unit_normal(p[0], p[1], p[2]);
     std::array<bool, 3> matters;
-    for (int k = 0; k < 3; ++k) matters[k] = edge_matters(mesh, f, k, p[k], n);
+    for (int k = 0; k < 3; ++k) matters[k] = turn.edges >> k & 1;
 
     // Clip at z_top; corner[i] is followed by an edge that matters[i] (the new edge along the top always does).
+    constexpr int along_top = 3;
     std::array<Vec3d, 4> corner;
-    std::array<bool, 4> edge{};
+    std::array<bool, 4> edge{}, end{};
+    std::array<int, 4> of{};  // which edge of the facet that is
     std::array<std::array<std::uint8_t, 2>, 4> turns{};
     const std::array<std::uint8_t, 2> most_turn{*std::max_element(turn.turn.begin(), turn.turn.end()),
                                                 *std::max_element(turn.aside.begin(), turn.aside.end())};
@@ -80,19 +109,31 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         if (a_in) {
             corner[corners] = a;
             turns[corners] = a[2] == z_top ? most_turn : std::array{turn.turn[k], turn.aside[k]};
+            end[corners] = a[2] == z_top || (turn.ends >> k & 1) != 0;
             // What lies beyond an edge in the top is not there to test it.
-            edge[corners++] = matters[k] || (a[2] == z_top && b[2] == z_top);
+            const bool in_top = a[2] == z_top && b[2] == z_top;
+            of[corners] = in_top ? along_top : k;
+            edge[corners++] = matters[k] || in_top;
         }
         if (a_in != b_in && a[2] != z_top && b[2] != z_top) {
             corner[corners] = cross_plane(a, b, z_top);
             turns[corners] = most_turn;
+            end[corners] = true;
+            of[corners] = a_in ? along_top : k;
             edge[corners++] = a_in ? true : matters[k];
         } else if (a_in && !b_in) {
             edge[corners - 1] = true;  // a lies on the top itself: what follows it is the top edge
+            of[corners - 1] = along_top;
         }
     }
     if (corners < 3) return;
-    auto emit = [&](int i, int j, int k, bool ij, bool jk, bool ki) {
+    EdgeNormals::Each top_low{-127, -127, -127}, top_high{127, 127, 127};
+    if (std::find(of.begin(), of.begin() + corners, along_top) != of.begin() + corners) {
+        EdgeNormals top;
+        lay_between(n, {0, 0, 1}, 0, top);
+        top_low = top.low[0], top_high = top.high[0];
+    }
+    auto emit = [&](int i, int j, int k, bool ij, bool jk, bool ki, bool first) {
         SolidFacet s;
         s.p = {corner[i], corner[j], corner[k]};
         s.normal = n;
@@ -102,12 +143,22 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         s.z_max = std::max({s.p[0][2], s.p[1][2], s.p[2][2]});
         s.top = s.z_max >= z_top;
         s.turn = {turns[i][0], turns[j][0], turns[k][0]}, s.aside = {turns[i][1], turns[j][1], turns[k][1]};
+        const auto ends_here = [&](int c) { return end[c] && (first || c == k); };
+        s.ends = static_cast<std::uint8_t>((ends_here(i) ? 1 : 0) | (ends_here(j) ? 2 : 0) | (ends_here(k) ? 4 : 0)) & 7;
         *out++ = s;
+        EdgeNormals around;
+        std::size_t at = 0;
+        for (const int c : {i, j, k}) {
+            const auto whole = static_cast<std::size_t>(of[c]);
+            around.low[at] = of[c] == along_top ? top_low : turn.normals.low[whole];
+            around.high[at++] = of[c] == along_top ? top_high : turn.normals.high[whole];
+        }
+        *normals++ = around;
     };
-    if (corners == 3) emit(0, 1, 2, edge[0], edge[1], edge[2]);
+    if (corners == 3) emit(0, 1, 2, edge[0], edge[1], edge[2], true);
     else {
-        emit(0, 1, 2, edge[0], edge[1], false);
-        emit(0, 2, 3, false, edge[2], edge[3]);
+        emit(0, 1, 2, edge[0], edge[1], false, true);
+        emit(0, 2, 3, false, edge[2], edge[3], false);
     }
 }
 
@@ -152,17 +203,24 @@ Seen seen_from_above(const Vec3d& n, std::array<double, 2>& direction) {
 std::vector<Turns> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets) {
     constexpr std::size_t grain = 4096;
     std::vector<Vec3d> normals(facets.size());
+    std::vector<Turns> turns(facets.size());
     parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const Index3& v = mesh.facets[facets[i]];
             const Index3& across = mesh.neighbours[facets[i]];
-            normals[i] = unit_normal(to_double(mesh.vertices[v[0]]), to_double(mesh.vertices[v[1]]), to_double(mesh.vertices[v[2]]));
+            normals[i] = normal_of(mesh, facets[i]);
+            for (int k = 0; k < 3; ++k) {
+                if (!edge_matters(mesh, facets[i], k, to_double(mesh.vertices[v[k]]), normals[i])) continue;
+                turns[i].edges |= static_cast<std::uint8_t>(1 << k);
+                if (across[k] != kNoFacet) lay_between(normals[i], normal_of(mesh, across[k]), static_cast<std::size_t>(k), turns[i].normals);
+            }
             if (across[0] == kNoFacet || across[1] == kNoFacet || across[2] == kNoFacet) normals[i] = {0, 0, 0};
         }
     });
     struct Around {
         Directions<3> normals;
         Directions<2> aside;
+        bool tested = false;
     };
     std::vector<Around> around(mesh.vertices.size());
     for (std::size_t i = 0; i < facets.size(); ++i) {
@@ -175,9 +233,15 @@ std::vector<Turns> turns(Context& context, MeshView mesh, std::span<const std::u
             if (const Seen seen = seen_from_above(normals[i], aside); seen == Seen::all) own.aside.add_all();
             else if (seen == Seen::direction) own.aside.add(aside);
         }
-        for (const std::uint32_t v : mesh.facets[facets[i]]) around[v].normals.add(own.normals), around[v].aside.add(own.aside);
+        for (std::size_t c = 0; c < 3; ++c) {
+            Around& at = around[mesh.facets[facets[i]][c]];
+            at.normals.add(own.normals), at.aside.add(own.aside);
+            // The first one with an edge to test that ends in a corner.
+            if (at.tested || (turns[i].edges & (1U << c | 1U << (c + 2) % 3)) == 0) continue;
+            at.tested = true;
+            turns[i].ends |= static_cast<std::uint8_t>(1U << c);
+        }
     }
-    std::vector<Turns> turns(facets.size());
     parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (normals[i] == Vec3d{0, 0, 0}) continue;
@@ -288,21 +352,31 @@ void lay_disc(std::span<const SolidFacet> facets, FacetGroup& group) {
     group.thickness = static_cast<float>(thickness + rounding);
 }
 
-// What SolidFacet::turn says of all of a facet's corners.
-Facing facing_of(const SolidFacet& facet) {
+constexpr EdgeNormals kAnyNormals;
+
+// What is known of a facet, of its edges that are to be tested and of its corners.
+Facing facing_of(const SolidFacet& facet, const EdgeNormals& edges) {
     constexpr Facing any{{-1, -1, -1}, {1, 1, 1}};
-    const std::uint8_t most_turn = *std::max_element(facet.turn.begin(), facet.turn.end());
-    if (most_turn == SolidFacet::kAnyTurn) return any;
     constexpr double rounding = 1e-6;
-    const double turn = most_turn * SolidFacet::kTurn + rounding;
-    std::array<double, 3> low, high;
-    for (std::size_t k = 0; k < 3; ++k) low[k] = facet.normal[k] - turn, high[k] = facet.normal[k] + turn;
-    if (facet.top) {
+    if (facet.normal == Vec3d{0, 0, 0}) return any;
+    std::array<double, 3> low = facet.normal, high = low;
+    const auto add = [&](std::size_t k, double from, double to) { low[k] = std::min(low[k], from), high[k] = std::max(high[k], to); };
+    for (std::size_t e = 0; e < 3; ++e)
+        for (std::size_t k = 0; k < 3 && (facet.edges >> e & 1) != 0; ++k)
+            add(k, edges.low[e][k] * SolidFacet::kTurn, edges.high[e][k] * SolidFacet::kTurn);
+    for (std::size_t c = 0; c < 3; ++c) {
+        if ((facet.ends >> c & 1) == 0) continue;
+        if (facet.turn[c] == SolidFacet::kAnyTurn) return any;
+        const double turn = facet.turn[c] * SolidFacet::kTurn + rounding;
+        const bool cut = facet.top && facet.p[c][2] >= facet.z_max;
         // Of a·n + b·up with unit length a is no more than 1, unless n points down: then it is 1 / √(1 − n_z²).
-        if (low[2] < -kMostDown) return any;
-        const double most = low[2] < 0 ? 1 / std::sqrt(1 - low[2] * low[2]) : 1;
-        for (std::size_t k = 0; k < 2; ++k) low[k] = std::min(0.0, most * low[k]), high[k] = std::max(0.0, most * high[k]);
-        low[2] = std::min(low[2], most * low[2]), high[2] = 1;
+        const double down = facet.normal[2] - turn, most = cut && down < 0 ? 1 / std::sqrt(1 - down * down) : 1;
+        if (cut && down < -kMostDown) return any;
+        for (std::size_t k = 0; k < 2; ++k) {
+            add(k, most * (facet.normal[k] - turn), most * (facet.normal[k] + turn));
+            if (cut) add(k, 0, 0);
+        }
+        add(2, most * down, cut ? 1 : facet.normal[2] + turn);
     }
     Facing facing{};
     for (std::size_t k = 0; k < 3; ++k)
@@ -312,7 +386,7 @@ Facing facing_of(const SolidFacet& facet) {
 
 }  // namespace
 
-std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets) {
+std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets, std::span<const EdgeNormals> edges) {
     constexpr float inf = std::numeric_limits<float>::infinity();
     auto down = [](double v) { return std::nextafter(static_cast<float>(v), -inf); };
     auto up = [](double v) { return std::nextafter(static_cast<float>(v), inf); };
@@ -335,7 +409,8 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
             lay_disc(own, group);
             group.facing = {{1, 1, 1}, {-1, -1, -1}};
             for (const SolidFacet& f : own) {
-                const Facing facing = facing_of(f);
+                const std::size_t i = g * FacetGroup::kFacets + static_cast<std::size_t>(&f - own.data());
+                const Facing facing = facing_of(f, i < edges.size() ? edges[i] : kAnyNormals);
                 for (std::size_t k = 0; k < 3; ++k) {
                     group.facing.low[k] = std::min(group.facing.low[k], facing.low[k]);
                     group.facing.high[k] = std::max(group.facing.high[k], facing.high[k]);
@@ -365,7 +440,8 @@ float aside_at(const SolidFacet& facet, std::size_t corner) {
 
 }  // namespace
 
-std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups) {
+std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups,
+                                        std::span<const EdgeNormals> edges) {
     constexpr float far_below = -1e15F;
     std::vector<GroupCorners> corners(groups.size());
     parallel_for(context, groups.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -382,7 +458,10 @@ std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidF
                     to.turn[c][i] = f < facets.size() ? turn_at(facets[f], c) : 0.0F;
                     to.aside[c][i] = f < facets.size() ? aside_at(facets[f], c) : 0.0F;
                 }
-                to.edges[i] = f < facets.size() ? facets[f].edges : 0;
+                to.edges[i] = f < facets.size() ? facets[f].edges | facets[f].ends << 3 : 0;
+                const EdgeNormals& normals = f < edges.size() ? edges[f] : kAnyNormals;
+                for (std::size_t e = 0; e < 3; ++e)
+                    for (std::size_t k = 0; k < 3; ++k) to.least[e][k][i] = normals.low[e][k], to.most[e][k][i] = normals.high[e][k];
             }
         }
     });
@@ -404,9 +483,11 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     });
     for (std::size_t c = 1; c < starts.size(); ++c) starts[c] += starts[c - 1];
     // Making room for the facets takes one thread; others meanwhile cut the cap.
+    std::vector<EdgeNormals> edges;
     parallel_each(context, 2, [&](std::size_t task) {
         if (task == 1) {
             solid.facets.resize(starts.back());
+            edges.resize(starts.back());
             return;
         }
         const Plane top{cut_off, Side::below};
@@ -415,7 +496,8 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     });
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         SolidFacet* to = solid.facets.data() + starts[begin / kGrain];
-        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], turn[i], cut_off, to);
+        EdgeNormals* to_edges = edges.data() + starts[begin / kGrain];
+        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], turn[i], cut_off, to, to_edges);
     });
     using Extent = std::array<double, 4>;  // least x, y; greatest x, y
     const Extent extent = parallel_reduce(
@@ -431,8 +513,8 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
         });
     solid.min = {extent[0], extent[1]};
     solid.max = {extent[2], extent[3]};
-    solid.groups = facet_groups(context, solid.facets);
-    solid.corners = group_corners(context, solid.facets, solid.groups);
+    solid.groups = facet_groups(context, solid.facets, edges);
+    solid.corners = group_corners(context, solid.facets, solid.groups, edges);
     solid.tree = facet_tree(context, solid.facets, solid.min, solid.max);
     return solid;
 }

@@ -24,6 +24,7 @@ struct SolidFacet {
     double z_min = 0, z_max = 0;
     std::uint8_t edges : 3 = 0;  ///< bit k: the edge (p[k], p[k + 1]) is not concave, and this facet is the one to test it
     bool top : 1 = false;        ///< it reaches up to where the solid is cut off
+    std::uint8_t ends : 3 = 7;   ///< bit k: this facet is the one to test the corner p[k], in which edges end that are tested
     static constexpr std::uint8_t kAnyTurn = 255;
     static constexpr double kTurn = 1.0 / 127;
     /// How far from `normal` the unit normals end of all facets that share this corner, at most, in kTurn; kAnyTurn: nothing is known. Where the
@@ -40,6 +41,14 @@ struct Facing {
     std::array<float, 3> low, high;
 };
 
+/// Of each of a facet's edges between which x, y and z the unit normals lie with which a ball outside the solid can touch it between its ends, in
+/// SolidFacet::kTurn.
+struct EdgeNormals {
+    using Each = std::array<std::int8_t, 3>;
+    std::array<Each, 3> low{Each{-127, -127, -127}, Each{-127, -127, -127}, Each{-127, -127, -127}},
+        high{Each{127, 127, 127}, Each{127, 127, 127}, Each{127, 127, 127}};
+};
+
 /// What FacetGroup::kFacets facets that follow one another have in common, mm, rounded outward.
 struct FacetGroup {
     static constexpr std::size_t kFacets = 8;
@@ -52,8 +61,8 @@ struct FacetGroup {
     float radius = 0, thickness = 0;
     Facing facing{};
 };
-/// Of each eight facets, in their order; the last may have fewer.
-[[nodiscard]] std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets);
+/// Of each eight facets, in their order; the last may have fewer. @param edges of the facets; none: nothing is known
+[[nodiscard]] std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets, std::span<const EdgeNormals> edges = {});
 
 /// The same facets side by side, for tests of all of them at once: corners, each an x, y and z relative to the group's middle, and normals. Where a
 /// group has fewer facets, the others lie far below everything.
@@ -67,10 +76,13 @@ struct GroupCorners {
     /// solid is cut off: there it may also lie between such a normal and the upright one.
     alignas(32) std::array<Each<float>, 3> turn;
     alignas(32) std::array<Each<float>, 3> aside;  ///< the same of a disc's, seen from above
-    alignas(32) Each<std::int32_t> edges;          ///< SolidFacet::edges
+    alignas(32) Each<std::int32_t> edges;          ///< SolidFacet::edges, and three bits up SolidFacet::ends
+    /// EdgeNormals, by edge and x, y and z.
+    alignas(8) std::array<std::array<Each<std::int8_t>, 3>, 3> least, most;
     static constexpr float kAny = 3;
 };
-[[nodiscard]] std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups);
+[[nodiscard]] std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups,
+                                                      std::span<const EdgeNormals> edges = {});
 
 struct LayerSolid {
     double z_low = 0, z_top = 0;         ///< facets wholly below z_low are left out
