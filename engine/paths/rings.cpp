@@ -617,7 +617,7 @@ private:
 
     void wait_for_neighbours() {
         const std::size_t n = plan_.pieces.size();
-        waits_for_.assign(n, 0), waiting_.resize(n);
+        waits_for_.assign(n, 0), waiting_.resize(n), boxes_.resize(n);
         auto ring = [&](std::size_t k) { return plan_.pieces[k].ring; };
         for (std::size_t first = 0, farther = 0, end = 0; first < n; first = farther) {  // pieces lie in the order of their rings
             for (farther = first; farther < n && ring(farther) == ring(first);) ++farther;
@@ -630,15 +630,42 @@ private:
             if (waits_for_[k] == 0) ready.push_back(k);
     }
 
-    [[nodiscard]] bool beside(const RingPlan::Piece& a, const RingPlan::Piece& b) const {
+    using Box = std::array<double, 4>;        // smallest x and y, largest x and y
+    static constexpr std::size_t kPart = 16;  // segments of a piece that share a box
+    static bool apart(const Box& a, const Box& b, double reach) {
+        return a[0] > b[2] + reach || b[0] > a[2] + reach || a[1] > b[3] + reach || b[1] > a[3] + reach;
+    }
+    // The boxes of a piece's parts.
+    [[nodiscard]] const std::vector<Box>& boxes_of_parts(const RingPlan::Piece& piece) {
+        std::vector<Box>& boxes = boxes_[static_cast<std::size_t>(&piece - plan_.pieces.data())];
+        for (std::size_t first = boxes.size() * kPart; first + 1 < piece.points.size(); first += kPart) {
+            Box& box = boxes.emplace_back(Box{1e300, 1e300, -1e300, -1e300});
+            for (std::size_t k = first; k <= std::min(first + kPart, piece.points.size() - 1); ++k) {
+                const PathPoint& p = piece.points[k];
+                box = {std::min<double>(box[0], p.x), std::min<double>(box[1], p.y), std::max<double>(box[2], p.x), std::max<double>(box[3], p.y)};
+            }
+        }
+        return boxes;
+    }
+
+    [[nodiscard]] bool beside(const RingPlan::Piece& a, const RingPlan::Piece& b) {
         const double reach = kBesideSteps * plan_.step * kUnitsPerMm;
-        for (int axis = 0; axis < 2; ++axis)
-            if (a.box[axis] > b.box[axis + 2] + reach || b.box[axis] > a.box[axis + 2] + reach) return false;
+        if (apart(a.box, b.box, reach)) return false;
         auto near = [&](const RingPlan::Piece& from, const RingPlan::Piece& to) {
-            return std::any_of(from.points.begin(), from.points.end(), [&](const PathPoint& p) {
-                return p.x >= to.box[0] - reach && p.x <= to.box[2] + reach && p.y >= to.box[1] - reach && p.y <= to.box[3] + reach &&
-                       near_line(p, to.points, reach);
-            });
+            const std::vector<Box>&from_boxes = boxes_of_parts(from), &to_boxes = boxes_of_parts(to);
+            for (std::size_t f = 0; f < from_boxes.size(); ++f) {
+                if (apart(from_boxes[f], to.box, reach)) continue;
+                for (std::size_t k = f * kPart; k <= std::min((f + 1) * kPart, from.points.size() - 1); ++k) {
+                    const PathPoint& p = from.points[k];
+                    const Box at{static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.x), static_cast<double>(p.y)};
+                    if (apart(at, to.box, reach)) continue;
+                    for (std::size_t t = 0; t < to_boxes.size(); ++t)
+                        if (!apart(at, to_boxes[t], reach) &&
+                            near_line(p, std::span(to.points).subspan(t * kPart, std::min(kPart + 1, to.points.size() - t * kPart)), reach))
+                            return true;
+                }
+            }
+            return false;
         };
         return near(a, b) || near(b, a);
     }
@@ -647,6 +674,7 @@ private:
     std::vector<std::size_t> left_;                  // by region: pieces not cut yet; with hold
     std::vector<std::size_t> waits_for_;             // by piece, without it: how many others
     std::vector<std::vector<std::size_t>> waiting_;  // and who waits for it
+    std::vector<std::vector<Box>> boxes_;            // of its parts, once they were asked for
 };
 
 }  // namespace
