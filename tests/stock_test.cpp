@@ -168,6 +168,9 @@ TEST(Sweep, SpansAgreeWithTheirCells) {
         for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k)
             some_span(spans.low[k], spans.left[k]), some_span(spans.right[k], spans.high[k]);
         const OverSpans over = spans_over(heights.data(), static_cast<std::size_t>(nx), rows, spans, level);
+        float highest = -std::numeric_limits<float>::infinity();
+        std::vector<float> under_zero = heights;
+        for (float& h : under_zero) h -= 2;
         std::vector<float> lowered = heights, expected = heights, deep = heights, expected_deep = heights;
         lower_spans(lowered.data(), static_cast<std::size_t>(nx), rows, spans, level_z);
         const auto under = static_cast<float>(2 * u(random) - 1);  // of a level itself, under 0 too
@@ -180,6 +183,7 @@ TEST(Sweep, SpansAgreeWithTheirCells) {
                     const std::size_t c = row * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i);
                     found = found || bottom + static_cast<double>(heights[c]) > level_z;
                     expected[c] = std::min(expected[c], static_cast<float>(std::max(0.0, level_z)));
+                    highest = std::max(highest, under_zero[c]);
                     expected_deep[c] = std::min(expected_deep[c], under);
                 }
                 return found;
@@ -187,6 +191,7 @@ TEST(Sweep, SpansAgreeWithTheirCells) {
             EXPECT_EQ((over.left >> row & 1) != 0, any(spans.low[row], spans.left[row])) << "trial " << trial << " row " << k;
             EXPECT_EQ((over.right >> row & 1) != 0, any(spans.right[row], spans.high[row])) << "trial " << trial << " row " << k;
         }
+        EXPECT_EQ(highest_in(under_zero.data(), static_cast<std::size_t>(nx), rows, spans), highest) << "trial " << trial;
         EXPECT_EQ(deep, expected_deep) << "trial " << trial;
         EXPECT_EQ(lowered, expected) << "trial " << trial;
     }

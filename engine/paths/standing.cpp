@@ -52,19 +52,28 @@ const Standing::BallTable& Standing::ball_table(double radius) const {
     return found != tables_.end() ? *found : tables_.emplace_back(made_table(radius));
 }
 
-// Calls row(j, first, last) for the cells whose centres lie within `radius` of the segment from a to b.
-template <class Row>
-void Standing::rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, Row&& row) const {
+// Calls take(first row, rows, spans) for the cells whose centres lie within `radius` of the segment from a to b, some rows at a time;
+// `been`: without those within it of a.
+template <class Spans>
+void Standing::each_spans(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, bool been, Spans&& take) const {
     if (radius <= 0) return;
     const CellGrid grid{x0_, y0_, cell_, nx_, ny_};
     const auto [first, last] = rows_between(grid, std::min(a[1], b[1]) - radius, std::max(a[1], b[1]) + radius);
     RowSpans spans;
     for (int j = first; j <= last; j += RowSpans::kRows) {
         const int together = std::min(RowSpans::kRows, last - j + 1);
-        spans_of_rows(grid, j, together, a, b, radius, false, spans);
+        spans_of_rows(grid, j, together, a, b, radius, been, spans);
+        take(j, together, spans);
+    }
+}
+
+// Calls row(j, first, last) for all of them.
+template <class Row>
+void Standing::rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, Row&& row) const {
+    each_spans(radius, a, b, false, [&](int j, int together, const RowSpans& spans) {
         for (std::size_t k = 0; k < static_cast<std::size_t>(together); ++k)
             if (spans.low[k] <= spans.left[k]) row(j + static_cast<int>(k), spans.low[k], spans.left[k]);
-    }
+    });
 }
 
 void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to) {
@@ -76,15 +85,10 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
         // Each covered cell was covered at some place of the way, and no place is higher than its higher end.
         const auto z = static_cast<float>((l2 > 0 ? high : low) - top_ + kRounding);
         const bool level = from[2] == to[2], been = level && from == last_ && cutter.radius == last_radius_;
-        const CellGrid grid{x0_, y0_, cell_, nx_, ny_};
-        const double radius = cutter.radius - d_;
-        const auto [first, last] = rows_between(grid, std::min(a[1], b[1]) - radius, std::max(a[1], b[1]) + radius);
-        RowSpans spans;
-        for (int j = first; j <= last; j += RowSpans::kRows) {
-            const int together = std::min(RowSpans::kRows, last - j + 1);
-            spans_of_rows(grid, j, together, a, b, radius, been, spans);
-            lower_spans(height_.data() + grid.index(0, j), static_cast<std::size_t>(nx_), together, spans, z);
-        }
+        each_spans(cutter.radius - d_, a, b, been, [&](int j, int together, const RowSpans& spans) {
+            lower_spans(height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_), static_cast<std::size_t>(nx_), together, spans,
+                        z);
+        });
         if (level) last_ = to, last_radius_ = cutter.radius;
         return;
     }
@@ -108,9 +112,9 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
 
 double Standing::top(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b) const {
     float most = -std::numeric_limits<float>::infinity();
-    rows(radius + d_, a, b, [&](int j, int first, int last) {
-        const float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
-        for (int i = first; i <= last; ++i) most = std::max(most, h[i]);
+    each_spans(radius + d_, a, b, false, [&](int j, int together, const RowSpans& spans) {
+        most = std::max(most, highest_in(height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_), static_cast<std::size_t>(nx_),
+                                         together, spans));
     });
     return top_ + static_cast<double>(most);
 }

@@ -48,6 +48,8 @@ private:
     [[nodiscard]] BallTable made_table(double radius) const;
     /// The table of this radius, made when it is first asked for; until the next call.
     [[nodiscard]] const BallTable& ball_table(double radius) const;
+    template <class Spans>
+    void each_spans(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, bool been, Spans&& take) const;
     template <class Row>
     void rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, Row&& row) const;
 

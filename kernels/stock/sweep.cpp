@@ -332,6 +332,28 @@ SLABWRIGHT_WIDE OverSpans spans_over(const float* height, std::size_t nx, int ro
     return over;
 }
 
+SLABWRIGHT_WIDE float highest_in(const float* height, std::size_t nx, int rows, const RowSpans& spans) {
+    constexpr float none = -std::numeric_limits<float>::infinity();
+    Floats most = Floats{} + none;
+    float of_rest = none;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k, height += nx) {
+        const auto in_span = [&](std::int32_t first, std::int32_t last) {
+            by_eights(
+                first, last,
+                [&](std::int32_t i, const Bits& mask) {
+                    Floats h;
+                    load(height + i, h);
+                    most = ((h > most) & mask) ? h : most;
+                },
+                [&](std::int32_t i) { of_rest = std::max(of_rest, height[i]); });
+        };
+        in_span(spans.low[k], spans.left[k]);
+        in_span(spans.right[k], spans.high[k]);
+    }
+    for (int k = 0; k < kLanes; ++k) of_rest = std::max(of_rest, most[k]);
+    return of_rest;
+}
+
 void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, double z) {
     lower_spans(height, nx, rows, spans, static_cast<float>(z > 0 ? z : 0.0));
 }

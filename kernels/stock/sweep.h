@@ -150,6 +150,8 @@ struct OverSpans {
 };
 /// @param height of the first row's first cell; rows lie nx apart
 [[nodiscard]] OverSpans spans_over(const float* height, std::size_t nx, int rows, const RowSpans& spans, float level);
+/// The highest of the heights in all spans; −infinity where they hold none.
+[[nodiscard]] float highest_in(const float* height, std::size_t nx, int rows, const RowSpans& spans);
 /// Lowers the heights in all spans to a level, or to max(0, z), where they are over it.
 void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, float level);
 void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, double z);
