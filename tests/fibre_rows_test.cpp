@@ -215,7 +215,6 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
             for (Vec3d& p : f.p) p = {away + within(-size, size), away + within(-size, size), within(-size, size)};
             f.normal = unit({within(-1, 1), within(-1, 1), within(-0.4, 1)});
             f.nz = static_cast<float>(f.normal[2]);
-            for (std::uint8_t& turn : f.turn) turn = random() % 5 == 0 ? SolidFacet::kAnyTurn : static_cast<std::uint8_t>(2 + random() % 160);
             f.top = random() % 4 == 0;
             if (f.top && random() % 2 == 0) f.p[0][2] = f.p[1][2] = size;
             f.edges = random() & 7;
@@ -230,7 +229,7 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
         const bool on_end = part == 2;
         if (part == 1) f.edges = f.edges | (1U << edge & 7U);
         if (on_end) f.ends = f.ends | (1U << edge & 7U);
-        std::vector<EdgeNormals> normals(random() % 4 == 0 ? 0 : facets.size());
+        std::vector<FacetNormals> normals(random() % 4 == 0 ? 0 : facets.size());
         const Vec3d& n = f.normal;
         Vec3d place, d = n;
         if (part == 0) {
@@ -238,13 +237,12 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
             if (a + b > 1) a = 1 - a, b = 1 - b;
             for (std::size_t c = 0; c < 3; ++c) place[c] = f.p[0][c] + a * (f.p[1][c] - f.p[0][c]) + b * (f.p[2][c] - f.p[0][c]);
         } else {
-            const double most = f.turn[edge] == SolidFacet::kAnyTurn ? 2.1 : f.turn[edge] * SolidFacet::kTurn, a = on_end ? 0 : within(0, 1);
+            const double a = on_end ? 0 : within(0, 1);
             d = unit({within(-1, 1), within(-1, 1), within(-1, 1)});
-            while (on_end && std::hypot(d[0] - n[0], d[1] - n[1], d[2] - n[2]) > most) d = unit({d[0] + n[0], d[1] + n[1], d[2] + n[2]});
-            if (on_end && f.top && f.p[edge][2] == f.z_max && random() % 2 == 0) d = unit({d[0], d[1], d[2] + within(0, 2)});
             for (std::size_t c = 0; c < 3 && !normals.empty(); ++c) {
-                normals[k].low[edge][c] = static_cast<std::int8_t>(std::max(-127.0, std::floor(d[c] / SolidFacet::kTurn - within(0, 20))));
-                normals[k].high[edge][c] = static_cast<std::int8_t>(std::min(127.0, std::ceil(d[c] / SolidFacet::kTurn + within(0, 20))));
+                NormalBox& box = on_end ? normals[k].corner[edge] : normals[k].edge[edge];
+                box.low[c] = static_cast<std::int8_t>(std::max(-127.0, std::floor(d[c] / SolidFacet::kTurn - within(0, 20))));
+                box.high[c] = static_cast<std::int8_t>(std::min(127.0, std::ceil(d[c] / SolidFacet::kTurn + within(0, 20))));
             }
             for (std::size_t c = 0; c < 3; ++c) place[c] = f.p[edge][c] + a * (f.p[next][c] - f.p[edge][c]);
         }

@@ -405,8 +405,8 @@ template <class T, class Vector>
 
 }  // namespace
 
-// A ball touches with the normal d at its centre less r·d: a facet with its own, an edge with one between those beside it, a corner with one that
-// is near enough, and each on the part that is as high as that. `wider` is more than what floats round, of the heights and of where an edge crosses
+// A ball touches with the normal d at its centre less r·d: a facet with its own, an edge with one between those beside it, a corner with one between
+// those around it, and each on the part that is as high as that. `wider` is more than what floats round, of the heights and of where an edge crosses
 // one of them.
 SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& group, std::size_t v, double radius, double zc, GroupTouched& touched) {
     const Floats none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
@@ -422,16 +422,12 @@ SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& grou
     // Of each corner the normals, and where a ball touches it; of each edge what it is wide for each mm that it is high.
     std::array<Floats, 3> pz, pv, wide, least, most;
     for (std::size_t c = 0; c < 3; ++c) {
-        Floats turn;
-        load(g.turn[c], turn), load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]);
-        const Bits cut = turn < 0;
-        turn = cut ? -1 - turn : turn;
-        Floats z_least = nz - turn, z_most = nz + turn, v_least = nv - turn, v_most = nv + turn;
-        raise(z_least, -one), lower(z_most, one), raise(v_least, -one), lower(v_most, one);
-        z_most = cut ? one : z_most;
-        v_least = (cut & (v_least > 0)) ? none : v_least, v_most = (cut & (v_most < 0)) ? none : v_most;
-        const Bits meets = ((edges & (8 << c)) != 0) & (pz[c] >= z - r * z_most - wider) & (pz[c] <= z - r * z_least + wider);
-        const Floats low = meets ? pv[c] + r * v_least - wider : inf, high = meets ? pv[c] + r * v_most + wider : -inf;
+        load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]);
+        Floats down, up, left, right;
+        load_small(g.corner.low[c][2], down), load_small(g.corner.high[c][2], up);
+        load_small(g.corner.low[c][v], left), load_small(g.corner.high[c][v], right);
+        const Bits meets = ((edges & (8 << c)) != 0) & (pz[c] >= z - step * up - wider) & (pz[c] <= z - step * down + wider);
+        const Floats low = meets ? pv[c] + step * left - wider : inf, high = meets ? pv[c] + step * right + wider : -inf;
         store(low, high, touched.end[c]);
         lower(all_low, low), raise(all_high, high);
     }
@@ -458,7 +454,8 @@ SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& grou
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t next = k == 2 ? 0 : k + 1;
         Floats down, up, left, right;
-        load_small(g.least[k][2], down), load_small(g.most[k][2], up), load_small(g.least[k][v], left), load_small(g.most[k][v], right);
+        load_small(g.edge.low[k][2], down), load_small(g.edge.high[k][2], up);
+        load_small(g.edge.low[k][v], left), load_small(g.edge.high[k][v], right);
         const Floats lowest = z - step * up - wider, highest = z - step * down + wider;
         low = inf, high = -inf;
         stretch(low, high, (pz[k] >= lowest) & (pz[k] <= highest), pv[k]);

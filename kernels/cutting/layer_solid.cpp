@@ -14,9 +14,9 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kMostDown = 0.5;    // z of a normal next to the top, below which nothing is said of how it may be touched there
-constexpr int kMostTurn = 170;       // in SolidFacet::kTurn: short of a right angle, within which a cone of normals holds all between them
-constexpr int kMostAside = 240;      // the same in a plane: short of straight back
+constexpr double kLeastAlong =
+    0.17;                        // of normals along one that is amid them: short of a right angle from it, within which they hold all between them
+constexpr int kMostAside = 240;  // the same in a plane: short of straight back
 constexpr double kMostTiles = 1024;  // along x and along y, of solid_near
 
 Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
@@ -59,18 +59,23 @@ bool edge_matters(MeshView mesh, std::uint32_t f, int k, const Vec3d& a, const V
     return true;
 }
 
-// Of a whole facet's corners and edges, SolidFacet::turn, aside, edges and ends.
+// Of a whole facet's corners and edges, SolidFacet::aside, edges and ends, and the normals.
 struct Turns {
-    std::array<std::uint8_t, 3> turn{SolidFacet::kAnyTurn, SolidFacet::kAnyTurn, SolidFacet::kAnyTurn}, aside = turn;
+    std::array<std::uint8_t, 3> aside{SolidFacet::kAnyTurn, SolidFacet::kAnyTurn, SolidFacet::kAnyTurn};
     std::uint8_t edges = 0, ends = 0;
-    EdgeNormals normals;
+    FacetNormals normals;
 };
 
-// Makes those of an edge what lies between the normals beside it: along the way from one to the other, no farther than in a half turn.
-void lay_between(const Vec3d& m, const Vec3d& n, std::size_t edge, EdgeNormals& normals) {
-    constexpr double most_turn = -0.99, no_turn = 1 - 1e-12, rounding = 1e-6;
+constexpr double kNormalRounding = 1e-6;
+std::int8_t rounded_down(double v) { return static_cast<std::int8_t>(std::max(-127.0, std::floor((v - kNormalRounding) / SolidFacet::kTurn))); }
+std::int8_t rounded_up(double v) { return static_cast<std::int8_t>(std::min(127.0, std::ceil((v + kNormalRounding) / SolidFacet::kTurn))); }
+
+// What lies between the normals beside an edge, along the way from one to the other, which is less than half a turn.
+NormalBox between(const Vec3d& m, const Vec3d& n) {
+    constexpr double most_turn = -0.99, no_turn = 1 - 1e-12;
+    NormalBox box;
     const double along = dot(m, n);
-    if (dot(m, m) == 0 || dot(n, n) == 0 || along < most_turn) return;
+    if (dot(m, m) == 0 || dot(n, n) == 0 || along < most_turn) return box;
     const Vec3d axis = cross(m, n);
     const double across2 = dot(axis, axis);
     for (std::size_t k = 0; k < 3; ++k) {
@@ -81,13 +86,38 @@ void lay_between(const Vec3d& m, const Vec3d& n, std::size_t edge, EdgeNormals& 
             if (from_m > 0 && from_n > 0) high = turn;
             if (from_m < 0 && from_n < 0) low = -turn;
         }
-        normals.low[edge][k] = static_cast<std::int8_t>(std::max(-127.0, std::floor((low - rounding) / SolidFacet::kTurn)));
-        normals.high[edge][k] = static_cast<std::int8_t>(std::min(127.0, std::ceil((high + rounding) / SolidFacet::kTurn)));
+        box.low[k] = rounded_down(low), box.high[k] = rounded_up(high);
     }
+    return box;
+}
+
+// What lies between all the unit normals of a box: sums of them, with weights that make one, lie in it too, and are no shorter than they reach along
+// the middle of the box.
+NormalBox between_all(const NormalBox& box) {
+    double middle2 = 0, half2 = 0;
+    std::array<double, 3> low, high;
+    for (std::size_t k = 0; k < 3; ++k) {
+        low[k] = box.low[k] * SolidFacet::kTurn, high[k] = box.high[k] * SolidFacet::kTurn;
+        const double middle = 0.5 * (low[k] + high[k]), half = 0.5 * (high[k] - low[k]);
+        middle2 += middle * middle, half2 += half * half;
+    }
+    const double middle = std::sqrt(middle2), along = (1 + middle2 - half2) / (2 * middle);
+    NormalBox all;
+    if (!(middle > 0) || along < kLeastAlong) return all;
+    const double most = along < 1 ? 1 / along : 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+        all.low[k] = rounded_down(low[k] < 0 ? low[k] * most : low[k]);
+        all.high[k] = rounded_up(high[k] > 0 ? high[k] * most : high[k]);
+    }
+    return all;
+}
+
+void widen(NormalBox& box, const NormalBox& other) {
+    for (std::size_t k = 0; k < 3; ++k) box.low[k] = std::min(box.low[k], other.low[k]), box.high[k] = std::max(box.high[k], other.high[k]);
 }
 
 // Writes the facets that it makes to `out` and `normals`, as many as pieces() says, and moves these on.
-void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_top, SolidFacet*& out, EdgeNormals*& normals) {
+void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_top, SolidFacet*& out, FacetNormals*& normals) {
     std::array<Vec3d, 3> p;
     for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     const Vec3d n = unit_normal(p[0], p[1], p[2]);
@@ -98,17 +128,16 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
     constexpr int along_top = 3;
     std::array<Vec3d, 4> corner;
     std::array<bool, 4> edge{}, end{};
-    std::array<int, 4> of{};  // which edge of the facet that is
-    std::array<std::array<std::uint8_t, 2>, 4> turns{};
-    const std::array<std::uint8_t, 2> most_turn{*std::max_element(turn.turn.begin(), turn.turn.end()),
-                                                *std::max_element(turn.aside.begin(), turn.aside.end())};
+    std::array<int, 4> of{}, which{};  // which edge of the facet that is, and which corner
+    std::array<bool, 4> cut{};
     int corners = 0;
     for (int k = 0; k < 3; ++k) {
         const Vec3d &a = p[k], &b = p[(k + 1) % 3];
         const bool a_in = a[2] <= z_top, b_in = b[2] <= z_top;
         if (a_in) {
             corner[corners] = a;
-            turns[corners] = a[2] == z_top ? most_turn : std::array{turn.turn[k], turn.aside[k]};
+            which[corners] = k;
+            cut[corners] = a[2] == z_top;
             end[corners] = a[2] == z_top || (turn.ends >> k & 1) != 0;
             // What lies beyond an edge in the top is not there to test it.
             const bool in_top = a[2] == z_top && b[2] == z_top;
@@ -117,8 +146,7 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         }
         if (a_in != b_in && a[2] != z_top && b[2] != z_top) {
             corner[corners] = cross_plane(a, b, z_top);
-            turns[corners] = most_turn;
-            end[corners] = true;
+            cut[corners] = end[corners] = true;
             of[corners] = a_in ? along_top : k;
             edge[corners++] = a_in ? true : matters[k];
         } else if (a_in && !b_in) {
@@ -127,11 +155,14 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         }
     }
     if (corners < 3) return;
-    EdgeNormals::Each top_low{-127, -127, -127}, top_high{127, 127, 127};
-    if (std::find(of.begin(), of.begin() + corners, along_top) != of.begin() + corners) {
-        EdgeNormals top;
-        lay_between(n, {0, 0, 1}, 0, top);
-        top_low = top.low[0], top_high = top.high[0];
+    // Where the solid is cut off, a ball may also touch it with all between a facet's normals and the upright one.
+    NormalBox along_cut, at_cut;
+    const std::uint8_t most_aside = *std::max_element(turn.aside.begin(), turn.aside.end());
+    if (std::find(cut.begin(), cut.begin() + corners, true) != cut.begin() + corners) {
+        along_cut = between(n, {0, 0, 1});
+        at_cut = {{0, 0, 127}, {0, 0, 127}};
+        for (const NormalBox& box : turn.normals.corner) widen(at_cut, box);
+        at_cut = between_all(at_cut);
     }
     auto emit = [&](int i, int j, int k, bool ij, bool jk, bool ki, bool first) {
         SolidFacet s;
@@ -142,16 +173,16 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         s.z_min = std::min({s.p[0][2], s.p[1][2], s.p[2][2]});
         s.z_max = std::max({s.p[0][2], s.p[1][2], s.p[2][2]});
         s.top = s.z_max >= z_top;
-        s.turn = {turns[i][0], turns[j][0], turns[k][0]}, s.aside = {turns[i][1], turns[j][1], turns[k][1]};
+        std::size_t at = 0;
+        for (const int c : {i, j, k}) s.aside[at++] = cut[c] ? most_aside : turn.aside[which[c]];
         const auto ends_here = [&](int c) { return end[c] && (first || c == k); };
         s.ends = static_cast<std::uint8_t>((ends_here(i) ? 1 : 0) | (ends_here(j) ? 2 : 0) | (ends_here(k) ? 4 : 0)) & 7;
         *out++ = s;
-        EdgeNormals around;
-        std::size_t at = 0;
+        FacetNormals around;
+        at = 0;
         for (const int c : {i, j, k}) {
-            const auto whole = static_cast<std::size_t>(of[c]);
-            around.low[at] = of[c] == along_top ? top_low : turn.normals.low[whole];
-            around.high[at++] = of[c] == along_top ? top_high : turn.normals.high[whole];
+            around.edge[at] = of[c] == along_top ? along_cut : turn.normals.edge[static_cast<std::size_t>(of[c])];
+            around.corner[at++] = cut[c] ? at_cut : turn.normals.corner[static_cast<std::size_t>(which[c])];
         }
         *normals++ = around;
     };
@@ -200,7 +231,7 @@ Seen seen_from_above(const Vec3d& n, std::array<double, 2>& direction) {
 }
 
 // For the facets. What the solid has no part of is left out: it is far below, or cut off.
-std::vector<Turns> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets) {
+std::vector<Turns> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets, double cut_off) {
     constexpr std::size_t grain = 4096;
     std::vector<Vec3d> normals(facets.size());
     std::vector<Turns> turns(facets.size());
@@ -212,7 +243,7 @@ std::vector<Turns> turns(Context& context, MeshView mesh, std::span<const std::u
             for (int k = 0; k < 3; ++k) {
                 if (!edge_matters(mesh, facets[i], k, to_double(mesh.vertices[v[k]]), normals[i])) continue;
                 turns[i].edges |= static_cast<std::uint8_t>(1 << k);
-                if (across[k] != kNoFacet) lay_between(normals[i], normal_of(mesh, across[k]), static_cast<std::size_t>(k), turns[i].normals);
+                if (across[k] != kNoFacet) turns[i].normals.edge[static_cast<std::size_t>(k)] = between(normals[i], normal_of(mesh, across[k]));
             }
             if (across[0] == kNoFacet || across[1] == kNoFacet || across[2] == kNoFacet) normals[i] = {0, 0, 0};
         }
@@ -246,10 +277,12 @@ std::vector<Turns> turns(Context& context, MeshView mesh, std::span<const std::u
         for (std::size_t i = begin; i < end; ++i) {
             if (normals[i] == Vec3d{0, 0, 0}) continue;
             std::array<double, 2> aside{};
-            const bool faces = seen_from_above(normals[i], aside) == Seen::direction;
+            const Index3& v = mesh.facets[facets[i]];
+            const bool faces = seen_from_above(normals[i], aside) == Seen::direction,
+                       at_top = std::max({mesh.vertices[v[0]].z, mesh.vertices[v[1]].z, mesh.vertices[v[2]].z}) >= cut_off;
             for (std::size_t c = 0; c < 3; ++c) {
                 const Around& at = around[mesh.facets[facets[i]][c]];
-                turns[i].turn[c] = at.normals.turn_from(normals[i], kMostTurn);
+                if (at_top || (turns[i].ends >> c & 1) != 0) turns[i].normals.corner[c] = between_all({at.normals.low, at.normals.high});
                 if (faces) turns[i].aside[c] = at.aside.turn_from(aside, kMostAside);
             }
         }
@@ -352,41 +385,29 @@ void lay_disc(std::span<const SolidFacet> facets, FacetGroup& group) {
     group.thickness = static_cast<float>(thickness + rounding);
 }
 
-constexpr EdgeNormals kAnyNormals;
+constexpr FacetNormals kAnyNormals;
 
-// What is known of a facet, of its edges that are to be tested and of its corners.
-Facing facing_of(const SolidFacet& facet, const EdgeNormals& edges) {
-    constexpr Facing any{{-1, -1, -1}, {1, 1, 1}};
-    constexpr double rounding = 1e-6;
-    if (facet.normal == Vec3d{0, 0, 0}) return any;
+// Of a facet, of its edges and of its corners that are to be tested.
+Facing facing_of(const SolidFacet& facet, const FacetNormals& normals) {
+    if (facet.normal == Vec3d{0, 0, 0}) return {{-1, -1, -1}, {1, 1, 1}};
     std::array<double, 3> low = facet.normal, high = low;
-    const auto add = [&](std::size_t k, double from, double to) { low[k] = std::min(low[k], from), high[k] = std::max(high[k], to); };
-    for (std::size_t e = 0; e < 3; ++e)
-        for (std::size_t k = 0; k < 3 && (facet.edges >> e & 1) != 0; ++k)
-            add(k, edges.low[e][k] * SolidFacet::kTurn, edges.high[e][k] * SolidFacet::kTurn);
-    for (std::size_t c = 0; c < 3; ++c) {
-        if ((facet.ends >> c & 1) == 0) continue;
-        if (facet.turn[c] == SolidFacet::kAnyTurn) return any;
-        const double turn = facet.turn[c] * SolidFacet::kTurn + rounding;
-        const bool cut = facet.top && facet.p[c][2] >= facet.z_max;
-        // Of a·n + b·up with unit length a is no more than 1, unless n points down: then it is 1 / √(1 − n_z²).
-        const double down = facet.normal[2] - turn, most = cut && down < 0 ? 1 / std::sqrt(1 - down * down) : 1;
-        if (cut && down < -kMostDown) return any;
-        for (std::size_t k = 0; k < 2; ++k) {
-            add(k, most * (facet.normal[k] - turn), most * (facet.normal[k] + turn));
-            if (cut) add(k, 0, 0);
-        }
-        add(2, most * down, cut ? 1 : facet.normal[2] + turn);
+    const auto add = [&](const NormalBox& box) {
+        for (std::size_t k = 0; k < 3; ++k)
+            low[k] = std::min(low[k], box.low[k] * SolidFacet::kTurn), high[k] = std::max(high[k], box.high[k] * SolidFacet::kTurn);
+    };
+    for (std::size_t k = 0; k < 3; ++k) {
+        if ((facet.edges >> k & 1) != 0) add(normals.edge[k]);
+        if ((facet.ends >> k & 1) != 0) add(normals.corner[k]);
     }
     Facing facing{};
     for (std::size_t k = 0; k < 3; ++k)
-        facing.low[k] = static_cast<float>(std::max(-1.0, low[k]) - rounding), facing.high[k] = static_cast<float>(std::min(1.0, high[k]) + rounding);
+        facing.low[k] = static_cast<float>(low[k] - kNormalRounding), facing.high[k] = static_cast<float>(high[k] + kNormalRounding);
     return facing;
 }
 
 }  // namespace
 
-std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets, std::span<const EdgeNormals> edges) {
+std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets, std::span<const FacetNormals> normals) {
     constexpr float inf = std::numeric_limits<float>::infinity();
     auto down = [](double v) { return std::nextafter(static_cast<float>(v), -inf); };
     auto up = [](double v) { return std::nextafter(static_cast<float>(v), inf); };
@@ -410,7 +431,7 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
             group.facing = {{1, 1, 1}, {-1, -1, -1}};
             for (const SolidFacet& f : own) {
                 const std::size_t i = g * FacetGroup::kFacets + static_cast<std::size_t>(&f - own.data());
-                const Facing facing = facing_of(f, i < edges.size() ? edges[i] : kAnyNormals);
+                const Facing facing = facing_of(f, i < normals.size() ? normals[i] : kAnyNormals);
                 for (std::size_t k = 0; k < 3; ++k) {
                     group.facing.low[k] = std::min(group.facing.low[k], facing.low[k]);
                     group.facing.high[k] = std::max(group.facing.high[k], facing.high[k]);
@@ -424,15 +445,7 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
 
 namespace {
 
-// GroupCorners::turn.
-float turn_at(const SolidFacet& facet, std::size_t corner) {
-    if (facet.turn[corner] == SolidFacet::kAnyTurn) return GroupCorners::kAny;
-    constexpr double rounding = 2e-6;
-    const double turn = facet.turn[corner] * SolidFacet::kTurn + rounding;
-    if (!facet.top || facet.p[corner][2] < facet.z_max) return static_cast<float>(turn);
-    return facet.normal[2] - turn < 0 ? GroupCorners::kAny : static_cast<float>(-1 - turn);
-}
-
+// GroupCorners::aside.
 float aside_at(const SolidFacet& facet, std::size_t corner) {
     constexpr double rounding = 2e-6;
     return facet.aside[corner] == SolidFacet::kAnyTurn ? GroupCorners::kAny : static_cast<float>(facet.aside[corner] * SolidFacet::kTurn + rounding);
@@ -441,7 +454,7 @@ float aside_at(const SolidFacet& facet, std::size_t corner) {
 }  // namespace
 
 std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups,
-                                        std::span<const EdgeNormals> edges) {
+                                        std::span<const FacetNormals> normals) {
     constexpr float far_below = -1e15F;
     std::vector<GroupCorners> corners(groups.size());
     parallel_for(context, groups.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -454,14 +467,14 @@ std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidF
                         to.p[c][k][i] = f < facets.size() ? static_cast<float>(facets[f].p[c][k] - groups[g].middle[k]) : (k == 2 ? far_below : 0.0F);
                 for (std::size_t k = 0; k < 3; ++k) to.normal[k][i] = f < facets.size() ? static_cast<float>(facets[f].normal[k]) : 0.0F;
                 to.nz[i] = f < facets.size() ? facets[f].nz : 0.0F;
-                for (std::size_t c = 0; c < 3; ++c) {
-                    to.turn[c][i] = f < facets.size() ? turn_at(facets[f], c) : 0.0F;
-                    to.aside[c][i] = f < facets.size() ? aside_at(facets[f], c) : 0.0F;
-                }
+                for (std::size_t c = 0; c < 3; ++c) to.aside[c][i] = f < facets.size() ? aside_at(facets[f], c) : 0.0F;
                 to.edges[i] = f < facets.size() ? facets[f].edges | facets[f].ends << 3 : 0;
-                const EdgeNormals& normals = f < edges.size() ? edges[f] : kAnyNormals;
+                const FacetNormals& own = f < normals.size() ? normals[f] : kAnyNormals;
                 for (std::size_t e = 0; e < 3; ++e)
-                    for (std::size_t k = 0; k < 3; ++k) to.least[e][k][i] = normals.low[e][k], to.most[e][k][i] = normals.high[e][k];
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        to.edge.low[e][k][i] = own.edge[e].low[k], to.edge.high[e][k][i] = own.edge[e].high[k];
+                        to.corner.low[e][k][i] = own.corner[e].low[k], to.corner.high[e][k][i] = own.corner[e].high[k];
+                    }
             }
         }
     });
@@ -474,7 +487,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     solid.z_top = z_top;
     const double cut_off = z_top - kTopSheet;  // the part is cut off here, facets and cap alike
     const BulkVector<std::uint32_t> facets = facets_between(context, mesh, z_low, cut_off);
-    const std::vector<Turns> turn = turns(context, mesh, facets);
+    const std::vector<Turns> turn = turns(context, mesh, facets, cut_off);
     std::vector<std::size_t> starts((facets.size() + kGrain - 1) / kGrain + 1, 0);
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         std::size_t count = 0;
@@ -483,11 +496,11 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     });
     for (std::size_t c = 1; c < starts.size(); ++c) starts[c] += starts[c - 1];
     // Making room for the facets takes one thread; others meanwhile cut the cap.
-    std::vector<EdgeNormals> edges;
+    std::vector<FacetNormals> normals;
     parallel_each(context, 2, [&](std::size_t task) {
         if (task == 1) {
             solid.facets.resize(starts.back());
-            edges.resize(starts.back());
+            normals.resize(starts.back());
             return;
         }
         const Plane top{cut_off, Side::below};
@@ -496,8 +509,8 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     });
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         SolidFacet* to = solid.facets.data() + starts[begin / kGrain];
-        EdgeNormals* to_edges = edges.data() + starts[begin / kGrain];
-        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], turn[i], cut_off, to, to_edges);
+        FacetNormals* to_normals = normals.data() + starts[begin / kGrain];
+        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], turn[i], cut_off, to, to_normals);
     });
     using Extent = std::array<double, 4>;  // least x, y; greatest x, y
     const Extent extent = parallel_reduce(
@@ -513,8 +526,8 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
         });
     solid.min = {extent[0], extent[1]};
     solid.max = {extent[2], extent[3]};
-    solid.groups = facet_groups(context, solid.facets, edges);
-    solid.corners = group_corners(context, solid.facets, solid.groups, edges);
+    solid.groups = facet_groups(context, solid.facets, normals);
+    solid.corners = group_corners(context, solid.facets, solid.groups, normals);
     solid.tree = facet_tree(context, solid.facets, solid.min, solid.max);
     return solid;
 }

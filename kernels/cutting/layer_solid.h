@@ -27,10 +27,8 @@ struct SolidFacet {
     std::uint8_t ends : 3 = 7;   ///< bit k: this facet is the one to test the corner p[k], in which edges end that are tested
     static constexpr std::uint8_t kAnyTurn = 255;
     static constexpr double kTurn = 1.0 / 127;
-    /// How far from `normal` the unit normals end of all facets that share this corner, at most, in kTurn; kAnyTurn: nothing is known. Where the
-    /// solid is cut off what is known of all of the facet's corners.
-    std::array<std::uint8_t, 3> turn{kAnyTurn, kAnyTurn, kAnyTurn};
-    /// The same of the directions in which those of them face, seen from above, that are not level.
+    /// How far from the direction in which this one faces, seen from above, those end of all facets that share this corner and are not level, at
+    /// most, in kTurn; kAnyTurn: nothing is known. Where the solid is cut off what is known of all of the facet's corners.
     std::array<std::uint8_t, 3> aside{kAnyTurn, kAnyTurn, kAnyTurn};
     float nz = 0;  ///< of the facet before cutting
 };
@@ -41,12 +39,13 @@ struct Facing {
     std::array<float, 3> low, high;
 };
 
-/// Of each of a facet's edges between which x, y and z the unit normals lie with which a ball outside the solid can touch it between its ends, in
-/// SolidFacet::kTurn.
-struct EdgeNormals {
-    using Each = std::array<std::int8_t, 3>;
-    std::array<Each, 3> low{Each{-127, -127, -127}, Each{-127, -127, -127}, Each{-127, -127, -127}},
-        high{Each{127, 127, 127}, Each{127, 127, 127}, Each{127, 127, 127}};
+/// Between which x, y and z unit normals lie, in SolidFacet::kTurn.
+struct NormalBox {
+    std::array<std::int8_t, 3> low{-127, -127, -127}, high{127, 127, 127};
+};
+/// The normals with which a ball outside the solid can touch a facet's edges between their ends, and its corners.
+struct FacetNormals {
+    std::array<NormalBox, 3> edge, corner;
 };
 
 /// What FacetGroup::kFacets facets that follow one another have in common, mm, rounded outward.
@@ -61,8 +60,8 @@ struct FacetGroup {
     float radius = 0, thickness = 0;
     Facing facing{};
 };
-/// Of each eight facets, in their order; the last may have fewer. @param edges of the facets; none: nothing is known
-[[nodiscard]] std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets, std::span<const EdgeNormals> edges = {});
+/// Of each eight facets, in their order; the last may have fewer. @param normals of the facets; none: nothing is known
+[[nodiscard]] std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets, std::span<const FacetNormals> normals = {});
 
 /// The same facets side by side, for tests of all of them at once: corners, each an x, y and z relative to the group's middle, and normals. Where a
 /// group has fewer facets, the others lie far below everything.
@@ -72,17 +71,18 @@ struct GroupCorners {
     alignas(32) std::array<std::array<Each<float>, 3>, 3> p;
     alignas(32) std::array<Each<float>, 3> normal;
     alignas(32) Each<float> nz;
-    /// How far from a facet's normal a ball's may end that touches a corner from outside, kAny: nowhere in particular. Less one and negative where the
-    /// solid is cut off: there it may also lie between such a normal and the upright one.
-    alignas(32) std::array<Each<float>, 3> turn;
-    alignas(32) std::array<Each<float>, 3> aside;  ///< the same of a disc's, seen from above
-    alignas(32) Each<std::int32_t> edges;          ///< SolidFacet::edges, and three bits up SolidFacet::ends
-    /// EdgeNormals, by edge and x, y and z.
-    alignas(8) std::array<std::array<Each<std::int8_t>, 3>, 3> least, most;
+    /// How far from the direction in which a facet faces, seen from above, a disc's may end that touches a corner from outside; kAny: nowhere in particular.
+    alignas(32) std::array<Each<float>, 3> aside;
+    alignas(32) Each<std::int32_t> edges;  ///< SolidFacet::edges, and three bits up SolidFacet::ends
+    /// FacetNormals, by edge or corner and x, y and z.
+    struct Normals {
+        std::array<std::array<Each<std::int8_t>, 3>, 3> low, high;
+    };
+    alignas(8) Normals edge, corner;
     static constexpr float kAny = 3;
 };
 [[nodiscard]] std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups,
-                                                      std::span<const EdgeNormals> edges = {});
+                                                      std::span<const FacetNormals> normals = {});
 
 struct LayerSolid {
     double z_low = 0, z_top = 0;         ///< facets wholly below z_low are left out
