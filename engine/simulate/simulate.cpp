@@ -592,14 +592,15 @@ private:
         const double limit = options_.cusp + options_.slack;
         const double lowest = l == 0 && options_.board_cut >= 0 ? layer.z_bottom - options_.board_cut : -std::numeric_limits<double>::infinity();
         Reach reach(part_, input_.tools, layer.z_bottom, layer.z_top, lowest);
-        for (std::size_t c = 0; c < grid.count(); ++c) {
-            const auto nx = static_cast<std::size_t>(grid.nx);
-            const int i = static_cast<int>(c % nx), j = static_cast<int>(c / nx);
-            const double x = grid.x(i), y = grid.y(j), z = stock.surface(l, c);
+        const StandingHeights surface = stock.standing(l);
+        const auto covered = static_cast<float>(layer.z_top);  // what the envelope is where the part goes on above
+        std::size_t c = 0;
+        const auto measure = [&](int i, int j) {
+            const double x = grid.x(i), y = grid.y(j), z = surface(c);
             if (!flask.empty() && flask[c] != FlaskCell::none) {
                 if (flask[c] == FlaskCell::core) raise(result.flask, layer.z_top - z, {x, y, z});
                 if (options_.maps) report.layers[l].kinds[map_cell(i0 + i, j0 + j)] = CellKind::flask;
-                continue;
+                return;
             }
             ++f.cells;
             const bool beside = envelope[c] < layer.z_bottom + StandingPart::kSheet;
@@ -607,7 +608,7 @@ private:
             double over = z - keep;
             CellKind kind = beside ? CellKind::beside : CellKind::pattern;
             if (over < 0) {
-                const double depth = depth_of_lost({x, y, z}, keep);
+                const double depth = depth_of_lost({x, y, z}, keep, options_.maps ? 0 : std::min(options_.gouge, f.gouge.size));
                 raise(f.gouge, depth, {x, y, z});
                 f.gouge_cells += depth > options_.gouge;
                 if (depth > options_.gouge) kind = CellKind::gouge;
@@ -616,7 +617,7 @@ private:
                 // Vertical height overstates what is left on a slope. Along the normal it is the distance from the finished surface,
                 // which beside the pattern is the layer's bottom.
                 if (over > options_.cusp) {
-                    const auto near = part_.from_shadow({x, y, z}, layer.z_top, over);
+                    const auto near = part_.from_shadow({x, y, z}, layer.z_top, over, envelope[c] == covered);
                     over = std::min(over, near.distance);
                     if (over > options_.cusp) kind = CellKind::left;
                     if (over > limit) kind = judge_leftover(layer, reach, {x, y, z}, over, near, beside, z - keep, f);
@@ -628,23 +629,27 @@ private:
                 report.layers[l].map[map_cell(i0 + i, j0 + j)] = static_cast<float>(over);
                 report.layers[l].kinds[map_cell(i0 + i, j0 + j)] = kind;
             }
-        }
+        };
+        for (int j = 0; j < grid.ny; ++j)
+            for (int i = 0; i < grid.nx; ++i, ++c) measure(i, j);
     }
 
     /// How deep in the part the material was that a column has lost between the stock's surface and the part's: the greatest
     /// distance from the part's surface of those of its points that are within the part. (The lowest point alone will not do: it may lie
     /// on the part's own bottom. Points under an overhang are in the part's shadow, but no part was lost there.)
-    double depth_of_lost(const Point3& surface, double keep) const {
+    /// @param enough what is no deeper need not be told from 0, mm
+    double depth_of_lost(const Point3& surface, double keep, double enough) const {
         const double height = keep - surface[2];
         if (height <= options_.gouge / 5) return height;
         constexpr int kPoints = 8;
-        double depth = 0;
+        double depth = 0, from = surface[2], distance = height;  // that a point below is from a facet at most, and it
         for (int k = 0; k < kPoints; ++k) {
-            const double z = surface[2] + height * k / kPoints, cap = std::min(height, keep - z);
-            if (cap <= depth) break;
+            const double z = surface[2] + height * k / kPoints, cap = std::min(height, keep - z), known = std::max(depth, enough);
+            if (cap <= known) break;
+            if (k > 0 && distance + (z - from) <= known) continue;
             const Point3 lost{surface[0], surface[1], z};
-            if (!part_.covered(lost[0], lost[1], lost[2])) continue;  // outside of the part
-            depth = std::max(depth, part_.from_facets(lost, cap));
+            from = z, distance = part_.from_facets(lost, cap, known);
+            if (distance > known && part_.covered(lost[0], lost[1], lost[2])) depth = distance;  // else it is outside of the part
         }
         return depth;
     }

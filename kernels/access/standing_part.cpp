@@ -1059,10 +1059,10 @@ void RisingEnvelope::at(double z_top, float none, float* out) {
         out[k] = above_[k] > 0 ? static_cast<float>(z_top) : below_[k] == -std::numeric_limits<float>::infinity() ? none : below_[k];
 }
 
-StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_top, double limit) const {
+StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_top, double limit, bool under) const {
     const double top = z_top - kSheet;
     Clearance best{limit, {0, 0, 0}};
-    if (point[2] - top < best.distance && covered(point[0], point[1], top)) {
+    if (under && point[2] - top < best.distance) {
         const double over = std::max(0.0, point[2] - top);
         best = {over, {0, 0, over}};
     }
@@ -1123,10 +1123,10 @@ StandingPart::Near StandingPart::nearest(const Point3& point, const Near& known,
     return best;
 }
 
-double StandingPart::from_facets(const Point3& point, double limit) const {
+double StandingPart::from_facets(const Point3& point, double limit, double enough) const {
     double best2 = limit * limit;
     walk_nearest(
-        {Away::Kind::facets, point, 0}, [&] { return best2; },
+        {Away::Kind::facets, point, 0}, [&] { return best2 <= enough * enough ? 0.0 : best2; },
         [&](const Facet& f, std::uint32_t) {
             const Point3 away = sub(point, closest_on_triangle(point, {to_point(f.v[0]), to_point(f.v[1]), to_point(f.v[2])}));
             best2 = std::min(best2, dot(away, away));

@@ -87,12 +87,17 @@ public:
         Point3 away{};
     };
     /// From a point to the shadow of the part below z_top; 0 within it.
-    [[nodiscard]] Clearance from_shadow(const Point3& point, double z_top, double limit) const;
+    [[nodiscard]] Clearance from_shadow(const Point3& point, double z_top, double limit) const {
+        const bool in_reach = point[2] - (z_top - kSheet) < limit;
+        return from_shadow(point, z_top, limit, in_reach && covered(point[0], point[1], z_top - kSheet));
+    }
+    /// The same where it is known whether there is part just under the top at (x, y).
+    [[nodiscard]] Clearance from_shadow(const Point3& point, double z_top, double limit, bool covered) const;
     /// Horizontally from an upright line through (x, y) to what of the part stands higher than z (and below z_top); 0 within it.
     [[nodiscard]] Clearance beside(const Point3& point, double z_top, double limit) const;
 
-    /// From a point to the nearest facet, whatever its height; the limit when none is nearer.
-    [[nodiscard]] double from_facets(const Point3& point, double limit) const;
+    /// From a point to the nearest facet, whatever its height; the limit when none is nearer. Of what is no farther than `enough` the first found.
+    [[nodiscard]] double from_facets(const Point3& point, double limit, double enough = 0) const;
 
     /// The greatest distance from a corner or middle of its facets to the nearest facet of another part, mm; `known` when none is greater or
     /// either has none.

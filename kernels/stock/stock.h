@@ -57,6 +57,8 @@ public:
 
     /// z of the slab's surface in a cell; its bottom when it is cut through.
     [[nodiscard]] double surface(std::size_t slab, std::size_t cell) const { return slabs_[slab].bottom + slabs_[slab].height[cell]; }
+    /// The same of all cells.
+    [[nodiscard]] StandingHeights standing(std::size_t slab) const { return {slabs_[slab].height.data(), slabs_[slab].bottom}; }
     /// z of the highest stock in a column, 0 or less on the bare board.
     [[nodiscard]] double top(std::size_t cell) const;
     /// The same of all columns.
