@@ -502,7 +502,10 @@ private:
             const Point3 from{a.x, a.y, a.z}, to{b.x, b.y, b.z};
             const double low = std::min(a.z, b.z);
             // An arc is cut whole at the first of its chords that comes near; the others then have nothing to do.
-            while (arc < arcs.size() && arcs[arc].end <= i) ++arc;
+            if (arc < arcs.size() && arcs[arc].end <= i)
+                arc = static_cast<std::size_t>(
+                    std::partition_point(arcs.begin() + static_cast<std::ptrdiff_t>(arc), arcs.end(), [&](const ProgramArc& each) { return each.end <= i; }) -
+                    arcs.begin());
             const bool in_arc = arc < arcs.size() && arcs[arc].begin <= i, cut_before = in_arc && arc < cut_arcs;
             const bool follows = (thick_shank && low + tool.flute_length < top) || (thick_nose && low + tool.stickout < top);
             const bool near = box.meets(grid, radius + kArcError, top) && !cut_before;

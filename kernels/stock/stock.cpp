@@ -1,5 +1,6 @@
 #include "kernels/stock/stock.h"
 
+#include <cstring>
 #include <functional>
 
 #include "kernels/wide.h"
@@ -10,6 +11,8 @@ namespace {
 
 constexpr int kLanes = 8;
 constexpr int kBlockCells = 16;  // a side
+using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
+using Doubles [[gnu::vector_size(kLanes * sizeof(double))]] = double;
 
 int blocks_of(int cells) { return (cells + kBlockCells - 1) / kBlockCells; }
 
@@ -88,7 +91,20 @@ SLABWRIGHT_WIDE bool lower_level(float* __restrict height, int n, float left, do
 // The greatest of n heights.
 [[gnu::always_inline]] inline float greatest(const float* height, int n) {
     float most = 0;
-    for (int i = 0; i < n; ++i) most = height[i] > most ? height[i] : most;
+    int i = 0;
+    if (n >= kLanes) {
+        Floats all{}, h;
+        for (; i + kLanes <= n; i += kLanes) {
+            std::memcpy(&h, height + i, sizeof h);
+            all = h > all ? h : all;
+        }
+        // The last eight may hold some that came before.
+        std::memcpy(&h, height + n - kLanes, sizeof h);
+        all = h > all ? h : all;
+        for (int k = 0; k < kLanes; ++k) most = all[k] > most ? all[k] : most;
+        return most;
+    }
+    for (; i < n; ++i) most = height[i] > most ? height[i] : most;
     return most;
 }
 
@@ -108,22 +124,23 @@ SLABWRIGHT_WIDE float keep_over(const float* height, std::size_t nx, float left,
 
 // Lowers n cells to one height; how much they lost together.
 SLABWRIGHT_WIDE double lower_run(float* __restrict height, int n, float left, double bottom) {
-    std::array<double, kLanes> lost{};
+    Doubles lost{};
     const double after = bottom + static_cast<double>(left);
     int i = 0;
-    for (; i + kLanes <= n; i += kLanes)
-        for (std::size_t k = 0; k < kLanes; ++k) {
-            float& h = height[static_cast<std::size_t>(i) + k];
-            const float stood = h;
-            lost[k] += stood > left ? (bottom + static_cast<double>(stood)) - after : 0.0;
-            h = stood > left ? left : stood;
-        }
+    for (; i + kLanes <= n; i += kLanes) {
+        Floats h;
+        std::memcpy(&h, height + i, sizeof h);
+        const Doubles stood = __builtin_convertvector(h, Doubles), none{};
+        lost += stood > static_cast<double>(left) ? (bottom + stood) - after : none;
+        h = h > left ? Floats{} + left : h;
+        std::memcpy(height + i, &h, sizeof h);
+    }
     double sum = 0;
     for (; i < n; ++i) {
         const float stood = height[i];
         if (stood > left) sum += (bottom + static_cast<double>(stood)) - after, height[i] = left;
     }
-    for (const double of_lane : lost) sum += of_lane;
+    for (int k = 0; k < kLanes; ++k) sum += lost[k];
     return sum;
 }
 
