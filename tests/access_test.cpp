@@ -516,6 +516,9 @@ TEST(StandingPart, EnvelopeByPointsAndByGrid) {
                 const double x = -1 + 0.5 * i, y = -0.5 + 0.5 * j;
                 const float g = grid[static_cast<std::size_t>(j) * nx + i];
                 EXPECT_NEAR(g, part.envelope(x, y, z_top, -1), 1e-6);
+                EXPECT_EQ(g == static_cast<float>(z_top), part.covered(x, y, z_top - StandingPart::kSheet));
+                const Point3 over{x, y, z_top + 0.4};
+                EXPECT_EQ(part.from_shadow(over, z_top, 1, g == static_cast<float>(z_top)).distance, part.from_shadow(over, z_top, 1).distance);
                 if (x < 0 || y < 0 || x > 12 || y > 12) {
                     EXPECT_EQ(g, -1);
                     ++open;
@@ -635,6 +638,9 @@ TEST(StandingPart, NearestOfManyFacets) {
                 aside = std::min(aside, one.beside(p, top, limit).distance);
             }
             ASSERT_NEAR(part.from_facets(p, limit), facets, 1e-9);
+            const double enough = i % 4, found = part.from_facets(p, limit, enough);
+            const double nearest = part.from_facets(p, limit);
+            ASSERT_TRUE(facets > enough ? found == nearest : found >= nearest && found <= enough) << found << " " << nearest << " " << enough;
             ASSERT_NEAR(part.from_shadow(p, top, limit).distance, shadow, 1e-9);
             ASSERT_NEAR(part.beside(p, top, limit).distance, aside, 1e-9);
         }

@@ -456,6 +456,20 @@ TEST(Simulate, NoCellIsGougedDeeperThanTheExactCheckSays) {
             EXPECT_LE(l.gouge.size, bound) << "trial " << trial;
             gouged += l.gouge.size > 0.05;
         }
+        // With maps every cell's depth is told, else only those that change what is found.
+        block.options.maps = true;
+        const SimulationReport mapped = block.run();
+        for (std::size_t l = 0; l < r.layers.size(); ++l) {
+            const LayerFindings &a = r.layers[l], &b = mapped.layers[l];
+            EXPECT_EQ(a.gouge.size, b.gouge.size) << "trial " << trial;
+            EXPECT_EQ(a.gouge.where, b.gouge.where);
+            EXPECT_EQ(a.gouge_cells, b.gouge_cells);
+            float deepest = 0;
+            std::uint64_t deep = 0;
+            for (const float over : b.map) deepest = std::max(deepest, -over), deep += -over > block.options.gouge;
+            EXPECT_EQ(a.gouge_cells, deep) << "trial " << trial;
+            EXPECT_EQ(static_cast<float>(a.gouge.size), deepest) << "trial " << trial;
+        }
     }
     EXPECT_GT(gouged, 8);
 }

@@ -503,9 +503,9 @@ private:
             const double low = std::min(a.z, b.z);
             // An arc is cut whole at the first of its chords that comes near; the others then have nothing to do.
             if (arc < arcs.size() && arcs[arc].end <= i)
-                arc = static_cast<std::size_t>(
-                    std::partition_point(arcs.begin() + static_cast<std::ptrdiff_t>(arc), arcs.end(), [&](const ProgramArc& each) { return each.end <= i; }) -
-                    arcs.begin());
+                arc = static_cast<std::size_t>(std::partition_point(arcs.begin() + static_cast<std::ptrdiff_t>(arc), arcs.end(),
+                                                                    [&](const ProgramArc& each) { return each.end <= i; }) -
+                                               arcs.begin());
             const bool in_arc = arc < arcs.size() && arcs[arc].begin <= i, cut_before = in_arc && arc < cut_arcs;
             const bool follows = (thick_shank && low + tool.flute_length < top) || (thick_nose && low + tool.stickout < top);
             const bool near = box.meets(grid, radius + kArcError, top) && !cut_before;
