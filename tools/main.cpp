@@ -338,6 +338,13 @@ void add_common(CLI::App& command, Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+#if defined(__x86_64__) && defined(__AVX2__)
+    if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("bmi2")) {
+        std::fputs("slabwright: this machine lacks AVX2, for which this program was built; build it here, or with -DSLABWRIGHT_X86_LEVEL=baseline\n",
+                   stderr);
+        return static_cast<int>(ErrorKind::usage);
+    }
+#endif
     Options options;
     CLI::App app("Plans Rapid Pattern Manufacturing: from the STL of a foundry pattern to layers, tool paths, G-code and the build sequence.",
                  "slabwright");
