@@ -24,6 +24,7 @@
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
+#include "kernels/forces/hardest.h"
 #include "kernels/mesh/simplify.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/parallel/progress_part.h"
@@ -260,12 +261,14 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
     const std::size_t half = (plan.layers.size() + 1) / 2;
     Spares<StockMemory> stock_memory;
     KnownCuts known_cuts;
+    SolverAhead solver(context);
     parallel_each(context, plan.layers.size(), [&](std::size_t task) {
         const std::size_t i = largest_first[task < half ? 2 * task : 2 * (task - half) + 1];
         ProgressPart progress(context, steps[i]);
         const Loops* const carried_by = i > 0 ? &joints[i] : nullptr;
         planned[i] = plan_layer(
             context, {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr, carried_by, &stock_memory, &known_cuts}, i, progress);
+        solver.expect(planned[i].cuts.cuts);
     });
     std::vector<LayerCuts> cuts;
     for (std::size_t i = 0; i < planned.size(); ++i) {
@@ -274,7 +277,7 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
     }
     context.begin_phase("forces", share.at(0.96), share.at(0.99));
     std::vector<std::vector<Diagnostic>> rated(planned.size());
-    if (job.cutting.engagement == Engagement::simulated) rated = rate_layers(context, plan, cuts);
+    if (job.cutting.engagement == Engagement::simulated) rated = rate_layers(context, plan, cuts, solver.solver());
     parallel_each(context, planned.size(), [&](std::size_t i) {
         for (Operation& op : plan.layers[i].operations) {
             context.throw_if_cancelled();

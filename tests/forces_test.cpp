@@ -393,7 +393,10 @@ TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
         starts.push_back(cuts.size());
     }
     Context context;
-    const HardestSearch with = hardest_cuts(context, cuts, starts, "auto", 0), without = hardest_cuts(context, cuts, starts, "reference");
+    SolverAhead ahead(context, 0);
+    ahead.expect(cuts);
+    ASSERT_NE(ahead.solver(), nullptr);
+    const HardestSearch with = hardest_cuts(context, cuts, starts, ahead.solver()), without = hardest_cuts(context, cuts, starts, nullptr);
     std::printf("device: %s\n", with.device.c_str());
     EXPECT_TRUE(without.device.empty());
     ASSERT_EQ(with.groups.size(), starts.size() - 1);
@@ -404,8 +407,32 @@ TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
         if (starts[g] == starts[g + 1]) EXPECT_EQ(with.groups[g].across, kNoCut);
         else EXPECT_NEAR(reference_forces(cuts[with.groups[g].across]).peak_y_n, most, 1e-9 * most);
     }
-    // Too few to be worth a device.
-    EXPECT_TRUE(hardest_cuts(context, cuts, starts).device.empty());
+}
+
+TEST(SolverAhead, OpensOneWhenAllThatIsExpectedIsWorthIt) {
+    Context context, without({.device = "reference"});
+    std::vector<CutSegment> cuts(1000, slot_of_luo());
+    SolverAhead ahead(context), never(without);
+    const auto flats = static_cast<std::size_t>(kDeviceWorthSeconds / 8e-6 / static_cast<double>(cuts.size()));
+    for (std::size_t i = 0; i + 2 < flats; ++i) ahead.expect(cuts), never.expect(cuts);
+    EXPECT_EQ(ahead.solver(), nullptr);
+    for (std::size_t i = 0; i < 4; ++i) ahead.expect(cuts), never.expect(cuts);
+    ForceSolver* const solver = ahead.solver();
+    ASSERT_NE(solver, nullptr);
+    ahead.expect(cuts);
+    EXPECT_EQ(ahead.solver(), solver);
+    EXPECT_EQ(never.solver(), nullptr);
+    ForceSolver device(context);
+    EXPECT_EQ(solver->device(), device.device());
+}
+
+TEST(SolverAhead, ThrowsWhatOpeningOneThrew) {
+    Context context({.device = "no such device"});
+    SolverAhead ahead(context, 0);
+    ahead.expect(std::vector<CutSegment>(1, slot_of_luo()));
+    EXPECT_THROW((void)ahead.solver(), Error);
+    SolverAhead unasked(context, 0);  // what was opened and not asked for is let go
+    unasked.expect(std::vector<CutSegment>(1, slot_of_luo()));
 }
 
 TEST(PeakForce, IsThatOfTheClosedFormOrTheReference) {

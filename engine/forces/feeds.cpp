@@ -22,6 +22,8 @@
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
 #include "kernels/forces/hardest.h"
+#include "kernels/mesh/raw_array.h"
+#include "kernels/parallel/parallel.h"
 #include "kernels/parallel/spares.h"
 
 namespace slabwright {
@@ -625,25 +627,29 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
     return result;
 }
 
-std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, std::span<const LayerCuts> layers) {
+std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, std::span<const LayerCuts> layers, ForceSolver* solver) {
     const Job& job = plan.job;
-    std::vector<CutSegment> cuts;
-    std::vector<std::size_t> starts;
+    std::vector<std::size_t> starts, bases;
+    std::size_t count = 0;
     for (const LayerCuts& layer : layers) {
-        for (std::size_t i = 0; i + 1 < layer.starts.size(); ++i) starts.push_back(cuts.size() + layer.starts[i]);
-        cuts.insert(cuts.end(), layer.cuts.begin(), layer.cuts.end());
+        for (std::size_t i = 0; i + 1 < layer.starts.size(); ++i) starts.push_back(count + layer.starts[i]);
+        bases.push_back(count);
+        count += layer.cuts.size();
     }
-    starts.push_back(cuts.size());
-    const MemoryCharge memory(context, cuts.size() * (sizeof(CutSegment) + sizeof(SegmentForces)), "the cuts of a plan");
-    const HardestSearch hardest = hardest_cuts(context, cuts, starts, context.device());
+    starts.push_back(count);
+    const MemoryCharge memory(context, count * (sizeof(CutSegment) + sizeof(SegmentForces)), "the cuts of a plan");
+    RawArray<CutSegment> cuts(count);
+    parallel_each(context, layers.size(), [&](std::size_t l) { std::copy(layers[l].cuts.begin(), layers[l].cuts.end(), cuts.data() + bases[l]); });
+    const HardestSearch hardest = hardest_cuts(context, cuts.span(), starts, solver);
     std::vector<std::vector<Diagnostic>> found(layers.size());
     if (!hardest.note.empty())
         plan.diagnostics.push_back({Severity::note,
                                     "forces.no_device",
                                     fmt::format("the forces of {} cuts were computed without an OpenCL device: {}", cuts.size(), hardest.note),
                                     {}});
-    std::size_t group = 0, base = 0;
+    std::size_t group = 0;
     for (std::size_t l = 0; l < layers.size(); ++l) {
+        const std::size_t base = bases[l];
         for (Operation& op : plan.layers[l].operations) {
             const HardestCuts& h = hardest.groups[group++];
             if (h.resultant == kNoCut) continue;
@@ -676,7 +682,6 @@ std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, s
                                                 op.purpose, stress, tool.strength_mpa),
                                     place(h.in_plane)});
         }
-        base += layers[l].cuts.size();
     }
     return found;
 }
@@ -686,7 +691,9 @@ void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Di
     Plan one;
     one.job = plan.job;
     one.layers.push_back(std::move(layer));
-    const auto found = rate_layers(context, one, {&cuts, 1});
+    SolverAhead ahead(context);
+    ahead.expect(cuts.cuts);
+    const auto found = rate_layers(context, one, {&cuts, 1}, ahead.solver());
     layer = std::move(one.layers[0]);
     diagnostics.insert(diagnostics.end(), found[0].begin(), found[0].end());
 }

@@ -67,12 +67,12 @@ private:
                                     std::vector<Diagnostic>& diagnostics, KnownCuts* known = nullptr);
 
 /// Sets of every operation peak_force_n (resultant), deflection_mm (of the tip, in the plane), wall_error_mm (normal to the way), peak_at and
-/// peak_move, from the closed form or the double reference; many cuts are screened on the context's device (hardest.h), and the plan says so when there
-/// was none.
+/// peak_move, from the closed form or the double reference; many cuts are screened on a device, and the plan says so when there was none.
 /// @param layers as adapt_layer gave them, one for each layer of the plan
+/// @param solver a SolverAhead's (kernels/forces/hardest.h); none: the double model looks at all
 /// @returns for each layer "cut.deflection" and "cut.strength", per operation, where a limit is passed all the same
 /// @throws Error(usage, "forces.segment"), Error(usage, "forces.device"), Error(cancelled)
-[[nodiscard]] std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, std::span<const LayerCuts> layers);
+[[nodiscard]] std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, std::span<const LayerCuts> layers, ForceSolver* solver);
 
 /// adapt_layer and rate_layers of one layer over nothing that hangs over.
 void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Diagnostic>& diagnostics);

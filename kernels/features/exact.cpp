@@ -308,11 +308,14 @@ std::vector<Feature> find_exact(Context& context, MeshView mesh, VertexStars sta
                 if (flat.type == FeatureType::up_flat) touching.on[v] = 1;
             }
     // The vertices of plateaus without flats, one plateau after the other by their lowest vertices, each ascending: counted, then placed.
+    BulkVector<std::uint32_t> next(n);
+    std::vector<std::uint32_t> plateau_starts{0};
     parallel_for(context, n, 4 * kGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v)
+        for (std::size_t v = begin; v < end; ++v) {
+            next[v] = 0;
             if (kind[v] != 0) lowest(static_cast<std::uint32_t>(v));  // shortens its way to one step, or nearly
+        }
     });
-    std::vector<std::uint32_t> next(n, 0), plateau_starts{0};
     context.throw_if_cancelled();
     for (std::uint32_t v = 0; v < n; ++v)
         if (kind[v] != 0) ++next[lowest(v)];

@@ -8,6 +8,7 @@
 // cell's width of the path at a time.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "kernels/errors.h"
 #include "kernels/features/finders.h"
@@ -263,13 +264,13 @@ std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh, s
     borders.back() = HUGE_VAL;  // nothing is placed on the last layer: whatever lies above is its own
 
     auto faces_down = [&](std::uint32_t f) { return classes.of[f] == FacetClass::undercut || classes.of[f] == FacetClass::down_flat; };
-    std::vector<std::uint32_t> down, all(mesh.size());
-    for (std::uint32_t f = 0; f < mesh.size(); ++f) {
-        all[f] = f;
+    std::vector<std::uint32_t> down;
+    for (std::uint32_t f = 0; f < mesh.size(); ++f)
         if (faces_down(f)) down.push_back(f);
-    }
     if (down.empty()) return {};
     const MemoryCharge charge(context, mesh.size() * 48, "measuring undercuts");
+    std::vector<std::uint32_t> all(mesh.size());
+    std::iota(all.begin(), all.end(), 0U);
     const Measure measure(context, mesh, all);
     std::vector<FacetUnmade> unmade(down.size());
     parallel_for(context, down.size(), 256, [&](std::size_t begin, std::size_t end) {

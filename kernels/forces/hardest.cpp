@@ -1,8 +1,10 @@
 #include "kernels/forces/hardest.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "kernels/forces/turn.h"
+#include "kernels/mesh/raw_array.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -22,39 +24,52 @@ constexpr double SegmentForces::*kAsked[] = {&SegmentForces::peak_resultant_n, &
 
 }  // namespace
 
-HardestSearch hardest_cuts(Context& context, std::span<const CutSegment> cuts, std::span<const std::size_t> starts, const std::string& device,
-                           double worth_seconds) {
+SolverAhead::SolverAhead(Context& context, double worth_seconds) : context_(context), worth_seconds_(worth_seconds) {}
+
+SolverAhead::~SolverAhead() {
+    if (opening_.valid()) opening_.wait();
+}
+
+void SolverAhead::expect(std::span<const CutSegment> cuts) {
+    const auto balls =
+        static_cast<std::uint64_t>(std::count_if(cuts.begin(), cuts.end(), [](const CutSegment& cut) { return cut.profile == CutterProfile::ball; }));
+    const std::lock_guard lock(mutex_);
+    balls_ += balls;
+    flats_ += cuts.size() - balls;
+    if (opening_.valid() || solver_ || context_.device() == "reference") return;
+    if (static_cast<double>(flats_) * kSecondsFlat + static_cast<double>(balls_) * kSecondsBall < worth_seconds_) return;
+    opening_ = std::async(std::launch::async, [this] { return std::make_unique<ForceSolver>(context_, context_.device()); });
+}
+
+ForceSolver* SolverAhead::solver() {
+    const std::lock_guard lock(mutex_);
+    if (opening_.valid()) solver_ = opening_.get();
+    return solver_.get();
+}
+
+HardestSearch hardest_cuts(Context& context, std::span<const CutSegment> cuts, std::span<const std::size_t> starts, ForceSolver* solver) {
     HardestSearch search;
-    double seconds = 0;
-    for (std::size_t i = 0; i < cuts.size(); ++i) {
-        forces::check_segment(cuts[i], i);
-        seconds += cuts[i].profile == CutterProfile::ball ? kSecondsBall : kSecondsFlat;
-    }
-    std::vector<SegmentForces> found(cuts.size());
+    for (std::size_t i = 0; i < cuts.size(); ++i) forces::check_segment(cuts[i], i);
+    RawArray<SegmentForces> found(cuts.size());
     // Cuts whose double forces are needed: all, or those that a device could not rule out.
     std::vector<std::uint32_t> doubtful;
-    const auto all = [&] {
-        for (std::size_t i = 0; i < cuts.size(); ++i) doubtful.push_back(static_cast<std::uint32_t>(i));
-    };
-    if (seconds < worth_seconds || device == "reference") {
-        all();
+    if (solver != nullptr) {
+        search.device = solver->device();
+        search.note = solver->on_device() ? "" : solver->note();
+    }
+    if (solver == nullptr || !solver->on_device()) {
+        doubtful.resize(cuts.size());
+        std::iota(doubtful.begin(), doubtful.end(), 0U);
     } else {
-        ForceSolver solver(context, device);
-        search.device = solver.device();
-        search.note = solver.on_device() ? "" : solver.note();
-        if (!solver.on_device()) {
-            all();
-        } else {
-            solver.solve(context, cuts, found);
-            for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
-                double surely[3] = {0, 0, 0};
-                for (std::size_t i = starts[g]; i < starts[g + 1]; ++i)
-                    for (int q = 0; q < 3; ++q) surely[q] = std::max(surely[q], found[i].*kAsked[q] - kScreen * found[i].peak_resultant_n);
-                for (std::size_t i = starts[g]; i < starts[g + 1]; ++i) {
-                    bool may = false;
-                    for (int q = 0; q < 3; ++q) may |= found[i].*kAsked[q] + kScreen * found[i].peak_resultant_n >= surely[q];
-                    if (may) doubtful.push_back(static_cast<std::uint32_t>(i));
-                }
+        solver->solve(context, cuts, found.span());
+        for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
+            double surely[3] = {0, 0, 0};
+            for (std::size_t i = starts[g]; i < starts[g + 1]; ++i)
+                for (int q = 0; q < 3; ++q) surely[q] = std::max(surely[q], found[i].*kAsked[q] - kScreen * found[i].peak_resultant_n);
+            for (std::size_t i = starts[g]; i < starts[g + 1]; ++i) {
+                bool may = false;
+                for (int q = 0; q < 3; ++q) may |= found[i].*kAsked[q] + kScreen * found[i].peak_resultant_n >= surely[q];
+                if (may) doubtful.push_back(static_cast<std::uint32_t>(i));
             }
         }
     }

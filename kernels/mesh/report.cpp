@@ -197,7 +197,7 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
 
     // Paths are flattened into a second array: reading and writing one array would let threads see each other's work.
     {
-        std::vector<std::uint32_t> roots(n);
+        BulkVector<std::uint32_t> roots(n);
         parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t f = begin; f < end; ++f) roots[f] = cluster_root(component, static_cast<std::uint32_t>(f));
         });

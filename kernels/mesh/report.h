@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "kernels/mesh/bulk_memory.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 
@@ -31,7 +32,7 @@ struct MeshReport {
     Box3 box;
     /// Component of every facet, numbered by lowest facet. Facets that are paired across an edge belong together, and so
     /// do all facets of a misoriented edge; bodies that touch along an edge stay two.
-    std::vector<std::uint32_t> component_of;
+    BulkVector<std::uint32_t> component_of;
 };
 
 /// Reports on a mesh whose adjacency is filled. Deterministic.
