@@ -295,7 +295,7 @@ void StandingPart::Facets::end() {
 
 StandingPart::StandingPart(Context& context, MeshView mesh) {
     const std::size_t n = mesh.size();
-    box_ = bounds(mesh);
+    box_ = bounds(context, mesh);
     closed_ = closes(context, mesh);
     const MortonGrid grid(box_);
     // A key is as much of the Morton number as fits beside the facet's own.
@@ -369,21 +369,24 @@ StandingPart::Within::Within(const Point3& from, const Point3& to) {
 }
 
 // Written with vectors of eight, since compilers take such a short loop apart into smaller ones.
-SLABWRIGHT_WIDE unsigned StandingPart::overlapping(const Nodes& n, const Within& box) {
+SLABWRIGHT_WIDE void StandingPart::overlapping(const ManyNodes& many, const Within& box, unsigned* __restrict kept) {
     using Eight [[gnu::vector_size(32)]] = float;
     using Signs [[gnu::vector_size(32)]] = std::int32_t;
-    static_assert(sizeof(n.x0) == sizeof(Eight));
-    Eight x0, y0, z0, x1, y1, z1;
-    std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
-    std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
     const Eight none{}, low_x = none + box.low[0], low_y = none + box.low[1], low_z = none + box.low[2];
     const Eight high_x = none + box.high[0], high_y = none + box.high[1], high_z = none + box.high[2];
-    const Signs kept = (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
-    const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = kept & own;
-    std::array<std::uint64_t, 4> pairs;
-    std::memcpy(pairs.data(), &bits, sizeof(pairs));
-    const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
-    return static_cast<unsigned>(all | all >> 32);
+    for (std::size_t i = 0; i < many.count; ++i) {
+        const Nodes& n = *many.eights[i];
+        static_assert(sizeof(n.x0) == sizeof(Eight));
+        Eight x0, y0, z0, x1, y1, z1;
+        std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
+        std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
+        const Signs signs = (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
+        const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
+        std::array<std::uint64_t, 4> pairs;
+        std::memcpy(pairs.data(), &bits, sizeof(pairs));
+        const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
+        kept[i] = static_cast<unsigned>(all | all >> 32);
+    }
 }
 
 namespace {
@@ -394,31 +397,48 @@ void expect(const T& what) {
 }
 }  // namespace
 
-/// Visits, in one fixed order, the facets [first, last) of every node whose bit is 1 in choose(eight nodes).
+/// Visits, in the order of the tree, the facets [first, last) of every node whose bit is 1 in what choose(eights, kept) says of up to eight times
+/// eight nodes of one level at a time: looking at them costs little more than calling for it.
 template <class Choose, class Visit>
 void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
-    struct Item {
-        std::uint32_t level;
-        std::size_t eight;
-    };
-    std::array<Item, 128> stack;
-    std::size_t size = 0;
     if (facets_.empty()) return;
-    stack[size++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0};
-    while (size > 0) {
-        const Item item = stack[--size];
-        unsigned keep = choose(levels_[item.level][item.eight]);
-        const std::size_t first = item.eight * kFan;
-        if (item.level == 0) {
-            for_each_bit(keep, [&](std::size_t k) { visit((first + k) * kFan, std::min(facets_.size(), (first + k + 1) * kFan)); });
+    struct Waiting {  // eights of a level, ascending: all that the last look at the level above has kept
+        std::size_t next, end;
+        std::array<std::uint32_t, ManyNodes::kMost * kFan> eights;
+    };
+    constexpr std::size_t levels = 12;  // of 2³² facets: 11
+    std::array<Waiting, levels> waiting;
+    ManyNodes many;
+    std::array<unsigned, ManyNodes::kMost> kept;
+    std::size_t level = levels_.size() - 1;
+    waiting[level].next = 0, waiting[level].end = 1, waiting[level].eights[0] = 0;
+    while (level < levels_.size()) {
+        Waiting& here = waiting[level];
+        if (here.next == here.end) {
+            ++level;
             continue;
         }
-        while (keep != 0) {  // the last first, so that the first is on top
-            const unsigned k = static_cast<unsigned>(std::bit_width(keep)) - 1;
-            expect(levels_[item.level - 1][first + k]);
-            stack[size++] = {item.level - 1, first + k};
-            keep ^= 1U << k;
+        const std::uint32_t* const eights = here.eights.data() + here.next;
+        many.count = std::min(here.end - here.next, ManyNodes::kMost);
+        here.next += many.count;
+        for (std::size_t i = 0; i < many.count; ++i) many.eights[i] = &levels_[level][eights[i]];
+        choose(many, kept);
+        if (level == 0) {
+            for (std::size_t i = 0; i < many.count; ++i)
+                for_each_bit(kept[i], [&](std::size_t k) {
+                    const std::size_t first = (eights[i] * kFan + k) * kFan;
+                    visit(first, std::min(facets_.size(), first + kFan));
+                });
+            continue;
         }
+        Waiting& below = waiting[--level];
+        below.next = below.end = 0;
+        for (std::size_t i = 0; i < many.count; ++i)
+            for_each_bit(kept[i], [&](std::size_t k) {
+                const std::size_t eight = eights[i] * kFan + k;
+                expect(levels_[level][eight]);
+                below.eights[below.end++] = static_cast<std::uint32_t>(eight);
+            });
     }
 }
 
@@ -426,10 +446,12 @@ void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
 template <class Enter, class Visit>
 void StandingPart::walk(Enter&& enter, Visit&& visit) const {
     walk_leaves(
-        [&](const Nodes& nodes) {
-            unsigned keep = 0;
-            for (unsigned k = 0; k < kFan; ++k) keep |= static_cast<unsigned>(nodes.x0[k] <= nodes.x1[k] && enter(nodes[k])) << k;
-            return keep;
+        [&](const ManyNodes& many, auto& kept) {
+            for (std::size_t i = 0; i < many.count; ++i) {
+                const Nodes& nodes = *many.eights[i];
+                kept[i] = 0;
+                for (unsigned k = 0; k < kFan; ++k) kept[i] |= static_cast<unsigned>(nodes.x0[k] <= nodes.x1[k] && enter(nodes[k])) << k;
+            }
         },
         [&](std::size_t first, std::size_t last) {
             for (std::size_t f = first; f < last; ++f) visit(facets_[f]);
@@ -439,7 +461,7 @@ void StandingPart::walk(Enter&& enter, Visit&& visit) const {
 /// The same of every node whose box has something in common with this.
 template <class Visit>
 void StandingPart::walk_within(const Within& box, Visit&& visit) const {
-    walk_leaves([&](const Nodes& nodes) { return overlapping(nodes, box); },
+    walk_leaves([&](const ManyNodes& many, auto& kept) { overlapping(many, box, kept.data()); },
                 [&](std::size_t first, std::size_t last) {
                     for (std::size_t f = first; f < last; ++f) visit(facets_[f]);
                 });
@@ -716,28 +738,33 @@ struct StandingPart::Stretch {
 };
 
 // Written with vectors of eight, as overlapping() is.
-SLABWRIGHT_WIDE unsigned StandingPart::around(const Nodes& n, const WayAround& w, const Within& box) {
+SLABWRIGHT_WIDE void StandingPart::around(const ManyNodes& many, const WayAround& way, const Within& box, unsigned* __restrict kept) {
     using Eight [[gnu::vector_size(32)]] = float;
     using Signs [[gnu::vector_size(32)]] = std::int32_t;
-    Eight x0, y0, z0, x1, y1, z1;
-    std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
-    std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
+    const WayAround w = way;
     const Eight none{}, top = none + w.top;
-    const Signs within = (x0 <= none + box.high[0]) & (none + box.low[0] <= x1) & (y0 <= none + box.high[1]) & (none + box.low[1] <= y1) &
-                         (z0 <= none + box.high[2]) & (none + box.low[2] <= z1);
+    const Eight low_x = none + box.low[0], low_y = none + box.low[1], low_z = none + box.low[2];
+    const Eight high_x = none + box.high[0], high_y = none + box.high[1], high_z = none + box.high[2];
     const float sx = std::abs(w.ux), sy = std::abs(w.uy);
-    const Eight hx = (x1 - x0) * 0.5F, hy = (y1 - y0) * 0.5F, cx = (x1 + x0) * 0.5F - w.ax, cy = (y1 + y0) * 0.5F - w.ay;
-    const Eight along = cx * w.ux + cy * w.uy, aside = cy * w.ux - cx * w.uy, across = aside > none ? aside : -aside;
-    const Eight before = -along - (hx * sx + hy * sy), behind = along - w.length - (hx * sx + hy * sy), beside = across - (hx * sy + hy * sx);
-    Eight l = before > behind ? before : behind, high = z1 < top ? z1 : top, under = w.lowest - high;
-    l = l > none ? l : none, under = under > none ? under : none;
-    const Eight c = beside > none ? beside : none, u = under * w.upwards;
-    const Signs kept = within & (z0 < top) & (z1 > none + w.above) & (l * l + c * c + u * u < none + w.reach2);
-    const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = kept & own;
-    std::array<std::uint64_t, 4> pairs;
-    std::memcpy(pairs.data(), &bits, sizeof(pairs));
-    const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
-    return static_cast<unsigned>(all | all >> 32);
+    for (std::size_t i = 0; i < many.count; ++i) {
+        const Nodes& n = *many.eights[i];
+        Eight x0, y0, z0, x1, y1, z1;
+        std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
+        std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
+        const Signs within = (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
+        const Eight hx = (x1 - x0) * 0.5F, hy = (y1 - y0) * 0.5F, cx = (x1 + x0) * 0.5F - w.ax, cy = (y1 + y0) * 0.5F - w.ay;
+        const Eight along = cx * w.ux + cy * w.uy, aside = cy * w.ux - cx * w.uy, across = aside > none ? aside : -aside;
+        const Eight before = -along - (hx * sx + hy * sy), behind = along - w.length - (hx * sx + hy * sy), beside = across - (hx * sy + hy * sx);
+        Eight l = before > behind ? before : behind, high = z1 < top ? z1 : top, under = w.lowest - high;
+        l = l > none ? l : none, under = under > none ? under : none;
+        const Eight c = beside > none ? beside : none, u = under * w.upwards;
+        const Signs signs = within & (z0 < top) & (z1 > none + w.above) & (l * l + c * c + u * u < none + w.reach2);
+        const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
+        std::array<std::uint64_t, 4> pairs;
+        std::memcpy(pairs.data(), &bits, sizeof(pairs));
+        const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
+        kept[i] = static_cast<unsigned>(all | all >> 32);
+    }
 }
 
 namespace {
@@ -804,14 +831,19 @@ bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t 
             });
         many.count = 0;
     };
-    walk_leaves([&](const Nodes& nodes) { return all ? around(nodes, place, box) : 0U; },
-                [&](std::size_t first, std::size_t) {
-                    static_assert(kFan == 8);
-                    first_of[many.count] = static_cast<std::uint32_t>(first);
-                    expect(facets_.eight(first / kFan));
-                    many.eights[many.count++] = &facets_.eight(first / kFan);
-                    if (many.count == ManyEights::kMost) take();
-                });
+    walk_leaves(
+        [&](const ManyNodes& nodes, auto& kept) {
+            if (all) around(nodes, place, box, kept.data());
+            else kept.fill(0);
+        },
+        [&](std::size_t first, std::size_t) {
+            static_assert(kFan == 8);
+            if (!all) return;
+            first_of[many.count] = static_cast<std::uint32_t>(first);
+            expect(facets_.eight(first / kFan));
+            many.eights[many.count++] = &facets_.eight(first / kFan);
+            if (many.count == ManyEights::kMost) take();
+        });
     if (many.count > 0 && all) take();
     if (some > 0 && all) look();
     return all;

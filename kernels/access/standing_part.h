@@ -145,8 +145,14 @@ private:
         Within(const Point3& low, const Point3& high);
         std::array<float, 3> low, high;
     };
-    // Bit k is 1 where node k is kept.
-    static unsigned overlapping(const Nodes& nodes, const Within& box);
+    /// Nodes of one level to look at in one go.
+    struct ManyNodes {
+        static constexpr std::size_t kMost = 8;
+        std::array<const Nodes*, kMost> eights;
+        std::size_t count = 0;
+    };
+    // Bit k of kept[i] is 1 where node k of eight i is kept, else 0.
+    static void overlapping(const ManyNodes& many, const Within& box, unsigned* kept);
     template <class Choose, class Visit>
     void walk_leaves(Choose&& choose, Visit&& visit) const;
     template <class Enter, class Visit>
@@ -175,7 +181,7 @@ private:
     [[nodiscard]] double distance(const Point3& point, std::uint32_t facet) const;
     struct Stretch;
     struct Search;
-    static unsigned around(const Nodes& nodes, const WayAround& way, const Within& box);
+    static void around(const ManyNodes& many, const WayAround& way, const Within& box, unsigned* kept);
     bool gather(Search& search, Stretch& stretch, double depth, std::size_t most) const;
     bool arc_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m, double depth) const;
     bool stretch_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m, double depth) const;
