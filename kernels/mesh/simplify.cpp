@@ -5,6 +5,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -23,7 +24,19 @@ namespace slabwright {
 
 namespace {
 
-using Place = std::array<double, 3>;
+// What is asked of all around a vertex is asked of four at once. The functions that return such vectors are called in this file alone.
+#pragma GCC diagnostic ignored "-Wpsabi"
+constexpr std::size_t kLanes = 4;
+using Four [[gnu::vector_size(kLanes * sizeof(double))]] = double;
+using Signs [[gnu::vector_size(kLanes * sizeof(double))]] = std::int64_t;
+
+template <class Real>
+struct Space {
+    Real x{}, y{}, z{};
+    friend Space operator-(const Space& a, const Space& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+};
+using Place = Space<double>;
+using Places = Space<Four>;
 
 constexpr std::size_t kBlockFacets = 1 << 15;    // that a block has on the average
 constexpr int kMostAround = 16;                  // a vertex with more facets around it stays
@@ -37,9 +50,32 @@ constexpr std::uint64_t kDealtAtOnce = 1 << 24;  // facets, unless one block has
 constexpr std::size_t kSparse = 8;               // of a block's facets: words of 64 vertices from which on sorting numbers them sooner
 constexpr double kLeastRound = 0.002;            // of a block's facets; a round in which fewer vertices go is the last
 
-Place minus(const Place& a, const Place& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Place cross(const Place& a, const Place& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-double dot(const Place& a, const Place& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+template <class A, class B>
+auto dot(const Space<A>& a, const Space<B>& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class A, class B>
+auto turn(const Space<A>& a, const Space<B>& b) {  // of the plan views
+    return a.x * b.y - a.y * b.x;
+}
+template <class Real>
+Space<Real> cross(const Space<Real>& a, const Space<Real>& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, turn(a, b)};
+}
+
+Four larger(const Four& a, const Four& b) { return a < b ? b : a; }
+Four smaller(const Four& a, const Four& b) { return b < a ? b : a; }
+double smallest(const Four& a) { return std::min(std::min(a[0], a[1]), std::min(a[2], a[3])); }
+Four root(const Four& a) { return Four{std::sqrt(a[0]), std::sqrt(a[1]), std::sqrt(a[2]), std::sqrt(a[3])}; }
+std::uint64_t joined_bits(const Signs& s) { return static_cast<std::uint64_t>(s[0] | s[1] | s[2] | s[3]); }
+constexpr Signs kOwn{1, 2, 4, 8};  // bits
+unsigned bits(const Signs& s) { return static_cast<unsigned>(joined_bits(s & kOwn)); }
+
+/// Heights of facets with one corner at the origin over their longest edges.
+Four heights(const Places& p, const Places& q, const Four& square) {
+    const Places third = q - p;
+    return root(square) / root(larger(larger(dot(p, p), dot(q, q)), dot(third, third)));
+}
 
 /// A facet and between which distances from it, counted outward, the surface lies that it stands for, mm.
 struct Face {
@@ -170,36 +206,41 @@ private:
         for (std::size_t i = 2; i < starts_.size(); ++i) starts_[i] += starts_[i - 1];
         around_.resize(3 * faces_.size());
         for (std::size_t f = 0; f < faces_.size(); ++f)
-            for (const std::uint32_t v : faces_[f].v) around_[starts_[v + 1]++] = static_cast<std::uint32_t>(f);
+            for (std::size_t k = 0; k < 3; ++k) around_[starts_[faces_[f].v[k] + 1]++] = static_cast<std::uint32_t>(4 * f + k);
     }
 
+    static constexpr std::array<std::uint8_t, 4> kNext{1, 2, 0, 1};  // corners of a facet
     // The facets around v and the vertices around it, counter-clockwise: facet i is (v, ring_[i], ring_[i + 1]). False where they are not one closed fan.
     bool gather(std::uint32_t v) {
         const auto n = static_cast<int>(starts_[v + 1] - starts_[v]);
         if (n < 3 || n > kMostAround) return false;
-        std::array<std::uint32_t, kMostAround> from, to;  // written as far as they are read
+        std::array<std::uint32_t, kMostAround> from, to, facet;  // written as far as they are read
         for (int i = 0; i < n; ++i) {
-            const Index3& f = faces_[around_[starts_[v] + static_cast<std::uint32_t>(i)]].v;
-            if (f[0] == f[1] || f[1] == f[2] || f[2] == f[0]) return false;
-            const std::size_t k = f[0] == v ? 0 : f[1] == v ? 1 : 2;
-            from[static_cast<std::size_t>(i)] = f[(k + 1) % 3];
-            to[static_cast<std::size_t>(i)] = f[(k + 2) % 3];
+            const std::uint32_t corner = around_[starts_[v] + static_cast<std::uint32_t>(i)];
+            const Index3& f = faces_[corner / 4].v;
+            from[static_cast<std::size_t>(i)] = f[kNext[corner % 4]];
+            to[static_cast<std::size_t>(i)] = f[kNext[corner % 4 + 1]];
+            facet[static_cast<std::size_t>(i)] = corner / 4;
+        }
+        // A bit for each facet that begins where this one ends. Two in a fan that visits all are at the same vertex where a facet is degenerate: then
+        // there is no such fan.
+        using Eight [[gnu::vector_size(32)]] = std::uint32_t;
+        std::array<std::uint32_t, kMostAround> follow;
+        for (std::size_t half = 0; half < static_cast<std::size_t>(n); half += 8) {
+            Eight ends, bits{};
+            std::memcpy(&ends, &to[half], sizeof(ends));
+            for (int j = 0; j < n; ++j) bits |= static_cast<Eight>(ends == from[static_cast<std::size_t>(j)]) & (1u << j);
+            std::memcpy(&follow[half], &bits, sizeof(bits));
         }
         n_ = n;
-        std::uint32_t at = from[0];
+        std::size_t at = 0;
         for (int i = 0; i < n; ++i) {
-            int found = -1;
-            for (int j = 0; j < n; ++j)
-                if (from[static_cast<std::size_t>(j)] == at) {
-                    if (found >= 0) return false;
-                    found = j;
-                }
-            if (found < 0 || (found == 0 && i > 0)) return false;
-            ring_[static_cast<std::size_t>(i)] = at;
-            fan_[static_cast<std::size_t>(i)] = around_[starts_[v] + static_cast<std::uint32_t>(found)];
-            at = to[static_cast<std::size_t>(found)];
+            if ((at == 0 && i > 0) || !std::has_single_bit(follow[at])) return false;
+            ring_[static_cast<std::size_t>(i)] = from[at];
+            fan_[static_cast<std::size_t>(i)] = facet[at];
+            at = static_cast<std::size_t>(std::countr_zero(follow[at]));
         }
-        return at == from[0];
+        return at == 0;
     }
 
     // Takes a vertex away where one of its edges allows it.
@@ -222,42 +263,56 @@ private:
     // Whether the fan has a facet of less than 30° from level, and reaches as near to one of the planes as it may move.
     [[nodiscard]] bool crosses_nearly_level(std::uint32_t v) const {
         if (planes_.empty()) return false;
-        double low = place_[v][2], high = low;
-        for (std::size_t a = 0; a < count(); ++a) low = std::min(low, place_[ring_[a]][2]), high = std::max(high, place_[ring_[a]][2]);
+        double low = place_[v].z, high = low;
+        for (std::size_t a = 0; a < count(); ++a) low = std::min(low, place_[ring_[a]].z), high = std::max(high, place_[ring_[a]].z);
         const double beside = kBesidePlane * tolerance_;
         const auto plane = std::lower_bound(planes_.begin(), planes_.end(), low - beside);
         if (plane == planes_.end() || *plane > high + beside) return false;
         for (std::size_t a = 0; a < count(); ++a)
-            if (normal_[a][2] * normal_[a][2] >= kNearlyLevel * kNearlyLevel * square_[a]) return true;
+            if (normal_.z[a] * normal_.z[a] >= kNearlyLevel * kNearlyLevel * square_[a]) return true;
         return false;
     }
 
     // The vertices around v as (u, v, w) from v, w along the facets' mean normal. False where nothing lets v go.
     bool look(std::uint32_t v) {
-        Place sum{0, 0, 0};
         low_ = high_ = 0;
-        for (std::size_t a = 0; a < count(); ++a) arm_[a] = minus(place_[ring_[a]], place_[v]);
-        arm_[count()] = arm_[0];
         for (std::size_t a = 0; a < count(); ++a) {
-            const Place n = normal_[a] = cross(arm_[a], arm_[a + 1]);
-            square_[a] = dot(n, n);
-            if (square_[a] == 0) return false;
-            for (std::size_t k = 0; k < 3; ++k) sum[k] += n[k];
+            arm_.set(a, place_[ring_[a]] - place_[v]);
             low_ = std::min(low_, faces_[fan_[a]].low);
             high_ = std::max(high_, faces_[fan_[a]].high);
         }
+        arm_.repeat(count(), count() + kLanes + 1);
+        Signs no_area{};
+        for (std::size_t a = 0; a < count(); a += kLanes) {
+            const Places n = cross(arm_.at(a), arm_.at(a + 1));
+            const Four square = dot(n, n);
+            normal_.put(a, n);
+            put(square_, a, square);
+            no_area |= square == 0;
+        }
+        if (joined_bits(no_area) != 0) return false;
+        Place sum;
+        for (std::size_t a = 0; a < count(); ++a) sum = {sum.x + normal_.x[a], sum.y + normal_.y[a], sum.z + normal_.z[a]};
         const double length = std::sqrt(dot(sum, sum));
         if (length == 0) return false;
-        const Place w{sum[0] / length, sum[1] / length, sum[2] / length};
-        for (std::size_t a = 0; a < count(); ++a)
-            if (const double along = dot(normal_[a], w); along <= 0 || along * along < kLeastFacing * kLeastFacing * square_[a]) return false;
+        const Place w{sum.x / length, sum.y / length, sum.z / length};
+        Signs turned{};
+        for (std::size_t a = 0; a < count(); a += kLanes) {
+            const Four along = dot(normal_.at(a), w);
+            turned |= (along <= 0) | (along * along < kLeastFacing * kLeastFacing * four(square_, a));
+        }
+        if (joined_bits(turned) != 0) return false;
         exactly_ = crosses_nearly_level(v);
-        const Place side = std::abs(w[0]) < 0.6 ? Place{1, 0, 0} : Place{0, 1, 0};
+        const Place side = std::abs(w.x) < 0.6 ? Place{1, 0, 0} : Place{0, 1, 0};
         Place u = cross(side, w);
         const double ul = std::sqrt(dot(u, u));
-        for (double& x : u) x /= ul;
+        u = {u.x / ul, u.y / ul, u.z / ul};
         const Place t = cross(w, u);
-        for (std::size_t a = 0; a < count(); ++a) flat_[a] = flat_[a + count()] = {dot(arm_[a], u), dot(arm_[a], t), dot(arm_[a], w)};
+        for (std::size_t a = 0; a < count(); a += kLanes) {
+            const Places arm = arm_.at(a), flat{dot(arm, u), dot(arm, t), dot(arm, w)};
+            flat_.put(a, flat);
+        }
+        flat_.repeat(count(), 2 * count() + kLanes);
         old_facets_known_ = false;
         return true;
     }
@@ -266,23 +321,17 @@ private:
     void look_at_old_facets() {
         if (old_facets_known_) return;
         old_facets_known_ = true;
-        least_height_ = kLeastHeight;
-        for (std::size_t a = 0; a < count(); ++a) {
-            least_height_ = std::min(least_height_, std::sqrt(square_[a]) / std::sqrt(longest2(arm_[a], arm_[a + 1])));
-            flat_normal_[a] = cross(flat_[a], flat_[a + 1]);
-            same_facing2_[a] = kSameFacing * kSameFacing * dot(flat_normal_[a], flat_normal_[a]);
+        Four least = Four{} + kLeastHeight;
+        for (std::size_t a = 0; a < count(); a += kLanes) {
+            least = smaller(least, heights(arm_.at(a), arm_.at(a + 1), four(square_, a)));
+            const Places n = cross(flat_.at(a), flat_.at(a + 1));
+            flat_normal_.put(a, n);
+            put(same_facing2_, a, kSameFacing * kSameFacing * dot(n, n));
         }
-    }
-
-    // Of the edges of a facet from one corner, squared.
-    static double longest2(const Place& p, const Place& q) {
-        const Place third = minus(q, p);
-        return std::max({dot(p, p), dot(q, q), dot(third, third)});
+        least_height_ = smallest(least);
     }
 
     [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(n_); }
-
-    static double turn(const Place& a, const Place& b) { return a[0] * b[1] - a[1] * b[0]; }  // of the plan views
 
     // Whether all facets around a vertex are known: in this block, and as they were when the round began.
     [[nodiscard]] bool known(std::uint32_t v) const { return inner_[v] && !touched_[v]; }
@@ -292,7 +341,7 @@ private:
         if (!known(a)) std::swap(a, b);
         if (!known(a)) return true;
         for (std::uint32_t i = starts_[a]; i < starts_[a + 1]; ++i) {
-            const Index3& f = faces_[around_[i]].v;
+            const Index3& f = faces_[around_[i] / 4].v;
             if (f[0] == b || f[1] == b || f[2] == b) return true;
         }
         return false;
@@ -301,9 +350,10 @@ private:
     // Whether v may be drawn into the vertex k of its ring, and leaves less flat facets than going to the best one so far. need_[v] becomes no more
     // than what a tolerance must allow so that this may change.
     bool may_go_to(std::uint32_t v, int k) {
-        const Place* const ring = &flat_[static_cast<std::size_t>(k)];
-        const std::size_t n = count();
-        const Place& a = ring[0];
+        const std::size_t n = count(), start = static_cast<std::size_t>(k);
+        const Place a = flat_.get(start);
+        const Places fours_a{Four{} + a.x, Four{} + a.y, Four{} + a.z};
+        auto from_a = [&](std::size_t i) { return flat_.at(start + i) - fours_a; };
         // How far what was there stands over what follows.
         double low = 0, high = 0;
         auto fits = [&](double gap) {
@@ -315,58 +365,71 @@ private:
             need_[v] = std::min(need_[v], asks);
             return false;
         };
+        // On which side of the way to a each vertex lies (bits from 0 on, from 16 on the other), and which new facets are upright (from 32 on).
+        Signs found{}, own = kOwn;
+        for (std::size_t i = 0; i < n; i += kLanes, own <<= kLanes) {
+            const Places p = from_a(i), q = from_a(i + 1);
+            const Four side = turn(fours_a, p), area2 = turn(p, q);
+            put(side_, i, side);
+            put(area2_, i, area2);
+            found |= ((side >= 0) & own) | ((side <= 0) & own << 16) | ((area2 > 0) & own << 32);
+        }
+        const std::uint64_t all = joined_bits(found);
+        const unsigned new_facets = (1u << (n - 1)) - 2, holders = static_cast<unsigned>(all & all >> 17) & new_facets;
         // The gap at v itself, which is a + s·p + t·q with s = of_q / area2, t = of_p / area2 in the new facet that it lies in: what
         // most often forbids to go.
-        for (std::size_t i = 1; i < n; ++i) {
-            from_a_[i] = minus(ring[i], a);
-            side_[i] = turn(a, from_a_[i]);
-        }
-        std::size_t holds_v = 0, holding = 0;
-        for (std::size_t i = 1; i + 1 < n; ++i) {
-            const double of_p = side_[i], of_q = -side_[i + 1];
-            if (!(of_p >= 0 && of_q >= 0)) continue;
-            holds_v = i, ++holding;
-            const Place &p = from_a_[i], &q = from_a_[i + 1];
-            const double area2 = turn(p, q);
+        for (unsigned left = holders; left != 0; left &= left - 1) {
+            const auto i = static_cast<std::size_t>(std::countr_zero(left));
+            const double area2 = area2_[i];
             if (!(area2 > 0)) return false;
-            const double s = of_q / area2, t = of_p / area2;
-            if (!fits(-(a[2] + s * p[2] + t * q[2]))) return false;
+            const double s = -side_[i + 1] / area2, t = side_[i] / area2;
+            if (!fits(-(a.z + s * (flat_.z[start + i] - a.z) + t * (flat_.z[start + i + 1] - a.z)))) return false;
         }
         // The new facets are upright.
-        for (std::size_t i = 1; i + 1 < n; ++i)
-            if (!(turn(from_a_[i], from_a_[i + 1]) > 0)) return false;
+        if ((~(all >> 32) & new_facets) != 0) return false;
         // Where the new edges cross those that meet in v. A new edge parts the ring: where v lies in one new facet only, just the vertices that are not
         // on its side have edges to it that cross.
+        const bool in_one = std::has_single_bit(holders);
+        const auto holds_v = static_cast<std::size_t>(std::countr_zero(holders));
         for (std::size_t i = 2; i + 1 < n; ++i) {
-            const Place& d = from_a_[i];
-            const double of_t = turn(a, d);
-            const std::size_t first = holding == 1 && i > holds_v ? i + 1 : 1, last = holding == 1 && i <= holds_v ? i : n;
-            for (std::size_t j = first; j < last; ++j) {
-                if (j == i) continue;
-                const Place& r = ring[j];
-                // a + s·d = t·r with s and t between 0 and 1, which is seen before it is divided
-                const double det = turn(r, d), of_s = turn(a, r), size = std::abs(det);
-                if (std::abs(of_t) >= size || std::abs(of_s) >= size || of_t * det <= 0 || of_s * det <= 0) continue;
-                const double t = of_t / det, s = of_s / det;
-                if (t >= 1 || s >= 1) continue;
-                if (!fits(t * r[2] - (a[2] + s * d[2]))) return false;
+            const Place d = flat_.get(start + i) - a;
+            const double of_t = side_[i];
+            const std::size_t first = in_one && i > holds_v ? i + 1 : 1, last = in_one && i <= holds_v ? i : n;
+            for (std::size_t j = first; j < last; j += kLanes) {
+                const Places r = flat_.at(start + j);
+                // a + s·d = t·r with s and t between 0 and 1
+                const Four det = turn(r, d), of_s = turn(fours_a, r);
+                const Four t = of_t / det, s = of_s / det;
+                const Four gap = t * r.z - (a.z + s * d.z);
+                unsigned crossing = bits((of_t * det > 0) & (of_s * det > 0) & (t < 1) & (s < 1));
+                crossing &= (1u << std::min(kLanes, last - j)) - 1;
+                if (i - j < kLanes) crossing &= ~(1u << (i - j));
+                for (; crossing != 0; crossing &= crossing - 1)
+                    if (!fits(gap[std::countr_zero(crossing)])) return false;
             }
         }
         look_at_old_facets();
-        new_height_ = kNever;
-        for (std::size_t i = 1; i + 1 < n; ++i) {
-            new_normal_[i] = cross(from_a_[i], from_a_[i + 1]);
-            new_square_[i] = dot(new_normal_[i], new_normal_[i]);
-            new_height_ = std::min(new_height_, std::sqrt(new_square_[i]) / std::sqrt(longest2(from_a_[i], from_a_[i + 1])));
-            if (new_height_ < least_height_ * (1 - 1e-9) || new_height_ <= best_height_) return false;
+        Four least = Four{} + kNever;
+        std::array<Places, kMostAround / kLanes> normal;
+        std::array<Four, kMostAround / kLanes> square;
+        for (std::size_t i = 1; i + 1 < n; i += kLanes) {
+            const Places p = from_a(i), q = from_a(i + 1);
+            normal[i / kLanes] = cross(p, q);
+            square[i / kLanes] = dot(normal[i / kLanes], normal[i / kLanes]);
+            const Four height = heights(p, q, square[i / kLanes]);
+            const auto beyond = static_cast<std::int64_t>(n - 1 - i);
+            least = smaller(least, Signs{0, 1, 2, 3} < beyond ? height : least);
         }
-        for (std::size_t i = 1; i + 1 < n; ++i) {
-            bool found = false;
-            for (std::size_t j = 0; j < n && !found; ++j) {
-                const double along = dot(flat_normal_[j], new_normal_[i]);
-                found = along > 0 && along * along >= same_facing2_[j] * new_square_[i];
+        new_height_ = smallest(least);
+        if (new_height_ < least_height_ * (1 - 1e-9) || new_height_ <= best_height_) return false;
+        for (std::size_t i = 1; i + 1 < n; i += kLanes) {
+            Signs same = Signs{0, 1, 2, 3} >= static_cast<std::int64_t>(n - 1 - i);
+            for (std::size_t j = 0; j < n; ++j) {
+                const Four along = dot(normal[i / kLanes], flat_normal_.get(j));
+                same |= (along > 0) & (along * along >= same_facing2_[j] * square[i / kLanes]);
+                if (bits(same) == 15) break;
             }
-            if (!found) return false;
+            if (bits(same) != 15) return false;
         }
         // None of the new edges may exist already: the surface would be pinched there.
         const std::uint32_t target = ring_[at(k, 0)];
@@ -388,7 +451,7 @@ private:
         for (const std::uint32_t v : {a, b, c})
             if (known(v)) {
                 for (std::uint32_t i = starts_[v]; i < starts_[v + 1]; ++i) {
-                    const Index3& f = faces_[around_[i]].v;
+                    const Index3& f = faces_[around_[i] / 4].v;
                     int of = 0;
                     for (const std::uint32_t w : f) of += w == a || w == b || w == c;
                     if (of == 3) return true;
@@ -433,16 +496,32 @@ private:
     std::vector<char> inner_, awake_, touched_;
     std::vector<double> need_;  // what the tolerance must be, at least, so that a vertex that is asleep may go
     // Around the vertex in work.
-    template <class T, int times = 1>
-    using Around = std::array<T, times * kMostAround + 1>;
+    template <class T, std::size_t times = 1>
+    using Around = std::array<T, times * kMostAround + 2 * kLanes>;
+    static Four four(const auto& from, std::size_t i) {
+        Four values;
+        std::memcpy(&values, &from[i], sizeof(values));
+        return values;
+    }
+    static void put(auto& to, std::size_t i, const Four& values) { std::memcpy(&to[i], &values, sizeof(values)); }
+    // Once and again from the start, so that four in a row may be asked anywhere.
+    struct PlacesAround {
+        Around<double, 2> x, y, z;
+        [[nodiscard]] Place get(std::size_t i) const { return {x[i], y[i], z[i]}; }
+        [[nodiscard]] Places at(std::size_t i) const { return {four(x, i), four(y, i), four(z, i)}; }
+        void set(std::size_t i, const Place& p) { x[i] = p.x, y[i] = p.y, z[i] = p.z; }
+        void put(std::size_t i, const Places& p) { Block::put(x, i, p.x), Block::put(y, i, p.y), Block::put(z, i, p.z); }
+        void repeat(std::size_t n, std::size_t last) {
+            for (std::size_t i = n; i < last; ++i) set(i, get(i - n));
+        }
+    };
     int n_ = 0;
     Around<std::uint32_t> ring_, fan_;
-    Around<Place> arm_, normal_;          // as the pattern stands: to the vertices around, and of the facets, twice their area long
-    Around<Place, 2> flat_;               // the vertices around, twice in a row
-    Around<Place> flat_normal_;           // as flat_
-    Around<Place> from_a_, new_normal_;   // as flat_: from the vertex that v may go to, and of the facets that follow
-    Around<double> square_, new_square_;  // of the lengths of normal_ and new_normal_
-    Around<double> side_;
+    PlacesAround arm_, normal_;  // as the pattern stands: to the vertices around, and of the facets, twice their area long
+    PlacesAround flat_;          // the vertices around
+    PlacesAround flat_normal_;   // as flat_
+    Around<double> square_;      // of the lengths of normal_
+    Around<double> side_, area2_;
     Around<double> same_facing2_;  // what a normal along flat_normal_ makes with it at least
     bool exactly_ = false;         // nothing may move
     bool old_facets_known_ = false;
