@@ -22,7 +22,6 @@ constexpr float kStands = 0.05F;         // mm over the tip: less is nothing to 
 constexpr double kEdge = 0.05;           // mm: what only the cutter's very edge meets was cut on the ring before
 constexpr double kWorthOfBall = 0.5;     // mm that a ball must lower a cell by: its rings leave ridges
 constexpr int kLevelsAStep = 2;          // of a ball
-constexpr int kFewCells = 4;             // that a cutter must meet to be of use: one or two may be a matter of rounding
 constexpr int kTile = 16;                // cells
 constexpr int kMostRings = 4000;
 
@@ -118,10 +117,9 @@ public:
             cells_.push_back({i, j});
         }
     }
-    [[nodiscard]] bool few() const { return cells_.size() < kFewCells; }
     [[nodiscard]] const std::vector<std::array<int, 2>>& cells() const { return cells_; }
 
-    // Whether a cutter whose middle is here meets some that still stand; a ball, some that it lowers by enough.
+    // Whether a cutter whose middle is here meets one that still stands; a ball, one that it lowers by enough.
     [[nodiscard]] bool met(double x, double y) {
         const CellGrid& grid = stock_.grid();
         const auto cell = [&](double at, double from, int n) { return static_cast<int>(std::clamp((at - from) / grid.cell + 0.5, 0.0, n - 1.0)); };
@@ -132,8 +130,6 @@ public:
         const int j1 = std::min(grid.ny - 1, static_cast<int>(std::floor((y + r - grid.y0) / grid.cell)));
         const int i0 = std::max(0, static_cast<int>(std::ceil((x - r - grid.x0) / grid.cell)));
         const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + r - grid.x0) / grid.cell)));
-        int found = 0;
-        std::array<std::array<int, 2>, kFewCells> cells;
         for (int tj = j0 / kTile; tj <= j1 / kTile && j0 <= j1; ++tj)
             for (int ti = i0 / kTile; ti <= i1 / kTile && i0 <= i1; ++ti) {
                 if (!tiles_[static_cast<std::size_t>(tj) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(ti)]) continue;
@@ -153,9 +149,7 @@ public:
                             continue;
                         }
                         if (ball_ && !lowers_enough(c, (grid.x(i) - x) * (grid.x(i) - x) + dy * dy)) continue;
-                        cells[static_cast<std::size_t>(found)] = {i, j};
-                        if (++found < kFewCells) continue;
-                        met_ = cells;
+                        met_ = {i, j};
                         return true;
                     }
                 }
@@ -175,18 +169,16 @@ private:
         if (stock_.surface(c) >= most || tip_ >= most) return false;
         return tip_ + radius_ - std::sqrt(std::max(0.0, radius_ * radius_ - away2)) < most;
     }
-    // Whether those that were met last are met here too: places follow each other along a ring.
+    // Whether the one that was met last is met here too: places follow each other along a ring.
     [[nodiscard]] bool meets_as_before(double x, double y, double r) const {
         const CellGrid& grid = stock_.grid();
         const double within = r - 1e-6;  // mm: what rounding decides is left to met()
-        return std::all_of(met_.begin(), met_.end(), [&](const std::array<int, 2>& cell) {
-            const auto [i, j] = cell;
-            if (i < 0 || (marked_[row_of(i, j)] >> (i % kTile) & 1) == 0) return false;
-            const double dx = grid.x(i) - x, dy = grid.y(j) - y, away2 = dx * dx + dy * dy;
-            if (away2 > within * within) return false;
-            const std::size_t c = grid.index(i, j);
-            return stock_.height(c) > tip_ + kStands && (!ball_ || lowers_enough(c, away2));
-        });
+        const auto [i, j] = met_;
+        if (i < 0 || (marked_[row_of(i, j)] >> (i % kTile) & 1) == 0) return false;
+        const double dx = grid.x(i) - x, dy = grid.y(j) - y, away2 = dx * dx + dy * dy;
+        if (away2 > within * within) return false;
+        const std::size_t c = grid.index(i, j);
+        return stock_.height(c) > tip_ + kStands && (!ball_ || lowers_enough(c, away2));
     }
     // A cutter whose middle is in one of the tiles around may meet what is in this one.
     void come_near(int ti, int tj) {
@@ -205,8 +197,8 @@ private:
     std::vector<char> near_;             // within reach of such
     std::vector<std::uint16_t> marked_;  // tile after tile, row after row, a bit for each cell
     std::vector<std::size_t> near_tiles_;
-    std::array<std::array<int, 2>, kFewCells> met_{{{-1, 0}, {-1, 0}, {-1, 0}, {-1, 0}}};  // at the last place that met enough
-    std::vector<std::array<int, 2>> left_over_, cells_;                                    // row after row; `cells_` of the level
+    std::array<int, 2> met_{-1, 0};                      // at the last place that met one
+    std::vector<std::array<int, 2>> left_over_, cells_;  // row after row; `cells_` of the level
 };
 
 // A place of the cutter on a ring; corners of the ring, and places between them that are looked at.
@@ -270,7 +262,7 @@ public:
             targets.mark(tips[i] - stock_.z_bottom(), levels[i].over - stock_.z_bottom(), swath[i], cut_.floors);
             const double depth = above - tips[i];
             above = tips[i];
-            if (targets.few()) continue;
+            if (targets.cells().empty()) continue;
             const bool floor = on_floor(tips[i]);
             const double allowance = allowances[i];
             const FibreGrid grid = grid_of(allowance);
