@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/features/facet_classes.h"
+#include "kernels/mesh/raw_array.h"
 #include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
 
@@ -11,10 +12,14 @@ namespace slabwright {
 
 namespace {
 
+std::array<Vec3d, 3> corners(MeshView mesh, std::size_t f) {
+    const Index3& t = mesh.facets[f];
+    return {to_double(mesh.vertices[t[0]]), to_double(mesh.vertices[t[1]]), to_double(mesh.vertices[t[2]])};
+}
+
 // Signed area in plan of the part of a facet above z. Facets at z belong below (the section is taken just above).
 double plan_area_above(MeshView mesh, std::uint32_t f, double z) {
-    std::array<Vec3d, 3> p;
-    for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
+    const std::array<Vec3d, 3> p = corners(mesh, f);
     double twice = 0;
     // The clipped polygon's area about p[0], edge by edge; where the facet dips below z two crossings join each other.
     std::array<std::array<double, 2>, 4> q;
@@ -46,35 +51,48 @@ SectionAreas::SectionAreas(Context& context, MeshView mesh) : mesh_(mesh) {
     const Box3 box = bounds(context, mesh);
     bottom_ = box.min.z;
     const double height = std::max(1e-3, static_cast<double>(box.max.z) - bottom_);
-    constexpr std::size_t grain = std::size_t{1} << 16;
-    // Calls take(first slab, last slab, plan area) for a facet that is seen from above or below.
-    auto with_slabs = [&](std::size_t f, auto&& take) {
-        const double area = area_normal(mesh, static_cast<std::uint32_t>(f))[2] / 2;
-        if (area == 0) return;
-        const Index3 t = mesh.facets[f];
-        const auto [low, high] = std::minmax({mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z});
-        take(slab(low), slab(high), area);
+    const std::size_t grain = std::max(std::size_t{1} << 16, mesh.size() / 64);
+    // The slabs [first, last] that a facet reaches into; last < first of one that is seen from the side.
+    struct Reach {
+        std::uint16_t first = 1, last = 0;
     };
+    const MemoryCharge reach_charge(context, mesh.size() * sizeof(Reach), "the areas of sections");
+    RawArray<Reach> reaches(mesh.size());
+    struct Sums {
+        std::uint64_t entries = 0;
+        std::vector<double> begins;  // plan area of the facets that begin in each slab
+    } sums;
     // Fewer slabs where tall facets would be listed in too many of them.
     for (std::size_t slabs = 1024;; slabs /= 4) {
         pitch_ = height / static_cast<double>(slabs);
         whole_.assign(slabs, 0);
-        const std::uint64_t entries = parallel_reduce(
-            context, mesh.size(), grain, std::uint64_t{0},
+        sums = parallel_reduce(
+            context, mesh.size(), grain, Sums{0, std::vector<double>(slabs, 0)},
             [&](std::size_t begin, std::size_t end) {
-                std::uint64_t count = 0;
-                for (std::size_t f = begin; f < end; ++f)
-                    with_slabs(f, [&](std::size_t first, std::size_t last, double) { count += last - first + 1; });
-                return count;
+                Sums part{0, std::vector<double>(slabs, 0)};
+                for (std::size_t f = begin; f < end; ++f) {
+                    reaches[f] = {};
+                    const auto [a, b, c] = corners(mesh, f);
+                    const double area = cross(minus(b, a), minus(c, a))[2] / 2;
+                    if (area == 0) continue;
+                    const auto [low, high] = std::minmax({a[2], b[2], c[2]});
+                    const Reach reach{static_cast<std::uint16_t>(slab(low)), static_cast<std::uint16_t>(slab(high))};
+                    reaches[f] = reach;
+                    part.entries += reach.last - reach.first + 1u;
+                    part.begins[reach.first] += area;
+                }
+                return part;
             },
-            [](std::uint64_t x, std::uint64_t y) { return x + y; });
-        if (slabs == 1 || entries <= 8 * mesh.size() + 4096) break;
-    }
-    auto each_slab = [&](std::size_t begin, std::size_t end, auto&& take) {
-        for (std::size_t f = begin; f < end; ++f)
-            with_slabs(f, [&](std::size_t first, std::size_t last, double) {
-                for (std::size_t k = first; k <= last; ++k) take(k, static_cast<std::uint32_t>(f));
+            [](Sums x, const Sums& y) {
+                x.entries += y.entries;
+                for (std::size_t k = 0; k < x.begins.size(); ++k) x.begins[k] += y.begins[k];
+                return x;
             });
+        if (slabs == 1 || sums.entries <= 8 * mesh.size() + 4096) break;
+    }
+    const auto each_slab = [&](std::size_t begin, std::size_t end, auto&& take) {
+        for (std::size_t f = begin; f < end; ++f)
+            for (std::size_t k = reaches[f].first; k <= reaches[f].last; ++k) take(k, static_cast<std::uint32_t>(f));
     };
     starts_.assign(whole_.size() + 1, 0);
     deal(
@@ -86,19 +104,7 @@ SectionAreas::SectionAreas(Context& context, MeshView mesh) : mesh_(mesh) {
             return std::pair(facets_.data(), total);
         },
         [&](std::size_t, std::size_t, std::span<const std::uint32_t> starts) { starts_.assign(starts.begin(), starts.end()); });
-    // Plan area of the facets that begin in each slab.
-    const std::vector<double> begins = parallel_reduce(
-        context, mesh.size(), std::max(grain, mesh.size() / 64), std::vector<double>(whole_.size(), 0),
-        [&](std::size_t begin, std::size_t end) {
-            std::vector<double> part(whole_.size(), 0);
-            for (std::size_t f = begin; f < end; ++f) with_slabs(f, [&](std::size_t first, std::size_t, double area) { part[first] += area; });
-            return part;
-        },
-        [](std::vector<double> x, const std::vector<double>& y) {
-            for (std::size_t k = 0; k < x.size(); ++k) x[k] += y[k];
-            return x;
-        });
-    for (std::size_t k = whole_.size() - 1; k-- > 0;) whole_[k] = whole_[k + 1] + begins[k + 1];
+    for (std::size_t k = whole_.size() - 1; k-- > 0;) whole_[k] = whole_[k + 1] + sums.begins[k + 1];
 }
 
 double SectionAreas::operator()(double z) const {
