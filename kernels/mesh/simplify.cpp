@@ -141,7 +141,7 @@ public:
         for (std::uint32_t v = 0; v < ids_.size(); ++v) inner_[v] = gather(v);
         awake_.resize(ids_.size());
         // What costs little goes first: rounding in a plane adds up less then.
-        for (const double share : {0.25, 0.5, 1.0}) {
+        for (const double share : {0.5, 1.0}) {
             allowed_ = share * tolerance_;
             for (std::size_t v = 0; v < ids_.size(); ++v) awake_[v] = inner_[v] && need_[v] <= allowed_;
             for (std::size_t gone = faces_.size(); static_cast<double>(gone) > kLeastRound * static_cast<double>(faces_.size());) {
