@@ -436,7 +436,10 @@ private:
         std::vector<std::size_t> by_y(lines_.size());
         std::iota(by_y.begin(), by_y.end(), std::size_t{0});
         std::sort(by_y.begin(), by_y.end(), [&](std::size_t a, std::size_t b) { return std::pair(lines_[a].y, a) < std::pair(lines_[b].y, b); });
-        auto higher = [&](const Place* beside, const Place& p) { return beside && p.tip < beside->tip - kSettle; };
+        // A place past a wall's foot that only the layer's bottom keeps as high is no wall.
+        auto higher = [&](const Place* beside, const Place& p) {
+            return beside && (beside->touches || !beside->reachable) && p.tip < beside->tip - kSettle;
+        };
         auto beside = [&](std::size_t rank, bool after, std::int32_t x) -> const Place* {
             constexpr std::size_t look = 4;  // lines between may not come by here
             for (std::size_t k = 1; k <= look; ++k) {
