@@ -164,7 +164,7 @@ private:
 
 /// Cells that resolve what passes of the layer's finest ball leave: a quarter of their distance, coarser where the layer would
 /// take more than kStockCells of them.
-inline constexpr double kStockCells = 12e6;
+inline constexpr double kStockCells = 8e6;
 [[nodiscard]] double stock_cell(const LayerCut& cut);
 
 [[nodiscard]] CutterEnd cutter_end(const Tool& tool);
