@@ -22,7 +22,7 @@ public:
     /// what is taken there, mm³: a cell belongs to the part on which the cutter's edge comes to it.
     void cut(const std::array<double, 3>& from, const std::array<double, 3>& to, std::vector<double>& volumes);
 
-    static constexpr double kMostCells = 1e6;  ///< 4 MB
+    static constexpr double kMostCells = 6e5;  ///< 2.4 MB
 
 private:
     CellGrid grid_;
