@@ -4,7 +4,9 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <span>
 
 #include "engine/paths/feet.h"
 #include "engine/paths/rings.h"
@@ -24,6 +26,7 @@ constexpr double kWorthOfBall = 0.5;     // mm that a ball must lower a cell by:
 constexpr int kLevelsAStep = 2;          // of a ball
 constexpr int kTile = 16;                // cells
 constexpr int kMostRings = 4000;
+constexpr std::size_t kMostPairs = 4'000'000;  // of cells and edges whose distance is asked for at once: some milliseconds
 
 // Where the rows of a grid run inside a region (winding number over 0): first and last cell of each stretch.
 std::vector<std::vector<std::array<int, 2>>> rows_inside(const CellGrid& grid, const Loops& region) {
@@ -201,6 +204,25 @@ private:
     std::vector<std::array<int, 2>> left_over_, cells_;  // row after row; `cells_` of the level
 };
 
+// Millimetres from an outline's edges to the nearest of these cells' middles.
+double nearest(const CellGrid& grid, std::span<const std::array<int, 2>> cells, const Loops& outline) {
+    double least2 = std::numeric_limits<double>::infinity();
+    for (std::size_t l = 0; l < outline.size(); ++l) {
+        const auto loop = outline.loop(l);
+        for (std::size_t k = 0; k < loop.size(); ++k) {
+            const Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
+            const double ax = to_mm(a.x), ay = to_mm(a.y), ux = to_mm(b.x) - ax, uy = to_mm(b.y) - ay, length2 = ux * ux + uy * uy;
+            const double share = length2 > 0 ? 1 / length2 : 0;
+            for (const auto& [i, j] : cells) {
+                const double x = grid.x(i) - ax, y = grid.y(j) - ay, t = std::clamp((x * ux + y * uy) * share, 0.0, 1.0);
+                const double dx = x - t * ux, dy = y - t * uy;
+                least2 = std::min(least2, dx * dx + dy * dy);
+            }
+        }
+    }
+    return std::sqrt(least2);
+}
+
 // A place of the cutter on a ring; corners of the ring, and places between them that are looked at.
 struct RingPlace {
     PathPoint at;
@@ -343,19 +365,29 @@ private:
         std::vector<Loops> rings{border};
         const double loose = ring_tolerance(tool_);
         const Loops thin = thinned(border, kRingTolerance);
+        const double reach = r_ + loose + kSample;  // how far at most from a ring's distance to the border it meets a target
         std::vector<std::array<int, 2>> outside = targets.cells();
+        double passed = 0;  // mm from the border: no target that a ring went past lies farther
         for (int k = 1; k < kMostRings; ++k) {
+            cut_.context.throw_if_cancelled();
             const auto inside = rows_inside(grid, rings.back());
-            std::erase_if(outside, [&](const std::array<int, 2>& c) {
+            const std::size_t gone = std::erase_if(outside, [&](const std::array<int, 2>& c) {
                 const auto& row = inside[static_cast<std::size_t>(c[1])];
                 return std::any_of(row.begin(), row.end(), [&](const std::array<int, 2>& s) { return s[0] <= c[0] && c[0] <= s[1]; });
             });
             if (outside.empty()) break;
+            if (gone > 0) passed = (k - 1) * step;
+            // Rings that lie beyond all targets that were passed and short of all others meet none.
+            if (k * step > passed + reach && outside.size() * thin.points.size() < kMostPairs) {
+                const double next = nearest(grid, outside, thin);
+                for (; k + 1 < kMostRings && k * step + reach < next; ++k) rings.emplace_back();
+            }
             rings.push_back(offset_outline(thin, k * step, loose));
         }
         const std::int32_t z = to_units(tip) + 1;
         const CutterEnd end = cutter_end(tool_);
         for (std::size_t k = rings.size(); k-- > 0;) {
+            cut_.context.throw_if_cancelled();
             runs.emplace_back();
             const double tolerance = k > 0 || keeps_off ? kRingTolerance * kUnitsPerMm : simplify_tolerance_units(cut_.job.tolerances.gouge);
             const double most = k > 0 ? loose * kUnitsPerMm : tolerance;
