@@ -182,6 +182,35 @@ TEST(RestMachining, LeavesWhatItsCutterCannotTake) {
         }
 }
 
+TEST(RestMachining, DoesNotComeForWhatClingsToAWall) {
+    // A plinth whose walls lean by 3 degrees and go on below the layer, where a ball may go too.
+    constexpr double base = 7, slope = 0.0524, foot = 10 + slope * kTop, limit = 0.06, stands = 0.165;  // mm
+    const auto plinth = [](double x, double /*y*/) { return std::clamp(kTop - (std::abs(x) - 10) / slope, -base, kTop); };
+    const auto deeper = [](Mesh& mesh) {
+        for (Vec3f& v : mesh.vertices)
+            if (v.z == 0) v.z = -2 * base;
+    };
+    for (const double beside : {0.009, 0.15}) {  // mm from the foot to the nearest column of cells
+        Waste w(plinth, deeper);
+        w.layer.floor_below = -base;
+        w.job.cutting.rest_pattern = RestPattern::raster;
+        LayerStock stock(w.cut, (25 + foot + beside) / 177.5);
+        const CutterEnd wide{CutterEnd::Form::flat, 60, 0};
+        const auto clear = [&](double x0, double y0, double x1, double y1, double z) { stock.cut_along(wide, {x0, y0, z}, {x1, y1, z}); };
+        clear(-80, 80.01, 80, 80.01, 0), clear(-80, -80.01, 80, -80.01, 0);
+        for (double z = 0; z < kTop; ++z) {  // along the walls, but for the foot of one
+            const double edge = foot - slope * z, other = z > 0 ? edge : foot + beside + 0.01;
+            clear(-60 - edge, -80, -60 - edge, 80, z), clear(60 + other, -80, 60 + other, 80, z);
+        }
+        clear(60 + foot, -80, 60 + foot, 80, stands);
+        const auto left = [&] { return stock.area_over(w.context, limit); };
+        EXPECT_GT(left(), 39 * stock.grid().cell) << "a column beside the wall";
+        const Operation op = cut_rest(w.cut, stock, w.layer.tools.finish, {OperationKind::finish, "rest", limit, false});
+        EXPECT_EQ(op.moves.empty(), beside < limit);
+        EXPECT_EQ(left() > 0, beside < limit);
+    }
+}
+
 TEST(SemiRough, TheAllowanceIsAThirdOfRoughings) {
     Job job;
     Tool tool = tool_of_kind(job, ToolKind::ball);

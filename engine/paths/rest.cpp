@@ -208,9 +208,8 @@ public:
           under_(ball_ ? pass.allowance : 0),
           end_(cutter_end(tool)),
           targets_(cut.context, stock, pass, finish_slopes(cut.job.cutting).levels_from,
-                   (pass.in_steps ? pass.skin > 0 : clears_on_contours(cut.job))
-                       ? &cut.drops({Cutter::Profile::flat, pass.in_steps ? std::min(pass.limit, r_ / 2) : pass.limit})
-                       : nullptr,
+                   (!pass.in_steps || pass.skin > 0) ? &cut.drops({Cutter::Profile::flat, pass.in_steps ? std::min(pass.limit, r_ / 2) : pass.limit})
+                                                     : nullptr,
                    r_),
           tolerance_(std::max(cut.job.tolerances.gouge, pass.allowance)),
           chord_(safe_chord_mm(wide_, tolerance_)),
