@@ -12,14 +12,10 @@ namespace slabwright {
 
 namespace {
 
-std::array<Vec3d, 3> corners(MeshView mesh, std::size_t f) {
-    const Index3& t = mesh.facets[f];
-    return {to_double(mesh.vertices[t[0]]), to_double(mesh.vertices[t[1]]), to_double(mesh.vertices[t[2]])};
-}
-
 // Signed area in plan of the part of a facet above z. Facets at z belong below (the section is taken just above).
 double plan_area_above(MeshView mesh, std::uint32_t f, double z) {
-    const std::array<Vec3d, 3> p = corners(mesh, f);
+    std::array<Vec3d, 3> p;
+    for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     double twice = 0;
     // The clipped polygon's area about p[0], edge by edge; where the facet dips below z two crossings join each other.
     std::array<std::array<double, 2>, 4> q;
@@ -72,10 +68,10 @@ SectionAreas::SectionAreas(Context& context, MeshView mesh) : mesh_(mesh) {
                 Sums part{0, std::vector<double>(slabs, 0)};
                 for (std::size_t f = begin; f < end; ++f) {
                     reaches[f] = {};
-                    const auto [a, b, c] = corners(mesh, f);
-                    const double area = cross(minus(b, a), minus(c, a))[2] / 2;
+                    const double area = area_normal(mesh, static_cast<std::uint32_t>(f))[2] / 2;
                     if (area == 0) continue;
-                    const auto [low, high] = std::minmax({a[2], b[2], c[2]});
+                    const Index3& t = mesh.facets[f];
+                    const auto [low, high] = std::minmax({mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z});
                     const Reach reach{static_cast<std::uint16_t>(slab(low)), static_cast<std::uint16_t>(slab(high))};
                     reaches[f] = reach;
                     part.entries += reach.last - reach.first + 1u;
