@@ -31,6 +31,33 @@ struct Patch {
     double nearest;  // mm from the centre to the nearest obstacle known
 };
 
+/// Points, and how near the nearest of them is to a place, several at once.
+class Near {
+public:
+    void add(const Point3& q) {
+        if (count_ % kLanes == 0) groups_.push_back({Doubles{} + kFar, Doubles{} + kFar, Doubles{} + kFar});
+        for (int k = 0; k < 3; ++k) groups_[count_ / kLanes][k][count_ % kLanes] = q[k];
+        ++count_;
+    }
+    /// mm²; what lies higher than a ball's centre counts as even with it, and all counts so for a flat end mill.
+    [[nodiscard]] double distance2(const Point3& c, bool ball) const {
+        Doubles least = Doubles{} + std::numeric_limits<double>::infinity();
+        for (const auto& [x, y, z] : groups_) {
+            const Doubles dx = c[0] - x, dy = c[1] - y, below = c[2] - z, dz = ball ? (below > 0.0 ? below : Doubles{}) : Doubles{};
+            const Doubles d2 = dx * dx + dy * dy + dz * dz;
+            least = d2 < least ? d2 : least;
+        }
+        return std::min(std::min(least[0], least[1]), std::min(least[2], least[3]));
+    }
+
+private:
+    static constexpr std::size_t kLanes = 4;
+    static constexpr double kFar = 1e100;  // mm
+    using Doubles [[gnu::vector_size(kLanes * sizeof(double))]] = double;
+    std::vector<std::array<Doubles, 3>> groups_;
+    std::size_t count_ = 0;
+};
+
 bool worse(const Patch& a, const Patch& b) { return a.nearest != b.nearest ? a.nearest < b.nearest : a.spread < b.spread; }
 }  // namespace
 
@@ -80,16 +107,12 @@ bool Reach::by(std::size_t index, const Point3& point) {
     const double floor = ball ? std::max(lowest_, z_bottom_ - R) + R : std::max(lowest_, z_bottom_);
     if (point[2] + (ball ? R : 0) < floor) return false;
 
-    std::vector<Point3> near;  // obstacles that can be in the way
+    Near near;  // obstacles that can be in the way
     auto add = [&](const Point3& q) {
         const double dx = q[0] - point[0], dy = q[1] - point[1], dz = q[2] - point[2];
-        if (ball ? dx * dx + dy * dy + std::pow(std::max(0.0, -dz), 2) < 4 * R * R : dz >= kRests && dx * dx + dy * dy < 4 * R * R) near.push_back(q);
+        if (ball ? dx * dx + dy * dy + std::pow(std::max(0.0, -dz), 2) < 4 * R * R : dz >= kRests && dx * dx + dy * dy < 4 * R * R) near.add(q);
     };
     for (const Point3& q : obstacles_) add(q);
-    auto distance2 = [&](const Point3& c, const Point3& q) {
-        const double dx = c[0] - q[0], dy = c[1] - q[1], dz = ball ? std::max(0.0, c[2] - q[2]) : 0;
-        return dx * dx + dy * dy + dz * dz;
-    };
     auto clearance = [&](const Point3& c) {
         if (ball) return part_.from_shadow(c, z_top_, R);
         return part_.beside({c[0], c[1], c[2] + kRests}, z_top_, R);  // what it stands on is not in its way
@@ -117,9 +140,7 @@ bool Reach::by(std::size_t index, const Point3& point) {
         const double u_most = std::min(p.u + p.du, ball ? std::numbers::pi / 2 : R), width = ball ? std::sin(u_most) * std::sin(p.u) : u_most * p.u;
         p.centre = at(p.u, p.v);
         p.spread = scale * std::sqrt(p.du * p.du + width * p.dv * p.dv);  // of two places: 4 sin²(Δu/2) + 4 sin u₁ sin u₂ sin²(Δv/2)
-        p.nearest = std::numeric_limits<double>::infinity();
-        for (const Point3& q : near) p.nearest = std::min(p.nearest, distance2(p.centre, q));
-        p.nearest = std::sqrt(p.nearest);
+        p.nearest = std::sqrt(near.distance2(p.centre, ball));
         if (p.nearest + p.spread < R - kTouch) return;
         heap.push_back(p);
         std::push_heap(heap.begin(), heap.end(), worse);
@@ -152,9 +173,7 @@ bool Reach::by(std::size_t index, const Point3& point) {
         Patch p = heap.back();
         heap.pop_back();
         // Obstacles met since may block it.
-        double nearest2 = std::numeric_limits<double>::infinity();
-        for (const Point3& q : near) nearest2 = std::min(nearest2, distance2(p.centre, q));
-        p.nearest = std::sqrt(nearest2);
+        p.nearest = std::sqrt(near.distance2(p.centre, ball));
         if (p.nearest >= R - kTouch) {
             const auto found = clearance(p.centre);
             if (found.distance >= R - kTouch) {
