@@ -295,6 +295,7 @@ TEST(Sweep, RowsAgreeWithTheirCells) {
         const auto size = static_cast<std::size_t>(n);
         // At its end: past the last nothing may be read.
         std::vector<float> stands(size), later(size);
+        std::vector<std::uint8_t> share(size);
         for (float& s : stands) s = random() % 4 == 0 ? 2.0F : static_cast<float>(3 * u(random));
         std::array<double, 64> h{};
         for (double& z : h) z = random() % 5 == 0 ? kUncovered : random() % 4 == 0 ? 2.0 : 4 * u(random) - 1;
@@ -316,7 +317,10 @@ TEST(Sweep, RowsAgreeWithTheirCells) {
             if (!(bottom + static_cast<double>(stands[k]) > h[k])) kept[k] = kUncovered;
             left = left || kept[k] < kUncovered;
             later[k] = random() % 2 == 0 ? stands[k] : stands[k] * static_cast<float>(u(random));
-            expected_lost.most = std::max(expected_lost.most, stands[k] - later[k]);
+            share[k] = static_cast<std::uint8_t>(random() % 4 == 0 ? 255 : random() % 256);
+            const float along = (stands[k] - later[k]) * (static_cast<float>(share[k]) / 255);
+            expected_lost.most = std::max(expected_lost.most, along);
+            expected_lost.sum += static_cast<double>(along);
             expected_lost.cells += stands[k] - later[k] > 0.3F;
             top = std::max(top, stands[k]);
         }
@@ -325,8 +329,9 @@ TEST(Sweep, RowsAgreeWithTheirCells) {
         EXPECT_EQ(any_over(stands.data(), bottom, n, over_bottom), any) << "trial " << trial;
         EXPECT_EQ(keep_lower(stands.data(), bottom, n, h.data()), left) << "trial " << trial;
         for (std::size_t k = 0; k < size; ++k) EXPECT_EQ(h[k], kept[k]) << "trial " << trial;
-        add_lost(stands.data(), later.data(), n, 0.3F, lost);
+        add_lost(stands.data(), later.data(), share.data(), n, 0.3F, lost);
         EXPECT_EQ(lost.most, expected_lost.most) << "trial " << trial;
+        EXPECT_NEAR(lost.sum, expected_lost.sum, 1e-5 * (1 + expected_lost.sum)) << "trial " << trial;
         EXPECT_EQ(lost.cells, expected_lost.cells) << "trial " << trial;
         const int rows = n % 4 == 0 ? 4 : 1;
         EXPECT_EQ(highest_of(stands.data(), size / static_cast<std::size_t>(rows), n / rows, rows), top) << "trial " << trial;

@@ -287,7 +287,7 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
     const std::vector<Move>& moves = operation.moves;
     if (moves.size() < 2) return {};
     const CutterEnd end = cutter_end(tool);
-    const double r = end.radius, top = cut.layer.z_top;
+    const double r = end.radius, top = cut.layer.z_top, cell_mm2 = grid_.cell * grid_.cell;
     auto over_bottom = [&](const Move& m) { return std::array<double, 3>{to_mm(m.x), to_mm(m.y), to_mm(m.z) - z_bottom_}; };
     std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock), parts((moves.size() + kPart - 1) / kPart);
     for (std::size_t i = 0; i < moves.size(); ++i) {
@@ -308,6 +308,7 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         const CellGrid part{grid_.x0, grid_.y(first), grid_.cell, grid_.nx, rows};
         const double y0 = part.y0 - r, y1 = part.y(rows - 1) + r;
         float* const height = memory_.height.data() + grid_.index(0, first);
+        const std::uint8_t* const nz = memory_.nz.data() + grid_.index(0, first);
         Lowering lowering{height, static_cast<std::size_t>(grid_.nx)};
         KeptTiles before(part);  // of what the operation comes to
         TileTops tops(height, part);
@@ -318,7 +319,7 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         Lost lost;
         const auto count_lost = [&] {
             lost = {};
-            before.rows([&](const float* kept, std::size_t cell, int n) { add_lost(kept, height + cell, n, kEmpty, lost); });
+            before.rows([&](const float* kept, std::size_t cell, int n) { add_lost(kept, height + cell, nz + cell, n, kEmpty, lost); });
         };
         bool keeps = true;    // what the operation comes to, for a trial or until so much is taken that more is not asked for
         unsigned looked = 0;  // moves that were cut until then
@@ -349,15 +350,15 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 sweep_above(part, end, over_bottom(p), over_bottom(q), StandingHeights{height, 0}, lowering, chain);
                 if (!keeps || trial_ != nullptr || !std::has_single_bit(++looked)) continue;
                 count_lost();
-                keeps = lost.cells < Taken::kFew;
+                keeps = lost.cells < Taken::kFew || lost.sum * cell_mm2 < Taken::kTrace;
             }
         }
         if (keeps) count_lost();
-        taken[band] = {lost.most, lost.cells};
+        taken[band] = {lost.most, lost.sum * cell_mm2, lost.cells};
         if (trial_ != nullptr) trial_->kept_.add(first / KeptTiles::kTile, before);
     });
     Taken all;
-    for (const Taken& t : taken) all.most = std::max(all.most, t.most), all.cells += t.cells;
+    for (const Taken& t : taken) all.most = std::max(all.most, t.most), all.mm3 += t.mm3, all.cells += t.cells;
     return all;
 }
 

@@ -21,13 +21,16 @@ namespace slabwright {
 /// mm: less than this off a cell is nothing done.
 inline constexpr float kEmpty = 0.01F;
 
-/// What an operation took off a stock. A cell's centre that lies on a wall to within rounding may stand in one stock and not in another,
-/// so a few cells alone are no reason to go there. Where many lost something, no more than that need be counted.
+/// What an operation took off a stock, along the normal of the surface below. A cell's centre that lies on a wall to within rounding may stand in one
+/// stock and not in another, and a cell stands for no more than its centre, so a few cells alone, or a trace off many, are no reason to go there.
+/// Where many lost something, no more than that need be counted.
 struct Taken {
     static constexpr std::size_t kFew = 4;
-    float most = 0;         ///< mm that one cell lost
-    std::size_t cells = 0;  ///< that lost more than kEmpty
-    [[nodiscard]] bool nothing() const { return few() && most < 0.4F; }
+    static constexpr double kTrace = 0.5;  ///< mm³
+    float most = 0;                        ///< mm that one cell lost
+    double mm3 = 0;
+    std::size_t cells = 0;  ///< that lost more than kEmpty of height
+    [[nodiscard]] bool nothing() const { return (few() && most < 0.4F) || (mm3 < kTrace && most < 0.2F); }
     [[nodiscard]] bool few() const { return cells < kFew; }
 };
 

@@ -13,6 +13,7 @@ namespace {
 constexpr int kLanes = 8;
 using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
 using Bits [[gnu::vector_size(kLanes * sizeof(std::int32_t))]] = std::int32_t;
+using Bytes [[gnu::vector_size(kLanes)]] = std::uint8_t;
 using Doubles [[gnu::vector_size(kLanes * sizeof(double))]] = double;
 using WideBits [[gnu::vector_size(kLanes * sizeof(std::int64_t))]] = std::int64_t;
 
@@ -114,7 +115,6 @@ SLABWRIGHT_WIDE std::uint64_t cells_left(const float* __restrict stands, const f
 }
 
 SLABWRIGHT_WIDE float most_left(const float* stands, const float* surface, const std::uint8_t* nz, int n) {
-    using Bytes [[gnu::vector_size(kLanes)]] = std::uint8_t;
     Floats most{};
     float of_rest = 0;
     int k = 0;
@@ -394,19 +394,26 @@ SLABWRIGHT_WIDE float highest_of(const float* height, std::size_t nx, int n, int
     return of_rest;
 }
 
-SLABWRIGHT_WIDE void add_lost(const float* before, const float* now, int n, float least, Lost& lost) {
-    Floats most{};
+SLABWRIGHT_WIDE void add_lost(const float* before, const float* now, const std::uint8_t* share, int n, float least, Lost& lost) {
+    constexpr float whole = 255;
+    Floats most{}, sum{};
     Bits cells{};
     int k = 0;
     for (; k + kLanes <= n; k += kLanes) {
         Floats b, a;
-        load(before + k, b), load(now + k, a);
-        const Floats off = b - a;
-        most = off > most ? off : most;
+        Bytes s;
+        load(before + k, b), load(now + k, a), std::memcpy(&s, share + k, sizeof s);
+        const Floats off = b - a, along = off * (__builtin_convertvector(s, Floats) / whole);
+        most = along > most ? along : most;
+        sum += along;
         cells -= off > least;  // true is -1
     }
-    for (; k < n; ++k) lost.most = std::max(lost.most, before[k] - now[k]), lost.cells += before[k] - now[k] > least;
-    for (int i = 0; i < kLanes; ++i) lost.most = std::max(lost.most, most[i]), lost.cells += static_cast<std::size_t>(cells[i]);
+    for (; k < n; ++k) {
+        const float off = before[k] - now[k], along = off * (static_cast<float>(share[k]) / whole);
+        lost.most = std::max(lost.most, along), lost.sum += static_cast<double>(along), lost.cells += off > least;
+    }
+    for (int i = 0; i < kLanes; ++i)
+        lost.most = std::max(lost.most, most[i]), lost.sum += static_cast<double>(sum[i]), lost.cells += static_cast<std::size_t>(cells[i]);
 }
 
 SLABWRIGHT_WIDE void edge_parts(const PartedWay& way, double px, double cell, double py, int n, std::int32_t* __restrict part,

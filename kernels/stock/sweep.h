@@ -100,12 +100,13 @@ void lower_to(float* height, int n, const double* h, double bottom = 0);
 
 /// The highest of heights in `rows` rows, n of each, that begin nx apart; 0 at least.
 [[nodiscard]] float highest_of(const float* height, std::size_t nx, int n, int rows);
-/// What heights lost at most, and how many of them more than `least`.
+/// What heights lost, each times its share (of 255) of a height that is a distance: at most and in all; how many lost more than `least` of height.
 struct Lost {
     float most = 0;
+    double sum = 0;
     std::size_t cells = 0;
 };
-void add_lost(const float* before, const float* now, int n, float least, Lost& lost);
+void add_lost(const float* before, const float* now, const std::uint8_t* share, int n, float least, Lost& lost);
 
 /// A straight way in equal parts: dx, dy its direction, `per_mm` parts a mm.
 struct PartedWay {
