@@ -33,6 +33,15 @@ namespace {
 
 const std::string kData = SLABWRIGHT_SOURCE_DIR "/tests/data/";
 
+void write_metre_pattern(const std::string& path, const MetrePattern& pattern) {
+    std::ofstream stl(path, std::ios::binary);
+    stl << stl_head("pattern", metre_pattern_facets(pattern));
+    metre_pattern(pattern, [&](const Facet& facet) {
+        const auto bytes = stl_facet(facet);
+        stl.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    });
+}
+
 CommandResult slabwright_command(std::vector<std::string> arguments, const std::vector<std::pair<std::string, std::string>>& environment = {},
                                  double interrupt_after = -1) {
     arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
@@ -244,20 +253,32 @@ TEST(Command, ProgramsOfAPlanPassTheInterpreter) {
     EXPECT_EQ(programs, static_cast<std::size_t>(std::distance(fs::directory_iterator(out + "/nc"), fs::directory_iterator())));
 }
 
+TEST(Command, PlansPassTheirOwnVerification) {
+    // Ribs around bosses, channels hardly wider than the cutter or narrower, drafted walls that go on below a layer.
+    TemporaryFolder folder;
+    for (const std::uint64_t seed : {5U, 6U}) {
+        MetrePattern pattern;
+        pattern.size_mm = 400;
+        pattern.height_mm = 120;
+        pattern.facets = 60000;
+        pattern.seed = seed;
+        write_metre_pattern(folder / "pattern.stl", pattern);
+        const CommandResult result = slabwright_command({"plan", folder / "pattern.stl", "-o", folder / "out", "--allow-undercut"});
+        EXPECT_EQ(result.exit, 0) << "seed " << seed << ": " << result.out << result.err;
+        const json verified = json::parse(slurp(folder / "out/verify.json"));
+        EXPECT_TRUE(verified["passed"].get<bool>()) << verified["violations"];
+        EXPECT_GT(verified["totals"]["within_tolerance_share"].get<double>(), 0.99997);
+        fs::remove_all(folder.path / "out");
+    }
+}
+
 TEST(Command, InterruptStopsWithinHalfASecondAndLeavesNothing) {
     TemporaryFolder folder;
-    {
-        MetrePattern pattern;
-        pattern.size_mm = 1000;
-        pattern.height_mm = 200;
-        pattern.facets = 600000;
-        std::ofstream stl(folder.path / "big.stl", std::ios::binary);
-        stl << stl_head("big", metre_pattern_facets(pattern));
-        metre_pattern(pattern, [&](const Facet& facet) {
-            const auto bytes = stl_facet(facet);
-            stl.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-        });
-    }
+    MetrePattern pattern;
+    pattern.size_mm = 1000;
+    pattern.height_mm = 200;
+    pattern.facets = 600000;
+    write_metre_pattern(folder / "big.stl", pattern);
     fs::create_directory(folder.path / "place");
     int interrupted = 0;
     for (const double after : {0.05, 0.3, 0.8, 1.5, 2.5, 4.0}) {

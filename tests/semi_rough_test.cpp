@@ -182,6 +182,36 @@ TEST(RestMachining, LeavesWhatItsCutterCannotTake) {
         }
 }
 
+TEST(RestMachining, FollowsChannelsAsFarAsTheyAreWideEnough) {
+    // A channel of 12 mm with a cove along its walls, which lean by 3 degrees: a flat end mill of 12.1 mm fits a millimetre over its floor, off all lines; and
+    // in one that narrows, as far as that goes.
+    constexpr double width = 12, floor = 4, top = floor + 1.6, limit = 0.06, worth = 0.05;  // mm
+    const auto along_y = [](double x, double /*y*/) { return std::abs(x) <= width / 2 ? floor : kTop; };
+    const auto along_x = [](double /*x*/, double y) { return std::abs(y) <= width / 2 ? floor : kTop; };
+    const Reshape aside = [](Mesh& mesh) {
+        for (Vec3f& v : mesh.vertices) v.x += 0.217F;
+    };
+    const Reshape narrowing = [](Mesh& mesh) {
+        for (Vec3f& v : mesh.vertices) v.y = (std::abs(v.y) < width / 2 + 1 ? v.y * (1 + 0.03F * v.x) : v.y) + 0.68F;
+    };
+    for (const bool narrows : {false, true}) {
+        Waste w(narrows ? Height(along_x) : Height(along_y), narrows ? narrowing : aside);
+        Tool tool = w.layer.tools.rough;
+        tool.diameter = width + 0.1;
+        LayerStock stock(w.cut, 0.2);
+        for (const auto& [radius, z] : {std::pair{width / 2 + 1, top}, {width / 2 - 1, floor}}) {
+            const CutterEnd end{CutterEnd::Form::flat, radius, 0};
+            if (narrows) stock.cut_along(end, {-40, 0.68, z}, {40, 0.68, z});
+            else stock.cut_along(end, {0.217, -40, z}, {0.217, 40, z});
+        }
+        const std::size_t before = could_be_lowered(w, stock, tool, limit, worth);
+        const Operation op = cut_rest(w.cut, stock, tool, {OperationKind::corner, "rest", limit, false});
+        const std::size_t after = could_be_lowered(w, stock, tool, limit, worth);
+        EXPECT_GT(before, 500U) << narrows;
+        EXPECT_LE(after, narrows ? 8U : 0U) << " of " << before;
+    }
+}
+
 TEST(RestMachining, DoesNotComeForWhatClingsToAWall) {
     // A plinth whose walls lean by 3 degrees and go on below the layer, where a ball may go too.
     constexpr double base = 7, slope = 0.0524, foot = 10 + slope * kTop, limit = 0.06, stands = 0.165;  // mm

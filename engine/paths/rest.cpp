@@ -293,7 +293,9 @@ private:
         Place p;
         p.x = ux;
         p.y = uy;
-        p.tip = stock_.z_bottom() + std::max(0.0, static_cast<double>(targets_.highest_near(x, y))) + kOver;
+        // A flat end mill's leaning walls lead down into slots that are hardly wider (settle), from as high as they are.
+        p.tip = ball_ ? stock_.z_bottom() + std::max(0.0, static_cast<double>(targets_.highest_near(x, y))) + kOver
+                      : std::numeric_limits<double>::infinity();
         const std::optional<Rest> found = index_->drop_within(x, y, matters, p.tip - under_, &met);
         if (!found) return p;
         const Rest& rest = *found;
@@ -413,18 +415,33 @@ private:
         }
     }
 
+    // Whether a line ends at a place of a flat end mill, or is stopped by a wall there, short of something that stands: in a channel that narrows a
+    // line between it and the next goes on.
+    [[nodiscard]] bool ends(const Place& p, const Line& line) const {
+        if (ball_ || !p.reachable) return false;
+        const auto goes_on = [&](std::int32_t x) {
+            const Place* next = at(line, x);
+            return next && next->tip <= p.tip + kJump;
+        };
+        return !(goes_on(p.x - step_) && goes_on(p.x + step_)) && lowers(to_mm(p.x), to_mm(p.y), p.tip, to_mm(step_));
+    }
+
     // A line between two, over what is too far from one to the other; without places where nothing is.
     [[nodiscard]] Line middle(const Line& a, const Line& b) const {
         Line line{a.y + (b.y - a.y) / 2, {}};
         if (b.y - a.y < 2 * finest_) return line;
-        MetPoints met;
+        std::vector<std::int32_t> over;
         for (const Place& p : a.places) {
             if (p.x % step_ != 0) continue;
-            const Place* other = at(b, p.x);
-            if (!other || !too_far(p, *other, to_mm(step_) / 2)) continue;
-            for (const std::int32_t x : {p.x - step_, p.x, p.x + step_})
-                if (line.places.empty() || x > line.places.back().x) append_between(line.places, line.y, place(x, line.y, met), met);
+            if (const Place* other = at(b, p.x); (other && too_far(p, *other, to_mm(step_) / 2)) || ends(p, a)) over.push_back(p.x);
         }
+        for (const Place& p : b.places)
+            if (p.x % step_ == 0 && ends(p, b)) over.push_back(p.x);
+        std::sort(over.begin(), over.end());
+        MetPoints met;
+        for (const std::int32_t middle : over)
+            for (const std::int32_t x : {middle - step_, middle, middle + step_})
+                if (line.places.empty() || x > line.places.back().x) append_between(line.places, line.y, place(x, line.y, met), met);
         return line;
     }
 
