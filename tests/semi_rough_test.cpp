@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
 #include "engine/paths/rest.h"
+#include "engine/paths/semi_rough.h"
 #include "tests/support/height_field.h"
 
 namespace slabwright {
@@ -239,6 +241,27 @@ TEST(RestMachining, DoesNotComeForWhatClingsToAWall) {
         EXPECT_EQ(op.moves.empty(), beside < limit);
         EXPECT_EQ(left() > 0, beside < limit);
     }
+}
+
+TEST(SemiRough, ReachesWhatStandsFarFromAnyWall) {
+    // Beside one corner of the only peg a lump, and two far away, with nothing to cut between them.
+    const auto peg = [](double x, double y) { return std::abs(x + 15) < 2 && std::abs(y + 15) < 2 ? kTop : 1.0; };
+    const std::array<std::array<double, 2>, 3> lumps{{{-11, -11}, {3, 6}, {14, 15}}};
+    Waste w(peg, {});
+    LayerStock stock(w.cut, 0.2);
+    const CellGrid& grid = stock.grid();
+    const CutterEnd needle{CutterEnd::Form::flat, 0.1, 0};
+    for (int j = 0; j < grid.ny; ++j)
+        for (int i = 0; i < grid.nx; ++i) {
+            const bool in_lump =
+                std::any_of(lumps.begin(), lumps.end(), [&](const auto& l) { return std::hypot(grid.x(i) - l[0], grid.y(j) - l[1]) < 1; });
+            if (!in_lump) stock.cut_at(needle, grid.x(i), grid.y(j), stock.surface(grid.index(i, j)));
+        }
+    const auto left = [&] { return stock.area_over(w.context, kLimit); };
+    EXPECT_GT(left(), 8);
+    const Operation op = semi_rough_layer(w.cut, stock, w.layer.tools.finish, {"waste", kLimit, 0, 0.3});
+    EXPECT_FALSE(op.moves.empty());
+    EXPECT_EQ(left(), 0);
 }
 
 TEST(SemiRough, TheAllowanceIsAThirdOfRoughings) {

@@ -36,7 +36,7 @@ double just_under(double z) { return std::nextafter(z, -std::numeric_limits<doub
 // A place of the cutter on the surface.
 struct Place {
     std::int32_t x = 0, y = 0, z = 0;  // 0.1 µm
-    double tip = 0;                    // mm; of a place that lies over all that stands near, that height: it lies as high or higher
+    double tip = 0;                    // mm; of a ball's place that lies over all that stands near, that height: it lies as high or higher
     std::array<double, 3> contact{};   // mm, where `touches`: a point of the surface
     bool reachable = false, touches = false, useful = false, cut = false;
 };
