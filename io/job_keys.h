@@ -167,6 +167,7 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.word("rest_pattern", job.cutting.rest_pattern, kRestWords,
                "what cutters leave: raster, on lines where it stands; contour, on rings, and along the feet of walls; by_library: contour where "
                "there is more than one flat or one ball");
+    visit.key("open_waste", job.cutting.open_waste, "contour roughing leaves what lies open from beside the stock to the face mill");
     visit.key("climb", job.cutting.climb, "contour roughing climbs everywhere; false: either way, where that is shorter");
     visit.key("max_engagement", job.cutting.max_engagement,
               "share of the diameter that roughing meets at full feed; slower in proportion where it meets more; 1: no limit");

@@ -13,6 +13,7 @@
 #include "io/slabwright.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
+#include "tests/support/end_mill_job.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
@@ -27,7 +28,7 @@ double notched_or_base(double x, double y) { return std::abs(y) < 9 && x > -12 ?
 
 struct Notch {
     Context context;
-    Job job;
+    Job job = test::end_mill_job();
     Mesh mesh = test::height_field(context, 60, 1, notched_or_base);
     LayerJob layer;
     LayerCut cut;
@@ -171,7 +172,7 @@ TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
         const Tool rough = n.flat(1), semi = n.flat(0.5);
         n.layer.tools.rough = rough;
         LayerStock stock(n.cut, 0.25);
-        const Operation roughing = rough_layer(n.cut);
+        const Operation roughing = rough_layer(n.cut).back();
         stock.cut(n.cut, roughing, rough);
         const LayerStock before = stock;
         const Operation op = semi_rough_layer(n.cut, stock, semi, {"waste", 1.0, swath, 0.3});
@@ -229,7 +230,7 @@ TEST(RestContours, ABallsRingsKeepOffTheSurface) {
         const Tool rough = n.flat(1), ball = n.tool(ToolKind::ball, 0.25);
         n.layer.tools.rough = rough;
         LayerStock stock(n.cut, 0.25);
-        stock.cut(n.cut, rough_layer(n.cut), rough);
+        stock.cut(n.cut, rough_layer(n.cut).back(), rough);
         const double before = stock.area_over(n.context, 1);
         const Operation op = semi_rough_layer(n.cut, stock, ball, {"waste", 1.0, 0, allowance});
         ASSERT_FALSE(op.moves.empty());
@@ -264,7 +265,7 @@ TEST(RestContours, AWiderSwathLeavesLessToSemiRoughing) {
         const Tool rough = n.flat(1), semi = n.flat(0.25);
         n.layer.tools.rough = rough;
         LayerStock stock(n.cut, 0.25);
-        stock.cut(n.cut, rough_layer(n.cut), rough);
+        stock.cut(n.cut, rough_layer(n.cut).back(), rough);
         double mm = 0;
         const Operation op = semi_rough_layer(n.cut, stock, semi, {"waste", 1.0, swath, 0.3});
         for (std::size_t i = 1; i < op.moves.size(); ++i)

@@ -23,19 +23,22 @@ struct Roughed {
     std::array<double, 2> low, high;
     LayerCut cut;
     Standing standing;
-    Operation op;
+    std::vector<Operation> all;
+    Operation op;  // the end mill's
     int nx = 0, ny = 0;
     std::vector<double> height;  // what is left, by cells
     double deepest_cut = 0;      // mm over a tip
+    double met_head_on = 0;      // mm that stood under a face mill's middle where it went straight down
 
-    // A height field over 60 mm around the origin in a stock.
+    // A height field of 120 by 120 cells around the origin in a stock.
     Roughed(const std::function<double(double, double)>& surface, std::array<double, 2> stock_low, std::array<double, 2> stock_high,
-            double last_steps)
-        : mesh(test::height_field(context, 120, 0.5, surface)),
+            double last_steps, double pitch = 0.5, bool open_waste = false)
+        : mesh(test::height_field(context, 120, pitch, surface)),
           low(stock_low),
           high(stock_high),
           cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, alpha_map(context, mesh.view(), 0, kTop), nullptr, {}},
           standing(low, high, kTop) {
+        job.cutting.open_waste = open_waste;
         layer.mesh = mesh.view();
         layer.job = &job;
         layer.z_top = layer.slab_thickness = kTop;
@@ -46,21 +49,35 @@ struct Roughed {
         cut.standing = &standing;
     }
     void rough() {
-        op = rough_layer(cut);
+        all = rough_layer(cut);
+        op = all.back();
         nx = static_cast<int>((high[0] - low[0]) / kCell), ny = static_cast<int>((high[1] - low[1]) / kCell);
         height.assign(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny), kTop);
-        for (std::size_t k = 1; k < op.moves.size(); ++k) {
-            const Move &a = op.moves[k - 1], &b = op.moves[k];
-            const double ax = to_mm(a.x), ay = to_mm(a.y), bx = to_mm(b.x), by = to_mm(b.y), z = to_mm(std::max(a.z, b.z));
+        for (const Operation& one : all) replay(one);
+    }
+    [[nodiscard]] double radius_of(const Operation& one) const {
+        return std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == one.tool; })->diameter / 2;
+    }
+    void replay(const Operation& one) {
+        const double r = radius_of(one);
+        for (std::size_t k = 1; k < one.moves.size(); ++k) {
+            const Move &a = one.moves[k - 1], &b = one.moves[k];
+            const double ax = to_mm(a.x), ay = to_mm(a.y), bx = to_mm(b.x), by = to_mm(b.y), z = to_mm(l2_of(a, b) > 0 ? std::max(a.z, b.z) : b.z);
             if (z >= kTop) continue;
-            const double r = layer.tools.rough.diameter / 2, dx = bx - ax, dy = by - ay, l2 = dx * dx + dy * dy;
+            const double dx = bx - ax, dy = by - ay, l2 = dx * dx + dy * dy;
             for (int j = std::max(0, cell(std::min(ay, by) - r, 1)); j <= std::min(ny - 1, cell(std::max(ay, by) + r, 1)); ++j)
                 for (int i = std::max(0, cell(std::min(ax, bx) - r, 0)); i <= std::min(nx - 1, cell(std::max(ax, bx) + r, 0)); ++i) {
                     const double t = l2 > 0 ? std::clamp(((x(i) - ax) * dx + (y(j) - ay) * dy) / l2, 0.0, 1.0) : 0;
-                    if (std::hypot(x(i) - ax - t * dx, y(j) - ay - t * dy) > r) continue;
+                    const double off = std::hypot(x(i) - ax - t * dx, y(j) - ay - t * dy);
+                    if (off > r) continue;
+                    if (&one != &all.back() && l2 == 0 && off < PathBuilder::kMiddle * r) met_head_on = std::max(met_head_on, at(i, j) - z);
                     deepest_cut = std::max(deepest_cut, at(i, j) - z), at(i, j) = std::min(at(i, j), z);
                 }
         }
+    }
+    static std::int64_t l2_of(const Move& a, const Move& b) {
+        const std::int64_t dx = std::int64_t{b.x} - a.x, dy = std::int64_t{b.y} - a.y;
+        return dx * dx + dy * dy;
     }
     [[nodiscard]] int cell(double v, int axis) const { return static_cast<int>(std::floor((v - low[static_cast<std::size_t>(axis)]) / kCell)); }
     [[nodiscard]] double x(int i) const { return low[0] + (i + 0.5) * kCell; }
@@ -147,6 +164,55 @@ TEST(Roughing, GoesRoundWhereWhatStaysIsFarApart) {
     // Of all levels but the last the ways back are short.
     EXPECT_LT(r.way(false), 1.6 / levels * r.way(true));
     EXPECT_GT(r.way(true), levels * 500 * 400 / (0.5 * r.layer.tools.rough.diameter));
+}
+
+// Two posts with a gap between them that no face mill passes, and a wall around a pocket that one would fit into but cannot come to.
+double posts_and_pocket(double x, double y) {
+    const bool first = std::abs(x + 70) < 30 && std::abs(y - 60) < 30, second = std::abs(x - 30) < 30 && std::abs(y - 60) < 30;
+    const double from_middle = std::hypot(x - 50, y + 55);
+    return first || second || (from_middle > 40 && from_middle < 52) ? 14.5 : 0.5;
+}
+
+TEST(Roughing, FaceMillTakesWhatLiesOpenAndTheEndMillTheRest) {
+    for (const double last_steps : {0.0, 2.2}) {
+        const std::array<double, 2> low{-160, -150}, high{150, 140};
+        Roughed alone(posts_and_pocket, low, high, last_steps, 2), both(posts_and_pocket, low, high, last_steps, 2, true);
+        alone.rough(), both.rough();
+        ASSERT_EQ(alone.all.size(), 1u);
+        ASSERT_EQ(both.all.size(), 2u);
+        const Operation& face = both.all.front();
+        EXPECT_EQ(face.kind, OperationKind::rough);
+        const double r = both.radius_of(face);
+        EXPECT_EQ(r, 25);
+        EXPECT_TRUE(both.cut.no_way_in.empty());
+        EXPECT_LE(both.met_head_on, PathBuilder::kScrape) << "it goes down beside the stock, or where it has been";
+        EXPECT_LE(both.deepest_cut, std::max(face.stepdown, both.op.stepdown) + 1e-3) << "what is left to the end mill is known to it";
+        // It keeps farther off than the end mill, and stays out of the pocket.
+        const DropIndex& part = both.cut.drops({Cutter::Profile::flat, r + both.job.cutting.wall_allowance + 0.9});
+        for (std::size_t k = 1; k < face.moves.size(); ++k) {
+            const Move &a = face.moves[k - 1], &b = face.moves[k];
+            if (b.feed == 0) continue;
+            for (int s = 0; s <= 20; ++s) {
+                const double t = s / 20.0, x = to_mm(a.x) + t * to_mm(b.x - a.x), y = to_mm(a.y) + t * to_mm(b.y - a.y),
+                             z = to_mm(a.z) + t * to_mm(b.z - a.z);
+                ASSERT_FALSE(part.stands_over(x, y, z)) << x << " " << y << " " << z;
+                if (z < kTop) {
+                    ASSERT_GT(std::hypot(x - 50, y + 55), 45) << "in the pocket";
+                }
+            }
+        }
+        // No more is left than by the end mill alone, nor less.
+        double more = 0, less = 0;
+        for (int j = 0; j < both.ny; ++j)
+            for (int i = 0; i < both.nx; ++i) {
+                if (both.at(i, j) > alone.at(i, j) + 0.01) more += kCell * kCell;
+                if (both.at(i, j) < alone.at(i, j) - 0.01) less += kCell * kCell;
+            }
+        std::printf("both leave more than the end mill alone on %.2f mm2, less on %.2f\n", more, less);
+        EXPECT_LE(more, 1);
+        EXPECT_LE(less, 1);
+        EXPECT_LT(both.way(true), 0.45 * alone.way(true)) << "the end mill's";
+    }
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "engine/paths/rest.h"
 #include "engine/paths/semi_rough.h"
+#include "tests/support/end_mill_job.h"
 #include "tests/support/height_field.h"
 
 namespace slabwright {
@@ -28,7 +29,7 @@ Mesh drawn(Context& context, const Height& height, const Reshape& reshape) {
 // A layer of a height field over 40 mm, full but for what the roughing cutter takes.
 struct Waste {
     Context context;
-    Job job;
+    Job job = test::end_mill_job();
     Mesh mesh;
     LayerJob layer;
     LayerCut cut;
@@ -61,7 +62,7 @@ Passed semi_roughed(const Height& height, ToolKind kind, double allowance, const
     Tool tool = w.layer.tools.finish;
     tool.kind = kind;
     LayerStock stock(w.cut, 0.2);
-    stock.cut(w.cut, rough_layer(w.cut), w.layer.tools.rough);
+    stock.cut(w.cut, rough_layer(w.cut).back(), w.layer.tools.rough);
     const Operation op = cut_rest(w.cut, stock, tool, {OperationKind::semi_rough, "waste", kLimit, true, 0, allowance});
     EXPECT_FALSE(op.moves.empty());
     Passed passed;
@@ -173,7 +174,7 @@ TEST(RestMachining, LeavesWhatItsCutterCannotTake) {
             Tool tool = w.layer.tools.finish;
             tool.kind = kind;
             LayerStock stock(w.cut, 0.2);
-            stock.cut(w.cut, rough_layer(w.cut), w.layer.tools.rough);
+            stock.cut(w.cut, rough_layer(w.cut).back(), w.layer.tools.rough);
             constexpr double limit = 0.06, worth = 0.05;  // mm; a place is visited for .05 at most
             const std::size_t before = could_be_lowered(w, stock, tool, limit, worth);
             const Operation op = cut_rest(w.cut, stock, tool, {OperationKind::corner, "rest", limit, false});

@@ -113,6 +113,11 @@ void EngagedStock::cut(const std::array<double, 3>& from, const std::array<doubl
     for (double& volume : volumes) volume *= grid_.cell * grid_.cell;
 }
 
+void EngagedStock::change_cutter(double radius) {
+    end_.radius = radius;
+    last_.fill(1e300);
+}
+
 double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& stock, const EngagementCap& cap) {
     if (moves.size() < 2) return 0;
     const double window = cap.diameter / 8, slot = cap.diameter * cap.stepdown;

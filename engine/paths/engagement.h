@@ -22,6 +22,9 @@ public:
     /// what is taken there, mm³: a cell belongs to the part on which the cutter's edge comes to it.
     void cut(const std::array<double, 3>& from, const std::array<double, 3>& to, std::vector<double>& volumes);
 
+    /// From now on the cutter is one of radius `radius`, mm. The cells stay.
+    void change_cutter(double radius);
+
     static constexpr double kMostCells = 6e5;  ///< 2.4 MB
 
 private:

@@ -90,7 +90,8 @@ void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<
             const std::vector<std::vector<Stretch>>& free, double tip_z, const std::function<Fibres(std::span<const std::int32_t>)>& links);
 
 [[nodiscard]] Operation face_layer(const LayerCut& cut);
-[[nodiscard]] Operation rough_layer(const LayerCut& cut);
+/// The end mill's, which may have no moves, and before it, where it is of use, the face mill's (open_waste.h).
+[[nodiscard]] std::vector<Operation> rough_layer(const LayerCut& cut);
 [[nodiscard]] Operation finish_floors(const LayerCut& cut);
 [[nodiscard]] Operation finish_walls(const LayerCut& cut);
 [[nodiscard]] Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics);

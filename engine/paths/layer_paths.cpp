@@ -176,7 +176,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     };
     take(face_layer(cut));
     reached(0.01);
-    take(rough_layer(cut));
+    for (Operation& op : rough_layer(cut)) take(std::move(op));
     reached(0.21);
     take(finish_floors(cut));
     take(finish_walls(cut));
@@ -214,7 +214,8 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         } const leaving{spares, std::move(memory), stock};
         std::vector<Operation> useful;
         for (Operation& op : result.operations) {
-            const bool idle = op.kind != OperationKind::face && stock.cut(cut, op, tools.rough).nothing();
+            const Tool& tool = op.tool == tools.rough.number ? tools.rough : tool_of_kind(cut.job, ToolKind::face);
+            const bool idle = op.kind != OperationKind::face && stock.cut(cut, op, tool).nothing();
             // A floor's cutter may have taken the whole wall beside it.
             if (!idle || op.kind != OperationKind::finish) useful.push_back(std::move(op));
         }

@@ -157,9 +157,10 @@ bool PathBuilder::enter(std::span<const PathPoint> run) {
     const PathPoint& first = run.front();
     descend(first);
     const double most = plunges_ ? kPlunge : kScrape;
-    if (to_mm(z_ - first.z) > most && standing_middle({first.x, first.y}) > to_mm(first.z) + most && !enter_on_helix(run) && !enter_on_ramp(run) &&
-        !plunges_ && !enter_from_side(first))
-        return false;
+    if (to_mm(z_ - first.z) > most && standing_middle({first.x, first.y}) > to_mm(first.z) + most) {
+        if (around_.from_side && enter_from_side(first)) return true;
+        if (!enter_on_helix(run) && !enter_on_ramp(run) && !plunges_ && !enter_from_side(first)) return false;
+    }
     plunge(first.z);
     return true;
 }

@@ -21,6 +21,7 @@ struct Surroundings {
     double ramp_deg = 5;                  ///< entry into stock
     std::shared_ptr<const Loops> room{};  ///< where the cutter's middle may be beside a flask; none: anywhere
     double lowest_rapid = -1e9;           ///< mm: rapids go no deeper
+    bool from_side = false;               ///< comes from beside a run where that is possible, rather than on a helix or a ramp
     /// Gets where a run begins that was left out: neither helix nor ramp has room, and the tool does not cut straight down.
     std::vector<std::array<double, 3>>* no_way_in = nullptr;
 };

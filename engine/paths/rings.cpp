@@ -14,6 +14,9 @@ constexpr double kBeyond = 20;                 // mm that the flask's region rea
 constexpr double kFineRing = 0.02;             // mm: what a ring may leave its line by, at least
 constexpr double kRingShare = 0.008;           // of the diameter: by what all others may, for they meet nothing but waste
 constexpr double kStepShare = 0.45;            // of the diameter: less than the radius by more than offsets and thinning may add
+// The same between a face mill's rectangles, between whose corners nothing is farther from the inner one than the radius. An end mill's lie no farther
+// apart than its rings: what it takes then overhanging wood bears at full feed.
+constexpr double kFaceShare = 0.6;
 constexpr double kBeside = 0.5;                // mm of air between the stock and a cutter that goes down beside it
 constexpr double kOnEdge = 0.1;                // mm
 constexpr std::size_t kRingsBesideStrips = 2;  // steps from the forbidden region to the farthest ring, where strips lie beyond
@@ -410,8 +413,8 @@ bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, con
     const Loops outside = beside_in_convex(useful, offset_outline(forbidden, kRingsBesideStrips * plan.step, kFineRing));
     Loops around;
     const double narrow = std::min(stands[2] - stands[0], stands[3] - stands[1]);
-    for (int k = 1; 2 * (k - 1) * plan.step < narrow; ++k) {
-        const double in = k * plan.step - r;
+    for (int k = 1; 2 * (k - 1) * plan.frame_step < narrow; ++k) {
+        const double in = k * plan.frame_step - r;
         const Loops corners = rectangle(stands[0] + in, stands[1] + in, stands[2] - in, stands[3] - in);
         around.points.insert(around.points.end(), corners.points.rbegin(), corners.points.rend());
         around.close_loop();
@@ -432,7 +435,7 @@ bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, con
         const Point2 a = run.points[0], b = run.points[1];
         const double l = length(a, b), ux = (static_cast<double>(b.x) - a.x) / l, uy = (static_cast<double>(b.y) - a.y) / l;
         for (const double along : {0.0, 0.5, 1.0, 1.5}) {
-            const double step = plan.step * kUnitsPerMm;
+            const double step = plan.frame_step * kUnitsPerMm;
             const Point2 beside{static_cast<std::int32_t>(std::lround(a.x + step * (along * ux - uy))),
                                 static_cast<std::int32_t>(std::lround(a.y + step * (along * uy + ux)))};
             if (winding(outside, beside) <= 0) continue;
@@ -480,19 +483,24 @@ void append_rings(RingPlan& plan, const LayerCut& cut, const Thinning& thinning,
 
 }  // namespace
 
+Loops thinned_rings(const LayerCut& cut, const Tool& tool, const Loops& region, double blend) { return Thinning(cut, tool, blend).of(region); }
+
+double ring_step(const Tool& tool) { return std::min(kStepShare, tool.stepover) * tool.diameter; }
+
 double ring_tolerance(const Tool& tool) { return std::max(kFineRing, kRingShare * tool.diameter); }
 
 RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double blend, bool hold) {
     RingPlan plan;
     plan.hold = hold;
     const double r = tool.diameter / 2;
-    plan.step = std::min(kStepShare, tool.stepover) * tool.diameter;
+    plan.step = ring_step(tool);
+    plan.frame_step = std::min(tool.kind == ToolKind::face ? kFaceShare : kStepShare, tool.stepover) * tool.diameter;
     plan.z = to_units(tip_z);
     if (forbidden.empty()) return plan;
-    plan.frames = frames_around(cut, r, plan.step, forbidden);
+    plan.frames = frames_around(cut, r, plan.frame_step, forbidden);
     plan.south = cut.layer.stock_min[1] - r - kBeside;
     // What stands within them.
-    const double cleared = static_cast<double>(plan.frames.size()) * plan.step;
+    const double cleared = static_cast<double>(plan.frames.size()) * plan.frame_step;
     const std::array<double, 4> stands{cut.layer.stock_min[0] + cleared, cut.layer.stock_min[1] + cleared, cut.layer.stock_max[0] - cleared,
                                        cut.layer.stock_max[1] - cleared};
     Bound bound;
@@ -561,7 +569,7 @@ RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbid
                       double blend) {
     RingPlan plan;
     const double r = tool.diameter / 2;
-    plan.step = std::min(kStepShare, tool.stepover) * tool.diameter;
+    plan.step = ring_step(tool);
     plan.z = to_units(tip_z);
     const Loops useful = useful_area(cut, r, {cut.layer.stock_min[0], cut.layer.stock_min[1], cut.layer.stock_max[0], cut.layer.stock_max[1]});
     const Thinning thinning(cut, tool, blend);
@@ -572,12 +580,17 @@ RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbid
 namespace {
 
 // Whose turn it is: pieces that wait for nothing. With RingPlan::hold a piece waits for all regions within its own, without it for the pieces
-// beside it that lie a step farther off: so one place is finished before the next is gone to.
+// beside it that lie a step farther off: so one place is finished before the next is gone to. With RingPlan::from_open it waits for any piece beside
+// it, unless it begins at the stock's edge.
 class Turns {
 public:
     std::vector<std::size_t> ready;
 
     explicit Turns(RingPlan& plan) : plan_(plan) {
+        if (plan.from_open) {
+            find_neighbours();
+            return;
+        }
         if (!plan.hold) {
             wait_for_neighbours();
             return;
@@ -592,6 +605,13 @@ public:
 
     /// To be called when a piece has been cut; its points may have been put in another order.
     void cut(std::size_t piece) {
+        if (plan_.from_open) {
+            state_[piece] = State::cut;
+            for (const std::size_t k : waiting_[piece])
+                if (state_[k] == State::waits) state_[k] = State::ready, ready.push_back(k);
+            if (ready.empty()) make_any_ready();
+            return;
+        }
         if (!plan_.hold) {
             for (const std::size_t k : waiting_[piece])
                 if (--waits_for_[k] == 0) ready.push_back(k);
@@ -603,7 +623,43 @@ public:
         release(around);
     }
 
+    /// With RingPlan::from_open, of a piece whose turn it is: whether one beside it has been cut, and whether one that is farther from the forbidden
+    /// region has.
+    struct Beside {
+        bool any = false, farther = false;
+    };
+    [[nodiscard]] Beside cut_beside(std::size_t piece) const {
+        Beside found;
+        for (const std::size_t k : waiting_[piece])
+            if (state_[k] == State::cut) found.any = true, found.farther |= plan_.pieces[k].ring > plan_.pieces[piece].ring;
+        return found;
+    }
+    /// The same: whether a place of it lies beside one that has been cut.
+    [[nodiscard]] bool beside_cut(std::size_t piece, const PathPoint& p) const {
+        const double reach = kBesideSteps * plan_.step * kUnitsPerMm;
+        return std::any_of(waiting_[piece].begin(), waiting_[piece].end(),
+                           [&](std::size_t k) { return state_[k] == State::cut && near_line(p, plan_.pieces[k].points, reach); });
+    }
+
 private:
+    enum class State : char { waits, ready, cut };
+    // Pieces that lie beside each other, on one ring or on the next.
+    void find_neighbours() {
+        const std::size_t n = plan_.pieces.size();
+        waiting_.resize(n), boxes_.resize(n), state_.assign(n, State::waits);
+        for (std::size_t k = 0; k < n; ++k)
+            for (std::size_t m = k + 1; m < n && plan_.pieces[m].ring <= plan_.pieces[k].ring + 1; ++m)
+                if (beside(plan_.pieces[k], plan_.pieces[m])) waiting_[k].push_back(m), waiting_[m].push_back(k);
+        for (std::size_t k = 0; k < n; ++k)
+            if (!plan_.pieces[k].closed) state_[k] = State::ready, ready.push_back(k);
+        if (ready.empty()) make_any_ready();
+    }
+    // Where no way leads from the edge: all that wait.
+    void make_any_ready() {
+        for (std::size_t k = 0; k < state_.size(); ++k)
+            if (state_[k] == State::waits) state_[k] = State::ready, ready.push_back(k);
+    }
+
     void release(std::size_t region) {
         RingPlan::Region& of = plan_.regions[region];
         if (of.waits_for > 0) return;
@@ -673,9 +729,30 @@ private:
     RingPlan& plan_;
     std::vector<std::size_t> left_;                  // by region: pieces not cut yet; with hold
     std::vector<std::size_t> waits_for_;             // by piece, without it: how many others
-    std::vector<std::vector<std::size_t>> waiting_;  // and who waits for it
+    std::vector<std::vector<std::size_t>> waiting_;  // and who waits for it; with from_open: who lies beside it
+    std::vector<State> state_;                       // by piece, with from_open
     std::vector<std::vector<Box>> boxes_;            // of its parts, once they were asked for
 };
+
+}  // namespace
+
+namespace {
+
+// With RingPlan::from_open: a closed piece begins at its point nearest to where the tool is of those beside a piece that has been cut, and is turned
+// over where that piece is the nearer one to the forbidden region: so the stock is on the right again.
+void begin_beside(const Turns& turns, std::size_t chosen, Point2 at, RingPlan::Piece& piece, Start& start) {
+    const Turns::Beside beside = turns.cut_beside(chosen);
+    if (!beside.any) return;
+    if (!beside.farther) std::reverse(piece.points.begin(), piece.points.end());
+    if (!piece.closed) return;
+    const PathPoint from{at.x, at.y, piece.points.front().z};
+    start = {};
+    for (std::size_t k = 0; k + 1 < piece.points.size(); ++k) {
+        const double way = length(from, piece.points[k]);
+        if (way < start.way && turns.beside_cut(chosen, piece.points[k])) start = {way, k, piece.points[k], false};
+    }
+    if (start.way == 1e300) (void)nearer(piece, at, false, start);  // only a place between two points lies beside one
+}
 
 }  // namespace
 
@@ -701,6 +778,7 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
         RingPlan::Piece& piece = plan.pieces[chosen];
         turns.ready.erase(turns.ready.begin() + static_cast<std::ptrdiff_t>(next));
         const std::size_t on = piece.ring;
+        if (plan.from_open) begin_beside(turns, chosen, path.at(), piece, start);
         // From ring to ring straight: a place `ring` steps from the forbidden region has that much room on all sides. Slantwise,
         // so that the cutter slides into the next ring, where there is room for the longer way too.
         const bool along = path.is_down() && path.z() == z && piece.closed && start.way <= 1.02 * step_units &&

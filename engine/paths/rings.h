@@ -26,8 +26,15 @@ namespace slabwright {
 /// along the ring itself; the stretch of the ramp is cut again. Heights in 0.1 µm.
 void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_t above, std::int32_t z, double ramp_deg);
 
+/// How far rings lie apart, mm.
+[[nodiscard]] double ring_step(const Tool& tool);
+
 /// What a ring that meets nothing but waste may leave its line by, mm: little of the step between rings, so that they still overlap.
 [[nodiscard]] double ring_tolerance(const Tool& tool);
+
+/// A region's loops with as few points as rings around it need that meet nothing but waste, ring_tolerance() at most beside where they were: chords
+/// that leave a curve by no more than `blend` (mm), by which the machine rounds corners, are run as fast as the curve.
+[[nodiscard]] Loops thinned_rings(const LayerCut& cut, const Tool& tool, const Loops& region, double blend);
 
 /// Rings around a forbidden region at one height, as far as they are of use, and which part of the free area each of them bounds.
 struct RingPlan {
@@ -51,14 +58,19 @@ struct RingPlan {
     std::vector<Piece> pieces;
     std::vector<Region> regions;  ///< with hold
     double step = 0;              ///< mm between rings
+    double frame_step = 0;        ///< mm between rectangles
+    [[nodiscard]] double widest_step() const { return frames.empty() && strips.empty() ? step : frame_step; }
     std::int32_t z = 0;
     bool hold = false;  ///< all rings of one distance are cut before any nearer one
+    /// Each piece is begun beside one that has been cut, from those at the stock's edge on: for a cutter that does not go down into stock. Not with hold.
+    bool from_open = false;
 };
 
 /// Plans to clear everything between `forbidden` and the edge of the stock at one height: first in rectangles from the stock's edge as
 /// far as these surround the forbidden region, then in rings around that region. The forbidden region is on the right of every ring (but see
-/// Cutting::climb), so the cutter climbs. Neighbouring rings are at most 0.45 of the tool's diameter, ring_tolerance() and 0.04 mm apart; the
-/// ring next to the forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region is nowhere near the stock.
+/// Cutting::climb), so the cutter climbs. Neighbouring rings are at most 0.45 of the tool's diameter, ring_tolerance() and 0.04 mm apart, rectangles as
+/// far or, of a face mill, 0.6 of it; the ring next to the forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region is
+/// nowhere near the stock.
 /// @param forbidden of the tool's middle, as simplify() or unite() give it; the flask's included
 /// @param tip_z mm
 /// @param blend mm by which the machine rounds the rings' corners (Operation::blend): chords are as long as it then takes at full feed

@@ -1,14 +1,16 @@
 // Roughing: level by level from the top, in rings around what the shadow forbids or in zigzags and then once along its border. A
 // level or, in rings, a terrace lies on every up-facing flat (plus allowance) and on the layer's bottom; between them the stepdowns of section 5. The
 // last level cuts the slab through where nothing lies under it, so it goes in rings that leave what hangs over held to the end.
-// Where the cutter meets more of its breadth than the job allows, the feed is lowered (engagement.h).
+// What lies open goes to the face mill (open_waste.h). Where a cutter meets more of its breadth than the job allows, the feed is lowered (engagement.h).
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "engine/paths/engagement.h"
 #include "engine/paths/feet.h"
 #include "engine/paths/layer_cut.h"
+#include "engine/paths/open_waste.h"
 #include "engine/paths/rings.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"
@@ -130,7 +132,7 @@ double least_width(const RoughStep& terrace, const RoughStep& floor, double cusp
 
 }  // namespace
 
-Operation rough_layer(const LayerCut& cut) {
+std::vector<Operation> rough_layer(const LayerCut& cut) {
     const Tool& tool = cut.layer.tools.rough;
     const bool contour = cut.job.cutting.rough_pattern == RoughPattern::contour;
     Operation op = cut.operation(OperationKind::rough, contour ? "contour-parallel levels" : "zigzag levels", tool);
@@ -169,6 +171,16 @@ Operation rough_layer(const LayerCut& cut) {
         forbidden_at[i] = simplify(forbidden_region(borders[i]));
         if (flask) forbidden_at[i] = unite(forbidden_at[i], beyond);
     });
+    std::optional<EngagedStock> stock;
+    if (cut.job.cutting.max_engagement < 1) stock.emplace(cut.layer.stock_min, cut.layer.stock_max, std::min(cut.stock_top, cut.layer.z_top), r);
+    std::vector<OpenLevel> open(steps.size());
+    Operation cleared;
+    if (const Tool* face = open_waste_tool(cut)) {
+        parallel_each(cut.context, steps.size(), [&](std::size_t i) {
+            if (steps[i].floor == i) open[i] = plan_open_level(cut, *face, tool, forbidden_at[i], steps[i].level.tip, steps[i].above, i == last);
+        });
+        cleared = clear_open_waste(cut, *face, open, stock ? &*stock : nullptr);
+    }
     std::vector<Level> cuts(steps.size());
     parallel_each(cut.context, steps.size(), [&](std::size_t i) {
         const double tip = steps[i].level.tip;
@@ -176,6 +188,10 @@ Operation rough_layer(const LayerCut& cut) {
             const double width = least_width(steps[i], steps[floor], cut.job.tolerances.rough_cusp);
             cuts[i].rings = plan_terrace(cut, tool, forbidden_at[i], offset_outline(forbidden_at[floor], -width, kOffsetError),
                                          offset_outline(forbidden_at[i - 1], -kMoreThanStep, kOffsetError), tip, op.blend);
+            return;
+        }
+        if (!cleared.moves.empty() && !open[i].left.empty()) {
+            cuts[i].rings = plan_terrace(cut, tool, forbidden_at[i], open[i].left, open[i].left, tip, op.blend);
             return;
         }
         if (i == last || contour) {
@@ -194,7 +210,7 @@ Operation rough_layer(const LayerCut& cut) {
         const double above = steps[i].above, tip = steps[i].level.tip;
         if (!cuts[i].rings.pieces.empty()) {
             op.stepdown = std::max(op.stepdown, above - tip);
-            op.stepover = std::max(op.stepover, cuts[i].rings.step);
+            op.stepover = std::max(op.stepover, cuts[i].rings.widest_step());
             clear_from_afar(path, cut, std::move(cuts[i].rings));
             continue;
         }
@@ -248,11 +264,14 @@ Operation rough_layer(const LayerCut& cut) {
         }
     }
     path.finish();
-    if (cut.job.cutting.max_engagement < 1 && op.stepdown > 0) {
-        EngagedStock stock(cut.layer.stock_min, cut.layer.stock_max, std::min(cut.stock_top, cut.layer.z_top), r);
-        cap_engagement(cut.context, op.moves, stock, {cut.job.cutting.max_engagement, tool.diameter, op.stepdown});
+    if (stock && op.stepdown > 0) {
+        stock->change_cutter(r);
+        cap_engagement(cut.context, op.moves, *stock, {cut.job.cutting.max_engagement, tool.diameter, op.stepdown});
     }
-    return op;
+    std::vector<Operation> operations;
+    if (!cleared.moves.empty()) operations.push_back(std::move(cleared));
+    operations.push_back(std::move(op));
+    return operations;
 }
 
 }  // namespace slabwright
