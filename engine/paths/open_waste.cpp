@@ -63,7 +63,9 @@ OpenLevel plan_open_level(const LayerCut& cut, const Tool& face, const Tool& too
     level.left = offset_outline(kept, kOverlap - wider, kOffsetError);
     const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
     Loops stock;
-    stock.points = {{to_units(lo[0]), to_units(lo[1])}, {to_units(hi[0]), to_units(lo[1])}, {to_units(hi[0]), to_units(hi[1])},
+    stock.points = {{to_units(lo[0]), to_units(lo[1])},
+                    {to_units(hi[0]), to_units(lo[1])},
+                    {to_units(hi[0]), to_units(hi[1])},
                     {to_units(lo[0]), to_units(hi[1])}};
     stock.close_loop();
     const double open = area(subtract(stock, level.left)), passes = std::ceil((above_z - tip_z) / deepest_step(cut, face) - 1e-9);

@@ -12,10 +12,10 @@ namespace slabwright {
 
 /// A level of roughing, or a part of one, as the face mill takes it.
 struct OpenLevel {
-    RingPlan rings;     ///< of the face mill; no pieces where it has nothing to do
-    double above = 0;   ///< mm: what stands there stands this high
-    Loops left;         ///< where the middle of the end mill, which comes after it, still meets something; with rings only
-    double saved = 0;   ///< minutes that the end mill would take longer
+    RingPlan rings;    ///< of the face mill; no pieces where it has nothing to do
+    double above = 0;  ///< mm: what stands there stands this high
+    Loops left;        ///< where the middle of the end mill, which comes after it, still meets something; with rings only
+    double saved = 0;  ///< minutes that the end mill would take longer
 };
 
 /// The face mill of a job that has it rough (Cutting::open_waste), where it can: between nothing that is higher than its holder, with levels for

@@ -10,10 +10,10 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kBeyond = 20;                 // mm that the flask's region reaches past the stock
-constexpr double kFineRing = 0.02;             // mm: what a ring may leave its line by, at least
-constexpr double kRingShare = 0.008;           // of the diameter: by what all others may, for they meet nothing but waste
-constexpr double kStepShare = 0.45;            // of the diameter: less than the radius by more than offsets and thinning may add
+constexpr double kBeyond = 20;        // mm that the flask's region reaches past the stock
+constexpr double kFineRing = 0.02;    // mm: what a ring may leave its line by, at least
+constexpr double kRingShare = 0.008;  // of the diameter: by what all others may, for they meet nothing but waste
+constexpr double kStepShare = 0.45;   // of the diameter: less than the radius by more than offsets and thinning may add
 // The same between a face mill's rectangles, between whose corners nothing is farther from the inner one than the radius. An end mill's lie no farther
 // apart than its rings: what it takes then overhanging wood bears at full feed.
 constexpr double kFaceShare = 0.6;
