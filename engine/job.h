@@ -141,7 +141,7 @@ struct Cutting {
     double face_depth = 4.0;                             ///< deepest face-milling step
     double ramp_deg = 5;                                 ///< entry into stock
     RoughPattern rough_pattern = RoughPattern::contour;
-    RestPattern rest_pattern = RestPattern::by_library;
+    RestPattern rest_pattern = RestPattern::contour;
     bool open_waste = true;       ///< contour roughing leaves what lies open from beside the stock to the face mill
     bool climb = true;            ///< contour roughing keeps the stock on its right everywhere; false: either way, where that is shorter
     double max_engagement = 0.7;  ///< share of the diameter that roughing meets at its full feed; 1: a slot

@@ -100,6 +100,38 @@ namespace {
 // radius, is no more than one cut.
 constexpr double kSwathShare = 0.5;
 
+double minutes_of(const Operation& op, const Machine& machine) { return motion_time(op.moves, machine, op.blend).minutes; }
+
+// Waste between walls. What lies within the swath of the level contours beside a wall may be left to them, which then meet more and go slower: it is
+// left where that spares this operation most of its time, as along upright walls; where slopes are gentle it spares little or none.
+// @param before minutes of the layer's operations so far: of those a small part is not worth a second look
+Operation clear_between(const LayerCut& cut, LayerStock& stock, RestPass pass, double before) {
+    constexpr double kSwath = 0.35;   // of the cutter's radius: wider, and the contours meet more than they bear at a good feed
+    constexpr double kLittle = 0.03;  // of the minutes before
+    constexpr double kSpared = 0.6;   // of the time without
+    const Tool& tool = cut.layer.tools.finish;
+    const Standing stood = *cut.standing;
+    const std::size_t no_ways = cut.no_way_in.size();
+    pass.swath = kSwath * tool.diameter / 2;
+    std::optional<LayerStock::Trial> trial(stock);
+    Operation some = cut_rest(cut, stock, tool, pass);
+    const double minutes = minutes_of(some, cut.job.machine);
+    if (minutes <= kLittle * before) return some;
+    trial->undo();
+    trial.reset();
+    Standing stands = *cut.standing;
+    std::vector<std::array<double, 3>> ways = cut.no_way_in;
+    *cut.standing = stood, cut.no_way_in.resize(no_ways);
+    pass.swath = 0;
+    trial.emplace(stock);
+    Operation all = cut_rest(cut, stock, tool, pass);
+    if (minutes > kSpared * minutes_of(all, cut.job.machine)) return all;
+    trial->undo();
+    *cut.standing = std::move(stands), cut.no_way_in = std::move(ways);
+    (void)stock.cut(cut, some, tool);
+    return some;
+}
+
 // Whatever the order of the cuts was meant to do: what comes loose is found from sections and moves alone.
 void report_loose(const LayerCut& cut, LayerResult& result) {
     const LayerJob& layer = cut.layer;
@@ -158,14 +190,14 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         context.throw_if_cancelled();
     };
     const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};
+    auto minutes = [&](std::span<const Operation> operations) {
+        double sum = 0;
+        for (const Operation& op : operations) sum += minutes_of(op, cut.job.machine);
+        return sum;
+    };
     // Whether the operations so far, which all stay, take too long. Arcs may be run faster than the straight moves they are made of.
     auto hopeless = [&] {
         if (std::isinf(layer.most_minutes)) return false;
-        auto minutes = [&](std::span<const Operation> operations) {
-            double sum = 0;
-            for (const Operation& op : operations) sum += motion_time(op.moves, cut.job.machine, op.blend).minutes;
-            return sum;
-        };
         if (minutes(result.operations) <= layer.most_minutes) return false;
         std::vector<Operation> fitted = result.operations;
         for (Operation& op : fitted) fit_arcs(op.moves, fit);
@@ -222,7 +254,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         result.operations = std::move(useful);
         const bool contours = clears_on_contours(cut.job);
         constexpr double kWaste = 1.0;  // mm: what is thicker is cut in steps
-        const double finish_r = tools.finish.diameter / 2, finish_swath = kSwathShare * tools.finish.diameter;
+        const double finish_swath = kSwathShare * tools.finish.diameter;
         auto waste = [&](const Tool& tool, const char* purpose) {
             return RestPass{OperationKind::semi_rough, purpose, kWaste, true, 0, semi_rough_allowance(cut.job, tool, kWaste)};
         };
@@ -242,9 +274,8 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         for (const Tool& tool : tools.rest)
             if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() && stock.area_over(context, 1.0) > kWasteWorthAChange)
                 semi_rough(tool, finish_swath);
-        RestPass between = waste(tools.finish, "waste between walls");
-        if (contours) between.swath = finish_r;
-        take(cut_rest(cut, stock, tools.finish, between));
+        const RestPass between = waste(tools.finish, "waste between walls");
+        take(contours ? clear_between(cut, stock, between, minutes(result.operations)) : cut_rest(cut, stock, tools.finish, between));
         reached(0.56);
         if (hopeless()) return result;
         finish([&](Operation& op) {
