@@ -55,6 +55,7 @@ const Tool* open_waste_tool(const LayerCut& cut) {
 
 OpenLevel plan_open_level(const LayerCut& cut, const Tool& face, const Tool& tool, const Loops& forbidden, double tip_z, double above_z, bool hold) {
     OpenLevel level;
+    level.whole = true;
     level.above = above_z;
     if (forbidden.empty()) return level;
     const double wider = (face.diameter - tool.diameter) / 2;
@@ -70,9 +71,18 @@ OpenLevel plan_open_level(const LayerCut& cut, const Tool& face, const Tool& too
     stock.close_loop();
     const double open = area(subtract(stock, level.left)), passes = std::ceil((above_z - tip_z) / deepest_step(cut, face) - 1e-9);
     level.saved = open / (ring_step(tool) * feed_of(cut, tool)) - passes * open / (ring_step(face) * feed_of(cut, face));
-    if (level.saved <= 0) level.left = {};
-    else level.rings = plan_rings(cut, face, kept, tip_z, blend, hold), level.rings.from_open = !hold && level.rings.strips.empty();
+    if (level.saved > 0) level.rings = plan_rings(cut, face, kept, tip_z, blend, hold), level.rings.from_open = !hold && level.rings.strips.empty();
+    if (level.rings.pieces.empty()) level.left = {};
     return level;
+}
+
+void leave_below_first_gap(std::span<OpenLevel> levels) {
+    bool gap = false;
+    for (OpenLevel& level : levels) {
+        if (!level.whole) continue;
+        gap |= level.rings.pieces.empty();
+        if (gap) level = {};
+    }
 }
 
 Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<OpenLevel> levels, EngagedStock* stock) {
@@ -89,6 +99,8 @@ Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<Open
     around.ramp_deg = std::min(around.ramp_deg, kRamp);
     around.from_side = true;
     path.know(around);
+    const Standing stood = *cut.standing;
+    const std::size_t no_ways = cut.no_way_in.size();
     for (OpenLevel& level : levels) {
         if (level.rings.pieces.empty()) continue;
         const double deep = level.above - to_mm(level.rings.z);
@@ -99,6 +111,10 @@ Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<Open
         clear_from_afar(path, cut, std::move(level.rings));
     }
     path.finish();
+    if (cut.no_way_in.size() > no_ways) {  // what it has left out the end mill would not know of
+        *cut.standing = stood, cut.no_way_in.resize(no_ways);
+        op.moves.clear();
+    }
     if (stock != nullptr && !op.moves.empty()) {
         stock->change_cutter(face.diameter / 2);
         cap_engagement(cut.context, op.moves, *stock, {cut.job.cutting.max_engagement, face.diameter, op.stepdown});

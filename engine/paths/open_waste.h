@@ -12,10 +12,11 @@ namespace slabwright {
 
 /// A level of roughing, or a part of one, as the face mill takes it.
 struct OpenLevel {
-    RingPlan rings;    ///< of the face mill; no pieces where it has nothing to do
-    double above = 0;  ///< mm: what stands there stands this high
-    Loops left;        ///< where the middle of the end mill, which comes after it, still meets something; with rings only
-    double saved = 0;  ///< minutes that the end mill would take longer
+    bool whole = false;  ///< of roughing; terraces are not looked at
+    RingPlan rings;      ///< of the face mill; no pieces where it has nothing to do
+    double above = 0;    ///< mm: what stands there stands this high
+    Loops left;          ///< where the middle of the end mill, which comes after it, still meets something; with rings only
+    double saved = 0;    ///< minutes that the end mill would take longer
 };
 
 /// The face mill of a job that has it rough (Cutting::open_waste), where it can: between nothing that is higher than its holder, with levels for
@@ -31,7 +32,12 @@ struct OpenLevel {
 [[nodiscard]] OpenLevel plan_open_level(const LayerCut& cut, const Tool& face, const Tool& tool, const Loops& forbidden, double tip_z, double above_z,
                                         bool hold);
 
-/// Cuts levels, which descend. No moves where they are not worth the face mill's time, or there are none.
+/// Below a level that the face mill does not take it takes none: it would meet what stands of that one too.
+/// @param levels descending
+void leave_below_first_gap(std::span<OpenLevel> levels);
+
+/// Cuts levels, which descend. No moves, and nothing changed, where there are none, where they are not worth the face mill's time, or where a run of
+/// theirs has no way in.
 /// @param stock what the feed is lowered by (engagement.h), which is cut; null: it is not lowered
 [[nodiscard]] Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<OpenLevel> levels, EngagedStock* stock);
 

@@ -179,6 +179,7 @@ std::vector<Operation> rough_layer(const LayerCut& cut) {
         parallel_each(cut.context, steps.size(), [&](std::size_t i) {
             if (steps[i].floor == i) open[i] = plan_open_level(cut, *face, tool, forbidden_at[i], steps[i].level.tip, steps[i].above, i == last);
         });
+        leave_below_first_gap(open);
         cleared = clear_open_waste(cut, *face, open, stock ? &*stock : nullptr);
     }
     std::vector<Level> cuts(steps.size());
