@@ -609,7 +609,7 @@ public:
             state_[piece] = State::cut;
             for (const std::size_t k : waiting_[piece])
                 if (state_[k] == State::waits) state_[k] = State::ready, ready.push_back(k);
-            if (ready.empty()) make_any_ready();
+            if (ready.empty()) make_farthest_ready();
             return;
         }
         if (!plan_.hold) {
@@ -652,12 +652,15 @@ private:
                 if (beside(plan_.pieces[k], plan_.pieces[m])) waiting_[k].push_back(m), waiting_[m].push_back(k);
         for (std::size_t k = 0; k < n; ++k)
             if (!plan_.pieces[k].closed) state_[k] = State::ready, ready.push_back(k);
-        if (ready.empty()) make_any_ready();
+        if (ready.empty()) make_farthest_ready();
     }
-    // Where no way leads from the edge: all that wait.
-    void make_any_ready() {
+    // Where no way leads from the edge: of those that wait, the farthest from the forbidden region.
+    void make_farthest_ready() {
+        std::size_t far = 0;
         for (std::size_t k = 0; k < state_.size(); ++k)
-            if (state_[k] == State::waits) state_[k] = State::ready, ready.push_back(k);
+            if (state_[k] == State::waits) far = std::max(far, plan_.pieces[k].ring);
+        for (std::size_t k = 0; k < state_.size(); ++k)
+            if (state_[k] == State::waits && plan_.pieces[k].ring == far) state_[k] = State::ready, ready.push_back(k);
     }
 
     void release(std::size_t region) {
@@ -733,10 +736,6 @@ private:
     std::vector<State> state_;                       // by piece, with from_open
     std::vector<std::vector<Box>> boxes_;            // of its parts, once they were asked for
 };
-
-}  // namespace
-
-namespace {
 
 // With RingPlan::from_open: a closed piece begins at its point nearest to where the tool is of those beside a piece that has been cut, and is turned
 // over where that piece is the nearer one to the forbidden region: so the stock is on the right again.
