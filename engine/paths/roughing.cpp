@@ -215,7 +215,7 @@ std::vector<Operation> rough_layer(const LayerCut& cut) {
             clear_from_afar(path, cut, std::move(cuts[i].rings));
             continue;
         }
-        if (steps[i].floor != i) continue;
+        if (cuts[i].free.empty()) continue;  // rings, of which none were of use
         op.stepdown = std::max(op.stepdown, above - tip);
         op.stepover = std::max(op.stepover, depth / gaps);
         zigzag(path, cut, tool, lines, cuts[i].free, tip, [&](std::span<const std::int32_t> at) {
