@@ -192,6 +192,10 @@ TEST(Roughing, FaceMillTakesWhatLiesOpenAndTheEndMillTheRest) {
         for (std::size_t k = 1; k < face.moves.size(); ++k) {
             const Move &a = face.moves[k - 1], &b = face.moves[k];
             if (b.feed == 0) continue;
+            if (const double way = std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y)); way > 0 && b.z < a.z) {
+                EXPECT_LT(to_mm(b.z), both.op.stepdown) << "helices and ramps lead to the last level only";
+                EXPECT_LE(to_mm(a.z - b.z), 1.01 * way * std::tan(2 * std::numbers::pi / 180) + 1e-3);
+            }
             for (int s = 0; s <= 20; ++s) {
                 const double t = s / 20.0, x = to_mm(a.x) + t * to_mm(b.x - a.x), y = to_mm(a.y) + t * to_mm(b.y - a.y),
                              z = to_mm(a.z) + t * to_mm(b.z - a.z);

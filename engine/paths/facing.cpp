@@ -7,13 +7,16 @@
 
 namespace slabwright {
 
+double face_step(const Job& job, const Tool& face) {
+    return face.stepdown_max > 0 ? std::min(job.cutting.face_depth, face.stepdown_max) : job.cutting.face_depth;
+}
+
 Operation face_layer(const LayerCut& cut) {
     const Tool& tool = tool_of_kind(cut.job, ToolKind::face);
     Operation op = cut.operation(OperationKind::face, "face to the layer's top", tool);
     const double depth = cut.stock_top - cut.layer.z_top;
     if (to_units(depth) <= 0) return op;  // no more than the text says
-    const double limit = std::min(cut.job.cutting.face_depth, tool.stepdown_max > 0 ? tool.stepdown_max : cut.job.cutting.face_depth);
-    const int steps = std::max(1, static_cast<int>(std::ceil(depth / limit - 1e-9)));
+    const int steps = std::max(1, static_cast<int>(std::ceil(depth / face_step(cut.job, tool) - 1e-9)));
     const double r = tool.diameter / 2, stepover = tool.stepover * tool.diameter;
     op.stepdown = depth / steps;
     op.stepover = stepover;

@@ -26,6 +26,8 @@ struct LayerCut {
     /// The place of x or y stretched past the stock's edge by `beyond`, kept within the travel of the machine.
     [[nodiscard]] double low(int axis, double beyond) const;
     [[nodiscard]] double high(int axis, double beyond) const;
+    /// The stock, seen from above.
+    [[nodiscard]] Loops stock_outline() const;
     /// Smallest slope (radians from level) of the facets to be machined between z0 and z1 that are at least `steepest_flat`
     /// steep; π/2 where there are none.
     [[nodiscard]] double least_slope(double z0, double z1, double at_least) const { return alpha.least(z0, z1, at_least); }
@@ -89,6 +91,8 @@ struct RoughLevel {
 void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<const std::int32_t> line_y,
             const std::vector<std::vector<Stretch>>& free, double tip_z, const std::function<Fibres(std::span<const std::int32_t>)>& links);
 
+/// How deep the face mill cuts at most, mm.
+[[nodiscard]] double face_step(const Job& job, const Tool& face);
 [[nodiscard]] Operation face_layer(const LayerCut& cut);
 /// The end mill's, which may have no moves, and before it, where it is of use, the face mill's (open_waste.h).
 [[nodiscard]] std::vector<Operation> rough_layer(const LayerCut& cut);

@@ -51,6 +51,14 @@ double LayerCut::high(int axis, double beyond) const {
     return std::min(layer.stock_max[axis] + beyond, 0.5 * (layer.stock_min[axis] + layer.stock_max[axis] + travel));
 }
 
+Loops LayerCut::stock_outline() const {
+    Loops stock;
+    const Point2 low{to_units(layer.stock_min[0]), to_units(layer.stock_min[1])}, high{to_units(layer.stock_max[0]), to_units(layer.stock_max[1])};
+    stock.points = {low, {high.x, low.y}, high, {low.x, high.y}};
+    stock.close_loop();
+    return stock;
+}
+
 std::vector<Section> LayerCut::insides(const Cutter& cutter, std::span<const double> tip_z) const {
     std::vector<Plane> planes;
     for (const double z : tip_z) planes.push_back(inside_plane(solid, cutter, z));
@@ -141,12 +149,7 @@ void report_loose(const LayerCut& cut, LayerResult& result) {
     slab.kept = simplify(sections[0].loops);
     slab.glued = simplify(sections[1].loops);
     if (!layer.opening.empty()) {
-        Loops stock;
-        const Point2 low{to_units(layer.stock_min[0]), to_units(layer.stock_min[1])},
-            high{to_units(layer.stock_max[0]), to_units(layer.stock_max[1])};
-        stock.points = {low, {high.x, low.y}, high, {low.x, high.y}};
-        stock.close_loop();
-        slab.kept = unite(slab.kept, subtract(stock, layer.opening));
+        slab.kept = unite(slab.kept, subtract(cut.stock_outline(), layer.opening));
     }
     for (const LoosePiece& piece : loose_pieces(cut.context, slab, result.operations, cut.job.tools))
         result.diagnostics.push_back({Severity::warning, "waste.loose",

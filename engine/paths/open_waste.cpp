@@ -15,10 +15,6 @@ constexpr double kWorth = 1;           // minutes
 
 double feed_of(const LayerCut& cut, const Tool& tool) { return std::min(tool.max_feed, cut.job.machine.max_feed); }
 
-double deepest_step(const LayerCut& cut, const Tool& face) {
-    return face.stepdown_max > 0 ? std::min(cut.job.cutting.face_depth, face.stepdown_max) : cut.job.cutting.face_depth;
-}
-
 // A region without its holes, and without what lies in them.
 Loops filled(const Loops& region) {
     Loops outer;
@@ -62,14 +58,7 @@ OpenLevel plan_open_level(const LayerCut& cut, const Tool& face, const Tool& too
     const double blend = rough_blend(cut.job.cutting);
     const Loops kept = simplify(thinned_rings(cut, face, filled(offset_outline(forbidden, wider + kCollar, kOffsetError)), blend));
     level.left = offset_outline(kept, kOverlap - wider, kOffsetError);
-    const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
-    Loops stock;
-    stock.points = {{to_units(lo[0]), to_units(lo[1])},
-                    {to_units(hi[0]), to_units(lo[1])},
-                    {to_units(hi[0]), to_units(hi[1])},
-                    {to_units(lo[0]), to_units(hi[1])}};
-    stock.close_loop();
-    const double open = area(subtract(stock, level.left)), passes = std::ceil((above_z - tip_z) / deepest_step(cut, face) - 1e-9);
+    const double open = area(subtract(cut.stock_outline(), level.left)), passes = std::ceil((above_z - tip_z) / face_step(cut.job, face) - 1e-9);
     level.saved = open / (ring_step(tool) * feed_of(cut, tool)) - passes * open / (ring_step(face) * feed_of(cut, face));
     if (level.saved > 0) level.rings = plan_rings(cut, face, kept, tip_z, blend, hold), level.rings.from_open = !hold && level.rings.strips.empty();
     if (level.rings.pieces.empty()) level.left = {};
@@ -104,7 +93,7 @@ Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<Open
     for (OpenLevel& level : levels) {
         if (level.rings.pieces.empty()) continue;
         const double deep = level.above - to_mm(level.rings.z);
-        const int passes = std::max(1, static_cast<int>(std::ceil(deep / deepest_step(cut, face) - 1e-9)));
+        const int passes = std::max(1, static_cast<int>(std::ceil(deep / face_step(cut.job, face) - 1e-9)));
         op.stepdown = std::max(op.stepdown, deep / passes);
         op.stepover = std::max(op.stepover, level.rings.widest_step());
         for (int pass = 1; pass < passes; ++pass) clear_from_afar(path, cut, lifted(level.rings, deep * (passes - pass) / passes));

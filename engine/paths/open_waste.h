@@ -19,8 +19,8 @@ struct OpenLevel {
     double saved = 0;    ///< minutes that the end mill would take longer
 };
 
-/// The face mill of a job that has it rough (Cutting::open_waste), where it can: between nothing that is higher than its holder, with levels for
-/// an end mill's rings, and without a flask, which leaves no way in. Null where not.
+/// The face mill of a job that has it rough (Cutting::open_waste), where it can: in a layer no deeper than its holder leaves room
+/// for, with levels for an end mill's rings, and without a flask, which leaves no way in. Null where not.
 [[nodiscard]] const Tool* open_waste_tool(const LayerCut& cut);
 
 /// Plans what the face mill takes of a level: all places at which it is kCollar farther from what the end mill must spare than that is, and to which
