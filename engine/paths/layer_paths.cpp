@@ -110,6 +110,23 @@ constexpr double kSwathShare = 0.5;
 
 double minutes_of(const Operation& op, const Machine& machine) { return motion_time(op.moves, machine, op.blend).minutes; }
 
+// What is cut while it lives can be undone, in all that operations leave to each other.
+class Attempt {
+public:
+    Attempt(const LayerCut& cut, LayerStock& stock) : cut_(cut), stood_(*cut.standing), no_ways_(cut.no_way_in.size()), trial_(stock) {}
+    void undo() {
+        *cut_.standing = std::move(stood_);
+        cut_.no_way_in.resize(no_ways_);
+        trial_.undo();
+    }
+
+private:
+    const LayerCut& cut_;
+    Standing stood_;
+    std::size_t no_ways_;
+    LayerStock::Trial trial_;
+};
+
 // Waste between walls. What lies within the swath of the level contours beside a wall may be left to them, which then meet more and go slower: it is
 // left where that spares this operation most of its time, as along upright walls; where slopes are gentle it spares little or none.
 // @param before minutes of the layer's operations so far: of those a small part is not worth a second look
@@ -118,23 +135,20 @@ Operation clear_between(const LayerCut& cut, LayerStock& stock, RestPass pass, d
     constexpr double kLittle = 0.03;  // of the minutes before
     constexpr double kSpared = 0.6;   // of the time without
     const Tool& tool = cut.layer.tools.finish;
-    const Standing stood = *cut.standing;
-    const std::size_t no_ways = cut.no_way_in.size();
     pass.swath = kSwath * tool.diameter / 2;
-    std::optional<LayerStock::Trial> trial(stock);
+    std::optional<Attempt> attempt(std::in_place, cut, stock);
     Operation some = cut_rest(cut, stock, tool, pass);
     const double minutes = minutes_of(some, cut.job.machine);
     if (minutes <= kLittle * before) return some;
-    trial->undo();
-    trial.reset();
     Standing stands = *cut.standing;
     std::vector<std::array<double, 3>> ways = cut.no_way_in;
-    *cut.standing = stood, cut.no_way_in.resize(no_ways);
+    attempt->undo();
+    attempt.reset();
     pass.swath = 0;
-    trial.emplace(stock);
+    attempt.emplace(cut, stock);
     Operation all = cut_rest(cut, stock, tool, pass);
     if (minutes > kSpared * minutes_of(all, cut.job.machine)) return all;
-    trial->undo();
+    attempt->undo();
     *cut.standing = std::move(stands), cut.no_way_in = std::move(ways);
     (void)stock.cut(cut, some, tool);
     return some;
@@ -295,19 +309,16 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             const double left = stock.area_over(context, limit);
             if (!last_of_kind(tool) && left < kCornersWorthAChange) continue;
             // What a tool between others is for is only seen when it has cut; where that is little it has not.
-            std::optional<Standing> stood;
-            std::optional<LayerStock::Trial> trial;
-            const std::size_t operations = result.operations.size(), no_ways = cut.no_way_in.size();
-            if (contours && !last_of_kind(tool)) stood = standing, trial.emplace(stock);
+            std::optional<Attempt> attempt;
+            const std::size_t operations = result.operations.size();
+            if (contours && !last_of_kind(tool)) attempt.emplace(cut, stock);
             if (contours && tool.kind == ToolKind::flat) take(semi_rough_layer(cut, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
             else take(cut_rest(cut, stock, tool, waste(tool, "waste in narrow places")));
             if (tool.kind == ToolKind::flat) take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
             else take(cut_rest(cut, stock, tool, {OperationKind::finish, "what is left in narrow places", limit, false}));
-            if (!stood || left - stock.area_over(context, limit) >= kCornersWorthAChange) continue;
-            standing = std::move(*stood);
-            trial->undo();
+            if (!attempt || left - stock.area_over(context, limit) >= kCornersWorthAChange) continue;
+            attempt->undo();
             result.operations.resize(operations);
-            cut.no_way_in.resize(no_ways);
         }
         result.left_mm2 = stock.area_over(context, limit);
     }
