@@ -196,5 +196,46 @@ TEST(Loose, ACoverOverACavityIsCutFromTheMiddle) {
     }
 }
 
+// Posts on a plate, two layers high: what lies between them in the second layer hangs over the first one's pockets, and the face mill clears it in
+// rings, not all of which have another a step farther off beside them all the way round. Begun at the nearest point, rings of five of these
+// patterns cut wedges off.
+TEST(Loose, AFaceMillsRingsCloseBesideWhatIsClear) {
+    auto outline = [](double x, double y, double half, double radius) {
+        const std::vector<Corner> corners{
+            {x - half, y - half, radius}, {x + half, y - half, radius}, {x + half, y + half, radius}, {x - half, y + half, radius}};
+        return rounded_polygon(corners, 0.01);
+    };
+    for (const unsigned seed : {8U, 25U, 27U, 31U, 38U, 41U}) {
+        std::mt19937 random(seed);
+        auto among = [&](double low, double high) { return low + (high - low) * static_cast<double>(random() % 1000) / 1000; };
+        constexpr double half = 190;
+        const Outline plate = outline(0, 0, half, 10);
+        const Ring bottom = ring(plate, {0, 0}), edge = ring(plate, {0, 5});
+        std::vector<Facet> facets;
+        std::vector<Ring> feet;
+        flat(facets, bottom, {}, false);
+        strip(facets, bottom, edge);
+        std::vector<std::array<double, 3>> posts;
+        for (int k = 0; k < 60 && posts.size() < 9; ++k) {
+            const double r = among(15, 30), x = among(-half + r + 5, half - r - 5), y = among(-half + r + 5, half - r - 5);
+            auto too_near = [&](const std::array<double, 3>& p) { return std::hypot(p[0] - x, p[1] - y) < (p[2] + r) * 1.2 + 20; };
+            if (std::any_of(posts.begin(), posts.end(), too_near)) continue;
+            posts.push_back({x, y, r});
+            const Outline post = outline(x, y, r, 0.9 * r);
+            feet.push_back(ring(post, {0, 5}));
+            const Ring top = ring(post, {0, 34});
+            strip(facets, feet.back(), top);
+            flat(facets, top, {}, true);
+        }
+        flat(facets, edge, feet, true);
+        Context context;
+        const Plan plan = make_plan(context, weld(context, facets), {}, {});
+        ASSERT_EQ(plan.layers.size(), 2U);
+        const std::vector<Operation>& operations = plan.layers[1].operations;
+        EXPECT_TRUE(std::any_of(operations.begin(), operations.end(), [](const Operation& op) { return op.purpose == "open waste"; }));
+        for (const Diagnostic& d : plan.diagnostics) EXPECT_NE(d.code, "waste.loose") << seed << ": " << d.message;
+    }
+}
+
 }  // namespace
 }  // namespace slabwright

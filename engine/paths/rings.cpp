@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "kernels/polygons/runs_inside.h"
 
@@ -23,6 +24,7 @@ constexpr std::size_t kRingsBesideStrips = 2;  // steps from the forbidden regio
 constexpr double kMostBetweenStrips = 0.1;     // of the strips' length: the ways between them
 constexpr double kShortestTerrace = 2;         // mm of a terrace's border ring: shorter ones are corners of walls that need none
 constexpr double kBesideSteps = 1.2;           // steps between rings that lie next to each other, at most, where they are nearest
+constexpr double kWedgeStep = 7.5;             // mm: where rings are a smaller step apart, what stays where one closes is no more than a chip (kChip)
 constexpr double kSlide = 1.2;                 // steps along the next ring that the way to it slants
 
 // Of a segment of Point2 or PathPoint, seen from above, and of a line of them; 0.1 µm.
@@ -93,6 +95,12 @@ void append_pieces(std::span<const Point2> loop, std::int32_t z, const Bound& bo
     take(points, false);
 }
 
+// The place at share t of the way from a to b.
+PathPoint between(const PathPoint& a, const PathPoint& b, double t) {
+    return {static_cast<std::int32_t>(std::lround(a.x + t * (static_cast<double>(b.x) - a.x))),
+            static_cast<std::int32_t>(std::lround(a.y + t * (static_cast<double>(b.y) - a.y))), b.z};
+}
+
 // Where a piece may begin.
 struct Start {
     double way = 1e300;  // 0.1 µm, from where the tool is
@@ -122,7 +130,7 @@ bool nearer(const RingPlan::Piece& piece, Point2 from, bool either_end, Start& b
         const double t = l2 > 0 ? std::clamp(((static_cast<double>(q.x) - a.x) * dx + (static_cast<double>(q.y) - a.y) * dy) / l2, 0.0, 1.0) : 0;
         const double ex = a.x + t * dx - q.x, ey = a.y + t * dy - q.y, reach = best.way + 1;  // a unit more: the place is rounded
         if (ex * ex + ey * ey > reach * reach) continue;
-        offer(k, {static_cast<std::int32_t>(std::lround(a.x + t * dx)), static_cast<std::int32_t>(std::lround(a.y + t * dy)), a.z}, false);
+        offer(k, between(a, b, t), false);
     }
     return found;
 }
@@ -134,9 +142,7 @@ void advance(const std::vector<PathPoint>& ring, double ahead, Start& start) {
         const PathPoint& b = ring[start.segment + 1];
         const double left = length(start.at, b);
         if (left >= ahead && left > 0) {
-            const double t = ahead / left;
-            start.at = {static_cast<std::int32_t>(std::lround(start.at.x + t * (static_cast<double>(b.x) - start.at.x))),
-                        static_cast<std::int32_t>(std::lround(start.at.y + t * (static_cast<double>(b.y) - start.at.y))), b.z};
+            start.at = between(start.at, b, ahead / left);
             return;
         }
         ahead -= left;
@@ -493,6 +499,7 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
     RingPlan plan;
     plan.hold = hold;
     const double r = tool.diameter / 2;
+    plan.radius = r;
     plan.step = ring_step(tool);
     plan.frame_step = std::min(tool.kind == ToolKind::face ? kFaceShare : kStepShare, tool.stepover) * tool.diameter;
     plan.z = to_units(tip_z);
@@ -569,6 +576,7 @@ RingPlan plan_terrace(const LayerCut& cut, const Tool& tool, const Loops& forbid
                       double blend) {
     RingPlan plan;
     const double r = tool.diameter / 2;
+    plan.radius = r;
     plan.step = ring_step(tool);
     plan.z = to_units(tip_z);
     const Loops useful = useful_area(cut, r, {cut.layer.stock_min[0], cut.layer.stock_min[1], cut.layer.stock_max[0], cut.layer.stock_max[1]});
@@ -753,6 +761,59 @@ void begin_beside(const Turns& turns, std::size_t chosen, Point2 at, RingPlan::P
     if (start.way == 1e300) (void)nearer(piece, at, false, start);  // only a place between two points lies beside one
 }
 
+// Where a closed piece had better close, with RingPlan::hold. There the cutter meets its own way about a radius before it has come round, and what then
+// stands between that and what is clear on the side away from the forbidden region is a wedge that hangs on nothing. None stays where a ring a step
+// farther off has been cut beside the last two radii.
+class Closing {
+public:
+    Closing(const RingPlan& plan, const std::vector<std::size_t>& cut, const RingPlan::Piece& piece)
+        : piece_(piece), beside_(piece.points.size() - 1, 0), run_(beside_.size(), 0) {
+        const double reach = kBesideSteps * plan.step * kUnitsPerMm, radius = plan.radius * kUnitsPerMm;
+        std::vector<const RingPlan::Piece*> farther;
+        for (const std::size_t c : cut)
+            if (plan.pieces[c].ring == piece.ring + 1) farther.push_back(&plan.pieces[c]);
+        auto beside_one = [&](const PathPoint& p) {
+            return std::any_of(farther.begin(), farther.end(), [&](const RingPlan::Piece* f) {
+                return p.x > f->box[0] - reach && p.x < f->box[2] + reach && p.y > f->box[1] - reach && p.y < f->box[3] + reach &&
+                       near_line(p, f->points, reach);
+            });
+        };
+        const std::size_t n = beside_.size();
+        for (std::size_t k = 0; k < n; ++k) {
+            const PathPoint &a = piece.points[k], &b = piece.points[k + 1];
+            const double l = length(a, b);
+            const int parts = static_cast<int>(std::ceil(4 * l / radius));
+            bool all = true;
+            for (int i = 0; i <= parts && all; ++i) all = beside_one(between(a, b, i / std::max(1.0, 1.0 * parts)));
+            if (all) run_[k] = l;
+        }
+        for (int round = 0; round < 2; ++round)  // what ends at the first point began before it
+            for (std::size_t k = 0; k < n; ++k) {
+                const std::size_t before = k == 0 ? n - 1 : k - 1;
+                beside_[k] = run_[before] > 0 ? std::min(2 * radius, beside_[before] + run_[before]) : 0;
+            }
+        best_ = *std::max_element(beside_.begin(), beside_.end());
+    }
+    /// Whether no place is better.
+    [[nodiscard]] bool good(const Start& start) const {
+        return best_ == 0 || (beside_[start.segment] == best_ && (run_[start.segment] > 0 || start.at == piece_.points[start.segment]));
+    }
+    /// Of the best points the nearest to where the tool is.
+    [[nodiscard]] Start nearest(Point2 at) const {
+        Start start;
+        for (std::size_t k = 0; k < beside_.size(); ++k)
+            if (const double way = length(PathPoint{at.x, at.y, 0}, piece_.points[k]); beside_[k] == best_ && way < start.way)
+                start = {way, k, piece_.points[k], false};
+        return start;
+    }
+
+private:
+    const RingPlan::Piece& piece_;
+    std::vector<double> beside_;  // 0.1 µm that lie beside such rings, up to each of its points
+    std::vector<double> run_;     // length of the chord from it, 0 where that does not lie beside any
+    double best_ = 0;
+};
+
 }  // namespace
 
 void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
@@ -763,6 +824,7 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
     for (const std::vector<PathPoint>& strip : plan.strips) path.follow(strip);
     Turns turns(plan);
     std::size_t ring = 0;  // that the tool is on, while it is down; none yet
+    std::vector<std::size_t> cut_already;
     while (!turns.ready.empty()) {
         cut.context.throw_if_cancelled();
         std::size_t next = SIZE_MAX;
@@ -778,12 +840,18 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
         turns.ready.erase(turns.ready.begin() + static_cast<std::ptrdiff_t>(next));
         const std::size_t on = piece.ring;
         if (plan.from_open) begin_beside(turns, chosen, path.at(), piece, start);
+        std::optional<Closing> closing;
+        if (plan.hold && piece.closed && plan.step > kWedgeStep) closing.emplace(plan, cut_already, piece);
+        if (closing && !closing->good(start)) start = closing->nearest(path.at());
         // From ring to ring straight: a place `ring` steps from the forbidden region has that much room on all sides. Slantwise,
         // so that the cutter slides into the next ring, where there is room for the longer way too.
         const bool along = path.is_down() && path.z() == z && piece.closed && start.way <= 1.02 * step_units &&
                            start.way <= 1.02 * static_cast<double>(ring) * step_units;
-        if (along && static_cast<double>(ring) * step_units > std::hypot(start.way, kSlide * step_units) + 0.05 * step_units)
-            advance(piece.points, kSlide * step_units, start);
+        if (along && static_cast<double>(ring) * step_units > std::hypot(start.way, kSlide * step_units) + 0.05 * step_units) {
+            Start slid = start;
+            advance(piece.points, kSlide * step_units, slid);
+            if (!closing || closing->good(slid)) start = slid;
+        }
         if (piece.closed) piece.points = started_at(piece.points, start.segment, start.at);
         else if (start.reversed) std::reverse(piece.points.begin(), piece.points.end());
         if (along)
@@ -791,6 +859,7 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
         else path.follow(piece.points);
         ring = on;
         turns.cut(chosen);
+        if (plan.hold) cut_already.push_back(chosen);
     }
     path.retract();
 }

@@ -57,6 +57,7 @@ struct RingPlan {
     std::vector<std::vector<PathPoint>> strips;  ///< runs along further rectangles, outside of the rings, in the order in which they are cut
     std::vector<Piece> pieces;
     std::vector<Region> regions;  ///< with hold
+    double radius = 0;            ///< mm, of the tool
     double step = 0;              ///< mm between rings
     double frame_step = 0;        ///< mm between rectangles
     [[nodiscard]] double widest_step() const { return frames.empty() && strips.empty() ? step : frame_step; }
