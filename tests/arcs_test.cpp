@@ -8,11 +8,14 @@
 #include <random>
 #include <sstream>
 
+#include "engine/planner.h"
 #include "engine/schedule/motion_time.h"
 #include "io/gcode_reader.h"
 #include "io/gcode_writer.h"
 #include "io/tool_table.h"
 #include "kernels/errors.h"
+#include "kernels/mesh/weld.h"
+#include "tests/data/sweep.h"
 #include "tests/support/rs274.h"
 #include "tests/support/seed.h"
 
@@ -211,6 +214,19 @@ TEST(Arcs, TakeAboutTheTimeOfTheirChords) {
     EXPECT_NEAR(motion_time(quarter, slow).minutes * 60, 2 * v / slow.acceleration + (length - 2 * ramp) / v, 1e-9);
 }
 
+// v² = a·r: at 50 mm/s and 500 mm/s² arcs of 5 mm radius are as fast as their chords, at 75 mm/s only those from 11.25 mm up.
+TEST(Arcs, AreNoneWhereTheyWouldBeRunSlower) {
+    for (const auto& [r, feed, fitted] : {std::tuple{8.0, 3000U, true}, {8.0, 4500U, false}, {12.0, 4500U, true}, {4.0, 3000U, false}}) {
+        std::vector<Move> moves;
+        for (double t = 0; t < 6; t += 0.2) moves.push_back({to_units(r * std::cos(t)), to_units(r * std::sin(t)), 0, moves.empty() ? 0U : feed});
+        std::vector<Move> always = moves;
+        fit_arcs(always, {.tolerance = 1000});
+        EXPECT_GT(arcs_in(always), 0);
+        fit_arcs(moves, {.tolerance = 1000, .acceleration = 500});
+        EXPECT_EQ(arcs_in(moves) > 0, fitted) << r << " mm at " << feed;
+    }
+}
+
 Plan plan_with(std::vector<Move> moves) {
     Plan plan;
     plan.input.file = "arcs.stl";
@@ -241,6 +257,42 @@ std::vector<Move> program_moves(std::mt19937& random) {
         moves.push_back({path.back().x, path.back().y, 29 * kMm, 0});
     }
     return moves;
+}
+
+// A round post on a plate. What roughing leaves is no finished surface: its arcs may leave the chords that they are fitted to by a share of that, or it
+// would have none; what the contours' own chords and these arcs take off it stays well under half.
+TEST(Arcs, OfRoughingTakeAShareOfWhatItLeaves) {
+    constexpr double radius = 30, half = 75;
+    auto outline = [](double side, double corner, double chord) {
+        return rounded_polygon(std::vector<Corner>{{-side, -side, corner}, {side, -side, corner}, {side, side, corner}, {-side, side, corner}},
+                               chord);
+    };
+    const Outline plate = outline(half, 1, 0.01), post = outline(radius, radius, 0.001);
+    const Ring bottom = ring(plate, {0, 0}), edge = ring(plate, {0, 3}), foot = ring(post, {0, 3}), top = ring(post, {0, 17});
+    std::vector<Facet> facets;
+    flat(facets, bottom, {}, false);
+    strip(facets, bottom, edge);
+    flat(facets, edge, {foot}, true);
+    strip(facets, foot, top);
+    flat(facets, top, {}, true);
+    Context context;
+    const Plan plan = make_plan(context, weld(context, facets), {}, {});
+    ASSERT_EQ(plan.layers.size(), 1U);
+    const Tool end_mill = tool_of_kind(plan.job, ToolKind::flat);
+    int arcs = 0;
+    std::size_t moves = 0;
+    double nearest = 1e300;
+    for (const Operation& op : plan.layers[0].operations) {
+        if (op.kind != OperationKind::rough || op.tool != end_mill.number) continue;
+        arcs += arcs_in(op.moves), moves += op.moves.size();
+        for (const Spot& s : sampled(op.moves, 0.05))
+            if (s.z < 17) nearest = std::min(nearest, std::hypot(s.x, s.y) - radius - end_mill.diameter / 2);
+    }
+    EXPECT_GT(arcs, 10);
+    std::printf("%d arcs in %zu moves; nearest %.4f mm\n", arcs, moves, nearest);
+    const double allowance = plan.job.cutting.wall_allowance;
+    EXPECT_GT(nearest, allowance * (1 - 0.2 - 1.0 / 15));
+    EXPECT_LT(nearest, allowance);
 }
 
 TEST(Arcs, TheInterpreterAcceptsThem) {

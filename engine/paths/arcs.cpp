@@ -78,7 +78,10 @@ std::optional<Centre> arc_through(std::span<const PathPoint> line, const ArcFit&
 class Chain {
 public:
     Chain(std::vector<Move>& out, std::span<const PathPoint> line, std::uint32_t feed, const ArcFit& fit)
-        : out_(out), line_(line), feed_(feed), fit_(fit) {}
+        : out_(out), line_(line), feed_(feed), fit_(fit) {
+        const double speed = feed / 60.0;  // mm/s
+        if (fit.acceleration > 0) fit_.min_radius = std::max(fit.min_radius, speed * speed / fit.acceleration * kUnitsPerMm);
+    }
 
     void run() {
         std::size_t at = 0, chords_from = 0;
@@ -140,7 +143,7 @@ private:
     std::vector<Move>& out_;
     std::span<const PathPoint> line_;
     std::uint32_t feed_;
-    const ArcFit& fit_;
+    ArcFit fit_;  // at this feed
 };
 
 }  // namespace

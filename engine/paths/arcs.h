@@ -13,6 +13,7 @@ struct ArcFit {
     double min_radius = 0.1 * kUnitsPerMm, max_radius = 2000 * kUnitsPerMm;  ///< 0.1 µm units
     double max_sweep = 2.2;                                                  ///< radians, under π: a circle becomes three arcs, none of them a stub
     int min_chords = 3;                                                      ///< that an arc must replace
+    double acceleration = 0;  ///< mm/s²: no arc is so narrow that this does not let it be run at the moves' feed; 0: any may be
 };
 
 /// Fits arcs to the feed moves that follow one another at one z and one feed, and chords to the rest (in three

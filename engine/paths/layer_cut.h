@@ -53,11 +53,11 @@ struct LayerCut {
 
 /// Longest chord between exact cutter locations that stays within 0.65 of the gouge tolerance (see level_contours), in
 /// 0.1 µm for a grid's pitch (chord/√2), and what simplifying may add (0.12 of it). The arcs and longer chords that are fitted to
-/// a finished operation may add 0.18 more, so that all of them stay within 0.95.
+/// a finished operation may add 0.18 more, so that all of them stay within 0.95; to a roughing, a share of what it leaves.
 [[nodiscard]] double safe_chord_mm(double radius, double gouge);
 [[nodiscard]] std::int32_t safe_pitch(double radius, double gouge);
 [[nodiscard]] double simplify_tolerance_units(double gouge);
-[[nodiscard]] double arc_tolerance_units(double gouge);
+[[nodiscard]] double arc_tolerance_units(const Job& job, OperationKind kind);
 
 /// Gives a finish run at one level a tangential arc into the cut and one out of it, on its free side, where drops of the
 /// cutter prove the room and nothing stands that would be entered head-on. The part is on the right of the run. A closed run

@@ -16,12 +16,21 @@
 
 namespace slabwright {
 
+namespace {
+constexpr double kFitShare = 1.0 / 15;  // of what roughing leaves
+}
+
 double safe_chord_mm(double radius, double gouge) { return std::sqrt(8 * radius * 0.65 * gouge); }
 std::int32_t safe_pitch(double radius, double gouge) {
     return static_cast<std::int32_t>(std::floor(safe_chord_mm(radius, gouge) / std::numbers::sqrt2 * kUnitsPerMm));
 }
 double simplify_tolerance_units(double gouge) { return 0.12 * gouge * kUnitsPerMm; }
-double arc_tolerance_units(double gouge) { return 0.18 * gouge * kUnitsPerMm; }
+
+double arc_tolerance_units(const Job& job, OperationKind kind) {
+    const double finest = 0.18 * job.tolerances.gouge * kUnitsPerMm;
+    if (kind != OperationKind::rough) return finest;
+    return std::max(finest, kFitShare * std::min(job.cutting.wall_allowance, job.cutting.floor_allowance) * kUnitsPerMm);
+}
 
 FinishSlopes finish_slopes(const Cutting& cutting) {
     constexpr double degree = std::numbers::pi / 180, none = 2;
@@ -206,7 +215,12 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         if (!operation.moves.empty()) result.operations.push_back(std::move(operation));
         context.throw_if_cancelled();
     };
-    const ArcFit fit{.tolerance = arc_tolerance_units(cut.job.tolerances.gouge), .arcs = cut.job.cutting.arcs};
+    auto fit = [&](Operation& op) {
+        ArcFit how{.tolerance = arc_tolerance_units(cut.job, op.kind), .arcs = cut.job.cutting.arcs};
+        // Roughing may round more off its corners (Operation::blend): where an arc would be run slower, its chords are not.
+        if (op.kind == OperationKind::rough) how.acceleration = cut.job.machine.acceleration;
+        fit_arcs(op.moves, how);
+    };
     auto minutes = [&](std::span<const Operation> operations) {
         double sum = 0;
         for (const Operation& op : operations) sum += minutes_of(op, cut.job.machine);
@@ -217,7 +231,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         if (std::isinf(layer.most_minutes)) return false;
         if (minutes(result.operations) <= layer.most_minutes) return false;
         std::vector<Operation> fitted = result.operations;
-        for (Operation& op : fitted) fit_arcs(op.moves, fit);
+        for (Operation& op : fitted) fit(op);
         if (minutes(fitted) <= layer.most_minutes) return false;
         result.operations = std::move(fitted);
         result.given_up = true;
@@ -332,7 +346,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     // Last, so that everything before has straight moves only to think of.
     for (Operation& op : result.operations) {
         context.throw_if_cancelled();
-        fit_arcs(op.moves, fit);
+        fit(op);
     }
     context.throw_if_cancelled();
     reached(1);
