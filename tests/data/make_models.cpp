@@ -26,16 +26,17 @@ void write_all(const std::string& directory) {
 }
 
 void write_metre(const std::string& path, const MetrePattern& pattern, bool shuffled) {
+    const std::uint64_t facets = metre_pattern_facets(pattern);  // before anything is written: it refuses what cannot be made
     std::ofstream file(path, std::ios::binary);
-    auto write_head = [&](std::uint64_t facets) {
-        const std::string head = stl_head("metre", facets);
+    auto write_head = [&](std::uint64_t count) {
+        const std::string head = stl_head("metre", count);
         file.write(head.data(), static_cast<std::streamsize>(head.size()));
     };
     std::uint64_t written = 0;
-    write_head(metre_pattern_facets(pattern));
+    write_head(facets);
     if (shuffled) {
         std::vector<std::array<char, 50>> records;
-        records.reserve(metre_pattern_facets(pattern));
+        records.reserve(facets);
         metre_pattern(pattern, [&](const Facet& facet) { records.push_back(stl_facet(facet)); });
         std::mt19937_64 random(pattern.seed);
         for (std::size_t i = records.size(); i > 1; --i) std::swap(records[i - 1], records[random() % i]);
