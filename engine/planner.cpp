@@ -206,8 +206,9 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan, const std
     std::sort(reach.begin(), reach.end(), std::greater<>());
     const std::size_t at_once = std::min<std::size_t>(reach.size(), context.threads());
     const std::uint64_t held = std::accumulate(reach.begin(), reach.begin() + static_cast<std::ptrdiff_t>(at_once), std::uint64_t{0});
+    constexpr std::uint64_t stands = 3;  // what stands, and two earlier states of it while one way of cutting is held against another
     return held * (sizeof(SolidFacet) + 16 + 3 * sizeof(Index3)) + static_cast<std::uint64_t>(3 * plan_view_mm2(plan)) * (sizeof(Move) + 64) +
-           (Standing::bytes(plan.stock_min, plan.stock_max) + LayerStock::bytes(plan.job, plan_view_mm2(plan))) * at_once;
+           (stands * Standing::bytes(plan.stock_min, plan.stock_max) + LayerStock::bytes(plan.job, plan_view_mm2(plan))) * at_once;
 }
 
 // What a slab is glued to, layer by layer: the section of the pattern at its joint and what of the flask stays there.
