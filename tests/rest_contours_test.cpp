@@ -103,9 +103,12 @@ TEST(LayerStock, StandsAsAfterOneMoveAfterAnother) {
 TEST(LayerStock, ATraceOffManyCellsIsNothing) {
     EXPECT_TRUE((Taken{.most = 0.1F, .mm3 = 0.4, .cells = 50}.nothing())) << "a trace";
     EXPECT_FALSE((Taken{.most = 0.1F, .mm3 = 0.6, .cells = 50}.nothing()));
-    EXPECT_FALSE((Taken{.most = 0.3F, .mm3 = 0.1, .cells = 4}.nothing())) << "little, but thick";
+    EXPECT_FALSE((Taken{.most = 0.3F, .mm3 = 0.1, .cells = 8}.nothing())) << "little, but thick";
     EXPECT_TRUE((Taken{.most = 0.3F, .mm3 = 0.1, .cells = 3}.nothing())) << "a few cells";
-    EXPECT_FALSE((Taken{.most = 0.5F, .mm3 = 0.1, .cells = 1}.nothing())) << "thick enough for any number";
+    EXPECT_TRUE((Taken{.most = 0.3F, .mm3 = 0.6, .cells = 3}.nothing())) << "a few cells";
+    EXPECT_TRUE((Taken{.most = 3.6F, .mm3 = 0.47, .cells = 6}.nothing())) << "centres that lie on a wall";
+    EXPECT_FALSE((Taken{.most = 3.6F, .mm3 = 0.6, .cells = 6}.nothing()));
+    EXPECT_FALSE((Taken{.most = 0.5F, .mm3 = 0.6, .cells = 1}.nothing())) << "thick enough for any number";
 }
 
 // A trial within another: what the inner one undoes is gone, what it leaves is undone with the outer.

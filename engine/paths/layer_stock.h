@@ -22,15 +22,16 @@ namespace slabwright {
 inline constexpr float kEmpty = 0.01F;
 
 /// What an operation took off a stock, along the normal of the surface below. A cell's centre that lies on a wall to within rounding may stand in one
-/// stock and not in another, and a cell stands for no more than its centre, so a few cells alone, or a trace off many, are no reason to go there.
+/// stock and not in another, and a cell stands for no more than its centre, so a few cells alone, a trace off some, however tall, or a shallow one off many
+/// are no reason to go there.
 /// Where many lost something, no more than that need be counted.
 struct Taken {
-    static constexpr std::size_t kFew = 4;
+    static constexpr std::size_t kFew = 4, kSome = 8;
     static constexpr double kTrace = 0.5;  ///< mm³
     float most = 0;                        ///< mm that one cell lost
     double mm3 = 0;
     std::size_t cells = 0;  ///< that lost more than kEmpty of height
-    [[nodiscard]] bool nothing() const { return (few() && most < 0.4F) || (mm3 < kTrace && most < 0.2F); }
+    [[nodiscard]] bool nothing() const { return (few() && most < 0.4F) || (mm3 < kTrace && (most < 0.2F || cells < kSome)); }
     [[nodiscard]] bool few() const { return cells < kFew; }
 };
 
