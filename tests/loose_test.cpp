@@ -233,6 +233,13 @@ TEST(Loose, AFaceMillsRingsCloseBesideWhatIsClear) {
         ASSERT_EQ(plan.layers.size(), 2U);
         const std::vector<Operation>& operations = plan.layers[1].operations;
         EXPECT_TRUE(std::any_of(operations.begin(), operations.end(), [](const Operation& op) { return op.purpose == "open waste"; }));
+        // And where a run begins in stock, the place beside it is gone to at once.
+        for (const Operation& op : operations)
+            for (std::size_t k = 2; op.kind == OperationKind::rough && k < op.moves.size(); ++k) {
+                const Move &a = op.moves[k - 2], &b = op.moves[k - 1], &c = op.moves[k];
+                const bool down = b.feed > 0 && a.x == b.x && a.y == b.y && b.z < a.z, up = c.feed == 0 && b.x == c.x && b.y == c.y && c.z > b.z;
+                EXPECT_FALSE(down && up) << op.purpose << ": down for nothing at " << to_mm(b.x) << " " << to_mm(b.y) << " " << to_mm(b.z);
+            }
         for (const Diagnostic& d : plan.diagnostics) EXPECT_NE(d.code, "waste.loose") << seed << ": " << d.message;
     }
 }

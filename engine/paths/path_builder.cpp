@@ -158,7 +158,6 @@ bool PathBuilder::enter(std::span<const PathPoint> run) {
     descend(first);
     const double most = plunges_ ? kPlunge : kScrape;
     if (to_mm(z_ - first.z) > most && standing_middle({first.x, first.y}) > to_mm(first.z) + most) {
-        if (around_.from_side && enter_from_side(first)) return true;
         if (!enter_on_helix(run) && !enter_on_ramp(run) && !plunges_ && !enter_from_side(first)) return false;
     }
     plunge(first.z);
@@ -249,26 +248,46 @@ bool PathBuilder::enter_on_ramp(std::span<const PathPoint> run) {
     return true;
 }
 
-// Down beside the run's beginning, at the nearest place where the cutter is free and its middle meets nothing, and from there
-// straight across: into the corner of a pocket that was cleared before.
-bool PathBuilder::enter_from_side(const PathPoint& first) {
-    if (around_.part == nullptr) return false;
-    const Point2 target{first.x, first.y};
-    for (int ring = 1; ring <= kSideRings; ++ring)
+// The nearest place beside a run's beginning where the cutter is free and its middle meets nothing, and from which it may go straight across; of
+// places as near the one nearest to where the tool is.
+std::optional<Point2> PathBuilder::place_beside(const PathPoint& first) {
+    if (around_.part == nullptr) return std::nullopt;
+    std::optional<Point2> best;
+    double least = 1e300;
+    for (int ring = 1; ring <= kSideRings && !best; ++ring)
         for (int k = 0; k < kSideWays; ++k) {
             const double turn = 2 * std::numbers::pi * k / kSideWays, far = ring * kSideStep * around_.cutter.radius * kUnitsPerMm;
             const Point2 beside{first.x + static_cast<std::int32_t>(std::lround(far * std::cos(turn))),
                                 first.y + static_cast<std::int32_t>(std::lround(far * std::sin(turn)))};
-            if (!has_room(beside) || around_.part->stands_over(to_mm(beside.x), to_mm(beside.y), to_mm(first.z) - around_.under) ||
-                standing_middle(beside) > to_mm(first.z) + kScrape || !part_leaves_way(beside, target, first.z))
+            const double way = std::hypot(static_cast<double>(beside.x) - x_, static_cast<double>(beside.y) - y_);
+            if (way >= least || !has_room(beside) || around_.part->stands_over(to_mm(beside.x), to_mm(beside.y), to_mm(first.z) - around_.under) ||
+                standing_middle(beside) > to_mm(first.z) + kScrape || !part_leaves_way(beside, {first.x, first.y}, first.z))
                 continue;
-            go_above(beside);
-            descend({beside.x, beside.y, first.z});
-            plunge(first.z);
-            cut(target, first.z);
-            return true;
+            least = way, best = beside;
         }
-    return false;
+    return best;
+}
+
+// Down there, and from there straight across: into the corner of a pocket that was cleared before.
+bool PathBuilder::enter_from_side(const PathPoint& first) {
+    const std::optional<Point2> beside = place_beside(first);
+    if (!beside) return false;
+    if (!go_straight(*beside, first.z)) {
+        go_above(*beside);
+        descend({beside->x, beside->y, first.z});
+    }
+    plunge(first.z);
+    cut({first.x, first.y}, first.z);
+    return true;
+}
+
+// Where the tool is down, at its height or that of a cut, whichever is higher, to over that, if the way is free.
+bool PathBuilder::go_straight(Point2 to, std::int32_t z) {
+    const std::int32_t level = std::max(z_, z);
+    if (!started_ || z_ >= link_ || around_.part == nullptr || !straight_is_free(to, level)) return false;
+    sink(level);
+    cut(to, level);
+    return true;
 }
 
 void PathBuilder::follow(std::span<const PathPoint> run) {
@@ -278,14 +297,10 @@ void PathBuilder::follow(std::span<const PathPoint> run) {
         go_above(first);
         plunge(run.front().z);
     } else {
-        const std::int32_t level = std::max(z_, run.front().z);
-        if (started_ && z_ < link_ && around_.part != nullptr && straight_is_free(first, level)) {
-            sink(level);
-            cut(first, level);
-        } else {
-            go_above(first);
-        }
-        if (!enter(run)) {
+        const double most = plunges_ ? kPlunge : kScrape;
+        const bool from_side = around_.from_side && standing_middle(first) > to_mm(run.front().z) + most && enter_from_side(run.front());
+        if (!from_side && !go_straight(first, run.front().z)) go_above(first);
+        if (!from_side && !enter(run)) {
             if (around_.no_way_in != nullptr) around_.no_way_in->push_back({to_mm(first.x), to_mm(first.y), to_mm(run.front().z)});
             return;
         }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "engine/paths/standing.h"
@@ -90,7 +91,9 @@ private:
     [[nodiscard]] bool enter(std::span<const PathPoint> run);
     [[nodiscard]] bool enter_on_helix(std::span<const PathPoint> run);
     [[nodiscard]] bool enter_on_ramp(std::span<const PathPoint> run);
+    [[nodiscard]] std::optional<Point2> place_beside(const PathPoint& first);
     [[nodiscard]] bool enter_from_side(const PathPoint& first);
+    [[nodiscard]] bool go_straight(Point2 to, std::int32_t z);
     [[nodiscard]] bool part_leaves_way(Point2 from, Point2 to, std::int32_t z) const;
     Operation& operation_;
     Surroundings around_;
