@@ -90,7 +90,7 @@ TEST(Rings, KeepTheirStep) {
         forbidden.points.insert(forbidden.points.end(), hollow.points.begin(), hollow.points.end());
         forbidden.close_loop();
         const RingPlan plan = plan_rings(bench.cut, bench.tool, simplify(forbidden), 5, blend, true);
-        const double most = 0.45 * bench.tool.diameter + ring_tolerance(bench.tool) + 0.04;
+        const double most = ring_step(bench.tool) + ring_tolerance(bench.tool) + 0.04;
         auto away = [](const PathPoint& p, std::span<const PathPoint> line) {
             double nearest = 1e300;
             for (std::size_t k = 1; k < line.size(); ++k) {

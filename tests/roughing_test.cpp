@@ -219,10 +219,10 @@ TEST(Roughing, FaceMillTakesWhatLiesOpenAndTheEndMillTheRest) {
     }
 }
 
-// Passes of .9 mm take longer than the end mill on whole levels, but not on the shallow last ones: over these, everything must be gone.
+// Passes of .75 mm take longer than the end mill on whole levels, but not on the shallow last ones: over these, everything must be gone.
 TEST(Roughing, FaceMillTakesNoLevelBelowOneThatItLeaves) {
-    Roughed r(posts_and_pocket, {-200, -190}, {190, 180}, 1.8, 2, true);
-    r.job.cutting.face_depth = 0.9;
+    Roughed r(posts_and_pocket, {-200, -190}, {190, 180}, 1.5, 2, true);
+    r.job.cutting.face_depth = 0.75;
     r.rough();
     double deepest = 0;
     for (const Operation& op : r.all) deepest = std::max(deepest, op.stepdown);

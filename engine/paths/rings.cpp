@@ -14,7 +14,9 @@ namespace {
 constexpr double kBeyond = 20;        // mm that the flask's region reaches past the stock
 constexpr double kFineRing = 0.02;    // mm: what a ring may leave its line by, at least
 constexpr double kRingShare = 0.008;  // of the diameter: by what all others may, for they meet nothing but waste
-constexpr double kStepShare = 0.45;   // of the diameter: less than the radius by more than offsets and thinning may add
+constexpr double kHoldShare = 0.45;   // of the diameter, at most between rings that keep what stands held
+constexpr double kLeastStep = 0.4;    // of the diameter
+constexpr double kOffLine = 0.2;      // mm that offsets, rounded corners and fitted chords may add to what thinning does between two rings
 // The same between a face mill's rectangles, between whose corners nothing is farther from the inner one than the radius. An end mill's lie no farther
 // apart than its rings: what it takes then overhanging wood bears at full feed.
 constexpr double kFaceShare = 0.6;
@@ -491,7 +493,11 @@ void append_rings(RingPlan& plan, const LayerCut& cut, const Thinning& thinning,
 
 Loops thinned_rings(const LayerCut& cut, const Tool& tool, const Loops& region, double blend) { return Thinning(cut, tool, blend).of(region); }
 
-double ring_step(const Tool& tool) { return std::min(kStepShare, tool.stepover) * tool.diameter; }
+double ring_step(const Tool& tool) {
+    // Nowhere is farther from a ring than the radius: where the innermost leaves room for none, that is a step from it.
+    const double widest = tool.diameter / 2 - 2 * ring_tolerance(tool) - kOffLine;
+    return std::min(tool.stepover * tool.diameter, std::max(widest, kLeastStep * tool.diameter));
+}
 
 double ring_tolerance(const Tool& tool) { return std::max(kFineRing, kRingShare * tool.diameter); }
 
@@ -500,8 +506,8 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
     plan.hold = hold;
     const double r = tool.diameter / 2;
     plan.radius = r;
-    plan.step = ring_step(tool);
-    plan.frame_step = std::min(tool.kind == ToolKind::face ? kFaceShare : kStepShare, tool.stepover) * tool.diameter;
+    plan.step = hold ? std::min(ring_step(tool), kHoldShare * tool.diameter) : ring_step(tool);
+    plan.frame_step = tool.kind == ToolKind::face ? std::min(kFaceShare, tool.stepover) * tool.diameter : ring_step(tool);
     plan.z = to_units(tip_z);
     if (forbidden.empty()) return plan;
     plan.frames = frames_around(cut, r, plan.frame_step, forbidden);
@@ -761,57 +767,48 @@ void begin_beside(const Turns& turns, std::size_t chosen, Point2 at, RingPlan::P
     if (start.way == 1e300) (void)nearer(piece, at, false, start);  // only a place between two points lies beside one
 }
 
-// Where a closed piece had better close, with RingPlan::hold. There the cutter meets its own way about a radius before it has come round, and what then
-// stands between that and what is clear on the side away from the forbidden region is a wedge that hangs on nothing. None stays where a ring a step
-// farther off has been cut beside the last two radii.
+// Where a closed piece had better close, with RingPlan::hold. There the cutter meets its own way when it is still as far from the beginning as it is
+// wide, and what then stands between that place, halfway, and what is clear on the side away from the forbidden region is a wedge that hangs on nothing.
+// It is but a chip where the swath of another ring comes near to that place.
 class Closing {
 public:
     Closing(const RingPlan& plan, const std::vector<std::size_t>& cut, const RingPlan::Piece& piece)
-        : piece_(piece), beside_(piece.points.size() - 1, 0), run_(beside_.size(), 0) {
-        const double reach = kBesideSteps * plan.step * kUnitsPerMm, radius = plan.radius * kUnitsPerMm;
-        std::vector<const RingPlan::Piece*> farther;
+        : piece_(piece), radius_(plan.radius * kUnitsPerMm) {
         for (const std::size_t c : cut)
-            if (plan.pieces[c].ring == piece.ring + 1) farther.push_back(&plan.pieces[c]);
-        auto beside_one = [&](const PathPoint& p) {
-            return std::any_of(farther.begin(), farther.end(), [&](const RingPlan::Piece* f) {
-                return p.x > f->box[0] - reach && p.x < f->box[2] + reach && p.y > f->box[1] - reach && p.y < f->box[3] + reach &&
-                       near_line(p, f->points, reach);
-            });
-        };
-        const std::size_t n = beside_.size();
-        for (std::size_t k = 0; k < n; ++k) {
-            const PathPoint &a = piece.points[k], &b = piece.points[k + 1];
-            const double l = length(a, b);
-            const int parts = static_cast<int>(std::ceil(4 * l / radius));
-            bool all = true;
-            for (int i = 0; i <= parts && all; ++i) all = beside_one(between(a, b, i / std::max(1.0, 1.0 * parts)));
-            if (all) run_[k] = l;
-        }
-        for (int round = 0; round < 2; ++round)  // what ends at the first point began before it
-            for (std::size_t k = 0; k < n; ++k) {
-                const std::size_t before = k == 0 ? n - 1 : k - 1;
-                beside_[k] = run_[before] > 0 ? std::min(2 * radius, beside_[before] + run_[before]) : 0;
-            }
-        best_ = *std::max_element(beside_.begin(), beside_.end());
+            if (plan.pieces[c].ring == piece.ring || plan.pieces[c].ring == piece.ring + 1) beside_.push_back(&plan.pieces[c]);
     }
-    /// Whether no place is better.
-    [[nodiscard]] bool good(const Start& start) const {
-        return best_ == 0 || (beside_[start.segment] == best_ && (run_[start.segment] > 0 || start.at == piece_.points[start.segment]));
-    }
-    /// Of the best points the nearest to where the tool is.
-    [[nodiscard]] Start nearest(Point2 at) const {
-        Start start;
-        for (std::size_t k = 0; k < beside_.size(); ++k)
-            if (const double way = length(PathPoint{at.x, at.y, 0}, piece_.points[k]); beside_[k] == best_ && way < start.way)
-                start = {way, k, piece_.points[k], false};
-        return start;
+    /// Whether a wedge that begins there is low, or none would be lower anywhere.
+    [[nodiscard]] bool good(const Start& start) const { return beside_.empty() || wedge_within(kLowWedge, start.segment, start.at); }
+    /// Of the points with the lowest wedges, as far as these are told apart, the nearest to where the tool is; else `otherwise`.
+    [[nodiscard]] Start nearest(Point2 at, const Start& otherwise) const {
+        std::vector<std::pair<double, std::size_t>> points;
+        for (std::size_t k = 0; k + 1 < piece_.points.size(); ++k) points.emplace_back(length(PathPoint{at.x, at.y, 0}, piece_.points[k]), k);
+        std::sort(points.begin(), points.end());
+        for (const double height : {kLowWedge, 2 * kLowWedge, 4 * kLowWedge, 6 * kLowWedge})
+            for (const auto& [way, k] : points)
+                if (wedge_within(height, k, piece_.points[k])) return {way, k, piece_.points[k], false};
+        return otherwise;
     }
 
 private:
+    static constexpr double kLowWedge = 2;  // mm
+
+    // Whether what is clear comes within `height` of halfway between a beginning and where the cutter meets its own way.
+    [[nodiscard]] bool wedge_within(double height, std::size_t segment, const PathPoint& at) const {
+        const std::size_t n = piece_.points.size() - 1;
+        PathPoint meets = at;
+        for (std::size_t passed = 0; passed < n && length(at, meets) < 2 * radius_; ++passed) meets = piece_.points[(segment + n - passed) % n];
+        const PathPoint halfway = between(at, meets, std::min(0.5, radius_ / std::max(1.0, length(at, meets))));
+        const double reach = radius_ + height * kUnitsPerMm;
+        return std::any_of(beside_.begin(), beside_.end(), [&](const RingPlan::Piece* f) {
+            return halfway.x > f->box[0] - reach && halfway.x < f->box[2] + reach && halfway.y > f->box[1] - reach && halfway.y < f->box[3] + reach &&
+                   near_line(halfway, f->points, reach);
+        });
+    }
+
     const RingPlan::Piece& piece_;
-    std::vector<double> beside_;  // 0.1 µm that lie beside such rings, up to each of its points
-    std::vector<double> run_;     // length of the chord from it, 0 where that does not lie beside any
-    double best_ = 0;
+    const double radius_;                           // 0.1 µm
+    std::vector<const RingPlan::Piece*> beside_{};  // those that have been cut, as far off and a step farther
 };
 
 }  // namespace
@@ -842,7 +839,7 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
         if (plan.from_open) begin_beside(turns, chosen, path.at(), piece, start);
         std::optional<Closing> closing;
         if (plan.hold && piece.closed && plan.step > kWedgeStep) closing.emplace(plan, cut_already, piece);
-        if (closing && !closing->good(start)) start = closing->nearest(path.at());
+        if (closing && !closing->good(start)) start = closing->nearest(path.at(), start);
         // From ring to ring straight: a place `ring` steps from the forbidden region has that much room on all sides. Slantwise,
         // so that the cutter slides into the next ring, where there is room for the longer way too.
         const bool along = path.is_down() && path.z() == z && piece.closed && start.way <= 1.02 * step_units &&

@@ -26,7 +26,7 @@ namespace slabwright {
 /// along the ring itself; the stretch of the ramp is cut again. Heights in 0.1 µm.
 void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_t above, std::int32_t z, double ramp_deg);
 
-/// How far rings lie apart, mm.
+/// How far rings lie apart, mm: the tool's stepover, and less than its radius by more than offsets, thinning and rounded corners may add.
 [[nodiscard]] double ring_step(const Tool& tool);
 
 /// What a ring that meets nothing but waste may leave its line by, mm: little of the step between rings, so that they still overlap.
@@ -69,8 +69,8 @@ struct RingPlan {
 
 /// Plans to clear everything between `forbidden` and the edge of the stock at one height: first in rectangles from the stock's edge as
 /// far as these surround the forbidden region, then in rings around that region. The forbidden region is on the right of every ring (but see
-/// Cutting::climb), so the cutter climbs. Neighbouring rings are at most 0.45 of the tool's diameter, ring_tolerance() and 0.04 mm apart, rectangles as
-/// far or, of a face mill, 0.6 of it; the ring next to the forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region is
+/// Cutting::climb), so the cutter climbs. Neighbouring rings are at most ring_step(), with `hold` no more than 0.45 of the diameter, ring_tolerance() and
+/// 0.04 mm apart, rectangles ring_step() or, of a face mill, 0.6 of the diameter; the ring next to the forbidden region keeps within 0.02 mm of its border. Without pieces the forbidden region is
 /// nowhere near the stock.
 /// @param forbidden of the tool's middle, as simplify() or unite() give it; the flask's included
 /// @param tip_z mm
