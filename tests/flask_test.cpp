@@ -194,8 +194,9 @@ TEST_P(FlaskPlan, IsMadeAndStays) {
     v = verify_folder(context, out, options);
     const auto cut = std::find_if(v.report.violations.begin(), v.report.violations.end(), [](const Violation& x) { return x.code == "gouge.flask"; });
     ASSERT_NE(cut, v.report.violations.end());
-    // Exactly, by the program that goes nearest; and its height is gone from the stock.
-    EXPECT_NEAR(cut->size, 0.5, 0.02);
+    // Exactly, by the program that goes nearest, which keeps off it what rings and arcs may add; and its height is gone from the stock.
+    EXPECT_LE(cut->size, 0.501);
+    EXPECT_GE(cut->size, 0.46);
     EXPECT_FALSE(cut->file.empty());
     const auto gone = std::find_if(v.report.violations.begin(), v.report.violations.end(),
                                    [](const Violation& x) { return x.code == "gouge.flask" && x.file.empty(); });
@@ -217,7 +218,15 @@ TEST(FlaskPlan, NoMoveTouchesIt) {
             for (std::size_t k = 1; k < op.moves.size(); ++k) {
                 const Move &a = op.moves[k - 1], &b = op.moves[k];
                 if (to_mm(std::min(a.z, b.z)) >= layer.z_top - 1e-6) continue;
-                nearest = std::min({nearest, winding(frame, {b.x, b.y}) > 0 ? 0 : distance_to(frame, {b.x, b.y})});
+                const ArcShape shape = b.is_arc() ? arc_shape(a, b) : ArcShape{};
+                for (const double t : {0.25, 0.5, 0.75, 1.0}) {
+                    Point2 p{a.x + static_cast<std::int32_t>(t * (b.x - a.x)), a.y + static_cast<std::int32_t>(t * (b.y - a.y))};
+                    if (b.is_arc()) {
+                        const double turn = shape.start + t * shape.sweep;
+                        p = {to_units(shape.x + shape.radius * std::cos(turn)), to_units(shape.y + shape.radius * std::sin(turn))};
+                    }
+                    nearest = std::min(nearest, winding(frame, p) > 0 ? 0 : distance_to(frame, p));
+                }
             }
             EXPECT_GE(nearest, tool->diameter / 2 - 0.005) << op.purpose << " of layer " << layer.index;
         }

@@ -21,6 +21,7 @@ namespace {
 
 constexpr double kContourError = 0.03;  // mm by which the contours of two levels may stand apart on a vertical wall
 constexpr double kOffsetError = 0.01;   // mm
+constexpr double kOnBorder = 0.02;      // mm by which the ring next to what is forbidden keeps to its border (plan_rings)
 constexpr double kMoreThanStep = 1.0;   // mm that a terrace's border ring may meet beyond the step between rings
 
 // Whether a flat end mill comes down to a floor anywhere, by places a third of its radius apart.
@@ -161,12 +162,14 @@ std::vector<Operation> rough_layer(const LayerCut& cut) {
         std::vector<std::vector<Stretch>> free;  // where no rings are cut
     };
     const bool flask = !cut.layer.opening.empty();
-    const Loops room = flask ? flask_room(cut, r) : Loops{};
+    // A ring may leave its border, and an arc the ring.
+    const double off_flask = r + kOnBorder + arc_tolerance_units(cut.job, OperationKind::rough) / kUnitsPerMm;
+    const Loops room = flask ? flask_room(cut, off_flask) : Loops{};
     std::vector<FibreLevel> heights;
     for (std::size_t i = 0; i < steps.size(); ++i) heights.push_back({steps[i].level.spare, &inside[i].loops});
     const std::vector<Contours> borders = level_contours(cut.context, cut.solid, heights, cutter, grid);
     std::vector<Loops> forbidden_at(steps.size());
-    const Loops beyond = flask ? beyond_room(cut, r, room) : Loops{};
+    const Loops beyond = flask ? beyond_room(cut, off_flask, room) : Loops{};
     parallel_each(cut.context, steps.size(), [&](std::size_t i) {
         forbidden_at[i] = simplify(forbidden_region(borders[i]));
         if (flask) forbidden_at[i] = unite(forbidden_at[i], beyond);
