@@ -99,6 +99,8 @@ double rough_blend(const Cutting& cutting) {
     return std::max(kJunction, std::min(cutting.rough_blend, std::min(cutting.wall_allowance, cutting.floor_allowance) / 3));
 }
 
+double rough_fit(const Cutting& cutting) { return std::min(cutting.wall_allowance, cutting.floor_allowance) / 15; }
+
 double least_flask_gap(const Job& job) {
     constexpr double kRoom = 2.5;  // mm: the leads of finish passes swing out by 2
     double widest = 0;

@@ -218,6 +218,9 @@ struct Job {
 /// and no less than everywhere else (kJunction).
 [[nodiscard]] double rough_blend(const Cutting& cutting);
 
+/// By how much arcs and longer chords of roughing paths may leave what they are fitted to, mm: a fifteenth of what roughing leaves.
+[[nodiscard]] double rough_fit(const Cutting& cutting);
+
 /// The narrowest flask.gap in which every flat and ball end mill of the job passes between pattern and flask: the widest
 /// cutter, what roughing leaves on the pattern's walls, and room for leads.
 [[nodiscard]] double least_flask_gap(const Job& job);

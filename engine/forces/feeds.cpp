@@ -402,7 +402,9 @@ double bending_limit(const Operation& operation, const Job& job) {
         case OperationKind::semi_rough:
             return std::max(operation.spare, job.tolerances.cusp);
         case OperationKind::rough:
-            return std::max(std::min(job.cutting.wall_allowance, job.cutting.floor_allowance) - (operation.blend - kJunction), job.tolerances.cusp);
+            return std::max(
+                std::min(job.cutting.wall_allowance, job.cutting.floor_allowance) - (operation.blend - kJunction) - rough_fit(job.cutting),
+                job.tolerances.cusp);
         default:
             return job.tolerances.cusp;
     }

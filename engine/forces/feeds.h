@@ -18,7 +18,7 @@ namespace slabwright {
 [[nodiscard]] CutSegment cut_of(const CutStretch& stretch, const Tool& tool, const Job& job, double feed);
 
 /// What an operation may bend its cutter, normal to the way, mm: roughing as much as it leaves for finishing, less what wider
-/// corners than a finish pass's may take of that (Operation::blend), semi-roughing what it leaves itself (Operation::spare), finishing the cusp,
+/// corners than a finish pass's (Operation::blend) and arcs (rough_fit) may take of that, semi-roughing what it leaves itself (Operation::spare), finishing the cusp,
 /// facing what facing takes off.
 [[nodiscard]] double bending_limit(const Operation& operation, const Job& job);
 

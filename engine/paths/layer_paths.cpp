@@ -16,10 +16,6 @@
 
 namespace slabwright {
 
-namespace {
-constexpr double kFitShare = 1.0 / 15;  // of what roughing leaves
-}
-
 double safe_chord_mm(double radius, double gouge) { return std::sqrt(8 * radius * 0.65 * gouge); }
 std::int32_t safe_pitch(double radius, double gouge) {
     return static_cast<std::int32_t>(std::floor(safe_chord_mm(radius, gouge) / std::numbers::sqrt2 * kUnitsPerMm));
@@ -28,8 +24,7 @@ double simplify_tolerance_units(double gouge) { return 0.12 * gouge * kUnitsPerM
 
 double arc_tolerance_units(const Job& job, OperationKind kind) {
     const double finest = 0.18 * job.tolerances.gouge * kUnitsPerMm;
-    if (kind != OperationKind::rough) return finest;
-    return std::max(finest, kFitShare * std::min(job.cutting.wall_allowance, job.cutting.floor_allowance) * kUnitsPerMm);
+    return kind == OperationKind::rough ? std::max(finest, rough_fit(job.cutting) * kUnitsPerMm) : finest;
 }
 
 FinishSlopes finish_slopes(const Cutting& cutting) {

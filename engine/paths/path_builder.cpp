@@ -272,10 +272,8 @@ std::optional<Point2> PathBuilder::place_beside(const PathPoint& first) {
 bool PathBuilder::enter_from_side(const PathPoint& first) {
     const std::optional<Point2> beside = place_beside(first);
     if (!beside) return false;
-    if (!go_straight(*beside, first.z)) {
-        go_above(*beside);
-        descend({beside->x, beside->y, first.z});
-    }
+    if (!go_straight(*beside, first.z)) go_above(*beside);
+    descend({beside->x, beside->y, first.z});
     plunge(first.z);
     cut({first.x, first.y}, first.z);
     return true;
