@@ -488,9 +488,9 @@ TEST(Feeds, AnOperationMayBendItsCutterByWhatItLeaves) {
     const Job job;  // allowances of 0.3 mm, a cusp of 0.05
     Operation op;
     op.kind = OperationKind::rough;
-    EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.3);
+    EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.3 - rough_fit(job.cutting));
     op.blend = 0.1;
-    EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.3 - (0.1 - kJunction));
+    EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.3 - (0.1 - kJunction) - 0.02);
     op.kind = OperationKind::semi_rough;
     EXPECT_DOUBLE_EQ(bending_limit(op, job), job.tolerances.cusp) << "one that leaves nothing bends as little as a finish pass";
     op.spare = 0.1;
