@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <random>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "engine/planner.h"
 #include "engine/tools/select.h"
 #include "io/slabwright.h"
+#include "io/verify.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
 #include "tests/support/end_mill_job.h"
@@ -304,6 +306,26 @@ TEST(RestContours, LuosSampleIsFasterOnContoursAndVerifies) {
     write(context, plan(context, stl, job), folder / "out");
     const VerifyResult result = verify(context, folder / "out", stl);
     EXPECT_TRUE(result.passed) << (result.violations.empty() ? "" : result.violations[0].message);
+}
+
+// Between two of this pattern's posts lies a slot that is .05 mm wider than the end mill where it is narrowest. The rest there is found by sliding down
+// between walls that a place's neighbours on either side stand on; other slots put a dozen lines between these.
+TEST(RestContours, ASlotHardlyWiderIsFoundAmongOthers) {
+    const MetrePattern pattern{150, 25, 8000, 2};
+    const support::TemporaryFolder folder;
+    const std::string stl = folder / "pattern.stl";
+    {
+        std::ofstream file(stl, std::ios::binary);
+        file << stl_head("pattern", metre_pattern_facets(pattern));
+        metre_pattern(pattern, [&](const Facet& facet) {
+            const auto record = stl_facet(facet);
+            file.write(record.data(), record.size());
+        });
+    }
+    Context context;
+    write(context, plan(context, stl, {}), folder / "out");
+    const Verification v = verify_folder(context, folder / "out", {.stl = stl, .write = false});
+    for (const Violation& violation : v.report.violations) ADD_FAILURE() << violation.code << ": " << violation.message;
 }
 
 }  // namespace

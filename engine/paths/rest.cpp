@@ -456,11 +456,13 @@ private:
         auto higher = [&](const Place* beside, const Place& p) {
             return beside && (beside->touches || !beside->reachable) && p.tip < beside->tip - kSettle;
         };
+        // Up to the next line of the even raster: lines between may not come by here.
         auto beside = [&](std::size_t rank, bool after, std::int32_t x) -> const Place* {
-            constexpr std::size_t look = 4;  // lines between may not come by here
-            for (std::size_t k = 1; k <= look; ++k) {
-                if (after ? rank + k >= by_y.size() : k > rank) return nullptr;
-                if (const Place* p = at(lines_[by_y[after ? rank + k : rank - k]], x)) return p;
+            const std::int32_t y = lines_[by_y[rank]].y;
+            for (std::size_t k = rank; after ? k + 1 < by_y.size() : k > 0;) {
+                const Line& line = lines_[by_y[after ? ++k : --k]];
+                if (std::abs(line.y - y) > spacing_) break;
+                if (const Place* p = at(line, x)) return p;
             }
             return nullptr;
         };
