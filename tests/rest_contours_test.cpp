@@ -308,24 +308,27 @@ TEST(RestContours, LuosSampleIsFasterOnContoursAndVerifies) {
     EXPECT_TRUE(result.passed) << (result.violations.empty() ? "" : result.violations[0].message);
 }
 
-// Between two of this pattern's posts lies a slot that is .05 mm wider than the end mill where it is narrowest. The rest there is found by sliding down
-// between walls that a place's neighbours on either side stand on; other slots put a dozen lines between these.
-TEST(RestContours, ASlotHardlyWiderIsFoundAmongOthers) {
-    const MetrePattern pattern{150, 25, 8000, 2};
-    const support::TemporaryFolder folder;
-    const std::string stl = folder / "pattern.stl";
-    {
-        std::ofstream file(stl, std::ios::binary);
-        file << stl_head("pattern", metre_pattern_facets(pattern));
-        metre_pattern(pattern, [&](const Facet& facet) {
-            const auto record = stl_facet(facet);
-            file.write(record.data(), record.size());
-        });
+// Slots hardly wider than the end mill. Seed 2 has one that is .05 mm wider where it is narrowest: the place in it is found by sliding down between
+// walls that its neighbours on either side stand on, and other slots put a dozen lines between these. Seed 6 has a pocket .12 mm wider, whose rim is
+// level: the raster's places on both sides of it stand on that, and nothing shows but what is left.
+TEST(RestContours, SlotsHardlyWiderAreFound) {
+    for (const std::uint64_t seed : {2U, 6U}) {
+        const MetrePattern pattern{150, 25, 8000, seed};
+        const support::TemporaryFolder folder;
+        const std::string stl = folder / "pattern.stl";
+        {
+            std::ofstream file(stl, std::ios::binary);
+            file << stl_head("pattern", metre_pattern_facets(pattern));
+            metre_pattern(pattern, [&](const Facet& facet) {
+                const auto record = stl_facet(facet);
+                file.write(record.data(), record.size());
+            });
+        }
+        Context context;
+        write(context, plan(context, stl, {}), folder / "out");
+        const Verification v = verify_folder(context, folder / "out", {.stl = stl, .write = false});
+        for (const Violation& violation : v.report.violations) ADD_FAILURE() << seed << ": " << violation.code << ": " << violation.message;
     }
-    Context context;
-    write(context, plan(context, stl, {}), folder / "out");
-    const Verification v = verify_folder(context, folder / "out", {.stl = stl, .write = false});
-    for (const Violation& violation : v.report.violations) ADD_FAILURE() << violation.code << ": " << violation.message;
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <numeric>
 #include <optional>
 
@@ -28,6 +29,9 @@ constexpr double kSettle = 0.01;  // mm by which a low point of a line lies unde
 constexpr float kRise = 0.5F;     // mm: a wall that is lower than what stands beside it by less is as high
 constexpr double kPlaces = 0.75;  // of the longest chord, between places of a line
 constexpr double kOver = 0.5;     // mm over all that stands for it: how much higher a place lies is not asked
+constexpr float kMuch = 0.25F;    // mm left that are worth a search for a place (probe)
+constexpr double kProbed = 1.0;   // mm: of squares of this side one cell is
+constexpr int kProbes = 32;       // places around it
 constexpr double kBridge = 3.0;   // mm between two useful stretches that are travelled along the surface
 
 // The greatest number under a height: what stands over it is as high or higher.
@@ -132,6 +136,8 @@ public:
         while (last >= first && rows_[static_cast<std::size_t>(last)].empty()) --last;
         return {first, last};
     }
+    /// The marked cells of a row, first and last of each run.
+    [[nodiscard]] std::span<const std::array<int, 2>> row(int j) const { return rows_[static_cast<std::size_t>(j)]; }
     [[nodiscard]] Spans around(double y, double radius, double x_low, double x_high) const {
         const CellGrid& grid = stock_.grid();
         const int j0 = std::max(0, static_cast<int>(std::ceil((y - radius - grid.y0) / grid.cell)));
@@ -227,6 +233,7 @@ public:
             LayerStock::Trial places(stock_);  // the stock stands as before when its lines are known
             lay_lines();
             settle();
+            if (!ball_) probe();
             places.undo();
         }
         std::vector<std::vector<PathPoint>> runs;
@@ -487,6 +494,48 @@ private:
         std::vector<Line> all;
         for (std::size_t rank = 0; rank < by_y.size(); ++rank)
             for (Line& line : found[by_y[rank]]) all.push_back(std::move(line));
+        keep_what_lowers(all);
+        for (Line& line : all) lines_.push_back(std::move(line));
+    }
+
+    // A slot so narrow that the raster's places on both sides of it stand on its walls' tops, which are level, shows nowhere. Where much is left, a flat
+    // end mill is held with its rim over it, all around, and slides down from where it is lowest.
+    void probe() {
+        const auto [first, last] = targets_.rows();
+        if (first > last) return;
+        const CellGrid& grid = stock_.grid();
+        const int side = std::max(1, static_cast<int>(kProbed / grid.cell));  // cells of a square, of which one is probed
+        const double beside = r_ - 0.7 * grid.cell, x_low = cut_.low(0, r_), x_high = cut_.high(0, r_), y_low = cut_.low(1, r_),
+                     y_high = cut_.high(1, r_);
+        std::vector<std::vector<Line>> found(static_cast<std::size_t>((last - first) / side + 1));
+        parallel_each(cut_.context, found.size(), [&](std::size_t b) {
+            cut_.context.throw_if_cancelled();
+            std::vector<std::array<int, 2>> cells;  // one of each square
+            std::vector<char> taken(static_cast<std::size_t>(grid.nx / side + 1), 0);
+            for (int j = first + static_cast<int>(b) * side; j < std::min(last + 1, first + (static_cast<int>(b) + 1) * side); ++j)
+                for (const auto& [begin, end] : targets_.row(j))
+                    for (int i = begin; i <= end; ++i) {
+                        char& square = taken[static_cast<std::size_t>(i / side)];
+                        if (square == 0 && static_cast<double>(stock_.left(grid.index(i, j))) > double{kMuch}) square = 1, cells.push_back({i, j});
+                    }
+            MetPoints met;
+            for (const auto& [i, j] : cells) {
+                Place lowest;
+                lowest.tip = std::numeric_limits<double>::infinity();
+                for (int k = 0; k < kProbes; ++k) {
+                    const double turn = 2 * std::numbers::pi * k / kProbes, x = grid.x(i) + beside * std::cos(turn),
+                                 y = grid.y(j) + beside * std::sin(turn);
+                    if (x < x_low || x > x_high || y < y_low || y > y_high) continue;
+                    const Place p = place(to_units(x), to_units(y), met);
+                    if (p.reachable && p.tip < lowest.tip) lowest = p;
+                }
+                if (std::isinf(lowest.tip)) continue;
+                if (const Place low = lowest.useful ? lowest : slide(lowest); low.useful) found[b].push_back({low.y, {low}});
+            }
+        });
+        std::vector<Line> all;
+        for (std::vector<Line>& lines : found)
+            for (Line& line : lines) all.push_back(std::move(line));
         keep_what_lowers(all);
         for (Line& line : all) lines_.push_back(std::move(line));
     }
