@@ -233,7 +233,7 @@ public:
             LayerStock::Trial places(stock_);  // the stock stands as before when its lines are known
             lay_lines();
             settle();
-            if (!ball_) probe();
+            if (!ball_ && !(pass_.allowance > 0)) probe();  // the pass after one that keeps off the walls is the one for narrow slots
             places.undo();
         }
         std::vector<std::vector<PathPoint>> runs;
@@ -501,10 +501,12 @@ private:
     // A slot so narrow that the raster's places on both sides of it stand on its walls' tops, which are level, shows nowhere. Where much is left, a flat
     // end mill is held with its rim over it, all around, and slides down from where it is lowest.
     void probe() {
-        const auto [first, last] = targets_.rows();
+        const std::array<int, 2> rows = targets_.rows();
+        const int first = rows[0], last = rows[1];
         if (first > last) return;
         const CellGrid& grid = stock_.grid();
         const int side = std::max(1, static_cast<int>(kProbed / grid.cell));  // cells of a square, of which one is probed
+        const double much = std::max(double{kMuch}, pass_.limit);
         const double beside = r_ - 0.7 * grid.cell, x_low = cut_.low(0, r_), x_high = cut_.high(0, r_), y_low = cut_.low(1, r_),
                      y_high = cut_.high(1, r_);
         std::vector<std::vector<Line>> found(static_cast<std::size_t>((last - first) / side + 1));
@@ -512,11 +514,12 @@ private:
             cut_.context.throw_if_cancelled();
             std::vector<std::array<int, 2>> cells;  // one of each square
             std::vector<char> taken(static_cast<std::size_t>(grid.nx / side + 1), 0);
-            for (int j = first + static_cast<int>(b) * side; j < std::min(last + 1, first + (static_cast<int>(b) + 1) * side); ++j)
+            const int row = first + static_cast<int>(b) * side;
+            for (int j = row; j <= std::min(last, row + side - 1); ++j)
                 for (const auto& [begin, end] : targets_.row(j))
                     for (int i = begin; i <= end; ++i) {
                         char& square = taken[static_cast<std::size_t>(i / side)];
-                        if (square == 0 && static_cast<double>(stock_.left(grid.index(i, j))) > double{kMuch}) square = 1, cells.push_back({i, j});
+                        if (square == 0 && static_cast<double>(stock_.left(grid.index(i, j))) > much) square = 1, cells.push_back({i, j});
                     }
             MetPoints met;
             for (const auto& [i, j] : cells) {
