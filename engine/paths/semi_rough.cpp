@@ -19,7 +19,6 @@ namespace {
 constexpr double kStepShare = 0.45;      // of the diameter, between rings
 constexpr double kRingTolerance = 0.02;  // mm, of the ring that keeps off the finished surface by its allowance
 constexpr double kSample = 0.4;          // mm between places of a ring that are looked at
-constexpr double kSwathPitch = 0.3;      // mm: the swath's border need not be exact
 constexpr float kStands = 0.05F;         // mm over the tip: less is nothing to cut
 constexpr double kEdge = 0.05;           // mm: what only the cutter's very edge meets was cut on the ring before
 constexpr double kWorthOfBall = 0.5;     // mm that a ball must lower a cell by: its rings leave ridges
@@ -76,44 +75,58 @@ public:
           marked_(tiles_.size() * kTile, 0) {
         // What is not left over now will not be on any level.
         const CellGrid& grid = stock.grid();
-        std::vector<std::vector<std::array<int, 2>>> rows(static_cast<std::size_t>(grid.ny));
+        std::vector<std::vector<LeftOver>> rows(static_cast<std::size_t>(grid.ny));
         parallel_each(context, rows.size(), [&](std::size_t j) {
             stock.each_left(static_cast<int>(j), limit, [&, row = static_cast<int>(j)](int i) { rows[j].push_back({i, row}); });
         });
         for (const auto& row : rows) left_over_.insert(left_over_.end(), row.begin(), row.end());
     }
     [[nodiscard]] bool none() const { return left_over_.empty(); }
-    [[nodiscard]] std::uint64_t bytes() const { return marked_.size() * sizeof(marked_[0]) + 2 * left_over_.size() * sizeof(left_over_[0]); }
+    [[nodiscard]] std::uint64_t bytes() const {
+        return marked_.size() * sizeof(marked_[0]) + left_over_.size() * (sizeof(left_over_[0]) + sizeof(cells_[0]));
+    }
+
+    /// From here on cells are left alone on levels on which they lie within the swath of walls.
+    /// @param wall   a flat cutter as wide as the swath: it cannot stand there
+    /// @param lowest mm above the layer's bottom, of all levels
+    /// @param floors mm; what stands on one of them is a target all the same, for no ball makes a floor
+    void leave_walls(Context& context, const DropIndex& wall, double lowest, std::span<const double> floors) {
+        const CellGrid& grid = stock_.grid();
+        const auto on_floor = [&](std::size_t c) {
+            const double z = stock_.z_bottom() + stock_.surface(c);
+            return std::any_of(floors.begin(), floors.end(), [&](double f) { return z <= f + 1e-3 && z >= f - kSameFloor - 1e-3; });
+        };
+        constexpr std::size_t grain = 512;
+        parallel_for(context, left_over_.size(), grain, [&](std::size_t begin, std::size_t end) {
+            MetPoints met;
+            for (std::size_t k = begin; k < end; ++k) {
+                LeftOver& cell = left_over_[k];
+                if (on_floor(grid.index(cell.i, cell.j))) continue;
+                const double tip = wall.drop(grid.x(cell.i), grid.y(cell.j), stock_.z_bottom() + lowest, &met).tip_z;
+                cell.wall = static_cast<float>(tip - stock_.z_bottom());
+            }
+        });
+    }
+
+    /// Whether a level has any, as things are. @param tip, over as for mark()
+    [[nodiscard]] bool any(double tip, double over) const {
+        return std::any_of(left_over_.begin(), left_over_.end(),
+                           [&](const LeftOver& cell) { return is_target(cell, static_cast<float>(tip), over); });
+    }
 
     /// Marks the cells of a level.
-    /// @param tip    mm above the layer's bottom
-    /// @param over   mm above the layer's bottom: only what lies over a surface that is higher
-    /// @param floors mm; what stands on one of them is a target even within the swath, for no ball makes a floor
-    void mark(double tip, double over, const Loops& swath, std::span<const double> floors) {
+    /// @param tip  mm above the layer's bottom
+    /// @param over mm above the layer's bottom: only what lies over a surface that is higher
+    void mark(double tip, double over) {
         const CellGrid& grid = stock_.grid();
         for (const auto& [i, j] : cells_) marked_[row_of(i, j)] = 0, tiles_[tile(i, j)] = 0;
         for (const std::size_t t : near_tiles_) near_[t] = 0;
         cells_.clear(), near_tiles_.clear();
         tip_ = static_cast<float>(tip);
-        std::erase_if(left_over_, [&](const std::array<int, 2>& c) { return stock_.left(grid.index(c[0], c[1])) <= limit_; });
-        std::vector<std::vector<std::array<int, 2>>> covered;
-        if (!swath.empty()) covered = rows_inside(grid, swath);
-        auto within_swath = [&](int i, int j) {
-            if (covered.empty()) return false;
-            const auto& row = covered[static_cast<std::size_t>(j)];
-            const auto span = std::lower_bound(row.begin(), row.end(), i, [](const std::array<int, 2>& s, int cell) { return s[1] < cell; });
-            return span != row.end() && (*span)[0] <= i;
-        };
-        auto on_floor = [&](std::size_t c) {
-            const double z = stock_.z_bottom() + stock_.surface(c);
-            return std::any_of(floors.begin(), floors.end(), [&](double f) { return z <= f + 1e-3 && z >= f - kSameFloor - 1e-3; });
-        };
-        for (const auto& [i, j] : left_over_) {
-            const std::size_t c = grid.index(i, j);
-            if (stock_.height(c) <= tip_ + kStands || stock_.surface(c) > std::max(tip_, 0.0F) + kStands || stock_.surface(c) <= over + kStands)
-                continue;
-            if (ball_ && !lowers_enough(c, 0)) continue;
-            if (within_swath(i, j) && !on_floor(c)) continue;
+        std::erase_if(left_over_, [&](const LeftOver& c) { return stock_.left(grid.index(c.i, c.j)) <= limit_; });
+        for (const LeftOver& cell : left_over_) {
+            if (!is_target(cell, tip_, over)) continue;
+            const auto [i, j, wall] = cell;
             marked_[row_of(i, j)] |= static_cast<std::uint16_t>(1U << (i % kTile));
             if (!tiles_[tile(i, j)]) come_near(i / kTile, j / kTile);
             tiles_[tile(i, j)] = 1;
@@ -147,11 +160,11 @@ public:
                     for (std::uint32_t left = rows[j % kTile] & asked; left != 0; left &= left - 1) {
                         const int i = ti * kTile + std::countr_zero(left);
                         const std::size_t c = grid.index(i, j);
-                        if (stock_.height(c) <= tip_ + kStands || (ball_ && !lowers_enough(c, 0))) {
+                        if (stock_.height(c) <= tip_ + kStands || (ball_ && !lowers_enough(c, 0, tip_))) {
                             rows[j % kTile] &= static_cast<std::uint16_t>(~(left & -left));  // nor does any place of the level lower it
                             continue;
                         }
-                        if (ball_ && !lowers_enough(c, (grid.x(i) - x) * (grid.x(i) - x) + dy * dy)) continue;
+                        if (ball_ && !lowers_enough(c, (grid.x(i) - x) * (grid.x(i) - x) + dy * dy, tip_)) continue;
                         met_ = {i, j};
                         return true;
                     }
@@ -161,16 +174,25 @@ public:
     }
 
 private:
+    struct LeftOver {
+        int i = 0, j = 0;
+        float wall = -std::numeric_limits<float>::infinity();  // mm above the layer's bottom: on a level below, a wall is near
+    };
+    [[nodiscard]] bool is_target(const LeftOver& cell, float tip, double over) const {
+        const std::size_t c = stock_.grid().index(cell.i, cell.j);
+        return stock_.height(c) > tip + kStands && stock_.surface(c) <= std::max(tip, 0.0F) + kStands && stock_.surface(c) > over + kStands &&
+               (!ball_ || lowers_enough(c, 0, tip)) && tip >= cell.wall;
+    }
     [[nodiscard]] std::size_t tile(int i, int j) const {
         return static_cast<std::size_t>(j / kTile) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(i / kTile);
     }
     // Of a cell's tile, the row that it is in.
     [[nodiscard]] std::size_t row_of(int i, int j) const { return tile(i, j) * kTile + static_cast<std::size_t>(j % kTile); }
-    // Whether a ball at the level's height, its axis so far from a cell's middle (mm²), lowers it by what is worth it.
-    [[nodiscard]] bool lowers_enough(std::size_t c, double away2) const {
+    // Whether a ball at a level's height, its axis so far from a cell's middle (mm²), lowers it by what is worth it.
+    [[nodiscard]] bool lowers_enough(std::size_t c, double away2, float tip) const {
         const double most = stock_.height(c) - kWorthOfBall;
-        if (stock_.surface(c) >= most || tip_ >= most) return false;
-        return tip_ + radius_ - std::sqrt(std::max(0.0, radius_ * radius_ - away2)) < most;
+        if (stock_.surface(c) >= most || tip >= most) return false;
+        return tip + radius_ - std::sqrt(std::max(0.0, radius_ * radius_ - away2)) < most;
     }
     // Whether the one that was met last is met here too: places follow each other along a ring.
     [[nodiscard]] bool meets_as_before(double x, double y, double r) const {
@@ -181,7 +203,7 @@ private:
         const double dx = grid.x(i) - x, dy = grid.y(j) - y, away2 = dx * dx + dy * dy;
         if (away2 > within * within) return false;
         const std::size_t c = grid.index(i, j);
-        return stock_.height(c) > tip_ + kStands && (!ball_ || lowers_enough(c, away2));
+        return stock_.height(c) > tip_ + kStands && (!ball_ || lowers_enough(c, away2, tip_));
     }
     // A cutter whose middle is in one of the tiles around may meet what is in this one.
     void come_near(int ti, int tj) {
@@ -200,8 +222,9 @@ private:
     std::vector<char> near_;             // within reach of such
     std::vector<std::uint16_t> marked_;  // tile after tile, row after row, a bit for each cell
     std::vector<std::size_t> near_tiles_;
-    std::array<int, 2> met_{-1, 0};                      // at the last place that met one
-    std::vector<std::array<int, 2>> left_over_, cells_;  // row after row; `cells_` of the level
+    std::array<int, 2> met_{-1, 0};          // at the last place that met one
+    std::vector<LeftOver> left_over_;        // row after row
+    std::vector<std::array<int, 2>> cells_;  // the level's, row after row
 };
 
 // Millimetres from an outline's edges to the nearest of these cells' middles.
@@ -261,11 +284,13 @@ public:
         const std::vector<Level> levels = levels_of();
         std::vector<double> tips;
         for (const Level& l : levels) tips.push_back(l.tip);
-        std::vector<Loops> swath(tips.size());
-        if (pass_.swath > 0) {
-            const std::vector<Contours> walls = cut_.contours({Cutter::Profile::flat, pass_.swath}, tips, to_units(kSwathPitch));
-            for (std::size_t i = 0; i < tips.size(); ++i) swath[i] = forbidden_region(walls[i]);
-        }
+        const auto tip_over = [&](double z) { return z - stock_.z_bottom(); };
+        if (pass_.swath > 0)
+            targets.leave_walls(cut_.context, cut_.drops({Cutter::Profile::flat, pass_.swath}), tip_over(*std::min_element(tips.begin(), tips.end())),
+                                cut_.floors);
+        // What no level has now none will have.
+        std::vector<char> wanted(tips.size());
+        parallel_each(cut_.context, tips.size(), [&](std::size_t i) { wanted[i] = targets.any(tip_over(tips[i]), tip_over(levels[i].over)); });
         const bool flask = !cut_.layer.opening.empty();
         const Loops room = flask ? flask_room(cut_, r_ + pass_.allowance) : Loops{};
         const Loops beyond = flask ? beyond_room(cut_, r_ + pass_.allowance, room) : Loops{};
@@ -281,14 +306,15 @@ public:
         double above = cut_.layer.z_top;
         for (std::size_t i = 0; i < tips.size(); ++i) {
             cut_.context.throw_if_cancelled();
-            targets.mark(tips[i] - stock_.z_bottom(), levels[i].over - stock_.z_bottom(), swath[i], cut_.floors);
             const double depth = above - tips[i];
             above = tips[i];
+            if (!wanted[i]) continue;
+            targets.mark(tip_over(tips[i]), tip_over(levels[i].over));
             if (targets.cells().empty()) continue;
             const bool floor = on_floor(tips[i]);
             const double allowance = allowances[i];
             const FibreGrid grid = grid_of(allowance);
-            if (!borders[i]) borders_from(i, tips, allowances, grid, borders);
+            if (!borders[i]) borders_from(i, tips, allowances, wanted, grid, borders);
             Loops border = forbidden_region(*borders[i]);
             borders[i].reset();
             if (flask) border = unite(border, beyond);
@@ -338,16 +364,15 @@ private:
         return fibre_grid(cut_.solid, wider_by(allowance), safe_pitch(r_, allowance > 0 ? std::max(gouge, 0.2 * allowance) : gouge));
     }
 
-    // What the wider cutter must not enter, on this level and those of the same allowance that follow: each is found from the one above. Nearly all
-    // that follow a level with something to cut have something too.
-    void borders_from(std::size_t first, std::span<const double> tips, std::span<const double> allowances, const FibreGrid& grid,
-                      std::vector<std::optional<Contours>>& borders) const {
+    // What the wider cutter must not enter, on this level and those of the same allowance that follow and are wanted: each is found from the one above.
+    void borders_from(std::size_t first, std::span<const double> tips, std::span<const double> allowances, std::span<const char> wanted,
+                      const FibreGrid& grid, std::vector<std::optional<Contours>>& borders) const {
         const double allowance = allowances[first];
         const Cutter cutter = wider_by(allowance);
         std::vector<std::size_t> which;
         std::vector<double> at;  // of the wider cutter's tip
         for (std::size_t i = first; i < tips.size(); ++i) {
-            if (allowances[i] != allowance || borders[i]) continue;
+            if (allowances[i] != allowance || borders[i] || !wanted[i]) continue;
             which.push_back(i);
             at.push_back(ball_ ? tips[i] - allowance : tips[i]);
         }
