@@ -46,7 +46,8 @@ Operation finish_floors(const LayerCut& cut) {
         // Once along the border of the free region, where the zigzag's ends leave scallops.
         const std::int32_t pitch = safe_pitch(r, cut.job.tolerances.gouge), z = to_units(heights[i]);
         const FibreGrid grid = fibre_grid(cut.solid, cutter, pitch);
-        const Contours border = level_contours(cut.context, cut.solid, inside[i].loops, cutter, heights[i], grid);
+        const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(pitch)));
+        const Contours border = std::move(contours_near(cut.context, around, {&heights[i], 1}, {&inside[i], 1}, cutter, grid).front());
         const NearFloor near_floor(cut, facets, r, grid);
         std::vector<std::vector<PathPoint>> runs;
         for (std::size_t c = 0; c < border.size(); ++c) {
