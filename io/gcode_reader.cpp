@@ -324,8 +324,15 @@ private:
             if (full) sweep = turn;
         }
         // A chord of angle φ misses the arc by r(1 − cos(φ/2)) = 2r·sin²(φ/4), which stays exact where the cosine is near one.
-        const double r = std::max(r0, r1), widest = 4 * std::asin(std::sqrt(std::min(1.0, limits_.arc_error / (2 * r))));
-        const int chords = std::max(1, static_cast<int>(std::min(1e7, std::ceil(std::abs(sweep) / widest))));
+        const double r = std::max(r0, r1);
+        const auto chords_within = [&](double error) {
+            const double widest = std::min(turn / 4, 4 * std::asin(std::sqrt(std::min(1.0, error / (2 * r)))));
+            return std::max(1, static_cast<int>(std::min(1e7, std::ceil(std::abs(sweep) / widest))));
+        };
+        const auto error_of = [&](int chords) { return 2 * r * std::pow(std::sin(std::abs(sweep) / chords / 4), 2); };
+        const bool level = c == 2 && at_[2] == to[2] && std::abs(r0 - r1) <= 2 * limits_.arc_error;
+        const int close = chords_within(limits_.arc_error),
+                  chords = level && limits_.level_arc_error > 0 ? std::min(close, chords_within(limits_.level_arc_error)) : close;
         const std::array<double, 3> from = at_;
         const std::size_t begin = program_.steps.size();
         for (int i = 1; i < chords; ++i) {
@@ -337,10 +344,11 @@ private:
             step(p, feed_);
         }
         step(to, feed_);
-        const double turned = std::abs(sweep) / chords;
-        program_.arc_error = std::max(program_.arc_error, 2 * r * std::pow(std::sin(turned / 4), 2));
-        if (c == 2 && from[2] == to[2] && std::abs(r0 - r1) <= 2 * limits_.arc_error)
-            program_.arcs.push_back({begin, program_.steps.size(), {ca, cb, to[2], (r0 + r1) / 2, start, sweep}});
+        // Whoever takes a level arc itself takes it with one radius.
+        program_.chord_error = std::max(program_.chord_error, error_of(chords));
+        program_.arc_error = std::max(program_.arc_error, error_of(close) + (level ? std::abs(r0 - r1) / 2 : 0));
+        if (level)
+            program_.arcs.push_back({begin, program_.steps.size(), {ca, cb, to[2], (r0 + r1) / 2, start, sweep}, static_cast<std::size_t>(close)});
     }
 
     /// Arcs have many chords: as many are foreseen in what is left of the text as have come of what was read.

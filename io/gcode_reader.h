@@ -11,6 +11,7 @@ namespace slabwright {
 
 struct GcodeLimits {
     double arc_error = 1e-4;          ///< mm: chords that stand for an arc lie this near to it
+    double level_arc_error = 0;       ///< mm: those of arcs that Program::arcs holds need be no nearer than this; 0: than arc_error
     double arc_radius_error = 0.005;  ///< mm: the two radii of an arc may differ by this
 };
 

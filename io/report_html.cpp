@@ -333,6 +333,7 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
             figures.drawn.paths[begin + i] = path_of(of_layer[i], input.machine.rapid_feed, kPathTolerance);
         });
         for (std::size_t i = 0; i < of_layer.size(); ++i) {
+            figures.drawn.error = std::max(figures.drawn.error, kPathTolerance + of_layer[i].chord_error);
             const ReplayedProgram found = replay.run(of_layer[i]);
             Json depth = Json::array(), width = Json::array(), force = Json::array(), deflection = Json::array();
             for (const ReplayPiece& piece : found.pieces) {

@@ -23,7 +23,8 @@ using nlohmann::json;
 
 namespace {
 
-constexpr double kArcShare = 0.05;  // of the gouge tolerance, by which an arc may miss its chords
+constexpr double kArcShare = 0.05;       // of the gouge tolerance, by which an arc may miss its chords
+constexpr double kLevelArcError = 0.01;  // mm: what must be nearer to a level arc takes the arc itself
 
 std::string read_text(const fs::path& path, const std::string& code) {
     std::ifstream file(path, std::ios::binary);
@@ -372,6 +373,7 @@ GcodeLimits gcode_limits(const Tolerances& tolerances) {
     GcodeLimits limits;
     // Beside kSheet, by which depths may be short, half of that does no harm; twice as near would need 1.4 times the chords.
     limits.arc_error = std::clamp(kArcShare * tolerances.gouge, 1e-5, StandingPart::kSheet / 2);
+    limits.level_arc_error = kLevelArcError;
     return limits;
 }
 

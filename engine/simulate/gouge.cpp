@@ -10,6 +10,8 @@ namespace slabwright {
 
 namespace {
 
+constexpr std::size_t kTogether = 1024;  // steps
+
 GougeReport join(GougeReport a, const GougeReport& b) {
     auto deeper = [](GougePlace& x, const GougePlace& y) {
         if (y.depth > x.depth) x = y;  // of equals the first, in the order of the program
@@ -33,7 +35,7 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
     const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
     std::atomic<double> deepest = 0;  // of the whole program, so far
     return parallel_reduce(
-        context, n - 1, 2048, GougeReport{},
+        context, n - 1, kTogether, GougeReport{},
         [&](std::size_t begin, std::size_t end) {
             GougeReport r;
             std::vector<StandingPart::Motion> motions;
@@ -44,18 +46,32 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
             for (std::size_t i = begin; i < end; ++i) {
                 const ProgramStep &from = program.steps[i], &to = program.steps[i + 1];
                 if (!from.known() || !to.known()) continue;
-                const Point3 a{from.x, from.y, from.z}, b{to.x, to.y, to.z};
-                ++r.motions;
-                r.length_mm += std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
-                if (std::min(a[2], b[2]) >= z_top) continue;
                 for (; arc != program.arcs.end() && arc->end <= i + 1; ++arc) in_arc = false;
-                if (arc != program.arcs.end() && arc->begin <= i + 1) {
-                    if (!in_arc) chords.push_back({motions.size(), motions.size(), arc->arc.x, arc->arc.y, arc->arc.radius});
-                    chords.back().last = motions.size() + 1;
-                    in_arc = true;
+                // Of an arc the close chords that begin on this step's share of it.
+                const bool of_arc = arc != program.arcs.end() && arc->begin <= i + 1;
+                const std::size_t steps = of_arc ? arc->end - arc->begin : 1, close = of_arc ? arc->close_chords() : 1,
+                                  step = of_arc ? i + 1 - arc->begin : 0, first = step * close / steps, last = (step + 1) * close / steps;
+                const auto end_of = [&](std::size_t k) -> Point3 {
+                    if (k == close) return {to.x, to.y, to.z};
+                    const auto [x, y] = arc->at(static_cast<double>(k) / static_cast<double>(close));
+                    return {x, y, to.z};
+                };
+                Point3 a = first == 0 ? Point3{from.x, from.y, from.z} : end_of(first);
+                for (std::size_t k = first; k < last; ++k) {
+                    const Point3 b = end_of(k + 1);
+                    ++r.motions;
+                    r.length_mm += std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
+                    if (std::min(a[2], b[2]) < z_top) {
+                        if (of_arc) {
+                            if (!in_arc) chords.push_back({motions.size(), motions.size(), arc->arc.x, arc->arc.y, arc->arc.radius});
+                            chords.back().last = motions.size() + 1;
+                            in_arc = true;
+                        }
+                        motions.push_back({a, b});
+                        lines.push_back(to.line);
+                    }
+                    a = b;
                 }
-                motions.push_back({a, b});
-                lines.push_back(to.line);
             }
             auto check = [&](StandingPart::Form form, double thick, GougePlace& place, std::atomic<double>* known) {
                 StandingPart::Found found = part.deepest(form, z_top, motions, thick, options.ignore, options.tolerance, known, chords);

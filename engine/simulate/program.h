@@ -1,6 +1,8 @@
 // A program as the machine would run it: straight motions of the tool's tip, in the order of their lines, and which of them are arcs.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -27,10 +29,18 @@ struct ProgramStep {
 };
 
 /// Steps [begin, end) are chords of a level arc, which starts where step begin − 1 ended: their ends lie on it, and no point
-/// of it is farther from them than GcodeLimits::arc_error. What can, takes the arc itself.
+/// of it is farther from them than Program::chord_error. What can, takes the arc itself, or as many chords as it wants of it.
 struct ProgramArc {
     std::size_t begin = 0, end = 0;
     LevelArc arc;
+    std::size_t close = 0;  ///< even chords that lie within GcodeLimits::arc_error of it; fewer than its steps: those do
+
+    [[nodiscard]] std::size_t close_chords() const { return std::max(close, end - begin); }
+    /// Where it is after a share of its way.
+    [[nodiscard]] std::array<double, 2> at(double share) const {
+        const double angle = arc.start + arc.turn * share;
+        return {arc.x + arc.radius * std::cos(angle), arc.y + arc.radius * std::sin(angle)};
+    }
 };
 
 /// One program and what it says of itself.
@@ -47,7 +57,15 @@ struct Program {
     double strays = kJunction;    ///< mm by which it may leave the path at most: P, and Q for points that it leaves out (P where no Q is given)
     std::vector<ProgramStep> steps;
     std::vector<ProgramArc> arcs;  ///< in the order of their steps
-    double arc_error = 0;          ///< mm: how far any arc is from its chords at most
+    double chord_error = 0;        ///< mm: how far any arc is from its steps at most
+    double arc_error = 0;          ///< mm: the same where close chords stand for level arcs
+
+    /// Its steps, but for close chords in place of those of arcs.
+    [[nodiscard]] std::size_t close_steps() const {
+        std::size_t count = steps.size();
+        for (const ProgramArc& a : arcs) count += a.close_chords() - (a.end - a.begin);
+        return count;
+    }
 };
 
 }  // namespace slabwright

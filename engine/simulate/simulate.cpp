@@ -26,7 +26,7 @@ constexpr double kDeeper = 0.05;          // mm by which a roughing cut may pass
 constexpr double kAbreast = 3;            // fewer cells than this side by side do not tell how wide a cut is
 constexpr double kStanding = 0.01;        // mm by which shank or holder must reach into stock to be reported
 
-constexpr double kArcError = 0.001;  // mm: more than an arc's chords may miss of it
+constexpr double kArcError = 0.001;  // mm: more than rounding may add to Program::chord_error
 
 /// The least box over some motions, widened by nothing yet.
 struct StepBox {
@@ -35,6 +35,16 @@ struct StepBox {
         x0 = std::min(x0, s.x), x1 = std::max(x1, s.x);
         y0 = std::min(y0, s.y), y1 = std::max(y1, s.y);
         z0 = std::min(z0, s.z), z1 = std::max(z1, s.z);
+    }
+    /// A level arc goes farthest where it crosses the axes through its centre.
+    void add(const ProgramArc& a) {
+        constexpr double quarter = std::numbers::pi / 2;
+        const double low = std::min(a.arc.start, a.arc.start + a.arc.turn), high = std::max(a.arc.start, a.arc.start + a.arc.turn);
+        for (double k = std::ceil(low / quarter); k * quarter <= high; ++k) {
+            const double x = a.arc.x + a.arc.radius * std::cos(k * quarter), y = a.arc.y + a.arc.radius * std::sin(k * quarter);
+            x0 = std::min(x0, x), x1 = std::max(x1, x);
+            y0 = std::min(y0, y), y1 = std::max(y1, y);
+        }
     }
     void add(const StepBox& b) {
         x0 = std::min(x0, b.x0), x1 = std::max(x1, b.x1);
@@ -215,7 +225,7 @@ private:
     SimulationSize size() const {
         SimulationSize size;
         for (const PreparedProgram& p : prepared_) {
-            size.steps += p.program->steps.size();
+            size.steps += p.program->close_steps();
             if (p.tool) size.swept_mm2 += p.cut_mm * p.tool->diameter;
         }
         size.stock_mm2 = static_cast<double>(nx_) * ny_ * cell_ * cell_;
@@ -314,12 +324,19 @@ private:
         f.stock_top = -1e300;
         f.seconds = program_seconds(program, input_.machine);
         StepBox box;
+        for (const ProgramArc& a : program.arcs) {
+            box.add(a);
+            f.cutting_mm += a.arc.length();
+        }
+        auto arc = program.arcs.begin();
         for (std::size_t k = 0; k < program.steps.size(); ++k) {
             const ProgramStep& s = program.steps[k];
             if (s.known()) box.add(s);
             if (std::isfinite(s.z)) box.z1 = std::max(box.z1, s.z), box.z0 = std::min(box.z0, s.z);
             if (!s.rapid() && !s.spindle && f.spindle_off_line == 0) f.spindle_off_line = s.line;
             if (k == 0 || !program.steps[k - 1].known() || !s.known()) continue;
+            while (arc != program.arcs.end() && arc->end <= k) ++arc;
+            if (arc != program.arcs.end() && arc->begin <= k) continue;
             const ProgramStep& b = program.steps[k - 1];
             (s.rapid() ? f.rapid_mm : f.cutting_mm) += std::sqrt((s.x - b.x) * (s.x - b.x) + (s.y - b.y) * (s.y - b.y) + (s.z - b.z) * (s.z - b.z));
         }
@@ -454,8 +471,9 @@ private:
         const double shallow = std::min(deep, tool.flute_length > 0 ? tool.flute_length + kStanding : 1e300) - kTaken;
         const bool thick_shank = shank > radius && tool.flute_length > 0, thick_nose = nose > radius && tool.stickout > 0;
         // Shank and holder are wider, but mostly stay above all that stands.
+        const double aside = radius + p.program->chord_error + kArcError;  // what an arc covers goes no farther beyond its chords
         const auto meets = [&](const StepBox& box) {
-            double margin = radius + kArcError;
+            double margin = aside;
             if (thick_shank && box.z0 + tool.flute_length < top) margin = std::max(margin, shank);
             if (thick_nose && box.z0 + tool.stickout < top) margin = std::max(margin, nose);
             return box.meets(grid, margin, top);
@@ -509,7 +527,7 @@ private:
                                                arcs.begin());
             const bool in_arc = arc < arcs.size() && arcs[arc].begin <= i, cut_before = in_arc && arc < cut_arcs;
             const bool follows = (thick_shank && low + tool.flute_length < top) || (thick_nose && low + tool.stickout < top);
-            const bool near = box.meets(grid, radius + kArcError, top) && !cut_before;
+            const bool near = box.meets(grid, aside, top) && !cut_before;
             if (!near && !follows) return;
             // A straight feed motion shares its ends with those beside it; what a rapid takes is all told of the rapid.
             const auto chained = [&](std::size_t k) {  // whether motion k, next to this one, is a straight feed motion too
@@ -526,7 +544,6 @@ private:
                 return;
             }
             // Nothing to take, as most of the ways between cuts; what is still to be cut only adds to that.
-            const double aside = radius + kArcError;
             if (!in_arc && !follows && stock.clear(box.x0 - aside, box.x1 + aside, box.y0 - aside, box.y1 + aside, low)) return;
             cut_level();
             if (near) {

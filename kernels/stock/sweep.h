@@ -39,6 +39,8 @@ struct CutterEnd {
 struct LevelArc {
     double x = 0, y = 0, z = 0, radius = 0;
     double start = 0, turn = 0;
+
+    [[nodiscard]] double length() const { return radius * std::abs(turn); }
 };
 
 /// Heights of a ball's tip side over n centres in a row: h[k] = a + b·k − c·√(r² − (q + k·dq)²), mm. @pre (q + k·dq)² ≤ r²
