@@ -14,7 +14,7 @@ namespace {
 
 const std::string kHead = "(a comment)\nG21 G17 G90 G94 G40 G49 G80\nG54\nT3 M6\nG43 H3\nS18000 M3\nG4 P3\n";
 
-Program read(const std::string& body) { return read_gcode(kHead + body + "M5\nM2\n", "nc/test.ngc"); }
+Program read(const std::string& body, const GcodeLimits& limits = {}) { return read_gcode(kHead + body + "M5\nM2\n", "nc/test.ngc", limits); }
 
 /// The error's code and place.
 std::string refusal(const std::string& text) {
@@ -125,7 +125,24 @@ TEST(GcodeReader, ArcsStayWithinTheirTolerance) {
         EXPECT_NEAR(a.arc.y, c.cy, 1e-9);
         EXPECT_NEAR(a.arc.radius, c.r, 1e-9);
         EXPECT_NEAR(a.arc.turn, c.sweep, 1e-9);
+        EXPECT_EQ(p.chord_error, p.arc_error);
+        EXPECT_EQ(p.close_steps(), p.steps.size());
+        // Few chords of it will do where the arc itself is at hand; as many as before are still known.
+        const Program few = read("G0 X10 Y0 Z0\nF1000\n" + c.text, {.level_arc_error = 0.01});
+        ASSERT_EQ(few.arcs.size(), 1u);
+        EXPECT_LT(few.steps.size(), p.steps.size() / 5);
+        EXPECT_GT(few.chord_error, 0.005);
+        EXPECT_LE(few.chord_error, 0.01);
+        EXPECT_EQ(few.arc_error, p.arc_error);
+        EXPECT_EQ(few.close_steps(), p.steps.size());
+        for (std::size_t k = 0; k < p.steps.size(); ++k) {
+            const auto [x, y] = few.arcs[0].at(static_cast<double>(k) / static_cast<double>(p.steps.size() - 1));
+            EXPECT_NEAR(x, p.steps[k].x, 1e-9);
+            EXPECT_NEAR(y, p.steps[k].y, 1e-9);
+        }
     }
+    const Program helix = read("G0 X10 Y0 Z0\nF1000\nG2 X10 Y0 I-10 Z-3\n", {.level_arc_error = 0.01});
+    EXPECT_LE(helix.chord_error, 1e-4) << "nobody takes a helix itself";
     // Other planes: XZ is G18 with I and K, YZ is G19 with J and K; seen from +y, G3 turns from z towards x.
     const Program xz = read("G0 X10 Y0 Z0\nF100\nG18 G3 X0 Z-10 I-10 K0\n");
     for (const ProgramStep& s : xz.steps) EXPECT_NEAR(std::hypot(s.x, s.z), 10, 1e-9);

@@ -494,6 +494,39 @@ TEST(Simulate, ArcsCutWhatTheirChordsCut) {
     EXPECT_NEAR(arcs.layers[0].left_rms, chords.layers[0].left_rms, 0.002);
     EXPECT_EQ(arcs.gouge_max, chords.gouge_max);
     EXPECT_EQ(codes(arcs), codes(chords));
+    // Read with few chords an arc it is found to do all the same, for nobody goes by them.
+    Program few = read_gcode(text, "arcs", {.level_arc_error = 0.01});
+    EXPECT_LT(few.steps.size(), p.steps.size() / 5);
+    few.file = p.file, few.planned_tool = p.planned_tool, few.kind = p.kind;
+    block.rough() = few;
+    const SimulationReport read_few = block.run(1);
+    EXPECT_NEAR(read_few.gouge_max, arcs.gouge_max, 1e-7);
+    EXPECT_EQ(read_few.programs[1].gouge.motions, arcs.programs[1].gouge.motions);
+    EXPECT_EQ(read_few.programs[1].removed_mm3, arcs.programs[1].removed_mm3);
+    EXPECT_EQ(read_few.programs[1].seconds, arcs.programs[1].seconds);
+    EXPECT_EQ(read_few.programs[1].cutting_mm, arcs.programs[1].cutting_mm);
+    EXPECT_NEAR(arcs.programs[1].cutting_mm, chords.programs[1].cutting_mm, 0.01);
+    EXPECT_NEAR(arcs.programs[1].seconds, chords.programs[1].seconds, 0.02 * chords.programs[1].seconds);
+    EXPECT_EQ(codes(read_few), codes(arcs));
+}
+
+// An arc is seen to leave the machine's travel though both its ends lie within it, and by how much.
+TEST(Simulate, ArcsBulgeBeyondTheTravel) {
+    Block block;
+    Program p = read_gcode("T3 M6\nG21 G17 G90\nS12000 M3\nG0 X-200 Y-150 Z25\nF3000\nG3 X-200 Y-350 I100 J-100\nG0 X0\nM5\nM2\n", "arcs",
+                           {.level_arc_error = 50});
+    ASSERT_EQ(p.arcs.size(), 1u);
+    ASSERT_EQ(p.arcs[0].end - p.arcs[0].begin, 1u) << "its steps do not show where it bulges";
+    p.file = "L1_02", p.planned_tool = 3, p.kind = OperationKind::finish;
+    block.rough() = p;
+    const double span = 100 + 100 * std::sqrt(2.0);
+    block.input.machine.travel_x = span + 0.01, block.input.machine.travel_y = 1000;
+    EXPECT_EQ(find(block.run(), "travel.exceeded"), nullptr);
+    block.input.machine.travel_x = span - 0.01;
+    const SimulationReport report = block.run();
+    const Violation* const found = find(report, "travel.exceeded");
+    ASSERT_NE(found, nullptr);
+    EXPECT_NEAR(found->size, 0.01, 1e-9);
 }
 
 TEST(Simulate, FlaskMustStay) {
