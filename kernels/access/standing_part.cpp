@@ -308,14 +308,14 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
         return grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)) >> drop << facet_bits | i;
     };
     auto part_of = [](std::uint64_t key) { return static_cast<std::size_t>(key >> (64 - part_bits)); };
-    RawArray<std::uint64_t> keys(n);
+    RawArray<std::uint64_t> keys(n), in_order(n);  // sorted, and as the facets come
     deal(
         context, n, std::max<std::size_t>(1 << 14, (n + 63) / 64), std::size_t{1} << part_bits,
         [&](std::size_t begin, std::size_t end, auto&& take) {
-            for (std::size_t i = begin; i < end; ++i) take(part_of(key_of(i)));
+            for (std::size_t i = begin; i < end; ++i) take(part_of(in_order[i] = key_of(i)));
         },
         [&](std::size_t begin, std::size_t end, auto&& take) {
-            for (std::size_t i = begin; i < end; ++i) take(part_of(key_of(i)), key_of(i));
+            for (std::size_t i = begin; i < end; ++i) take(part_of(in_order[i]), in_order[i]);
         },
         [&](std::uint64_t, std::uint64_t) { return std::pair(keys.data(), std::uint64_t{n}); },
         [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
@@ -323,6 +323,7 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
                 for (std::size_t i = begin; i < end; ++i) std::sort(keys.data() + starts[i], keys.data() + starts[i + 1]);
             });
         });
+    in_order = {};
     const std::uint64_t facet_mask = (std::uint64_t{1} << facet_bits) - 1;
     facets_.resize(n);
     parallel_for(context, n, 1 << 14, [&](std::size_t begin, std::size_t end) {
