@@ -112,7 +112,7 @@ private:
     /// three cells.
     /// @param aim facets that the grid aims at
     void cluster(MeshView mesh, std::size_t aim) {
-        charge_.emplace(context_, 4 * mesh.vertices.size() + 100 * aim, kWhat);
+        charge_.emplace(context_, 12 * mesh.vertices.size() + 100 * aim, kWhat);
         const auto corners = [&](std::size_t f) {
             const Index3& v = mesh.facets[f];
             return std::array<Vector, 3>{vector_of(mesh.vertices[v[0]]), vector_of(mesh.vertices[v[1]]), vector_of(mesh.vertices[v[2]])};
@@ -148,6 +148,7 @@ private:
         };
         const std::size_t n = mesh.vertices.size(), parts = std::size_t{1} << kPartBits;
         RawArray<std::uint32_t> to(n);
+        RawArray<std::uint64_t> cells(n);
         std::vector<std::vector<Vector>> means(parts);
         {
             std::optional<MemoryCharge> charge;
@@ -155,11 +156,11 @@ private:
             deal(
                 context_, n, std::max(kGrain, n / 64 + 1), parts,
                 [&](std::size_t begin, std::size_t end, auto&& take) {
-                    for (std::size_t i = begin; i < end; ++i) take(part_of(cell_of(mesh.vertices[i])));
+                    for (std::size_t i = begin; i < end; ++i) take(part_of(cells[i] = cell_of(mesh.vertices[i])));
                 },
                 [&](std::size_t begin, std::size_t end, auto&& take) {
                     for (std::size_t i = begin; i < end; ++i) {
-                        const std::uint64_t key = cell_of(mesh.vertices[i]);
+                        const std::uint64_t key = cells[i];
                         take(part_of(key), Item{key, static_cast<std::uint32_t>(i)});
                     }
                 },
@@ -211,7 +212,7 @@ private:
             std::vector<Vector>().swap(means[p]);
         }
         parallel_for(context_, n, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) to[i] += before[part_of(cell_of(mesh.vertices[i]))];
+            for (std::size_t i = begin; i < end; ++i) to[i] += before[part_of(cells[i])];
         });
 
         std::vector<std::vector<std::uint32_t>> staying((mesh.facets.size() + kGrain - 1) / kGrain);
