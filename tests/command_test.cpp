@@ -95,6 +95,15 @@ constexpr double kCancelSeconds = 0.5;
 
 }  // namespace
 
+#ifdef SLABWRIGHT_JEMALLOC
+TEST(Command, TakesItsMemoryAsToolsAllocatorSays) {
+    const CommandResult told = slabwright_command({"--version"}, {{"MALLOC_CONF", "stats_print:true"}});
+    ASSERT_EQ(told.exit, 0) << told.err;
+    for (const char* setting : {"opt.thp: \"always\"", "opt.oversize_threshold: 0", "opt.dirty_decay_ms: 3000"})
+        EXPECT_NE(told.err.find(setting), std::string::npos) << setting << " is not in " << told.err.substr(0, 2000);
+}
+#endif
+
 TEST(Command, HelpAndVersionSucceed) {
     for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{{"--help"}, {"plan", "--help"}, {"--version"}}) {
         const CommandResult result = slabwright_command(arguments);

@@ -4,10 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cinttypes>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <map>
+#include <optional>
 #include <random>
 #include <set>
 #include <string>
@@ -250,6 +255,38 @@ TEST(MeshWeld, MemoryThatIsKeptIsUsedAgain) {
     std::thread([&] { release_bulk(pieces[0].first, pieces[0].second); }).join();
     for (std::size_t i = 1; i < pieces.size(); ++i) release_bulk(pieces[i].first, pieces[i].second);
     release_bulk(outside, large);
+}
+
+// The flags of the mapping that an address lies in, as the system tells them; nothing where it tells none.
+std::string flags_of(const void* address) {
+    std::ifstream maps("/proc/self/smaps");
+    bool within = false;
+    for (std::string line; std::getline(maps, line);) {
+        std::uintptr_t begin = 0, end = 0;
+        if (std::sscanf(line.c_str(), "%" SCNxPTR "-%" SCNxPTR " ", &begin, &end) == 2)
+            within = reinterpret_cast<std::uintptr_t>(address) >= begin && reinterpret_cast<std::uintptr_t>(address) < end;
+        else if (within && line.starts_with("VmFlags:")) return line;
+    }
+    return {};
+}
+
+TEST(MeshWeld, LargeArraysAskForHugePages) {
+    if (!std::filesystem::exists("/sys/kernel/mm/transparent_hugepage/enabled")) {
+        std::printf("skipped: this system has no huge pages\n");
+        return;
+    }
+    constexpr std::size_t large = std::size_t{1} << 25;
+    for (const bool keeping : {false, true}) {
+        std::optional<KeptMemory> kept;
+        if (keeping) kept.emplace();
+        char* const data = static_cast<char*>(take_bulk(large));
+        std::fill_n(data, large, 'a');
+        EXPECT_NE(flags_of(data).find(" hg"), std::string::npos) << flags_of(data);
+        EXPECT_NE(flags_of(data + large / 2).find(" hg"), std::string::npos);
+        release_bulk(data, large);
+    }
+    char on_the_stack = 0;
+    EXPECT_EQ(flags_of(&on_the_stack).find(" hg"), std::string::npos);
 }
 
 TEST(MeshWeld, RecordsAreScaledLoweredAndNotAligned) {
