@@ -102,6 +102,22 @@ TEST(Command, TakesItsMemoryAsToolsAllocatorSays) {
     for (const char* setting : {"opt.thp: \"always\"", "opt.oversize_threshold: 0", "opt.dirty_decay_ms: 3000"})
         EXPECT_NE(told.err.find(setting), std::string::npos) << setting << " is not in " << told.err.substr(0, 2000);
 }
+
+// What is given back is kept while there is plenty, and no more than the promise of --memory allows where there is not.
+TEST(Command, KeepsMemoryWithinWhatMayBeUsed) {
+    const TemporaryFolder folder;
+    const std::string stl = folder / "metre.stl";
+    write_metre_pattern(stl, {.size_mm = 290, .height_mm = 29, .facets = 600'000});
+    const auto peak = [&](const char* gib) {
+        const CommandResult made =
+            slabwright_command({"plan", stl, "-o", folder / "out", "--allow-undercut", "--no-verify", "--quiet", "--threads", "2", "--memory", gib});
+        EXPECT_EQ(made.exit, 0) << made.err;
+        return made.peak_bytes;
+    };
+    const std::uint64_t bounded = peak("0.2"), plenty = peak("6");
+    EXPECT_LT(static_cast<double>(bounded), 0.2 * (1 << 30) + (256 << 20));
+    EXPECT_GT(plenty, bounded + (bounded >> 3));  // 1.5 times as much here
+}
 #endif
 
 TEST(Command, HelpAndVersionSucceed) {

@@ -156,7 +156,7 @@ TEST(FibreRows, FacetsOfAGroupForbidNoMoreThanIsSaid) {
         alignas(64) std::array<std::int64_t, kLinesTogether> state{};
         for (std::int64_t& s : state) s = random() % 8 == 0 ? 0 : kReachesOut;
         const std::vector<FacetGroup> groups = facet_groups(context, facets);
-        const std::vector<GroupCorners> corners = group_corners(context, facets, groups);
+        const BulkVector<GroupCorners> corners = group_corners(context, facets, groups);
         group_out_rows(corners.front(), groups.front(), u, r, zc, cover, v.data(), 3, 61, state.data(), *rows);
         for (std::size_t k = facets.size(); k < FacetGroup::kFacets; ++k) ASSERT_GE(rows->first[k], rows->last[k]);
         for (std::size_t k = 0; k < facets.size(); ++k) {
@@ -247,7 +247,7 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
             for (std::size_t c = 0; c < 3; ++c) place[c] = f.p[edge][c] + a * (f.p[next][c] - f.p[edge][c]);
         }
         const std::vector<FacetGroup> groups = facet_groups(context, facets, normals);
-        const std::vector<GroupCorners> corners = group_corners(context, facets, groups, normals);
+        const BulkVector<GroupCorners> corners = group_corners(context, facets, groups, normals);
         for (std::size_t c = 0; c < 3; ++c) {
             ASSERT_LE(groups.front().facing.low[c], d[c]) << "round " << round << " part " << part;
             ASSERT_GE(groups.front().facing.high[c], d[c]) << "round " << round << " part " << part;

@@ -20,6 +20,7 @@
 #include "io/output_folder.h"
 #include "io/plan_json.h"
 #include "io/slabwright.h"
+#include "tools/allocator.h"
 
 namespace {
 
@@ -214,6 +215,9 @@ void with_context(const Options& options, Body&& body) {
     settings.memory_bytes = static_cast<std::uint64_t>(options.memory_gib * (1u << 30));
     if (!options.quiet && !options.json && isatty(STDERR_FILENO) != 0) settings.progress = [&](const Progress& progress) { bar.show(progress); };
     Context context(std::move(settings));
+#ifdef SLABWRIGHT_JEMALLOC
+    const KeptWithin kept(context.memory_limit() / 2);
+#endif
     running = &context;
     std::signal(SIGINT, on_signal);
     std::signal(SIGTERM, on_signal);

@@ -143,7 +143,7 @@ FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const
     // The facets along the curve; those that are larger than a mesh as fine as the mean has them apart, so that they do not widen the others' nodes.
     const double mean = std::sqrt(std::max(width * depth, 1e-12) / static_cast<double>(n));
     const double to_curve = ((1 << 15) - 1) / std::max({width, depth, 1e-9});
-    std::vector<std::uint64_t> keys(n);
+    BulkVector<std::uint64_t> keys(n);
     parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const auto [xl, xh] = extent(facets[i], 0);

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "kernels/mesh/bulk_memory.h"
 #include "kernels/parallel/context.h"
 
 namespace slabwright {
@@ -27,9 +28,9 @@ struct FacetTree {
     };
     /// Facets of about one size: those that are much larger than the others would widen the others' nodes, and be looked at first.
     struct Tier {
-        std::vector<Node> nodes;            ///< the leaves first, then level on level; child k of a level's node i is node 8·i + k of the one below
+        BulkVector<Node> nodes;             ///< the leaves first, then level on level; child k of a level's node i is node 8·i + k of the one below
         std::vector<std::uint32_t> starts;  ///< of each level in `nodes`, and their end
-        std::vector<std::uint32_t> facets;  ///< in the order of the leaves
+        BulkVector<std::uint32_t> facets;   ///< in the order of the leaves
     };
     std::vector<Tier> tiers;          ///< the smallest facets first; each has some
     double x0 = 0, y0 = 0, unit = 1;  ///< mm

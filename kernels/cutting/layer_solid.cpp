@@ -231,15 +231,16 @@ Seen seen_from_above(const Vec3d& n, std::array<double, 2>& direction) {
 }
 
 // For the facets. What the solid has no part of is left out: it is far below, or cut off.
-std::vector<Turns> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets, double cut_off) {
+BulkVector<Turns> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets, double cut_off) {
     constexpr std::size_t grain = 4096;
-    std::vector<Vec3d> normals(facets.size());
-    std::vector<Turns> turns(facets.size());
+    BulkVector<Vec3d> normals(facets.size());
+    BulkVector<Turns> turns(facets.size());
     parallel_for(context, facets.size(), grain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const Index3& v = mesh.facets[facets[i]];
             const Index3& across = mesh.neighbours[facets[i]];
             normals[i] = normal_of(mesh, facets[i]);
+            turns[i] = {};
             for (int k = 0; k < 3; ++k) {
                 if (!edge_matters(mesh, facets[i], k, to_double(mesh.vertices[v[k]]), normals[i])) continue;
                 turns[i].edges |= static_cast<std::uint8_t>(1 << k);
@@ -453,10 +454,10 @@ float aside_at(const SolidFacet& facet, std::size_t corner) {
 
 }  // namespace
 
-std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups,
-                                        std::span<const FacetNormals> normals) {
+BulkVector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups,
+                                       std::span<const FacetNormals> normals) {
     constexpr float far_below = -1e15F;
-    std::vector<GroupCorners> corners(groups.size());
+    BulkVector<GroupCorners> corners(groups.size());
     parallel_for(context, groups.size(), 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t g = begin; g < end; ++g) {
             GroupCorners& to = corners[g];
@@ -487,7 +488,7 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     solid.z_top = z_top;
     const double cut_off = z_top - kTopSheet;  // the part is cut off here, facets and cap alike
     const BulkVector<std::uint32_t> facets = facets_between(context, mesh, z_low, cut_off);
-    const std::vector<Turns> turn = turns(context, mesh, facets, cut_off);
+    const BulkVector<Turns> turn = turns(context, mesh, facets, cut_off);
     std::vector<std::size_t> starts((facets.size() + kGrain - 1) / kGrain + 1, 0);
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         std::size_t count = 0;
@@ -495,18 +496,11 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
         starts[begin / kGrain + 1] = count;
     });
     for (std::size_t c = 1; c < starts.size(); ++c) starts[c] += starts[c - 1];
-    // Making room for the facets takes one thread; others meanwhile cut the cap.
-    std::vector<FacetNormals> normals;
-    parallel_each(context, 2, [&](std::size_t task) {
-        if (task == 1) {
-            solid.facets.resize(starts.back());
-            normals.resize(starts.back());
-            return;
-        }
-        const Plane top{cut_off, Side::below};
-        solid.cap = std::move(slice(context, mesh, {&top, 1})[0].loops);
-        solid.cap_cells = CapCells(solid.cap);
-    });
+    const Plane top{cut_off, Side::below};
+    solid.cap = std::move(slice(context, mesh, {&top, 1})[0].loops);
+    solid.cap_cells = CapCells(solid.cap);
+    solid.facets.resize(starts.back());
+    BulkVector<FacetNormals> normals(starts.back());
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         SolidFacet* to = solid.facets.data() + starts[begin / kGrain];
         FacetNormals* to_normals = normals.data() + starts[begin / kGrain];
@@ -563,8 +557,11 @@ LayerSolid solid_near(Context& context, const LayerSolid& solid, std::span<const
             if (before[j * (nx + 1) + i1 + 1] > before[j * (nx + 1) + i0]) return true;
         return false;
     };
-    for (std::size_t g = 0; g < solid.groups.size(); ++g) {
-        if (!meets(solid.groups[g])) continue;
+    std::vector<std::uint32_t> met;
+    for (std::size_t g = 0; g < solid.groups.size(); ++g)
+        if (meets(solid.groups[g])) met.push_back(static_cast<std::uint32_t>(g));
+    near.facets.reserve(met.size() * FacetGroup::kFacets);
+    for (const std::size_t g : met) {
         const std::size_t first = g * FacetGroup::kFacets, last = std::min(solid.facets.size(), first + FacetGroup::kFacets);
         near.facets.insert(near.facets.end(), solid.facets.begin() + static_cast<std::ptrdiff_t>(first),
                            solid.facets.begin() + static_cast<std::ptrdiff_t>(last));

@@ -9,6 +9,7 @@
 
 #include "kernels/cutting/cap_cells.h"
 #include "kernels/cutting/facet_tree.h"
+#include "kernels/mesh/bulk_memory.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 #include "kernels/polygons/loops.h"
@@ -81,16 +82,16 @@ struct GroupCorners {
     alignas(8) Normals edge, corner;
     static constexpr float kAny = 3;
 };
-[[nodiscard]] std::vector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups,
-                                                      std::span<const FacetNormals> normals = {});
+[[nodiscard]] BulkVector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups,
+                                                     std::span<const FacetNormals> normals = {});
 
 struct LayerSolid {
     double z_low = 0, z_top = 0;         ///< facets wholly below z_low are left out
-    std::vector<SolidFacet> facets;      ///< in Morton order of the mesh's facets: neighbours in space are near in memory
+    BulkVector<SolidFacet> facets;       ///< in Morton order of the mesh's facets: neighbours in space are near in memory
     Loops cap;                           ///< the section kTopSheet below z_top: the solid's flat upper end
     std::array<double, 2> min{}, max{};  ///< of the facets, in x and y
     std::vector<FacetGroup> groups;      ///< of the facets, for fibres
-    std::vector<GroupCorners> corners;   ///< of the groups; none: fibres look at each facet by itself
+    BulkVector<GroupCorners> corners;    ///< of the groups; none: fibres look at each facet by itself
     FacetTree tree;                      ///< of the facets, for drops
     CapCells cap_cells;                  ///< of the cap
     bool part = false;                   ///< of a solid: where its facets end it may be touched with any normal

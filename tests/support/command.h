@@ -3,10 +3,12 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -23,8 +25,9 @@ struct CommandResult {
     int exit = -1;   ///< −1 when a signal ended it
     int signal = 0;  ///< that signal
     std::string out, err;
-    double seconds = 0;          ///< from start to end
-    double after_interrupt = 0;  ///< from SIGINT to the end; 0 when it had ended before
+    double seconds = 0;            ///< from start to end
+    double after_interrupt = 0;    ///< from SIGINT to the end; 0 when it had ended before
+    std::uint64_t peak_bytes = 0;  ///< of memory, mapped files too
 };
 
 /// @param interrupt_after seconds until SIGINT is sent; negative: never
@@ -54,7 +57,8 @@ inline CommandResult run_command(const std::vector<std::string>& arguments, cons
     int status = 0;
     bool interrupted = false;
     Clock::time_point interrupt{};
-    while (::waitpid(child, &status, WNOHANG) == 0) {
+    rusage used{};
+    while (::wait4(child, &status, WNOHANG, &used) == 0) {
         if (interrupt_after >= 0 && !interrupted && since(begin) >= interrupt_after) {
             interrupted = true;
             interrupt = Clock::now();
@@ -63,6 +67,7 @@ inline CommandResult run_command(const std::vector<std::string>& arguments, cons
         ::usleep(2000);
     }
     result.seconds = since(begin);
+    result.peak_bytes = static_cast<std::uint64_t>(used.ru_maxrss) * 1024;
     if (interrupted) result.after_interrupt = since(interrupt);
     if (WIFEXITED(status)) result.exit = WEXITSTATUS(status);
     if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
