@@ -33,14 +33,15 @@ void keep_given_back(std::int64_t ms) {
     for (unsigned i = 0; i < arenas; ++i) mallctl(("arena." + std::to_string(i) + ".dirty_decay_ms").c_str(), nullptr, nullptr, &value, sizeof value);
 }
 
-// Bytes of the process that lie in the machine's memory, as /proc/self/statm says; 0 where it does not.
+// Bytes of the process that lie in the machine's memory, but for those of mapped files, as /proc/self/statm says; 0 where it does not.
 std::uint64_t held(int statm) {
     char text[128];
     const ssize_t got = ::pread(statm, text, sizeof text - 1, 0);
     if (got <= 0) return 0;
     text[got] = 0;
-    unsigned long long pages = 0;
-    return std::sscanf(text, "%*u %llu", &pages) == 1 ? pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) : 0;
+    unsigned long long resident = 0, of_files = 0;
+    if (std::sscanf(text, "%*u %llu %llu", &resident, &of_files) != 2) return 0;
+    return (resident - of_files) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
 }  // namespace
