@@ -23,6 +23,7 @@
 #include "kernels/mesh/morton.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
+#include "tools/allocator.h"
 
 namespace {
 
@@ -314,4 +315,14 @@ BENCHMARK(accessibility)
     ->Args({200'000, 1, 2, 1})
     ->Unit(benchmark::kMillisecond);
 
-BENCHMARK_MAIN();
+// Memory as the command has it: what one question gives back the next one takes.
+int main(int argc, char** argv) {
+#ifdef SLABWRIGHT_JEMALLOC
+    const slabwright::KeptWithin kept(std::uint64_t{1} << 32);
+#endif
+    benchmark::Initialize(&argc, argv);
+    if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+    benchmark::RunSpecifiedBenchmarks();
+    benchmark::Shutdown();
+    return 0;
+}
