@@ -1,5 +1,6 @@
-// How many questions a second accessibility asks of Embree (nearest surface within the cutter, height over its axis), all of its own work
-// counted, and how many Embree answers at best: the same places, in the same order, with float arithmetic and nothing around it.
+// How many questions a second accessibility asks of Embree (nearest surface within the cutter, height over
+// its axis), all of its own work counted, and how many Embree answers at best: the same places, in the same
+// order, with float arithmetic and nothing around it.
 #include <benchmark/benchmark.h>
 
 #if __has_include(<embree4/rtcore.h>)
@@ -50,7 +51,8 @@ Mesh make_relief(Context& context, std::uint64_t facets) {
     for (std::uint32_t j = 0; j < row; ++j)
         for (std::uint32_t i = 0; i < row; ++i) {
             const double x = 290.0 * i / n, y = 290.0 * j / n;
-            mesh.vertices.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(10 + 5 * std::sin(x / 17) * std::cos(y / 19))});
+            mesh.vertices.push_back({static_cast<float>(x), static_cast<float>(y),
+                                     static_cast<float>(10 + 5 * std::sin(x / 17) * std::cos(y / 19))});
         }
     for (std::uint32_t j = 0; j < n; ++j)
         for (std::uint32_t i = 0; i < n; ++i) {
@@ -65,7 +67,8 @@ Mesh make_relief(Context& context, std::uint64_t facets) {
     for (std::uint32_t i = n; i > 0; --i) border.push_back(n * row + i);
     for (std::uint32_t i = n; i > 0; --i) border.push_back(i * row);
     for (const std::uint32_t v : border) mesh.vertices.push_back({mesh.vertices[v].x, mesh.vertices[v].y, 0});
-    const auto middle = static_cast<std::uint32_t>(mesh.vertices.size()), count = static_cast<std::uint32_t>(border.size());
+    const auto middle = static_cast<std::uint32_t>(mesh.vertices.size()),
+               count = static_cast<std::uint32_t>(border.size());
     mesh.vertices.push_back({145, 145, 0});
     for (std::uint32_t i = 0; i < count; ++i) {
         const std::uint32_t k = (i + 1) % count, a = foot + i, b = foot + k;
@@ -84,13 +87,15 @@ Model make_model(std::uint64_t facets, bool relief) {
         model.mesh = make_relief(context, facets);
     } else {
         std::vector<Facet> corners;
-        metre_pattern({.size_mm = 290, .height_mm = 29, .facets = facets}, [&](const Facet& f) { corners.push_back(f); });
+        metre_pattern({.size_mm = 290, .height_mm = 29, .facets = facets},
+                      [&](const Facet& f) { corners.push_back(f); });
         model.mesh = weld(context, corners);
     }
     const MortonGrid grid(bounds(model.mesh.view()));
     for (const Index3& f : model.mesh.facets) {
         Point3 t[3];
-        for (int k = 0; k < 3; ++k) t[k] = {model.mesh.vertices[f[k]].x, model.mesh.vertices[f[k]].y, model.mesh.vertices[f[k]].z};
+        for (int k = 0; k < 3; ++k)
+            t[k] = {model.mesh.vertices[f[k]].x, model.mesh.vertices[f[k]].y, model.mesh.vertices[f[k]].z};
         const auto [low, high] = std::minmax({t[0][2], t[1][2], t[2][2]});
         if (low < kLow || high > kHigh) continue;
         const double ux = t[1][0] - t[0][0], uy = t[1][1] - t[0][1], uz = t[1][2] - t[0][2];
@@ -107,11 +112,14 @@ Model make_model(std::uint64_t facets, bool relief) {
                 w[i - 1] = 1 - kInset;
             }
             float p[3];
-            for (int c = 0; c < 3; ++c) p[c] = static_cast<float>(w[0] * t[0][c] + w[1] * t[1][c] + w[2] * t[2][c] + (kRadius + 0.01) * n[c] / l);
+            for (int c = 0; c < 3; ++c)
+                p[c] = static_cast<float>(w[0] * t[0][c] + w[1] * t[1][c] + w[2] * t[2][c] +
+                                          (kRadius + 0.01) * n[c] / l);
             model.places.push_back({{p[0], p[1], p[2]}, code});
         }
     }
-    std::stable_sort(model.places.begin(), model.places.end(), [](const Place& a, const Place& b) { return a.code < b.code; });
+    std::stable_sort(model.places.begin(), model.places.end(),
+                     [](const Place& a, const Place& b) { return a.code < b.code; });
     if (model.places.empty()) {
         std::fprintf(stderr, "access_bench: the pattern has no facets in the layer\n");
         std::exit(1);
@@ -123,7 +131,9 @@ const Model& model(std::int64_t facets, std::int64_t relief) {
     static std::map<std::pair<std::int64_t, std::int64_t>, Model> made;
     const std::pair key(facets, relief);
     const auto it = made.find(key);
-    return it != made.end() ? it->second : made.emplace(key, make_model(static_cast<std::uint64_t>(facets), relief != 0)).first->second;
+    return it != made.end()
+               ? it->second
+               : made.emplace(key, make_model(static_cast<std::uint64_t>(facets), relief != 0)).first->second;
 }
 
 struct Closest {
@@ -138,9 +148,12 @@ bool closest(RTCPointQueryFunctionArguments* args) {
     const Index3& f = state.mesh->facets[args->primID];
     auto sub = [](Vec3f a, Vec3f b) { return Vec3f{a.x - b.x, a.y - b.y, a.z - b.z}; };
     auto dot = [](Vec3f a, Vec3f b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
-    const Vec3f a = state.mesh->vertices[f[0]], b = state.mesh->vertices[f[1]], c = state.mesh->vertices[f[2]];
-    const Vec3f ab = sub(b, a), ac = sub(c, a), ap = sub(state.p, a), bp = sub(state.p, b), cp = sub(state.p, c);
-    const float d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
+    const Vec3f a = state.mesh->vertices[f[0]], b = state.mesh->vertices[f[1]],
+                c = state.mesh->vertices[f[2]];
+    const Vec3f ab = sub(b, a), ac = sub(c, a), ap = sub(state.p, a), bp = sub(state.p, b),
+                cp = sub(state.p, c);
+    const float d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp),
+                d6 = dot(ac, cp);
     float v = 0, w = 0;
     const float vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
     if (d1 <= 0 && d2 <= 0) v = w = 0;
@@ -165,11 +178,13 @@ public:
         rtcSetSceneFlags(scene_, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
         RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
         std::copy(m.mesh.vertices.begin(), m.mesh.vertices.end(),
-                  static_cast<Vec3f*>(
-                      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), m.mesh.vertices.size())));
-        std::copy(m.mesh.facets.begin(), m.mesh.facets.end(),
-                  static_cast<Index3*>(
-                      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Index3), m.mesh.facets.size())));
+                  static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                                              RTC_FORMAT_FLOAT3, sizeof(Vec3f),
+                                                              m.mesh.vertices.size())));
+        std::copy(
+            m.mesh.facets.begin(), m.mesh.facets.end(),
+            static_cast<Index3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                         sizeof(Index3), m.mesh.facets.size())));
         rtcCommitGeometry(geometry);
         rtcAttachGeometry(scene_, geometry);
         rtcReleaseGeometry(geometry);
@@ -195,7 +210,8 @@ public:
             rtcPointQuery(scene_, &query, &stack, &closest, &nearest);
             met += nearest.squared < radius * radius;
             RTCRayHit ray{};
-            ray.ray.org_x = place.centre.x, ray.ray.org_y = place.centre.y, ray.ray.org_z = static_cast<float>(kHigh);
+            ray.ray.org_x = place.centre.x, ray.ray.org_y = place.centre.y,
+            ray.ray.org_z = static_cast<float>(kHigh);
             ray.ray.dir_z = -1;
             ray.ray.tfar = std::numeric_limits<float>::infinity();
             ray.ray.mask = 0xFFFFFFFFu;
@@ -223,10 +239,12 @@ void bare_embree(benchmark::State& state) {
     const Bare bare(model(state.range(0), state.range(1)));
     for (auto _ : state) benchmark::DoNotOptimize(bare.ask());
     state.counters["asked"] = bare.questions();
-    state.counters["asked/s"] = benchmark::Counter(bare.questions(), benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["asked/s"] =
+        benchmark::Counter(bare.questions(), benchmark::Counter::kIsIterationInvariantRate);
 }
 
-/// Accessibility of a ball, bull nose or flat on a model; without refinement on borders, so that points are those of the facets.
+/// Accessibility of a ball, bull nose or flat on a model; without refinement on borders, so that points are
+/// those of the facets.
 class Kernel {
 public:
     Kernel(const Model& m, int threads, std::int64_t profile)
@@ -262,13 +280,14 @@ void accessibility(benchmark::State& state) {
     for (auto _ : state) result = kernel.ask();
     const double asked = static_cast<double>(result.queries + result.rays);
     state.counters["AR"] = result.ratio();
-    state.counters["points/s"] = benchmark::Counter(static_cast<double>(result.points), benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["points/s"] =
+        benchmark::Counter(static_cast<double>(result.points), benchmark::Counter::kIsIterationInvariantRate);
     state.counters["asked/point"] = asked / static_cast<double>(result.points);
     state.counters["asked/s"] = benchmark::Counter(asked, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-/// Of the bare rate, the kernel's: the median of rounds in which the two take turns, in processor time, for a machine that others use
-/// meanwhile. Arguments: facets, relief. A ball, one thread.
+/// Of the bare rate, the kernel's: the median of rounds in which the two take turns, in processor time, for a
+/// machine that others use meanwhile. Arguments: facets, relief. A ball, one thread.
 void share_of_bare(benchmark::State& state) {
     constexpr std::size_t rounds = 9;
     const Model& m = model(state.range(0), state.range(1));
@@ -304,8 +323,17 @@ void share_of_bare(benchmark::State& state) {
 
 }  // namespace
 
-BENCHMARK(bare_embree)->ArgNames({"facets", "relief"})->Args({200'000, 1})->Args({200'000, 0})->Unit(benchmark::kMillisecond);
-BENCHMARK(share_of_bare)->ArgNames({"facets", "relief"})->Args({200'000, 1})->Args({200'000, 0})->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(bare_embree)
+    ->ArgNames({"facets", "relief"})
+    ->Args({200'000, 1})
+    ->Args({200'000, 0})
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(share_of_bare)
+    ->ArgNames({"facets", "relief"})
+    ->Args({200'000, 1})
+    ->Args({200'000, 0})
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(accessibility)
     ->ArgNames({"facets", "relief", "threads", "profile"})
     ->Args({200'000, 1, 1, 1})

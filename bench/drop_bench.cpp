@@ -1,4 +1,5 @@
-// How many places a cutter is dropped on a pattern in a second: at random and in the order in which a raster comes by.
+// How many places a cutter is dropped on a pattern in a second: at random and in the order in which a raster
+// comes by.
 //     build/release/drop_bench --benchmark_counters_tabular=true
 #include <benchmark/benchmark.h>
 
@@ -31,8 +32,8 @@ const LayerSolid& pattern(std::uint64_t facets) {
         of = facets;
     }
     if (solid.facets.size() < facets) {
-        std::fprintf(stderr, "drop_bench: the pattern has %zu facets, %llu were asked for\n", solid.facets.size(),
-                     static_cast<unsigned long long>(facets));
+        std::fprintf(stderr, "drop_bench: the pattern has %zu facets, %llu were asked for\n",
+                     solid.facets.size(), static_cast<unsigned long long>(facets));
         std::exit(1);
     }
     return solid;
@@ -49,7 +50,9 @@ void drop_cutter(benchmark::State& state, Cutter cutter) {
     for (std::size_t i = 0; i < n; ++i) {
         const std::size_t in_line = i % 2048, line = i / 2048;
         if (state.range(1) == random) places[i] = {x(engine), y(engine)};
-        else places[i] = {solid.min[0] + 100 + step * static_cast<double>(in_line), solid.min[1] + 100 + 1.5 * static_cast<double>(line)};
+        else
+            places[i] = {solid.min[0] + 100 + step * static_cast<double>(in_line),
+                         solid.min[1] + 100 + 1.5 * static_cast<double>(line)};
     }
     const DropIndex index(solid, cutter);
     std::vector<double> tips(n);
@@ -80,7 +83,9 @@ void make_solid(benchmark::State& state) {
         std::fprintf(stderr, "drop_bench: the pattern has only %zu facets\n", mesh.facets.size());
         std::exit(1);
     }
-    for (auto _ : state) benchmark::DoNotOptimize(layer_solid(context, mesh.view(), 0, 2 * pattern.height_mm).tree.tiers.data());
+    for (auto _ : state)
+        benchmark::DoNotOptimize(
+            layer_solid(context, mesh.view(), 0, 2 * pattern.height_mm).tree.tiers.data());
     state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(mesh.facets.size()));
 }
 
@@ -95,7 +100,11 @@ BENCHMARK_CAPTURE(drop_cutter, flat_12_7, Cutter{Cutter::Profile::flat, 6.35})
     ->ArgsProduct(cases)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
-BENCHMARK(make_solid)->ArgNames({"facets", "threads"})->ArgsProduct({{100'000, 1'000'000}, {1, 2}})->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(make_solid)
+    ->ArgNames({"facets", "threads"})
+    ->ArgsProduct({{100'000, 1'000'000}, {1, 2}})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace slabwright

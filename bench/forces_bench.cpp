@@ -1,10 +1,12 @@
-// Segments a second of the force kernel, on the OpenCL device that the self-test chooses and on C++ beside it, in one run on
-// the same cuts with the same threads: the scalar double model; the kernel's integrals at every instant by hand in vectors of 8 and 16;
-// and the obvious way, discs and angles with angle addition in vectors of 16, some 7200 evaluations a segment. This file
-// is compiled with -O3 -march=native -fno-math-errno. GFLOP/s count the operations of the inner loops, without comparisons; the machine's
-// peak is a loop of fused multiply-adds, which count twice.
+// Segments a second of the force kernel, on the OpenCL device that the self-test chooses and on C++ beside
+// it, in one run on the same cuts with the same threads: the scalar double model; the kernel's integrals at
+// every instant by hand in vectors of 8 and 16; and the obvious way, discs and angles with angle addition in
+// vectors of 16, some 7200 evaluations a segment. This file is compiled with -O3 -march=native
+// -fno-math-errno. GFLOP/s count the operations of the inner loops, without comparisons; the machine's peak
+// is a loop of fused multiply-adds, which count twice.
 //
-// Every way's peak resultants are compared with the reference first; a benchmark of wrong forces stops the program.
+// Every way's peak resultants are compared with the reference first; a benchmark of wrong forces stops the
+// program.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -29,30 +31,35 @@ const std::vector<CutSegment>& cuts(int sort) {
     std::vector<CutSegment>& all = made[sort];
     if (!all.empty()) return all;
     std::mt19937_64 random(3);
-    auto drawn = [&](double low, double high) { return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53; };
+    auto drawn = [&](double low, double high) {
+        return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+    };
     all.resize(1 << 17);
     for (CutSegment& s : all) {
         s.profile = sort == ball_cuts ? CutterProfile::ball : CutterProfile::flat;
         s.radius_mm = sort == ball_cuts ? 3.175 : 6.35;
         s.helix_rad = std::numbers::pi / 6;
         s.high_mm = sort == ball_cuts ? drawn(0.3, 3.0) : drawn(1, 4);
-        s.arc = engagement_arc(s.radius_mm, drawn(0.1, 2.2) * s.radius_mm, random() % 2 ? MillingSense::up : MillingSense::down);
+        s.arc = engagement_arc(s.radius_mm, drawn(0.1, 2.2) * s.radius_mm,
+                               random() % 2 ? MillingSense::up : MillingSense::down);
         s.chip_load_mm = drawn(0.05, 0.3);
         s.spindle_rpm = 18000;
-        s.coefficients = resolve_coefficients({8.8575, 1.1268, 0.6188, 2.4948}, s.helix_rad, CoefficientTransform::oblique);
+        s.coefficients = resolve_coefficients({8.8575, 1.1268, 0.6188, 2.4948}, s.helix_rad,
+                                              CoefficientTransform::oblique);
     }
     return all;
 }
 
-/// Floating-point operations for these cuts: of the kernel, which takes what all instants with a whole tooth share once, or of the same
-/// integrals taken at every instant.
+/// Floating-point operations for these cuts: of the kernel, which takes what all instants with a whole tooth
+/// share once, or of the same integrals taken at every instant.
 double operations(const std::vector<CutSegment>& all, bool tooth_once) {
     double sum = 0;
     for (const CutSegment& s : all) {
         const forces::Turn t = forces::make_turn(s);
         const bool ball = s.profile == CutterProfile::ball;
         const double every = ball ? 15 + 6 * 61 : 84, whole = tooth_once ? 52 : every;
-        if (tooth_once && t.lag_per_mm * (t.high - t.low) < t.exit - t.entry) sum += ball ? 8 * 90 + 12 * 7 : 60;
+        if (tooth_once && t.lag_per_mm * (t.high - t.low) < t.exit - t.entry)
+            sum += ball ? 8 * 90 + 12 * 7 : 60;
         for (int p = 0; p < t.count; ++p) {
             const forces::Turn::Piece& piece = t.pieces[static_cast<std::size_t>(p)];
             const forces::Teeth teeth = forces::teeth_in(t, piece);
@@ -60,7 +67,8 @@ double operations(const std::vector<CutSegment>& all, bool tooth_once) {
             sum += n * 8;
             for (int m = teeth.first; m <= teeth.last; ++m) {
                 const double middle = piece.begin + piece.length / 2 + m * t.pitch;
-                const bool changes = t.lag_per_mm > 0 && (middle - t.lag_per_mm * t.high < t.entry || middle - t.lag_per_mm * t.low > t.exit);
+                const bool changes = t.lag_per_mm > 0 && (middle - t.lag_per_mm * t.high < t.entry ||
+                                                          middle - t.lag_per_mm * t.low > t.exit);
                 sum += n * (changes ? every : whole);
             }
         }
@@ -97,7 +105,8 @@ V sinc(V x2) {
 }
 template <class V>
 V cosine(V x2) {
-    return 1.0f + x2 * (-0.5f + x2 * (4.1666667e-2f + x2 * (-1.3888889e-3f + x2 * (2.4801587e-5f + x2 * -2.7152e-7f))));
+    return 1.0f + x2 * (-0.5f + x2 * (4.1666667e-2f +
+                                      x2 * (-1.3888889e-3f + x2 * (2.4801587e-5f + x2 * -2.7152e-7f))));
 }
 
 /// Peaks of one lane set, gathered.
@@ -107,7 +116,8 @@ struct Peaks {
     V x{}, y{}, z{}, plane{}, all{}, torque{}, mean{};
     void add(V fx, V fy, V fz, V ft, V share) {
         const V plane2 = fx * fx + fy * fy, in_plane = root<W>(plane2);
-        x = larger(x, absolute(fx)), y = larger(y, absolute(fy)), z = larger(z, absolute(fz)), torque = larger(torque, absolute(ft));
+        x = larger(x, absolute(fx)), y = larger(y, absolute(fy)), z = larger(z, absolute(fz)),
+        torque = larger(torque, absolute(ft));
         plane = larger(plane, in_plane), all = larger(all, plane2 + fz * fz);
         mean += share * in_plane;
     }
@@ -133,14 +143,18 @@ void by_hand(const CutSegment& s, SegmentForces& out) {
     out = {};
     const double angle = forces::sample_angle(kForceAccuracy);
     const float c = static_cast<float>(s.chip_load_mm), tc = static_cast<float>(s.coefficients.ktc) * c,
-                rc = static_cast<float>(s.coefficients.krc) * c, ac = static_cast<float>(s.coefficients.kac) * c,
-                te = static_cast<float>(s.coefficients.kte), re = static_cast<float>(s.coefficients.kre), ae = static_cast<float>(s.coefficients.kae);
-    const float radius = static_cast<float>(s.radius_mm), lag = static_cast<float>(t.lag_per_mm), inverse_lag = lag > 0 ? 1 / lag : 0;
-    const float entry = static_cast<float>(t.entry), exit = static_cast<float>(t.exit), low = static_cast<float>(t.low),
-                high = static_cast<float>(t.high);
+                rc = static_cast<float>(s.coefficients.krc) * c,
+                ac = static_cast<float>(s.coefficients.kac) * c, te = static_cast<float>(s.coefficients.kte),
+                re = static_cast<float>(s.coefficients.kre), ae = static_cast<float>(s.coefficients.kae);
+    const float radius = static_cast<float>(s.radius_mm), lag = static_cast<float>(t.lag_per_mm),
+                inverse_lag = lag > 0 ? 1 / lag : 0;
+    const float entry = static_cast<float>(t.entry), exit = static_cast<float>(t.exit),
+                low = static_cast<float>(t.low), high = static_cast<float>(t.high);
     const bool ball = s.profile == CutterProfile::ball;
-    constexpr float node[6] = {-0.93246951f, -0.66120939f, -0.23861919f, 0.23861919f, 0.66120939f, 0.93246951f};
-    constexpr float weight[6] = {0.17132449f, 0.36076157f, 0.46791393f, 0.46791393f, 0.36076157f, 0.17132449f};
+    constexpr float node[6] = {-0.93246951f, -0.66120939f, -0.23861919f,
+                               0.23861919f,  0.66120939f,  0.93246951f};
+    constexpr float weight[6] = {0.17132449f, 0.36076157f, 0.46791393f,
+                                 0.46791393f, 0.36076157f, 0.17132449f};
     V lane;
     for (int i = 0; i < W; ++i) lane[i] = static_cast<float>(i);
     Peaks<W> peaks;
@@ -148,28 +162,36 @@ void by_hand(const CutSegment& s, SegmentForces& out) {
         const forces::Turn::Piece& piece = t.pieces[static_cast<std::size_t>(p)];
         const forces::Teeth teeth = forces::teeth_in(t, piece);
         const int blocks = (forces::samples_of(piece, angle) + W - 1) / W;
-        const float length = static_cast<float>(piece.length), step = length / static_cast<float>(blocks * W - 1);
+        const float length = static_cast<float>(piece.length),
+                    step = length / static_cast<float>(blocks * W - 1);
         for (int b = 0; b < blocks; ++b) {
             const V index = lane + static_cast<float>(b * W);
             V x{}, y{}, z{}, torque{};
             for (int m = teeth.first; m <= teeth.last; ++m) {
-                const float begin = static_cast<float>(piece.begin + m * t.pitch), middle = begin + 0.5f * length;
+                const float begin = static_cast<float>(piece.begin + m * t.pitch),
+                            middle = begin + 0.5f * length;
                 const V u = begin + index * step;
                 V zl = V{} + low, zh = V{} + high;
                 if (lag > 0) {
-                    if (middle - lag * high < entry) zh = smaller(larger((u - entry) * inverse_lag, V{} + low), V{} + high);
-                    if (middle - lag * low > exit) zl = smaller(larger((u - exit) * inverse_lag, V{} + low), V{} + high);
+                    if (middle - lag * high < entry)
+                        zh = smaller(larger((u - entry) * inverse_lag, V{} + low), V{} + high);
+                    if (middle - lag * low > exit)
+                        zl = smaller(larger((u - exit) * inverse_lag, V{} + low), V{} + high);
                 }
                 zh = larger(zh, zl);
                 if (ball && low < radius) {
                     const float half_inverse = 0.5f / radius;
-                    const V qa = root<W>(smaller(zl, V{} + radius) * half_inverse), qb = root<W>(smaller(zh, V{} + radius) * half_inverse);
+                    const V qa = root<W>(smaller(zl, V{} + radius) * half_inverse),
+                            qb = root<W>(smaller(zh, V{} + radius) * half_inverse);
                     const V half_q = 0.5f * (qb - qa), mid_q = 0.5f * (qb + qa);
                     V bx{}, by{}, bz{}, bt{};
                     for (int i = 0; i < 6; ++i) {
-                        const V q = mid_q + half_q * node[i], q2 = q * q, r = root<W>(1.0f - q2), sin_k = 2.0f * q * r, cos_k = 1.0f - 2.0f * q2;
-                        const V a = u - 2.0f * radius * lag * q2 - 1.57079633f, a2 = a * a, sin_p = cosine(a2), cos_p = -a * sinc(a2);
-                        const V h = sin_p * sin_k, db = weight[i] / r, ft = (tc * h + te) * db, fr = (rc * h + re) * db, fa = (ac * h + ae) * db;
+                        const V q = mid_q + half_q * node[i], q2 = q * q, r = root<W>(1.0f - q2),
+                                sin_k = 2.0f * q * r, cos_k = 1.0f - 2.0f * q2;
+                        const V a = u - 2.0f * radius * lag * q2 - 1.57079633f, a2 = a * a,
+                                sin_p = cosine(a2), cos_p = -a * sinc(a2);
+                        const V h = sin_p * sin_k, db = weight[i] / r, ft = (tc * h + te) * db,
+                                fr = (rc * h + re) * db, fa = (ac * h + ae) * db;
                         const V inward = fr * sin_k + fa * cos_k;
                         bx -= ft * cos_p + inward * sin_p;
                         by += ft * sin_p - inward * cos_p;
@@ -181,9 +203,11 @@ void by_hand(const CutSegment& s, SegmentForces& out) {
                     zl = larger(zl, V{} + radius), zh = larger(zh, V{} + radius);
                 }
                 if (!ball || high > radius) {
-                    const V edge = zh - zl, a = u - 0.5f * lag * (zh + zl) - 1.57079633f, delta = 0.5f * lag * edge, a2 = a * a, d2 = delta * delta;
+                    const V edge = zh - zl, a = u - 0.5f * lag * (zh + zl) - 1.57079633f,
+                            delta = 0.5f * lag * edge, a2 = a * a, d2 = delta * delta;
                     const V one = sinc(d2), two = one * cosine(d2), sin_p = cosine(a2), cos_p = -a * sinc(a2);
-                    const V s1 = sin_p * one, c1 = cos_p * one, s2 = sin_p * cos_p * two, ss = 0.5f - (0.5f - sin_p * sin_p) * two;
+                    const V s1 = sin_p * one, c1 = cos_p * one, s2 = sin_p * cos_p * two,
+                            ss = 0.5f - (0.5f - sin_p * sin_p) * two;
                     x -= edge * (tc * s2 + te * c1 + rc * ss + re * s1);
                     y += edge * (tc * ss + te * s1 - rc * s2 - re * c1);
                     z += edge * (ac * s1 + ae);
@@ -208,14 +232,17 @@ void by_discs(const CutSegment& s, SegmentForces& out) {
     using V = Lanes<16>::Vector;
     out = {};
     const ForceCoefficients& k = s.coefficients;
-    const float c = static_cast<float>(s.chip_load_mm), ktc = static_cast<float>(k.ktc), krc = static_cast<float>(k.krc),
-                kac = static_cast<float>(k.kac), kte = static_cast<float>(k.kte), kre = static_cast<float>(k.kre), kae = static_cast<float>(k.kae);
+    const float c = static_cast<float>(s.chip_load_mm), ktc = static_cast<float>(k.ktc),
+                krc = static_cast<float>(k.krc), kac = static_cast<float>(k.kac),
+                kte = static_cast<float>(k.kte), kre = static_cast<float>(k.kre),
+                kae = static_cast<float>(k.kae);
     const float radius = static_cast<float>(s.radius_mm);
     const bool ball = s.profile == CutterProfile::ball;
     const double lag = std::tan(s.helix_rad) / s.radius_mm, pitch = 2 * std::numbers::pi / s.flutes;
     auto edge_at = [&](double z) {
         if (!ball) return z;
-        return z < s.radius_mm ? s.radius_mm * std::acos(1 - z / s.radius_mm) : s.radius_mm * (std::numbers::pi / 2 - 1) + z;
+        return z < s.radius_mm ? s.radius_mm * std::acos(1 - z / s.radius_mm)
+                               : s.radius_mm * (std::numbers::pi / 2 - 1) + z;
     };
     const double e0 = edge_at(s.low_mm), de = (edge_at(s.high_mm) - e0) / kDiscs;
     const float db = static_cast<float>(de);
@@ -228,7 +255,10 @@ void by_discs(const CutSegment& s, SegmentForces& out) {
         const float e = static_cast<float>(e0) + (static_cast<float>(d) + 0.5f) * db;
         const bool shank = !ball || e > radius * 1.57079633f;
         sin_k[d] = shank ? 1 : sk, cos_k[d] = shank ? 0 : ck;
-        const float z = !ball ? e : shank ? e - radius * 0.57079633f : radius * (1 - ck), a = static_cast<float>(lag) * (z - last);
+        const float z = !ball   ? e
+                        : shank ? e - radius * 0.57079633f
+                                : radius * (1 - ck),
+                    a = static_cast<float>(lag) * (z - last);
         turn_s[d] = a * sinc(a * a), turn_c[d] = cosine(a * a);
         last = z;
         const float next = sk * dk_c + ck * dk_s;
@@ -244,7 +274,8 @@ void by_discs(const CutSegment& s, SegmentForces& out) {
         for (int j = 0; j < 2; ++j)
             for (int a = 0; a < kAngles; ++a) {
                 const double theta = std::numbers::pi * ((a + 0.5) / kAngles + j);
-                g.sine[j][a / 16][a % 16] = static_cast<float>(std::sin(theta)), g.cosine[j][a / 16][a % 16] = static_cast<float>(std::cos(theta));
+                g.sine[j][a / 16][a % 16] = static_cast<float>(std::sin(theta)),
+                                      g.cosine[j][a / 16][a % 16] = static_cast<float>(std::cos(theta));
             }
         return g;
     }();
@@ -261,7 +292,8 @@ void by_discs(const CutSegment& s, SegmentForces& out) {
                 sine = sn;
                 // Within 0 … π the cosine falls: engaged while it lies between those of the limits.
                 const V in = ((sine > 0.0f) & (cosn <= cos_entry) & (cosn >= cos_exit)) ? V{} + db : V{};
-                const V h = c * sine * sin_k[d], ft = (ktc * h + kte) * in, fr = (krc * h + kre) * in, fa = (kac * h + kae) * in;
+                const V h = c * sine * sin_k[d], ft = (ktc * h + kte) * in, fr = (krc * h + kre) * in,
+                        fa = (kac * h + kae) * in;
                 const V inward = fr * sin_k[d] + fa * cos_k[d];
                 x -= ft * cosn + inward * sine;
                 y += ft * sine - inward * cosn;
@@ -276,14 +308,18 @@ void by_discs(const CutSegment& s, SegmentForces& out) {
     if (t.count > 0) forces::set_means(s, t, out);
 }
 
-void scalar(const CutSegment& s, SegmentForces& out) { out = s.profile == CutterProfile::flat ? closed_form_forces(s) : reference_forces(s); }
+void scalar(const CutSegment& s, SegmentForces& out) {
+    out = s.profile == CutterProfile::flat ? closed_form_forces(s) : reference_forces(s);
+}
 
 /// Stops the program unless the forces are right.
-void check(const char* way, const std::vector<CutSegment>& all, const std::vector<SegmentForces>& found, double within) {
+void check(const char* way, const std::vector<CutSegment>& all, const std::vector<SegmentForces>& found,
+           double within) {
     double worst = 0;
     for (std::size_t i = 0; i < all.size(); i += 97) {
         const SegmentForces f = reference_forces(all[i]);
-        worst = std::max(worst, std::abs(f.peak_resultant_n - found[i].peak_resultant_n) / f.peak_resultant_n);
+        worst =
+            std::max(worst, std::abs(f.peak_resultant_n - found[i].peak_resultant_n) / f.peak_resultant_n);
     }
     if (!(worst <= within)) {
         std::fprintf(stderr, "forces_bench: %s is wrong by %.1e\n", way, worst);
@@ -292,8 +328,11 @@ void check(const char* way, const std::vector<CutSegment>& all, const std::vecto
 }
 
 void report(benchmark::State& state, const std::vector<CutSegment>& all, double operations) {
-    state.counters["segments/s"] = benchmark::Counter(static_cast<double>(all.size()), benchmark::Counter::kIsIterationInvariantRate);
-    if (operations > 0) state.counters["flop/s"] = benchmark::Counter(operations, benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["segments/s"] =
+        benchmark::Counter(static_cast<double>(all.size()), benchmark::Counter::kIsIterationInvariantRate);
+    if (operations > 0)
+        state.counters["flop/s"] =
+            benchmark::Counter(operations, benchmark::Counter::kIsIterationInvariantRate);
 }
 
 template <class Way>
@@ -329,14 +368,17 @@ void opencl(benchmark::State& state) {
 }
 
 void every_instant_16(benchmark::State& state) {
-    run(state, "the integrals at every instant", by_hand<16>, 2e-3, operations(cuts(static_cast<int>(state.range(0))), false));
+    run(state, "the integrals at every instant", by_hand<16>, 2e-3,
+        operations(cuts(static_cast<int>(state.range(0))), false));
 }
 void every_instant_8(benchmark::State& state) {
-    run(state, "the integrals at every instant", by_hand<8>, 1e-4, operations(cuts(static_cast<int>(state.range(0))), false));
+    run(state, "the integrals at every instant", by_hand<8>, 1e-4,
+        operations(cuts(static_cast<int>(state.range(0))), false));
 }
 void discs_16(benchmark::State& state) {
     const std::vector<CutSegment>& all = cuts(static_cast<int>(state.range(0)));
-    run(state, "angle addition over discs", by_discs, 0.05, static_cast<double>(all.size()) * kAngles * kDiscs * 2 * 29);
+    run(state, "angle addition over discs", by_discs, 0.05,
+        static_cast<double>(all.size()) * kAngles * kDiscs * 2 * 29);
 }
 void double_model(benchmark::State& state) { run(state, "the double model", scalar, 1e-9, 0); }
 
@@ -347,14 +389,16 @@ void peak(benchmark::State& state) {
     for (auto _ : state)
         parallel_each(context, tasks, [&](std::size_t task) {
             Lanes<16>::Vector v[vectors];
-            for (int i = 0; i < vectors; ++i) v[i] = Lanes<16>::Vector{} + static_cast<float>(task + static_cast<std::size_t>(i));
+            for (int i = 0; i < vectors; ++i)
+                v[i] = Lanes<16>::Vector{} + static_cast<float>(task + static_cast<std::size_t>(i));
             const float a = 0.999f, b = 0.001f;
             for (int t = 0; t < turns; ++t)
                 for (int i = 0; i < vectors; ++i)
                     for (int l = 0; l < 16; ++l) v[i][l] = __builtin_fmaf(v[i][l], a, b);
             for (int i = 0; i < vectors; ++i) benchmark::DoNotOptimize(v[i]);
         });
-    state.counters["flop/s"] = benchmark::Counter(2.0 * 16 * vectors * turns * tasks, benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["flop/s"] =
+        benchmark::Counter(2.0 * 16 * vectors * turns * tasks, benchmark::Counter::kIsIterationInvariantRate);
 }
 
 void arguments(benchmark::internal::Benchmark* b) {

@@ -1,7 +1,8 @@
-// How every phase before and under the paths grows with the facets of one pattern (metre_pattern, 1160 × 1160 × 300 mm), on one thread and on two.
+// How every phase before and under the paths grows with the facets of one pattern (metre_pattern, 1160 × 1160
+// × 300 mm), on one thread and on two.
 //     build/release/growth_bench --benchmark_counters_tabular=true
-// `output` counts what comes out besides: segments, features, facets, points. bench/table makes exponents of it. The memory is what a phase
-// takes at its most over the mesh that it is given (30 bytes a facet).
+// `output` counts what comes out besides: segments, features, facets, points. bench/table makes exponents of
+// it. The memory is what a phase takes at its most over the mesh that it is given (30 bytes a facet).
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
@@ -55,7 +56,8 @@ const Pattern& pattern(std::uint64_t facets) {
         metre_pattern(wish, [&](const Facet& f) { soup.push_back(f); });
         next->mesh = weld(context, soup);
     }
-    if (next->mesh.facets.size() < facets) stop("the pattern has only " + std::to_string(next->mesh.facets.size()) + " facets");
+    if (next->mesh.facets.size() < facets)
+        stop("the pattern has only " + std::to_string(next->mesh.facets.size()) + " facets");
     next->solid = layer_solid(context, next->mesh.view(), kBottom - kBall.radius, kTop);
     made = std::move(next);
     return *made;
@@ -74,13 +76,15 @@ void measure(benchmark::State& state, Phase&& phase) {
     state.counters["facets"] = static_cast<double>(of.mesh.facets.size());
     state.counters["anonymous bytes/facet"] = peak / static_cast<double>(of.mesh.facets.size());
     state.counters["output"] = static_cast<double>(output);
-    state.counters["output/s"] = benchmark::Counter(static_cast<double>(output), benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["output/s"] =
+        benchmark::Counter(static_cast<double>(output), benchmark::Counter::kIsIterationInvariantRate);
 }
 
 void slice_600(benchmark::State& state) {
     measure(state, [](Context& context, const Pattern& of) {
         std::vector<Plane> planes(600);
-        for (std::size_t i = 0; i < planes.size(); ++i) planes[i].z = 300.0 * (static_cast<double>(i) + 0.5) / 600;
+        for (std::size_t i = 0; i < planes.size(); ++i)
+            planes[i].z = 300.0 * (static_cast<double>(i) + 0.5) / 600;
         std::size_t segments = 0;
         for (const Section& s : slice(context, of.mesh.view(), planes)) segments += s.loops.points.size();
         return segments;
@@ -88,8 +92,9 @@ void slice_600(benchmark::State& state) {
 }
 
 void features(benchmark::State& state) {
-    measure(state,
-            [](Context& context, const Pattern& of) { return find_features(context, of.mesh.view(), feature_options(Job{})).features.size(); });
+    measure(state, [](Context& context, const Pattern& of) {
+        return find_features(context, of.mesh.view(), feature_options(Job{})).features.size();
+    });
 }
 
 void undercuts(benchmark::State& state) {
@@ -100,16 +105,21 @@ void undercuts(benchmark::State& state) {
 }
 
 void slopes(benchmark::State& state) {
-    measure(state, [](Context& context, const Pattern& of) { return alpha_map(context, of.mesh.view(), kBottom, kTop).slopes.size(); });
+    measure(state, [](Context& context, const Pattern& of) {
+        return alpha_map(context, of.mesh.view(), kBottom, kTop).slopes.size();
+    });
 }
 
 void fewer_facets(benchmark::State& state) {
-    measure(state, [](Context& context, const Pattern& of) { return simplify(context, of.mesh.view(), 0.001).facets.size(); });
+    measure(state, [](Context& context, const Pattern& of) {
+        return simplify(context, of.mesh.view(), 0.001).facets.size();
+    });
 }
 
 void solid_of_a_layer(benchmark::State& state) {
-    measure(state,
-            [](Context& context, const Pattern& of) { return layer_solid(context, of.mesh.view(), kBottom - kBall.radius, kTop).facets.size(); });
+    measure(state, [](Context& context, const Pattern& of) {
+        return layer_solid(context, of.mesh.view(), kBottom - kBall.radius, kTop).facets.size();
+    });
 }
 
 void drops(benchmark::State& state) {
@@ -119,7 +129,9 @@ void drops(benchmark::State& state) {
         std::vector<double> tips(lines * places);
         parallel_for(context, tips.size(), 1024, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
-                tips[i] = index.drop(of.solid.min[0] + 1.1 * static_cast<double>(i % places), of.solid.min[1] + 9.0 * static_cast<double>(i / places))
+                tips[i] = index
+                              .drop(of.solid.min[0] + 1.1 * static_cast<double>(i % places),
+                                    of.solid.min[1] + 9.0 * static_cast<double>(i / places))
                               .tip_z;
         });
         benchmark::DoNotOptimize(tips.data());
@@ -128,8 +140,9 @@ void drops(benchmark::State& state) {
 }
 
 void areas_of_sections(benchmark::State& state) {
-    measure(state,
-            [](Context& context, const Pattern& of) { return SectionAreas(context, of.mesh.view())(kBottom) > 0 ? std::size_t{1} : std::size_t{0}; });
+    measure(state, [](Context& context, const Pattern& of) {
+        return SectionAreas(context, of.mesh.view())(kBottom) > 0 ? std::size_t{1} : std::size_t{0};
+    });
 }
 
 // One level at the height of most walls, such that chords stay within 0.01 mm.
@@ -138,7 +151,9 @@ void level_contour(benchmark::State& state) {
         const double tip = 0.5 * (kBottom + kTop);
         const Plane plane = inside_plane(of.solid, kBall, tip);
         const std::vector<Section> inside = slice(context, of.mesh.view(), {&plane, 1});
-        return level_contours(context, of.solid, inside[0].loops, kBall, tip, fibre_grid(of.solid, kBall, 2000)).points.size();
+        return level_contours(context, of.solid, inside[0].loops, kBall, tip,
+                              fibre_grid(of.solid, kBall, 2000))
+            .points.size();
     });
 }
 

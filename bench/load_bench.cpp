@@ -1,8 +1,10 @@
-// How fast an STL becomes a mesh: read, weld, adjacency, beside what the machine's memory can do in the same run.
+// How fast an STL becomes a mesh: read, weld, adjacency, beside what the machine's memory can do in the same
+// run.
 //     build/release/load_bench --benchmark_counters_tabular=true
-// The generated pattern (metre_pattern) is written to a temporary folder, in the order it is made and shuffled, and removed at the end.
-// `read_mesh` is what other programs' loaders do too; `read_stl` adds the SHA-256 of the file and the report of all that is wrong.
-// A file that does not load, or not with all of its facets, stops the program.
+// The generated pattern (metre_pattern) is written to a temporary folder, in the order it is made and
+// shuffled, and removed at the end. `read_mesh` is what other programs' loaders do too; `read_stl` adds the
+// SHA-256 of the file and the report of all that is wrong. A file that does not load, or not with all of its
+// facets, stops the program.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -33,7 +35,9 @@ namespace {
 /// The files that the benchmarks read; each is written when it is first asked for.
 class Files {
 public:
-    Files() : folder_(std::filesystem::temp_directory_path() / ("slabwright-load-" + std::to_string(::getpid()))) {
+    Files()
+        : folder_(std::filesystem::temp_directory_path() /
+                  ("slabwright-load-" + std::to_string(::getpid()))) {
         std::filesystem::create_directory(folder_);
     }
     ~Files() {
@@ -52,7 +56,8 @@ public:
         if (const auto it = made_.find(key); it != made_.end()) return it->second;
         MetrePattern pattern;
         pattern.facets = facets;
-        File file{(folder_ / (std::to_string(facets) + (shuffled ? "-shuffled.stl" : ".stl"))).string(), metre_pattern_facets(pattern)};
+        File file{(folder_ / (std::to_string(facets) + (shuffled ? "-shuffled.stl" : ".stl"))).string(),
+                  metre_pattern_facets(pattern)};
         std::ofstream out(file.path, std::ios::binary);
         const std::string head = stl_head("metre", file.facets);
         out.write(head.data(), static_cast<std::streamsize>(head.size()));
@@ -62,7 +67,8 @@ public:
             metre_pattern(pattern, [&](const Facet& facet) { records.push_back(stl_facet(facet)); });
             std::mt19937_64 random(1);
             for (std::size_t i = records.size(); i > 1; --i) std::swap(records[i - 1], records[random() % i]);
-            out.write(records.front().data(), static_cast<std::streamsize>(records.size() * sizeof records[0]));
+            out.write(records.front().data(),
+                      static_cast<std::streamsize>(records.size() * sizeof records[0]));
         } else {
             metre_pattern(pattern, [&](const Facet& facet) {
                 const auto record = stl_facet(facet);
@@ -83,8 +89,8 @@ Files& files() {
     return all;
 }
 
-/// STREAM's triad, a = b + s·c, on arrays far larger than the caches: what all else is to be compared with. Bytes as STREAM counts
-/// them: two read, one written.
+/// STREAM's triad, a = b + s·c, on arrays far larger than the caches: what all else is to be compared with.
+/// Bytes as STREAM counts them: two read, one written.
 void triad(benchmark::State& state) {
     const std::size_t n = std::size_t{1} << 25;
     Context context({.threads = static_cast<int>(state.range(0))});
@@ -96,11 +102,14 @@ void triad(benchmark::State& state) {
         benchmark::DoNotOptimize(a.data());
         benchmark::ClobberMemory();
     }
-    state.SetBytesProcessed(static_cast<std::int64_t>(state.iterations()) * static_cast<std::int64_t>(3 * n * sizeof(double)));
+    state.SetBytesProcessed(static_cast<std::int64_t>(state.iterations()) *
+                            static_cast<std::int64_t>(3 * n * sizeof(double)));
 }
-BENCHMARK(triad)->ArgName("threads")->Arg(1)->Arg(2)->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(triad)->ArgName("threads")->Arg(1)->Arg(2)->MeasureProcessCPUTime()->UseRealTime()->Unit(
+    benchmark::kMillisecond);
 
-/// Loads the file of the arguments (facets, threads, shuffled) with `load(context, path)`, which returns the number of facets.
+/// Loads the file of the arguments (facets, threads, shuffled) with `load(context, path)`, which returns the
+/// number of facets.
 template <class Load>
 void measure(benchmark::State& state, Load&& load) {
     const Files::File& file = files().get(static_cast<std::uint64_t>(state.range(0)), state.range(2) != 0);
@@ -111,7 +120,8 @@ void measure(benchmark::State& state, Load&& load) {
             PeakMemory memory;
             const std::uint64_t facets = load(context, file.path);
             peak = std::max(peak, memory.finish());
-            if (facets != file.facets) stop(file.path + " was read with " + std::to_string(facets) + " facets");
+            if (facets != file.facets)
+                stop(file.path + " was read with " + std::to_string(facets) + " facets");
         } catch (const Error& error) {
             stop(error.what());
         }
@@ -119,7 +129,8 @@ void measure(benchmark::State& state, Load&& load) {
     const double facets = static_cast<double>(file.facets);
     state.counters["facets/s"] = benchmark::Counter(facets, benchmark::Counter::kIsIterationInvariantRate);
     state.counters["anonymous bytes/facet"] = peak / facets;
-    state.SetBytesProcessed(static_cast<std::int64_t>(state.iterations()) * static_cast<std::int64_t>(std::filesystem::file_size(file.path)));
+    state.SetBytesProcessed(static_cast<std::int64_t>(state.iterations()) *
+                            static_cast<std::int64_t>(std::filesystem::file_size(file.path)));
 }
 
 void read_whole(benchmark::State& state) {
@@ -139,7 +150,10 @@ void read_only(benchmark::State& state) {
 }
 
 void sizes(benchmark::internal::Benchmark* bench) {
-    bench->ArgNames({"facets", "threads", "shuffled"})->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
+    bench->ArgNames({"facets", "threads", "shuffled"})
+        ->MeasureProcessCPUTime()
+        ->UseRealTime()
+        ->Unit(benchmark::kMillisecond);
     for (const std::int64_t facets : {100'000, 1'000'000, 10'000'000})
         for (const std::int64_t shuffled : {0, 1})
             for (const std::int64_t threads : {1, 2}) bench->Args({facets, threads, shuffled});

@@ -13,7 +13,8 @@
 
 namespace slabwright {
 
-/// The most anonymous memory (resident, not of a file) while this lives, over what there was before; looked at every millisecond.
+/// The most anonymous memory (resident, not of a file) while this lives, over what there was before; looked
+/// at every millisecond.
 class PeakMemory {
 public:
     PeakMemory() {
@@ -30,7 +31,8 @@ public:
             done_ = true;
             watcher_.join();
         }
-        return static_cast<double>(std::max(0L, peak_ - before_)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+        return static_cast<double>(std::max(0L, peak_ - before_)) *
+               static_cast<double>(::sysconf(_SC_PAGESIZE));
     }
 
 private:

@@ -1,4 +1,5 @@
-// How the time of a whole plan grows: with facets, with the part's size (and so with the length of what is written).
+// How the time of a whole plan grows: with facets, with the part's size (and so with the length of what is
+// written).
 //     build/release/plan_bench --benchmark_counters_tabular=true
 #include <benchmark/benchmark.h>
 
@@ -25,8 +26,8 @@ void plan_metre_pattern(benchmark::State& state) {
     metre_pattern(pattern, [&](const Facet& f) { facets.push_back(f); });
     const Mesh mesh = weld(context, facets);
     if (mesh.facets.size() < pattern.facets) {
-        std::fprintf(stderr, "plan_bench: the pattern has %zu facets, %llu were asked for\n", mesh.facets.size(),
-                     static_cast<unsigned long long>(pattern.facets));
+        std::fprintf(stderr, "plan_bench: the pattern has %zu facets, %llu were asked for\n",
+                     mesh.facets.size(), static_cast<unsigned long long>(pattern.facets));
         std::exit(1);
     }
     Job job;
@@ -47,8 +48,8 @@ void plan_metre_pattern(benchmark::State& state) {
     state.counters["facets"] = static_cast<double>(mesh.facets.size());
     state.counters["moves"] = moves;
     state.counters["cut_m"] = metres;
-    state.counters["facets+moves/s"] =
-        benchmark::Counter(static_cast<double>(mesh.facets.size()) + moves, benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["facets+moves/s"] = benchmark::Counter(static_cast<double>(mesh.facets.size()) + moves,
+                                                          benchmark::Counter::kIsIterationInvariantRate);
 }
 BENCHMARK(plan_metre_pattern)
     ->ArgNames({"size_mm", "facets", "threads"})

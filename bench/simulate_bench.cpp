@@ -109,7 +109,9 @@ void check_gouge_metre_pattern(benchmark::State& state) {
         for (const Program& program : p.input.programs) {
             for (const Tool& tool : p.input.tools) {
                 if (tool.number != program.tool) continue;
-                const GougeReport r = check_gouge(context, part, p.input.layers[static_cast<std::size_t>(program.layer)].z_top, tool, program);
+                const GougeReport r =
+                    check_gouge(context, part, p.input.layers[static_cast<std::size_t>(program.layer)].z_top,
+                                tool, program);
                 motions += static_cast<double>(r.motions), metres += r.length_mm / 1000;
             }
         }
@@ -118,7 +120,13 @@ void check_gouge_metre_pattern(benchmark::State& state) {
     state.counters["motions/s"] = benchmark::Counter(motions, benchmark::Counter::kIsIterationInvariantRate);
     state.counters["m/s"] = benchmark::Counter(metres, benchmark::Counter::kIsIterationInvariantRate);
 }
-BENCHMARK(check_gouge_metre_pattern)->ArgName("threads")->Arg(1)->Arg(2)->Iterations(1)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(check_gouge_metre_pattern)
+    ->ArgName("threads")
+    ->Arg(1)
+    ->Arg(2)
+    ->Iterations(1)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace slabwright

@@ -1,5 +1,5 @@
-// How many segments a second the slicer cuts from a relief (a height field closed to a solid), on one thread and on two.
-// An input that yields no segments stops the program: a benchmark of nothing looks fast.
+// How many segments a second the slicer cuts from a relief (a height field closed to a solid), on one thread
+// and on two. An input that yields no segments stops the program: a benchmark of nothing looks fast.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -16,18 +16,21 @@ namespace {
 
 using namespace slabwright;
 
-/// A closed relief of about `facets` facets, 1 m wide, 20 mm base, waves of three lengths up to 180 mm over it.
+/// A closed relief of about `facets` facets, 1 m wide, 20 mm base, waves of three lengths up to 180 mm over
+/// it.
 Mesh make_relief(Context& context, std::size_t facets) {
-    const auto n = static_cast<std::uint32_t>(std::sqrt(static_cast<double>(facets) / 4));  // a top and a bottom of 2 n² each
+    const auto n = static_cast<std::uint32_t>(
+        std::sqrt(static_cast<double>(facets) / 4));  // a top and a bottom of 2 n² each
     Mesh mesh;
     const std::uint32_t row = n + 1, layer = row * row;
     for (int top = 0; top < 2; ++top) {
         for (std::uint32_t j = 0; j < row; ++j) {
             for (std::uint32_t i = 0; i < row; ++i) {
                 const double x = 1000.0 * i / n, y = 1000.0 * j / n;
-                const double z =
-                    110 + 60 * std::sin(x / 90) * std::cos(y / 110) + 25 * std::sin(x / 23 + y / 31) + 5 * std::cos(x / 5) * std::sin(y / 4);
-                mesh.vertices.push_back({static_cast<float>(x), static_cast<float>(y), top ? static_cast<float>(z) : 0.0f});
+                const double z = 110 + 60 * std::sin(x / 90) * std::cos(y / 110) +
+                                 25 * std::sin(x / 23 + y / 31) + 5 * std::cos(x / 5) * std::sin(y / 4);
+                mesh.vertices.push_back(
+                    {static_cast<float>(x), static_cast<float>(y), top ? static_cast<float>(z) : 0.0f});
             }
         }
     }
@@ -56,7 +59,8 @@ Mesh make_relief(Context& context, std::size_t facets) {
 /// The same facets in random order, as an STL writer may leave them.
 Mesh shuffled(Context& context, Mesh mesh) {
     std::mt19937_64 random(1);
-    for (std::size_t i = mesh.facets.size(); i > 1; --i) std::swap(mesh.facets[i - 1], mesh.facets[random() % i]);
+    for (std::size_t i = mesh.facets.size(); i > 1; --i)
+        std::swap(mesh.facets[i - 1], mesh.facets[random() % i]);
     pair_edges(context, mesh);
     return mesh;
 }
@@ -78,7 +82,8 @@ const Mesh& relief(std::size_t facets, bool shuffle) {
 void slice_relief(benchmark::State& state) {
     const Mesh& mesh = relief(static_cast<std::size_t>(state.range(0)), state.range(3) != 0);
     std::vector<Plane> planes(static_cast<std::size_t>(state.range(1)));
-    for (std::size_t i = 0; i < planes.size(); ++i) planes[i].z = 200.0 * (static_cast<double>(i) + 0.5) / static_cast<double>(planes.size());
+    for (std::size_t i = 0; i < planes.size(); ++i)
+        planes[i].z = 200.0 * (static_cast<double>(i) + 0.5) / static_cast<double>(planes.size());
     Context context({.threads = static_cast<int>(state.range(2))});
     std::size_t segments = 0;
     for (auto _ : state) {
@@ -91,7 +96,8 @@ void slice_relief(benchmark::State& state) {
         }
     }
     state.counters["segments"] = static_cast<double>(segments);
-    state.counters["segments/s"] = benchmark::Counter(static_cast<double>(segments), benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["segments/s"] =
+        benchmark::Counter(static_cast<double>(segments), benchmark::Counter::kIsIterationInvariantRate);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-// How true the time left is that a progress bar shows while a pattern is planned, written and verified: after the first tenth of the
-// progress and of the time, the time that was foretold over the time that it took in the end.
+// How true the time left is that a progress bar shows while a pattern is planned, written and verified: after
+// the first tenth of the progress and of the time, the time that was foretold over the time that it took in
+// the end.
 //     SLABWRIGHT_CORPUS=../shared/corpus build/release/time_left_bench --benchmark_counters_tabular=true
 // Generated patterns, the pump cover, and where SLABWRIGHT_CORPUS is set two of its castings.
 #include <benchmark/benchmark.h>
@@ -49,23 +50,26 @@ double processor_seconds() {
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// The time left that was foretold over the time that it took. By the clock it is what a user sees; by the processor time of all threads it
-/// does not depend on what else the machine does.
+/// The time left that was foretold over the time that it took. By the clock it is what a user sees; by the
+/// processor time of all threads it does not depend on what else the machine does.
 struct Foretold {
     double least = 1e300, most = 0;
-    double left_when_wrong = 0;  ///< the share of all time that was left when it was first wrong by more than a factor of two
+    double left_when_wrong =
+        0;  ///< the share of all time that was left when it was first wrong by more than a factor of two
 
     void add(double at, double total, double fraction) {
         // Neither at the very end, where both are nothing.
         if (fraction < 0.1 || at < 0.1 * total || total - at < 0.02 * total) return;
         const double foretold = at * (1 - fraction) / fraction, was = total - at;
         least = std::min(least, foretold / was), most = std::max(most, foretold / was);
-        if (foretold < was / 2 || foretold > 2 * was) left_when_wrong = std::max(left_when_wrong, was / total);
+        if (foretold < was / 2 || foretold > 2 * was)
+            left_when_wrong = std::max(left_when_wrong, was / total);
     }
 };
 
 /// @param cell_mm between the points of the stock; 0: as fine as the cutters ask for
-void measure(benchmark::State& state, const std::string& stl, const Scratch& scratch, double cell_mm, int threads) {
+void measure(benchmark::State& state, const std::string& stl, const Scratch& scratch, double cell_mm,
+             int threads) {
     Foretold clock, processor;
     bool falls = false;
     for (auto _ : state) {
@@ -75,15 +79,18 @@ void measure(benchmark::State& state, const std::string& stl, const Scratch& scr
             double clock_s, processor_s, fraction;
         };
         const auto now = [&](double fraction) {
-            return Shown{std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), processor_seconds() - begin_s, fraction};
+            return Shown{std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(),
+                         processor_seconds() - begin_s, fraction};
         };
         std::vector<Shown> shown;
-        Context context({.threads = threads, .progress = [&](const Progress& p) { shown.push_back(now(p.fraction)); }});
+        Context context(
+            {.threads = threads, .progress = [&](const Progress& p) { shown.push_back(now(p.fraction)); }});
         context.share_progress(0, kPlanningShare);
         Job job;
         job.allow_undercut = true;
         const Plan planned = plan(context, stl, job);
-        const VerifyResult result = write_verified(context, planned, (scratch.path / "out").string(), stl, cell_mm);
+        const VerifyResult result =
+            write_verified(context, planned, (scratch.path / "out").string(), stl, cell_mm);
         if (!result.passed) state.SkipWithError("the plan does not make the part");
         const Shown end = now(1);
         double last = 0;
@@ -128,9 +135,11 @@ void time_left_of_part(benchmark::State& state, const std::string& stl) {
 void add_parts() {
     std::vector<std::string> parts{"tests/data/pump-cover.stl"};
     if (const char* const corpus = std::getenv("SLABWRIGHT_CORPUS"); corpus != nullptr)
-        for (const char* const part : {"bearing_block", "casting_cover"}) parts.push_back((fs::path(corpus) / "castings" / part).string() + ".stl");
+        for (const char* const part : {"bearing_block", "casting_cover"})
+            parts.push_back((fs::path(corpus) / "castings" / part).string() + ".stl");
     for (const std::string& part : parts)
-        benchmark::RegisterBenchmark(("time_left_of_part/" + fs::path(part).stem().string()).c_str(), time_left_of_part, part)
+        benchmark::RegisterBenchmark(("time_left_of_part/" + fs::path(part).stem().string()).c_str(),
+                                     time_left_of_part, part)
             ->Iterations(1)
             ->UseRealTime()
             ->Unit(benchmark::kSecond);

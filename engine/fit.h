@@ -12,10 +12,11 @@ namespace slabwright {
 /// The Error(no_plan) of a part that cannot be made.
 [[nodiscard]] Error refusal(const char* code, std::string message, std::string place, std::string remedy);
 
-/// Sets the plan's stock: the pattern's outline and the job's margin around it, no larger than a slab, and such that the machine reaches
-/// all of it.
+/// Sets the plan's stock: the pattern's outline and the job's margin around it, no larger than a slab, and
+/// such that the machine reaches all of it.
 /// @param box of the pattern, mm
-/// @throws Error(no_plan) "fit.slab", "fit.travel", "fit.flask" or "fit.chamber", saying by how many mm it is too large
+/// @throws Error(no_plan) "fit.slab", "fit.travel", "fit.flask" or "fit.chamber", saying by how many mm it is
+/// too large
 void place_stock(Plan& plan, const Box3& box);
 
 /// @throws Error(no_plan, "fit.travel") where a program leaves the machine's travel, arcs included

@@ -24,9 +24,9 @@ void require(const std::string& key, double value, double low, double high, Ends
     const bool low_ok = ends == Ends::closed ? value >= low : value > low;
     const bool high_ok = ends == Ends::open_both ? value < high : value <= high;
     if (low_ok && high_ok) return;  // a NaN fails both
-    refuse(
-        key, fmt::format("{} is {}, out of range", key, value),
-        fmt::format("give a number {} {} and {} {}", ends == Ends::closed ? "from" : "over", low, ends == Ends::open_both ? "under" : "up to", high));
+    refuse(key, fmt::format("{} is {}, out of range", key, value),
+           fmt::format("give a number {} {} and {} {}", ends == Ends::closed ? "from" : "over", low,
+                       ends == Ends::open_both ? "under" : "up to", high));
 }
 
 void validate_tool(const Tool& tool, std::size_t position) {
@@ -37,7 +37,9 @@ void validate_tool(const Tool& tool, std::size_t position) {
     require(key("shank_diameter"), tool.shank_diameter, 0, 1000, Ends::open_low);
     require(key("stickout"), tool.stickout, 0, 2000, Ends::open_low);
     if (tool.stickout < tool.flute_length)
-        refuse(key("stickout"), fmt::format("{} is {}, less than the flute length {}", key("stickout"), tool.stickout, tool.flute_length),
+        refuse(key("stickout"),
+               fmt::format("{} is {}, less than the flute length {}", key("stickout"), tool.stickout,
+                           tool.flute_length),
                "give the length from the holder's nose to the tip");
     require(key("holder_diameter"), tool.holder_diameter, 0, 1000, Ends::open_low);
     require(key("flutes"), tool.flutes, 1, 100);
@@ -48,20 +50,23 @@ void validate_tool(const Tool& tool, std::size_t position) {
     require(key("stepdown_min"), tool.stepdown_min, 0, 1000);
     require(key("stepdown_max"), tool.stepdown_max, 0, 1000, Ends::open_low);
     if (tool.stepdown_max < tool.stepdown_min)
-        refuse(key("stepdown_max"), fmt::format("{} is {}, less than stepdown_min {}", key("stepdown_max"), tool.stepdown_max, tool.stepdown_min),
+        refuse(key("stepdown_max"),
+               fmt::format("{} is {}, less than stepdown_min {}", key("stepdown_max"), tool.stepdown_max,
+                           tool.stepdown_min),
                "swap the two");
     require(key("stepover"), tool.stepover, 0, 1, Ends::open_low);
     require(key("strength_mpa"), tool.strength_mpa, 0, 1e5);
 }
 
-// A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the bottom.
+// A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the
+// bottom.
 bool reaches_down(const Tool& tool) { return tool.kind == ToolKind::flat || tool.kind == ToolKind::ball; }
 
 }  // namespace
 
 double max_layer_of(const Job& job, const Tool& tool) {
-    // To touch a wall of slope a at the layer's bottom, a ball's tip passes it by R(1 - cos a); walls steeper than
-    // the vertical limit go to the flat end mill, which stops at the bottom.
+    // To touch a wall of slope a at the layer's bottom, a ball's tip passes it by R(1 - cos a); walls steeper
+    // than the vertical limit go to the flat end mill, which stops at the bottom.
     const double steepest = job.cutting.vertical_deg * std::numbers::pi / 180;
     const double overrun = tool.kind == ToolKind::ball ? tool.diameter / 2 * (1 - std::cos(steepest)) : 0.0;
     return tool.flute_length - overrun - job.cutting.holder_clearance;
@@ -86,26 +91,34 @@ double max_layer_of_longest(const Job& job) {
 Job with_tools_for(const Job& job, double height) {
     Job fitted = job;
     constexpr double same = 1e-3;  // mm; layers keep to their limits within less
-    std::erase_if(fitted.tools, [&](const Tool& tool) { return reaches_down(tool) && max_layer_of(job, tool) < height - same; });
+    std::erase_if(fitted.tools, [&](const Tool& tool) {
+        return reaches_down(tool) && max_layer_of(job, tool) < height - same;
+    });
     return fitted;
 }
 
 double max_layer_thickness(const Job& job) {
-    const double slab = job.slabs.thicknesses.empty() ? 0 : *std::max_element(job.slabs.thicknesses.begin(), job.slabs.thicknesses.end());
+    const double slab = job.slabs.thicknesses.empty()
+                            ? 0
+                            : *std::max_element(job.slabs.thicknesses.begin(), job.slabs.thicknesses.end());
     return std::min(slab - job.slabs.facing_allowance, max_bonded_layer_thickness(job));
 }
 
 double rough_blend(const Cutting& cutting) {
-    return std::max(kJunction, std::min(cutting.rough_blend, std::min(cutting.wall_allowance, cutting.floor_allowance) / 3));
+    return std::max(kJunction, std::min(cutting.rough_blend,
+                                        std::min(cutting.wall_allowance, cutting.floor_allowance) / 3));
 }
 
-double rough_fit(const Cutting& cutting) { return std::min(cutting.wall_allowance, cutting.floor_allowance) / 15; }
+double rough_fit(const Cutting& cutting) {
+    return std::min(cutting.wall_allowance, cutting.floor_allowance) / 15;
+}
 
 double least_flask_gap(const Job& job) {
     constexpr double kRoom = 2.5;  // mm: the leads of finish passes swing out by 2
     double widest = 0;
     for (const Tool& tool : job.tools)
-        if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball) widest = std::max(widest, tool.diameter);
+        if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball)
+            widest = std::max(widest, tool.diameter);
     return widest + job.cutting.wall_allowance + kRoom;
 }
 
@@ -125,10 +138,13 @@ bool plunges_by_default(ToolKind kind) { return kind == ToolKind::ball || kind =
 const Tool& tool_of_kind(const Job& job, ToolKind kind) {
     static constexpr const char* words[] = {"flat end mill", "ball end mill", "face mill", "drill"};
     static constexpr const char* keys[] = {"flat", "ball", "face", "drill"};
-    const auto found = std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& tool) { return tool.kind == kind; });
+    const auto found =
+        std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& tool) { return tool.kind == kind; });
     if (found != job.tools.end()) return *found;
-    throw Error(ErrorKind::usage, "job.tool", fmt::format("the tool library has no {}", words[static_cast<int>(kind)]), "tool",
-                fmt::format("add a [[tool]] with kind = \"{}\" to the job file", keys[static_cast<int>(kind)]));
+    throw Error(
+        ErrorKind::usage, "job.tool",
+        fmt::format("the tool library has no {}", words[static_cast<int>(kind)]), "tool",
+        fmt::format("add a [[tool]] with kind = \"{}\" to the job file", keys[static_cast<int>(kind)]));
 }
 
 void validate(const Job& job) {
@@ -143,11 +159,14 @@ void validate(const Job& job) {
     require("material.kfe", m.kfe, 0, 100000);
 
     const Slabs& s = job.slabs;
-    if (s.thicknesses.empty()) refuse("slabs.thicknesses", "slabs.thicknesses is empty", "list the thicknesses in stock, e.g. [19.0]");
+    if (s.thicknesses.empty())
+        refuse("slabs.thicknesses", "slabs.thicknesses is empty",
+               "list the thicknesses in stock, e.g. [19.0]");
     for (std::size_t i = 0; i < s.thicknesses.size(); ++i) {
         require("slabs.thicknesses", s.thicknesses[i], 0, 1000, Ends::open_low);
         if (i > 0 && !(s.thicknesses[i] > s.thicknesses[i - 1]))
-            refuse("slabs.thicknesses", fmt::format("slabs.thicknesses has {} after {}", s.thicknesses[i], s.thicknesses[i - 1]),
+            refuse("slabs.thicknesses",
+                   fmt::format("slabs.thicknesses has {} after {}", s.thicknesses[i], s.thicknesses[i - 1]),
                    "list them in ascending order, each once");
     }
     require("slabs.length", s.length, 0, 100000, Ends::open_low);
@@ -156,7 +175,8 @@ void validate(const Job& job) {
     require("slabs.facing_allowance", s.facing_allowance, 0, 1000);
     if (s.facing_allowance >= s.thicknesses.front())
         refuse("slabs.facing_allowance",
-               fmt::format("slabs.facing_allowance is {}: nothing is left of the {} mm slab", s.facing_allowance, s.thicknesses.front()),
+               fmt::format("slabs.facing_allowance is {}: nothing is left of the {} mm slab",
+                           s.facing_allowance, s.thicknesses.front()),
                "face off less, or take that slab out of the list");
 
     const Machine& c = job.machine;
@@ -202,7 +222,8 @@ void validate(const Job& job) {
     require("layers.halving_resolution", l.halving_resolution, 0, 1000, Ends::open_low);
     if (l.halving_resolution > l.halving_coarse)
         refuse("layers.halving_resolution",
-               fmt::format("layers.halving_resolution is {}, over halving_coarse {}", l.halving_resolution, l.halving_coarse),
+               fmt::format("layers.halving_resolution is {}, over halving_coarse {}", l.halving_resolution,
+                           l.halving_coarse),
                "halving starts at the coarse spacing and ends at the resolution");
 
     const Cutting& k = job.cutting;
@@ -213,7 +234,9 @@ void validate(const Job& job) {
     require("cutting.overlap_deg", k.overlap_deg, 0, 45);
     require("cutting.vertical_deg", k.vertical_deg, 45, 90);
     if (k.vertical_deg <= k.steep_limit_deg)
-        refuse("cutting.vertical_deg", fmt::format("cutting.vertical_deg is {}, not over steep_limit_deg {}", k.vertical_deg, k.steep_limit_deg),
+        refuse("cutting.vertical_deg",
+               fmt::format("cutting.vertical_deg is {}, not over steep_limit_deg {}", k.vertical_deg,
+                           k.steep_limit_deg),
                "vertical walls are steeper than steep ones");
     require("cutting.min_stepdown", k.min_stepdown, 0, 100, Ends::open_low);
     require("cutting.min_stepover", k.min_stepover, 0, 100, Ends::open_low);
@@ -234,24 +257,33 @@ void validate(const Job& job) {
     require("flask.wall", f.wall, 0, 10000, Ends::open_low);
     require("flask.draft_deg", f.draft_deg, 0, 45);
     if (f.enabled && f.gap < least_flask_gap(job))
-        refuse("flask.gap", fmt::format("flask.gap is {}: the cutters do not pass between pattern and flask", f.gap),
-               fmt::format("give at least {} (the widest end mill, the wall allowance and room)", least_flask_gap(job)));
+        refuse("flask.gap",
+               fmt::format("flask.gap is {}: the cutters do not pass between pattern and flask", f.gap),
+               fmt::format("give at least {} (the widest end mill, the wall allowance and room)",
+                           least_flask_gap(job)));
     if (f.enabled && !(f.wall > 2 * b.edge_setback))
-        refuse("flask.wall", fmt::format("flask.wall is {}: glue that keeps {} mm from every edge finds no place on it", f.wall, b.edge_setback),
+        refuse("flask.wall",
+               fmt::format("flask.wall is {}: glue that keeps {} mm from every edge finds no place on it",
+                           f.wall, b.edge_setback),
                fmt::format("give more than {}, or less bonding.edge_setback", 2 * b.edge_setback));
 
-    if (job.tools.empty()) throw Error(ErrorKind::usage, "job.tool", "the tool library is empty", "tool", "add a [[tool]] to the job file");
+    if (job.tools.empty())
+        throw Error(ErrorKind::usage, "job.tool", "the tool library is empty", "tool",
+                    "add a [[tool]] to the job file");
     for (std::size_t i = 0; i < job.tools.size(); ++i) {
         validate_tool(job.tools[i], i);
         for (std::size_t j = 0; j < i; ++j)
             if (job.tools[j].number == job.tools[i].number)
-                refuse(fmt::format("tool[{}].number", i + 1), fmt::format("tool number {} appears twice", job.tools[i].number),
+                refuse(fmt::format("tool[{}].number", i + 1),
+                       fmt::format("tool number {} appears twice", job.tools[i].number),
                        "number each tool once");
     }
     const double tallest = max_layer_thickness(job);
     if (!(tallest > 0) || tallest < l.min_layer)
         throw Error(ErrorKind::usage, "job.no_layer",
-                    fmt::format("the tallest layer that these slabs and tools can cut is {:.3f} mm, under layers.min_layer {}", tallest, l.min_layer),
+                    fmt::format("the tallest layer that these slabs and tools can cut is {:.3f} mm, under "
+                                "layers.min_layer {}",
+                                tallest, l.min_layer),
                     "", "take thicker slabs or tools with longer flutes, or lower the minimum");
 }
 

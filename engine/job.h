@@ -1,6 +1,6 @@
-// What the user decides: material, slabs, machine, tools, tolerances, strategy. Every default plans a 0.75 in MDF
-// pattern on the 1160 mm machine of the RPM paper. Millimetres, newtons, seconds and millimetres a minute, unless a
-// name says otherwise. The TOML spelling of every key is io/job_toml.
+// What the user decides: material, slabs, machine, tools, tolerances, strategy. Every default plans a 0.75 in
+// MDF pattern on the 1160 mm machine of the RPM paper. Millimetres, newtons, seconds and millimetres a
+// minute, unless a name says otherwise. The TOML spelling of every key is io/job_toml.
 #pragma once
 
 #include <cstdint>
@@ -14,28 +14,33 @@
 namespace slabwright {
 
 enum class LengthUnit : std::uint8_t { mm, inch };
-/// Boundaries as printed (LUO 4.2.5), by the dynamic program, or, slabs bonded to any thickness, those with which the whole build takes least.
+/// Boundaries as printed (LUO 4.2.5), by the dynamic program, or, slabs bonded to any thickness, those with
+/// which the whole build takes least.
 enum class LayerStrategy : std::uint8_t { printed, optimal, combined };
 enum class Frame : std::uint8_t { pattern_base, layer_top };
-/// Which slopes level contours finish and which projected paths do (SHAPING 5): each its own side of the steep limit, one of
-/// them everything, or both everything, each in the steps that it needs at the limit.
+/// Which slopes level contours finish and which projected paths do (SHAPING 5): each its own side of the
+/// steep limit, one of them everything, or both everything, each in the steps that it needs at the limit.
 enum class FinishStrategy : std::uint8_t { split, levels, projection, both };
-/// Projected paths run on parallel lines, or on curves offset again and again from the border of what they finish.
+/// Projected paths run on parallel lines, or on curves offset again and again from the border of what they
+/// finish.
 enum class Projection : std::uint8_t { raster, offset };
-/// What a cut is taken to meet: what the operations before have left standing, or the most that its steps can leave it.
+/// What a cut is taken to meet: what the operations before have left standing, or the most that its steps can
+/// leave it.
 enum class Engagement : std::uint8_t { simulated, nominal };
-/// How roughing clears a level: in rings offset again and again from what stays, or on parallel lines to and fro.
+/// How roughing clears a level: in rings offset again and again from what stays, or on parallel lines to and
+/// fro.
 enum class RoughPattern : std::uint8_t { contour, zigzag };
-/// How what a cutter leaves is cleared before and after finishing: where it stands, on the lines of a raster; or on contours, the feet of
-/// steep walls too, and what level contours take by the way is left to them. By default contours where the library has more than
-/// one flat or one ball end mill.
+/// How what a cutter leaves is cleared before and after finishing: where it stands, on the lines of a raster;
+/// or on contours, the feet of steep walls too, and what level contours take by the way is left to them. By
+/// default contours where the library has more than one flat or one ball end mill.
 enum class RestPattern : std::uint8_t { by_library, raster, contour };
 /// Whether tools are chosen layer by layer (LUO 5.5), or every layer is cut with the fixed set.
 enum class SelectionMode : std::uint8_t { select, fixed };
-/// How much of a layer a tool reaches: by the length of its sections that a disc of the tool's radius touches; by area in 3D, shank and
-/// holder included; or by length on sections as printed (LUO 5.5.1).
+/// How much of a layer a tool reaches: by the length of its sections that a disc of the tool's radius
+/// touches; by area in 3D, shank and holder included; or by length on sections as printed (LUO 5.5.1).
 enum class AccessRule : std::uint8_t { sections, exact, printed };
-/// The L from which the roughing stepdown follows (LUO 5.5.3.3): the finish tool's radius, tolerances.rough_cusp, or the smaller.
+/// The L from which the roughing stepdown follows (LUO 5.5.3.3): the finish tool's radius,
+/// tolerances.rough_cusp, or the smaller.
 enum class RoughLimit : std::uint8_t { smaller, finish_radius, cusp };
 enum class ToolKind : std::uint8_t { flat, ball, face, drill };
 
@@ -59,25 +64,28 @@ struct Tool {
     double stepdown_min = 0, stepdown_max = 0;  ///< LUO table 5.4
     double stepover = 0.5;                      ///< share of the diameter, for clearing
     bool plunges = false;                       ///< cuts straight down into stock (plunges_by_default)
-    double strength_mpa = 0;                    ///< the cutter's own in bending, as its maker states it; 0: not checked
+    double strength_mpa = 0;  ///< the cutter's own in bending, as its maker states it; 0: not checked
 };
 
 struct Material {
     std::string name = "MDF";
-    double strength_mpa = 27;            ///< LUO 6.5.2
-    double min_thickness = 0.2 * kInch;  ///< MTmin, thinnest material above a boundary; 0: from the cutters' forces
-    double shallow_limit_deg = 15;       ///< Type III
+    double strength_mpa = 27;  ///< LUO 6.5.2
+    double min_thickness =
+        0.2 * kInch;  ///< MTmin, thinnest material above a boundary; 0: from the cutters' forces
+    double shallow_limit_deg = 15;  ///< Type III
     double density_kg_m3 = 750;
-    double ktc = 8.8575, kte = 1.1268, kfc = 0.6188, kfe = 2.4948;         ///< LUO 6.5.1: N/mm², N/mm, from orthogonal cutting
+    double ktc = 8.8575, kte = 1.1268, kfc = 0.6188,
+           kfe = 2.4948;  ///< LUO 6.5.1: N/mm², N/mm, from orthogonal cutting
     std::string source = "Luo 6.5.1: orthogonal cutting of MDF (Dippon)";  ///< of these four, in words
-    CoefficientTransform transform = CoefficientTransform::oblique;        ///< how they become those of a helical edge
+    CoefficientTransform transform =
+        CoefficientTransform::oblique;  ///< how they become those of a helical edge
 };
 
 struct Slabs {
     std::vector<double> thicknesses{19.0};  ///< in stock, ascending
     double length = 1160, width = 1160;     ///< the largest slab, x and y
-    double margin = 25.4;                   ///< the stock reaches this far past the pattern, where the slab allows
-    double facing_allowance = 0.5;          ///< the face mill takes at least this off, to find the whole slab
+    double margin = 25.4;           ///< the stock reaches this far past the pattern, where the slab allows
+    double facing_allowance = 0.5;  ///< the face mill takes at least this off, to find the whole slab
 };
 
 struct Machine {
@@ -114,7 +122,8 @@ struct Tolerances {
     double undercut = 0.25;             ///< an undercut that leaves less than this is a remark, not a refusal
     double gap = 0;                     ///< open chains this near are closed, and reported
     double weld = 0;                    ///< vertices this near are merged, and reported; 0: bit-exact only
-    double simplify = 0.1;  ///< share of `gouge` that 200 000 facets and more may be made fewer for, under the paths; 0: the facets as they are
+    double simplify = 0.1;  ///< share of `gouge` that 200 000 facets and more may be made fewer for, under
+                            ///< the paths; 0: the facets as they are
 };
 
 struct LayerPlanning {
@@ -132,31 +141,38 @@ inline constexpr double kJunction = 0.02;
 
 struct Cutting {
     double wall_allowance = 0.3, floor_allowance = 0.3;  ///< left by roughing
-    double rough_blend = 0.1;                            ///< by which corners of its paths may be rounded: see rough_blend()
-    double steep_limit_deg = 45;                         ///< level contours from here up, projected raster below
-    double overlap_deg = 2;                              ///< both cut this far past the limit
-    double vertical_deg = 89.5;                          ///< walls from here up go to the flat end mill
-    double min_stepdown = 0.2, min_stepover = 0.2;       ///< floors of the finish steps; reported where they bite
-    double min_flat_area = 4.0;                          ///< mm²; smaller up-facing flats get no level of their own, the ball covers them
-    double face_depth = 4.0;                             ///< deepest face-milling step
-    double ramp_deg = 5;                                 ///< entry into stock
+    double rough_blend = 0.1;     ///< by which corners of its paths may be rounded: see rough_blend()
+    double steep_limit_deg = 45;  ///< level contours from here up, projected raster below
+    double overlap_deg = 2;       ///< both cut this far past the limit
+    double vertical_deg = 89.5;   ///< walls from here up go to the flat end mill
+    double min_stepdown = 0.2, min_stepover = 0.2;  ///< floors of the finish steps; reported where they bite
+    double min_flat_area =
+        4.0;  ///< mm²; smaller up-facing flats get no level of their own, the ball covers them
+    double face_depth = 4.0;  ///< deepest face-milling step
+    double ramp_deg = 5;      ///< entry into stock
     RoughPattern rough_pattern = RoughPattern::contour;
     RestPattern rest_pattern = RestPattern::contour;
-    bool open_waste = true;       ///< contour roughing leaves what lies open from beside the stock to the face mill
-    bool climb = true;            ///< contour roughing keeps the stock on its right everywhere; false: either way, where that is shorter
+    bool open_waste =
+        true;           ///< contour roughing leaves what lies open from beside the stock to the face mill
+    bool climb = true;  ///< contour roughing keeps the stock on its right everywhere; false: either way,
+                        ///< where that is shorter
     double max_engagement = 0.7;  ///< share of the diameter that roughing meets at its full feed; 1: a slot
     double holder_clearance = 2.0;
     double finish_feed = 5000;
     FinishStrategy finish_strategy = FinishStrategy::split;
     Projection projection = Projection::raster;
-    bool uniform_steps = false;  ///< one stepdown and one step-over a layer, for its worst slope, and nothing cut again (SHAPING 3, to compare)
+    bool uniform_steps = false;  ///< one stepdown and one step-over a layer, for its worst slope, and nothing
+                                 ///< cut again (SHAPING 3, to compare)
     Engagement engagement = Engagement::simulated;  ///< from which the forces are computed
-    bool adapt_feed = true;                         ///< feeds by chip load and deflection (engine/forces/feeds.h), where engagement is simulated
-    bool adapt_stepdown = true;                     ///< deep cuts in several passes where no feed will do (engine/forces/feeds.h), likewise
-    bool arcs = true;                               ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
+    bool adapt_feed =
+        true;  ///< feeds by chip load and deflection (engine/forces/feeds.h), where engagement is simulated
+    bool adapt_stepdown =
+        true;  ///< deep cuts in several passes where no feed will do (engine/forces/feeds.h), likewise
+    bool arcs = true;  ///< arcs (G2, G3) where the path turns evenly, within the gouge tolerance
 };
 
-/// Choosing tools for a layer (engine/tools/select). With one flat and one ball end mill in the library there is nothing to choose.
+/// Choosing tools for a layer (engine/tools/select). With one flat and one ball end mill in the library there
+/// is nothing to choose.
 struct ToolSelection {
     SelectionMode mode = SelectionMode::select;
     AccessRule accessibility = AccessRule::sections;
@@ -191,15 +207,15 @@ struct Job {
     /// The fixed set: face mill, 1/2 in flat end mill, 1/4 in ball end mill (LUO's comparison set).
     std::vector<Tool> tools{
         {1, ToolKind::face, "face mill 50 mm", 50, 20, 20, 60, 60, 4, 0.0, 12000, 9000, 1000, 0.1, 4.0, 0.6},
-        {2, ToolKind::flat, "flat end mill 1/2 in", 0.5 * kInch, 32, 0.5 * kInch, 50, 40, 2, std::numbers::pi / 6, 18000, 9000, 1500, 0.1 * kInch,
-         0.15 * kInch, 0.5},
-        {3, ToolKind::ball, "ball end mill 1/4 in", 0.25 * kInch, 30, 0.25 * kInch, 45, 32, 2, std::numbers::pi / 6, 18000, 9000, 1500,
-         0.0625 * kInch, 0.125 * kInch, 0.5, true},
+        {2, ToolKind::flat, "flat end mill 1/2 in", 0.5 * kInch, 32, 0.5 * kInch, 50, 40, 2,
+         std::numbers::pi / 6, 18000, 9000, 1500, 0.1 * kInch, 0.15 * kInch, 0.5},
+        {3, ToolKind::ball, "ball end mill 1/4 in", 0.25 * kInch, 30, 0.25 * kInch, 45, 32, 2,
+         std::numbers::pi / 6, 18000, 9000, 1500, 0.0625 * kInch, 0.125 * kInch, 0.5, true},
     };
 };
 
-/// The tallest layer this job can cut (LTmax, method.md section 4): the thickest slab less the facing allowance, and for
-/// every tool its flutes less overrun and holder clearance.
+/// The tallest layer this job can cut (LTmax, method.md section 4): the thickest slab less the facing
+/// allowance, and for every tool its flutes less overrun and holder clearance.
 [[nodiscard]] double max_layer_thickness(const Job& job);
 
 /// The same where slabs may be bonded into one: the slabs' thickness is no limit then, but the flutes are.
@@ -214,22 +230,23 @@ struct Job {
 /// The job without those flat and ball end mills that do not make a layer of this height.
 [[nodiscard]] Job with_tools_for(const Job& job, double height);
 
-/// By how much the machine may round corners of roughing paths, mm: Cutting::rough_blend, but no more than a third of what roughing leaves,
-/// and no less than everywhere else (kJunction).
+/// By how much the machine may round corners of roughing paths, mm: Cutting::rough_blend, but no more than a
+/// third of what roughing leaves, and no less than everywhere else (kJunction).
 [[nodiscard]] double rough_blend(const Cutting& cutting);
 
-/// By how much arcs and longer chords of roughing paths may leave what they are fitted to, mm: a fifteenth of what roughing leaves.
+/// By how much arcs and longer chords of roughing paths may leave what they are fitted to, mm: a fifteenth of
+/// what roughing leaves.
 [[nodiscard]] double rough_fit(const Cutting& cutting);
 
-/// The narrowest flask.gap in which every flat and ball end mill of the job passes between pattern and flask: the widest
-/// cutter, what roughing leaves on the pattern's walls, and room for leads.
+/// The narrowest flask.gap in which every flat and ball end mill of the job passes between pattern and flask:
+/// the widest cutter, what roughing leaves on the pattern's walls, and room for leads.
 [[nodiscard]] double least_flask_gap(const Job& job);
 
 /// What the job asks of the feature finders.
 [[nodiscard]] FeatureOptions feature_options(const Job& job);
 
-/// Whether tools of a kind mill straight down unless the job says otherwise: ball end mills and drills do; the edges of a face
-/// mill do not reach its middle, nor do those of many flat end mills.
+/// Whether tools of a kind mill straight down unless the job says otherwise: ball end mills and drills do;
+/// the edges of a face mill do not reach its middle, nor do those of many flat end mills.
 [[nodiscard]] bool plunges_by_default(ToolKind kind);
 
 /// The first tool of a kind. @throws Error(usage, "job.tool") when the library has none

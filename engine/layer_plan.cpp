@@ -19,7 +19,8 @@ namespace slabwright {
 namespace {
 
 constexpr double kSelectionShare = 0.3;  // of a layer's work, where its tools are chosen
-constexpr double kFirstSetsShare = 0.4;  // of what then remains, the sets of the choice; those that they lead to take the rest
+constexpr double kFirstSetsShare =
+    0.4;  // of what then remains, the sets of the choice; those that they lead to take the rest
 
 // A layer as one set of tools makes it, with the forces of its programs and the feeds that they allow.
 struct Trial {
@@ -58,7 +59,8 @@ public:
           overrun_(overrun_of(ground.plan.job)),
           progress_(progress) {
         const Plan& plan = ground.plan;
-        near_ = part_between(context, ground.mesh, layer_.z_bottom - std::max(overrun_.below, overrun_.board), layer_.z_top);
+        near_ = part_between(context, ground.mesh, layer_.z_bottom - std::max(overrun_.below, overrun_.board),
+                             layer_.z_top);
         work_.mesh = near_.view();
         work_.job = &fitted_;
         work_.z_bottom = layer_.z_bottom;
@@ -72,7 +74,8 @@ public:
         fitted_.tolerances.gouge -= ground.mesh_gap;
         work_.flats = flats_between(layer_.z_bottom);
         work_.floor_below = layer_.z_bottom - (ground.carried_by ? overrun_.below : overrun_.board);
-        if (ground.carried_by) overhang_ = overhang_map({&ground.carried_by, 1}, plan.stock_min, plan.stock_max);
+        if (ground.carried_by)
+            overhang_ = overhang_map({&ground.carried_by, 1}, plan.stock_min, plan.stock_max);
     }
 
     PlannedLayer run() {
@@ -81,13 +84,15 @@ public:
         if (!selecting || compare) sets_.push_back({"fixed", fixed_tools(fitted_)});
         if (selecting) choose();
         const bool may_widen = selecting && compare && !selection_->vertical;
-        const double chosen_at = selecting ? kSelectionShare : 0, middle = may_widen ? chosen_at + kFirstSetsShare * (1 - chosen_at) : 1;
+        const double chosen_at = selecting ? kSelectionShare : 0,
+                     middle = may_widen ? chosen_at + kFirstSetsShare * (1 - chosen_at) : 1;
         progress_.reach(chosen_at);
         try_sets(0, chosen_at, middle);
         if (may_widen) {
             // Of the sets planned so far the best, with a wider roughing cutter.
             const std::size_t first = sets_.size();
-            for (LayerTools& tools : with_wider_rough(context_, work_, sets_[chosen_].tools)) sets_.push_back({"wider rough", std::move(tools)});
+            for (LayerTools& tools : with_wider_rough(context_, work_, sets_[chosen_].tools))
+                sets_.push_back({"wider rough", std::move(tools)});
             try_sets(first, middle, 1);
         }
         if (selection_) give_reasons();
@@ -106,7 +111,9 @@ private:
     [[nodiscard]] std::vector<Flat> flats_between(double z) const {
         std::vector<Flat> flats;
         for (const Feature& f : ground_.plan.features) {
-            if (f.type != FeatureType::up_flat || f.area < fitted_.cutting.min_flat_area || f.z_low >= layer_.z_top || f.z_low <= z) continue;
+            if (f.type != FeatureType::up_flat || f.area < fitted_.cutting.min_flat_area ||
+                f.z_low >= layer_.z_top || f.z_low <= z)
+                continue;
             Flat& flat = flats.emplace_back(Flat{f.z_low, f.z_low});
             for (const std::uint32_t facet : f.facets)
                 for (const std::uint32_t v : ground_.pattern.facets[facet])
@@ -118,10 +125,12 @@ private:
     void choose() {
         ToolChoice choice = select_tools(context_, work_, reach_ratio(context_, work_, ground_.scene));
         std::optional<Tool> wider;
-        if (fitted_.selection.compare && !choice.record.vertical) wider = next_wider_ball(fitted_, choice.tools.finish);
+        if (fitted_.selection.compare && !choice.record.vertical)
+            wider = next_wider_ball(fitted_, choice.tools.finish);
         sets_.push_back({"selected", std::move(choice.tools)});
         selection_ = std::move(choice.record);
-        // One narrow place may have decided for the whole layer: the next wider finish tool, with smaller ones in that place only.
+        // One narrow place may have decided for the whole layer: the next wider finish tool, with smaller
+        // ones in that place only.
         if (wider) sets_.push_back({"wider", select_tools(context_, work_, {}, wider).tools});
     }
 
@@ -131,25 +140,32 @@ private:
         for (std::size_t s = first; s < sets_.size(); ++s) {
             const double at = from + step * static_cast<double>(s - first);
             ProgressPart part(progress_, at, at + step);
-            // Adapted feeds seldom make a plan faster by so much; a set that is given up for it is not proven slower.
+            // Adapted feeds seldom make a plan faster by so much; a set that is given up for it is not proven
+            // slower.
             constexpr double kHopeless = 1.5;
-            judge(s, plan_with(sets_[s].tools, best_ ? kHopeless * best_->minutes : std::numeric_limits<double>::infinity(), part));
+            judge(s, plan_with(sets_[s].tools,
+                               best_ ? kHopeless * best_->minutes : std::numeric_limits<double>::infinity(),
+                               part));
             part.reach(1);
         }
     }
 
-    // @param most minutes: where the paths alone take longer at the feeds they are planned with, they are not followed any further
+    // @param most minutes: where the paths alone take longer at the feeds they are planned with, they are not
+    // followed any further
     Trial plan_with(const LayerTools& tools, double most, ProgressPart& part) {
         const Job& job = ground_.plan.job;
         work_.tools = tools;
         work_.progress = &part;
         const double below = tools.finish.diameter / 2;
-        const double board = job.machine.base_board_cut >= 0 ? overrun_.board : std::min(below, overrun_.board);
+        const double board =
+            job.machine.base_board_cut >= 0 ? overrun_.board : std::min(below, overrun_.board);
         work_.floor_below = layer_.z_bottom - (ground_.carried_by ? below : board);
         work_.feet = flats_between(work_.floor_below);
         work_.most_minutes = most;
         work_.last_steps =
-            overhang_ ? last_rough_steps(job, tools.rough, overhang_->largest() + job.bonding.edge_setback, layer_.z_top - layer_.z_bottom) : 0;
+            overhang_ ? last_rough_steps(job, tools.rough, overhang_->largest() + job.bonding.edge_setback,
+                                         layer_.z_top - layer_.z_bottom)
+                      : 0;
         LayerResult result = plan_layer_paths(context_, work_);
         Trial trial;
         Layer& layer = trial.planned.layer = layer_;
@@ -163,9 +179,10 @@ private:
         const bool compared = selection_ || sets_.size() > 1;  // else nobody asks for its time
         if (compared) trial.minutes = minutes_of(layer, job.machine);
         trial.whole = !result.given_up && trial.minutes <= most;
-        if (!trial.whole || trial.leaves_more || job.cutting.engagement != Engagement::simulated) return trial;
-        trial.planned.cuts =
-            adapt_layer(context_, layer, ground_.plan, overhang_ ? &*overhang_ : nullptr, trial.planned.diagnostics, ground_.known_cuts);
+        if (!trial.whole || trial.leaves_more || job.cutting.engagement != Engagement::simulated)
+            return trial;
+        trial.planned.cuts = adapt_layer(context_, layer, ground_.plan, overhang_ ? &*overhang_ : nullptr,
+                                         trial.planned.diagnostics, ground_.known_cuts);
         if (compared) trial.minutes = minutes_of(layer, job.machine);
         return trial;
     }
@@ -173,24 +190,35 @@ private:
     // Keeps the trial of set s where it is the best so far.
     void judge(std::size_t s, Trial trial) {
         if (selection_) {
-            ToolSet& set =
-                selection_->sets.emplace_back(ToolSet{sets_[s].name, tools_in_order(trial.planned.layer), trial.minutes, trial.left_mm2, false, {}});
+            ToolSet& set = selection_->sets.emplace_back(ToolSet{sets_[s].name,
+                                                                 tools_in_order(trial.planned.layer),
+                                                                 trial.minutes,
+                                                                 trial.left_mm2,
+                                                                 false,
+                                                                 {}});
             if (!trial.left_mm2)
-                set.reason = fmt::format("given up: its first programs alone take {:.1f} min, against {:.1f} min", trial.minutes, best_->minutes);
+                set.reason =
+                    fmt::format("given up: its first programs alone take {:.1f} min, against {:.1f} min",
+                                trial.minutes, best_->minutes);
             else if (trial.leaves_more)
-                set.reason = fmt::format("leaves {:.1f} mm² over the limit, the first set {:.1f} mm²", *trial.left_mm2,
-                                         selection_->sets[0].left_mm2.value_or(0));
-            else if (!trial.whole) set.reason = fmt::format("its paths alone take {:.1f} min, against {:.1f} min", trial.minutes, best_->minutes);
+                set.reason = fmt::format("leaves {:.1f} mm² over the limit, the first set {:.1f} mm²",
+                                         *trial.left_mm2, selection_->sets[0].left_mm2.value_or(0));
+            else if (!trial.whole)
+                set.reason = fmt::format("its paths alone take {:.1f} min, against {:.1f} min", trial.minutes,
+                                         best_->minutes);
         }
-        if (!best_ || (trial.whole && !trial.leaves_more && trial.minutes < best_->minutes)) best_ = std::move(trial), chosen_ = s;
+        if (!best_ || (trial.whole && !trial.leaves_more && trial.minutes < best_->minutes))
+            best_ = std::move(trial), chosen_ = s;
     }
 
     void give_reasons() {
         ToolSet& chosen = selection_->sets[chosen_];
         chosen.chosen = true;
-        chosen.reason = sets_.size() > 1 ? "takes the least time of those that leave no more" : "not compared";
+        chosen.reason =
+            sets_.size() > 1 ? "takes the least time of those that leave no more" : "not compared";
         for (ToolSet& set : selection_->sets)
-            if (set.reason.empty()) set.reason = fmt::format("takes {:.1f} min longer", set.minutes - chosen.minutes);
+            if (set.reason.empty())
+                set.reason = fmt::format("takes {:.1f} min longer", set.minutes - chosen.minutes);
     }
 
     Context& context_;
@@ -217,11 +245,13 @@ Overrun overrun_of(const Job& job) {
         for (const Tool& tool : job.tools)
             if (tool.kind == ToolKind::ball) overrun.below = std::max(overrun.below, tool.diameter / 2);
     const Machine& machine = job.machine;
-    overrun.board = std::min(machine.base_board_cut >= 0 ? machine.base_board_cut : overrun.below, machine.base_board_thickness);
+    overrun.board = std::min(machine.base_board_cut >= 0 ? machine.base_board_cut : overrun.below,
+                             machine.base_board_thickness);
     return overrun;
 }
 
-PlannedLayer plan_layer(Context& context, const LayerGround& ground, std::size_t index, ProgressPart& progress) {
+PlannedLayer plan_layer(Context& context, const LayerGround& ground, std::size_t index,
+                        ProgressPart& progress) {
     return LayerPlanner(context, ground, index, progress).run();
 }
 

@@ -61,7 +61,8 @@ ArcShape arc_shape(const Move& from, const Move& arc) {
     ArcShape shape;
     shape.x = to_mm(std::int64_t{from.x} + arc.i);
     shape.y = to_mm(std::int64_t{from.y} + arc.j);
-    const double u = static_cast<double>(ax), v = static_cast<double>(ay), p = static_cast<double>(bx), q = static_cast<double>(by);
+    const double u = static_cast<double>(ax), v = static_cast<double>(ay), p = static_cast<double>(bx),
+                 q = static_cast<double>(by);
     shape.radius = std::hypot(u, v) / kUnitsPerMm;
     shape.start = std::atan2(v, u);
     shape.sweep = std::atan2(u * q - v * p, u * p + v * q);

@@ -27,9 +27,10 @@ struct Diagnostic {
     friend bool operator==(const Diagnostic&, const Diagnostic&) = default;
 };
 
-/// One move to (x, y, z) in 0.1 µm, frame pattern-base; feed in mm/min, 0 for a rapid. Straight where i = j = 0; else, by feed
-/// and at one z only, along the arc of less than half a circle whose centre lies (i, j) from where the move begins. That it is
-/// the shorter arc says which way it turns: against the clock where the centre lies left of the way from begin to end.
+/// One move to (x, y, z) in 0.1 µm, frame pattern-base; feed in mm/min, 0 for a rapid. Straight where i = j =
+/// 0; else, by feed and at one z only, along the arc of less than half a circle whose centre lies (i, j) from
+/// where the move begins. That it is the shorter arc says which way it turns: against the clock where the
+/// centre lies left of the way from begin to end.
 struct Move {
     std::int32_t x = 0, y = 0, z = 0;
     std::uint32_t feed = 0;
@@ -38,8 +39,8 @@ struct Move {
     friend bool operator==(const Move&, const Move&) = default;
 };
 
-/// An arc in the plane, mm and radians; the sweep is positive against the clock and less than π either way. The end's radius
-/// differs from the begin's by what rounding to 0.1 µm does; `radius` is the begin's.
+/// An arc in the plane, mm and radians; the sweep is positive against the clock and less than π either way.
+/// The end's radius differs from the begin's by what rounding to 0.1 µm does; `radius` is the begin's.
 struct ArcShape {
     double x = 0, y = 0, radius = 0;  ///< the centre
     double start = 0, sweep = 0;
@@ -54,7 +55,8 @@ struct ArcShape {
 enum class OperationKind : std::uint8_t { face, rough, semi_rough, finish, corner, drill, edge };
 [[nodiscard]] SLABWRIGHT_API std::string_view name(OperationKind kind);  ///< as plan.json spells it
 
-/// Heights between which the surface is about as steep, and how far apart the level passes that cut it lie (LUO 5.4).
+/// Heights between which the surface is about as steep, and how far apart the level passes that cut it lie
+/// (LUO 5.4).
 struct StepBand {
     double z_low = 0, z_high = 0;  ///< mm
     double least_slope_deg = 90;   ///< from level, of what level passes finish there
@@ -77,10 +79,11 @@ struct Operation {
     std::vector<Move> moves;
     std::string file;  ///< name under nc/, "" until named
     double cutting_mm = 0, rapid_mm = 0, minutes = 0;
-    double peak_force_n = 0, deflection_mm = 0;    ///< the largest of all its cuts
-    double wall_error_mm = 0;                      ///< the most that the cutter, bending, leaves on a wall or takes from it
-    std::optional<std::array<double, 3>> peak_at;  ///< mm, where the cut of peak_force_n ends; none where it is the nominal cut's
-    std::optional<std::uint32_t> peak_move;        ///< and by which move it is made
+    double peak_force_n = 0, deflection_mm = 0;  ///< the largest of all its cuts
+    double wall_error_mm = 0;  ///< the most that the cutter, bending, leaves on a wall or takes from it
+    std::optional<std::array<double, 3>>
+        peak_at;  ///< mm, where the cut of peak_force_n ends; none where it is the nominal cut's
+    std::optional<std::uint32_t> peak_move;  ///< and by which move it is made
 };
 
 /// A tool that was looked at for one purpose of a layer (LUO 5.5.3).
@@ -97,21 +100,25 @@ struct ToolCandidate {
 
 /// A set of tools that a layer was planned with.
 struct ToolSet {
-    std::string name;                ///< "selected", "wider" (the next wider finish tool), "fixed" or "wider rough"
-    std::vector<int> tools;          ///< numbers, in the order of their first cut
-    double minutes = 0;              ///< of its programs, tool changes within the layer included; of the first of them where it was given up
-    std::optional<double> left_mm2;  ///< of the layer's plan view, where more than the cusp's limit is left; none where it was given up
+    std::string name;        ///< "selected", "wider" (the next wider finish tool), "fixed" or "wider rough"
+    std::vector<int> tools;  ///< numbers, in the order of their first cut
+    double minutes = 0;  ///< of its programs, tool changes within the layer included; of the first of them
+                         ///< where it was given up
+    std::optional<double> left_mm2;  ///< of the layer's plan view, where more than the cusp's limit is left;
+                                     ///< none where it was given up
     bool chosen = false;
     std::string reason;  ///< why it was kept or not, in words
 };
 
 /// How the tools of a layer were chosen.
 struct LayerSelection {
-    double least_slope_deg = 90;         ///< smallest α of its steep facets
-    bool vertical = false;               ///< every wall is upright: one flat end mill cuts all
-    double finish_stepdown = 0;          ///< mm, of the finish tool at the least slope and the cusp; 0 where it has no slopes to finish
+    double least_slope_deg = 90;  ///< smallest α of its steep facets
+    bool vertical = false;        ///< every wall is upright: one flat end mill cuts all
+    double finish_stepdown =
+        0;  ///< mm, of the finish tool at the least slope and the cusp; 0 where it has no slopes to finish
     double finish_stepdown_printed = 0;  ///< by print's rule (LUO table 5.1)
-    double rough_stepdown = 0;           ///< mm, LUO eq. 6 at the least slope, before any tool's range; 0: without limit
+    double rough_stepdown =
+        0;  ///< mm, LUO eq. 6 at the least slope, before any tool's range; 0: without limit
     std::vector<ToolCandidate> candidates;
     std::vector<ToolSet> sets;
 };
@@ -129,11 +136,13 @@ struct Layer {
     Loops glue;  ///< where glue goes
 };
 
-/// A step of the machine's sequence (method.md section 12); `needs` are ids of the steps that must be done before.
+/// A step of the machine's sequence (method.md section 12); `needs` are ids of the steps that must be done
+/// before.
 struct SequenceStep {
     int id = 0;
     int layer = 0;
-    std::string action;  ///< "take_slab", "clamp", "glue", "place", "press", "table", "touch_off", "face", "mill", "unload", "mould_box"
+    std::string action;  ///< "take_slab", "clamp", "glue", "place", "press", "table", "touch_off", "face",
+                         ///< "mill", "unload", "mould_box"
     std::vector<int> needs;
     std::vector<std::pair<std::string, double>> numbers;     ///< named quantities, names end in their unit
     std::vector<std::pair<std::string, std::string>> words;  ///< programs, materials
@@ -143,7 +152,8 @@ struct SequenceStep {
 /// What stays around the pattern (engine/flask). Millimetres.
 struct Flask {
     Loops outer;               ///< one loop: the stock's rectangle
-    std::vector<Loops> inner;  ///< one loop for each layer, ascending: the opening, wider from layer to layer where there is draft
+    std::vector<Loops> inner;  ///< one loop for each layer, ascending: the opening, wider from layer to layer
+                               ///< where there is draft
     double wall_mm = 0;        ///< where it is thinnest
     double volume_mm3 = 0;     ///< of the frame
     double opening_mm3 = 0;    ///< of what it encloses, the pattern's volume included

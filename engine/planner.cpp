@@ -34,7 +34,8 @@ namespace slabwright {
 
 namespace {
 
-constexpr std::size_t kManyFacets = 200'000;  // from here on fewer facets are worth their gap; the job file says so
+constexpr std::size_t kManyFacets =
+    200'000;  // from here on fewer facets are worth their gap; the job file says so
 
 // The pattern, and what the paths are laid on: fewer facets where a share of the gouge tolerance allows it.
 struct PathGround {
@@ -55,7 +56,8 @@ PathGround ground_of(Context& context, Plan& plan, MeshView pattern) {
     plan.diagnostics.push_back(
         {Severity::note,
          "paths.simplified",
-         fmt::format("the paths are laid on {} facets that lie within {:.4g} mm of the pattern's {}", ground.mesh.size(), ground.gap, pattern.size()),
+         fmt::format("the paths are laid on {} facets that lie within {:.4g} mm of the pattern's {}",
+                     ground.mesh.size(), ground.gap, pattern.size()),
          {}});
     return ground;
 }
@@ -79,8 +81,9 @@ struct LayerShare {
     double work = 0;           ///< of its paths, against a square millimetre of slab that is roughed away
 };
 
-/// The work of a square millimetre of surface, by how steep it is, and of a facet, against one of slab that is roughed away. First fitted to
-/// the processor time of 44 layers of six patterns; since roughing costs less, set by what bench/time_left_bench says of seven.
+/// The work of a square millimetre of surface, by how steep it is, and of a facet, against one of slab that
+/// is roughed away. First fitted to the processor time of 44 layers of six patterns; since roughing costs
+/// less, set by what bench/time_left_bench says of seven.
 struct PathWork {
     static constexpr double kFlat = 4, kSlope = 24, kUpright = 4, kFacet = 100;
     static constexpr double kFlatNz = 0.9998, kUprightNz = 0.05;  ///< from here on up, and from here on down
@@ -88,11 +91,14 @@ struct PathWork {
     static double of_area(double nz) { return nz > kFlatNz ? kFlat : nz > kUprightNz ? kSlope : kUpright; }
 };
 
-// @param layers ascending; @param overrun how far below its bottom a layer's cutters may reach, mm; @param slab_mm2 plan view
-std::vector<LayerShare> shares_of_layers(Context& context, MeshView mesh, std::span<const Layer> layers, double overrun, double slab_mm2) {
+// @param layers ascending; @param overrun how far below its bottom a layer's cutters may reach, mm; @param
+// slab_mm2 plan view
+std::vector<LayerShare> shares_of_layers(Context& context, MeshView mesh, std::span<const Layer> layers,
+                                         double overrun, double slab_mm2) {
     struct Sums {
         std::vector<LayerShare> shares;
-        std::vector<double> above_mm2;  // of the part's section in the middle of each layer, seen in plan: what lies above it up to the next one's
+        std::vector<double> above_mm2;  // of the part's section in the middle of each layer, seen in plan:
+                                        // what lies above it up to the next one's
     };
     const Sums none{std::vector<LayerShare>(layers.size()), std::vector<double>(layers.size() + 1)};
     Sums sums = parallel_reduce(
@@ -100,34 +106,40 @@ std::vector<LayerShare> shares_of_layers(Context& context, MeshView mesh, std::s
         [&](std::size_t begin, std::size_t end) {
             Sums part = none;
             for (std::size_t f = begin; f < end; ++f) {
-                const Vec3f &a = mesh.vertices[mesh.facets[f][0]], &b = mesh.vertices[mesh.facets[f][1]], &c = mesh.vertices[mesh.facets[f][2]];
+                const Vec3f &a = mesh.vertices[mesh.facets[f][0]], &b = mesh.vertices[mesh.facets[f][1]],
+                            &c = mesh.vertices[mesh.facets[f][2]];
                 const double low = std::min({a.z, b.z, c.z}), high = std::max({a.z, b.z, c.z});
-                const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z, vx = double{c.x} - a.x, vy = double{c.y} - a.y,
-                             vz = double{c.z} - a.z;
+                const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z,
+                             vx = double{c.x} - a.x, vy = double{c.y} - a.y, vz = double{c.z} - a.z;
                 const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
                 const double length = std::sqrt(nx * nx + ny * ny + nz * nz), area = nz < 0 ? 0 : length / 2;
                 const double work = length > 0 ? area * PathWork::of_area(nz / length) : 0;
                 const double centre = (double{a.z} + b.z + c.z) / 3;
-                const auto middles =
-                    std::partition_point(layers.begin(), layers.end(), [&](const Layer& l) { return (l.z_bottom + l.z_top) / 2 < centre; });
+                const auto middles = std::partition_point(layers.begin(), layers.end(), [&](const Layer& l) {
+                    return (l.z_bottom + l.z_top) / 2 < centre;
+                });
                 part.above_mm2[static_cast<std::size_t>(middles - layers.begin())] += nz / 2;
-                auto layer = std::partition_point(layers.begin(), layers.end(), [&](const Layer& l) { return l.z_top <= low; });
+                auto layer = std::partition_point(layers.begin(), layers.end(),
+                                                  [&](const Layer& l) { return l.z_top <= low; });
                 for (; layer != layers.end() && layer->z_bottom - overrun < high; ++layer) {
                     LayerShare& share = part.shares[static_cast<std::size_t>(layer - layers.begin())];
                     ++share.facets;
                     const double within = std::min(high, layer->z_top) - std::max(low, layer->z_bottom);
-                    if (within >= 0 && nz >= 0) share.work += PathWork::kFacet + (high > low ? work * within / (high - low) : work);
+                    if (within >= 0 && nz >= 0)
+                        share.work += PathWork::kFacet + (high > low ? work * within / (high - low) : work);
                 }
             }
             return part;
         },
         [](Sums a, const Sums& b) {
-            for (std::size_t i = 0; i < a.shares.size(); ++i) a.shares[i].facets += b.shares[i].facets, a.shares[i].work += b.shares[i].work;
+            for (std::size_t i = 0; i < a.shares.size(); ++i)
+                a.shares[i].facets += b.shares[i].facets, a.shares[i].work += b.shares[i].work;
             for (std::size_t i = 0; i < a.above_mm2.size(); ++i) a.above_mm2[i] += b.above_mm2[i];
             return a;
         });
     double section = sums.above_mm2[layers.size()];
-    for (std::size_t i = layers.size(); i-- > 0; section += sums.above_mm2[i]) sums.shares[i].work += std::clamp(slab_mm2 - section, 0.0, slab_mm2);
+    for (std::size_t i = layers.size(); i-- > 0; section += sums.above_mm2[i])
+        sums.shares[i].work += std::clamp(slab_mm2 - section, 0.0, slab_mm2);
     return std::move(sums.shares);
 }
 
@@ -136,15 +148,16 @@ void warn_of_overhang(Plan& plan, const LayerRequest& request, const std::vector
     if (!request.min_material_at) return;
     double most = 0, where = 0;
     for (std::size_t i = 0; i + 1 < boundaries.size(); ++i)
-        if (const double z = boundaries[i].z, least = request.min_material_at(z); least > most) most = least, where = z;
+        if (const double z = boundaries[i].z, least = request.min_material_at(z); least > most)
+            most = least, where = z;
     if (most > request.max_layer)
-        plan.diagnostics.push_back(
-            {Severity::warning,
-             "layers.overhang",
-             fmt::format("the slab glued at {:.2f} mm hangs over so far that {:.1f} mm of it would be needed to bear the cutters, more than the "
-                         "tallest layer's {:.1f} mm; a flask would carry it",
-                         where, most, request.max_layer),
-             {}});
+        plan.diagnostics.push_back({Severity::warning,
+                                    "layers.overhang",
+                                    fmt::format("the slab glued at {:.2f} mm hangs over so far that {:.1f} "
+                                                "mm of it would be needed to bear the cutters, more than the "
+                                                "tallest layer's {:.1f} mm; a flask would carry it",
+                                                where, most, request.max_layer),
+                                    {}});
 }
 
 std::vector<Layer> layers_between(const Job& job, const std::vector<Boundary>& boundaries) {
@@ -169,14 +182,16 @@ void settle_undercuts(Context& context, Plan& plan, MeshView mesh) {
     for (const Layer& layer : plan.layers) tops.push_back(layer.z_top);
     const std::vector<UnmadeUndercut> unmade = measure_undercuts(context, mesh, tops, feature_options(job));
     if (unmade.empty()) return;
-    const UnmadeUndercut& deepest =
-        *std::max_element(unmade.begin(), unmade.end(), [](const UnmadeUndercut& a, const UnmadeUndercut& b) { return a.depth_mm < b.depth_mm; });
+    const UnmadeUndercut& deepest = *std::max_element(
+        unmade.begin(), unmade.end(),
+        [](const UnmadeUndercut& a, const UnmadeUndercut& b) { return a.depth_mm < b.depth_mm; });
     if (deepest.depth_mm <= job.tolerances.undercut) {
         double total = 0;
         for (const UnmadeUndercut& u : unmade) total += u.area_mm2;
         plan.diagnostics.push_back(
             {Severity::note, "undercut.shallow",
-             fmt::format("{} undercut patches ({:.1f} mm²) stay filled, at most {:.3f} mm deep", unmade.size(), total, deepest.depth_mm),
+             fmt::format("{} undercut patches ({:.1f} mm²) stay filled, at most {:.3f} mm deep",
+                         unmade.size(), total, deepest.depth_mm),
              std::array{deepest.x, deepest.y, deepest.z}});
         return;
     }
@@ -184,43 +199,58 @@ void settle_undercuts(Context& context, Plan& plan, MeshView mesh) {
     for (const UnmadeUndercut& u : unmade)
         if (u.depth_mm > job.tolerances.undercut) {
             ++count;
-            plan.diagnostics.push_back({job.allow_undercut ? Severity::warning : Severity::error, "undercut.unmade",
-                                        fmt::format("an undercut of {:.1f} mm² stays filled up to {:.2f} mm deep", u.area_mm2, u.depth_mm),
-                                        std::array{u.x, u.y, u.z}});
+            plan.diagnostics.push_back(
+                {job.allow_undercut ? Severity::warning : Severity::error, "undercut.unmade",
+                 fmt::format("an undercut of {:.1f} mm² stays filled up to {:.2f} mm deep", u.area_mm2,
+                             u.depth_mm),
+                 std::array{u.x, u.y, u.z}});
         }
     if (!job.allow_undercut)
         throw refusal("undercut.unmade",
-                      fmt::format("{} undercut{} cannot be milled from above; the deepest, of {:.1f} mm², would stay filled {:.2f} mm deep", count,
-                                  count == 1 ? "" : "s", deepest.area_mm2, deepest.depth_mm),
+                      fmt::format("{} undercut{} cannot be milled from above; the deepest, of {:.1f} mm², "
+                                  "would stay filled {:.2f} mm deep",
+                                  count, count == 1 ? "" : "s", deepest.area_mm2, deepest.depth_mm),
                       fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", deepest.x, deepest.y, deepest.z),
                       "turn or split the pattern, or accept it with --allow-undercut");
 }
 
-double plan_view_mm2(const Plan& plan) { return (plan.stock_max[0] - plan.stock_min[0]) * (plan.stock_max[1] - plan.stock_min[1]); }
+double plan_view_mm2(const Plan& plan) {
+    return (plan.stock_max[0] - plan.stock_min[0]) * (plan.stock_max[1] - plan.stock_min[1]);
+}
 
-// What the layers in work hold at once: their facets with an index of them and what stands of them, and the moves of all layers, of which a raster over the whole
-// stock has about three a square millimetre.
-std::uint64_t bytes_of_paths(const Context& context, const Plan& plan, const std::vector<LayerShare>& shares) {
+// What the layers in work hold at once: their facets with an index of them and what stands of them, and the
+// moves of all layers, of which a raster over the whole stock has about three a square millimetre.
+std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
+                             const std::vector<LayerShare>& shares) {
     std::vector<std::uint64_t> reach;
     for (const LayerShare& s : shares) reach.push_back(s.facets);
     std::sort(reach.begin(), reach.end(), std::greater<>());
     const std::size_t at_once = std::min<std::size_t>(reach.size(), context.threads());
-    const std::uint64_t held = std::accumulate(reach.begin(), reach.begin() + static_cast<std::ptrdiff_t>(at_once), std::uint64_t{0});
-    constexpr std::uint64_t stands = 3;  // what stands, and two earlier states of it while one way of cutting is held against another
-    return held * (sizeof(SolidFacet) + 16 + 3 * sizeof(Index3)) + static_cast<std::uint64_t>(3 * plan_view_mm2(plan)) * (sizeof(Move) + 64) +
-           (stands * Standing::bytes(plan.stock_min, plan.stock_max) + LayerStock::bytes(plan.job, plan_view_mm2(plan))) * at_once;
+    const std::uint64_t held = std::accumulate(
+        reach.begin(), reach.begin() + static_cast<std::ptrdiff_t>(at_once), std::uint64_t{0});
+    constexpr std::uint64_t stands =
+        3;  // what stands, and two earlier states of it while one way of cutting is held against another
+    return held * (sizeof(SolidFacet) + 16 + 3 * sizeof(Index3)) +
+           static_cast<std::uint64_t>(3 * plan_view_mm2(plan)) * (sizeof(Move) + 64) +
+           (stands * Standing::bytes(plan.stock_min, plan.stock_max) +
+            LayerStock::bytes(plan.job, plan_view_mm2(plan))) *
+               at_once;
 }
 
-// What a slab is glued to, layer by layer: the section of the pattern at its joint and what of the flask stays there.
+// What a slab is glued to, layer by layer: the section of the pattern at its joint and what of the flask
+// stays there.
 std::vector<Loops> joints_of(Context& context, const Plan& plan, MeshView mesh) {
     std::vector<Plane> planes;
-    for (const Layer& layer : plan.layers) planes.push_back({layer.z_bottom, layer.index == 1 ? Side::above : Side::below});
-    // A gap in the mesh shows as an open chain; sections at every boundary and feature would miss one in between, so the loader has
-    // refused all open edges but those in the base plane already. What is left here is proof by section.
+    for (const Layer& layer : plan.layers)
+        planes.push_back({layer.z_bottom, layer.index == 1 ? Side::above : Side::below});
+    // A gap in the mesh shows as an open chain; sections at every boundary and feature would miss one in
+    // between, so the loader has refused all open edges but those in the base plane already. What is left
+    // here is proof by section.
     std::vector<Section> sections = slice(context, mesh, planes, {plan.job.tolerances.gap});
     std::vector<Loops> joints;
     for (std::size_t i = 0; i < plan.layers.size(); ++i)
-        joints.push_back(plan.flask ? unite(sections[i].loops, flask_frame(*plan.flask, i)) : std::move(sections[i].loops));
+        joints.push_back(plan.flask ? unite(sections[i].loops, flask_frame(*plan.flask, i))
+                                    : std::move(sections[i].loops));
     return joints;
 }
 
@@ -231,34 +261,41 @@ void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnos
     op.rapid_mm = time.rapid_mm;
     op.minutes = time.minutes + job.machine.spindle_dwell_s / 60;
     if (job.cutting.engagement == Engagement::simulated) return;
-    const auto tool = std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+    const auto tool =
+        std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
     rate_operation(op, *tool, job);
     const double allowance = bending_limit(op, job);
     if (op.kind == OperationKind::rough && op.deflection_mm > allowance)
         diagnostics.push_back({Severity::warning,
                                "rough.deflection",
-                               fmt::format("layer {}: the roughing cutter may bend by {:.3f} mm, more than the {:.3f} mm it leaves for finishing",
+                               fmt::format("layer {}: the roughing cutter may bend by {:.3f} mm, more than "
+                                           "the {:.3f} mm it leaves for finishing",
                                            layer.index, op.deflection_mm, allowance),
                                {}});
 }
 
 // The programs of all layers, with their diagnostics.
-void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vector<Loops>& joints, ProgressShare share) {
+void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vector<Loops>& joints,
+                ProgressShare share) {
     const Job& job = plan.job;
     const PathGround ground = ground_of(context, plan, pattern);
     std::optional<AccessScene> scene;
-    if (selects_tools(job) && job.selection.accessibility == AccessRule::exact) scene.emplace(context, ground.mesh);
-    const std::vector<LayerShare> shares = shares_of_layers(context, ground.mesh, plan.layers, overrun_of(job).below, plan_view_mm2(plan));
+    if (selects_tools(job) && job.selection.accessibility == AccessRule::exact)
+        scene.emplace(context, ground.mesh);
+    const std::vector<LayerShare> shares =
+        shares_of_layers(context, ground.mesh, plan.layers, overrun_of(job).below, plan_view_mm2(plan));
     const MemoryCharge path_memory(context, bytes_of_paths(context, plan, shares), "the paths");
     std::vector<std::uint64_t> steps;
     for (const LayerShare& s : shares) steps.push_back(static_cast<std::uint64_t>(std::ceil(s.work)));
-    context.begin_phase("paths", share.at(0), share.at(0.96), std::accumulate(steps.begin(), steps.end(), std::uint64_t{0}));
+    context.begin_phase("paths", share.at(0), share.at(0.96),
+                        std::accumulate(steps.begin(), steps.end(), std::uint64_t{0}));
     std::vector<PlannedLayer> planned(plan.layers.size());
-    // Threads begin at the first and in the middle of what there is to do: from either place on it becomes smaller, so that none is left with a
-    // large layer in the end.
+    // Threads begin at the first and in the middle of what there is to do: from either place on it becomes
+    // smaller, so that none is left with a large layer in the end.
     std::vector<std::size_t> largest_first(plan.layers.size());
     std::iota(largest_first.begin(), largest_first.end(), std::size_t{0});
-    std::stable_sort(largest_first.begin(), largest_first.end(), [&](std::size_t a, std::size_t b) { return steps[a] > steps[b]; });
+    std::stable_sort(largest_first.begin(), largest_first.end(),
+                     [&](std::size_t a, std::size_t b) { return steps[a] > steps[b]; });
     const std::size_t half = (plan.layers.size() + 1) / 2;
     Spares<StockMemory> stock_memory;
     KnownCuts known_cuts;
@@ -267,8 +304,10 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
         const std::size_t i = largest_first[task < half ? 2 * task : 2 * (task - half) + 1];
         ProgressPart progress(context, steps[i]);
         const Loops* const carried_by = i > 0 ? &joints[i] : nullptr;
-        planned[i] = plan_layer(
-            context, {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr, carried_by, &stock_memory, &known_cuts}, i, progress);
+        planned[i] = plan_layer(context,
+                                {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr,
+                                 carried_by, &stock_memory, &known_cuts},
+                                i, progress);
         solver.expect(planned[i].cuts.cuts);
     });
     std::vector<LayerCuts> cuts;
@@ -278,7 +317,8 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
     }
     context.begin_phase("forces", share.at(0.96), share.at(0.99));
     std::vector<std::vector<Diagnostic>> rated(planned.size());
-    if (job.cutting.engagement == Engagement::simulated) rated = rate_layers(context, plan, cuts, solver.solver());
+    if (job.cutting.engagement == Engagement::simulated)
+        rated = rate_layers(context, plan, cuts, solver.solver());
     parallel_each(context, planned.size(), [&](std::size_t i) {
         for (Operation& op : plan.layers[i].operations) {
             context.throw_if_cancelled();
@@ -286,17 +326,20 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
         }
     });
     for (std::size_t i = 0; i < planned.size(); ++i)
-        for (const auto* found : {&planned[i].diagnostics, &rated[i]}) plan.diagnostics.insert(plan.diagnostics.end(), found->begin(), found->end());
-    if (std::all_of(plan.layers.begin(), plan.layers.end(), [](const Layer& layer) { return layer.operations.empty(); }))
+        for (const auto* found : {&planned[i].diagnostics, &rated[i]})
+            plan.diagnostics.insert(plan.diagnostics.end(), found->begin(), found->end());
+    if (std::all_of(plan.layers.begin(), plan.layers.end(),
+                    [](const Layer& layer) { return layer.operations.empty(); }))
         throw refusal("plan.empty", "nothing would be cut", plan.input.file, "check the units and the slabs");
     check_travel(plan);
 }
 
 // From layers on. `begun` is a plan with its stock and features.
-Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request, const LayerPlacement& placement,
-                 ProgressShare share) {
+Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request,
+                 const LayerPlacement& placement, ProgressShare share) {
     Plan plan = begun;
-    plan.diagnostics.insert(plan.diagnostics.end(), placement.diagnostics.begin(), placement.diagnostics.end());
+    plan.diagnostics.insert(plan.diagnostics.end(), placement.diagnostics.begin(),
+                            placement.diagnostics.end());
     warn_of_overhang(plan, request, placement.boundaries);
     plan.layers = layers_between(plan.job, placement.boundaries);
     settle_undercuts(context, plan, pattern);
@@ -306,8 +349,10 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
 
     context.begin_phase("schedule", share.at(0.99), share.at(1));
     std::vector<std::vector<Diagnostic>> bonded(plan.layers.size());
-    parallel_each(context, plan.layers.size(), [&](std::size_t i) { bond_layer(plan.layers[i], joints[i], plan, bonded[i]); });
-    for (const std::vector<Diagnostic>& found : bonded) plan.diagnostics.insert(plan.diagnostics.end(), found.begin(), found.end());
+    parallel_each(context, plan.layers.size(),
+                  [&](std::size_t i) { bond_layer(plan.layers[i], joints[i], plan, bonded[i]); });
+    for (const std::vector<Diagnostic>& found : bonded)
+        plan.diagnostics.insert(plan.diagnostics.end(), found.begin(), found.end());
     context.throw_if_cancelled();
     schedule(plan);
     check_mass(plan);
@@ -315,8 +360,8 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
 }
 
 // Every placement planned whole; the one that is built in the least time stays.
-Plan fastest_plan(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request, const std::vector<LayerCandidate>& tried,
-                  ProgressShare share) {
+Plan fastest_plan(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request,
+                  const std::vector<LayerCandidate>& tried, ProgressShare share) {
     std::optional<Plan> best;
     std::exception_ptr refused;  // the first
     std::string words;
@@ -326,9 +371,12 @@ Plan fastest_plan(Context& context, MeshView pattern, const Plan& begun, const L
         LayerRequest asked = request;
         asked.max_layer = tried[i].max_layer;
         try {
-            Plan plan = plan_layers(context, pattern, begun, asked, tried[i].placement, {share.at(at), share.at(at + step)});
-            words += fmt::format("{}{} {:.1f} min", words.empty() ? "" : ", ", tried[i].name, plan.totals.build_minutes);
-            if (!best || plan.totals.build_minutes < best->totals.build_minutes) best = std::move(plan), name = tried[i].name;
+            Plan plan = plan_layers(context, pattern, begun, asked, tried[i].placement,
+                                    {share.at(at), share.at(at + step)});
+            words += fmt::format("{}{} {:.1f} min", words.empty() ? "" : ", ", tried[i].name,
+                                 plan.totals.build_minutes);
+            if (!best || plan.totals.build_minutes < best->totals.build_minutes)
+                best = std::move(plan), name = tried[i].name;
         } catch (const Error& e) {
             if (e.kind() != ErrorKind::no_plan || e.code().starts_with("memory")) throw;
             words += fmt::format("{}{} refused ({})", words.empty() ? "" : ", ", tried[i].name, e.code());
@@ -338,7 +386,8 @@ Plan fastest_plan(Context& context, MeshView pattern, const Plan& begun, const L
     if (!best) std::rethrow_exception(refused);
     best->diagnostics.push_back({Severity::note,
                                  "layers.combined",
-                                 fmt::format("of {} placement{} {} is built fastest: {}", tried.size(), tried.size() == 1 ? "" : "s", name, words),
+                                 fmt::format("of {} placement{} {} is built fastest: {}", tried.size(),
+                                             tried.size() == 1 ? "" : "s", name, words),
                                  {}});
     return std::move(*best);
 }
@@ -351,21 +400,25 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     plan.input = input;
     plan.totals.part_volume_mm3 = input.volume_mm3;
     plan.job = job;
-    if (mesh.facets.empty()) throw refusal("input.empty", "there is nothing to make: the mesh has no facets", input.file, "export the pattern again");
+    if (mesh.facets.empty())
+        throw refusal("input.empty", "there is nothing to make: the mesh has no facets", input.file,
+                      "export the pattern again");
     const MeshView view = mesh.view();
     const Box3 box = bounds(context, view);
     const double height = box.max.z;
     place_stock(plan, box);
 
-    const MemoryCharge mesh_memory(context, mesh.vertices.size() * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3), "the mesh");
+    const MemoryCharge mesh_memory(
+        context, mesh.vertices.size() * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3), "the mesh");
     context.begin_phase("features", 0.01, 0.015);
     const FeatureOptions options = feature_options(job);
     FeatureSet found = find_features(context, view, options);
     plan.features = std::move(found.features);
     for (const FinderDisagreement& d : found.disagreements)
-        plan.diagnostics.push_back({Severity::note, "features.finders_disagree",
-                                    fmt::format("only the {} finder sees a {} at {:.3f} mm", name(d.found_by), name(d.type), d.z),
-                                    std::array{d.x, d.y, d.z}});
+        plan.diagnostics.push_back(
+            {Severity::note, "features.finders_disagree",
+             fmt::format("only the {} finder sees a {} at {:.3f} mm", name(d.found_by), name(d.type), d.z),
+             std::array{d.x, d.y, d.z}});
 
     context.begin_phase("layers", 0.015, 0.02);
     LayerRequest request;
@@ -386,7 +439,9 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
         request.section_area = {};  // nobody asks again, and it is large
         return fastest_plan(context, view, plan, request, tried, {0.02, 0.985});
     }
-    const LayerPlacement placement = job.layers.strategy == LayerStrategy::printed ? place_layers_printed(request) : place_layers_optimal(request);
+    const LayerPlacement placement = job.layers.strategy == LayerStrategy::printed
+                                         ? place_layers_printed(request)
+                                         : place_layers_optimal(request);
     request.section_area = {};
     return plan_layers(context, view, plan, request, placement, {0.02, 0.985});
 }

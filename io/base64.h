@@ -15,7 +15,8 @@ namespace slabwright {
     text.reserve((bytes.size() + 2) / 3 * 4);
     for (std::size_t i = 0; i < bytes.size(); i += 3) {
         const std::size_t left = bytes.size() - i;
-        const std::uint32_t three = static_cast<std::uint32_t>(bytes[i]) << 16 | (left > 1 ? static_cast<std::uint32_t>(bytes[i + 1]) << 8 : 0u) |
+        const std::uint32_t three = static_cast<std::uint32_t>(bytes[i]) << 16 |
+                                    (left > 1 ? static_cast<std::uint32_t>(bytes[i + 1]) << 8 : 0u) |
                                     (left > 2 ? static_cast<std::uint32_t>(bytes[i + 2]) : 0u);
         text += digits[three >> 18 & 63];
         text += digits[three >> 12 & 63];

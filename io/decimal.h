@@ -28,7 +28,7 @@ inline void append_mm(std::string& text, std::int64_t units) {
 
 /// Appends the shortest decimal that reads back as `value`, which must be finite.
 inline void append_decimal(std::string& text, double value) {
-    char digits[400];           // 1.8e308 has 309 digits before its point, the least denormal 325 and 17 more after it
+    char digits[400];  // 1.8e308 has 309 digits before its point, the least denormal 325 and 17 more after it
     if (value == 0) value = 0;  // no "-0"
     text.append(digits, std::to_chars(digits, digits + sizeof digits, value, std::chars_format::fixed).ptr);
 }

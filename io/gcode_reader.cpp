@@ -22,13 +22,20 @@ enum class Motion { none, rapid, line, clockwise, counter_clockwise };
 struct Line {
     std::vector<int> g, m;
     std::array<std::optional<double>, 26> words;
-    [[nodiscard]] const std::optional<double>& operator[](char letter) const { return words[static_cast<std::size_t>(letter - 'A')]; }
-    [[nodiscard]] std::optional<double>& operator[](char letter) { return words[static_cast<std::size_t>(letter - 'A')]; }
+    [[nodiscard]] const std::optional<double>& operator[](char letter) const {
+        return words[static_cast<std::size_t>(letter - 'A')];
+    }
+    [[nodiscard]] std::optional<double>& operator[](char letter) {
+        return words[static_cast<std::size_t>(letter - 'A')];
+    }
 };
 
 class Reader {
 public:
-    Reader(std::string_view text, const std::string& file, const GcodeLimits& limits) : text_(text), limits_(limits) { program_.file = file; }
+    Reader(std::string_view text, const std::string& file, const GcodeLimits& limits)
+        : text_(text), limits_(limits) {
+        program_.file = file;
+    }
 
     Program run() {
         program_.steps.reserve(static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n')));
@@ -43,13 +50,16 @@ public:
             execute(parse(line));
             at = end + 1;
         }
-        if (!ended_) fail("gcode.no_end", "the program does not end with M2 or M30", "its end may be missing");
+        if (!ended_)
+            fail("gcode.no_end", "the program does not end with M2 or M30", "its end may be missing");
         return std::move(program_);
     }
 
 private:
-    [[noreturn]] void fail(const std::string& code, const std::string& message, const std::string& remedy = "plan again") const {
-        throw Error(ErrorKind::verification, code, message, program_.file + ":" + std::to_string(line_), remedy);
+    [[noreturn]] void fail(const std::string& code, const std::string& message,
+                           const std::string& remedy = "plan again") const {
+        throw Error(ErrorKind::verification, code, message, program_.file + ":" + std::to_string(line_),
+                    remedy);
     }
 
     Line parse(std::string_view s) const {
@@ -64,18 +74,21 @@ private:
             }
             if (c == ';') break;
             if (c == '%') {
-                if (s.find_first_not_of(" \t%") != std::string_view::npos) fail("gcode.percent", "text beside a % mark");
+                if (s.find_first_not_of(" \t%") != std::string_view::npos)
+                    fail("gcode.percent", "text beside a % mark");
                 break;
             }
             if (c == '(') {
                 const std::size_t close = s.find(')', i);
                 if (close == std::string_view::npos) fail("gcode.comment", "a comment that is not closed");
-                if (s.substr(i + 1, close - i - 1).find('(') != std::string_view::npos) fail("gcode.comment", "a comment within a comment");
+                if (s.substr(i + 1, close - i - 1).find('(') != std::string_view::npos)
+                    fail("gcode.comment", "a comment within a comment");
                 i = close + 1;
                 continue;
             }
             const char letter = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
-            if (letter < 'A' || letter > 'Z') fail("gcode.unknown_word", std::string("'") + c + "' begins no word that this reader knows");
+            if (letter < 'A' || letter > 'Z')
+                fail("gcode.unknown_word", std::string("'") + c + "' begins no word that this reader knows");
             ++i;
             while (i < s.size() && blank(s[i])) ++i;
             const std::size_t start = i;
@@ -84,7 +97,8 @@ private:
             std::string_view digits = s.substr(start, i - start);
             if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
             double value = 0;
-            const auto [stop, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::fixed);
+            const auto [stop, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value,
+                                                        std::chars_format::fixed);
             if (status != std::errc{} || stop != digits.data() + digits.size() || digits.empty())
                 fail("gcode.number", std::string("no number follows ") + letter,
                      "exponents, parameters and expressions are not emitted, so not read");
@@ -104,7 +118,8 @@ private:
         if (letter == 'N') return;
         if (std::string_view("FHIJKPQRSTXYZ").find(letter) == std::string_view::npos)
             fail("gcode.unknown_word", std::string("a word ") + letter + ", which this reader does not know");
-        if (line[letter]) fail("gcode.twice", std::string("the word ") + letter + " stands twice in one line");
+        if (line[letter])
+            fail("gcode.twice", std::string("the word ") + letter + " stands twice in one line");
         line[letter] = value;
     }
 
@@ -154,7 +169,8 @@ private:
                     length_offset = true;
                     break;
                 case 431:
-                    fail("gcode.offset", "a length offset written into the program (G43.1)", "the machine keeps what it measured");
+                    fail("gcode.offset", "a length offset written into the program (G43.1)",
+                         "the machine keeps what it measured");
                 case 540:
                 case 550:
                 case 560:
@@ -164,7 +180,8 @@ private:
                 case 591:
                 case 592:
                 case 593: {
-                    if (work_offset_ != 0 && work_offset_ != g) fail("gcode.offset", "a second work offset in one program");
+                    if (work_offset_ != 0 && work_offset_ != g)
+                        fail("gcode.offset", "a second work offset in one program");
                     work_offset_ = g;
                     break;
                 }
@@ -220,13 +237,15 @@ private:
                     turning_ = true;
                     break;
                 case 40:
-                    fail("gcode.spindle", "a spindle turning backwards (M4)", "the cutters are right-hand ones");
+                    fail("gcode.spindle", "a spindle turning backwards (M4)",
+                         "the cutters are right-hand ones");
                 case 50:
                     turning_ = false;
                     break;
                 case 60:
                     if (selected_ <= 0) fail("gcode.tool", "a tool change (M6) that names no tool");
-                    if (program_.tool != 0 && program_.tool != selected_) fail("gcode.tool", "a second tool in one program");
+                    if (program_.tool != 0 && program_.tool != selected_)
+                        fail("gcode.tool", "a second tool in one program");
                     program_.tool = selected_;
                     turning_ = false;
                     break;
@@ -244,7 +263,8 @@ private:
             program_.dwell_s += *line['P'];
         } else if (path_mode) {
             for (const char letter : {'P', 'Q'})
-                if (line[letter] && *line[letter] < 0) fail("gcode.number", std::string("G64 with a negative tolerance ") + letter);
+                if (line[letter] && *line[letter] < 0)
+                    fail("gcode.number", std::string("G64 with a negative tolerance ") + letter);
             // LinuxCNC leaves out points within Q of a straight way, and takes P for a Q that is not given.
             const double rounds = line['P'] ? *line['P'] * unit_ : kJunction;
             if (line['P'] || line['Q']) blend(rounds, line['Q'] ? *line['Q'] * unit_ : rounds);
@@ -254,9 +274,11 @@ private:
         if (line['Q'] && !path_mode) fail("gcode.unused_word", "Q without G64");
         const bool axes = line['X'] || line['Y'] || line['Z'];
         const bool arc = motion_ == Motion::clockwise || motion_ == Motion::counter_clockwise;
-        if (!arc && (line['I'] || line['J'] || line['K'] || line['R'])) fail("gcode.unused_word", "an arc's word (I, J, K or R) without an arc");
+        if (!arc && (line['I'] || line['J'] || line['K'] || line['R']))
+            fail("gcode.unused_word", "an arc's word (I, J, K or R) without an arc");
         if (axes || (arc && motion_named)) move(line);
-        else if (line['I'] || line['J'] || line['K'] || line['R']) fail("gcode.unused_word", "an arc's word (I, J, K or R) without an arc");
+        else if (line['I'] || line['J'] || line['K'] || line['R'])
+            fail("gcode.unused_word", "an arc's word (I, J, K or R) without an arc");
         if (stop) ended_ = true;
     }
 
@@ -274,7 +296,8 @@ private:
         for (int k = 0; k < 3; ++k) {
             const auto& value = line[letters[k]];
             if (!value) continue;
-            if (incremental_ && !std::isfinite(at_[k])) fail("gcode.unknown_place", "an incremental motion from an unknown place");
+            if (incremental_ && !std::isfinite(at_[k]))
+                fail("gcode.unknown_place", "an incremental motion from an unknown place");
             to[k] = incremental_ ? at_[k] + *value * unit_ : *value * unit_;
             if (std::abs(to[k]) > kFarthest) fail("gcode.number", "a coordinate beyond 214 m");
         }
@@ -284,7 +307,8 @@ private:
         }
         if (!(feed_ > 0)) fail("gcode.feed", "a feed motion before any feed (F)");
         for (int k = 0; k < 3; ++k)
-            if (!std::isfinite(to[k]) || !std::isfinite(at_[k])) fail("gcode.unknown_place", "a feed motion from or to an unknown place");
+            if (!std::isfinite(to[k]) || !std::isfinite(at_[k]))
+                fail("gcode.unknown_place", "a feed motion from or to an unknown place");
         if (motion_ == Motion::line) step(to, feed_);
         else arc(line, to);
     }
@@ -295,13 +319,19 @@ private:
         const bool clockwise = motion_ == Motion::clockwise;
         double ca = 0, cb = 0;
         const char letters[3] = {'I', 'J', 'K'};
-        if (line[letters[c]]) fail("gcode.unused_word", std::string("the word ") + letters[c] + " in an arc of another plane");
+        if (line[letters[c]])
+            fail("gcode.unused_word", std::string("the word ") + letters[c] + " in an arc of another plane");
         if (line['R']) {
-            if (line[letters[a]] || line[letters[b]]) fail("gcode.arc", "an arc with both a radius and a centre");
+            if (line[letters[a]] || line[letters[b]])
+                fail("gcode.arc", "an arc with both a radius and a centre");
             const double r = *line['R'] * unit_, chord = std::hypot(da, db);
-            if (chord <= 0 || chord > 2 * std::abs(r) + limits_.arc_radius_error) fail("gcode.arc", "an arc whose radius does not reach its end");
+            if (chord <= 0 || chord > 2 * std::abs(r) + limits_.arc_radius_error)
+                fail("gcode.arc", "an arc whose radius does not reach its end");
             const double h = std::sqrt(std::max(0.0, r * r - chord * chord / 4));
-            const double turn = (clockwise == (r > 0)) ? -1 : 1;  // the centre lies left of the chord for a short counter-clockwise arc
+            const double turn =
+                (clockwise == (r > 0))
+                    ? -1
+                    : 1;  // the centre lies left of the chord for a short counter-clockwise arc
             ca = at_[a] + da / 2 - turn * h * db / chord;
             cb = at_[b] + db / 2 + turn * h * da / chord;
         } else {
@@ -311,7 +341,8 @@ private:
             cb = absolute_centres_ ? v : at_[b] + v;
         }
         const double r0 = std::hypot(at_[a] - ca, at_[b] - cb), r1 = std::hypot(to[a] - ca, to[b] - cb);
-        if (!(r0 > 0) || std::abs(r0 - r1) > limits_.arc_radius_error) fail("gcode.arc", "an arc whose start and end lie at different radii");
+        if (!(r0 > 0) || std::abs(r0 - r1) > limits_.arc_radius_error)
+            fail("gcode.arc", "an arc whose start and end lie at different radii");
         const double start = std::atan2(at_[b] - cb, at_[a] - ca);
         double sweep = std::atan2(to[b] - cb, to[a] - ca) - start;
         constexpr double turn = 2 * std::numbers::pi;
@@ -323,20 +354,27 @@ private:
             while (sweep <= 0) sweep += turn;
             if (full) sweep = turn;
         }
-        // A chord of angle φ misses the arc by r(1 − cos(φ/2)) = 2r·sin²(φ/4), which stays exact where the cosine is near one.
+        // A chord of angle φ misses the arc by r(1 − cos(φ/2)) = 2r·sin²(φ/4), which stays exact where the
+        // cosine is near one.
         const double r = std::max(r0, r1);
         const auto chords_within = [&](double error) {
-            const double widest = std::min(turn / 4, 4 * std::asin(std::sqrt(std::min(1.0, error / (2 * r)))));
+            const double widest =
+                std::min(turn / 4, 4 * std::asin(std::sqrt(std::min(1.0, error / (2 * r)))));
             return std::max(1, static_cast<int>(std::min(1e7, std::ceil(std::abs(sweep) / widest))));
         };
-        const auto error_of = [&](int chords) { return 2 * r * std::pow(std::sin(std::abs(sweep) / chords / 4), 2); };
+        const auto error_of = [&](int chords) {
+            return 2 * r * std::pow(std::sin(std::abs(sweep) / chords / 4), 2);
+        };
         const bool level = c == 2 && at_[2] == to[2] && std::abs(r0 - r1) <= 2 * limits_.arc_error;
         const int close = chords_within(limits_.arc_error),
-                  chords = level && limits_.level_arc_error > 0 ? std::min(close, chords_within(limits_.level_arc_error)) : close;
+                  chords = level && limits_.level_arc_error > 0
+                               ? std::min(close, chords_within(limits_.level_arc_error))
+                               : close;
         const std::array<double, 3> from = at_;
         const std::size_t begin = program_.steps.size();
         for (int i = 1; i < chords; ++i) {
-            const double t = static_cast<double>(i) / chords, angle = start + sweep * t, radius = r0 + (r1 - r0) * t;
+            const double t = static_cast<double>(i) / chords, angle = start + sweep * t,
+                         radius = r0 + (r1 - r0) * t;
             std::array<double, 3> p{};
             p[a] = ca + radius * std::cos(angle);
             p[b] = cb + radius * std::sin(angle);
@@ -346,9 +384,13 @@ private:
         step(to, feed_);
         // Whoever takes a level arc itself takes it with one radius.
         program_.chord_error = std::max(program_.chord_error, error_of(chords));
-        program_.arc_error = std::max(program_.arc_error, error_of(close) + (level ? std::abs(r0 - r1) / 2 : 0));
+        program_.arc_error =
+            std::max(program_.arc_error, error_of(close) + (level ? std::abs(r0 - r1) / 2 : 0));
         if (level)
-            program_.arcs.push_back({begin, program_.steps.size(), {ca, cb, to[2], (r0 + r1) / 2, start, sweep}, static_cast<std::size_t>(close)});
+            program_.arcs.push_back({begin,
+                                     program_.steps.size(),
+                                     {ca, cb, to[2], (r0 + r1) / 2, start, sweep},
+                                     static_cast<std::size_t>(close)});
     }
 
     /// Arcs have many chords: as many are foreseen in what is left of the text as have come of what was read.
@@ -367,7 +409,8 @@ private:
     }
 
     int whole(double value, char letter) const {
-        if (value < 0 || value > 99999 || value != std::floor(value)) fail("gcode.number", std::string(1, letter) + " needs a whole number");
+        if (value < 0 || value > 99999 || value != std::floor(value))
+            fail("gcode.number", std::string(1, letter) + " needs a whole number");
         return static_cast<int>(value);
     }
 
@@ -395,6 +438,8 @@ private:
 
 }  // namespace
 
-Program read_gcode(std::string_view text, const std::string& file, const GcodeLimits& limits) { return Reader(text, file, limits).run(); }
+Program read_gcode(std::string_view text, const std::string& file, const GcodeLimits& limits) {
+    return Reader(text, file, limits).run();
+}
 
 }  // namespace slabwright

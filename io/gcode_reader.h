@@ -1,4 +1,5 @@
-// RS-274 in: the programs that this project emits, and no more of the language than a router's operator would expect.
+// RS-274 in: the programs that this project emits, and no more of the language than a router's operator would
+// expect.
 #pragma once
 
 #include <string>
@@ -10,18 +11,22 @@
 namespace slabwright {
 
 struct GcodeLimits {
-    double arc_error = 1e-4;          ///< mm: chords that stand for an arc lie this near to it
-    double level_arc_error = 0;       ///< mm: those of arcs that Program::arcs holds need be no nearer than this; 0: than arc_error
+    double arc_error = 1e-4;  ///< mm: chords that stand for an arc lie this near to it
+    double level_arc_error =
+        0;  ///< mm: those of arcs that Program::arcs holds need be no nearer than this; 0: than arc_error
     double arc_radius_error = 0.005;  ///< mm: the two radii of an arc may differ by this
 };
 
-/// What a program commands, line by line, arcs as chords; Program::arcs holds the level ones whose two radii agree to twice arc_error.
-/// Understands comments, line numbers, % lines, G0–G3 (centre I J K, in planes
-/// G17 G18 G19, or radius R), G4, G17–G19, G20/G21, G40, G43/G43.1 (length offset: taken as measured), G49, G54–G59.3,
-/// G61, G64 (P, Q), G80, G90/G91, G90.1/G91.1, G94, M0–M9, M30, F, S, T, H, and modal motion. Nothing after M2 or M30 is run.
-/// @throws Error(verification, "gcode.…") with file:line for any other word or number, a word twice on a line, a motion
-///   without feed (G1 with no F), a feed motion from or to an unknown place, an arc that is none, a tool change that
-///   names no tool, two tools in one program, no M2 or M30 at the end, a coordinate beyond 214 m
-[[nodiscard]] Program read_gcode(std::string_view text, const std::string& file, const GcodeLimits& limits = {});
+/// What a program commands, line by line, arcs as chords; Program::arcs holds the level ones whose two radii
+/// agree to twice arc_error. Understands comments, line numbers, % lines, G0–G3 (centre I J K, in planes G17
+/// G18 G19, or radius R), G4, G17–G19, G20/G21, G40, G43/G43.1 (length offset: taken as measured), G49,
+/// G54–G59.3, G61, G64 (P, Q), G80, G90/G91, G90.1/G91.1, G94, M0–M9, M30, F, S, T, H, and modal motion.
+/// Nothing after M2 or M30 is run.
+/// @throws Error(verification, "gcode.…") with file:line for any other word or number, a word twice on a
+/// line, a motion
+///   without feed (G1 with no F), a feed motion from or to an unknown place, an arc that is none, a tool
+///   change that names no tool, two tools in one program, no M2 or M30 at the end, a coordinate beyond 214 m
+[[nodiscard]] Program read_gcode(std::string_view text, const std::string& file,
+                                 const GcodeLimits& limits = {});
 
 }  // namespace slabwright

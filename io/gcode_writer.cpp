@@ -25,7 +25,8 @@ std::string decimal(double value, int decimals) {
 /// What a program needs to be safe to start and to leave the spindle where the next one can start.
 void require_safe(const Layer& layer, const Operation& operation, const Tool* tool) {
     const auto refuse = [&](const std::string& message) {
-        throw Error(ErrorKind::no_plan, "program.unsafe", fmt::format("{} of layer {}: {}", name(operation.kind), layer.index, message),
+        throw Error(ErrorKind::no_plan, "program.unsafe",
+                    fmt::format("{} of layer {}: {}", name(operation.kind), layer.index, message),
                     operation.file, "report this with the pattern and the job");
     };
     if (tool == nullptr) refuse(fmt::format("tool {} is not in the library", operation.tool));
@@ -33,7 +34,8 @@ void require_safe(const Layer& layer, const Operation& operation, const Tool* to
     const std::vector<Move>& moves = operation.moves;
     const std::int32_t clearance = to_units(operation.clearance_z);
     if (moves.size() < 2) refuse("it has no moves");
-    if (moves.front().feed != 0 || moves.front().z != clearance) refuse("it does not begin with a rapid to the clearance height");
+    if (moves.front().feed != 0 || moves.front().z != clearance)
+        refuse("it does not begin with a rapid to the clearance height");
     const Move &last = moves.back(), &before = moves[moves.size() - 2];
     if (last.feed != 0 || last.z != clearance || last.x != before.x || last.y != before.y)
         refuse("it does not end with a Z-only rapid to the clearance height");
@@ -41,7 +43,8 @@ void require_safe(const Layer& layer, const Operation& operation, const Tool* to
         const Move& arc = moves[i];
         if (!arc.is_arc()) continue;
         if (i == 0 || arc.feed == 0 || arc.z != moves[i - 1].z) refuse("an arc is rapid or leaves its plane");
-        if (std::abs(arc_shape(moves[i - 1], arc).sweep) >= std::numbers::pi * (1 - 1e-9) || (arc.x == moves[i - 1].x && arc.y == moves[i - 1].y))
+        if (std::abs(arc_shape(moves[i - 1], arc).sweep) >= std::numbers::pi * (1 - 1e-9) ||
+            (arc.x == moves[i - 1].x && arc.y == moves[i - 1].y))
             refuse("an arc turns by half a circle or more");
     }
 }
@@ -115,7 +118,8 @@ std::string comment_text(std::string_view text) {
         const unsigned char byte = static_cast<unsigned char>(c);
         if (c == '(') out += '[';
         else if (c == ')') out += ']';
-        else if (byte >= 0x80 && byte < 0xC0) continue;  // inside a UTF-8 letter: one mark for the whole letter
+        else if (byte >= 0x80 && byte < 0xC0)
+            continue;  // inside a UTF-8 letter: one mark for the whole letter
         else out += byte >= 0x80 ? '?' : byte < 0x20 || byte == 0x7F ? ' ' : c;
     }
     return out;
@@ -124,9 +128,11 @@ std::string comment_text(std::string_view text) {
 namespace {
 
 // As write_program; stops before the first line after move `until`, with a piece that ends there.
-void write_until(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink, std::size_t until) {
+void write_until(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink,
+                 std::size_t until) {
     const std::vector<Tool>& tools = plan.job.tools;
-    const auto tool = std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == operation.tool; });
+    const auto tool =
+        std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == operation.tool; });
     require_safe(layer, operation, tool == tools.end() ? nullptr : &*tool);
 
     const bool layer_top = plan.job.machine.frame == Frame::layer_top;
@@ -135,14 +141,17 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
     const auto comment = [&](const std::string& line) { text += fmt::format("({})\n", comment_text(line)); };
     comment(fmt::format("Slabwright {}: {}", SLABWRIGHT_VERSION, operation.file));
     comment(fmt::format("pattern {}", plan.input.file));
-    comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index, plan.layers.size(), decimal(layer.z_bottom, 4),
-                        decimal(layer.z_top, 4)));
+    comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index,
+                        plan.layers.size(), decimal(layer.z_bottom, 4), decimal(layer.z_top, 4)));
     comment(fmt::format("z = 0 at {}", layer_top ? "the layer's top" : "the pattern's bottom"));
     comment(fmt::format("{}: {}", name(operation.kind), operation.purpose));
     comment(fmt::format("tool {}: {}, diameter {} mm", tool->number, tool->name, decimal(tool->diameter, 4)));
-    comment(fmt::format("cutting {} mm, {} min", decimal(operation.cutting_mm, 1), decimal(operation.minutes, 2)));
-    text += fmt::format("G21 G17 G90 G94 G40 G49 G80\nG64 P{3} Q0\nG54\nT{0} M6\nG43 H{0}\nS{1} M3\nG4 P{2}\n", tool->number,
-                        decimal(operation.spindle_rpm, 0), decimal(plan.job.machine.spindle_dwell_s, 3), decimal(operation.blend, 4));
+    comment(fmt::format("cutting {} mm, {} min", decimal(operation.cutting_mm, 1),
+                        decimal(operation.minutes, 2)));
+    text +=
+        fmt::format("G21 G17 G90 G94 G40 G49 G80\nG64 P{3} Q0\nG54\nT{0} M6\nG43 H{0}\nS{1} M3\nG4 P{2}\n",
+                    tool->number, decimal(operation.spindle_rpm, 0),
+                    decimal(plan.job.machine.spindle_dwell_s, 3), decimal(operation.blend, 4));
 
     const std::vector<Move>& moves = operation.moves;
     // Centres count from where an arc begins, whatever the program before has left in force.
@@ -150,8 +159,8 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
     const std::int32_t clearance = to_units(operation.clearance_z);
     MotionText motion(text, layer_top ? to_units(layer.z_top) : 0);
     motion.rapid_z(clearance);
-    // The first move's x and y are where the program's work starts. The next move goes there by itself when it is a rapid
-    // at clearance height; else the tool is brought over that place before it may go down.
+    // The first move's x and y are where the program's work starts. The next move goes there by itself when
+    // it is a rapid at clearance height; else the tool is brought over that place before it may go down.
     if (moves[1].feed != 0 || moves[1].z != clearance) motion.move(moves[0]);
     for (std::size_t i = 1; i + 1 < moves.size(); ++i) {
         motion.move(moves[i]);
@@ -177,7 +186,10 @@ std::size_t program_line(const Plan& plan, const Layer& layer, const Operation& 
     const auto lines = [&](std::size_t until) {
         std::size_t count = 0;
         write_until(
-            plan, layer, operation, [&](std::string_view piece) { count += static_cast<std::size_t>(std::count(piece.begin(), piece.end(), '\n')); },
+            plan, layer, operation,
+            [&](std::string_view piece) {
+                count += static_cast<std::size_t>(std::count(piece.begin(), piece.end(), '\n'));
+            },
             until);
         return count;
     };

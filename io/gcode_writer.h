@@ -1,4 +1,5 @@
-// RS-274 out: one program per operation (method.md section 11), judged by LinuxCNC's interpreter in the tests.
+// RS-274 out: one program per operation (method.md section 11), judged by LinuxCNC's interpreter in the
+// tests.
 #pragma once
 
 #include <cstddef>
@@ -13,22 +14,28 @@ namespace slabwright {
 /// Takes the next piece of a program's text.
 using TextSink = std::function<void(std::string_view)>;
 
-/// Writes the program of one operation: comment header, G21 G17 G90 G94 G40 G49 G80, G54, tool and length offset, spindle with
-/// dwell, the moves as G0 and G1 (arcs as G2 and G3 with I and J, after G91.1), M5, M2. Coordinates are exact from the integers of 0.1 µm: at most four decimals, no
-/// exponent. Words are modal. The first and the last motion are Z-only G0 to the clearance height. With the frame layer-top, z counts
+/// Writes the program of one operation: comment header, G21 G17 G90 G94 G40 G49 G80, G54, tool and length
+/// offset, spindle with dwell, the moves as G0 and G1 (arcs as G2 and G3 with I and J, after G91.1), M5, M2.
+/// Coordinates are exact from the integers of 0.1 µm: at most four decimals, no exponent. Words are modal.
+/// The first and the last motion are Z-only G0 to the clearance height. With the frame layer-top, z counts
 /// from the layer's top.
 /// @param sink is given pieces of about a megabyte, so that a program of any length takes little memory
-/// @throws Error(no_plan, "program.unsafe") when the operation does not begin and end with a rapid to its clearance height,
-///         the last one Z-only, has no tool of the job's library, or an arc is none (Move); nothing has been given to the sink then
+/// @throws Error(no_plan, "program.unsafe") when the operation does not begin and end with a rapid to its
+/// clearance height,
+///         the last one Z-only, has no tool of the job's library, or an arc is none (Move); nothing has been
+///         given to the sink then
 void write_program(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink);
 
 /// The same text as one string.
 [[nodiscard]] std::string program_text(const Plan& plan, const Layer& layer, const Operation& operation);
 
-/// The line (from 1) of that text which makes the operation's move `move`; 0 when the text has no line of its own for it.
-[[nodiscard]] std::size_t program_line(const Plan& plan, const Layer& layer, const Operation& operation, std::size_t move);
+/// The line (from 1) of that text which makes the operation's move `move`; 0 when the text has no line of its
+/// own for it.
+[[nodiscard]] std::size_t program_line(const Plan& plan, const Layer& layer, const Operation& operation,
+                                       std::size_t move);
 
-/// Makes a text fit for a G-code comment: ASCII, no parentheses, one line, at most 200 characters (LinuxCNC reads lines of 255).
+/// Makes a text fit for a G-code comment: ASCII, no parentheses, one line, at most 200 characters (LinuxCNC
+/// reads lines of 255).
 [[nodiscard]] std::string comment_text(std::string_view text);
 
 }  // namespace slabwright

@@ -95,7 +95,14 @@ std::string inspection_json(const Inspection& inspection) {
     json.key("disagreements").begin_array();
     for (const FinderDisagreement& d : inspection.disagreements) {
         json.begin_object(Shape::line).key("type").string(name(d.type)).key("z").rounded(d.z, 6);
-        json.key("xy").begin_array().rounded(d.x, 6).rounded(d.y, 6).end().key("found_by").string(name(d.found_by)).end();
+        json.key("xy")
+            .begin_array()
+            .rounded(d.x, 6)
+            .rounded(d.y, 6)
+            .end()
+            .key("found_by")
+            .string(name(d.found_by))
+            .end();
     }
     json.end();
     json.key("undercuts").begin_array();
@@ -116,14 +123,19 @@ std::string inspection_text(const Inspection& inspection) {
     const MeshReport& report = inspection.report;
     const InputInfo& input = inspection.input;
     std::string text = fmt::format("{}\n", input.file);
-    text += fmt::format("  size        {} x {} x {} mm\n", mm(input.max[0] - input.min[0]), mm(input.max[1] - input.min[1]),
-                        mm(input.max[2] - input.min[2]));
-    text += fmt::format("  facets      {} in {} {}\n", report.facets, report.components, report.components == 1 ? "body" : "bodies");
-    text += fmt::format("  volume      {} cm3, surface {} cm2\n", mm(report.volume_mm3 / 1000, 2), mm(report.area_mm2 / 100, 2));
+    text += fmt::format("  size        {} x {} x {} mm\n", mm(input.max[0] - input.min[0]),
+                        mm(input.max[1] - input.min[1]), mm(input.max[2] - input.min[2]));
+    text += fmt::format("  facets      {} in {} {}\n", report.facets, report.components,
+                        report.components == 1 ? "body" : "bodies");
+    text += fmt::format("  volume      {} cm3, surface {} cm2\n", mm(report.volume_mm3 / 1000, 2),
+                        mm(report.area_mm2 / 100, 2));
     for (const NamedFinding& f : findings(report))
-        if (f.finding.count > 0) text += fmt::format("  {:<11} {}, the first at facet {}\n", f.finding.count, f.words, f.finding.first_facet);
+        if (f.finding.count > 0)
+            text += fmt::format("  {:<11} {}, the first at facet {}\n", f.finding.count, f.words,
+                                f.finding.first_facet);
     if (!inspection.solid) text += fmt::format("  not usable: {}\n", inspection.unusable);
-    // A castings mesh can have thousands of features of one kind; people need the count and the most important ones.
+    // A castings mesh can have thousands of features of one kind; people need the count and the most
+    // important ones.
     constexpr std::size_t shown = 12;
     for (int t = 0; t <= static_cast<int>(FeatureType::saddle); ++t) {
         const FeatureType type = static_cast<FeatureType>(t);
@@ -142,11 +154,13 @@ std::string inspection_text(const Inspection& inspection) {
     text += inspection.undercuts.empty() && inspection.solid ? "  undercuts   none\n" : "";
     for (std::size_t i = 0; i < std::min(shown, inspection.undercuts.size()); ++i) {
         const UnmadeUndercut& u = inspection.undercuts[i];
-        text += fmt::format("  undercut    {} mm2, {} mm deep at x {} y {} z {} if milled as one layer\n", mm(u.area_mm2, 1), mm(u.depth_mm),
-                            mm(u.x, 2), mm(u.y, 2), mm(u.z, 2));
+        text += fmt::format("  undercut    {} mm2, {} mm deep at x {} y {} z {} if milled as one layer\n",
+                            mm(u.area_mm2, 1), mm(u.depth_mm), mm(u.x, 2), mm(u.y, 2), mm(u.z, 2));
     }
-    if (inspection.undercuts.size() > shown) text += fmt::format("  and {} more undercuts\n", inspection.undercuts.size() - shown);
-    for (const Diagnostic& d : inspection.diagnostics) text += fmt::format("  {}: {}\n", name(d.severity), d.message);
+    if (inspection.undercuts.size() > shown)
+        text += fmt::format("  and {} more undercuts\n", inspection.undercuts.size() - shown);
+    for (const Diagnostic& d : inspection.diagnostics)
+        text += fmt::format("  {}: {}\n", name(d.severity), d.message);
     return text;
 }
 

@@ -13,7 +13,8 @@ struct Inspection {
     InputInfo input;
     MeshReport report;
     std::vector<Diagnostic> diagnostics;
-    bool solid = false;    ///< whether a planner may use the mesh; features and undercuts are looked for only then
+    bool solid =
+        false;  ///< whether a planner may use the mesh; features and undercuts are looked for only then
     std::string unusable;  ///< why not, in one line
     std::vector<Feature> features;
     std::vector<FinderDisagreement> disagreements;
@@ -21,7 +22,8 @@ struct Inspection {
     std::vector<UnmadeUndercut> undercuts;
 };
 
-/// Reads the file and looks at it. @throws Error(input | usage | cancelled) as read_stl; a mesh that is read but not solid is a finding
+/// Reads the file and looks at it. @throws Error(input | usage | cancelled) as read_stl; a mesh that is read
+/// but not solid is a finding
 [[nodiscard]] Inspection inspect_stl(Context& context, const std::string& stl_path, const Job& job);
 
 /// Schema slabwright.inspect/1.

@@ -1,5 +1,5 @@
-// The one table of a job's keys: their names, comments and places in engine/job.h. Reading, printing the defaults,
-// naming unknown keys and writing the job into plan.json all walk it, so they cannot disagree.
+// The one table of a job's keys: their names, comments and places in engine/job.h. Reading, printing the
+// defaults, naming unknown keys and writing the job into plan.json all walk it, so they cannot disagree.
 #pragma once
 
 #include "engine/job.h"
@@ -14,24 +14,35 @@ struct Word {
 };
 
 inline constexpr Word<LengthUnit> kUnitWords[] = {{"mm", LengthUnit::mm}, {"in", LengthUnit::inch}};
-inline constexpr Word<LayerStrategy> kStrategyWords[] = {
-    {"printed", LayerStrategy::printed}, {"optimal", LayerStrategy::optimal}, {"combined", LayerStrategy::combined}};
-inline constexpr Word<Finder> kFinderWords[] = {{"halving", Finder::halving}, {"exact", Finder::exact}, {"both", Finder::both}};
-inline constexpr Word<FinishStrategy> kFinishWords[] = {
-    {"split", FinishStrategy::split}, {"levels", FinishStrategy::levels}, {"projection", FinishStrategy::projection}, {"both", FinishStrategy::both}};
-inline constexpr Word<Projection> kProjectionWords[] = {{"raster", Projection::raster}, {"offset", Projection::offset}};
+inline constexpr Word<LayerStrategy> kStrategyWords[] = {{"printed", LayerStrategy::printed},
+                                                         {"optimal", LayerStrategy::optimal},
+                                                         {"combined", LayerStrategy::combined}};
+inline constexpr Word<Finder> kFinderWords[] = {
+    {"halving", Finder::halving}, {"exact", Finder::exact}, {"both", Finder::both}};
+inline constexpr Word<FinishStrategy> kFinishWords[] = {{"split", FinishStrategy::split},
+                                                        {"levels", FinishStrategy::levels},
+                                                        {"projection", FinishStrategy::projection},
+                                                        {"both", FinishStrategy::both}};
+inline constexpr Word<Projection> kProjectionWords[] = {{"raster", Projection::raster},
+                                                        {"offset", Projection::offset}};
 inline constexpr Word<CoefficientTransform> kTransformWords[] = {{"printed", CoefficientTransform::printed},
                                                                  {"oblique", CoefficientTransform::oblique}};
-inline constexpr Word<RoughPattern> kRoughWords[] = {{"contour", RoughPattern::contour}, {"zigzag", RoughPattern::zigzag}};
-inline constexpr Word<RestPattern> kRestWords[] = {
-    {"by_library", RestPattern::by_library}, {"raster", RestPattern::raster}, {"contour", RestPattern::contour}};
-inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}};
-inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated}, {"nominal", Engagement::nominal}};
-inline constexpr Word<SelectionMode> kSelectionWords[] = {{"select", SelectionMode::select}, {"fixed", SelectionMode::fixed}};
+inline constexpr Word<RoughPattern> kRoughWords[] = {{"contour", RoughPattern::contour},
+                                                     {"zigzag", RoughPattern::zigzag}};
+inline constexpr Word<RestPattern> kRestWords[] = {{"by_library", RestPattern::by_library},
+                                                   {"raster", RestPattern::raster},
+                                                   {"contour", RestPattern::contour}};
+inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base},
+                                              {"layer-top", Frame::layer_top}};
+inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated},
+                                                        {"nominal", Engagement::nominal}};
+inline constexpr Word<SelectionMode> kSelectionWords[] = {{"select", SelectionMode::select},
+                                                          {"fixed", SelectionMode::fixed}};
 inline constexpr Word<AccessRule> kAccessWords[] = {
     {"sections", AccessRule::sections}, {"exact", AccessRule::exact}, {"printed", AccessRule::printed}};
-inline constexpr Word<RoughLimit> kRoughLimitWords[] = {
-    {"smaller", RoughLimit::smaller}, {"finish_radius", RoughLimit::finish_radius}, {"cusp", RoughLimit::cusp}};
+inline constexpr Word<RoughLimit> kRoughLimitWords[] = {{"smaller", RoughLimit::smaller},
+                                                        {"finish_radius", RoughLimit::finish_radius},
+                                                        {"cusp", RoughLimit::cusp}};
 inline constexpr Word<ToolKind> kToolWords[] = {
     {"flat", ToolKind::flat}, {"ball", ToolKind::ball}, {"face", ToolKind::face}, {"drill", ToolKind::drill}};
 
@@ -69,8 +80,11 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.required();
     visit.key("stepdown_max", tool.stepdown_max, "mm (LUO table 5.4)");
     visit.key("stepover", tool.stepover, "share of the diameter, for clearing");
-    visit.key("strength_mpa", tool.strength_mpa, "MPa, the cutter's own in bending, as its maker states it; 0: not checked");
-    visit.key("plunges", tool.plunges, "cuts straight down into stock; when left out: true for ball and drill, false for flat and face");
+    visit.key("strength_mpa", tool.strength_mpa,
+              "MPa, the cutter's own in bending, as its maker states it; 0: not checked");
+    visit.key(
+        "plunges", tool.plunges,
+        "cuts straight down into stock; when left out: true for ball and drill, false for flat and face");
 }
 
 /// Walks every key of the job but the tools: first those of the top, then table by table.
@@ -83,14 +97,17 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("name", job.material.name, "");
     visit.key("strength_mpa", job.material.strength_mpa, "MPa");
     visit.key("min_thickness", job.material.min_thickness,
-              "mm, MTmin: thinnest material above a layer boundary; 0: what bears the cutters where the slab hangs over (Luo 6.3)");
-    visit.key("shallow_limit_deg", job.material.shallow_limit_deg, "degrees from horizontal: shallower slopes are features (Type III)");
+              "mm, MTmin: thinnest material above a layer boundary; 0: what bears the cutters where the slab "
+              "hangs over (Luo 6.3)");
+    visit.key("shallow_limit_deg", job.material.shallow_limit_deg,
+              "degrees from horizontal: shallower slopes are features (Type III)");
     visit.key("density_kg_m3", job.material.density_kg_m3, "kg/m^3");
     visit.key("ktc", job.material.ktc, "N/mm^2, cutting coefficient along the cut (LUO 6.5.1)");
     visit.key("kte", job.material.kte, "N/mm, edge coefficient along the cut");
     visit.key("kfc", job.material.kfc, "N/mm^2, cutting coefficient across the cut");
     visit.key("kfe", job.material.kfe, "N/mm, edge coefficient across the cut");
-    visit.key("source", job.material.source, "where these four come from: orthogonal cutting of this material");
+    visit.key("source", job.material.source,
+              "where these four come from: orthogonal cutting of this material");
     visit.word("transform", job.material.transform, kTransformWords,
                "of the four to a helical edge: oblique, or printed (Luo 6.2.2, whose matrix repeats a row)");
 
@@ -99,7 +116,8 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("length", job.slabs.length, "mm in x, the largest slab");
     visit.key("width", job.slabs.width, "mm in y");
     visit.key("margin", job.slabs.margin, "mm of stock past the pattern, where the slab allows");
-    visit.key("facing_allowance", job.slabs.facing_allowance, "mm that the face mill takes off at least, to find the whole slab");
+    visit.key("facing_allowance", job.slabs.facing_allowance,
+              "mm that the face mill takes off at least, to find the whole slab");
 
     visit.table("machine", "the router");
     visit.key("name", job.machine.name, "");
@@ -115,15 +133,19 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("spindle_dwell_s", job.machine.spindle_dwell_s, "s, from spindle start to the first motion");
     visit.key("tool_change_s", job.machine.tool_change_s, "s");
     visit.key("clearance", job.machine.clearance, "mm of air between a rapid and the highest stock");
-    visit.word("frame", job.machine.frame, kFrameWords, "pattern-base (z = 0 at the pattern's bottom) or layer-top (z = 0 at the layer's top)");
-    visit.key("base_board_thickness", job.machine.base_board_thickness, "mm, the sacrificial board under the first layer");
-    visit.key("base_board_cut", job.machine.base_board_cut, "mm that may be cut into it; negative: as deep as the finish tool overruns");
+    visit.word("frame", job.machine.frame, kFrameWords,
+               "pattern-base (z = 0 at the pattern's bottom) or layer-top (z = 0 at the layer's top)");
+    visit.key("base_board_thickness", job.machine.base_board_thickness,
+              "mm, the sacrificial board under the first layer");
+    visit.key("base_board_cut", job.machine.base_board_cut,
+              "mm that may be cut into it; negative: as deep as the finish tool overruns");
 
     visit.table("bonding", "glue and press");
     visit.key("glue", job.bonding.glue, "");
     visit.key("press_force", job.bonding.press_force, "N, at most");
     visit.key("press_time_s", job.bonding.press_time_s, "s");
-    visit.key("max_pressure_mpa", job.bonding.max_pressure_mpa, "MPa on the glued area, so that no rib is crushed");
+    visit.key("max_pressure_mpa", job.bonding.max_pressure_mpa,
+              "MPa on the glued area, so that no rib is crushed");
     visit.key("edge_setback", job.bonding.edge_setback, "mm that glue keeps from finished edges");
     visit.key("handling_s", job.bonding.handling_s, "s, to fetch, clamp and place a slab");
     visit.key("glue_s_per_m2", job.bonding.glue_s_per_m2, "s for each square metre of glue");
@@ -133,76 +155,114 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("cusp", job.tolerances.cusp, "mm, scallop height of the finish passes");
     visit.key("rough_cusp", job.tolerances.rough_cusp, "mm, L of the roughing stepdown (LUO 5.5.3.3)");
     visit.key("chordal_deviation", job.tolerances.chordal_deviation, "mm, of the STL");
-    visit.key("undercut", job.tolerances.undercut, "mm: an undercut that leaves less is a remark, not a refusal");
+    visit.key("undercut", job.tolerances.undercut,
+              "mm: an undercut that leaves less is a remark, not a refusal");
     visit.key("gap", job.tolerances.gap, "mm: open chains this near are closed, and reported");
-    visit.key("weld", job.tolerances.weld, "mm: vertices this near are merged, and reported; 0: only equal ones");
-    visit.key("simplify", job.tolerances.simplify, "share of gouge for which 200 000 facets and more are made fewer, under the paths; 0: never");
+    visit.key("weld", job.tolerances.weld,
+              "mm: vertices this near are merged, and reported; 0: only equal ones");
+    visit.key("simplify", job.tolerances.simplify,
+              "share of gouge for which 200 000 facets and more are made fewer, under the paths; 0: never");
 
     visit.table("layers", "where layers end");
     visit.word("strategy", job.layers.strategy, kStrategyWords,
-               "optimal, printed (LUO 4.2.5), or combined: slabs bonded to any thickness, whatever is built fastest (LUO 6.4.2)");
+               "optimal, printed (LUO 4.2.5), or combined: slabs bonded to any thickness, whatever is built "
+               "fastest (LUO 6.4.2)");
     visit.word("finder", job.layers.finder, kFinderWords, "of features: exact, halving or both");
     visit.key("min_layer", job.layers.min_layer, "mm: thinner layers are reported");
     visit.key("alpha", job.layers.alpha, "per inch, in Q = alpha DT + beta A (LUO 4.2.4)");
     visit.key("beta", job.layers.beta, "per square inch");
     visit.key("saddles_constrain", job.layers.saddles_constrain, "saddles keep boundaries away as peaks do");
-    visit.key("flat_merge", job.layers.flat_merge, "mm: a peak or valley this near an up-facing flat is no feature of its own");
-    visit.key("halving_coarse", job.layers.halving_coarse, "mm between the first sections of the halving search");
+    visit.key("flat_merge", job.layers.flat_merge,
+              "mm: a peak or valley this near an up-facing flat is no feature of its own");
+    visit.key("halving_coarse", job.layers.halving_coarse,
+              "mm between the first sections of the halving search");
     visit.key("halving_resolution", job.layers.halving_resolution, "mm at which it ends");
 
     visit.table("cutting", "tool paths");
     visit.key("wall_allowance", job.cutting.wall_allowance, "mm that roughing leaves on walls");
     visit.key("floor_allowance", job.cutting.floor_allowance, "mm that roughing leaves on floors");
     visit.key("rough_blend", job.cutting.rough_blend,
-              "mm by which the machine may round corners of roughing (G64 P); 0.02 to a third of the smaller allowance is what it gets");
-    visit.key("steep_limit_deg", job.cutting.steep_limit_deg, "degrees from horizontal: level contours from here up, projected raster below");
+              "mm by which the machine may round corners of roughing (G64 P); 0.02 to a third of the smaller "
+              "allowance is what it gets");
+    visit.key("steep_limit_deg", job.cutting.steep_limit_deg,
+              "degrees from horizontal: level contours from here up, projected raster below");
     visit.key("overlap_deg", job.cutting.overlap_deg, "degrees that both cut past the limit");
-    visit.key("vertical_deg", job.cutting.vertical_deg, "degrees: walls from here up go to the flat end mill");
-    visit.key("min_stepdown", job.cutting.min_stepdown, "mm, floor of the finish stepdown; reported where it bites");
-    visit.key("min_stepover", job.cutting.min_stepover, "mm, floor of the finish stepover; reported where it bites");
-    visit.key("min_flat_area", job.cutting.min_flat_area, "mm^2: smaller up-facing flats get no level of their own");
+    visit.key("vertical_deg", job.cutting.vertical_deg,
+              "degrees: walls from here up go to the flat end mill");
+    visit.key("min_stepdown", job.cutting.min_stepdown,
+              "mm, floor of the finish stepdown; reported where it bites");
+    visit.key("min_stepover", job.cutting.min_stepover,
+              "mm, floor of the finish stepover; reported where it bites");
+    visit.key("min_flat_area", job.cutting.min_flat_area,
+              "mm^2: smaller up-facing flats get no level of their own");
     visit.key("face_depth", job.cutting.face_depth, "mm, deepest step of the face mill");
-    visit.key("ramp_deg", job.cutting.ramp_deg, "degrees, entry into stock: on a helix where there is room, else to and fro");
-    visit.word("rough_pattern", job.cutting.rough_pattern, kRoughWords, "contour: rings around what stays; zigzag: parallel lines to and fro");
+    visit.key("ramp_deg", job.cutting.ramp_deg,
+              "degrees, entry into stock: on a helix where there is room, else to and fro");
+    visit.word("rough_pattern", job.cutting.rough_pattern, kRoughWords,
+               "contour: rings around what stays; zigzag: parallel lines to and fro");
     visit.word("rest_pattern", job.cutting.rest_pattern, kRestWords,
-               "what cutters leave: raster, on lines where it stands; contour, on rings, and along the feet of walls; by_library: contour where "
+               "what cutters leave: raster, on lines where it stands; contour, on rings, and along the feet "
+               "of walls; by_library: contour where "
                "there is more than one flat or one ball");
-    visit.key("open_waste", job.cutting.open_waste, "contour roughing leaves what lies open from beside the stock to the face mill");
-    visit.key("climb", job.cutting.climb, "contour roughing climbs everywhere; false: either way, where that is shorter");
+    visit.key("open_waste", job.cutting.open_waste,
+              "contour roughing leaves what lies open from beside the stock to the face mill");
+    visit.key("climb", job.cutting.climb,
+              "contour roughing climbs everywhere; false: either way, where that is shorter");
     visit.key("max_engagement", job.cutting.max_engagement,
-              "share of the diameter that roughing meets at full feed; slower in proportion where it meets more; 1: no limit");
-    visit.key("holder_clearance", job.cutting.holder_clearance, "mm between the holder and anything that stands");
-    visit.key("finish_feed", job.cutting.finish_feed, "mm/min; faster where the chip is thin, see adapt_feed");
-    visit.word("finish_strategy", job.cutting.finish_strategy, kFinishWords,
-               "split at the steep limit, levels alone, projection alone, or both over everything (SHAPING 5)");
-    visit.word("projection", job.cutting.projection, kProjectionWords, "raster: parallel lines; offset: curves offset inwards from the border");
+              "share of the diameter that roughing meets at full feed; slower in proportion where it meets "
+              "more; 1: no limit");
+    visit.key("holder_clearance", job.cutting.holder_clearance,
+              "mm between the holder and anything that stands");
+    visit.key("finish_feed", job.cutting.finish_feed,
+              "mm/min; faster where the chip is thin, see adapt_feed");
+    visit.word(
+        "finish_strategy", job.cutting.finish_strategy, kFinishWords,
+        "split at the steep limit, levels alone, projection alone, or both over everything (SHAPING 5)");
+    visit.word("projection", job.cutting.projection, kProjectionWords,
+               "raster: parallel lines; offset: curves offset inwards from the border");
     visit.key("uniform_steps", job.cutting.uniform_steps,
-              "one stepdown and one stepover a layer, for its worst slope, and no rest machining: to compare methods");
+              "one stepdown and one stepover a layer, for its worst slope, and no rest machining: to compare "
+              "methods");
     visit.word("engagement", job.cutting.engagement, kEngagementWords,
-               "what forces are computed from: simulated, what stands when a move cuts; nominal, an operation's largest steps");
+               "what forces are computed from: simulated, what stands when a move cuts; nominal, an "
+               "operation's largest steps");
     visit.key("adapt_feed", job.cutting.adapt_feed,
-              "feeds lowered where the cutter would bend too far, raised where the chip is thin; needs simulated engagement");
+              "feeds lowered where the cutter would bend too far, raised where the chip is thin; needs "
+              "simulated engagement");
     visit.key("adapt_stepdown", job.cutting.adapt_stepdown,
-              "deep cuts in several passes where no feed keeps cutter and wood within their limits; needs simulated engagement");
-    visit.key("arcs", job.cutting.arcs, "arcs (G2, G3) where a path turns evenly; false: straight moves only");
+              "deep cuts in several passes where no feed keeps cutter and wood within their limits; needs "
+              "simulated engagement");
+    visit.key("arcs", job.cutting.arcs,
+              "arcs (G2, G3) where a path turns evenly; false: straight moves only");
 
-    visit.table("selection", "which tools of the library cut a layer (LUO 5.5); nothing to select with one flat and one ball");
-    visit.word("mode", job.selection.mode, kSelectionWords, "select: layer by layer; fixed: 1/2 in flat and 1/4 in ball, or the first of each");
+    visit.table(
+        "selection",
+        "which tools of the library cut a layer (LUO 5.5); nothing to select with one flat and one ball");
+    visit.word("mode", job.selection.mode, kSelectionWords,
+               "select: layer by layer; fixed: 1/2 in flat and 1/4 in ball, or the first of each");
     visit.word("accessibility", job.selection.accessibility, kAccessWords,
-               "sections: by the length of sections that is touched; exact: by area in 3D, slow; printed: as LUO 5.5.1");
+               "sections: by the length of sections that is touched; exact: by area in 3D, slow; printed: as "
+               "LUO 5.5.1");
     visit.key("threshold", job.selection.threshold, "share of a layer that its finish tool must reach (AR)");
-    visit.key("overlap_weight", job.selection.overlap_weight, "W, weight of walls too near each other, of the printed AR");
+    visit.key("overlap_weight", job.selection.overlap_weight,
+              "W, weight of walls too near each other, of the printed AR");
     visit.word("rough_limit", job.selection.rough_limit, kRoughLimitWords,
-               "L of the roughing stepdown (LUO 5.5.3.3): finish_radius, cusp (tolerances.rough_cusp), or the smaller");
+               "L of the roughing stepdown (LUO 5.5.3.3): finish_radius, cusp (tolerances.rough_cusp), or "
+               "the smaller");
     visit.key("semi_rough", job.selection.semi_rough, "a semi-roughing tool where it saves time");
-    visit.key("compare", job.selection.compare, "plan every layer with the fixed set too, and keep what is faster");
+    visit.key("compare", job.selection.compare,
+              "plan every layer with the fixed set too, and keep what is faster");
     visit.key("voxel", job.selection.voxel, "mm, on which the semi-roughing area AS is measured");
 
-    visit.table("flask", "a frame of every slab that stays around the pattern, to carry it while it is cut and as moulding box");
+    visit.table("flask",
+                "a frame of every slab that stays around the pattern, to carry it while it is cut and as "
+                "moulding box");
     visit.key("enabled", job.flask.enabled, "leave a flask");
-    visit.key("gap", job.flask.gap, "mm from the pattern's outline to the opening, at the bottom; the widest end mill must pass");
+    visit.key("gap", job.flask.gap,
+              "mm from the pattern's outline to the opening, at the bottom; the widest end mill must pass");
     visit.key("wall", job.flask.wall, "mm, the thinnest wall around the opening");
-    visit.key("draft_deg", job.flask.draft_deg, "degrees by which the opening widens upwards, in one step a layer");
+    visit.key("draft_deg", job.flask.draft_deg,
+              "degrees by which the opening widens upwards, in one step a layer");
 }
 
 }  // namespace slabwright

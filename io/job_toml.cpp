@@ -99,7 +99,8 @@ public:
         const toml::node* node = find(name);
         if (node == nullptr) return;
         const auto integer = node->value_exact<std::int64_t>();
-        if (!integer || *integer < -2147483647 || *integer > 2147483647) wrong_type(*node, prefix_ + name, "a whole number");
+        if (!integer || *integer < -2147483647 || *integer > 2147483647)
+            wrong_type(*node, prefix_ + name, "a whole number");
         value = static_cast<int>(*integer);
     }
     void key(const char* name, bool& value, const char*) {
@@ -121,7 +122,8 @@ public:
         for (const toml::node& element : *array) value.push_back(number(element, prefix_ + name));
     }
     void degrees(const char* name, double& radians, const char*) {
-        if (const toml::node* node = find(name)) radians = number(*node, prefix_ + name) * std::numbers::pi / 180;
+        if (const toml::node* node = find(name))
+            radians = number(*node, prefix_ + name) * std::numbers::pi / 180;
     }
     template <class Enum, std::size_t N>
     void word(const char* name, Enum& value, const Word<Enum> (&words)[N], const char*) {
@@ -136,7 +138,8 @@ public:
             }
             known.emplace_back(w.text);
         }
-        fail(*node, "job.word", fmt::format("{}{} is \"{}\", none of {}", prefix_, name, given, fmt::join(known, ", ")),
+        fail(*node, "job.word",
+             fmt::format("{}{} is \"{}\", none of {}", prefix_, name, given, fmt::join(known, ", ")),
              fmt::format("did you mean \"{}\"?", nearest(given, known)));
     }
 
@@ -144,7 +147,8 @@ public:
     [[nodiscard]] std::string place_of(const toml::node& node) const {
         return node.source().begin.line > 0 ? fmt::format("{}:{}", file_, node.source().begin.line) : file_;
     }
-    [[noreturn]] void fail(const toml::node& node, const char* code, const std::string& message, const std::string& remedy) const {
+    [[noreturn]] void fail(const toml::node& node, const char* code, const std::string& message,
+                           const std::string& remedy) const {
         throw Error(ErrorKind::usage, code, message, place_of(node), remedy);
     }
     static const char* type_name(const toml::node& node) {
@@ -190,7 +194,8 @@ protected:
         return *value;
     }
     [[noreturn]] void wrong_type(const toml::node& node, const std::string& key, const char* wanted) const {
-        fail(node, "job.type", fmt::format("{} is {}, not {}", key, type_name(node), wanted), fmt::format("give {}", wanted));
+        fail(node, "job.type", fmt::format("{} is {}, not {}", key, type_name(node), wanted),
+             fmt::format("give {}", wanted));
     }
 
 private:
@@ -220,7 +225,8 @@ KeyNames all_keys() {
 }
 
 /// Refuses the first key (by line) that the table does not have, naming the nearest that it has.
-void refuse_unknown(const toml::table& values, const std::string& prefix, const KeyNames& known, const Reader& reader) {
+void refuse_unknown(const toml::table& values, const std::string& prefix, const KeyNames& known,
+                    const Reader& reader) {
     std::vector<std::pair<std::string, const toml::node*>> given;
     for (auto&& [key, node] : values) given.emplace_back(std::string(key.str()), &node);
     std::sort(given.begin(), given.end(), [](const auto& a, const auto& b) {
@@ -229,28 +235,34 @@ void refuse_unknown(const toml::table& values, const std::string& prefix, const 
         return std::tie(p.line, p.column, a.first) < std::tie(q.line, q.column, b.first);
     });
     for (const auto& [key, node] : given) {
-        if (prefix.empty() && std::find(known.tables.begin(), known.tables.end(), key) != known.tables.end()) {
+        if (prefix.empty() &&
+            std::find(known.tables.begin(), known.tables.end(), key) != known.tables.end()) {
             if (key == "tool") continue;  // a list; its entries are looked at one by one
             if (const toml::table* inner = node->as_table()) refuse_unknown(*inner, key + ".", known, reader);
             continue;
         }
         const std::string full = prefix + key;
         if (std::find(known.names.begin(), known.names.end(), full) != known.names.end()) continue;
-        // The key may be misspelt, or right but in the wrong table: both are found by the better of two distances.
+        // The key may be misspelt, or right but in the wrong table: both are found by the better of two
+        // distances.
         std::string best;
         std::size_t best_distance = ~std::size_t{0};
         std::vector<std::string> candidates = known.names;
         if (prefix.empty()) candidates.insert(candidates.end(), known.tables.begin(), known.tables.end());
         for (const std::string& candidate : candidates) {
             const std::size_t dot = candidate.find('.');
-            const std::string_view bare = dot == std::string::npos ? std::string_view(candidate) : std::string_view(candidate).substr(dot + 1);
-            const std::size_t distance = std::min(2 * edit_distance(full, candidate), 2 * edit_distance(key, bare) + 1);
+            const std::string_view bare = dot == std::string::npos
+                                              ? std::string_view(candidate)
+                                              : std::string_view(candidate).substr(dot + 1);
+            const std::size_t distance =
+                std::min(2 * edit_distance(full, candidate), 2 * edit_distance(key, bare) + 1);
             if (distance < best_distance) {
                 best = candidate;
                 best_distance = distance;
             }
         }
-        reader.fail(*node, "job.unknown_key", fmt::format("unknown key {}", full), fmt::format("did you mean {}?", best));
+        reader.fail(*node, "job.unknown_key", fmt::format("unknown key {}", full),
+                    fmt::format("did you mean {}?", best));
     }
 }
 
@@ -278,22 +290,28 @@ struct Printer {
         std::string out = "\"";
         for (const char c : value) {
             if (c == '"' || c == '\\') (out += '\\') += c;
-            else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) out += fmt::format("\\u{:04X}", static_cast<unsigned>(c));
+            else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F)
+                out += fmt::format("\\u{:04X}", static_cast<unsigned>(c));
             else out += c;
         }
         return out + '"';
     }
     void key(const char* name, double value, const char* comment) { line(name, real(value), comment); }
     void key(const char* name, int value, const char* comment) { line(name, std::to_string(value), comment); }
-    void key(const char* name, bool value, const char* comment) { line(name, value ? "true" : "false", comment); }
-    void key(const char* name, const std::string& value, const char* comment) { line(name, quoted(value), comment); }
+    void key(const char* name, bool value, const char* comment) {
+        line(name, value ? "true" : "false", comment);
+    }
+    void key(const char* name, const std::string& value, const char* comment) {
+        line(name, quoted(value), comment);
+    }
     void key(const char* name, const std::vector<double>& values, const char* comment) {
         std::string list;
         for (const double value : values) list += (list.empty() ? "" : ", ") + real(value);
         line(name, "[" + list + "]", comment);
     }
     void degrees(const char* name, double radians, const char* comment) {
-        // Degrees that come out of radians carry rounding in the last digits; nine decimals bring 30 back as 30.
+        // Degrees that come out of radians carry rounding in the last digits; nine decimals bring 30 back
+        // as 30.
         std::string digits;
         append_rounded(digits, radians * 180 / std::numbers::pi, 9);
         if (digits.find('.') == std::string::npos) digits += ".0";
@@ -313,7 +331,8 @@ Job parse_job(std::string_view text, const std::string& file) {
         root = toml::parse(text, file);
     } catch (const toml::parse_error& error) {
         throw Error(ErrorKind::usage, "job.syntax", fmt::format("not TOML: {}", error.description()),
-                    fmt::format("{}:{}", file, error.source().begin.line), "`slabwright job --defaults` prints a job file that is right");
+                    fmt::format("{}:{}", file, error.source().begin.line),
+                    "`slabwright job --defaults` prints a job file that is right");
     }
     Job job;
     JobReader reader(root, file);
@@ -323,7 +342,8 @@ Job parse_job(std::string_view text, const std::string& file) {
     if (const toml::node* node = root.get("tool")) {
         const toml::array* tools = node->as_array();
         if (tools == nullptr || !tools->is_array_of_tables())
-            reader.fail(*node, "job.type", fmt::format("tool is {}, not a list of tables", Reader::type_name(*node)),
+            reader.fail(*node, "job.type",
+                        fmt::format("tool is {}, not a list of tables", Reader::type_name(*node)),
                         "write [[tool]] in double brackets");
         job.tools.clear();
         std::size_t position = 0;
@@ -340,16 +360,19 @@ Job parse_job(std::string_view text, const std::string& file) {
     try {
         validate(job);
     } catch (const Error& error) {
-        // validate() names the key; the reader knows on which line it stands. A key at its default has no line.
+        // validate() names the key; the reader knows on which line it stands. A key at its default has no
+        // line.
         const auto place = reader.places().find(error.place());
-        throw Error(error.kind(), error.code(), error.message(), place != reader.places().end() ? place->second : file, error.remedy());
+        throw Error(error.kind(), error.code(), error.message(),
+                    place != reader.places().end() ? place->second : file, error.remedy());
     }
     return job;
 }
 
 std::string job_toml(const Job& job) {
     Printer printer;
-    printer.text = "# A job of Slabwright. Every key may be left out; lengths in mm, forces in N, angles in degrees.\n";
+    printer.text =
+        "# A job of Slabwright. Every key may be left out; lengths in mm, forces in N, angles in degrees.\n";
     visit_job_keys(job, printer);
     printer.text += "\n# The tool library. Any [[tool]] replaces the whole default library.\n";
     for (const Tool& tool : job.tools) {

@@ -13,13 +13,16 @@ namespace {
 
 void require_finite(double value) {
     if (!std::isfinite(value))
-        throw Error(ErrorKind::no_plan, "number.not_finite", "a quantity of the plan is not a finite number", "",
-                    "report this with the pattern and the job");
+        throw Error(ErrorKind::no_plan, "number.not_finite", "a quantity of the plan is not a finite number",
+                    "", "report this with the pattern and the job");
 }
 
-/// Length of the well-formed UTF-8 sequence at text[i], 0 when there is none (RFC 3629: no overlong forms, no surrogates).
+/// Length of the well-formed UTF-8 sequence at text[i], 0 when there is none (RFC 3629: no overlong forms, no
+/// surrogates).
 std::size_t utf8_length(std::string_view text, std::size_t i) {
-    const auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u; };
+    const auto byte = [&](std::size_t k) {
+        return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u;
+    };
     const auto tail = [&](std::size_t k) { return (byte(k) & 0xC0u) == 0x80u; };
     const unsigned a = byte(i), b = byte(i + 1);
     if (a < 0x80) return 1;
@@ -29,7 +32,9 @@ std::size_t utf8_length(std::string_view text, std::size_t i) {
         return 3;
     }
     if (a >= 0xF0 && a <= 0xF4) {
-        if (!tail(i + 1) || !tail(i + 2) || !tail(i + 3) || (a == 0xF0 && b < 0x90) || (a == 0xF4 && b > 0x8F)) return 0;
+        if (!tail(i + 1) || !tail(i + 2) || !tail(i + 3) || (a == 0xF0 && b < 0x90) ||
+            (a == 0xF4 && b > 0x8F))
+            return 0;
         return 4;
     }
     return 0;
@@ -40,7 +45,8 @@ std::size_t utf8_length(std::string_view text, std::size_t i) {
 void append_rounded(std::string& text, double value, int decimals) {
     require_finite(value);
     char buffer[400];
-    const auto result = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, decimals);
+    const auto result =
+        std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, decimals);
     const char* end = result.ptr;
     if (decimals > 0) {
         while (end[-1] == '0') --end;
@@ -150,7 +156,8 @@ JsonText& JsonText::string(std::string_view value) {
         else if (c == '\n') text_ += "\\n";
         else if (c == '\t') text_ += "\\t";
         else if (c == '\r') text_ += "\\r";
-        else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) ((text_ += "\\u00") += hex[c >> 4]) += hex[c & 15];
+        else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F)
+            ((text_ += "\\u00") += hex[c >> 4]) += hex[c & 15];
         else text_ += c;
         i += length;
     }

@@ -1,4 +1,5 @@
-// JSON out: keys in the order in which they are written, numbers without exponents, the same bytes everywhere.
+// JSON out: keys in the order in which they are written, numbers without exponents, the same bytes
+// everywhere.
 #pragma once
 
 #include <cstdint>
@@ -22,14 +23,16 @@ public:
     JsonText& end();  ///< closes the innermost container
 
     JsonText& key(std::string_view name);
-    JsonText& exact(double value);                  ///< shortest text that reads back the same; @throws as append_rounded
-    JsonText& rounded(double value, int decimals);  ///< for measured and predicted quantities; @throws as append_rounded
+    JsonText& exact(double value);  ///< shortest text that reads back the same; @throws as append_rounded
+    JsonText& rounded(double value,
+                      int decimals);  ///< for measured and predicted quantities; @throws as append_rounded
     JsonText& units(std::int64_t tenths_of_micrometre);
     JsonText& integer(std::int64_t value);
     JsonText& count(std::uint64_t value);
     JsonText& boolean(bool value);
     JsonText& null();
-    JsonText& string(std::string_view value);  ///< invalid UTF-8 becomes U+FFFD, so that every reader takes the file
+    JsonText& string(
+        std::string_view value);  ///< invalid UTF-8 becomes U+FFFD, so that every reader takes the file
 
     /// The finished text, with a line feed at its end.
     [[nodiscard]] std::string take();

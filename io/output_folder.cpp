@@ -23,13 +23,15 @@ namespace {
 
 constexpr const char* kRemedy = "give another folder after -o, or make room and rights for this one";
 
-[[noreturn]] void refuse(const char* code, const fs::path& place, const std::string& what, const std::string& remedy = kRemedy) {
+[[noreturn]] void refuse(const char* code, const fs::path& place, const std::string& what,
+                         const std::string& remedy = kRemedy) {
     throw Error(ErrorKind::input, code, what, place.string(), remedy);
 }
 
 /// Names that OUT may hold (design.md), so that replacing it loses nothing of anybody else's.
 bool is_ours(const fs::path& name) {
-    static constexpr std::array ours{"plan.json", "tool.tbl", "sequence.json", "report.html", "verify.json", "nc"};
+    static constexpr std::array ours{"plan.json",   "tool.tbl",    "sequence.json",
+                                     "report.html", "verify.json", "nc"};
     for (const char* known : ours)
         if (name == known) return true;
     return false;
@@ -41,7 +43,8 @@ bool is_our_plan(const fs::path& path) {
     char head[128];
     const ssize_t got = ::read(file, head, sizeof head);
     ::close(file);
-    return got > 0 && std::string_view(head, static_cast<std::size_t>(got)).find("\"slabwright.plan/") != std::string_view::npos;
+    return got > 0 && std::string_view(head, static_cast<std::size_t>(got)).find("\"slabwright.plan/") !=
+                          std::string_view::npos;
 }
 
 /// The path with symlinks resolved as far as it exists and no slash at its end: what rename() must be given.
@@ -56,7 +59,8 @@ fs::path resolved(const std::string& path) {
 /// A name beside `target` that nobody else uses: several plans may be written at once, also by one process.
 fs::path beside(const fs::path& target, const char* purpose) {
     static std::atomic<unsigned> counter{0};
-    return target.parent_path() / fmt::format(".{}.{}-{}-{}", target.filename().string(), purpose, ::getpid(), counter++);
+    return target.parent_path() /
+           fmt::format(".{}.{}-{}-{}", target.filename().string(), purpose, ::getpid(), counter++);
 }
 
 }  // namespace
@@ -71,12 +75,15 @@ void require_replaceable(const std::string& directory) {
         fs::path parent = target.parent_path();
         while (!fs::exists(parent, error) && parent.has_relative_path()) parent = parent.parent_path();
         if (!fs::is_directory(parent, error)) refuse("out.unusable", parent, "not a folder");
-        if (::access(parent.c_str(), W_OK | X_OK) != 0) refuse("out.unwritable", parent, std::strerror(errno));
+        if (::access(parent.c_str(), W_OK | X_OK) != 0)
+            refuse("out.unwritable", parent, std::strerror(errno));
         return;
     }
     if (error) refuse("out.unusable", target, error.message());
-    if (status.type() != fs::file_type::directory) refuse("out.unusable", target, "exists and is not a folder");
-    if (::access(target.parent_path().c_str(), W_OK | X_OK) != 0) refuse("out.unwritable", target.parent_path(), std::strerror(errno));
+    if (status.type() != fs::file_type::directory)
+        refuse("out.unusable", target, "exists and is not a folder");
+    if (::access(target.parent_path().c_str(), W_OK | X_OK) != 0)
+        refuse("out.unwritable", target.parent_path(), std::strerror(errno));
     fs::path foreign;
     bool empty = true;
     fs::directory_iterator entries(target, error);
@@ -89,14 +96,19 @@ void require_replaceable(const std::string& directory) {
     if (error) refuse("out.unusable", target, error.message());
     if (empty) return;
     if (!is_our_plan(target / "plan.json"))
-        refuse("out.not_ours", target, "the folder is not empty and holds no plan of ours", "give another folder after -o");
+        refuse("out.not_ours", target, "the folder is not empty and holds no plan of ours",
+               "give another folder after -o");
     if (foreign.empty()) {
-        for (entries = fs::directory_iterator(target / "nc", error); !error && entries != fs::directory_iterator(); entries.increment(error))
-            if (entries->path().extension() != ".ngc" && (foreign.empty() || entries->path().filename() < foreign.filename()))
+        for (entries = fs::directory_iterator(target / "nc", error);
+             !error && entries != fs::directory_iterator(); entries.increment(error))
+            if (entries->path().extension() != ".ngc" &&
+                (foreign.empty() || entries->path().filename() < foreign.filename()))
                 foreign = fs::path("nc") / entries->path().filename();
     }
     if (!foreign.empty())
-        refuse("out.not_ours", target, fmt::format("the folder holds a plan and also {}, which replacing it would lose", foreign.string()),
+        refuse("out.not_ours", target,
+               fmt::format("the folder holds a plan and also {}, which replacing it would lose",
+                           foreign.string()),
                "move that away, or give another folder after -o");
 }
 
@@ -104,7 +116,8 @@ OutputFolder::OutputFolder(const std::string& directory) {
     require_replaceable(directory);
     target_ = resolved(directory);
     std::error_code error;
-    // Parents that are made for this folder are remembered by the topmost, to be taken away if nothing comes of it.
+    // Parents that are made for this folder are remembered by the topmost, to be taken away if nothing comes
+    // of it.
     fs::path missing = target_.parent_path();
     while (!missing.empty() && !fs::exists(missing, error)) {
         made_parent_ = missing;
@@ -185,15 +198,18 @@ void write_file_whole(const std::string& path, std::string_view text) {
     if (path.empty()) refuse("out.missing", "", "no file to write to", "give one after -o");
     const fs::path target = resolved(path), fresh = beside(target, "partial");
     std::error_code error;
-    if (fs::is_directory(target, error)) refuse("out.unusable", target, "is a folder", "give a file after -o");
+    if (fs::is_directory(target, error))
+        refuse("out.unusable", target, "is a folder", "give a file after -o");
     try {
         OutputFile file(fresh);
         file.write(text);
         file.close();
-        if (::rename(fresh.c_str(), target.c_str()) != 0) refuse("out.unwritable", target, std::strerror(errno));
+        if (::rename(fresh.c_str(), target.c_str()) != 0)
+            refuse("out.unwritable", target, std::strerror(errno));
     } catch (const Error& e) {
         fs::remove(fresh, error);
-        throw Error(e.kind(), e.code(), e.message(), target.string(), e.remedy());  // the user knows the target, not the file beside it
+        throw Error(e.kind(), e.code(), e.message(), target.string(),
+                    e.remedy());  // the user knows the target, not the file beside it
     }
 }
 

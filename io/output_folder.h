@@ -7,14 +7,17 @@
 
 namespace slabwright {
 
-/// @throws Error(input) unless `directory` can become a folder of ours: it does not exist, is an empty folder, or is a folder that holds
+/// @throws Error(input) unless `directory` can become a folder of ours: it does not exist, is an empty
+/// folder, or is a folder that holds
 ///         a plan.json of ours and nothing that we do not write
 void require_replaceable(const std::string& directory);
 
-/// A folder under way. If commit() is not reached, the destructor takes it away again, with the parent folders that were made for it.
+/// A folder under way. If commit() is not reached, the destructor takes it away again, with the parent
+/// folders that were made for it.
 class OutputFolder {
 public:
-    /// Makes the fresh folder. @throws Error(input) as require_replaceable, or when the place cannot be written
+    /// Makes the fresh folder. @throws Error(input) as require_replaceable, or when the place cannot be
+    /// written
     explicit OutputFolder(const std::string& directory);
     ~OutputFolder();
     OutputFolder(const OutputFolder&) = delete;
@@ -22,7 +25,8 @@ public:
 
     /// Where `name` is to be written until commit().
     [[nodiscard]] std::filesystem::path path(std::string_view name) const { return fresh_ / name; }
-    /// The target takes the fresh folder's content; an older one goes. @throws Error(input), and the target is as it was
+    /// The target takes the fresh folder's content; an older one goes. @throws Error(input), and the target
+    /// is as it was
     void commit();
 
 private:

@@ -11,10 +11,12 @@ namespace fs = std::filesystem;
 namespace {
 
 /// Where the pattern lies: as named, or where plan.json's file name leads.
-fs::path find_pattern(const fs::path& directory, const std::string& file, const std::string& given, const std::string& asker) {
+fs::path find_pattern(const fs::path& directory, const std::string& file, const std::string& given,
+                      const std::string& asker) {
     if (!given.empty()) return given;
     const auto refuse = [&](const std::string& message) -> fs::path {
-        throw Error(ErrorKind::input, asker + ".no_pattern", message, directory.string(), "name the STL with --stl");
+        throw Error(ErrorKind::input, asker + ".no_pattern", message, directory.string(),
+                    "name the STL with --stl");
     };
     const fs::path base = fs::path(file).filename();
     if (base.empty()) return refuse("plan.json names no pattern");
@@ -28,16 +30,20 @@ fs::path find_pattern(const fs::path& directory, const std::string& file, const 
 }  // namespace
 
 bool Pattern::is(const PlannedPattern& planned) const {
-    return stl.input.sha256 == planned.sha256 && reading.units == planned.reading.units && reading.weld_mm == planned.reading.weld_mm;
+    return stl.input.sha256 == planned.sha256 && reading.units == planned.reading.units &&
+           reading.weld_mm == planned.reading.weld_mm;
 }
 
-std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory, const PlannedPattern& planned, const std::string& given,
+std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory,
+                                      const PlannedPattern& planned, const std::string& given,
                                       const std::string& asker) {
     const std::string path = find_pattern(directory, planned.file, given, asker).string();
-    auto pattern = std::make_shared<Pattern>(Pattern{path, planned.reading, read_stl(context, path, planned.reading), {}});
+    auto pattern = std::make_shared<Pattern>(
+        Pattern{path, planned.reading, read_stl(context, path, planned.reading), {}});
     if (!pattern->is(planned))
-        throw Error(ErrorKind::input, asker + ".other_pattern", "is not the pattern that was planned: its SHA-256 is " + pattern->stl.input.sha256,
-                    path, "name the planned STL with --stl, or plan again");
+        throw Error(ErrorKind::input, asker + ".other_pattern",
+                    "is not the pattern that was planned: its SHA-256 is " + pattern->stl.input.sha256, path,
+                    "name the planned STL with --stl, or plan again");
     return pattern;
 }
 

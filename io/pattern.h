@@ -31,7 +31,8 @@ struct Pattern {
 /// @param given the STL; "" looks for the file that the plan names: in OUT, beside OUT, in the working folder
 /// @param asker "verify" or "report", the family of the errors' codes
 /// @throws Error(input) when the STL is missing, unreadable, or not the one that was planned (by its SHA-256)
-[[nodiscard]] std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory, const PlannedPattern& planned,
-                                                    const std::string& given, const std::string& asker);
+[[nodiscard]] std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory,
+                                                    const PlannedPattern& planned, const std::string& given,
+                                                    const std::string& asker);
 
 }  // namespace slabwright

@@ -16,7 +16,9 @@ using Shape = JsonText::Shape;
 // Decimals of derived quantities. What the job or the engine decided is written exactly.
 constexpr int kLength = 4, kMinutes = 4, kForce = 3, kArea = 3, kDeflection = 6;
 
-void put_xy(JsonText& json, const std::array<double, 2>& xy) { json.begin_array(Shape::line).exact(xy[0]).exact(xy[1]).end(); }
+void put_xy(JsonText& json, const std::array<double, 2>& xy) {
+    json.begin_array(Shape::line).exact(xy[0]).exact(xy[1]).end();
+}
 
 /// Writes the keys of a job as they are spelled in the job file.
 struct JobPrinter {
@@ -41,7 +43,9 @@ struct JobPrinter {
         for (const double value : values) json.exact(value);
         json.end();
     }
-    void degrees(const char* name, double radians, const char*) { json.key(name).rounded(radians * 180 / std::numbers::pi, 9); }
+    void degrees(const char* name, double radians, const char*) {
+        json.key(name).rounded(radians * 180 / std::numbers::pi, 9);
+    }
     template <class Enum, std::size_t N>
     void word(const char* name, Enum value, const Word<Enum> (&words)[N], const char*) {
         json.key(name).string(word_of(words, value));
@@ -56,7 +60,13 @@ void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
     json.key("diameter").exact(tool.diameter);
     json.key("flute_length").exact(tool.flute_length);
     json.key("shank_diameter").exact(tool.shank_diameter);
-    json.key("holder").begin_object().key("diameter").exact(tool.holder_diameter).key("stickout").exact(tool.stickout).end();
+    json.key("holder")
+        .begin_object()
+        .key("diameter")
+        .exact(tool.holder_diameter)
+        .key("stickout")
+        .exact(tool.stickout)
+        .end();
     json.key("flutes").integer(tool.flutes);
     json.key("helix_deg").rounded(tool.helix_rad * 180 / std::numbers::pi, 9);
     json.key("max_rpm").exact(tool.max_rpm);
@@ -69,7 +79,9 @@ void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
     double allowed = 0;
     for (const Layer& layer : plan.layers)
         for (const Operation& operation : layer.operations)
-            if (const double length = operation.tool == tool.number ? allowed_length(operation, tool, plan.job) : 0; length > 0)
+            if (const double length =
+                    operation.tool == tool.number ? allowed_length(operation, tool, plan.job) : 0;
+                length > 0)
                 allowed = allowed > 0 ? std::min(allowed, length) : length;
     json.key("allowed_length");
     if (allowed > 0) json.rounded(allowed, kLength);
@@ -117,7 +129,9 @@ void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const O
     json.key("peak_at");
     put_place(json, operation.peak_at);
     json.key("peak_line");
-    if (const std::size_t line = operation.peak_move ? program_line(plan, layer, operation, *operation.peak_move) : 0; line > 0)
+    if (const std::size_t line =
+            operation.peak_move ? program_line(plan, layer, operation, *operation.peak_move) : 0;
+        line > 0)
         json.integer(static_cast<std::int64_t>(line));
     else json.null();
     json.end();
@@ -179,7 +193,11 @@ void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     json.key("selection");
     put_selection(json, layer.selection);
     json.key("glue_area_mm2").rounded(layer.glue_area_mm2, kArea);
-    json.key("glue_centroid").begin_array(Shape::line).rounded(layer.glue_centroid[0], kLength).rounded(layer.glue_centroid[1], kLength).end();
+    json.key("glue_centroid")
+        .begin_array(Shape::line)
+        .rounded(layer.glue_centroid[0], kLength)
+        .rounded(layer.glue_centroid[1], kLength)
+        .end();
     json.key("press_force_n").rounded(layer.press_force_n, kForce);
     json.key("operations").begin_array();
     for (const Operation& operation : layer.operations) put_operation(json, plan, layer, operation);

@@ -8,8 +8,8 @@
 
 namespace slabwright {
 
-/// The plan without its moves, schema slabwright.plan/1. Heights count from the pattern's bottom; `frame` is that of the programs.
-/// The same plan gives the same bytes.
+/// The plan without its moves, schema slabwright.plan/1. Heights count from the pattern's bottom; `frame` is
+/// that of the programs. The same plan gives the same bytes.
 [[nodiscard]] std::string plan_json(const Plan& plan);
 
 /// Pieces that inspect_json writes the same way.

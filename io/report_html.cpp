@@ -42,9 +42,9 @@ namespace {
 constexpr std::size_t kMostFacets = 80'000, kFewestFacets = 2'000;   // of the model in the page
 constexpr std::size_t kMostPoints = 400'000, kFewestPoints = 4'000;  // of all paths together
 constexpr double kPathTolerance = 0.02;                              // mm, first try
-constexpr double kWidestTolerance = 2.0;                             // mm; paths that need more are left out, longest first
-constexpr double kStockCells = 80'000, kAllStockCells = 800'000;     // of one layer's map, and of all
-constexpr double kFinestCell = 0.25;                                 // mm
+constexpr double kWidestTolerance = 2.0;  // mm; paths that need more are left out, longest first
+constexpr double kStockCells = 80'000, kAllStockCells = 800'000;  // of one layer's map, and of all
+constexpr double kFinestCell = 0.25;                              // mm
 constexpr int kSilhouetteRows = 140, kSlopeRows = 200;
 constexpr double kOutlineTolerance = 0.05;  // mm, of sections and glue
 constexpr double kHundredths = 100;         // outlines are written in 0.01 mm
@@ -61,13 +61,15 @@ std::string read_text(const fs::path& path, const char* code) {
     return text;
 }
 
-/// Runs `body` over a document of OUT; what the JSON library says against it becomes an error that names the file.
+/// Runs `body` over a document of OUT; what the JSON library says against it becomes an error that names the
+/// file.
 template <class Body>
 auto understood(const fs::path& path, const char* code, Body&& body) {
     try {
         return body();
     } catch (const nlohmann::json::exception& e) {
-        throw Error(ErrorKind::input, code, std::string("cannot be understood: ") + e.what(), path.string(), "plan again");
+        throw Error(ErrorKind::input, code, std::string("cannot be understood: ") + e.what(), path.string(),
+                    "plan again");
     }
 }
 
@@ -85,7 +87,8 @@ template <class Enum, std::size_t N>
 Enum word_value(const Word<Enum> (&words)[N], const std::string& text) {
     for (const Word<Enum>& word : words)
         if (text == word.text) return word.value;
-    throw Error(ErrorKind::input, "report.plan", "\"" + text + "\" is a word that this version does not know", "plan.json", "plan again");
+    throw Error(ErrorKind::input, "report.plan", "\"" + text + "\" is a word that this version does not know",
+                "plan.json", "plan again");
 }
 
 /// One program as plan.json names it.
@@ -122,7 +125,8 @@ Tool read_tool(const Json& t) {
 }
 
 void add_polygon(Loops& loops, const Json& polygon) {
-    for (const Json& p : polygon) loops.points.push_back({to_units(p.at(0).get<double>()), to_units(p.at(1).get<double>())});
+    for (const Json& p : polygon)
+        loops.points.push_back({to_units(p.at(0).get<double>()), to_units(p.at(1).get<double>())});
     loops.close_loop();
 }
 
@@ -133,12 +137,16 @@ PlanFolder read_plan_folder(const fs::path& out) {
     understood(path, "report.plan", [&] {
         const Json& plan = folder.plan;
         if (plan.at("schema") != "slabwright.plan/1")
-            throw Error(ErrorKind::input, "report.plan", "is not of schema slabwright.plan/1", path.string(), "plan again");
+            throw Error(ErrorKind::input, "report.plan", "is not of schema slabwright.plan/1", path.string(),
+                        "plan again");
         folder.frame = word_value(kFrameWords, plan.at("frame").get<std::string>());
-        const Json &job = plan.at("job"), &material = job.at("material"), &machine = job.at("machine"), &tolerances = job.at("tolerances");
+        const Json &job = plan.at("job"), &material = job.at("material"), &machine = job.at("machine"),
+                   &tolerances = job.at("tolerances");
         folder.units = word_value(kUnitWords, job.at("units").get<std::string>());
-        for (const auto& [key, to] :
-             {std::pair{"ktc", &folder.material.ktc}, {"kte", &folder.material.kte}, {"kfc", &folder.material.kfc}, {"kfe", &folder.material.kfe}})
+        for (const auto& [key, to] : {std::pair{"ktc", &folder.material.ktc},
+                                      {"kte", &folder.material.kte},
+                                      {"kfc", &folder.material.kfc},
+                                      {"kfe", &folder.material.kfe}})
             *to = material.at(key).get<double>();
         folder.material.transform = word_value(kTransformWords, material.at("transform").get<std::string>());
         folder.tolerances.cusp = tolerances.at("cusp").get<double>();
@@ -148,34 +156,44 @@ PlanFolder read_plan_folder(const fs::path& out) {
         SimulationInput& input = folder.input;
         input.machine.rapid_feed = machine.at("rapid_feed").get<double>();
         if (!(input.machine.rapid_feed > 0))
-            throw Error(ErrorKind::input, "report.plan", "states a machine that does not move", path.string(), "plan again");
+            throw Error(ErrorKind::input, "report.plan", "states a machine that does not move", path.string(),
+                        "plan again");
         for (std::size_t k = 0; k < 2; ++k) {
             input.stock_min[k] = plan.at("stock").at("min").at(k).get<double>();
             input.stock_max[k] = plan.at("stock").at("max").at(k).get<double>();
             if (!(input.stock_max[k] > input.stock_min[k]))
-                throw Error(ErrorKind::input, "report.plan", "states a stock of no size", path.string(), "plan again");
+                throw Error(ErrorKind::input, "report.plan", "states a stock of no size", path.string(),
+                            "plan again");
         }
         for (const Json& tool : plan.at("tools")) input.tools.push_back(read_tool(tool));
         const Json flask = plan.value("flask", Json());
         for (const Json& layer : plan.at("layers")) {
-            input.layers.push_back(
-                {layer.at("z_bottom").get<double>(), layer.at("z_top").get<double>(), layer.at("slab_thickness").get<double>(), {}});
+            input.layers.push_back({layer.at("z_bottom").get<double>(),
+                                    layer.at("z_top").get<double>(),
+                                    layer.at("slab_thickness").get<double>(),
+                                    {}});
             if (flask.is_object()) {
                 Loops outer, inner;
                 add_polygon(outer, flask.at("outer"));
-                add_polygon(inner, flask.contains("inner_by_layer") ? flask.at("inner_by_layer").at(input.layers.size() - 1) : flask.at("inner"));
+                add_polygon(inner, flask.contains("inner_by_layer")
+                                       ? flask.at("inner_by_layer").at(input.layers.size() - 1)
+                                       : flask.at("inner"));
                 input.layers.back().flask = subtract(outer, inner);
             }
             for (const Json& operation : layer.at("operations")) {
-                Named named{operation.at("file").get<std::string>(), static_cast<int>(input.layers.size()) - 1, operation.at("tool").get<int>(),
+                Named named{operation.at("file").get<std::string>(),
+                            static_cast<int>(input.layers.size()) - 1, operation.at("tool").get<int>(),
                             operation.at("minutes").get<double>()};
-                if (named.file.rfind("nc/", 0) != 0 || named.file.find("..") != std::string::npos || named.file.find('/', 3) != std::string::npos)
-                    throw Error(ErrorKind::input, "report.plan", "names a program that is no file of nc/: " + named.file, path.string(),
+                if (named.file.rfind("nc/", 0) != 0 || named.file.find("..") != std::string::npos ||
+                    named.file.find('/', 3) != std::string::npos)
+                    throw Error(ErrorKind::input, "report.plan",
+                                "names a program that is no file of nc/: " + named.file, path.string(),
                                 "plan again");
                 folder.programs.push_back(std::move(named));
             }
         }
-        if (input.layers.empty()) throw Error(ErrorKind::input, "report.plan", "has no layers", path.string(), "plan again");
+        if (input.layers.empty())
+            throw Error(ErrorKind::input, "report.plan", "has no layers", path.string(), "plan again");
         return 0;
     });
     return folder;
@@ -183,7 +201,9 @@ PlanFolder read_plan_folder(const fs::path& out) {
 
 PlannedPattern planned_pattern(const PlanFolder& folder) {
     const Json& input = folder.plan.at("input");
-    return {input.at("file").get<std::string>(), input.value("sha256", ""), {folder.units, folder.tolerances.weld}};
+    return {input.at("file").get<std::string>(),
+            input.value("sha256", ""),
+            {folder.units, folder.tolerances.weld}};
 }
 
 /// Douglas and Peucker on a closed loop, from its first point and the one farthest from that.
@@ -195,7 +215,10 @@ std::vector<Point2> thinned_loop(std::span<const Point2> loop, double tolerance_
     std::size_t far = 1;
     double most = -1;
     for (std::size_t k = 1; k < n; ++k)
-        if (const double d = length(static_cast<double>(at(k).x) - at(0).x, static_cast<double>(at(k).y) - at(0).y); d > most) most = d, far = k;
+        if (const double d =
+                length(static_cast<double>(at(k).x) - at(0).x, static_cast<double>(at(k).y) - at(0).y);
+            d > most)
+            most = d, far = k;
     std::vector<char> kept(n + 1, 0);
     kept[0] = kept[far] = kept[n] = 1;
     std::vector<std::pair<std::size_t, std::size_t>> open{{0, far}, {far, n}};
@@ -206,7 +229,8 @@ std::vector<Point2> thinned_loop(std::span<const Point2> loop, double tolerance_
         std::size_t worst = a;
         double distance = tolerance_mm * kUnitsPerMm;
         for (std::size_t k = a + 1; k < b; ++k) {
-            const double wx = at(k).x - ax, wy = at(k).y - ay, t = uu > 0 ? std::clamp((wx * ux + wy * uy) / uu, 0.0, 1.0) : 0;
+            const double wx = at(k).x - ax, wy = at(k).y - ay,
+                         t = uu > 0 ? std::clamp((wx * ux + wy * uy) / uu, 0.0, 1.0) : 0;
             if (const double d = length(wx - t * ux, wy - t * uy); d > distance) distance = d, worst = k;
         }
         if (worst == a) continue;
@@ -234,7 +258,8 @@ Json outline(std::span<const Point2> loop) {
 Json outlines(const Loops& loops) {
     Json list = Json::array();
     for (std::size_t i = 0; i < loops.size(); ++i)
-        list.push_back({{"parent", loops.parents.empty() ? -1 : loops.parents[i]}, {"points", outline(loops.loop(i))}});
+        list.push_back(
+            {{"parent", loops.parents.empty() ? -1 : loops.parents[i]}, {"points", outline(loops.loop(i))}});
     return list;
 }
 
@@ -254,10 +279,12 @@ Json silhouette(std::span<const Section> sections, bool along_y) {
         std::sort(spans.begin(), spans.end());
         std::vector<std::pair<double, double>> merged;
         for (const auto& span : spans)
-            if (!merged.empty() && span.first <= merged.back().second) merged.back().second = std::max(merged.back().second, span.second);
+            if (!merged.empty() && span.first <= merged.back().second)
+                merged.back().second = std::max(merged.back().second, span.second);
             else merged.push_back(span);
         Json row = Json::array();
-        for (const auto& [low, high] : merged) row.push_back(rounded(low, 2)), row.push_back(rounded(high, 2));
+        for (const auto& [low, high] : merged)
+            row.push_back(rounded(low, 2)), row.push_back(rounded(high, 2));
         rows.push_back(std::move(row));
     }
     return rows;
@@ -265,8 +292,9 @@ Json silhouette(std::span<const Section> sections, bool along_y) {
 
 /// The paths as far as they have been thinned.
 struct DrawnPaths {
-    std::vector<std::vector<ReplayPoint>> paths;                ///< by program
-    double tolerance = kPathTolerance, error = kPathTolerance;  ///< mm, of the last thinning and of all together
+    std::vector<std::vector<ReplayPoint>> paths;  ///< by program
+    double tolerance = kPathTolerance,
+           error = kPathTolerance;  ///< mm, of the last thinning and of all together
 };
 
 /// What the page is made of.
@@ -282,12 +310,13 @@ double stock_cell(const SimulationInput& input) {
     return std::max(kFinestCell, std::ceil(std::sqrt(area / cells) * 100) / 100);
 }
 
-/// A left-over as one byte: 0 … 253 is the root of its size, so that small ones keep their digits; 254 is cut into the part deeper than the
-/// tolerance, 255 the flask.
+/// A left-over as one byte: 0 … 253 is the root of its size, so that small ones keep their digits; 254 is cut
+/// into the part deeper than the tolerance, 255 the flask.
 std::uint8_t left_over_code(float left, double gouge) {
     if (std::isnan(left)) return 255;
     if (left < -gouge) return 254;
-    return static_cast<std::uint8_t>(std::min(253.0, std::round(100 * std::sqrt(std::max(0.0, static_cast<double>(left))))));
+    return static_cast<std::uint8_t>(
+        std::min(253.0, std::round(100 * std::sqrt(std::max(0.0, static_cast<double>(left))))));
 }
 
 /// Reads a program of OUT.
@@ -297,7 +326,8 @@ Program read_program(const fs::path& out, const PlanFolder& folder, const Named&
         Program program = read_gcode(text, named.file, gcode_limits(folder.tolerances));
         program.layer = named.layer;
         if (folder.frame == Frame::layer_top)
-            for (ProgramStep& s : program.steps) s.z += folder.input.layers[static_cast<std::size_t>(named.layer)].z_top;
+            for (ProgramStep& s : program.steps)
+                s.z += folder.input.layers[static_cast<std::size_t>(named.layer)].z_top;
         return program;
     } catch (const Error& e) {
         throw Error(ErrorKind::input, "report.program", e.message(), e.place(), e.remedy());
@@ -307,11 +337,13 @@ Program read_program(const fs::path& out, const PlanFolder& folder, const Named&
 /// What stands over in the end takes up to a fifth of the time of the replay: so many programs' steps.
 std::size_t left_over_steps(const PlanFolder& folder) { return 1 + folder.programs.size() / 8; }
 
-/// Runs every program, one layer's after the other's. The replay's figures go into the page with a light page too; its maps only with the model.
+/// Runs every program, one layer's after the other's. The replay's figures go into the page with a light page
+/// too; its maps only with the model.
 /// @param programs those that have been read already; each is let go when it has run, the others are read
 /// @param part of the input's mesh; none with a light page
-void replay_programs(Context& context, const fs::path& out, const PlanFolder& folder, const SimulationInput& input, std::vector<Program> programs,
-                     const StandingPart* part, Figures& figures) {
+void replay_programs(Context& context, const fs::path& out, const PlanFolder& folder,
+                     const SimulationInput& input, std::vector<Program> programs, const StandingPart* part,
+                     Figures& figures) {
     ReplayOptions options;
     options.cell = stock_cell(input);
     options.cusp = folder.tolerances.cusp;
@@ -323,7 +355,8 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
     figures.drawn.paths.resize(folder.programs.size());
     for (std::size_t begin = 0; begin < folder.programs.size();) {
         std::size_t end = begin;
-        while (end < folder.programs.size() && folder.programs[end].layer == folder.programs[begin].layer) ++end;
+        while (end < folder.programs.size() && folder.programs[end].layer == folder.programs[begin].layer)
+            ++end;
         std::vector<Program> of_layer(end - begin);
         parallel_each(context, of_layer.size(), [&](std::size_t i) {
             const Named& named = folder.programs[begin + i];
@@ -335,10 +368,12 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
         for (std::size_t i = 0; i < of_layer.size(); ++i) {
             figures.drawn.error = std::max(figures.drawn.error, kPathTolerance + of_layer[i].chord_error);
             const ReplayedProgram found = replay.run(of_layer[i]);
-            Json depth = Json::array(), width = Json::array(), force = Json::array(), deflection = Json::array();
+            Json depth = Json::array(), width = Json::array(), force = Json::array(),
+                 deflection = Json::array();
             for (const ReplayPiece& piece : found.pieces) {
                 depth.push_back(rounded(piece.depth_mm, 3)), width.push_back(rounded(piece.width_mm, 3));
-                force.push_back(rounded(piece.force_n, 2)), deflection.push_back(rounded(piece.deflection_mm, 5));
+                force.push_back(rounded(piece.force_n, 2)),
+                    deflection.push_back(rounded(piece.deflection_mm, 5));
             }
             engagement.push_back({{"file", folder.programs[begin + i].file},
                                   {"depth_mm", depth},
@@ -350,20 +385,25 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
         begin = end;
     }
     figures.data["engagement"] = std::move(engagement);
-    figures.data["stock"] = {
-        {"cell_mm", options.cell}, {"nx", replay.nx()}, {"ny", replay.ny()}, {"x0", replay.first()[0]}, {"y0", replay.first()[1]}};
+    figures.data["stock"] = {{"cell_mm", options.cell},
+                             {"nx", replay.nx()},
+                             {"ny", replay.ny()},
+                             {"x0", replay.first()[0]},
+                             {"y0", replay.first()[1]}};
     if (part == nullptr) return;
     figures.replay = Json::array();
     replay.left_over(*part, [&](std::size_t, const std::vector<float>& left_over) {
         std::string codes;
-        for (const float left : left_over) codes += static_cast<char>(left_over_code(left, folder.tolerances.gouge));
+        for (const float left : left_over)
+            codes += static_cast<char>(left_over_code(left, folder.tolerances.gouge));
         figures.replay.push_back(base64(codes));
     });
     context.advance(left_over_steps(folder));
 }
 
 /// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
-void draw_figures(Context& context, MeshView mesh, const PlanFolder& folder, const Json& sequence, Json& data) {
+void draw_figures(Context& context, MeshView mesh, const PlanFolder& folder, const Json& sequence,
+                  Json& data) {
     const SimulationInput& input = folder.input;
     const Box3 box = bounds(context, mesh);
     std::vector<Plane> planes;
@@ -377,32 +417,45 @@ void draw_figures(Context& context, MeshView mesh, const PlanFolder& folder, con
     const std::size_t ends = 2 * input.layers.size();
     const auto between = std::span<const Section>(sections).subspan(ends);
     std::vector<Json> drawn(ends + 2);
-    parallel_each(context, drawn.size(), [&](std::size_t i) { drawn[i] = i < ends ? outlines(sections[i].loops) : silhouette(between, i == ends); });
+    parallel_each(context, drawn.size(), [&](std::size_t i) {
+        drawn[i] = i < ends ? outlines(sections[i].loops) : silhouette(between, i == ends);
+    });
     Json layers = Json::array();
     for (std::size_t l = 0; l < input.layers.size(); ++l)
-        layers.push_back({{"bottom", std::move(drawn[2 * l])}, {"top", std::move(drawn[2 * l + 1])}, {"glue", Json::array()}});
+        layers.push_back({{"bottom", std::move(drawn[2 * l])},
+                          {"top", std::move(drawn[2 * l + 1])},
+                          {"glue", Json::array()}});
     if (sequence.is_object()) {
         const Json& glue = sequence.at("glue");
         for (std::size_t l = 0; l < std::min(glue.size(), layers.size()); ++l)
             for (const Json& loop : glue[l].at("loops")) {
                 std::vector<Point2> points;
-                for (const Json& p : loop) points.push_back({to_units(p.at(0).get<double>()), to_units(p.at(1).get<double>())});
+                for (const Json& p : loop)
+                    points.push_back({to_units(p.at(0).get<double>()), to_units(p.at(1).get<double>())});
                 layers[l]["glue"].push_back(outline(points));
             }
     }
-    data["outlines"] = {{"unit_mm", 1 / kHundredths}, {"tolerance_mm", kOutlineTolerance}, {"layers", std::move(layers)}};
-    data["silhouette"] = {{"z0", rounded(box.min.z, 4)}, {"dz", step}, {"x", std::move(drawn[ends])}, {"y", std::move(drawn[ends + 1])}};
+    data["outlines"] = {
+        {"unit_mm", 1 / kHundredths}, {"tolerance_mm", kOutlineTolerance}, {"layers", std::move(layers)}};
+    data["silhouette"] = {{"z0", rounded(box.min.z, 4)},
+                          {"dz", step},
+                          {"x", std::move(drawn[ends])},
+                          {"y", std::move(drawn[ends + 1])}};
     const SlopeProfile slopes = slope_profile(context, mesh, kSlopeRows);
     Json least = Json::array(), areas = Json::array();
     for (const double v : slopes.least_deg) least.push_back(rounded(v, 2));
     for (const double v : slopes.area_mm2) areas.push_back(rounded(v, 1));
-    data["slopes"] = {
-        {"z0", rounded(slopes.z_low, 4)}, {"dz", (slopes.z_high - slopes.z_low) / kSlopeRows}, {"least_deg", std::move(least)},
-        {"area_mm2", std::move(areas)},   {"down_flat_mm2", rounded(slopes.down_flat_mm2, 1)}, {"undercut_mm2", rounded(slopes.undercut_mm2, 1)}};
+    data["slopes"] = {{"z0", rounded(slopes.z_low, 4)},
+                      {"dz", (slopes.z_high - slopes.z_low) / kSlopeRows},
+                      {"least_deg", std::move(least)},
+                      {"area_mm2", std::move(areas)},
+                      {"down_flat_mm2", rounded(slopes.down_flat_mm2, 1)},
+                      {"undercut_mm2", rounded(slopes.undercut_mm2, 1)}};
 }
 
-/// For every facet of the picture: 0 faces down, 1 some tool reaches its middle, 2 none was found that does. Facets that lie in one small
-/// cell and face about the same way share the answer of the first of them, because a search without success is long.
+/// For every facet of the picture: 0 faces down, 1 some tool reaches its middle, 2 none was found that does.
+/// Facets that lie in one small cell and face about the same way share the answer of the first of them,
+/// because a search without success is long.
 struct ReachMap {
     std::string codes;
     double cell_mm = 0;
@@ -415,7 +468,8 @@ ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder&
             if (tool.kind == ToolKind::ball) board = std::max(board, tool.diameter / 2);
     const auto reach_of = [&](std::size_t l) {
         const SimulatedLayer& layer = input.layers[l];
-        return std::make_unique<Reach>(part, input.tools, layer.z_bottom, layer.z_top, l == 0 ? layer.z_bottom - board : -1e300);
+        return std::make_unique<Reach>(part, input.tools, layer.z_bottom, layer.z_top,
+                                       l == 0 ? layer.z_bottom - board : -1e300);
     };
 
     struct Side {
@@ -423,11 +477,16 @@ ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder&
         double area = 0;
     };
     const auto side_of = [&](std::size_t f) {
-        const Vec3f &a = model.vertices[model.facets[f][0]], &b = model.vertices[model.facets[f][1]], &c = model.vertices[model.facets[f][2]];
+        const Vec3f &a = model.vertices[model.facets[f][0]], &b = model.vertices[model.facets[f][1]],
+                    &c = model.vertices[model.facets[f][2]];
         const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z;
         const double vx = double{c.x} - a.x, vy = double{c.y} - a.y, vz = double{c.z} - a.z;
-        const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx, n = std::sqrt(nx * nx + ny * ny + nz * nz);
-        Side side{{(double{a.x} + b.x + c.x) / 3, (double{a.y} + b.y + c.y) / 3, (double{a.z} + b.z + c.z) / 3}, {}, n / 2};
+        const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx,
+                     n = std::sqrt(nx * nx + ny * ny + nz * nz);
+        Side side{
+            {(double{a.x} + b.x + c.x) / 3, (double{a.y} + b.y + c.y) / 3, (double{a.z} + b.z + c.z) / 3},
+            {},
+            n / 2};
         if (n > 0) side.normal = {nx / n, ny / n, nz / n};
         return side;
     };
@@ -453,7 +512,8 @@ ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder&
     }
     std::string answers(asked.size(), '\0');
     parallel_for(context, asked.size(), 64, [&](std::size_t begin, std::size_t end) {
-        std::vector<std::unique_ptr<Reach>> reaches(input.layers.size());  // a search remembers, so that no two threads may share it
+        std::vector<std::unique_ptr<Reach>> reaches(
+            input.layers.size());  // a search remembers, so that no two threads may share it
         for (std::size_t i = begin; i < end; ++i) {
             Point3 p = asked[i].middle;
             std::size_t layer = 0;
@@ -470,7 +530,8 @@ ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder&
 
 /// The pattern for the 3D view: places as 16-bit shares of its box.
 /// @param model of the mesh, decimated
-Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart& part, const PlanFolder& folder) {
+Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart& part,
+                const PlanFolder& folder) {
     const Box3 box = bounds(context, mesh);
     const float low[3] = {box.min.x, box.min.y, box.min.z}, high[3] = {box.max.x, box.max.y, box.max.z};
     std::string vertices, indices;
@@ -478,9 +539,11 @@ Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart&
         float* const at[3] = {&v.x, &v.y, &v.z};
         for (std::size_t k = 0; k < 3; ++k) {
             const double extent = std::max(1e-9, static_cast<double>(high[k]) - low[k]);
-            const auto share = static_cast<std::uint16_t>(std::clamp(std::round((*at[k] - low[k]) / extent * 65535), 0.0, 65535.0));
+            const auto share = static_cast<std::uint16_t>(
+                std::clamp(std::round((*at[k] - low[k]) / extent * 65535), 0.0, 65535.0));
             append_little_endian(vertices, share);
-            *at[k] = static_cast<float>(low[k] + share * extent / 65535);  // so that the stated error is that of what is shown
+            *at[k] = static_cast<float>(
+                low[k] + share * extent / 65535);  // so that the stated error is that of what is shown
         }
     }
     const ReachMap reach = reach_map(context, part, folder, model.view());
@@ -503,7 +566,8 @@ Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart&
             {"reach", base64(reach.codes)}};
 }
 
-/// All paths within a number of points: the tolerance is doubled until they fit, then the longest are left out.
+/// All paths within a number of points: the tolerance is doubled until they fit, then the longest are left
+/// out.
 /// @param drawn thinned further where that is needed: fewer points come from where more ended
 Json paths_json(Context& context, DrawnPaths& drawn, const PlanFolder& folder, std::size_t most) {
     const auto sizes_now = [&] {
@@ -516,7 +580,8 @@ Json paths_json(Context& context, DrawnPaths& drawn, const PlanFolder& folder, s
     while (count() > most && drawn.tolerance < kWidestTolerance) {
         drawn.tolerance *= 2;
         drawn.error += drawn.tolerance;  // each thinning works on what the one before left
-        parallel_each(context, drawn.paths.size(), [&](std::size_t i) { thin(drawn.paths[i], drawn.tolerance); });
+        parallel_each(context, drawn.paths.size(),
+                      [&](std::size_t i) { thin(drawn.paths[i], drawn.tolerance); });
         sizes = sizes_now();
     }
     std::vector<char> left_out(sizes.size(), 0);
@@ -525,12 +590,15 @@ Json paths_json(Context& context, DrawnPaths& drawn, const PlanFolder& folder, s
         left_out[static_cast<std::size_t>(longest - sizes.begin())] = 1;
         *longest = 0;
     }
-    const auto shown = [&](std::size_t i) { return left_out[i] ? std::span<const ReplayPoint>() : std::span<const ReplayPoint>(drawn.paths[i]); };
+    const auto shown = [&](std::size_t i) {
+        return left_out[i] ? std::span<const ReplayPoint>() : std::span<const ReplayPoint>(drawn.paths[i]);
+    };
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
     for (std::size_t i = 0; i < sizes.size(); ++i)
         for (const ReplayPoint& p : shown(i)) {
             const double at[3] = {p.x, p.y, p.z};
-            for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], at[k]), high[k] = std::max(high[k], at[k]);
+            for (std::size_t k = 0; k < 3; ++k)
+                low[k] = std::min(low[k], at[k]), high[k] = std::max(high[k], at[k]);
         }
     double quantum = 0;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -546,11 +614,18 @@ Json paths_json(Context& context, DrawnPaths& drawn, const PlanFolder& folder, s
         for (const ReplayPoint& p : path) {
             const double at[3] = {p.x, p.y, p.z};
             for (std::size_t k = 0; k < 3; ++k)
-                append_little_endian(bytes, static_cast<std::uint16_t>(std::round((at[k] - low[k]) / std::max(1e-9, high[k] - low[k]) * 65535)));
-            const auto share = static_cast<std::uint16_t>(seconds > 0 ? std::floor(p.seconds / seconds * 32767) : 0);
-            append_little_endian(bytes, static_cast<std::uint16_t>(share << 1 | static_cast<unsigned>(p.rapid)));
+                append_little_endian(
+                    bytes, static_cast<std::uint16_t>(
+                               std::round((at[k] - low[k]) / std::max(1e-9, high[k] - low[k]) * 65535)));
+            const auto share =
+                static_cast<std::uint16_t>(seconds > 0 ? std::floor(p.seconds / seconds * 32767) : 0);
+            append_little_endian(bytes,
+                                 static_cast<std::uint16_t>(share << 1 | static_cast<unsigned>(p.rapid)));
         }
-        programs.push_back({{"file", folder.programs[i].file}, {"points", path.size()}, {"left_out", left_out[i] != 0}, {"data", base64(bytes)}});
+        programs.push_back({{"file", folder.programs[i].file},
+                            {"points", path.size()},
+                            {"left_out", left_out[i] != 0},
+                            {"data", base64(bytes)}});
     }
     return {{"tolerance_mm", rounded(drawn.error + quantum * std::sqrt(3.0), 4)},
             {"min", {low[0], low[1], low[2]}},
@@ -579,35 +654,45 @@ std::string page(const Json& data, bool three_d) {
         }
     const std::size_t mark = text.find(kDataMark);
     if (mark == std::string::npos)
-        throw Error(ErrorKind::usage, "report.not_built", "the page that was built in has no place for data", "", "build again");
+        throw Error(ErrorKind::usage, "report.not_built", "the page that was built in has no place for data",
+                    "", "build again");
     return text.replace(mark, kDataMark.size(), script_text(data));
 }
 
 }  // namespace
 
 ReportWork report_work(std::uint64_t steps, std::uint64_t facets) {
-    // Fitted to the metre pattern of 0.1 to 10 M facets, whose programs have 4 M steps. The replay's stock has about as many points
-    // whatever its size, and longer programs are those of larger patterns: its time grows as the root of the steps, 1 s at a million.
-    const double shown = static_cast<double>(std::min<std::uint64_t>(facets, kMostFacets)), all = static_cast<double>(facets);
-    return {1000 * std::sqrt(static_cast<double>(steps)), 0.15e6 + 2.7 * shown + (facets > kMostFacets ? 1e6 + 0.12 * all : 0)};
+    // Fitted to the metre pattern of 0.1 to 10 M facets, whose programs have 4 M steps. The replay's stock
+    // has about as many points whatever its size, and longer programs are those of larger patterns: its time
+    // grows as the root of the steps, 1 s at a million.
+    const double shown = static_cast<double>(std::min<std::uint64_t>(facets, kMostFacets)),
+                 all = static_cast<double>(facets);
+    return {1000 * std::sqrt(static_cast<double>(steps)),
+            0.15e6 + 2.7 * shown + (facets > kMostFacets ? 1e6 + 0.12 * all : 0)};
 }
 
 bool reports_are_built() { return !report_template().empty(); }
 
-std::string report_html(Context& context, const std::string& directory, const ReportOptions& options, std::optional<Verification> verified) {
+std::string report_html(Context& context, const std::string& directory, const ReportOptions& options,
+                        std::optional<Verification> verified) {
     if (!reports_are_built())
         throw Error(ErrorKind::usage, "report.not_built", "this build of slabwright has no report page", "",
                     "run tools/setup, which fetches its parts, and build again with SLABWRIGHT_REPORT=ON");
     if (!(options.size_limit_mb > 0))
-        throw Error(ErrorKind::usage, "report.size_limit", "a page of no size is none", "--size-limit", "give megabytes");
+        throw Error(ErrorKind::usage, "report.size_limit", "a page of no size is none", "--size-limit",
+                    "give megabytes");
     const fs::path out(directory);
     const PlanFolder folder = read_plan_folder(out);
-    const Json sequence = fs::exists(out / "sequence.json") ? read_json(out / "sequence.json", "report.sequence") : Json();
-    const Json verify = fs::exists(out / "verify.json") ? read_json(out / "verify.json", "report.verify") : Json();
+    const Json sequence =
+        fs::exists(out / "sequence.json") ? read_json(out / "sequence.json", "report.sequence") : Json();
+    const Json verify =
+        fs::exists(out / "verify.json") ? read_json(out / "verify.json", "report.verify") : Json();
     const std::shared_ptr<Pattern> pattern =
         verified ? std::move(verified->pattern)
-                 : read_pattern(context, directory, understood(out / "plan.json", "report.plan", [&] { return planned_pattern(folder); }),
-                                options.stl, "report");
+                 : read_pattern(
+                       context, directory,
+                       understood(out / "plan.json", "report.plan", [&] { return planned_pattern(folder); }),
+                       options.stl, "report");
     std::vector<Program> programs;
     if (verified) programs = std::move(verified->input.programs);
     verified.reset();
@@ -619,12 +704,16 @@ std::string report_html(Context& context, const std::string& directory, const Re
     const double replayed = options.three_d ? 0.02 + 0.98 * work.replay / (work.replay + work.page) : 1.0;
     context.begin_phase("report", 0.02, replayed, folder.programs.size() + left_over_steps(folder));
     Figures figures;
-    figures.data = {{"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", folder.plan}, {"verify", verify}};
+    figures.data = {{"schema", "slabwright.report/1"},
+                    {"three_d", options.three_d},
+                    {"plan", folder.plan},
+                    {"verify", verify}};
     const auto draw = [&] {
         Json steps = Json::array();
         if (sequence.is_object())
             for (const Json& step : sequence.at("steps"))
-                steps.push_back({step.at("layer").get<int>(), step.at("action").get<std::string>(), step.at("seconds").get<double>(),
+                steps.push_back({step.at("layer").get<int>(), step.at("action").get<std::string>(),
+                                 step.at("seconds").get<double>(),
                                  step.contains("program") ? step.at("program") : Json()});
         figures.data["steps"] = std::move(steps);
         draw_figures(context, mesh, folder, sequence, figures.data);
@@ -642,15 +731,18 @@ std::string report_html(Context& context, const std::string& directory, const Re
             return;
         }
         understood(out / "sequence.json", "report.sequence", draw);
-        replay_programs(context, out, folder, input, std::move(programs), options.three_d ? &*pattern->part : nullptr, figures);
+        replay_programs(context, out, folder, input, std::move(programs),
+                        options.three_d ? &*pattern->part : nullptr, figures);
     });
     context.throw_if_cancelled();
 
     const auto limit = static_cast<std::size_t>(options.size_limit_mb * 1e6);
     const auto too_large = [&](std::size_t size) {
         return Error(ErrorKind::usage, "report.size_limit",
-                     fmt::format("the page has {:.2f} MB at least, {:.2f} MB are allowed", static_cast<double>(size) / 1e6, options.size_limit_mb),
-                     "--size-limit", options.three_d ? "allow more, or leave out the model with --no-3d" : "allow more");
+                     fmt::format("the page has {:.2f} MB at least, {:.2f} MB are allowed",
+                                 static_cast<double>(size) / 1e6, options.size_limit_mb),
+                     "--size-limit",
+                     options.three_d ? "allow more, or leave out the model with --no-3d" : "allow more");
     };
     if (!options.three_d) {
         std::string text = page(figures.data, false);
@@ -687,8 +779,10 @@ std::string report_html(Context& context, const std::string& directory, const Re
     }
 }
 
-void write_report(Context& context, const std::string& directory, const ReportOptions& options, std::optional<Verification> verified) {
-    write_file_whole((fs::path(directory) / "report.html").string(), report_html(context, directory, options, std::move(verified)));
+void write_report(Context& context, const std::string& directory, const ReportOptions& options,
+                  std::optional<Verification> verified) {
+    write_file_whole((fs::path(directory) / "report.html").string(),
+                     report_html(context, directory, options, std::move(verified)));
 }
 
 }  // namespace slabwright

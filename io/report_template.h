@@ -5,7 +5,8 @@
 
 namespace slabwright {
 
-/// The whole page with the places where data go; "" when the library was built without it (SLABWRIGHT_REPORT).
+/// The whole page with the places where data go; "" when the library was built without it
+/// (SLABWRIGHT_REPORT).
 [[nodiscard]] std::string_view report_template();
 
 }  // namespace slabwright

@@ -35,7 +35,8 @@ std::string layer_name(const Section& section, bool open) {
     return name;
 }
 
-void append_polyline(std::string& text, const std::string& layer, const std::string& height, std::span<const Point2> points, bool closed) {
+void append_polyline(std::string& text, const std::string& layer, const std::string& height,
+                     std::span<const Point2> points, bool closed) {
     append_group(text, 0, "POLYLINE");
     append_group(text, 8, layer);
     append_group(text, 66, "1");
@@ -59,7 +60,8 @@ void append_polyline(std::string& text, const std::string& layer, const std::str
 std::string sections_dxf(std::span<const Section> sections) {
     std::vector<std::string> layers;  // in the order of the sections
     std::set<std::string> known;
-    std::int32_t x0 = std::numeric_limits<std::int32_t>::max(), y0 = x0, x1 = std::numeric_limits<std::int32_t>::min(), y1 = x1;
+    std::int32_t x0 = std::numeric_limits<std::int32_t>::max(), y0 = x0,
+                 x1 = std::numeric_limits<std::int32_t>::min(), y1 = x1;
     for (const Section& section : sections) {
         if (auto name = layer_name(section, false); known.insert(name).second) layers.push_back(name);
         if (!section.open_chains.empty())
@@ -107,7 +109,8 @@ std::string sections_dxf(std::span<const Section> sections) {
         std::string height;
         append_decimal(height, section.plane.z);
         height = real(height);
-        for (std::size_t i = 0; i < section.loops.size(); ++i) append_polyline(text, layer_name(section, false), height, section.loops.loop(i), true);
+        for (std::size_t i = 0; i < section.loops.size(); ++i)
+            append_polyline(text, layer_name(section, false), height, section.loops.loop(i), true);
         for (std::size_t i = 0; i < section.open_chains.size(); ++i)
             append_polyline(text, layer_name(section, true), height, section.open_chains.loop(i), false);
     }

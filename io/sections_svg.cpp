@@ -39,7 +39,9 @@ std::string sections_svg(std::span<const Section> sections) {
     const auto margin = static_cast<std::int64_t>(kUnitsPerMm);  // 1 mm, so that lines on the border show
     x0 -= margin, y0 -= margin, x1 += margin, y1 += margin;
 
-    std::string text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" version=\"1.1\" width=\"";
+    std::string text =
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" "
+        "version=\"1.1\" width=\"";
     append_mm(text, x1 - x0);
     text += "mm\" height=\"";
     append_mm(text, y1 - y0);
@@ -51,7 +53,9 @@ std::string sections_svg(std::span<const Section> sections) {
     append_mm(text, x1 - x0);
     text += ' ';
     append_mm(text, y1 - y0);
-    text += "\">\n<g fill=\"#c08a4a\" fill-opacity=\"0.15\" fill-rule=\"evenodd\" stroke=\"#333\" stroke-width=\"0.1\">\n";
+    text +=
+        "\">\n<g fill=\"#c08a4a\" fill-opacity=\"0.15\" fill-rule=\"evenodd\" stroke=\"#333\" "
+        "stroke-width=\"0.1\">\n";
     std::map<std::string, int> used;
     for (const Section& section : sections) {
         std::string id = "z" + height_text(section.plane.z);
@@ -60,7 +64,8 @@ std::string sections_svg(std::span<const Section> sections) {
         text += "<g id=\"" + id + "\">\n";
         if (!section.loops.empty()) {
             text += "<path d=\"";
-            for (std::size_t i = 0; i < section.loops.size(); ++i) append_path(text, section.loops.loop(i), true);
+            for (std::size_t i = 0; i < section.loops.size(); ++i)
+                append_path(text, section.loops.loop(i), true);
             text += "\"/>\n";
         }
         for (std::size_t i = 0; i < section.open_chains.size(); ++i) {

@@ -7,8 +7,8 @@
 
 namespace slabwright {
 
-/// The steps in order, each with the ids of those that must be done before, and where glue goes on each layer as closed
-/// polygons in mm. A glue step names its polygons by a JSON pointer into the file.
+/// The steps in order, each with the ids of those that must be done before, and where glue goes on each layer
+/// as closed polygons in mm. A glue step names its polygons by a JSON pointer into the file.
 [[nodiscard]] std::string sequence_json(const Plan& plan);
 
 }  // namespace slabwright

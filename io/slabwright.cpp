@@ -46,25 +46,30 @@ auto guarded(Body&& body) -> decltype(body()) {
     } catch (const Error&) {
         throw;
     } catch (const std::bad_alloc&) {
-        throw Error(ErrorKind::no_plan, "memory.exhausted", "the machine has no more memory", "", "give fewer facets, or a machine with more memory");
+        throw Error(ErrorKind::no_plan, "memory.exhausted", "the machine has no more memory", "",
+                    "give fewer facets, or a machine with more memory");
     } catch (const std::filesystem::filesystem_error& error) {
-        throw Error(ErrorKind::input, "file.system", error.code().message(), error.path1().string(), "check the path and its rights");
+        throw Error(ErrorKind::input, "file.system", error.code().message(), error.path1().string(),
+                    "check the path and its rights");
     } catch (const std::exception& error) {
-        throw Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the pattern and the job");
+        throw Error(ErrorKind::no_plan, "internal", error.what(), "",
+                    "report this with the pattern and the job");
     }
 }
 
 std::string read_text(const std::string& path) {
     const auto refuse = [&] {
         const std::string reason = std::strerror(errno);
-        throw Error(ErrorKind::usage, "job.unreadable", fmt::format("cannot read the job file: {}", reason), path, "check the path after --job");
+        throw Error(ErrorKind::usage, "job.unreadable", fmt::format("cannot read the job file: {}", reason),
+                    path, "check the path after --job");
     };
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (file < 0) refuse();
     std::string text;
     char buffer[1 << 16];
     ssize_t got = 0;
-    while ((got = ::read(file, buffer, sizeof buffer)) > 0) text.append(buffer, static_cast<std::size_t>(got));
+    while ((got = ::read(file, buffer, sizeof buffer)) > 0)
+        text.append(buffer, static_cast<std::size_t>(got));
     if (got < 0) {
         const int reason = errno;
         ::close(file);
@@ -88,7 +93,8 @@ std::string default_job_toml(std::string_view library) {
         Job job;
         if (library == "luo") job.tools = luo_library();
         else if (library != "default")
-            throw Error(ErrorKind::usage, "job.library", "there is no tool library of that name", std::string(library), "default or luo");
+            throw Error(ErrorKind::usage, "job.library", "there is no tool library of that name",
+                        std::string(library), "default or luo");
         return job_toml(job);
     });
 }
@@ -97,11 +103,14 @@ std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& stl_p
     return guarded([&] {
         validate(job);
         const StlOptions reading{job.units, job.tolerances.weld};
-        return std::make_shared<Pattern>(Pattern{stl_path, reading, read_stl(context, stl_path, reading), {}});
+        return std::make_shared<Pattern>(
+            Pattern{stl_path, reading, read_stl(context, stl_path, reading), {}});
     });
 }
 
-Plan plan(Context& context, const std::string& stl_path, const Job& job) { return plan(context, *read_pattern(context, stl_path, job), job); }
+Plan plan(Context& context, const std::string& stl_path, const Job& job) {
+    return plan(context, *read_pattern(context, stl_path, job), job);
+}
 
 Plan plan(Context& context, const Pattern& pattern, const Job& job) {
     return guarded([&] {
@@ -109,7 +118,8 @@ Plan plan(Context& context, const Pattern& pattern, const Job& job) {
         const StlMesh& stl = pattern.stl;
         const std::string& stl_path = pattern.path;
         if (pattern.reading.units != job.units || pattern.reading.weld_mm != job.tolerances.weld)
-            throw Error(ErrorKind::usage, "plan.reading", "was read with other units or another tolerance of welding than the job's", stl_path,
+            throw Error(ErrorKind::usage, "plan.reading",
+                        "was read with other units or another tolerance of welding than the job's", stl_path,
                         "read the pattern with the job that it is planned with");
         require_solid(context, stl, stl_path);
         const auto planned = [&] {
@@ -117,14 +127,16 @@ Plan plan(Context& context, const Pattern& pattern, const Job& job) {
                 return make_plan(context, stl.mesh, stl.input, job);
             } catch (const Error& error) {  // the engine knows no file; the user wants to hear of it
                 if (error.kind() != ErrorKind::no_plan) throw;
-                throw Error(error.kind(), error.code(), error.message(), error.place().empty() ? stl_path : stl_path + ", " + error.place(),
+                throw Error(error.kind(), error.code(), error.message(),
+                            error.place().empty() ? stl_path : stl_path + ", " + error.place(),
                             error.remedy());
             }
         };
         Plan result = planned();
         result.diagnostics.insert(result.diagnostics.begin(), stl.diagnostics.begin(), stl.diagnostics.end());
         if (!reports_are_built())
-            result.diagnostics.push_back({Severity::note, "report.not_built", "this build of slabwright writes no report.html", std::nullopt});
+            result.diagnostics.push_back({Severity::note, "report.not_built",
+                                          "this build of slabwright writes no report.html", std::nullopt});
         return result;
     });
 }
@@ -172,7 +184,9 @@ VerifyResult verdict(const Verification& found) {
     result.minutes = found.report.seconds / 60;
     for (const Violation& v : found.report.violations) {
         Diagnostic d{Severity::error, v.code, v.message, v.where};
-        if (!v.file.empty()) d.message = v.line > 0 ? fmt::format("{}:{}: {}", v.file, v.line, v.message) : fmt::format("{}: {}", v.file, v.message);
+        if (!v.file.empty())
+            d.message = v.line > 0 ? fmt::format("{}:{}: {}", v.file, v.line, v.message)
+                                   : fmt::format("{}: {}", v.file, v.message);
         result.violations.push_back(std::move(d));
     }
     return result;
@@ -183,7 +197,8 @@ double verifying_share(const Plan& plan, double cell_mm) {
     SimulationSize size;
     for (const Layer& layer : plan.layers)
         for (const Operation& op : layer.operations) {
-            const auto tool = std::find_if(plan.job.tools.begin(), plan.job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+            const auto tool = std::find_if(plan.job.tools.begin(), plan.job.tools.end(),
+                                           [&](const Tool& t) { return t.number == op.tool; });
             size.steps += op.moves.size();
             if (tool != plan.job.tools.end()) size.swept_mm2 += op.cutting_mm * tool->diameter;
         }
@@ -194,12 +209,14 @@ double verifying_share(const Plan& plan, double cell_mm) {
     const SimulationWork simulating = simulation_work(size);
     const ReportWork reporting = report_work(size.steps, size.facets);
     const double verifying = simulating.checking + simulating.cutting;
-    return kPlanningShare + (1 - kPlanningShare) * verifying / (verifying + reporting.replay + reporting.page);
+    return kPlanningShare +
+           (1 - kPlanningShare) * verifying / (verifying + reporting.replay + reporting.page);
 }
 
 void check_cell(double cell_mm) {
     if (cell_mm != 0 && !(cell_mm >= 0.01 && cell_mm <= 10))
-        throw Error(ErrorKind::usage, "verify.cell", fmt::format("a stock cannot be simulated with points every {} mm", cell_mm), "--cell",
+        throw Error(ErrorKind::usage, "verify.cell",
+                    fmt::format("a stock cannot be simulated with points every {} mm", cell_mm), "--cell",
                     "give 0.01 to 10, or none");
 }
 
@@ -209,7 +226,8 @@ void write(Context& context, const Plan& plan, const std::string& directory, con
     guarded([&] {
         OutputFolder out(directory);
         fill(context, plan, out);
-        if (!stl_path.empty() && reports_are_built()) write_report(context, out.path("").string(), {stl_path});
+        if (!stl_path.empty() && reports_are_built())
+            write_report(context, out.path("").string(), {stl_path});
         context.throw_if_cancelled();
         out.commit();
     });
@@ -217,7 +235,8 @@ void write(Context& context, const Plan& plan, const std::string& directory, con
 
 namespace {
 
-VerifyResult write_and_verify(Context& context, const Plan& plan, const std::string& directory, const VerifyOptions& options) {
+VerifyResult write_and_verify(Context& context, const Plan& plan, const std::string& directory,
+                              const VerifyOptions& options) {
     return guarded([&] {
         check_cell(options.cell);
         OutputFolder out(directory);
@@ -237,41 +256,49 @@ VerifyResult write_and_verify(Context& context, const Plan& plan, const std::str
 
 }  // namespace
 
-VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path, double cell_mm) {
+VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
+                            const std::string& stl_path, double cell_mm) {
     return write_and_verify(context, plan, directory, {.stl = stl_path, .cell = cell_mm});
 }
 
-VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory, const std::shared_ptr<Pattern>& pattern,
-                            double cell_mm) {
-    return write_and_verify(context, plan, directory, {.stl = pattern->path, .pattern = pattern, .cell = cell_mm});
+VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
+                            const std::shared_ptr<Pattern>& pattern, double cell_mm) {
+    return write_and_verify(context, plan, directory,
+                            {.stl = pattern->path, .pattern = pattern, .cell = cell_mm});
 }
 
-void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path, const std::string& directory) {
+void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path,
+                       const std::string& directory) {
     guarded([&] {
         const StlMesh stl = read_stl(context, stl_path, {plan.job.units, plan.job.tolerances.weld});
         if (stl.input.sha256 != plan.input.sha256)
-            throw Error(ErrorKind::input, "access_maps.stl", "is not the pattern that was planned", stl_path, "give the STL of the plan");
+            throw Error(ErrorKind::input, "access_maps.stl", "is not the pattern that was planned", stl_path,
+                        "give the STL of the plan");
         std::error_code failed;
         std::filesystem::create_directories(directory, failed);
         if (failed)
-            throw Error(ErrorKind::input, "access_maps.write", "cannot be made: " + failed.message(), directory,
-                        "choose another folder for the maps");
+            throw Error(ErrorKind::input, "access_maps.write", "cannot be made: " + failed.message(),
+                        directory, "choose another folder for the maps");
         context.begin_phase("access maps", 1, 1);
         access_maps(context, stl.mesh.view(), plan, [&](const AccessMap& map) {
             const Accessibility& a = map.accessibility;
-            const std::string comment = fmt::format("{}: layer {}, tool {} reaches {:.4f} of the surface to be machined; mm, z = 0 at the bottom",
-                                                    plan.input.sha256.substr(0, 12), map.layer, map.tool, a.ratio());
-            const std::filesystem::path file = std::filesystem::path(directory) / fmt::format("layer_{:02}_tool_{:02}.ply", map.layer, map.tool);
+            const std::string comment = fmt::format(
+                "{}: layer {}, tool {} reaches {:.4f} of the surface to be machined; mm, z = 0 at the bottom",
+                plan.input.sha256.substr(0, 12), map.layer, map.tool, a.ratio());
+            const std::filesystem::path file = std::filesystem::path(directory) /
+                                               fmt::format("layer_{:02}_tool_{:02}.ply", map.layer, map.tool);
             write_file_whole(file.string(), access_ply(stl.mesh.view(), a.share, comment));
         });
     });
 }
 
-void report(Context& context, const std::string& directory, const std::string& stl_path, bool three_d, double size_limit_mb) {
+void report(Context& context, const std::string& directory, const std::string& stl_path, bool three_d,
+            double size_limit_mb) {
     guarded([&] { write_report(context, directory, {stl_path, three_d, size_limit_mb}); });
 }
 
-VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path, const std::string& maps_directory, double cell_mm) {
+VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path,
+                    const std::string& maps_directory, double cell_mm) {
     return guarded([&] {
         check_cell(cell_mm);
         VerifyOptions options;
@@ -289,15 +316,19 @@ std::string inspect(Context& context, const std::string& stl_path, const Job& jo
     });
 }
 
-void slice_to_file(Context& context, const std::string& stl_path, const Job& job, double every_mm, const std::string& out) {
+void slice_to_file(Context& context, const std::string& stl_path, const Job& job, double every_mm,
+                   const std::string& out) {
     guarded([&] {
         validate(job);
         if (!(every_mm > 0) || !std::isfinite(every_mm))
-            throw Error(ErrorKind::usage, "slice.every", fmt::format("sections every {} mm are none", every_mm), "--every", "give a distance over 0");
+            throw Error(ErrorKind::usage, "slice.every",
+                        fmt::format("sections every {} mm are none", every_mm), "--every",
+                        "give a distance over 0");
         const std::size_t dot = out.rfind('.');
         const std::string ending = dot == std::string::npos ? "" : out.substr(dot);
         if (ending != ".svg" && ending != ".dxf" && ending != ".json")
-            throw Error(ErrorKind::usage, "slice.format", fmt::format("no format has the ending \"{}\"", ending), out,
+            throw Error(ErrorKind::usage, "slice.format",
+                        fmt::format("no format has the ending \"{}\"", ending), out,
                         "end the name in .svg, .dxf or .json");
         const StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld});
         const double height = bounds(stl.mesh.view()).max.z;
@@ -305,18 +336,23 @@ void slice_to_file(Context& context, const std::string& stl_path, const Job& job
         constexpr double most = 1e6;
         if (number > most)
             throw Error(ErrorKind::usage, "slice.every",
-                        fmt::format("sections every {} mm of {} mm are {:.0f}, over {:.0f}", every_mm, height, number, most), "--every",
-                        "give a larger distance");
+                        fmt::format("sections every {} mm of {} mm are {:.0f}, over {:.0f}", every_mm, height,
+                                    number, most),
+                        "--every", "give a larger distance");
         if (number < 1)
-            throw Error(ErrorKind::usage, "slice.every", fmt::format("the pattern is {} mm high: no multiple of {} mm lies inside", height, every_mm),
-                        "--every", "give a smaller distance");
+            throw Error(
+                ErrorKind::usage, "slice.every",
+                fmt::format("the pattern is {} mm high: no multiple of {} mm lies inside", height, every_mm),
+                "--every", "give a smaller distance");
         std::vector<Plane> planes;
         for (int i = 1; i <= static_cast<int>(number); ++i)
             if (i * every_mm < height) planes.push_back({i * every_mm, Side::above});
         context.begin_phase("slicing", 0.5, 0.9);
         const std::vector<Section> sections = slice(context, stl.mesh.view(), planes, {job.tolerances.gap});
         context.begin_phase("writing", 0.9, 1.0);
-        const std::string text = ending == ".svg" ? sections_svg(sections) : ending == ".dxf" ? sections_dxf(sections) : sections_json(sections);
+        const std::string text = ending == ".svg"   ? sections_svg(sections)
+                                 : ending == ".dxf" ? sections_dxf(sections)
+                                                    : sections_json(sections);
         context.throw_if_cancelled();
         write_file_whole(out, text);
     });

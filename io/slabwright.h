@@ -5,8 +5,9 @@
 //     slabwright::Plan plan = slabwright::plan(context, "pattern.stl", job);
 //     slabwright::write(context, plan, "out");
 //
-// Everything throws slabwright::Error and nothing else; context.cancel() from any thread stops it. The library writes
-// nothing to stderr, sets no signal handler and never exits; several plans may run at once, each on its own Context.
+// Everything throws slabwright::Error and nothing else; context.cancel() from any thread stops it. The
+// library writes nothing to stderr, sets no signal handler and never exits; several plans may run at once,
+// each on its own Context.
 #pragma once
 
 #include <memory>
@@ -28,82 +29,107 @@ namespace slabwright {
 /// Reads a job file (TOML). @throws Error(usage) with file, line and the nearest known key
 [[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path);
 
-/// All keys with their defaults and comments, as a job file. @param library "default", or "luo" for the tools of LUO table 5.4
+/// All keys with their defaults and comments, as a job file. @param library "default", or "luo" for the tools
+/// of LUO table 5.4
 [[nodiscard]] SLABWRIGHT_API std::string default_job_toml(std::string_view library = "default");
 
 /// Reads the STL and plans the build. @throws Error(input | no_plan | cancelled | usage)
 [[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const std::string& stl_path, const Job& job);
 
-/// A pattern that was read, for whoever plans it and verifies the plan: its file is then read once. What it holds is this library's.
+/// A pattern that was read, for whoever plans it and verifies the plan: its file is then read once. What it
+/// holds is this library's.
 struct Pattern;
 
 /// Reads the STL as `job` says. @throws Error(input | cancelled | usage)
-[[nodiscard]] SLABWRIGHT_API std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& stl_path, const Job& job);
+[[nodiscard]] SLABWRIGHT_API std::shared_ptr<Pattern> read_pattern(Context& context,
+                                                                   const std::string& stl_path,
+                                                                   const Job& job);
 
-/// Plans the build of a pattern that was read with the same units and tolerance of welding. @throws as plan() of an STL, and Error(usage)
-/// when it was read otherwise
+/// Plans the build of a pattern that was read with the same units and tolerance of welding. @throws as plan()
+/// of an STL, and Error(usage) when it was read otherwise
 [[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const Pattern& pattern, const Job& job);
 
-/// Writes plan.json, nc/, tool.tbl and sequence.json into `directory`, all or nothing: a fresh folder beside it is
-/// filled and then takes its place; an existing folder is replaced only if it holds a plan.json of ours or is empty.
-/// @param stl_path the pattern that was planned: with it report.html is written too, where this library can (plan() notes when it cannot)
+/// Writes plan.json, nc/, tool.tbl and sequence.json into `directory`, all or nothing: a fresh folder beside
+/// it is filled and then takes its place; an existing folder is replaced only if it holds a plan.json of ours
+/// or is empty.
+/// @param stl_path the pattern that was planned: with it report.html is written too, where this library can
+/// (plan() notes when it cannot)
 /// @throws Error(input) when the place cannot be written
-SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path = {});
+SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string& directory,
+                          const std::string& stl_path = {});
 
-/// Writes what tools reach into `directory`, for viewers of meshes: layer_01_tool_02.ply and so on, the facets of layer 1 that are to be
-/// machined with the share of each that tool 2 reaches (io/access_ply.h), pattern-base. Of the flat and ball end mills that were looked at
-/// for a layer or cut it.
+/// Writes what tools reach into `directory`, for viewers of meshes: layer_01_tool_02.ply and so on, the
+/// facets of layer 1 that are to be machined with the share of each that tool 2 reaches (io/access_ply.h),
+/// pattern-base. Of the flat and ball end mills that were looked at for a layer or cut it.
 /// @param stl_path the pattern that was planned
 /// @throws Error(input) when the place cannot be written or the STL is another one, Error(cancelled)
-SLABWRIGHT_API void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path, const std::string& directory);
+SLABWRIGHT_API void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path,
+                                      const std::string& directory);
 
 /// Makes report.html of a folder again, from what lies in it (verify.json among it) and the pattern.
 /// @param stl_path as verify's. @param three_d false: a light page without model and paths
 /// @param size_limit_mb the page is made no larger, by showing less detail; it says how much
-/// @throws Error(usage) when the library was built without the page or the limit cannot be kept, Error(input) when the folder cannot be
+/// @throws Error(usage) when the library was built without the page or the limit cannot be kept, Error(input)
+/// when the folder cannot be
 ///         understood, the STL is missing or another one, or the place cannot be written
-SLABWRIGHT_API void report(Context& context, const std::string& directory, const std::string& stl_path = {}, bool three_d = true,
-                           double size_limit_mb = 10);
+SLABWRIGHT_API void report(Context& context, const std::string& directory, const std::string& stl_path = {},
+                           bool three_d = true, double size_limit_mb = 10);
 
-/// Of the time that plan() and write_verified() take together, that of plan() and of the writing: 0.55 to 0.75. A caller
-/// that shows progress begins with `context.share_progress(0, kPlanningShare)`; write_verified() goes on from there.
+/// Of the time that plan() and write_verified() take together, that of plan() and of the writing: 0.55 to
+/// 0.75. A caller that shows progress begins with `context.share_progress(0, kPlanningShare)`;
+/// write_verified() goes on from there.
 inline constexpr double kPlanningShare = 0.67;
 
 /// What the simulation of a folder's programs found.
 struct VerifyResult {
     bool passed = false;
-    double gouge_mm = 0;                 ///< deepest place of a cutter in the part, along the normal
-    double cell_mm = 0;                  ///< between the points of the simulated stock
-    double minutes = 0;                  ///< of all programs on the plan's machine
-    std::vector<Diagnostic> violations;  ///< what must not be, with program, line and place; empty when passed
+    double gouge_mm = 0;  ///< deepest place of a cutter in the part, along the normal
+    double cell_mm = 0;   ///< between the points of the simulated stock
+    double minutes = 0;   ///< of all programs on the plan's machine
+    std::vector<Diagnostic>
+        violations;  ///< what must not be, with program, line and place; empty when passed
 };
 
-/// Writes as write() does, and verifies what it wrote before it takes its place: `directory` then holds verify.json too, also when the
-/// programs do not make the part. Cancelled or refused, it is as it was before.
+/// Writes as write() does, and verifies what it wrote before it takes its place: `directory` then holds
+/// verify.json too, also when the programs do not make the part. Cancelled or refused, it is as it was
+/// before.
 /// @param stl_path the pattern that was planned. @param cell_mm as verify's
 /// @throws Error as write() and verify()
-[[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
+[[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan,
+                                                         const std::string& directory,
                                                          const std::string& stl_path, double cell_mm = 0);
-/// The same of a pattern that plan() was given. What the programs say is read from their text all the same. Not from two threads at once with
-/// one pattern, which keeps what verification makes of it.
-[[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
-                                                         const std::shared_ptr<Pattern>& pattern, double cell_mm = 0);
+/// The same of a pattern that plan() was given. What the programs say is read from their text all the same.
+/// Not from two threads at once with one pattern, which keeps what verification makes of it.
+[[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan,
+                                                         const std::string& directory,
+                                                         const std::shared_ptr<Pattern>& pattern,
+                                                         double cell_mm = 0);
 
-/// Simulates the programs in `directory` against the pattern, from the folder's text alone, and writes verify.json into it.
-/// @param stl_path the pattern; "" looks for the file that plan.json names: in the folder, beside it, where the caller stands
-/// @param maps_directory where a picture of each layer is written, layer_01.ppm and so on: what is left over, missed, unreachable or
+/// Simulates the programs in `directory` against the pattern, from the folder's text alone, and writes
+/// verify.json into it.
+/// @param stl_path the pattern; "" looks for the file that plan.json names: in the folder, beside it, where
+/// the caller stands
+/// @param maps_directory where a picture of each layer is written, layer_01.ppm and so on: what is left over,
+/// missed, unreachable or
 ///        gouged; "": none
-/// @param cell_mm between the points of the simulated stock, 0.01 to 10; 0: as fine as the plan's cusp asks for. The check of every move
-///        for gouges needs no cells and is as exact with any; with coarser ones than that an operation that takes nothing is not told
-/// @throws Error(verification) when the folder cannot be understood, Error(input) when the STL is missing or another one, Error(usage)
+/// @param cell_mm between the points of the simulated stock, 0.01 to 10; 0: as fine as the plan's cusp asks
+/// for. The check of every move
+///        for gouges needs no cells and is as exact with any; with coarser ones than that an operation that
+///        takes nothing is not told
+/// @throws Error(verification) when the folder cannot be understood, Error(input) when the STL is missing or
+/// another one, Error(usage)
 ///         on another cell
-[[nodiscard]] SLABWRIGHT_API VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path = {},
+[[nodiscard]] SLABWRIGHT_API VerifyResult verify(Context& context, const std::string& directory,
+                                                 const std::string& stl_path = {},
                                                  const std::string& maps_directory = {}, double cell_mm = 0);
 
 /// Mesh report, features and undercuts of a file as JSON (schema slabwright.inspect/1).
-[[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const std::string& stl_path, const Job& job);
+[[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const std::string& stl_path,
+                                                 const Job& job);
 
-/// Sections every `every_mm` (at its multiples above the bottom) written by the ending of `out`: .svg, .dxf or .json.
-SLABWRIGHT_API void slice_to_file(Context& context, const std::string& stl_path, const Job& job, double every_mm, const std::string& out);
+/// Sections every `every_mm` (at its multiples above the bottom) written by the ending of `out`: .svg, .dxf
+/// or .json.
+SLABWRIGHT_API void slice_to_file(Context& context, const std::string& stl_path, const Job& job,
+                                  double every_mm, const std::string& out);
 
 }  // namespace slabwright

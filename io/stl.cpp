@@ -36,9 +36,11 @@ constexpr double kSmallBox = 5;           ///< in the declared unit; below, the 
 constexpr double kLargeBox = 5000;        ///< likewise, above
 constexpr std::string_view kExportAgain = "export the file again";
 
-// ---------------------------------------------------------------------------------------------------- the file
+// ---------------------------------------------------------------------------------------------------- the
+// file
 
-[[noreturn]] void refuse(const std::string& code, const std::string& message, const std::string& place, std::string_view remedy) {
+[[noreturn]] void refuse(const std::string& code, const std::string& message, const std::string& place,
+                         std::string_view remedy) {
     throw Error(ErrorKind::input, "stl." + code, message, place, std::string(remedy));
 }
 
@@ -52,14 +54,17 @@ public:
         const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
         if (file < 0) {
             const int error = errno;
-            if (error == ENOENT || error == ENOTDIR) refuse("missing", "there is no such file", path, "check the path");
-            refuse("unreadable", "the file cannot be opened: " + reason(error), path, "check its permissions");
+            if (error == ENOENT || error == ENOTDIR)
+                refuse("missing", "there is no such file", path, "check the path");
+            refuse("unreadable", "the file cannot be opened: " + reason(error), path,
+                   "check its permissions");
         }
         struct stat info {};
         const bool known = ::fstat(file, &info) == 0;
         if (!known || !S_ISREG(info.st_mode)) {
             ::close(file);
-            if (known && S_ISDIR(info.st_mode)) refuse("directory", "this is a directory", path, "name an STL file in it");
+            if (known && S_ISDIR(info.st_mode))
+                refuse("directory", "this is a directory", path, "name an STL file in it");
             refuse("unreadable", "this is no regular file", path, "copy the mesh to a file first");
         }
         size_ = static_cast<std::size_t>(info.st_size);
@@ -67,7 +72,9 @@ public:
             void* data = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, file, 0);
             const int error = errno;
             ::close(file);
-            if (data == MAP_FAILED) refuse("unreadable", "the file cannot be mapped: " + reason(error), path, "copy it to a local disk");
+            if (data == MAP_FAILED)
+                refuse("unreadable", "the file cannot be mapped: " + reason(error), path,
+                       "copy it to a local disk");
             data_ = static_cast<const char*>(data);
             ::madvise(data, size_, MADV_WILLNEED);
         } else {
@@ -96,7 +103,8 @@ std::string hash_file(Context& context, std::string_view bytes) {
     return hash.hex();
 }
 
-// ---------------------------------------------------------------------------------------------------- what is common
+// ---------------------------------------------------------------------------------------------------- what
+// is common
 
 /// Facets, to be set on z = 0 in millimetres, and where they lie in the file.
 struct Corners {
@@ -125,9 +133,11 @@ struct Extent {
     }
 };
 
-/// The one rounding a coordinate suffers: scaled and lowered in double, then to float32 (as FacetRecords do with binary ones).
+/// The one rounding a coordinate suffers: scaled and lowered in double, then to float32 (as FacetRecords do
+/// with binary ones).
 Vec3f place_corner(const std::array<double, 3>& p, double mm_per_unit, double lowest_mm) {
-    return {static_cast<float>(p[0] * mm_per_unit), static_cast<float>(p[1] * mm_per_unit), static_cast<float>(p[2] * mm_per_unit - lowest_mm)};
+    return {static_cast<float>(p[0] * mm_per_unit), static_cast<float>(p[1] * mm_per_unit),
+            static_cast<float>(p[2] * mm_per_unit - lowest_mm)};
 }
 
 void set_box(Corners& corners, const Extent& extent, double mm_per_unit) {
@@ -141,9 +151,12 @@ bool absurd(double value, double mm_per_unit) { return !(std::abs(value * mm_per
 
 [[noreturn]] void refuse_coordinate(double value, double mm_per_unit, const std::string& place) {
     if (!std::isfinite(value))
-        refuse("non_finite", fmt::format("a corner has the coordinate {}", value), place, "repair the mesh in the program that made it");
-    refuse("absurd", fmt::format("a corner has the coordinate {:.6g} mm, over the limit of {:.0f} mm", value * mm_per_unit, kAbsurdMm), place,
-           "check the unit (--units) and the file, which may be damaged");
+        refuse("non_finite", fmt::format("a corner has the coordinate {}", value), place,
+               "repair the mesh in the program that made it");
+    refuse("absurd",
+           fmt::format("a corner has the coordinate {:.6g} mm, over the limit of {:.0f} mm",
+                       value * mm_per_unit, kAbsurdMm),
+           place, "check the unit (--units) and the file, which may be damaged");
 }
 
 // ---------------------------------------------------------------------------------------------------- binary
@@ -161,12 +174,14 @@ std::array<double, 3> binary_corner(const char* facet, std::size_t corner) {
 }
 
 /// `bytes` holds exactly `count` facets after the header.
-Corners read_binary(Context& context, std::string_view bytes, std::size_t count, double mm_per_unit, const std::string& path) {
+Corners read_binary(Context& context, std::string_view bytes, std::size_t count, double mm_per_unit,
+                    const std::string& path) {
     constexpr std::size_t grain = std::size_t{1} << 15;
     const char* facets = bytes.data() + kHeaderBytes;
     struct Scan {
         Extent extent = Extent::none();
-        std::size_t bad = std::numeric_limits<std::size_t>::max();  ///< first coordinate that is unusable, counted through
+        std::size_t bad =
+            std::numeric_limits<std::size_t>::max();  ///< first coordinate that is unusable, counted through
     };
     const Scan scan = parallel_reduce(
         context, count, grain, Scan{},
@@ -190,8 +205,8 @@ Corners read_binary(Context& context, std::string_view bytes, std::size_t count,
     if (scan.bad != std::numeric_limits<std::size_t>::max()) {
         const std::size_t f = scan.bad / 9, c = scan.bad / 3 % 3, k = scan.bad % 3;
         refuse_coordinate(binary_corner(facets + kFacetBytes * f, c)[k], mm_per_unit,
-                          fmt::format("{}, facet {} (counted from 0), {} of corner {}, offset {}", path, f, "xyz"[k], c,
-                                      kHeaderBytes + kFacetBytes * f + 12 + 12 * c + 4 * k));
+                          fmt::format("{}, facet {} (counted from 0), {} of corner {}, offset {}", path, f,
+                                      "xyz"[k], c, kHeaderBytes + kFacetBytes * f + 12 + 12 * c + 4 * k));
     }
     Corners corners;
     set_box(corners, scan.extent, mm_per_unit);
@@ -206,7 +221,8 @@ char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + '
 
 /// `word` in any case; `expected` in lower case.
 bool is_word(std::string_view word, std::string_view expected) {
-    return word.size() == expected.size() && std::equal(word.begin(), word.end(), expected.begin(), [](char a, char b) { return lower(a) == b; });
+    return word.size() == expected.size() && std::equal(word.begin(), word.end(), expected.begin(),
+                                                        [](char a, char b) { return lower(a) == b; });
 }
 
 /// Words separated by white space; lines matter only for the names of solids.
@@ -249,12 +265,14 @@ struct Piece {
 bool read_number(std::string_view word, double& value) {
     const std::string_view digits = !word.empty() && word[0] == '+' ? word.substr(1) : word;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (end != digits.data() + digits.size() || digits.empty() || (digits != word && digits[0] == '-')) return false;
+    if (end != digits.data() + digits.size() || digits.empty() || (digits != word && digits[0] == '-'))
+        return false;
     if (error == std::errc::result_out_of_range) {
         // Too small to be told from zero, or too large to be a length.
         const std::size_t exponent = digits.find_first_of("eE");
-        const bool tiny = exponent != std::string_view::npos ? digits.substr(exponent).find('-') != std::string_view::npos
-                                                             : digits.find_first_of("123456789") > digits.find('.');
+        const bool tiny = exponent != std::string_view::npos
+                              ? digits.substr(exponent).find('-') != std::string_view::npos
+                              : digits.find_first_of("123456789") > digits.find('.');
         value = tiny ? 0.0 : std::numeric_limits<double>::infinity();
         return true;
     }
@@ -324,8 +342,8 @@ void read_piece(std::string_view text, double mm_per_unit, Piece& piece) {
     }
 }
 
-/// The first line at or after `from`, before `to`, that begins a facet: "facet normal". The name of a solid cannot, as it
-/// follows its keyword on the line. Returns `to` when there is none.
+/// The first line at or after `from`, before `to`, that begins a facet: "facet normal". The name of a solid
+/// cannot, as it follows its keyword on the line. Returns `to` when there is none.
 std::size_t find_facet_line(std::string_view text, std::size_t from, std::size_t to) {
     for (std::size_t at = from; at < to; ++at) {
         if (text[at] != '\n' && text[at] != '\r') continue;
@@ -333,7 +351,8 @@ std::size_t find_facet_line(std::string_view text, std::size_t from, std::size_t
         words.skip_space();
         if (words.at >= to) return to;
         const std::size_t begin = words.at;
-        if (lower(text[begin]) == 'f' && is_word(words.next(), "facet") && is_word(words.next(), "normal")) return begin;
+        if (lower(text[begin]) == 'f' && is_word(words.next(), "facet") && is_word(words.next(), "normal"))
+            return begin;
         at = begin;
     }
     return to;
@@ -350,14 +369,17 @@ std::string printable(std::string_view word) {
     return text + (word.size() > 40 ? "…'" : "'");
 }
 
-std::string ascii_place(const std::string& path, std::string_view text, std::size_t offset, std::size_t facet) {
+std::string ascii_place(const std::string& path, std::string_view text, std::size_t offset,
+                        std::size_t facet) {
     // Lines end with \n, \r\n or \r.
     std::size_t line = 1;
-    for (std::size_t i = 0; i < offset; ++i) line += text[i] == '\n' || (text[i] == '\r' && (i + 1 == text.size() || text[i + 1] != '\n'));
+    for (std::size_t i = 0; i < offset; ++i)
+        line += text[i] == '\n' || (text[i] == '\r' && (i + 1 == text.size() || text[i + 1] != '\n'));
     return fmt::format("{}, line {}, offset {}, facet {} (counted from 0)", path, line, offset, facet);
 }
 
-Corners read_ascii(Context& context, std::string_view text, std::size_t begin, double mm_per_unit, const std::string& path) {
+Corners read_ascii(Context& context, std::string_view text, std::size_t begin, double mm_per_unit,
+                   const std::string& path) {
     constexpr std::size_t piece_bytes = std::size_t{1} << 20;
     const std::size_t shares = (text.size() - begin + piece_bytes - 1) / piece_bytes;
     std::vector<std::size_t> starts(shares);
@@ -367,7 +389,8 @@ Corners read_ascii(Context& context, std::string_view text, std::size_t begin, d
     });
     std::vector<Piece> pieces;
     for (std::size_t i = 0; i < shares; ++i) {
-        if (i > 0 && starts[i] >= std::min(text.size(), begin + (i + 1) * piece_bytes)) continue;  // no facet begins in this share
+        if (i > 0 && starts[i] >= std::min(text.size(), begin + (i + 1) * piece_bytes))
+            continue;  // no facet begins in this share
         if (!pieces.empty()) pieces.back().end = starts[i];
         pieces.emplace_back().begin = starts[i];
     }
@@ -388,13 +411,15 @@ Corners read_ascii(Context& context, std::string_view text, std::size_t begin, d
         if (piece.fault == Fault::none) continue;
         const std::string place = ascii_place(path, text, piece.offset, count);
         if (piece.fault == Fault::coordinate) refuse_coordinate(piece.value, mm_per_unit, place);
-        if (piece.found.empty()) refuse("truncated", "the text ends where " + piece.expected + " should stand", place, kExportAgain);
-        refuse("unparsable", "found " + printable(piece.found) + " where " + piece.expected + " should stand", place,
-               "export the file again, or as binary STL");
+        if (piece.found.empty())
+            refuse("truncated", "the text ends where " + piece.expected + " should stand", place,
+                   kExportAgain);
+        refuse("unparsable", "found " + printable(piece.found) + " where " + piece.expected + " should stand",
+               place, "export the file again, or as binary STL");
     }
     if (!ended)
-        refuse("truncated", fmt::format("the text ends after {} facets without 'endsolid'", count), ascii_place(path, text, text.size(), count),
-               kExportAgain);
+        refuse("truncated", fmt::format("the text ends after {} facets without 'endsolid'", count),
+               ascii_place(path, text, text.size(), count), kExportAgain);
     if (count == 0) refuse("no_facets", "the text holds no facets", path, kExportAgain);
 
     Corners corners;
@@ -404,7 +429,8 @@ Corners read_ascii(Context& context, std::string_view text, std::size_t begin, d
         std::size_t f = firsts[i];
         for (const std::array<double, 9>& facet : pieces[i].facets) {
             for (std::size_t c = 0; c < 3; ++c)
-                corners.spelt[f][c] = place_corner({facet[3 * c], facet[3 * c + 1], facet[3 * c + 2]}, mm_per_unit, corners.min[2]);
+                corners.spelt[f][c] = place_corner({facet[3 * c], facet[3 * c + 1], facet[3 * c + 2]},
+                                                   mm_per_unit, corners.min[2]);
             ++f;
         }
         pieces[i].facets = {};
@@ -413,10 +439,11 @@ Corners read_ascii(Context& context, std::string_view text, std::size_t begin, d
     return corners;
 }
 
-// ---------------------------------------------------------------------------------------------------- which of the two
+// ---------------------------------------------------------------------------------------------------- which
+// of the two
 
-/// Offset of the word "solid" that begins an ASCII file, or npos. Binary headers may begin with it too; but their
-/// numbers hold zero bytes and text does not.
+/// Offset of the word "solid" that begins an ASCII file, or npos. Binary headers may begin with it too; but
+/// their numbers hold zero bytes and text does not.
 std::size_t ascii_begin(std::string_view bytes) {
     Words words{bytes, bytes.substr(0, 3) == "\xEF\xBB\xBF" ? std::size_t{3} : std::size_t{0}};
     words.skip_space();
@@ -433,30 +460,40 @@ Corners read_facets(Context& context, std::string_view bytes, double mm_per_unit
     const std::uint64_t count = has_header ? load<std::uint32_t>(bytes.data() + 80) : 0;
     const std::uint64_t expected = kHeaderBytes + kFacetBytes * count;
     if (has_header && expected == bytes.size()) {
-        if (count == 0) refuse("no_facets", "the header announces 0 facets and none follow", path, kExportAgain);
+        if (count == 0)
+            refuse("no_facets", "the header announces 0 facets and none follow", path, kExportAgain);
         return read_binary(context, bytes, count, mm_per_unit, path);
     }
     const std::size_t begin = ascii_begin(bytes);
     if (begin != std::string_view::npos) return read_ascii(context, bytes, begin, mm_per_unit, path);
     if (bytes.substr(0, 4096).find('\0') == std::string_view::npos)
-        refuse("not_stl", "found " + printable(Words{bytes}.next()) + " where an ASCII STL begins with 'solid', and the length fits no binary STL",
+        refuse("not_stl",
+               "found " + printable(Words{bytes}.next()) +
+                   " where an ASCII STL begins with 'solid', and the length fits no binary STL",
                path + ", line 1", "name an STL file");
     if (!has_header)
-        refuse("truncated", fmt::format("the file ends at offset {}, inside the {} bytes of a binary header", bytes.size(), kHeaderBytes),
+        refuse("truncated",
+               fmt::format("the file ends at offset {}, inside the {} bytes of a binary header", bytes.size(),
+                           kHeaderBytes),
                fmt::format("{}, offset {}", path, bytes.size()), kExportAgain);
-    const std::uint64_t present = (bytes.size() - kHeaderBytes) / kFacetBytes, rest = (bytes.size() - kHeaderBytes) % kFacetBytes;
-    const std::string both = fmt::format("the header announces {} facets ({} bytes), but the data ends at offset {} after {} facets", count, expected,
-                                         bytes.size(), present);
+    const std::uint64_t present = (bytes.size() - kHeaderBytes) / kFacetBytes,
+                        rest = (bytes.size() - kHeaderBytes) % kFacetBytes;
+    const std::string both = fmt::format(
+        "the header announces {} facets ({} bytes), but the data ends at offset {} after {} facets", count,
+        expected, bytes.size(), present);
     const std::string place = fmt::format("{}, offset {}", path, bytes.size());
     if (rest != 0 && expected > bytes.size())
-        refuse("truncated", fmt::format("{} and {} bytes of the next", both, rest), place, "copy or export the file again; its end is missing");
+        refuse("truncated", fmt::format("{} and {} bytes of the next", both, rest), place,
+               "copy or export the file again; its end is missing");
     if (rest != 0)
         refuse("facet_count", fmt::format("{} and {} bytes more", both, rest), place,
                "export the file again; a transfer as text may have damaged it");
-    refuse("facet_count", both, place, "export the file again; the writer did not correct its header, or facets are missing");
+    refuse("facet_count", both, place,
+           "export the file again; the writer did not correct its header, or facets are missing");
 }
 
-// ---------------------------------------------------------------------------------------------------- diagnostics
+// ----------------------------------------------------------------------------------------------------
+// diagnostics
 
 std::array<double, 3> facet_centre(const Mesh& mesh, std::uint32_t facet) {
     std::array<double, 3> centre{};
@@ -472,47 +509,58 @@ std::string number_of(std::uint64_t count, std::string_view one, std::string_vie
     return fmt::format("{} {}", count, count == 1 ? one : many);
 }
 
-void describe(const Mesh& mesh, const Finding& finding, Severity severity, std::string code, std::string message,
-              std::vector<Diagnostic>& diagnostics) {
+void describe(const Mesh& mesh, const Finding& finding, Severity severity, std::string code,
+              std::string message, std::vector<Diagnostic>& diagnostics) {
     if (finding.count == 0) return;
-    diagnostics.push_back(
-        {severity, std::move(code), fmt::format("{}, first at facet {}", message, finding.first_facet), facet_centre(mesh, finding.first_facet)});
+    diagnostics.push_back({severity, std::move(code),
+                           fmt::format("{}, first at facet {}", message, finding.first_facet),
+                           facet_centre(mesh, finding.first_facet)});
 }
 
 void describe_report(const Mesh& mesh, const MeshReport& report, std::vector<Diagnostic>& diagnostics) {
     auto edges = [](const Finding& finding) { return number_of(finding.count, "edge", "edges"); };
     auto facets = [](const Finding& finding) { return number_of(finding.count, "facet", "facets"); };
     describe(mesh, report.open_edges_off_base, Severity::error, "mesh.open",
-             edges(report.open_edges_off_base) + " above the base with one facet only: the mesh is open", diagnostics);
+             edges(report.open_edges_off_base) + " above the base with one facet only: the mesh is open",
+             diagnostics);
     if (report.open_edges.count > report.open_edges_off_base.count && report.open_edges_off_base.count == 0)
-        describe(mesh, report.open_edges, Severity::warning, "mesh.open_base",
-                 edges(report.open_edges) + " in the base plane with one facet only: the base is taken as closed", diagnostics);
+        describe(
+            mesh, report.open_edges, Severity::warning, "mesh.open_base",
+            edges(report.open_edges) + " in the base plane with one facet only: the base is taken as closed",
+            diagnostics);
     else if (report.open_edges.count > report.open_edges_off_base.count)
-        diagnostics.push_back({Severity::warning, "mesh.open_base",
-                               number_of(report.open_edges.count - report.open_edges_off_base.count, "edge", "edges") +
-                                   " in the base plane with one facet only: the base is taken as closed",
-                               std::nullopt});
+        diagnostics.push_back(
+            {Severity::warning, "mesh.open_base",
+             number_of(report.open_edges.count - report.open_edges_off_base.count, "edge", "edges") +
+                 " in the base plane with one facet only: the base is taken as closed",
+             std::nullopt});
     describe(mesh, report.misoriented_edges, Severity::error, "mesh.misoriented",
              edges(report.misoriented_edges) + " whose facets do not face the same side", diagnostics);
     describe(mesh, report.inverted_components, Severity::error, "mesh.inverted",
-             number_of(report.inverted_components.count, "body", "bodies") + " inside out (negative volume)", diagnostics);
-    describe(mesh, report.non_manifold_edges, Severity::warning, "mesh.non_manifold", edges(report.non_manifold_edges) + " with more than two facets",
+             number_of(report.inverted_components.count, "body", "bodies") + " inside out (negative volume)",
              diagnostics);
-    describe(mesh, report.duplicate_facets, Severity::warning, "mesh.duplicate", facets(report.duplicate_facets) + " given twice", diagnostics);
-    describe(mesh, report.degenerate_facets, Severity::note, "mesh.degenerate", facets(report.degenerate_facets) + " without area", diagnostics);
+    describe(mesh, report.non_manifold_edges, Severity::warning, "mesh.non_manifold",
+             edges(report.non_manifold_edges) + " with more than two facets", diagnostics);
+    describe(mesh, report.duplicate_facets, Severity::warning, "mesh.duplicate",
+             facets(report.duplicate_facets) + " given twice", diagnostics);
+    describe(mesh, report.degenerate_facets, Severity::note, "mesh.degenerate",
+             facets(report.degenerate_facets) + " without area", diagnostics);
 }
 
 /// The unit is never guessed; a box that suggests another is only remarked on.
 void question_units(const InputInfo& input, LengthUnit units, std::vector<Diagnostic>& diagnostics) {
     const double mm_per_unit = units == LengthUnit::inch ? kInch : 1.0;
     double longest = 0;
-    for (std::size_t k = 0; k < 3; ++k) longest = std::max(longest, (input.max[k] - input.min[k]) / mm_per_unit);
+    for (std::size_t k = 0; k < 3; ++k)
+        longest = std::max(longest, (input.max[k] - input.min[k]) / mm_per_unit);
     if (longest >= kSmallBox && longest <= kLargeBox) return;
     const bool inch = units == LengthUnit::inch;
     diagnostics.push_back(
         {Severity::warning, "units.suspicious",
-         fmt::format("the pattern's longest side is {:.6g} {}, which is {} {:g} {}; if the file is in {} (then {:.6g} mm), say --units {}", longest,
-                     inch ? "in" : "mm", longest < kSmallBox ? "under" : "over", longest < kSmallBox ? kSmallBox : kLargeBox, inch ? "in" : "mm",
+         fmt::format("the pattern's longest side is {:.6g} {}, which is {} {:g} {}; if the file is in {} "
+                     "(then {:.6g} mm), say --units {}",
+                     longest, inch ? "in" : "mm", longest < kSmallBox ? "under" : "over",
+                     longest < kSmallBox ? kSmallBox : kLargeBox, inch ? "in" : "mm",
                      inch ? "millimetres" : "inches", inch ? longest : longest * kInch, inch ? "mm" : "in"),
          std::nullopt});
 }
@@ -527,18 +575,21 @@ void set_on_base(Mesh& mesh) {
 /// In which order a mesh has the facets of its file.
 enum class FacetOrder : std::uint8_t {
     file,
-    near,  ///< the file's where neighbours follow each other in it, or else one in which they do: all that follows is many times faster then
+    near,  ///< the file's where neighbours follow each other in it, or else one in which they do: all that
+           ///< follows is many times faster then
 };
 
 constexpr std::size_t kFewFacets = 50'000;  // fewer lie in the caches in any order
 
-/// Decodes and welds the bytes of a file; sets the input's count and box. @param order set to that of the mesh
-Mesh load_mesh(Context& context, std::string_view bytes, double mm_per_unit, const std::string& path, InputInfo& input,
-               std::vector<std::uint32_t>* odd, FacetOrder& order) {
+/// Decodes and welds the bytes of a file; sets the input's count and box. @param order set to that of the
+/// mesh
+Mesh load_mesh(Context& context, std::string_view bytes, double mm_per_unit, const std::string& path,
+               InputInfo& input, std::vector<std::uint32_t>* odd, FacetOrder& order) {
     // 30 bytes a facet for the mesh; a text has fewer facets than its length could hold in binary.
     const MemoryCharge charge(context, bytes.size() / kFacetBytes * 30, "reading " + path);
     const Corners corners = read_facets(context, bytes, mm_per_unit, path);
-    const MemoryCharge spelt(context, corners.spelt.size() * sizeof(corners.spelt[0]), "the corners of " + path);
+    const MemoryCharge spelt(context, corners.spelt.size() * sizeof(corners.spelt[0]),
+                             "the corners of " + path);
     context.advance();
     input.triangles = corners.facets.count;
     input.min = corners.min;
@@ -548,18 +599,23 @@ Mesh load_mesh(Context& context, std::string_view bytes, double mm_per_unit, con
         return weld_records(context, corners.facets, odd);
     }
     const auto at = [&](const std::array<double, 3>& p) {
-        return Vec3f{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2] - corners.min[2])};
+        return Vec3f{static_cast<float>(p[0]), static_cast<float>(p[1]),
+                     static_cast<float>(p[2] - corners.min[2])};
     };
     const KeptMemory kept;
-    const MemoryCharge together(context, corners.facets.count * sizeof(std::array<Vec3f, 3>), "bringing facets together");
-    return weld_and_let_go(context, in_space(context, corners.facets, {at(corners.min), at(corners.max)}), odd);
+    const MemoryCharge together(context, corners.facets.count * sizeof(std::array<Vec3f, 3>),
+                                "bringing facets together");
+    return weld_and_let_go(context, in_space(context, corners.facets, {at(corners.min), at(corners.max)}),
+                           odd);
 }
 
 /// Whether something is wrong that is told by a facet.
 bool names_a_facet(const MeshReport& r) {
-    const Finding findings[] = {r.open_edges,        r.open_edges_off_base, r.non_manifold_edges, r.misoriented_edges,
-                                r.degenerate_facets, r.duplicate_facets,    r.inverted_components};
-    return std::any_of(std::begin(findings), std::end(findings), [](const Finding& f) { return f.count > 0; });
+    const Finding findings[] = {r.open_edges,         r.open_edges_off_base, r.non_manifold_edges,
+                                r.misoriented_edges,  r.degenerate_facets,   r.duplicate_facets,
+                                r.inverted_components};
+    return std::any_of(std::begin(findings), std::end(findings),
+                       [](const Finding& f) { return f.count > 0; });
 }
 
 }  // namespace
@@ -569,7 +625,8 @@ Mesh read_mesh(Context& context, const std::string& path, LengthUnit units) {
     const MappedFile file(path);
     InputInfo ignored;
     FacetOrder order = FacetOrder::near;
-    Mesh mesh = load_mesh(context, file.bytes(), units == LengthUnit::inch ? kInch : 1.0, path, ignored, nullptr, order);
+    Mesh mesh = load_mesh(context, file.bytes(), units == LengthUnit::inch ? kInch : 1.0, path, ignored,
+                          nullptr, order);
     context.advance();
     return mesh;
 }
@@ -600,17 +657,20 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
         ToleranceWeld welded = weld_within(context, stl.mesh.view(), options.weld_mm);
         stl.mesh = std::move(welded.mesh);
         if (stl.mesh.facets.empty())
-            refuse("no_facets", fmt::format("no facet is left after welding within {:g} mm", options.weld_mm), path, "weld within less");
+            refuse("no_facets", fmt::format("no facet is left after welding within {:g} mm", options.weld_mm),
+                   path, "weld within less");
         set_on_base(stl.mesh);
         stl.report = report_mesh(context, stl.mesh.view());
         return Diagnostic{Severity::note, "mesh.welded",
                           fmt::format("welding within {:g} mm merged {} and removed {}", options.weld_mm,
-                                      number_of(welded.merged, "vertex", "vertices"), number_of(welded.removed_facets, "facet", "facets")),
+                                      number_of(welded.merged, "vertex", "vertices"),
+                                      number_of(welded.removed_facets, "facet", "facets")),
                           std::nullopt};
     };
     context.advance();
     std::optional<Diagnostic> note = weld_and_report();
-    if (order == FacetOrder::near && names_a_facet(stl.report)) {  // what is wrong is told by the file's facets
+    if (order == FacetOrder::near &&
+        names_a_facet(stl.report)) {  // what is wrong is told by the file's facets
         order = FacetOrder::file;
         stl.mesh = {};
         stl.mesh = load_mesh(context, file.bytes(), mm_per_unit, path, stl.input, &odd, order);
@@ -627,12 +687,15 @@ void require_solid(Context& context, const StlMesh& stl, const std::string& path
     const MeshReport& report = stl.report;
     auto place = [&](const Finding& finding) {
         const std::array<double, 3> at = facet_centre(stl.mesh, finding.first_facet);
-        return fmt::format("{}, facet {} at ({:.3f}, {:.3f}, {:.3f}) mm", path, finding.first_facet, at[0], at[1], at[2]);
+        return fmt::format("{}, facet {} at ({:.3f}, {:.3f}, {:.3f}) mm", path, finding.first_facet, at[0],
+                           at[1], at[2]);
     };
     if (report.open_edges_off_base.count > 0) {
-        // Cracks between vertices that were rounded differently close under a small weld: try, and name what works.
+        // Cracks between vertices that were rounded differently close under a small weld: try, and name what
+        // works.
         const Box3& box = report.box;
-        const double dx = double(box.max.x) - box.min.x, dy = double(box.max.y) - box.min.y, dz = double(box.max.z) - box.min.z;
+        const double dx = double(box.max.x) - box.min.x, dy = double(box.max.y) - box.min.y,
+                     dz = double(box.max.z) - box.min.z;
         const double diagonal = std::sqrt(dx * dx + dy * dy + dz * dz);
         std::string remedy, largest;
         for (const double share : {1e-6, 1e-5, 1e-4}) {
@@ -643,26 +706,38 @@ void require_solid(Context& context, const StlMesh& stl, const std::string& path
             std::from_chars(largest.data(), largest.data() + largest.size(), tolerance);
             if (!(tolerance > 0)) continue;
             const ToleranceWeld welded = weld_within(context, stl.mesh.view(), tolerance);
-            if (welded.mesh.facets.empty() || report_mesh(context, welded.mesh.view()).open_edges_off_base.count > 0) continue;
+            if (welded.mesh.facets.empty() ||
+                report_mesh(context, welded.mesh.view()).open_edges_off_base.count > 0)
+                continue;
             remedy = "--weld " + largest + " (mm) closes them all";
             break;
         }
-        if (remedy.empty()) remedy = "no weld up to " + largest + " mm closes them: close the mesh in the program that made it";
-        refuse("open", number_of(report.open_edges_off_base.count, "edge", "edges") + " above the base with one facet only: the mesh is open",
+        if (remedy.empty())
+            remedy =
+                "no weld up to " + largest + " mm closes them: close the mesh in the program that made it";
+        refuse("open",
+               number_of(report.open_edges_off_base.count, "edge", "edges") +
+                   " above the base with one facet only: the mesh is open",
                place(report.open_edges_off_base), remedy);
     }
     if (report.misoriented_edges.count > 0)
-        refuse("misoriented", number_of(report.misoriented_edges.count, "edge", "edges") + " whose facets do not face the same side",
-               place(report.misoriented_edges), "make the normals consistent in the program that made the mesh");
+        refuse("misoriented",
+               number_of(report.misoriented_edges.count, "edge", "edges") +
+                   " whose facets do not face the same side",
+               place(report.misoriented_edges),
+               "make the normals consistent in the program that made the mesh");
     if (report.inverted_components.count > 0)
-        refuse("inverted", number_of(report.inverted_components.count, "body is", "bodies are") + " inside out (negative volume)",
+        refuse("inverted",
+               number_of(report.inverted_components.count, "body is", "bodies are") +
+                   " inside out (negative volume)",
                place(report.inverted_components), "flip its normals in the program that made the mesh");
 }
 
 void write_stl(const std::string& path, const Mesh& mesh) {
     // A fresh file beside the target takes its place when complete, so nobody ever reads half of one.
     auto fail = [&](int error) {
-        refuse("write", "the file cannot be written: " + reason(error), path, "check the folder and the space on its disk");
+        refuse("write", "the file cannot be written: " + reason(error), path,
+               "check the folder and the space on its disk");
     };
     std::string fresh;
     int file = -1;

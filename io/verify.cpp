@@ -31,23 +31,29 @@ std::string read_text(const fs::path& path, const std::string& code) {
     if (!file) throw Error(ErrorKind::verification, code, "cannot be read", path.string(), "plan again");
     std::string text;
     std::array<char, 1 << 16> piece;
-    while (file.read(piece.data(), piece.size()) || file.gcount() > 0) text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
-    if (file.bad()) throw Error(ErrorKind::verification, code, "cannot be read to its end", path.string(), "plan again");
+    while (file.read(piece.data(), piece.size()) || file.gcount() > 0)
+        text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
+    if (file.bad())
+        throw Error(ErrorKind::verification, code, "cannot be read to its end", path.string(), "plan again");
     return text;
 }
 
 /// A value of plan.json with the way to it, so that what is missing can be named.
 class Field {
 public:
-    Field(const json& value, std::string way, const std::string& file) : value_(value), way_(std::move(way)), file_(file) {}
+    Field(const json& value, std::string way, const std::string& file)
+        : value_(value), way_(std::move(way)), file_(file) {}
 
     [[nodiscard]] Field operator[](const char* key) const {
         if (!value_.is_object() || !value_.contains(key)) fail(way_ + "." + key, "is missing");
         return {value_.at(key), way_ + "." + key, file_};
     }
-    [[nodiscard]] bool has(const char* key) const { return value_.is_object() && value_.contains(key) && !value_.at(key).is_null(); }
+    [[nodiscard]] bool has(const char* key) const {
+        return value_.is_object() && value_.contains(key) && !value_.at(key).is_null();
+    }
     [[nodiscard]] Field operator[](std::size_t i) const {
-        if (!value_.is_array() || i >= value_.size()) fail(way_ + "[" + std::to_string(i) + "]", "is missing");
+        if (!value_.is_array() || i >= value_.size())
+            fail(way_ + "[" + std::to_string(i) + "]", "is missing");
         return {value_.at(i), way_ + "[" + std::to_string(i) + "]", file_};
     }
     [[nodiscard]] std::size_t size() const {
@@ -89,8 +95,9 @@ Enum enumerator(const Word<Enum> (&words)[N], const Field& field) {
 
 OperationKind operation_kind(const Field& field) {
     const std::string text = field.text();
-    for (const OperationKind kind : {OperationKind::face, OperationKind::rough, OperationKind::semi_rough, OperationKind::finish,
-                                     OperationKind::corner, OperationKind::drill, OperationKind::edge})
+    for (const OperationKind kind :
+         {OperationKind::face, OperationKind::rough, OperationKind::semi_rough, OperationKind::finish,
+          OperationKind::corner, OperationKind::drill, OperationKind::edge})
         if (text == name(kind)) return kind;
     field.fail("says \"" + text + "\", which is no kind of operation");
 }
@@ -134,7 +141,8 @@ JobPart read_job_part(const Field& plan) {
                                   {"base_board_cut", &m.base_board_cut}}) {
         *to = machine[key].number();
     }
-    if (!(m.acceleration > 0) || !(m.rapid_feed > 0) || !(m.max_feed > 0)) machine.fail("states a machine that does not move");
+    if (!(m.acceleration > 0) || !(m.rapid_feed > 0) || !(m.max_feed > 0))
+        machine.fail("states a machine that does not move");
     part.job.tolerances.gouge = tolerances["gouge"].number();
     part.job.tolerances.cusp = tolerances["cusp"].number();
     part.job.tolerances.weld = tolerances["weld"].number();
@@ -152,7 +160,8 @@ void add_polygon(Loops& loops, const Field& polygon) {
 }
 
 /// tool.tbl against the library: what the machine believes of a tool is what the paths were made for.
-void check_tool_table(const fs::path& path, const std::vector<Tool>& tools, std::vector<Violation>& violations) {
+void check_tool_table(const fs::path& path, const std::vector<Tool>& tools,
+                      std::vector<Violation>& violations) {
     const std::string text = read_text(path, "verify.tool_table");
     std::set<int> seen;
     std::size_t at = 0;
@@ -166,7 +175,8 @@ void check_tool_table(const fs::path& path, const std::vector<Tool>& tools, std:
         std::string_view line(text.data() + at, end - at);
         at = end + 1;
         ++line_number;
-        if (const std::size_t comment = line.find(';'); comment != std::string_view::npos) line = line.substr(0, comment);
+        if (const std::size_t comment = line.find(';'); comment != std::string_view::npos)
+            line = line.substr(0, comment);
         double t = -1, d = -1, z = 0;
         std::size_t i = 0;
         while (i < line.size()) {
@@ -176,13 +186,16 @@ void check_tool_table(const fs::path& path, const std::vector<Tool>& tools, std:
             }
             const char letter = line[i++];
             std::size_t stop = i;
-            while (stop < line.size() && line[stop] != ' ' && line[stop] != '\t' && line[stop] != '\r') ++stop;
+            while (stop < line.size() && line[stop] != ' ' && line[stop] != '\t' && line[stop] != '\r')
+                ++stop;
             std::string_view digits = line.substr(i, stop - i);
             if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
             double value = 0;
-            const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::fixed);
+            const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value,
+                                                        std::chars_format::fixed);
             if (status != std::errc{} || rest != digits.data() + digits.size())
-                throw Error(ErrorKind::verification, "verify.tool_table", std::string("no number follows ") + letter,
+                throw Error(ErrorKind::verification, "verify.tool_table",
+                            std::string("no number follows ") + letter,
                             path.string() + ":" + std::to_string(line_number), "plan again");
             if (letter == 'T') t = value;
             if (letter == 'D') d = value;
@@ -190,19 +203,23 @@ void check_tool_table(const fs::path& path, const std::vector<Tool>& tools, std:
             i = stop;
         }
         if (t < 0) continue;
-        const auto tool = std::find_if(tools.begin(), tools.end(), [&](const Tool& k) { return k.number == t; });
+        const auto tool =
+            std::find_if(tools.begin(), tools.end(), [&](const Tool& k) { return k.number == t; });
         if (tool == tools.end()) {
             complain(fmt::format("tool {} is not in the plan", t), 0);
             continue;
         }
         seen.insert(tool->number);
         if (std::abs(d - tool->diameter) > 1e-3)
-            complain(fmt::format("tool {} has the diameter {} where the plan says {}", t, d, tool->diameter), std::abs(d - tool->diameter));
-        if (z != 0) complain(fmt::format("tool {} has a length; the machine keeps what it measured", t), std::abs(z));
+            complain(fmt::format("tool {} has the diameter {} where the plan says {}", t, d, tool->diameter),
+                     std::abs(d - tool->diameter));
+        if (z != 0)
+            complain(fmt::format("tool {} has a length; the machine keeps what it measured", t), std::abs(z));
     }
     line_number = 0;
     for (const Tool& tool : tools)
-        if (!seen.contains(tool.number)) complain(fmt::format("tool {} of the plan is not in the table", tool.number), 0);
+        if (!seen.contains(tool.number))
+            complain(fmt::format("tool {} of the plan is not in the table", tool.number), 0);
 }
 
 void put_point(JsonText& text, const Point3& p) {
@@ -219,8 +236,8 @@ void put_extreme(JsonText& text, const char* key, const Extreme& e) {
     text.end();
 }
 
-std::string report_json(const SimulationInput& input, const SimulationReport& r, const SimulationOptions& options, const std::string& pattern,
-                        bool job_stated) {
+std::string report_json(const SimulationInput& input, const SimulationReport& r,
+                        const SimulationOptions& options, const std::string& pattern, bool job_stated) {
     JsonText text;
     text.begin_object();
     text.key("schema").string("slabwright.verify/1");
@@ -247,7 +264,8 @@ std::string report_json(const SimulationInput& input, const SimulationReport& r,
     double gouge_stock = 0, left = 0, missed = 0, squares = 0;
     std::uint64_t cells = 0, unreachable = 0, missed_cells = 0;
     for (const LayerFindings& f : r.layers) {
-        gouge_stock = std::max(gouge_stock, f.gouge.size), left = std::max(left, f.left.size), missed = std::max(missed, f.missed_left.size);
+        gouge_stock = std::max(gouge_stock, f.gouge.size), left = std::max(left, f.left.size),
+        missed = std::max(missed, f.missed_left.size);
         squares += f.left_rms * f.left_rms * static_cast<double>(f.cells);
         cells += f.cells, unreachable += f.unreachable, missed_cells += f.missed;
     }
@@ -311,14 +329,35 @@ std::string report_json(const SimulationInput& input, const SimulationReport& r,
         const ProgramFindings& f = r.programs[i];
         const Program& p = input.programs[i];
         text.begin_object(JsonText::Shape::line);
-        text.key("file").string("nc/" + p.file).key("layer").integer(p.layer + 1).key("kind").string(name(p.kind)).key("tool").integer(p.tool);
+        text.key("file")
+            .string("nc/" + p.file)
+            .key("layer")
+            .integer(p.layer + 1)
+            .key("kind")
+            .string(name(p.kind))
+            .key("tool")
+            .integer(p.tool);
         text.key("gouge_mm").rounded(f.gouge.cutter.depth, 5);
         text.key("gouge_line");
         if (f.gouge.cutter.line != 0) text.count(f.gouge.cutter.line);
         else text.null();
-        text.key("shank_in_part_mm").rounded(f.gouge.shank.depth, 5).key("holder_in_part_mm").rounded(f.gouge.holder.depth, 5);
-        text.key("rapid_takes_mm").rounded(f.rapid.size, 4).key("removed_mm3").rounded(f.removed_mm3, 1).key("lowest_z").rounded(f.lowest, 4);
-        text.key("cutting_mm").rounded(f.cutting_mm, 1).key("rapid_mm").rounded(f.rapid_mm, 1).key("minutes").rounded(f.seconds / 60, 3).end();
+        text.key("shank_in_part_mm")
+            .rounded(f.gouge.shank.depth, 5)
+            .key("holder_in_part_mm")
+            .rounded(f.gouge.holder.depth, 5);
+        text.key("rapid_takes_mm")
+            .rounded(f.rapid.size, 4)
+            .key("removed_mm3")
+            .rounded(f.removed_mm3, 1)
+            .key("lowest_z")
+            .rounded(f.lowest, 4);
+        text.key("cutting_mm")
+            .rounded(f.cutting_mm, 1)
+            .key("rapid_mm")
+            .rounded(f.rapid_mm, 1)
+            .key("minutes")
+            .rounded(f.seconds / 60, 3)
+            .end();
     }
     text.end();
     text.end();
@@ -349,7 +388,9 @@ void write_maps(const SimulationReport& report, const std::string& directory) {
     };
     std::error_code failed;
     fs::create_directories(directory, failed);
-    if (failed) throw Error(ErrorKind::input, "verify.write", "cannot be made: " + failed.message(), directory, "choose another folder for the maps");
+    if (failed)
+        throw Error(ErrorKind::input, "verify.write", "cannot be made: " + failed.message(), directory,
+                    "choose another folder for the maps");
     for (std::size_t l = 0; l < report.layers.size(); ++l) {
         const std::vector<CellKind>& kinds = report.layers[l].kinds;
         const fs::path file = fs::path(directory) / fmt::format("layer_{:02}.ppm", l + 1);
@@ -358,20 +399,25 @@ void write_maps(const SimulationReport& report, const std::string& directory) {
         std::vector<char> row(3 * static_cast<std::size_t>(report.nx));
         for (int j = report.ny; j-- > 0 && !kinds.empty();) {
             for (int i = 0; i < report.nx; ++i) {
-                const auto c = colour(kinds[static_cast<std::size_t>(j) * static_cast<std::size_t>(report.nx) + static_cast<std::size_t>(i)]);
-                for (std::size_t k = 0; k < 3; ++k) row[3 * static_cast<std::size_t>(i) + k] = static_cast<char>(c[k]);
+                const auto c =
+                    colour(kinds[static_cast<std::size_t>(j) * static_cast<std::size_t>(report.nx) +
+                                 static_cast<std::size_t>(i)]);
+                for (std::size_t k = 0; k < 3; ++k)
+                    row[3 * static_cast<std::size_t>(i) + k] = static_cast<char>(c[k]);
             }
             stream.write(row.data(), static_cast<std::streamsize>(row.size()));
         }
         stream.flush();
         if (!stream)
-            throw Error(ErrorKind::input, "verify.write", "cannot be written", file.string(), "free space, or choose another folder for the maps");
+            throw Error(ErrorKind::input, "verify.write", "cannot be written", file.string(),
+                        "free space, or choose another folder for the maps");
     }
 }
 
 GcodeLimits gcode_limits(const Tolerances& tolerances) {
     GcodeLimits limits;
-    // Beside kSheet, by which depths may be short, half of that does no harm; twice as near would need 1.4 times the chords.
+    // Beside kSheet, by which depths may be short, half of that does no harm; twice as near would need 1.4
+    // times the chords.
     limits.arc_error = std::clamp(kArcShare * tolerances.gouge, 1e-5, StandingPart::kSheet / 2);
     limits.level_arc_error = kLevelArcError;
     return limits;
@@ -384,7 +430,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
     try {
         document = json::parse(read_text(plan_path, "verify.plan"));
     } catch (const json::exception& e) {
-        throw Error(ErrorKind::verification, "verify.plan", std::string("is no JSON: ") + e.what(), plan_path, "plan again");
+        throw Error(ErrorKind::verification, "verify.plan", std::string("is no JSON: ") + e.what(), plan_path,
+                    "plan again");
     }
     const Field plan(document, "plan", plan_path);
     if (plan["schema"].text() != "slabwright.plan/1") plan["schema"].fail("is not slabwright.plan/1");
@@ -409,7 +456,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
     std::set<std::string> planned;
     std::string last;
     for (std::size_t l = 0; l < layers.size(); ++l) {
-        const SimulatedLayer layer{layers[l]["z_bottom"].number(), layers[l]["z_top"].number(), layers[l]["slab_thickness"].number()};
+        const SimulatedLayer layer{layers[l]["z_bottom"].number(), layers[l]["z_top"].number(),
+                                   layers[l]["slab_thickness"].number()};
         input.layers.push_back(layer);
         if (plan.has("flask")) {
             const Field flask = plan["flask"];
@@ -423,13 +471,21 @@ Verification verify_folder(Context& context, const std::string& directory, const
             const Field op = operations[o];
             std::string file = op["file"].text();
             if (file.rfind("nc/", 0) == 0) file.erase(0, 3);
-            if (file.empty() || file.find('/') != std::string::npos || file.find("..") != std::string::npos) op["file"].fail("is no file of nc/");
+            if (file.empty() || file.find('/') != std::string::npos || file.find("..") != std::string::npos)
+                op["file"].fail("is no file of nc/");
             if (!planned.insert(file).second) op["file"].fail("names a program a second time");
-            if (file <= last) violations.push_back({"program.order", "its name sorts before that of the program before it, " + last, file, 0, {}, 0});
+            if (file <= last)
+                violations.push_back({"program.order",
+                                      "its name sorts before that of the program before it, " + last,
+                                      file,
+                                      0,
+                                      {},
+                                      0});
             last = file;
             const fs::path path = out / "nc" / file;
             if (std::error_code ignored; !fs::exists(path, ignored)) {
-                violations.push_back({"program.missing", "plan.json names it, nc/ does not hold it", file, 0, {}, 0});
+                violations.push_back(
+                    {"program.missing", "plan.json names it, nc/ does not hold it", file, 0, {}, 0});
                 continue;
             }
             Program program;
@@ -443,8 +499,10 @@ Verification verify_folder(Context& context, const std::string& directory, const
     }
     parallel_each(context, input.programs.size(), [&](std::size_t i) {
         Program& program = input.programs[i];
-        Program read = read_gcode(read_text(out / "nc" / program.file, "verify.program"), "nc/" + program.file, limits);
-        const double up = frame == Frame::layer_top ? input.layers[static_cast<std::size_t>(program.layer)].z_top : 0;
+        Program read =
+            read_gcode(read_text(out / "nc" / program.file, "verify.program"), "nc/" + program.file, limits);
+        const double up =
+            frame == Frame::layer_top ? input.layers[static_cast<std::size_t>(program.layer)].z_top : 0;
         for (ProgramStep& s : read.steps) s.z += up;
         for (ProgramArc& a : read.arcs) a.arc.z += up;
         read.file = program.file, read.layer = program.layer, read.kind = program.kind;
@@ -454,13 +512,17 @@ Verification verify_folder(Context& context, const std::string& directory, const
     if (std::error_code ignored; fs::is_directory(out / "nc", ignored)) {
         std::vector<std::string> strangers;
         for (const auto& entry : fs::directory_iterator(out / "nc"))
-            if (const std::string file = entry.path().filename().string(); !planned.contains(file)) strangers.push_back(file);
+            if (const std::string file = entry.path().filename().string(); !planned.contains(file))
+                strangers.push_back(file);
         std::sort(strangers.begin(), strangers.end());
         for (const std::string& file : strangers)
-            violations.push_back({"program.unplanned", "nc/ holds it, plan.json does not name it", file, 0, {}, 0});
+            violations.push_back(
+                {"program.unplanned", "nc/ holds it, plan.json does not name it", file, 0, {}, 0});
     }
 
-    const PlannedPattern planned_pattern{plan["input"]["file"].text(), plan["input"]["sha256"].text(), {part.job.units, part.job.tolerances.weld}};
+    const PlannedPattern planned_pattern{plan["input"]["file"].text(),
+                                         plan["input"]["sha256"].text(),
+                                         {part.job.units, part.job.tolerances.weld}};
     result.pattern = options.pattern && options.pattern->is(planned_pattern)
                          ? options.pattern
                          : read_pattern(context, directory, planned_pattern, options.stl, "verify");
@@ -478,13 +540,15 @@ Verification verify_folder(Context& context, const std::string& directory, const
         // As deep as a ball end mill may pass the bottom: its radius.
         simulation.board_cut = 0;
         for (const Tool& tool : input.tools)
-            if (tool.kind == ToolKind::ball) simulation.board_cut = std::max(simulation.board_cut, tool.diameter / 2);
+            if (tool.kind == ToolKind::ball)
+                simulation.board_cut = std::max(simulation.board_cut, tool.diameter / 2);
     }
     simulation.board_cut = std::min(simulation.board_cut, part.job.machine.base_board_thickness);
     result.report = simulate(context, input, *pattern.part, simulation);
     input.mesh = {};
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
-    result.json = report_json(input, result.report, simulation, fs::path(pattern.path).filename().string(), part.stated);
+    result.json = report_json(input, result.report, simulation, fs::path(pattern.path).filename().string(),
+                              part.stated);
 
     if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);
     if (options.write) {
@@ -493,13 +557,15 @@ Verification verify_folder(Context& context, const std::string& directory, const
             std::ofstream stream(fresh, std::ios::binary | std::ios::trunc);
             stream << result.json;
             stream.flush();
-            if (!stream) throw Error(ErrorKind::input, "verify.write", "cannot be written", fresh.string(), "free space, or choose another folder");
+            if (!stream)
+                throw Error(ErrorKind::input, "verify.write", "cannot be written", fresh.string(),
+                            "free space, or choose another folder");
         }
         std::error_code failed;
         fs::rename(fresh, file, failed);
         if (failed)
-            throw Error(ErrorKind::input, "verify.write", "cannot be written: " + failed.message(), file.string(),
-                        "free space, or choose another folder");
+            throw Error(ErrorKind::input, "verify.write", "cannot be written: " + failed.message(),
+                        file.string(), "free space, or choose another folder");
     }
     return result;
 }

@@ -11,8 +11,10 @@
 namespace slabwright {
 
 struct VerifyOptions {
-    std::string stl;  ///< the pattern; "" looks for the file that plan.json names: in OUT, beside OUT, in the working folder
-    /// The pattern where it has been read already: it is not read again if it is the one that plan.json names.
+    std::string stl;  ///< the pattern; "" looks for the file that plan.json names: in OUT, beside OUT, in the
+                      ///< working folder
+    /// The pattern where it has been read already: it is not read again if it is the one that plan.json
+    /// names.
     std::shared_ptr<Pattern> pattern{};
     double cell = 0;               ///< mm, SimulationOptions::cell
     bool maps = false;             ///< keep the maps in the report
@@ -28,19 +30,24 @@ struct Verification {
     std::string json;  ///< what verify.json holds (schema slabwright.verify/1)
 };
 
-/// How a plan's programs are read: chords that stand for an arc take next to nothing of the gouge tolerance that the paths were made for.
+/// How a plan's programs are read: chords that stand for an arc take next to nothing of the gouge tolerance
+/// that the paths were made for.
 [[nodiscard]] GcodeLimits gcode_limits(const Tolerances& tolerances);
 
-/// Reads plan.json, every program of nc/, tool.tbl and, if it is not given, the pattern, simulates, and writes OUT/verify.json (a whole file or
-/// none). The report's violations say what is wrong with programs and part; `report.passed()` is the verdict.
-/// @throws Error(verification) when OUT cannot be understood: plan.json missing or not of schema slabwright.plan/1 or without
+/// Reads plan.json, every program of nc/, tool.tbl and, if it is not given, the pattern, simulates, and
+/// writes OUT/verify.json (a whole file or none). The report's violations say what is wrong with programs and
+/// part; `report.passed()` is the verdict.
+/// @throws Error(verification) when OUT cannot be understood: plan.json missing or not of schema
+/// slabwright.plan/1 or without
 ///   a key (names it), a program that read_gcode refuses (file:line)
 /// @throws Error(input) when the STL is missing, unreadable, or not the one that was planned (by its SHA-256)
-[[nodiscard]] Verification verify_folder(Context& context, const std::string& directory, const VerifyOptions& options = {});
+[[nodiscard]] Verification verify_folder(Context& context, const std::string& directory,
+                                         const VerifyOptions& options = {});
 
-/// Writes one picture (binary PPM, a pixel a cell, y upwards) for each layer of a report with maps: beside the pattern light grey, the
-/// pattern grey, left-over above the cusp but within tolerance yellow, missed orange, unreachable blue, gouge red, flask dark grey.
-/// The directory is made if it is not there. @throws Error(input, "verify.write") when it cannot be written
+/// Writes one picture (binary PPM, a pixel a cell, y upwards) for each layer of a report with maps: beside
+/// the pattern light grey, the pattern grey, left-over above the cusp but within tolerance yellow, missed
+/// orange, unreachable blue, gouge red, flask dark grey. The directory is made if it is not there. @throws
+/// Error(input, "verify.write") when it cannot be written
 void write_maps(const SimulationReport& report, const std::string& directory);
 
 }  // namespace slabwright

@@ -1,4 +1,5 @@
-// Errors that cross a room's border. One exception type; its kind is the command's exit code, its code names the reason.
+// Errors that cross a room's border. One exception type; its kind is the command's exit code, its code names
+// the reason.
 #pragma once
 
 #include <stdexcept>
@@ -25,7 +26,8 @@ public:
     /// @param message what is wrong, without a full stop
     /// @param place  file, offset, facet or coordinates; may be empty
     /// @param remedy what the user can do; may be empty
-    Error(ErrorKind kind, std::string code, std::string message, std::string place = {}, std::string remedy = {})
+    Error(ErrorKind kind, std::string code, std::string message, std::string place = {},
+          std::string remedy = {})
         : std::runtime_error(join(message, place, remedy)),
           kind_(kind),
           code_(std::move(code)),

@@ -46,7 +46,8 @@ std::vector<Face> read(const std::string& text, std::string& comment) {
         else properties += line + ";";
     }
     EXPECT_EQ(properties,
-              "property float x;property float y;property float z;property list uchar uint vertex_indices;property float reached;"
+              "property float x;property float y;property float z;property list uchar uint "
+              "vertex_indices;property float reached;"
               "property uint facet;property uchar red;property uchar green;property uchar blue;");
     EXPECT_EQ(text.size(), at + 12 * vertices + 24 * faces);
     auto byte = [&] { return static_cast<unsigned char>(text.at(at++)); };
@@ -98,30 +99,38 @@ TEST(AccessMap, OfAPlanReadsBackAsItWasMeasured) {
         ASSERT_EQ(map.layer, 1);
         ASSERT_EQ(map.accessibility.share.size(), mesh.facets.size());
         std::string comment;
-        const std::vector<Face> faces = read(access_ply(mesh.view(), map.accessibility.share, "layer 1"), comment);
+        const std::vector<Face> faces =
+            read(access_ply(mesh.view(), map.accessibility.share, "layer 1"), comment);
         EXPECT_EQ(comment, "layer 1");
         ASSERT_EQ(static_cast<std::ptrdiff_t>(faces.size()),
-                  std::count_if(map.accessibility.share.begin(), map.accessibility.share.end(), [](float s) { return s >= 0; }));
+                  std::count_if(map.accessibility.share.begin(), map.accessibility.share.end(),
+                                [](float s) { return s >= 0; }));
         double area = 0, reached = 0;
         for (const Face& face : faces) {
             ASSERT_LT(face.facet, mesh.facets.size());
             EXPECT_EQ(face.reached, map.accessibility.share[face.facet]);
-            for (int k = 0; k < 3; ++k) EXPECT_EQ(std::memcmp(&face.corners[k], &mesh.vertices[mesh.facets[face.facet][k]], sizeof(Vec3f)), 0);
+            for (int k = 0; k < 3; ++k)
+                EXPECT_EQ(
+                    std::memcmp(&face.corners[k], &mesh.vertices[mesh.facets[face.facet][k]], sizeof(Vec3f)),
+                    0);
             if (face.reached == 0) {
                 EXPECT_EQ(face.colour, (std::array<int, 3>{230, 120, 0}));
             } else if (face.reached == 1) {
                 EXPECT_EQ(face.colour, (std::array<int, 3>{0, 114, 178}));
             }
-            // All of a facet that is to be machined here lies in the layer, but for upright ones that go on to the ground.
+            // All of a facet that is to be machined here lies in the layer, but for upright ones that go on
+            // to the ground.
             const auto [low, high] = std::minmax({face.corners[0].z, face.corners[1].z, face.corners[2].z});
-            if (low >= 0 && high < 14) area += area_of(face.corners), reached += face.reached * area_of(face.corners);
+            if (low >= 0 && high < 14)
+                area += area_of(face.corners), reached += face.reached * area_of(face.corners);
         }
         EXPECT_GT(area, 1000);
         ratio[map.tool] = reached / area;
     });
     EXPECT_GE(maps, 2);
     ASSERT_TRUE(plan.layers[0].selection);
-    // Balls, from the largest looked at down: each reaches more than the one before, and none all of the channel but the smallest.
+    // Balls, from the largest looked at down: each reaches more than the one before, and none all of the
+    // channel but the smallest.
     double last = -1;
     int balls = 0;
     for (const ToolCandidate& candidate : plan.layers[0].selection->candidates)

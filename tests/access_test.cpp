@@ -42,7 +42,9 @@ void box(Mesh& m, Point3 l, Point3 h) {
 /// A closed block whose top is height(x, y) over [0, n]², on a grid of 1 mm, with its bottom at 0.
 Mesh relief(int n, const std::function<double(double, double)>& height) {
     Mesh m;
-    auto p = [&](int i, int j) { return Point3{static_cast<double>(i), static_cast<double>(j), height(i, j)}; };
+    auto p = [&](int i, int j) {
+        return Point3{static_cast<double>(i), static_cast<double>(j), height(i, j)};
+    };
     auto o = [&](int i, int j) { return Point3{static_cast<double>(i), static_cast<double>(j), 0}; };
     for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) {
@@ -65,11 +67,13 @@ std::vector<Point3> surface_points(const Mesh& m, double z_top, double step) {
         auto v = [&](int k) { return Point3{m.vertices[f[k]].x, m.vertices[f[k]].y, m.vertices[f[k]].z}; };
         const Point3 a = v(0), b = v(1), c = v(2);
         auto length = [](Point3 p, Point3 q) { return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]); };
-        const int n = static_cast<int>(std::ceil(std::max({length(a, b), length(b, c), length(c, a)}) / step));
+        const int n =
+            static_cast<int>(std::ceil(std::max({length(a, b), length(b, c), length(c, a)}) / step));
         for (int i = 0; i <= n; ++i)
             for (int j = 0; i + j <= n; ++j) {
                 const double s = static_cast<double>(i) / n, t = static_cast<double>(j) / n;
-                const Point3 q{a[0] + s * (b[0] - a[0]) + t * (c[0] - a[0]), a[1] + s * (b[1] - a[1]) + t * (c[1] - a[1]),
+                const Point3 q{a[0] + s * (b[0] - a[0]) + t * (c[0] - a[0]),
+                               a[1] + s * (b[1] - a[1]) + t * (c[1] - a[1]),
                                a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2])};
                 if (q[2] <= z_top) points.push_back(q);
             }
@@ -77,7 +81,9 @@ std::vector<Point3> surface_points(const Mesh& m, double z_top, double step) {
     return points;
 }
 
-double bumpy(double x, double y) { return 6 + 2.5 * std::sin(x * 0.9) * std::cos(y * 0.7) + std::sin(2.1 * x + y); }
+double bumpy(double x, double y) {
+    return 6 + 2.5 * std::sin(x * 0.9) * std::cos(y * 0.7) + std::sin(2.1 * x + y);
+}
 
 }  // namespace
 
@@ -94,7 +100,8 @@ TEST(StandingPart, BallOnBoxInClosedForm) {
     // Above the top edge, along it and across it.
     const double h = 10 - StandingPart::kSheet;
     EXPECT_NEAR(part.ball(10, {22, 5, 7.5}, {22, 15, 7.5}, R, 0).depth, R - std::hypot(2, 7.5 + R - h), e);
-    // On the top: the cap counts, from any side, and a motion that dips in the middle is caught between its ends.
+    // On the top: the cap counts, from any side, and a motion that dips in the middle is caught between its
+    // ends.
     EXPECT_NEAR(part.ball(10, {5, 5, 9.9}, {15, 5, 9.9}, R, 0).depth, 0.1 - StandingPart::kSheet, e);
     EXPECT_EQ(part.ball(10, {5, 5, 10}, {15, 5, 10}, R, 1e-5).depth, 0);
     // Across the corner: deepest where the way is nearest to it.
@@ -117,13 +124,16 @@ TEST(StandingPart, CylinderOnBoxInClosedForm) {
     const double R = 5, e = 2e-6, s = StandingPart::kSheet;
     EXPECT_EQ(part.cylinder(10, {25, 0, 3}, {25, 20, 3}, R, 1e-5).depth, 0);
     EXPECT_NEAR(part.cylinder(10, {24.98, 0, 3}, {24.98, 20, 3}, R, 0).depth, 0.02, e);
-    EXPECT_NEAR(part.cylinder(10, {22, 0, 9.7}, {22, 20, 9.7}, R, 0).depth, 0.3 - s, e);   // the floor is nearer than the wall
+    EXPECT_NEAR(part.cylinder(10, {22, 0, 9.7}, {22, 20, 9.7}, R, 0).depth, 0.3 - s,
+                e);  // the floor is nearer than the wall
     EXPECT_NEAR(part.cylinder(10, {10, 10, 9.7}, {11, 10, 9.7}, R, 0).depth, 0.3 - s, e);  // all over the cap
-    EXPECT_NEAR(part.cylinder(10, {24, 10, 12}, {24, 10, 2}, R, 0).depth, 1, e);           // plunge beside: the wall is nearer
+    EXPECT_NEAR(part.cylinder(10, {24, 10, 12}, {24, 10, 2}, R, 0).depth, 1,
+                e);  // plunge beside: the wall is nearer
     EXPECT_NEAR(part.cylinder(10, {24, 10, 12}, {24, 10, 9.5}, R, 0).depth, 0.5 - s, e);
     // Down a ramp past the top edge: depth grows until the wall limits it; the end is the deepest.
     EXPECT_NEAR(part.cylinder(10, {24.9, 0, 12}, {24.9, 20, 9.95}, R, 0).depth, 0.05 - s, e);
-    EXPECT_EQ(part.cylinder(10, {-20, -20, 10}, {40, 40, 10}, 25, 1e-5).depth, 0);  // a face mill over the top
+    EXPECT_EQ(part.cylinder(10, {-20, -20, 10}, {40, 40, 10}, 25, 1e-5).depth,
+              0);  // a face mill over the top
 }
 
 TEST(StandingPart, OverhangCountsLikeItsShadowAndOnlyUpToTheTop) {
@@ -132,7 +142,8 @@ TEST(StandingPart, OverhangCountsLikeItsShadowAndOnlyUpToTheTop) {
     box(m, {0, 0, 0}, {10, 10, 5});
     box(m, {0, 0, 5}, {30, 10, 10});  // overhangs the first, from z = 5
     const StandingPart part(context, m.view());
-    // In the lower layer the space beside the first box is free, although the overhang begins exactly at its top.
+    // In the lower layer the space beside the first box is free, although the overhang begins exactly at its
+    // top.
     EXPECT_EQ(part.ball(5, {20, -5, 1}, {20, 15, 1}, 3, 1e-5).depth, 0);
     EXPECT_EQ(part.cylinder(5, {20, -5, 1}, {20, 15, 1}, 3, 1e-5).depth, 0);
     EXPECT_FALSE(part.covered(20, 5, 4.999));
@@ -181,7 +192,8 @@ TEST(StandingPart, AgreesWithBruteForceOnARelief) {
                 }
             }
             // Brute force samples, so it can only miss: by half a step of the way and of the surface.
-            const double miss = step * 0.6 + std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]) / samples / 2 + 2 * StandingPart::kSheet;
+            const double miss = step * 0.6 + std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]) / samples / 2 +
+                                2 * StandingPart::kSheet;
             const double gb = part.ball(z_top, a, b, R, 0).depth, gc = part.cylinder(z_top, a, b, R, 0).depth;
             EXPECT_GE(gb, ball - 2 * StandingPart::kSheet) << "trial " << trial << " R " << R;
             EXPECT_LE(gb, ball + miss) << "trial " << trial << " R " << R;
@@ -216,17 +228,20 @@ TEST(StandingPart, RowsOfMotionsAgreeWithOneAfterTheOther) {
                 const double kind = unit(random);
                 if (kind < 0.05) to = {u(random), u(random), uz(random)};
                 else if (kind < 0.1) to[2] += 4 * d(random);
-                else if (kind < 0.95) to = {at[0] + d(random), at[1] + d(random), kind < 0.5 ? at[2] : at[2] + 0.3 * d(random)};
+                else if (kind < 0.95)
+                    to = {at[0] + d(random), at[1] + d(random), kind < 0.5 ? at[2] : at[2] + 0.3 * d(random)};
                 motions.push_back({at, to});
                 at = kind < 0.9 ? to : Point3{u(random), u(random), uz(random)};
             }
-            const double R = ur(random), tolerance = 0.2 + 3 * unit(random), ignore = trial % 2 == 0 ? 1e-5 : 0.0;
+            const double R = ur(random), tolerance = 0.2 + 3 * unit(random),
+                         ignore = trial % 2 == 0 ? 1e-5 : 0.0;
             for (const auto form : {StandingPart::Form::ball, StandingPart::Form::cylinder}) {
                 double most = 0;
                 std::vector<double> depths;
                 for (const auto& [from, to] : motions) {
                     const bool ball = form == StandingPart::Form::ball;
-                    const Penetration p = ball ? part.ball(z_top, from, to, R, ignore) : part.cylinder(z_top, from, to, R, ignore);
+                    const Penetration p = ball ? part.ball(z_top, from, to, R, ignore)
+                                               : part.cylinder(z_top, from, to, R, ignore);
                     depths.push_back(p.depth);
                     most = std::max(most, p.depth);
                 }
@@ -238,7 +253,8 @@ TEST(StandingPart, RowsOfMotionsAgreeWithOneAfterTheOther) {
                 }
                 for (std::size_t i = 0; i < motions.size(); ++i) {
                     if (std::abs(depths[i] - tolerance) < 1e-6) continue;
-                    const bool listed = std::binary_search(found.beyond.begin(), found.beyond.end(), static_cast<std::uint32_t>(i));
+                    const bool listed = std::binary_search(found.beyond.begin(), found.beyond.end(),
+                                                           static_cast<std::uint32_t>(i));
                     EXPECT_EQ(listed, depths[i] > tolerance) << "motion " << i << " depth " << depths[i];
                     ++(listed ? deep : free);
                 }
@@ -248,7 +264,8 @@ TEST(StandingPart, RowsOfMotionsAgreeWithOneAfterTheOther) {
     EXPECT_GT(free, 1000u);
 }
 
-// The first motions of a chain of short ones run under the part's top sheet, far deeper than the tolerance: the others are found all the same.
+// The first motions of a chain of short ones run under the part's top sheet, far deeper than the tolerance:
+// the others are found all the same.
 TEST(StandingPart, ShortMotionsAfterOneInsideThePartAreFound) {
     Context context;
     const Mesh m = relief(24, bumpy);
@@ -272,10 +289,13 @@ TEST(StandingPart, ShortMotionsAfterOneInsideThePartAreFound) {
             const StandingPart::Found found = part.deepest(form, z_top, motions, R, 0, tolerance);
             for (std::size_t i = 0; i < motions.size(); ++i) {
                 const auto& [from, to] = motions[i];
-                const double depth =
-                    form == StandingPart::Form::ball ? part.ball(z_top, from, to, R, 0).depth : part.cylinder(z_top, from, to, R, 0).depth;
+                const double depth = form == StandingPart::Form::ball
+                                         ? part.ball(z_top, from, to, R, 0).depth
+                                         : part.cylinder(z_top, from, to, R, 0).depth;
                 if (std::abs(depth - tolerance) < 1e-6) continue;
-                ASSERT_EQ(std::binary_search(found.beyond.begin(), found.beyond.end(), static_cast<std::uint32_t>(i)), depth > tolerance)
+                ASSERT_EQ(std::binary_search(found.beyond.begin(), found.beyond.end(),
+                                             static_cast<std::uint32_t>(i)),
+                          depth > tolerance)
                     << "trial " << trial << " motion " << i << " depth " << depth;
                 deep += depth > tolerance;
             }
@@ -284,7 +304,8 @@ TEST(StandingPart, ShortMotionsAfterOneInsideThePartAreFound) {
     EXPECT_GT(deep, 1000U);
 }
 
-// Rows as programs have them: arcs of short chords, rings and zigzags of long motions, far from the part, beside it and just within it.
+// Rows as programs have them: arcs of short chords, rings and zigzags of long motions, far from the part,
+// beside it and just within it.
 TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
     Context context;
     const Mesh m = relief(24, bumpy);
@@ -304,14 +325,17 @@ TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
             motions.push_back({at, to});
             at = to;
         };
-        const double climb = trial % 3 == 0 ? between(-0.01, 0.01) : 0, stair = trial % 3 == 1 ? between(0, 0.6) : 0;
+        const double climb = trial % 3 == 0 ? between(-0.01, 0.01) : 0,
+                     stair = trial % 3 == 1 ? between(0, 0.6) : 0;
         while (motions.size() < 300) {
             const double kind = unit(random);
             if (kind < 0.6) {  // an arc
-                const double bend = std::pow(10, between(0, 1.7)) * (unit(random) < 0.5 ? -1 : 1), chord = between(0.05, 0.4);
+                const double bend = std::pow(10, between(0, 1.7)) * (unit(random) < 0.5 ? -1 : 1),
+                             chord = between(0.05, 0.4);
                 double heading = between(0, 6.3);
                 for (int n = static_cast<int>(between(5, 120)); n > 0; --n, heading += chord / bend)
-                    go({at[0] + chord * std::cos(heading), at[1] + chord * std::sin(heading), at[2] + climb + (n % 2 == 0 ? stair : -stair)});
+                    go({at[0] + chord * std::cos(heading), at[1] + chord * std::sin(heading),
+                        at[2] + climb + (n % 2 == 0 ? stair : -stair)});
             } else if (kind < 0.8) {  // rows and rings
                 for (int n = static_cast<int>(between(3, 20)); n > 0; --n) {
                     go({at[0] + (at[0] > 12 ? -1 : 1) * between(1, 20), at[1], at[2]});
@@ -330,13 +354,16 @@ TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
             std::vector<double> depths;
             for (StandingPart::Motion way : motions) {
                 way.from[2] += lift, way.to[2] += lift;
-                depths.push_back((is_ball ? part.ball(z_top, way.from, way.to, r, 0) : part.cylinder(z_top, way.from, way.to, r, 0)).depth);
+                depths.push_back((is_ball ? part.ball(z_top, way.from, way.to, r, 0)
+                                          : part.cylinder(z_top, way.from, way.to, r, 0))
+                                     .depth);
                 most = std::max(most, depths.back());
             }
             return std::pair(most, depths);
         };
         const auto [full, all] = deepest_of(radius, 0);
-        // A cutter as much smaller, its centre or floor as much less deep, is in the part so much less: what is deepest then is less than a hair.
+        // A cutter as much smaller, its centre or floor as much less deep, is in the part so much less: what
+        // is deepest then is less than a hair.
         for (const double left : {-1.0, 4e-6, 2e-4, -1e-5}) {
             const double less = left == -1.0 ? 0 : full - left;
             if (less < 0 || less >= radius) continue;
@@ -345,7 +372,8 @@ TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
             const auto [most, depths] = deepest_of(radius - less, less);
             const double tolerance = left == -1.0 ? 0.3 : std::max(left / 2, 0.0);
             const StandingPart::Found found = part.deepest(form, z_top, raised, radius - less, 0, tolerance);
-            EXPECT_NEAR(found.most.depth, most, 3e-7) << "seed " << seed << " trial " << trial << " left " << left;
+            EXPECT_NEAR(found.most.depth, most, 3e-7)
+                << "seed " << seed << " trial " << trial << " left " << left;
             if (most > 1e-6) {
                 ASSERT_TRUE(found.most.found) << "seed " << seed << " trial " << trial << " left " << left;
                 EXPECT_NEAR(depths[found.motion], most, 3e-7);
@@ -353,8 +381,10 @@ TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
             } else free += left < 0;
             for (std::size_t i = 0; i < motions.size(); ++i) {
                 if (std::abs(depths[i] - tolerance) < 1e-6) continue;
-                const bool listed = std::binary_search(found.beyond.begin(), found.beyond.end(), static_cast<std::uint32_t>(i));
-                ASSERT_EQ(listed, depths[i] > tolerance) << "seed " << seed << " trial " << trial << " motion " << i << " depth " << depths[i];
+                const bool listed = std::binary_search(found.beyond.begin(), found.beyond.end(),
+                                                       static_cast<std::uint32_t>(i));
+                ASSERT_EQ(listed, depths[i] > tolerance)
+                    << "seed " << seed << " trial " << trial << " motion " << i << " depth " << depths[i];
                 deep += listed;
             }
         }
@@ -364,7 +394,8 @@ TEST(StandingPart, LongRowsAgreeWithSingleQuestionsDownToTheDeepestHair) {
     EXPECT_GT(deep, 2000U);
 }
 
-// Rows that are checked together, in whichever order, find what one row of all finds: of equal depths the first.
+// Rows that are checked together, in whichever order, find what one row of all finds: of equal depths the
+// first.
 TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
     Context context;
     const unsigned seed = test::seed();
@@ -379,7 +410,8 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
         std::vector<StandingPart::Motion> motions;
         Point3 at{40 * unit(random), 40 * unit(random), 7};
         for (int i = 0; i < 400; ++i) {
-            const Point3 to{at[0] + 2 * unit(random) - 1, at[1] + 2 * unit(random) - 1, 5.5 + 2.5 * unit(random)};
+            const Point3 to{at[0] + 2 * unit(random) - 1, at[1] + 2 * unit(random) - 1,
+                            5.5 + 2.5 * unit(random)};
             motions.push_back({at, to});
             at = to;
         }
@@ -388,7 +420,8 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
         const StandingPart::Found all = part.deepest(form, 100, motions, radius, 1e-5, tolerance);
         if (!all.most.found) {  // a way off the relief
             for (const auto& [from, to] : motions)
-                ASSERT_LT(part.ball(100, from, to, radius, 0).depth, 2e-5) << "seed " << seed << " trial " << trial;
+                ASSERT_LT(part.ball(100, from, to, radius, 0).depth, 2e-5)
+                    << "seed " << seed << " trial " << trial;
             continue;
         }
         ++met;
@@ -397,14 +430,18 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
         std::array<StandingPart::Found, 8> found;
         std::atomic<double> known = 0;
         for (const std::size_t row : order)
-            found[row] = part.deepest(form, 100, std::span(motions).subspan(50 * row, 50), radius, 1e-5, tolerance, &known);
+            found[row] = part.deepest(form, 100, std::span(motions).subspan(50 * row, 50), radius, 1e-5,
+                                      tolerance, &known);
         Penetration most;
         std::size_t motion = 0, beyond = 0, beyond_alone = 0;
         for (std::size_t row = 0; row < found.size(); ++row) {
-            if (found[row].most.depth > most.depth) most = found[row].most, motion = 50 * row + found[row].motion;
+            if (found[row].most.depth > most.depth)
+                most = found[row].most, motion = 50 * row + found[row].motion;
             if (tolerance < 1) {
                 beyond += found[row].beyond.size();
-                beyond_alone += part.deepest(form, 100, std::span(motions).subspan(50 * row, 50), radius, 1e-5, tolerance).beyond.size();
+                beyond_alone +=
+                    part.deepest(form, 100, std::span(motions).subspan(50 * row, 50), radius, 1e-5, tolerance)
+                        .beyond.size();
             }
         }
         EXPECT_EQ(most.depth, all.most.depth) << "seed " << seed << " trial " << trial;
@@ -417,8 +454,8 @@ TEST(StandingPart, RowsThatKnowOfOneAnotherFindTheGreatestDepth) {
     EXPECT_GT(met, 30);
 }
 
-// Chords of circles, of which it is told that they are: what is found is the same, down to the last digit but for the top sheet, under which many
-// motions are as deep as one another.
+// Chords of circles, of which it is told that they are: what is found is the same, down to the last digit but
+// for the top sheet, under which many motions are as deep as one another.
 TEST(StandingPart, ChordsOfCirclesAgreeWithSingleQuestions) {
     Context context;
     const Mesh m = relief(24, bumpy);
@@ -436,16 +473,22 @@ TEST(StandingPart, ChordsOfCirclesAgreeWithSingleQuestions) {
         for (int arc = 0; arc < 6; ++arc) {
             // Sometimes a line first; then an arc whose chords miss it by up to some micrometres.
             if (unit(random) < 0.5) {
-                const Point3 to{at[0] + between(-2, 2), at[1] + between(-2, 2), unit(random) < 0.5 ? at[2] : between(3, 9)};
+                const Point3 to{at[0] + between(-2, 2), at[1] + between(-2, 2),
+                                unit(random) < 0.5 ? at[2] : between(3, 9)};
                 motions.push_back({at, to});
                 at = to;
             }
-            const double radius = std::pow(10, between(-1, 2)), start = between(-4, 4), step = 2 * std::sqrt(2 * 0.0005 / radius);
-            const double x = at[0] - radius * std::cos(start), y = at[1] - radius * std::sin(start), way = unit(random) < 0.5 ? -step : step;
-            const std::size_t first = motions.size(), count = static_cast<std::size_t>(between(1, std::min(60.0, 6.2 / step)));
+            const double radius = std::pow(10, between(-1, 2)), start = between(-4, 4),
+                         step = 2 * std::sqrt(2 * 0.0005 / radius);
+            const double x = at[0] - radius * std::cos(start), y = at[1] - radius * std::sin(start),
+                         way = unit(random) < 0.5 ? -step : step;
+            const std::size_t first = motions.size(),
+                              count = static_cast<std::size_t>(between(1, std::min(60.0, 6.2 / step)));
             for (std::size_t i = 1; i <= count; ++i) {
-                const double angle = start + way * static_cast<double>(i), off = trial % 3 == 0 ? between(-0.001, 0.001) : 0;
-                const Point3 to{x + (radius + off) * std::cos(angle), y + (radius + off) * std::sin(angle), at[2]};
+                const double angle = start + way * static_cast<double>(i),
+                             off = trial % 3 == 0 ? between(-0.001, 0.001) : 0;
+                const Point3 to{x + (radius + off) * std::cos(angle), y + (radius + off) * std::sin(angle),
+                                at[2]};
                 motions.push_back({at, to});
                 at = to;
             }
@@ -455,12 +498,15 @@ TEST(StandingPart, ChordsOfCirclesAgreeWithSingleQuestions) {
         if (trial % 5 != 0)
             for (int round = 0; round < 4; ++round) {
                 double most = 0;
-                for (const auto& [from, to] : motions) most = std::max(most, part.ball(z_top, from, to, R, 0).depth);
+                for (const auto& [from, to] : motions)
+                    most = std::max(most, part.ball(z_top, from, to, R, 0).depth);
                 for (auto& [from, to] : motions) from[2] += most - 0.003, to[2] += most - 0.003;
             }
         const double tolerance = trial % 2 == 0 ? 0.01 : 10;
-        const StandingPart::Found alone = part.deepest(StandingPart::Form::ball, z_top, motions, R, 1e-5, tolerance);
-        const StandingPart::Found found = part.deepest(StandingPart::Form::ball, z_top, motions, R, 1e-5, tolerance, nullptr, chords);
+        const StandingPart::Found alone =
+            part.deepest(StandingPart::Form::ball, z_top, motions, R, 1e-5, tolerance);
+        const StandingPart::Found found =
+            part.deepest(StandingPart::Form::ball, z_top, motions, R, 1e-5, tolerance, nullptr, chords);
         if (z_top == 100.0) {
             EXPECT_EQ(found.most.depth, alone.most.depth) << "seed " << seed << " trial " << trial;
             EXPECT_EQ(found.motion, alone.motion) << "seed " << seed << " trial " << trial;
@@ -472,7 +518,9 @@ TEST(StandingPart, ChordsOfCirclesAgreeWithSingleQuestions) {
             const double depth = part.ball(z_top, motions[i].from, motions[i].to, R, 1e-5).depth;
             most = std::max(most, depth);
             if (std::abs(depth - tolerance) < 1e-6) continue;
-            EXPECT_EQ(std::binary_search(found.beyond.begin(), found.beyond.end(), static_cast<std::uint32_t>(i)), depth > tolerance)
+            EXPECT_EQ(
+                std::binary_search(found.beyond.begin(), found.beyond.end(), static_cast<std::uint32_t>(i)),
+                depth > tolerance)
                 << "seed " << seed << " trial " << trial << " motion " << i << " depth " << depth;
             ++(depth > tolerance ? deep : shallow);
         }
@@ -494,7 +542,8 @@ TEST(StandingPart, RowsThatComeDownWithinTheOutlineMeetTheTop) {
         for (int i = 0; i < 40; ++i) motions.push_back({motions.back().to, {30, 30 + 0.2 * i, 9.5}});
         motions.push_back({motions.back().to, {80, 30, 60}});
         for (const std::size_t count : {std::size_t{1}, std::size_t{2}, motions.size()}) {
-            const StandingPart::Found found = part.deepest(form, 10, std::span(motions).first(count), 2, 1e-5, 0.01);
+            const StandingPart::Found found =
+                part.deepest(form, 10, std::span(motions).first(count), 2, 1e-5, 0.01);
             EXPECT_NEAR(found.most.depth, 0.5 - StandingPart::kSheet, 1e-6);
             EXPECT_EQ(found.beyond.size(), count);
         }
@@ -518,7 +567,8 @@ TEST(StandingPart, EnvelopeByPointsAndByGrid) {
                 EXPECT_NEAR(g, part.envelope(x, y, z_top, -1), 1e-6);
                 EXPECT_EQ(g == static_cast<float>(z_top), part.covered(x, y, z_top - StandingPart::kSheet));
                 const Point3 over{x, y, z_top + 0.4};
-                EXPECT_EQ(part.from_shadow(over, z_top, 1, g == static_cast<float>(z_top)).distance, part.from_shadow(over, z_top, 1).distance);
+                EXPECT_EQ(part.from_shadow(over, z_top, 1, g == static_cast<float>(z_top)).distance,
+                          part.from_shadow(over, z_top, 1).distance);
                 if (x < 0 || y < 0 || x > 12 || y > 12) {
                     EXPECT_EQ(g, -1);
                     ++open;
@@ -548,7 +598,8 @@ TEST(StandingPart, EnvelopeByGridOfFacetsThatDoNotClose) {
         Index3 g{};
         for (std::size_t k = 0; k < 3; ++k) {
             const Vec3f& v = same.vertices[f[k]];
-            const auto [at, added] = known.try_emplace({v.x, v.y, v.z}, static_cast<std::uint32_t>(closed.vertices.size()));
+            const auto [at, added] =
+                known.try_emplace({v.x, v.y, v.z}, static_cast<std::uint32_t>(closed.vertices.size()));
             if (added) closed.vertices.push_back(v);
             g[k] = at->second;
         }
@@ -576,11 +627,13 @@ TEST(StandingPart, EnvelopeByGridOfFacetsThatDoNotClose) {
         rising.at(z_top, -1, grid.data());
         for (int j = 0; j < ny; ++j)
             for (int i = 0; i < nx; ++i)
-                EXPECT_NEAR(grid[static_cast<std::size_t>(j) * nx + i], part.envelope(-1 + 0.3 * i, -0.5 + 0.3 * j, z_top, -1), 1e-6)
+                EXPECT_NEAR(grid[static_cast<std::size_t>(j) * nx + i],
+                            part.envelope(-1 + 0.3 * i, -0.5 + 0.3 * j, z_top, -1), 1e-6)
                     << m.facets.size();
         return grid;
     };
-    const StandingPart of_closed(context, closed.view()), of_same(context, same.view()), of_open(context, open.view()), of_torn(context, torn.view());
+    const StandingPart of_closed(context, closed.view()), of_same(context, same.view()),
+        of_open(context, open.view()), of_torn(context, torn.view());
     for (const double z_top : {2.0, 6.5, 100.0}) {
         EXPECT_EQ(grid_of(closed, of_closed, z_top), grid_of(same, of_same, z_top));
         grid_of(open, of_open, z_top);
@@ -620,7 +673,9 @@ TEST(StandingPart, NearestOfManyFacets) {
         std::vector<StandingPart> each;
         for (std::size_t i = 0; i < count; ++i) {
             const Point3 a{place(random), place(random), place(random)};
-            const auto beside = [&] { return Point3{a[0] + size(random), a[1] + size(random), a[2] + size(random)}; };
+            const auto beside = [&] {
+                return Point3{a[0] + size(random), a[1] + size(random), a[2] + size(random)};
+            };
             Point3 b = beside(), c = beside();
             if ((b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0])) std::swap(b, c);
             Mesh one;
@@ -640,7 +695,8 @@ TEST(StandingPart, NearestOfManyFacets) {
             ASSERT_NEAR(part.from_facets(p, limit), facets, 1e-9);
             const double enough = i % 4, found = part.from_facets(p, limit, enough);
             const double nearest = part.from_facets(p, limit);
-            ASSERT_TRUE(facets > enough ? found == nearest : found >= nearest && found <= enough) << found << " " << nearest << " " << enough;
+            ASSERT_TRUE(facets > enough ? found == nearest : found >= nearest && found <= enough)
+                << found << " " << nearest << " " << enough;
             ASSERT_NEAR(part.from_shadow(p, top, limit).distance, shadow, 1e-9);
             ASSERT_NEAR(part.beside(p, top, limit).distance, aside, 1e-9);
         }
@@ -662,7 +718,8 @@ TEST(ClosestPoint, AgreesWithBruteForce) {
     for (std::size_t i = 0; i < queries.size(); ++i) {
         const Point3& q = queries[i];
         double best = 1e9;
-        for (const Point3& p : points) best = std::min(best, std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]));
+        for (const Point3& p : points)
+            best = std::min(best, std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]));
         ASSERT_NE(hits[i].facet, kNoFacet);
         EXPECT_LE(std::abs(hits[i].distance), best + 1e-6);
         EXPECT_GE(std::abs(hits[i].distance), best - 0.05);
@@ -698,8 +755,8 @@ TEST(ClosestPoint, RadiusSignAndTies) {
     EXPECT_NEAR(closest.query({1010, 1010, 15}, 5).distance, 5, 1e-9);
     EXPECT_NEAR(closest.query({1010, 1003, 5}, 50).distance, -3, 1e-9);
     EXPECT_NEAR(closest.query({1010, 1010, 5}, 50).distance, -5, 1e-9);
-    // The diagonal of a face belongs to two facets: the lower index answers. The column above an edge or a corner is
-    // either inside or outside, never half.
+    // The diagonal of a face belongs to two facets: the lower index answers. The column above an edge or a
+    // corner is either inside or outside, never half.
     EXPECT_EQ(closest.query({1010, 1010, 12}, 50).facet, 2u);
     EXPECT_EQ(closest.winding({1010, 1010, 5}), 1);
     EXPECT_EQ(closest.winding({1010, 1010, 11}), 0);

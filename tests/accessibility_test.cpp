@@ -1,4 +1,5 @@
-// Accessibility against closed forms, and against brute force over dense places of the tool on random small parts.
+// Accessibility against closed forms, and against brute force over dense places of the tool on random small
+// parts.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,9 +23,14 @@ using Profile = ToolShape::Profile;
 
 ToolShape flat(double radius) { return {.profile = Profile::flat, .radius = radius}; }
 ToolShape ball(double radius) { return {.profile = Profile::ball, .radius = radius}; }
-ToolShape bull_nose(double radius, double corner) { return {.profile = Profile::bull_nose, .radius = radius, .corner_radius = corner}; }
+ToolShape bull_nose(double radius, double corner) {
+    return {.profile = Profile::bull_nose, .radius = radius, .corner_radius = corner};
+}
 ToolShape tapered_ball(double radius, double tip, double degrees) {
-    return {.profile = Profile::tapered_ball, .radius = radius, .corner_radius = tip, .taper_rad = degrees * std::numbers::pi / 180};
+    return {.profile = Profile::tapered_ball,
+            .radius = radius,
+            .corner_radius = tip,
+            .taper_rad = degrees * std::numbers::pi / 180};
 }
 
 /// Columns of square cells with upright walls between them.
@@ -34,7 +40,9 @@ Mesh blocks(Context& context, int n, double cell, const std::function<double(int
         facets.push_back({a, b, c});
         facets.push_back({a, c, d});
     };
-    auto at = [&](int i, int j, double z) { return Vec3f{static_cast<float>(i * cell), static_cast<float>(j * cell), static_cast<float>(z)}; };
+    auto at = [&](int i, int j, double z) {
+        return Vec3f{static_cast<float>(i * cell), static_cast<float>(j * cell), static_cast<float>(z)};
+    };
     auto h = [&](int i, int j) { return i < 0 || j < 0 || i >= n || j >= n ? 0.0 : height(i, j); };
     for (int i = 0; i <= n; ++i)
         for (int j = 0; j <= n; ++j) {
@@ -43,12 +51,17 @@ Mesh blocks(Context& context, int n, double cell, const std::function<double(int
                 quad(at(i, j, z), at(i + 1, j, z), at(i + 1, j + 1, z), at(i, j + 1, z));
                 quad(at(i, j, 0), at(i, j + 1, 0), at(i + 1, j + 1, 0), at(i + 1, j, 0));
             }
-            // The wall between this cell and the one before it in x, and the same in y; facing the lower of the two.
+            // The wall between this cell and the one before it in x, and the same in y; facing the lower of
+            // the two.
             const double west = h(i - 1, j), here = h(i, j), south = h(i, j - 1);
-            if (j < n && west < here) quad(at(i, j + 1, west), at(i, j, west), at(i, j, here), at(i, j + 1, here));
-            if (j < n && west > here) quad(at(i, j, here), at(i, j + 1, here), at(i, j + 1, west), at(i, j, west));
-            if (i < n && south < here) quad(at(i, j, south), at(i + 1, j, south), at(i + 1, j, here), at(i, j, here));
-            if (i < n && south > here) quad(at(i + 1, j, here), at(i, j, here), at(i, j, south), at(i + 1, j, south));
+            if (j < n && west < here)
+                quad(at(i, j + 1, west), at(i, j, west), at(i, j, here), at(i, j + 1, here));
+            if (j < n && west > here)
+                quad(at(i, j, here), at(i, j + 1, here), at(i, j + 1, west), at(i, j, west));
+            if (i < n && south < here)
+                quad(at(i, j, south), at(i + 1, j, south), at(i + 1, j, here), at(i, j, here));
+            if (i < n && south > here)
+                quad(at(i + 1, j, here), at(i, j, here), at(i, j, south), at(i + 1, j, south));
         }
     return weld(context, facets);
 }
@@ -105,8 +118,8 @@ TEST(Accessibility, OfASlotByWidth) {
 
 namespace {
 
-/// The under side of a tool by its definition, at steps of the distance from the axis: shrunk by `depth`, and grown by `cover`. Offsets
-/// are taken from a dense outline, point by point.
+/// The under side of a tool by its definition, at steps of the distance from the axis: shrunk by `depth`, and
+/// grown by `cover`. Offsets are taken from a dense outline, point by point.
 class Outline {
 public:
     Outline(const ToolShape& tool, double depth, double cover) : radius_(tool.radius) {
@@ -117,7 +130,8 @@ public:
             line.push_back({d, height(tool, std::abs(d))});
         }
         for (int i = 1; i <= steps; ++i)
-            for (const int side : {-1, 1}) line.push_back({side * radius_, height(tool, radius_) + 8.0 * i / steps});
+            for (const int side : {-1, 1})
+                line.push_back({side * radius_, height(tool, radius_) + 8.0 * i / steps});
         // Over every point of the under side by `depth`, or under some point of the outline by `cover`.
         auto offset = [&](double d, double by, bool over) {
             double h = over ? -1e9 : 1e9;
@@ -141,10 +155,13 @@ public:
 
 private:
     static double height(const ToolShape& tool, double d) {
-        const double r = tool.profile == Profile::ball ? tool.radius : tool.profile == Profile::flat ? 0 : tool.corner_radius;
+        const double r = tool.profile == Profile::ball   ? tool.radius
+                         : tool.profile == Profile::flat ? 0
+                                                         : tool.corner_radius;
         if (tool.profile == Profile::tapered_ball) {
             const double tangent = r * std::cos(tool.taper_rad);
-            if (d > tangent) return r - r * std::sin(tool.taper_rad) + (d - tangent) / std::tan(tool.taper_rad);
+            if (d > tangent)
+                return r - r * std::sin(tool.taper_rad) + (d - tangent) / std::tan(tool.taper_rad);
             return r - std::sqrt(r * r - d * d);
         }
         const double x = d - (tool.radius - r);
@@ -159,11 +176,13 @@ private:
     std::vector<double> shrunk_, grown_;
 };
 
-/// All places on a grid, and the lowest that the tool may go in each: over the columns of the part on the same grid.
+/// All places on a grid, and the lowest that the tool may go in each: over the columns of the part on the
+/// same grid.
 class DensePlaces {
 public:
     static constexpr double kCell = 0.1;
-    DensePlaces(const StandingPart& part, double size, double z_top, const ToolShape& tool, double depth, double cover)
+    DensePlaces(const StandingPart& part, double size, double z_top, const ToolShape& tool, double depth,
+                double cover)
         : outline_(tool, depth, cover), reach_(tool.radius + cover) {
         constexpr double room = 4;
         low_ = -room;
@@ -205,16 +224,23 @@ private:
 
 /// Upright steps, or slopes, on cells of 2 mm, and at times a plate that floats over some of it.
 Mesh random_part(Context& context, std::mt19937_64& random, int kind) {
-    auto uniform = [&](double a, double b) { return a + (b - a) * static_cast<double>(random() % 10007) / 10006; };
+    auto uniform = [&](double a, double b) {
+        return a + (b - a) * static_cast<double>(random() % 10007) / 10006;
+    };
     constexpr int n = 9;
     constexpr double cell = 2;
     std::array<std::array<double, n + 1>, n + 1> h{};
     for (auto& row : h)
         for (double& v : row) v = uniform(2, 8.5);
-    if (kind % 2 == 0) return blocks(context, n, cell, [&](int i, int j) { return std::round(h[i][j] * 2) / 2; });
+    if (kind % 2 == 0)
+        return blocks(context, n, cell, [&](int i, int j) { return std::round(h[i][j] * 2) / 2; });
     shapes::Facets facets;
-    auto top = [&](int i, int j) { return Vec3f{static_cast<float>(i * cell), static_cast<float>(j * cell), static_cast<float>(h[i][j])}; };
-    auto foot = [&](int i, int j) { return Vec3f{static_cast<float>(i * cell), static_cast<float>(j * cell), 0}; };
+    auto top = [&](int i, int j) {
+        return Vec3f{static_cast<float>(i * cell), static_cast<float>(j * cell), static_cast<float>(h[i][j])};
+    };
+    auto foot = [&](int i, int j) {
+        return Vec3f{static_cast<float>(i * cell), static_cast<float>(j * cell), 0};
+    };
     auto quad = [&](Vec3f a, Vec3f b, Vec3f c, Vec3f d) {
         facets.push_back({a, b, c});
         facets.push_back({a, c, d});
@@ -242,7 +268,8 @@ struct SurfacePoint {
 };
 
 /// Points on facets that do not face down, below z_top.
-std::vector<SurfacePoint> random_points(const Mesh& mesh, std::mt19937_64& random, std::size_t count, double z_top) {
+std::vector<SurfacePoint> random_points(const Mesh& mesh, std::mt19937_64& random, std::size_t count,
+                                        double z_top) {
     std::vector<SurfacePoint> points;
     while (points.size() < count) {
         const auto f = static_cast<std::uint32_t>(random() % mesh.facets.size());
@@ -255,7 +282,8 @@ std::vector<SurfacePoint> random_points(const Mesh& mesh, std::mt19937_64& rando
             t[k] = {c.x, c.y, c.z};
         }
         Point3 a{}, b{}, p{};
-        for (int k = 0; k < 3; ++k) a[k] = t[1][k] - t[0][k], b[k] = t[2][k] - t[0][k], p[k] = t[0][k] + u * a[k] + v * b[k];
+        for (int k = 0; k < 3; ++k)
+            a[k] = t[1][k] - t[0][k], b[k] = t[2][k] - t[0][k], p[k] = t[0][k] + u * a[k] + v * b[k];
         Point3 n{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
         const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         for (double& c : n) c /= length;
@@ -266,9 +294,10 @@ std::vector<SurfacePoint> random_points(const Mesh& mesh, std::mt19937_64& rando
 
 }  // namespace
 
-// A place of the grid stands for all within 0.071 mm of it, and its columns for all within 0.15 (a corner of 90° holds one of them), so
-// what the kernel reaches with the tolerance t is reached on the grid with t + 0.08, and what the grid reaches 0.15 within half of t the
-// kernel reaches. Between the two either may be right; few points are.
+// A place of the grid stands for all within 0.071 mm of it, and its columns for all within 0.15 (a corner of
+// 90° holds one of them), so what the kernel reaches with the tolerance t is reached on the grid with t +
+// 0.08, and what the grid reaches 0.15 within half of t the kernel reaches. Between the two either may be
+// right; few points are.
 TEST(Accessibility, OfRandomPartsAgainstDensePlaces) {
     constexpr std::uint64_t seed = 20261121;
     std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
@@ -284,9 +313,11 @@ TEST(Accessibility, OfRandomPartsAgainstDensePlaces) {
         const AccessScene scene(context, mesh.view());
         const StandingPart standing(context, mesh.view());
         const std::vector<SurfacePoint> points = random_points(mesh, random, 110, z_top);
-        for (const ToolShape& tool : {flat(2.2), ball(1.8), bull_nose(2.4, 0.9), tapered_ball(2.2, 0.8, 12)}) {
+        for (const ToolShape& tool :
+             {flat(2.2), ball(1.8), bull_nose(2.4, 0.9), tapered_ball(2.2, 0.8, 12)}) {
             const double t = options.tolerance;
-            const DensePlaces generous(standing, size, z_top, tool, t + place, t + place), strict(standing, size, z_top, tool, t / 2 - column, t);
+            const DensePlaces generous(standing, size, z_top, tool, t + place, t + place),
+                strict(standing, size, z_top, tool, t / 2 - column, t);
             // The same by facet: what is reached or missed as a whole is so in its points.
             std::vector<float> shares;
             if (part % 5 == 0) {
@@ -300,11 +331,13 @@ TEST(Accessibility, OfRandomPartsAgainstDensePlaces) {
                 const bool kernel = scene.reaches(z_top, s.p, s.n, tool, options);
                 const bool may = generous.reach(s.p), must = strict.reach(s.p);
                 if (kernel)
-                    EXPECT_TRUE(may) << "part " << part << " profile " << static_cast<int>(tool.profile) << " facet " << s.facet << " at " << s.p[0]
-                                     << ", " << s.p[1] << ", " << s.p[2];
+                    EXPECT_TRUE(may) << "part " << part << " profile " << static_cast<int>(tool.profile)
+                                     << " facet " << s.facet << " at " << s.p[0] << ", " << s.p[1] << ", "
+                                     << s.p[2];
                 else
-                    EXPECT_FALSE(must) << "part " << part << " profile " << static_cast<int>(tool.profile) << " facet " << s.facet << " at " << s.p[0]
-                                       << ", " << s.p[1] << ", " << s.p[2];
+                    EXPECT_FALSE(must)
+                        << "part " << part << " profile " << static_cast<int>(tool.profile) << " facet "
+                        << s.facet << " at " << s.p[0] << ", " << s.p[1] << ", " << s.p[2];
                 // What a plate hangs over is not in the facet's share.
                 const bool hung_over = standing.envelope(s.p[0], s.p[1], z_top, -1) > s.p[2] + 0.01;
                 const float share = shares.empty() || hung_over ? -1 : shares[s.facet];
@@ -322,8 +355,10 @@ TEST(Accessibility, OfRandomPartsAgainstDensePlaces) {
             }
         }
     }
-    std::printf("%zu reached and %zu missed by both, %zu too near to call; %zu on facets reached and %zu on facets missed as a whole\n", reached,
-                missed, open, whole, none);
+    std::printf(
+        "%zu reached and %zu missed by both, %zu too near to call; %zu on facets reached and %zu on facets "
+        "missed as a whole\n",
+        reached, missed, open, whole, none);
     EXPECT_GT(whole, 400u);
     EXPECT_GT(none, 50u);
     EXPECT_GT(reached, 3000u);
@@ -331,8 +366,9 @@ TEST(Accessibility, OfRandomPartsAgainstDensePlaces) {
     EXPECT_LT(open, (reached + missed) / 2);
 }
 
-// Whatever a larger tool reaches a smaller one of the same kind reaches too, if neither has shank or holder. The larger one gets half the
-// tolerance, for what is missed is missed with half of it only; without refinement both are asked about the same points.
+// Whatever a larger tool reaches a smaller one of the same kind reaches too, if neither has shank or holder.
+// The larger one gets half the tolerance, for what is missed is missed with half of it only; without
+// refinement both are asked about the same points.
 TEST(Accessibility, NeverFallsAsTheToolShrinks) {
     constexpr std::uint64_t seed = 4;
     std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
@@ -345,13 +381,16 @@ TEST(Accessibility, NeverFallsAsTheToolShrinks) {
         for (int profile = 0; profile < 3; ++profile) {
             double last = 0;
             for (const double radius : {2.5, 1.2, 0.5}) {
-                const ToolShape tool = profile == 0 ? flat(radius) : profile == 1 ? ball(radius) : bull_nose(radius, radius / 3);
+                const ToolShape tool = profile == 0   ? flat(radius)
+                                       : profile == 1 ? ball(radius)
+                                                      : bull_nose(radius, radius / 3);
                 AccessOptions options;
                 options.accuracy = 1;
                 options.spacing = 4;
                 options.tolerance = 0.05;
                 const double now = scene.accessible(context, 1, 9, tool, options).reached;
-                EXPECT_GE(now, last * (1 - 1e-12)) << "part " << part << " profile " << profile << " radius " << radius;
+                EXPECT_GE(now, last * (1 - 1e-12))
+                    << "part " << part << " profile " << profile << " radius " << radius;
                 grew += now > last;
                 options.tolerance /= 2;
                 last = scene.accessible(context, 1, 9, tool, options).reached;
@@ -361,7 +400,8 @@ TEST(Accessibility, NeverFallsAsTheToolShrinks) {
     EXPECT_GT(grew, 12);
 }
 
-// What overhangs is left out with all that lies in its shadow, and the same figures come out on any number of threads.
+// What overhangs is left out with all that lies in its shadow, and the same figures come out on any number of
+// threads.
 TEST(Accessibility, LeavesUndercutsOut) {
     Context one({.threads = 1}), many({.threads = 3});
     shapes::Facets facets = shapes::box({0, 0, 0}, {20, 20, 4});
@@ -371,10 +411,12 @@ TEST(Accessibility, LeavesUndercutsOut) {
     AccessOptions options;
     options.shares = true;
     options.accuracy = 0.005;
-    const Accessibility a = scene.accessible(one, 0, 12, ball(2), options), b = scene.accessible(many, 0, 12, ball(2), options);
+    const Accessibility a = scene.accessible(one, 0, 12, ball(2), options),
+                        b = scene.accessible(many, 0, 12, ball(2), options);
     EXPECT_NEAR(a.undercut, 100 + 100, 2 + a.uncertain);  // the plate's under side, and what is under it
     EXPECT_NEAR(a.area, 4 * 20 * 4 + 300 + 100 + 40, 2 + a.uncertain);
-    // A ball beside the plate leaves a strip at its foot unreached only where it cannot go under: none, for it is tangent there.
+    // A ball beside the plate leaves a strip at its foot unreached only where it cannot go under: none, for
+    // it is tangent there.
     EXPECT_GT(a.ratio(), 0.8);
     EXPECT_EQ(a.area, b.area);
     EXPECT_EQ(a.reached, b.reached);

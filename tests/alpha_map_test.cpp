@@ -22,7 +22,9 @@ Mesh stump(Context& context, const std::vector<std::pair<double, double>>& sides
     auto ring = [](double h, double at) {
         std::array<Vec3f, 4> r;
         constexpr int sign[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
-        for (int i = 0; i < 4; ++i) r[i] = {static_cast<float>(sign[i][0] * h), static_cast<float>(sign[i][1] * h), static_cast<float>(at)};
+        for (int i = 0; i < 4; ++i)
+            r[i] = {static_cast<float>(sign[i][0] * h), static_cast<float>(sign[i][1] * h),
+                    static_cast<float>(at)};
         return r;
     };
     auto r = ring(half, z);
@@ -70,7 +72,8 @@ TEST(AlphaMap, FindsSlopesAndBands) {
     }
     EXPECT_NEAR(bands[1].z_low, 5, 0.11);
     EXPECT_NEAR(bands[2].z_low, 9, 0.11);
-    // Bands of less than 5 mm: the middle one goes to the neighbour nearer in α, and keeps the smaller α of the two.
+    // Bands of less than 5 mm: the middle one goes to the neighbour nearer in α, and keeps the smaller α of
+    // the two.
     const auto joined = map.bands(0, 0.5 * kDegree, 5);
     ASSERT_EQ(joined.size(), 2u);
     EXPECT_NEAR(joined[1].alpha, 60 * kDegree, 1e-6);
@@ -80,7 +83,8 @@ TEST(AlphaMap, FindsSlopesAndBands) {
 TEST(AlphaMap, KnowsVerticalLayers) {
     Context context;
     const Mesh mesh = stump(context, {{90, 5}, {60, 4}});
-    const AlphaMap lower = alpha_map(context, mesh.view(), 0, 5), upper = alpha_map(context, mesh.view(), 5, 9),
+    const AlphaMap lower = alpha_map(context, mesh.view(), 0, 5),
+                   upper = alpha_map(context, mesh.view(), 5, 9),
                    both = alpha_map(context, mesh.view(), 2, 7);
     EXPECT_TRUE(lower.vertical());
     EXPECT_NEAR(lower.area, 400 * (5 - 0.001), 1e-3);

@@ -1,4 +1,5 @@
-// Arcs fitted to paths, compared with the paths by brute force, read by LinuxCNC's interpreter and by the project's own reader.
+// Arcs fitted to paths, compared with the paths by brute force, read by LinuxCNC's interpreter and by the
+// project's own reader.
 #include "engine/paths/arcs.h"
 
 #include <gtest/gtest.h>
@@ -41,7 +42,9 @@ std::vector<Spot> sampled(const std::vector<Move>& moves, double step) {
         const int n = std::max(1, static_cast<int>(std::ceil((arc ? shape.length() : away(p, q)) / step)));
         for (int k = 0; k <= n; ++k) {
             const double t = static_cast<double>(k) / n, angle = shape.start + t * shape.sweep;
-            if (arc) spots.push_back({shape.x + shape.radius * std::cos(angle), shape.y + shape.radius * std::sin(angle), p.z});
+            if (arc)
+                spots.push_back({shape.x + shape.radius * std::cos(angle),
+                                 shape.y + shape.radius * std::sin(angle), p.z});
             else spots.push_back({p.x + t * (q.x - p.x), p.y + t * (q.y - p.y), p.z + t * (q.z - p.z)});
         }
     }
@@ -56,7 +59,9 @@ double farthest(const std::vector<Spot>& spots, const std::vector<Spot>& others)
         for (std::size_t k = 1; k < others.size(); ++k) {
             const Spot &a = others[k - 1], &b = others[k];
             const double dx = b.x - a.x, dy = b.y - a.y, dz = b.z - a.z, l2 = dx * dx + dy * dy + dz * dz;
-            const double t = l2 > 0 ? std::clamp(((s.x - a.x) * dx + (s.y - a.y) * dy + (s.z - a.z) * dz) / l2, 0.0, 1.0) : 0.0;
+            const double t =
+                l2 > 0 ? std::clamp(((s.x - a.x) * dx + (s.y - a.y) * dy + (s.z - a.z) * dz) / l2, 0.0, 1.0)
+                       : 0.0;
             nearest = std::min(nearest, away(s, {a.x + t * dx, a.y + t * dy, a.z + t * dz}));
         }
         worst = std::max(worst, nearest);
@@ -65,29 +70,37 @@ double farthest(const std::vector<Spot>& spots, const std::vector<Spot>& others)
 }
 
 int arcs_in(const std::vector<Move>& moves) {
-    return static_cast<int>(std::count_if(moves.begin(), moves.end(), [](const Move& m) { return m.is_arc(); }));
+    return static_cast<int>(
+        std::count_if(moves.begin(), moves.end(), [](const Move& m) { return m.is_arc(); }));
 }
 
 /// A path of one kind; its chords miss the curve by about `sag` mm.
 std::vector<Move> random_path(std::mt19937& random, int kind, double sag) {
-    const auto pick = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
-    const double cx = pick(-100, 100), cy = pick(-100, 100), r = std::pow(10, pick(-0.5, 2)), turn = pick(0, 1) < 0.5 ? -1 : 1,
-                 begin = pick(0, 2 * pi);
+    const auto pick = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    const double cx = pick(-100, 100), cy = pick(-100, 100), r = std::pow(10, pick(-0.5, 2)),
+                 turn = pick(0, 1) < 0.5 ? -1 : 1, begin = pick(0, 2 * pi);
     const double step = std::sqrt(8 * sag / r);
     std::vector<Move> moves;
-    auto add = [&](double x, double y, double z) { moves.push_back({to_units(x), to_units(y), to_units(z), 3000}); };
+    auto add = [&](double x, double y, double z) {
+        moves.push_back({to_units(x), to_units(y), to_units(z), 3000});
+    };
     if (kind == 0) {  // a circle, or nearly two turns of it
         const double sweep = pick(0.5, 12);
-        for (double t = 0; t < sweep; t += step * pick(0.4, 1)) add(cx + r * std::cos(begin + turn * t), cy + r * std::sin(begin + turn * t), 5);
+        for (double t = 0; t < sweep; t += step * pick(0.4, 1))
+            add(cx + r * std::cos(begin + turn * t), cy + r * std::sin(begin + turn * t), 5);
     } else if (kind == 1) {  // a spiral
         for (double t = 0; t < 4; t += step * pick(0.4, 1))
-            add(cx + r * (1 + t / 5) * std::cos(begin + turn * t), cy + r * (1 + t / 5) * std::sin(begin + turn * t), 5);
+            add(cx + r * (1 + t / 5) * std::cos(begin + turn * t),
+                cy + r * (1 + t / 5) * std::sin(begin + turn * t), 5);
     } else if (kind == 2) {  // a rectangle with rounded corners, as a pocket's wall
         const double w = r * pick(0.1, 3);
         const Spot corners[] = {{cx, cy, 5}, {cx + w, cy, 5}, {cx + w, cy + w, 5}, {cx, cy + w, 5}};
         for (int c = 0; c < 4; ++c)
             for (double t = 0; t <= pi / 2; t += step)
-                add(corners[c].x + r * std::cos(t + (c - 2) * pi / 2), corners[c].y + r * std::sin(t + (c - 2) * pi / 2), 5);
+                add(corners[c].x + r * std::cos(t + (c - 2) * pi / 2),
+                    corners[c].y + r * std::sin(t + (c - 2) * pi / 2), 5);
     } else if (kind == 3) {  // a helix: no arc may be fitted
         for (double t = 0; t < 7; t += step) add(cx + r * std::cos(t), cy + r * std::sin(t), 5 + t);
     } else if (kind == 4) {  // corners everywhere
@@ -126,7 +139,9 @@ TEST(Arcs, StayWithinTheToleranceBothWays) {
         std::size_t at = 0;
         for (std::size_t m = 1; m < fitted.size(); ++m) {
             const std::size_t from = at;
-            while (at < path.size() && (path[at].x != fitted[m].x || path[at].y != fitted[m].y || path[at].z != fitted[m].z || at == from)) ++at;
+            while (at < path.size() && (path[at].x != fitted[m].x || path[at].y != fitted[m].y ||
+                                        path[at].z != fitted[m].z || at == from))
+                ++at;
             ASSERT_LT(at, path.size());
             ASSERT_EQ(fitted[m].feed, 3000U);
             if (fitted[m].is_arc()) {
@@ -137,13 +152,15 @@ TEST(Arcs, StayWithinTheToleranceBothWays) {
                 ASSERT_LE(std::abs(end - shape.radius), 0.0003);
             }
             // Piece against piece: what one move stands for is that part of the path.
-            const std::vector<Move> piece(path.begin() + static_cast<std::ptrdiff_t>(from), path.begin() + static_cast<std::ptrdiff_t>(at) + 1);
+            const std::vector<Move> piece(path.begin() + static_cast<std::ptrdiff_t>(from),
+                                          path.begin() + static_cast<std::ptrdiff_t>(at) + 1);
             const std::vector<Move> move{fitted[m - 1], fitted[m]};
             const double length = std::max(0.05, motion_time(move, Machine{}).cutting_mm);
             const std::vector<Spot> a = sampled(piece, length / 60), b = sampled(move, length / 400);
             // The arc's own samples miss it by (length/400)²/8r, far below 0.1 µm.
             ASSERT_LE(farthest(a, b), tolerance + 1e-4) << "round " << round << " move " << m;
-            ASSERT_LE(farthest(sampled(move, length / 60), sampled(piece, 1e9)), tolerance + 1e-4) << "round " << round << " move " << m;
+            ASSERT_LE(farthest(sampled(move, length / 60), sampled(piece, 1e9)), tolerance + 1e-4)
+                << "round " << round << " move " << m;
         }
         ASSERT_EQ(at + 1, path.size());
     }
@@ -154,7 +171,8 @@ TEST(Arcs, StayWithinTheToleranceBothWays) {
 TEST(Arcs, ACircleBecomesThreeArcs) {
     std::vector<Move> moves;
     for (int k = 0; k <= 360; ++k)
-        moves.push_back({to_units(20 * std::cos(k * pi / 180)), to_units(20 * std::sin(-k * pi / 180)), 0, k == 0 ? 0U : 1000U});
+        moves.push_back({to_units(20 * std::cos(k * pi / 180)), to_units(20 * std::sin(-k * pi / 180)), 0,
+                         k == 0 ? 0U : 1000U});
     fit_arcs(moves, {.tolerance = 18});
     ASSERT_EQ(moves.size(), 4U);
     for (std::size_t m = 1; m < 4; ++m) {
@@ -185,7 +203,8 @@ TEST(Arcs, TheBoxHoldsTheBulge) {
         const ArcShape shape = arc_shape(from, to);
         std::array<double, 4> seen{1e300, 1e300, -1e300, -1e300};
         for (int k = 0; k <= 4000; ++k) {
-            const double a = shape.start + shape.sweep * k / 4000, x = shape.x + shape.radius * std::cos(a), y = shape.y + shape.radius * std::sin(a);
+            const double a = shape.start + shape.sweep * k / 4000, x = shape.x + shape.radius * std::cos(a),
+                         y = shape.y + shape.radius * std::sin(a);
             seen = {std::min(seen[0], x), std::min(seen[1], y), std::max(seen[2], x), std::max(seen[3], y)};
         }
         const std::array<double, 4> box = shape.box();
@@ -198,7 +217,9 @@ TEST(Arcs, TakeAboutTheTimeOfTheirChords) {
     for (const double r : {10.0, 50.0, 200.0}) {
         std::vector<Move> moves;
         const double step = std::sqrt(8 * 0.0012 / r);
-        for (double t = 0; t < 6; t += step) moves.push_back({to_units(r * std::cos(t)), to_units(r * std::sin(t)), 0, moves.empty() ? 0U : 5000U});
+        for (double t = 0; t < 6; t += step)
+            moves.push_back(
+                {to_units(r * std::cos(t)), to_units(r * std::sin(t)), 0, moves.empty() ? 0U : 5000U});
         std::vector<Move> fitted = moves;
         fit_arcs(fitted, {.tolerance = 18});
         ASSERT_GT(arcs_in(fitted), 0);
@@ -211,14 +232,19 @@ TEST(Arcs, TakeAboutTheTimeOfTheirChords) {
     Machine slow;
     slow.acceleration = 100;
     const double v = std::sqrt(100.0 * 10), length = 10 * pi / 2, ramp = v * v / (2 * slow.acceleration);
-    EXPECT_NEAR(motion_time(quarter, slow).minutes * 60, 2 * v / slow.acceleration + (length - 2 * ramp) / v, 1e-9);
+    EXPECT_NEAR(motion_time(quarter, slow).minutes * 60, 2 * v / slow.acceleration + (length - 2 * ramp) / v,
+                1e-9);
 }
 
-// v² = a·r: at 50 mm/s and 500 mm/s² arcs of 5 mm radius are as fast as their chords, at 75 mm/s only those from 11.25 mm up.
+// v² = a·r: at 50 mm/s and 500 mm/s² arcs of 5 mm radius are as fast as their chords, at 75 mm/s only those
+// from 11.25 mm up.
 TEST(Arcs, AreNoneWhereTheyWouldBeRunSlower) {
-    for (const auto& [r, feed, fitted] : {std::tuple{8.0, 3000U, true}, {8.0, 4500U, false}, {12.0, 4500U, true}, {4.0, 3000U, false}}) {
+    for (const auto& [r, feed, fitted] :
+         {std::tuple{8.0, 3000U, true}, {8.0, 4500U, false}, {12.0, 4500U, true}, {4.0, 3000U, false}}) {
         std::vector<Move> moves;
-        for (double t = 0; t < 6; t += 0.2) moves.push_back({to_units(r * std::cos(t)), to_units(r * std::sin(t)), 0, moves.empty() ? 0U : feed});
+        for (double t = 0; t < 6; t += 0.2)
+            moves.push_back(
+                {to_units(r * std::cos(t)), to_units(r * std::sin(t)), 0, moves.empty() ? 0U : feed});
         std::vector<Move> always = moves;
         fit_arcs(always, {.tolerance = 1000});
         EXPECT_GT(arcs_in(always), 0);
@@ -259,16 +285,20 @@ std::vector<Move> program_moves(std::mt19937& random) {
     return moves;
 }
 
-// A round post on a plate. What roughing leaves is no finished surface: its arcs may leave the chords that they are fitted to by a share of that, or it
-// would have none; what the contours' own chords and these arcs take off it stays well under half.
+// A round post on a plate. What roughing leaves is no finished surface: its arcs may leave the chords that
+// they are fitted to by a share of that, or it would have none; what the contours' own chords and these arcs
+// take off it stays well under half.
 TEST(Arcs, OfRoughingTakeAShareOfWhatItLeaves) {
     constexpr double radius = 30, half = 75;
     auto outline = [](double side, double corner, double chord) {
-        return rounded_polygon(std::vector<Corner>{{-side, -side, corner}, {side, -side, corner}, {side, side, corner}, {-side, side, corner}},
-                               chord);
+        return rounded_polygon(
+            std::vector<Corner>{
+                {-side, -side, corner}, {side, -side, corner}, {side, side, corner}, {-side, side, corner}},
+            chord);
     };
     const Outline plate = outline(half, 1, 0.01), post = outline(radius, radius, 0.001);
-    const Ring bottom = ring(plate, {0, 0}), edge = ring(plate, {0, 3}), foot = ring(post, {0, 3}), top = ring(post, {0, 17});
+    const Ring bottom = ring(plate, {0, 0}), edge = ring(plate, {0, 3}), foot = ring(post, {0, 3}),
+               top = ring(post, {0, 17});
     std::vector<Facet> facets;
     flat(facets, bottom, {}, false);
     strip(facets, bottom, edge);
@@ -310,7 +340,8 @@ TEST(Arcs, TheInterpreterAcceptsThem) {
         std::vector<std::vector<double>> arcs;
         std::istringstream lines(canon.text);
         for (std::string line; std::getline(lines, line);)
-            if (const std::size_t at = line.find("ARC_FEED("); at != std::string::npos) arcs.push_back(support::canon_numbers(line.substr(at + 8)));
+            if (const std::size_t at = line.find("ARC_FEED("); at != std::string::npos)
+                arcs.push_back(support::canon_numbers(line.substr(at + 8)));
         std::size_t k = 0;
         for (std::size_t m = 1; m < moves.size(); ++m) {
             if (!moves[m].is_arc()) continue;
@@ -336,7 +367,8 @@ TEST(Arcs, TheReaderSeesThePath) {
     const Plan plan = plan_with(moves);
     GcodeLimits limits;
     limits.arc_error = 0.0002;
-    const Program program = read_gcode(program_text(plan, plan.layers[0], plan.layers[0].operations[0]), "arcs.ngc", limits);
+    const Program program =
+        read_gcode(program_text(plan, plan.layers[0], plan.layers[0].operations[0]), "arcs.ngc", limits);
     // Move by move: a straight one is one step, an arc several on one line that end where it ends.
     std::size_t step = 0;
     for (std::size_t m = 1; m + 1 < moves.size(); ++m) {
@@ -344,7 +376,8 @@ TEST(Arcs, TheReaderSeesThePath) {
         const Move &from = moves[m - 1], &to = moves[m];
         if (from.x == to.x && from.y == to.y && from.z == to.z) continue;
         auto reached = [&](const ProgramStep& s) {
-            return std::abs(s.x - to_mm(to.x)) < 1e-6 && std::abs(s.y - to_mm(to.y)) < 1e-6 && std::abs(s.z - to_mm(to.z)) < 1e-6;
+            return std::abs(s.x - to_mm(to.x)) < 1e-6 && std::abs(s.y - to_mm(to.y)) < 1e-6 &&
+                   std::abs(s.z - to_mm(to.z)) < 1e-6;
         };
         const ArcShape shape = to.is_arc() ? arc_shape(from, to) : ArcShape{};
         Spot before{to_mm(from.x), to_mm(from.y), to_mm(from.z)};
@@ -352,12 +385,15 @@ TEST(Arcs, TheReaderSeesThePath) {
             ASSERT_LT(step, program.steps.size());
             const ProgramStep& s = program.steps[step];
             if (!s.known()) continue;
-            if (m == 1 && !reached(s) && !to.is_arc()) continue;  // on the way to where the program's work starts
+            if (m == 1 && !reached(s) && !to.is_arc())
+                continue;  // on the way to where the program's work starts
             done = reached(s);
             if (!to.is_arc()) {
                 ASSERT_TRUE(done);
             } else {
-                const double miss = std::abs(std::hypot((s.x + before.x) / 2 - shape.x, (s.y + before.y) / 2 - shape.y) - shape.radius);
+                const double miss =
+                    std::abs(std::hypot((s.x + before.x) / 2 - shape.x, (s.y + before.y) / 2 - shape.y) -
+                             shape.radius);
                 ASSERT_LE(miss, limits.arc_error + 3e-4) << "a chord of the reader's is far from the arc";
                 before = {s.x, s.y, s.z};
             }
@@ -366,7 +402,10 @@ TEST(Arcs, TheReaderSeesThePath) {
 }
 
 TEST(Arcs, TheWriterRefusesWhatIsNoArc) {
-    const std::vector<Move> good{{0, 0, 29 * kMm, 0}, {0, 0, 10 * kMm, 1000}, {kMm, kMm, 10 * kMm, 1000, kMm, 0}, {kMm, kMm, 29 * kMm, 0}};
+    const std::vector<Move> good{{0, 0, 29 * kMm, 0},
+                                 {0, 0, 10 * kMm, 1000},
+                                 {kMm, kMm, 10 * kMm, 1000, kMm, 0},
+                                 {kMm, kMm, 29 * kMm, 0}};
     auto refused = [](const std::vector<Move>& moves) {
         const Plan plan = plan_with(moves);
         try {
@@ -396,7 +435,9 @@ TEST(Arcs, WordForWord) {
                                  {2 * kMm, -kMm, 10 * kMm, 2000},
                                  {2 * kMm, -kMm, 29 * kMm, 0}});
     const std::string text = program_text(plan, plan.layers[0], plan.layers[0].operations[0]);
-    EXPECT_NE(text.find("G91.1\nG0 Z29\nX0 Y0\nG1 Z10 F1000\nG3 X1 Y1 I0 J1\nG2 X2 Y0 I0 J-1 F2000\nG1 Y-1\nG0 Z29\nM5\nM2\n"), std::string::npos)
+    EXPECT_NE(text.find("G91.1\nG0 Z29\nX0 Y0\nG1 Z10 F1000\nG3 X1 Y1 I0 J1\nG2 X2 Y0 I0 J-1 F2000\nG1 "
+                        "Y-1\nG0 Z29\nM5\nM2\n"),
+              std::string::npos)
         << text;
 }
 

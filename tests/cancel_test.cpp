@@ -1,6 +1,7 @@
 // Cancel from another thread in every phase of a whole plan with verification, and progress that never falls.
 //     SLABWRIGHT_SCALE=1000000 build/release/cancel_test
-// does the same on a pattern of so many facets and a metre's width, where every phase must end within half a second of cancel().
+// does the same on a pattern of so many facets and a metre's width, where every phase must end within half a
+// second of cancel().
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +29,9 @@ namespace {
 using support::TemporaryFolder;
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+double seconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+}
 
 /// A phase that was reported, and how long it ran.
 struct Phase {
@@ -56,9 +59,11 @@ std::vector<Phase> phases_of(const std::function<void(Context&)>& work) {
     return phases;
 }
 
-/// Runs `work` until its phase number `index` has lasted for `delay_s`, then cancels it from a thread of its own.
+/// Runs `work` until its phase number `index` has lasted for `delay_s`, then cancels it from a thread of its
+/// own.
 /// @return seconds from cancel() to the end; negative when the work ended before
-double cancel_in(const std::function<void(Context&)>& work, const std::vector<Phase>& phases, std::size_t index, double delay_s) {
+double cancel_in(const std::function<void(Context&)>& work, const std::vector<Phase>& phases,
+                 std::size_t index, double delay_s) {
     std::mutex mutex;
     std::condition_variable reached;
     std::size_t at = 0;  // phases begun so far
@@ -105,17 +110,20 @@ double cancel_in(const std::function<void(Context&)>& work, const std::vector<Ph
 }
 
 /// Cancels `work` in each of its phases, as it begins and in its middle.
-/// @param brief_s a phase shorter than this is cancelled as it begins only: wherever it is cancelled, it is over in time by itself, and the
-///                next one's beginning is tested too. At a million facets every case costs all phases before it once more.
-void cancel_everywhere(const std::function<void(Context&)>& work, double limit_s, double brief_s, const std::function<void()>& check) {
+/// @param brief_s a phase shorter than this is cancelled as it begins only: wherever it is cancelled, it is
+/// over in time by itself, and the
+///                next one's beginning is tested too. At a million facets every case costs all phases before
+///                it once more.
+void cancel_everywhere(const std::function<void(Context&)>& work, double limit_s, double brief_s,
+                       const std::function<void()>& check) {
     const std::vector<Phase> phases = phases_of(work);
     std::size_t cancelled = 0;
     for (std::size_t i = 0; i < phases.size(); ++i) {
         for (const double share : {0.0, 0.5}) {
             if (share > 0 && phases[i].seconds < brief_s) continue;
             const double took = cancel_in(work, phases, i, share * phases[i].seconds);
-            std::printf("%-16s %7.3f s, cancelled at %.1f: %s%.3f s\n", phases[i].name.c_str(), phases[i].seconds, share,
-                        took < 0 ? "had ended; " : "", std::max(0.0, took));
+            std::printf("%-16s %7.3f s, cancelled at %.1f: %s%.3f s\n", phases[i].name.c_str(),
+                        phases[i].seconds, share, took < 0 ? "had ended; " : "", std::max(0.0, took));
             std::fflush(stdout);
             if (took < 0) continue;
             ++cancelled;
@@ -135,7 +143,9 @@ TEST(Cancel, StopsEveryPhaseAndLeavesNothing) {
     pattern.height_mm = wish != nullptr ? 300 : 20;
     // Without a wish it is not the time that is tested: a machine may be busy with much else.
     const double limit_s = wish != nullptr ? 0.5 : 20, brief_s = wish != nullptr ? limit_s / 2 : 0;
-    if (wish == nullptr) std::printf("SLABWRIGHT_SCALE is not set: %llu facets\n", static_cast<unsigned long long>(pattern.facets));
+    if (wish == nullptr)
+        std::printf("SLABWRIGHT_SCALE is not set: %llu facets\n",
+                    static_cast<unsigned long long>(pattern.facets));
 
     const TemporaryFolder folder;
     const std::string stl = folder / "pattern.stl", out = folder / "out";
@@ -167,7 +177,8 @@ TEST(Cancel, StopsEveryPhaseAndLeavesNothing) {
         [&] {
             EXPECT_FALSE(std::filesystem::exists(out));
             std::size_t left = 0;
-            for (const auto& entry : std::filesystem::directory_iterator(folder.path)) left += entry.path() != stl;
+            for (const auto& entry : std::filesystem::directory_iterator(folder.path))
+                left += entry.path() != stl;
             EXPECT_EQ(left, 0u) << "a half-written folder stays";
         });
 }

@@ -35,10 +35,13 @@ TEST(CapCover, OneCapLeavesTheRest) {
 // What is called covered is so in all of many directions, and a corner that is named lies in no cap.
 TEST(CapCover, OfRandomCapsAgainstDenseDirections) {
     std::mt19937_64 random(test::seed());
-    auto uniform = [&](double a, double b) { return a + (b - a) * static_cast<double>(random() % 1'000'003) / 1'000'002; };
+    auto uniform = [&](double a, double b) {
+        return a + (b - a) * static_cast<double>(random() % 1'000'003) / 1'000'002;
+    };
     std::vector<Point3> dense;
     constexpr int n = 20000;
-    for (int i = 0; i < n; ++i) dense.push_back(direction(1 - (2 * i + 1.0) / n, i * std::numbers::pi * (3 - std::sqrt(5.0))));
+    for (int i = 0; i < n; ++i)
+        dense.push_back(direction(1 - (2 * i + 1.0) / n, i * std::numbers::pi * (3 - std::sqrt(5.0))));
     int covered = 0, open = 0;
     for (int round = 0; round < 300; ++round) {
         std::vector<Cap> caps{{{0, 0, -1}, uniform(-0.3, 0.3)}};
@@ -46,7 +49,8 @@ TEST(CapCover, OfRandomCapsAgainstDenseDirections) {
         cover.begin(caps.front());
         const int most = 3 + round % 12;
         for (int k = 0; k < most; ++k) {
-            caps.push_back({direction(uniform(-0.5, 1), uniform(0, 2 * std::numbers::pi)), uniform(0.05, 0.9)});
+            caps.push_back(
+                {direction(uniform(-0.5, 1), uniform(0, 2 * std::numbers::pi)), uniform(0.05, 0.9)});
             cover.add(caps.back());
             const auto corner = cover.uncovered(direction(uniform(-1, 1), uniform(0, 6)));
             bool all = true;

@@ -1,4 +1,5 @@
-// Layers and tools together: the joining of a tool map, against what its rules say, and the strategy `combined`.
+// Layers and tools together: the joining of a tool map, against what its rules say, and the strategy
+// `combined`.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,11 +28,13 @@ std::vector<ToolSlice> sliced(const std::vector<ToolSlice>& map, double step) {
     return slices;
 }
 
-// LUO tables 6.2 and 6.3 and the lengths of 6.5.3: .125 in .57, .25 in 3.4, 1 in 8.0; .5 and .75 in are not named.
+// LUO tables 6.2 and 6.3 and the lengths of 6.5.3: .125 in .57, .25 in 3.4, 1 in 8.0; .5 and .75 in are not
+// named.
 TEST(JoinSlices, LuoTable63) {
     const std::vector<double> allowed{0.57 * kIn, 3.4 * kIn, 5 * kIn, 6.5 * kIn, 8 * kIn};
     const std::vector<ToolSlice> map{{0, 0.75 * kIn, 4}, {0.75 * kIn, 1.7 * kIn, 1}, {1.7 * kIn, 2 * kIn, 0}};
-    for (const double step : {0.01, 0.05, 0.3}) EXPECT_EQ(join_slices(sliced(map, step * kIn), allowed, 3), map) << step;
+    for (const double step : {0.01, 0.05, 0.3})
+        EXPECT_EQ(join_slices(sliced(map, step * kIn), allowed, 3), map) << step;
     // A .125 in tool that may be .2 in long needs two layers for its .3 in.
     std::vector<double> shorter = allowed;
     shorter[0] = 0.2 * kIn;
@@ -46,14 +49,15 @@ TEST(JoinSlices, ThinLayersJoinTheNearestTool) {
     // One millimetre of tool 1 between tools 2 and 4 goes to tool 2's layer, which then needs tool 1.
     EXPECT_EQ(join_slices(std::vector<ToolSlice>{{0, 10, 4}, {10, 11, 1}, {11, 20, 2}}, allowed, 3),
               (std::vector<ToolSlice>{{0, 10, 4}, {10, 20, 1}}));
-    EXPECT_EQ(join_slices(std::vector<ToolSlice>{{0, 1, 0}, {1, 2, 3}}, allowed, 3), (std::vector<ToolSlice>{{0, 2, 0}}));
+    EXPECT_EQ(join_slices(std::vector<ToolSlice>{{0, 1, 0}, {1, 2, 3}}, allowed, 3),
+              (std::vector<ToolSlice>{{0, 2, 0}}));
     EXPECT_TRUE(join_slices({}, allowed, 3).empty());
     EXPECT_THROW((void)join_slices(std::vector<ToolSlice>{{0, 1, 0}, {2, 3, 0}}, allowed, 3), Error);
     EXPECT_THROW((void)join_slices(std::vector<ToolSlice>{{0, 1, 7}}, allowed, 3), Error);
 }
 
-// Over random maps: the layers fill the same heights, no tool is larger than the slice allows nor longer than it may be, and a layer
-// thinner than the least is the only one or a part of one that its tool's length cut.
+// Over random maps: the layers fill the same heights, no tool is larger than the slice allows nor longer than
+// it may be, and a layer thinner than the least is the only one or a part of one that its tool's length cut.
 TEST(JoinSlices, RandomMaps) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
@@ -83,7 +87,8 @@ TEST(JoinSlices, RandomMaps) {
                 if (s.z_high > layers[i].z_low + 1e-9 && s.z_low < layers[i].z_high - 1e-9) {
                     EXPECT_LE(layers[i].tool, s.tool);
                 }
-            const bool cut = (i > 0 && layers[i - 1].tool == layers[i].tool) || (i + 1 < layers.size() && layers[i + 1].tool == layers[i].tool);
+            const bool cut = (i > 0 && layers[i - 1].tool == layers[i].tool) ||
+                             (i + 1 < layers.size() && layers[i + 1].tool == layers[i].tool);
             if (!cut && layers.size() > 1) {
                 EXPECT_GE(layers[i].z_high - layers[i].z_low, 3 - 1e-3);
             }
@@ -120,13 +125,18 @@ TEST(PlaceByTools, KeepsTheToolChangesAndTheLengths) {
     }
     EXPECT_EQ(placed.cost, layer_cost(request, tops));
     EXPECT_EQ(placed.cost.broken_type1, 0);
-    EXPECT_THROW((void)place_layers_by_tools(request, std::vector<ToolSlice>{{0, 30, 1}}, std::vector<double>{12, 35}), Error);
+    EXPECT_THROW(
+        (void)place_layers_by_tools(request, std::vector<ToolSlice>{{0, 30, 1}}, std::vector<double>{12, 35}),
+        Error);
 }
 
-// A block with two steps: whatever the other strategies make of it, combined takes no longer, and says what it compared.
+// A block with two steps: whatever the other strategies make of it, combined takes no longer, and says what
+// it compared.
 TEST(Combined, IsNeverSlowerThanTheOtherStrategies) {
     Context context;
-    const Mesh mesh = test::height_field(context, 12, 6.0, [](double x, double y) { return std::max(std::abs(x), std::abs(y)) < 20 ? 44.0 : 23.0; });
+    const Mesh mesh = test::height_field(context, 12, 6.0, [](double x, double y) {
+        return std::max(std::abs(x), std::abs(y)) < 20 ? 44.0 : 23.0;
+    });
     Job job;
     job.tools[1].flute_length = 48, job.tools[1].stickout = 56;
     job.tools[2].flute_length = 48, job.tools[2].stickout = 56;
@@ -139,8 +149,8 @@ TEST(Combined, IsNeverSlowerThanTheOtherStrategies) {
     const Plan plan = make_plan(context, mesh, {}, job);
     EXPECT_LE(plan.totals.build_minutes, best);
     EXPECT_EQ(plan.job.layers.strategy, LayerStrategy::combined);
-    const auto said =
-        std::count_if(plan.diagnostics.begin(), plan.diagnostics.end(), [](const Diagnostic& d) { return d.code == "layers.combined"; });
+    const auto said = std::count_if(plan.diagnostics.begin(), plan.diagnostics.end(),
+                                    [](const Diagnostic& d) { return d.code == "layers.combined"; });
     EXPECT_EQ(said, 1);
     // Every slab of a layer is bonded by itself.
     int slabs = 0;
@@ -150,9 +160,11 @@ TEST(Combined, IsNeverSlowerThanTheOtherStrategies) {
         wood += layer.slab_thickness;
         EXPECT_NEAR(layer.slab_thickness, 19.0 * layer.slabs, 1e-9);
     }
-    EXPECT_EQ(slabs, std::count_if(plan.sequence.begin(), plan.sequence.end(), [](const SequenceStep& s) { return s.action == "press"; }));
+    EXPECT_EQ(slabs, std::count_if(plan.sequence.begin(), plan.sequence.end(),
+                                   [](const SequenceStep& s) { return s.action == "press"; }));
     EXPECT_GE(plan.totals.bonding_minutes, slabs * (job.bonding.handling_s + job.bonding.press_time_s) / 60);
-    std::printf("%d layers of %d slabs, %.1f min; the others at best %.1f\n", plan.totals.layers, slabs, plan.totals.build_minutes, best);
+    std::printf("%d layers of %d slabs, %.1f min; the others at best %.1f\n", plan.totals.layers, slabs,
+                plan.totals.build_minutes, best);
 }
 
 }  // namespace

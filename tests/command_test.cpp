@@ -42,7 +42,8 @@ void write_metre_pattern(const std::string& path, const MetrePattern& pattern) {
     });
 }
 
-CommandResult slabwright_command(std::vector<std::string> arguments, const std::vector<std::pair<std::string, std::string>>& environment = {},
+CommandResult slabwright_command(std::vector<std::string> arguments,
+                                 const std::vector<std::pair<std::string, std::string>>& environment = {},
                                  double interrupt_after = -1) {
     arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
     return run_command(arguments, environment, interrupt_after);
@@ -50,8 +51,11 @@ CommandResult slabwright_command(std::vector<std::string> arguments, const std::
 
 /// An axis-parallel box, `open` without its top.
 std::vector<Facet> box(Vec3f low, Vec3f high, bool open = false) {
-    const auto at = [&](int i) { return Vec3f{i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z}; };
-    const int quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+    const auto at = [&](int i) {
+        return Vec3f{i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z};
+    };
+    const int quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                             {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
     std::vector<Facet> facets;
     for (int q = 0; q < 6; ++q) {
         if (open && q == 1) continue;
@@ -62,14 +66,16 @@ std::vector<Facet> box(Vec3f low, Vec3f high, bool open = false) {
     return facets;
 }
 
-/// A board on a post: its underside can never be milled from above in one layer, nor be met by a boundary if it slopes.
+/// A board on a post: its underside can never be milled from above in one layer, nor be met by a boundary if
+/// it slopes.
 std::vector<Facet> mushroom() {
     // A cone standing on its tip's stump: every side facet leans outwards.
     std::vector<Facet> facets;
     const int n = 24;
     const auto ring = [&](int i, float radius, float z) {
         const double angle = 2 * 3.14159265358979 * (i % n) / n;
-        return Vec3f{static_cast<float>(radius * std::cos(angle)), static_cast<float>(radius * std::sin(angle)), z};
+        return Vec3f{static_cast<float>(radius * std::cos(angle)),
+                     static_cast<float>(radius * std::sin(angle)), z};
     };
     for (int i = 0; i < n; ++i) {
         facets.push_back({Vec3f{0, 0, 0}, ring(i + 1, 20, 0), ring(i, 20, 0)});
@@ -99,18 +105,22 @@ constexpr double kCancelSeconds = 0.5;
 TEST(Command, TakesItsMemoryAsToolsAllocatorSays) {
     const CommandResult told = slabwright_command({"--version"}, {{"MALLOC_CONF", "stats_print:true"}});
     ASSERT_EQ(told.exit, 0) << told.err;
-    for (const char* setting : {"opt.thp: \"always\"", "opt.oversize_threshold: 0", "opt.dirty_decay_ms: 3000"})
-        EXPECT_NE(told.err.find(setting), std::string::npos) << setting << " is not in " << told.err.substr(0, 2000);
+    for (const char* setting :
+         {"opt.thp: \"always\"", "opt.oversize_threshold: 0", "opt.dirty_decay_ms: 3000"})
+        EXPECT_NE(told.err.find(setting), std::string::npos)
+            << setting << " is not in " << told.err.substr(0, 2000);
 }
 
-// What is given back is kept while there is plenty, and no more than the promise of --memory allows where there is not.
+// What is given back is kept while there is plenty, and no more than the promise of --memory allows where
+// there is not.
 TEST(Command, KeepsMemoryWithinWhatMayBeUsed) {
     const TemporaryFolder folder;
     const std::string stl = folder / "metre.stl";
     write_metre_pattern(stl, {.size_mm = 290, .height_mm = 29, .facets = 600'000});
     const auto peak = [&](const char* gib) {
         const CommandResult made =
-            slabwright_command({"plan", stl, "-o", folder / "out", "--allow-undercut", "--no-verify", "--quiet", "--threads", "2", "--memory", gib});
+            slabwright_command({"plan", stl, "-o", folder / "out", "--allow-undercut", "--no-verify",
+                                "--quiet", "--threads", "2", "--memory", gib});
         EXPECT_EQ(made.exit, 0) << made.err;
         return made.peak_bytes;
     };
@@ -121,7 +131,8 @@ TEST(Command, KeepsMemoryWithinWhatMayBeUsed) {
 #endif
 
 TEST(Command, HelpAndVersionSucceed) {
-    for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{{"--help"}, {"plan", "--help"}, {"--version"}}) {
+    for (const std::vector<std::string>& arguments :
+         std::vector<std::vector<std::string>>{{"--help"}, {"plan", "--help"}, {"--version"}}) {
         const CommandResult result = slabwright_command(arguments);
         EXPECT_EQ(result.exit, 0);
         EXPECT_FALSE(result.out.empty());
@@ -133,31 +144,32 @@ TEST(Command, WrongUseExitsTwoWithOneLine) {
     TemporaryFolder folder;
     const std::string stl = kData + "half-sphere.stl", out = folder / "out";
     spit(folder.path / "bad.toml", "[machine]\nclearence = 5\n");
-    const std::vector<std::vector<std::string>> wrong = {{},
-                                                         {"bake"},
-                                                         {"plan"},
-                                                         {"plan", stl},
-                                                         {"plan", stl, "-o", out, "--units", "cm"},
-                                                         {"plan", stl, "-o", out, "--threads", "0"},
-                                                         {"plan", stl, "-o", out, "--threads", "-1"},
-                                                         {"plan", stl, "-o", out, "--threads", "two"},
-                                                         {"plan", stl, "-o", out, "--memory", "0"},
-                                                         {"plan", stl, "-o", out, "--strategy", "best"},
-                                                         {"plan", stl, "-o", out, "--finder", "luck"},
-                                                         {"plan", stl, "-o", out, "--weld", "-1"},
-                                                         {"plan", stl, "-o", out, "--wled", "1"},
-                                                         {"plan", stl, "-o", out, "--cell", "0"},
-                                                         {"verify", out, "--cell", "20"},
-                                                         {"plan", stl, "-o", out, "--job", folder / "missing.toml"},
-                                                         {"plan", stl, "-o", out, "--job", folder.path.string()},
-                                                         {"plan", stl, "-o", out, "--job", folder / "bad.toml"},
-                                                         {"slice", stl, "-o", out + ".svg"},
-                                                         {"slice", stl, "--every", "0", "-o", out + ".svg"},
-                                                         {"slice", stl, "--every", "-3", "-o", out + ".svg"},
-                                                         {"slice", stl, "--every", "1e-9", "-o", out + ".svg"},
-                                                         {"slice", stl, "--every", "500", "-o", out + ".svg"},
-                                                         {"slice", stl, "--every", "5", "-o", out + ".png"},
-                                                         {"job"}};
+    const std::vector<std::vector<std::string>> wrong = {
+        {},
+        {"bake"},
+        {"plan"},
+        {"plan", stl},
+        {"plan", stl, "-o", out, "--units", "cm"},
+        {"plan", stl, "-o", out, "--threads", "0"},
+        {"plan", stl, "-o", out, "--threads", "-1"},
+        {"plan", stl, "-o", out, "--threads", "two"},
+        {"plan", stl, "-o", out, "--memory", "0"},
+        {"plan", stl, "-o", out, "--strategy", "best"},
+        {"plan", stl, "-o", out, "--finder", "luck"},
+        {"plan", stl, "-o", out, "--weld", "-1"},
+        {"plan", stl, "-o", out, "--wled", "1"},
+        {"plan", stl, "-o", out, "--cell", "0"},
+        {"verify", out, "--cell", "20"},
+        {"plan", stl, "-o", out, "--job", folder / "missing.toml"},
+        {"plan", stl, "-o", out, "--job", folder.path.string()},
+        {"plan", stl, "-o", out, "--job", folder / "bad.toml"},
+        {"slice", stl, "-o", out + ".svg"},
+        {"slice", stl, "--every", "0", "-o", out + ".svg"},
+        {"slice", stl, "--every", "-3", "-o", out + ".svg"},
+        {"slice", stl, "--every", "1e-9", "-o", out + ".svg"},
+        {"slice", stl, "--every", "500", "-o", out + ".svg"},
+        {"slice", stl, "--every", "5", "-o", out + ".png"},
+        {"job"}};
     for (const auto& arguments : wrong) {
         const CommandResult result = slabwright_command(arguments);
         std::string line;
@@ -188,7 +200,8 @@ TEST(Command, UnusableInputExitsThree) {
     }
     // A place that cannot be written is told before any planning.
     spit(folder.path / "file", "x");
-    const CommandResult result = slabwright_command({"plan", kData + "pump-cover.stl", "-o", folder / "file"});
+    const CommandResult result =
+        slabwright_command({"plan", kData + "pump-cover.stl", "-o", folder / "file"});
     EXPECT_EQ(result.exit, 3);
     expect_one_line(result);
 }
@@ -204,27 +217,31 @@ TEST(Command, ImpossiblePartExitsFourAndSaysWhere) {
         expect_one_line(result);
         EXPECT_FALSE(fs::exists(out));
     }
-    const CommandResult memory = slabwright_command({"plan", kData + "pump-cover.stl", "-o", out, "--memory", "0.001"});
+    const CommandResult memory =
+        slabwright_command({"plan", kData + "pump-cover.stl", "-o", out, "--memory", "0.001"});
     EXPECT_EQ(memory.exit, 4) << memory.err;
     EXPECT_FALSE(fs::exists(out));
-    const CommandResult allowed = slabwright_command({"plan", folder / "mushroom.stl", "-o", out, "--allow-undercut"});
+    const CommandResult allowed =
+        slabwright_command({"plan", folder / "mushroom.stl", "-o", out, "--allow-undercut"});
     EXPECT_EQ(allowed.exit, 0) << allowed.err;
     EXPECT_NE(allowed.out.find("warning: "), std::string::npos) << "what stays unmade is told";
 }
 
 TEST(Command, ErrorsComeAsJsonOnRequest) {
     TemporaryFolder folder;
-    const std::vector<std::pair<int, std::vector<std::string>>> cases = {{3, {"plan", folder / "missing.stl", "-o", folder / "out", "--json"}},
-                                                                         {2, {"plan", "--json"}},
-                                                                         {2, {"plan", "x", "-o", folder / "out", "--json", "--threads", "0"}},
-                                                                         {3, {"inspect", folder / "missing.stl", "--json"}}};
+    const std::vector<std::pair<int, std::vector<std::string>>> cases = {
+        {3, {"plan", folder / "missing.stl", "-o", folder / "out", "--json"}},
+        {2, {"plan", "--json"}},
+        {2, {"plan", "x", "-o", folder / "out", "--json", "--threads", "0"}},
+        {3, {"inspect", folder / "missing.stl", "--json"}}};
     for (const auto& [exit, arguments] : cases) {
         const CommandResult result = slabwright_command(arguments);
         EXPECT_EQ(result.exit, exit);
         EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
         const json error = json::parse(result.err)["error"];
         EXPECT_EQ(error["exit"], exit);
-        for (const char* key : {"kind", "code", "message", "place", "remedy"}) EXPECT_TRUE(error[key].is_string()) << key;
+        for (const char* key : {"kind", "code", "message", "place", "remedy"})
+            EXPECT_TRUE(error[key].is_string()) << key;
         EXPECT_FALSE(error["message"].get<std::string>().empty());
     }
 }
@@ -232,15 +249,18 @@ TEST(Command, ErrorsComeAsJsonOnRequest) {
 TEST(Command, SameBytesOnAnyThreadsAndInAnyLocale) {
     TemporaryFolder folder;
     const support::CommaLocale locale;
-    if (!locale.made) std::printf("no locale with decimal commas could be made here; LC_ALL is tried without one\n");
-    const std::vector<std::pair<std::string, std::string>> commas = {{"LOCPATH", locale.folder}, {"LC_ALL", locale.name}};
+    if (!locale.made)
+        std::printf("no locale with decimal commas could be made here; LC_ALL is tried without one\n");
+    const std::vector<std::pair<std::string, std::string>> commas = {{"LOCPATH", locale.folder},
+                                                                     {"LC_ALL", locale.name}};
     for (const char* model : {"pump-cover", "luo-tool-sample"}) {
         std::map<std::string, std::string> first;
         for (const char* threads : {"1", "2", "4", "commas"}) {
             const bool in_commas = std::string(threads) == "commas";
             const std::string out = folder / (std::string(model) + "-" + threads);
-            const CommandResult result = slabwright_command({"plan", kData + model + ".stl", "-o", out, "--threads", in_commas ? "2" : threads},
-                                                            in_commas ? commas : std::vector<std::pair<std::string, std::string>>{});
+            const CommandResult result = slabwright_command(
+                {"plan", kData + model + ".stl", "-o", out, "--threads", in_commas ? "2" : threads},
+                in_commas ? commas : std::vector<std::pair<std::string, std::string>>{});
             ASSERT_EQ(result.exit, 0) << result.err;
             EXPECT_EQ(result.err, "") << "no progress where there is no terminal";
             const auto files = tree(out);
@@ -250,7 +270,8 @@ TEST(Command, SameBytesOnAnyThreadsAndInAnyLocale) {
                 continue;
             }
             ASSERT_EQ(files.size(), first.size());
-            for (const auto& [name, bytes] : files) EXPECT_TRUE(first[name] == bytes) << name << " differs at " << threads;
+            for (const auto& [name, bytes] : files)
+                EXPECT_TRUE(first[name] == bytes) << name << " differs at " << threads;
         }
     }
 }
@@ -275,25 +296,31 @@ TEST(Command, ProgramsOfAPlanPassTheInterpreter) {
             ++programs;
         }
     EXPECT_EQ(programs, plan["totals"]["operations"].get<std::size_t>());
-    EXPECT_EQ(programs, static_cast<std::size_t>(std::distance(fs::directory_iterator(out + "/nc"), fs::directory_iterator())));
+    EXPECT_EQ(programs, static_cast<std::size_t>(
+                            std::distance(fs::directory_iterator(out + "/nc"), fs::directory_iterator())));
 }
 
 // SLABWRIGHT_SOAK=6 does it for so many seeds, and for larger patterns too.
 TEST(Command, PlansPassTheirOwnVerification) {
-    // Ribs around bosses, channels hardly wider than the cutter or narrower, drafted walls that go on below a layer.
-    const MetrePattern small{.size_mm = 400, .height_mm = 120, .facets = 60000}, wide{.size_mm = 700, .height_mm = 200, .facets = 400000},
+    // Ribs around bosses, channels hardly wider than the cutter or narrower, drafted walls that go on below a
+    // layer.
+    const MetrePattern small{.size_mm = 400, .height_mm = 120, .facets = 60000},
+        wide{.size_mm = 700, .height_mm = 200, .facets = 400000},
         full{.size_mm = 1160, .height_mm = 300, .facets = 150000};
     std::vector<MetrePattern> patterns;
     if (const char* soak = std::getenv("SLABWRIGHT_SOAK"))
         for (std::uint64_t seed = 1; seed <= std::stoull(soak); ++seed)
-            for (const MetrePattern& p : {small, wide, full}) patterns.push_back(p), patterns.back().seed = seed;
+            for (const MetrePattern& p : {small, wide, full})
+                patterns.push_back(p), patterns.back().seed = seed;
     else
         for (const std::uint64_t seed : {5U, 6U}) patterns.push_back(small), patterns.back().seed = seed;
     TemporaryFolder folder;
     for (const MetrePattern& pattern : patterns) {
         write_metre_pattern(folder / "pattern.stl", pattern);
-        const CommandResult result = slabwright_command({"plan", folder / "pattern.stl", "-o", folder / "out", "--allow-undercut"});
-        const std::string which = std::to_string(pattern.size_mm) + " mm, seed " + std::to_string(pattern.seed);
+        const CommandResult result =
+            slabwright_command({"plan", folder / "pattern.stl", "-o", folder / "out", "--allow-undercut"});
+        const std::string which =
+            std::to_string(pattern.size_mm) + " mm, seed " + std::to_string(pattern.seed);
         EXPECT_EQ(result.exit, 0) << which << ": " << result.out << result.err;
         const json verified = json::parse(slurp(folder / "out/verify.json"));
         EXPECT_TRUE(verified["passed"].get<bool>()) << which << ": " << verified["violations"];
@@ -312,7 +339,8 @@ TEST(Command, InterruptStopsWithinHalfASecondAndLeavesNothing) {
     fs::create_directory(folder.path / "place");
     int interrupted = 0;
     for (const double after : {0.05, 0.3, 0.8, 1.5, 2.5, 4.0}) {
-        const CommandResult result = slabwright_command({"plan", folder / "big.stl", "-o", folder / "place/a/out", "--allow-undercut"}, {}, after);
+        const CommandResult result = slabwright_command(
+            {"plan", folder / "big.stl", "-o", folder / "place/a/out", "--allow-undercut"}, {}, after);
         if (result.after_interrupt == 0) {
             EXPECT_EQ(result.exit, 0) << result.err;
             fs::remove_all(folder.path / "place" / "a");
@@ -320,7 +348,8 @@ TEST(Command, InterruptStopsWithinHalfASecondAndLeavesNothing) {
         }
         ++interrupted;
         std::printf("SIGINT after %.2f s: ended %.3f s later\n", after, result.after_interrupt);
-        if (after < 0.1 && result.signal == SIGINT) continue;  // before the command had its handler: nothing was begun
+        if (after < 0.1 && result.signal == SIGINT)
+            continue;  // before the command had its handler: nothing was begun
         EXPECT_EQ(result.exit, 6) << result.err;
         expect_one_line(result);
         EXPECT_LT(result.after_interrupt, kCancelSeconds);
@@ -360,19 +389,23 @@ TEST(Command, SliceWritesEveryFormatWhole) {
     TemporaryFolder folder;
     for (const char* ending : {".svg", ".dxf", ".json"}) {
         const std::string out = folder / (std::string("sections") + ending);
-        const CommandResult result = slabwright_command({"slice", kData + "half-sphere.stl", "--every", "12.5", "-o", out});
+        const CommandResult result =
+            slabwright_command({"slice", kData + "half-sphere.stl", "--every", "12.5", "-o", out});
         EXPECT_EQ(result.exit, 0) << result.err;
         EXPECT_GT(fs::file_size(out), 1000u);
     }
-    // Half a sphere of 50 mm: sections at 12.5, 25 and 37.5, none at the top; areas are those of circles within the facets.
+    // Half a sphere of 50 mm: sections at 12.5, 25 and 37.5, none at the top; areas are those of circles
+    // within the facets.
     const json drawing = json::parse(slurp(folder / "sections.json"));
     ASSERT_EQ(drawing["sections"].size(), 3u);
     for (std::size_t i = 0; i < 3; ++i) {
         const double z = 12.5 * static_cast<double>(i + 1);
         EXPECT_EQ(drawing["sections"][i]["z"], z);
-        EXPECT_NEAR(drawing["sections"][i]["area_mm2"].get<double>(), 3.14159265 * (2500 - z * z), 0.01 * 7854);
+        EXPECT_NEAR(drawing["sections"][i]["area_mm2"].get<double>(), 3.14159265 * (2500 - z * z),
+                    0.01 * 7854);
     }
-    const CommandResult nowhere = slabwright_command({"slice", kData + "half-sphere.stl", "--every", "5", "-o", folder / "no/such/folder.svg"});
+    const CommandResult nowhere = slabwright_command(
+        {"slice", kData + "half-sphere.stl", "--every", "5", "-o", folder / "no/such/folder.svg"});
     EXPECT_EQ(nowhere.exit, 3);
     expect_one_line(nowhere);
 }
@@ -383,23 +416,29 @@ TEST(Command, JobDefaultsPlanTheSameAsNoJob) {
     ASSERT_EQ(defaults.exit, 0);
     spit(folder.path / "job.toml", defaults.out);
     ASSERT_EQ(slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "a"}).exit, 0);
-    const CommandResult with_job = slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "b", "--job", folder / "job.toml"});
+    const CommandResult with_job = slabwright_command(
+        {"plan", kData + "half-sphere.stl", "-o", folder / "b", "--job", folder / "job.toml"});
     ASSERT_EQ(with_job.exit, 0) << with_job.err;
     EXPECT_EQ(tree(folder / "a"), tree(folder / "b"));
 }
 
 TEST(Command, SummaryTellsWhatToLoad) {
     TemporaryFolder folder;
-    const CommandResult result = slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out"});
+    const CommandResult result =
+        slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out"});
     ASSERT_EQ(result.exit, 0) << result.err;
-    for (const char* wanted : {"layers", "min", "slabs", "19 mm MDF", "T2 flat end mill 1/2 in", "layer   1: 0 to"})
+    for (const char* wanted :
+         {"layers", "min", "slabs", "19 mm MDF", "T2 flat end mill 1/2 in", "layer   1: 0 to"})
         EXPECT_NE(result.out.find(wanted), std::string::npos) << wanted << "\n" << result.out;
-    const CommandResult quiet = slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out", "--quiet"});
+    const CommandResult quiet =
+        slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out", "--quiet"});
     EXPECT_EQ(quiet.exit, 0);
     EXPECT_EQ(quiet.out + quiet.err, "");
-    const CommandResult as_json = slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out", "--json"});
+    const CommandResult as_json =
+        slabwright_command({"plan", kData + "half-sphere.stl", "-o", folder / "out", "--json"});
     EXPECT_EQ(json::parse(as_json.out)["layers"], 3);
-    const CommandResult coarse = slabwright_command({"verify", folder / "out", "--stl", kData + "half-sphere.stl", "--cell", "0.5"});
+    const CommandResult coarse =
+        slabwright_command({"verify", folder / "out", "--stl", kData + "half-sphere.stl", "--cell", "0.5"});
     EXPECT_EQ(coarse.exit, 0) << coarse.out << coarse.err;
     EXPECT_NE(coarse.out.find("simulated at 0.500 mm"), std::string::npos) << coarse.out;
 }

@@ -27,7 +27,9 @@ Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], 
 double distance_to(const Vec3d& p, const std::array<Vec3d, 3>& t) {
     const Vec3d ab = minus(t[1], t[0]), ac = minus(t[2], t[0]), ap = minus(p, t[0]);
     auto at = [&](double v, double w) {
-        const Vec3d q{t[0][0] + v * ab[0] + w * ac[0], t[0][1] + v * ab[1] + w * ac[1], t[0][2] + v * ab[2] + w * ac[2]}, d = minus(p, q);
+        const Vec3d q{t[0][0] + v * ab[0] + w * ac[0], t[0][1] + v * ab[1] + w * ac[1],
+                      t[0][2] + v * ab[2] + w * ac[2]},
+            d = minus(p, q);
         return std::sqrt(dot(d, d));
     };
     const double d1 = dot(ab, ap), d2 = dot(ac, ap);
@@ -50,18 +52,21 @@ double distance_to(const Vec3d& p, const std::array<Vec3d, 3>& t) {
     return at(vb / (va + vb + vc), vc / (va + vb + vc));
 }
 
-// How much room the cutter has: distance of its axis (ball centre and up, disc and up) from the mesh cut off at z_top,
-// less its radius; negative where it touches. Facets are lifted flat to the cutter's level where they stand above it.
+// How much room the cutter has: distance of its axis (ball centre and up, disc and up) from the mesh cut off
+// at z_top, less its radius; negative where it touches. Facets are lifted flat to the cutter's level where
+// they stand above it.
 double room(const Mesh& mesh, double z_top, const Cutter& cutter, double x, double y, double tip) {
     const bool ball = cutter.profile == Cutter::Profile::ball;
     const double zc = ball ? tip + cutter.radius : tip;
     if (tip >= z_top) return 1e9;
     double nearest = 1e9;
     auto visit = [&](std::array<Vec3d, 3> t) { nearest = std::min(nearest, distance_to({x, y, zc}, t)); };
-    int turns = 0;  // of the section at zc (or the cap) around the axis, by a ray upward from the axis point: crossings
+    int turns = 0;  // of the section at zc (or the cap) around the axis, by a ray upward from the axis point:
+                    // crossings
     for (const Index3& f : mesh.facets) {
         std::vector<Vec3d> p;
-        for (const std::uint32_t v : f) p.push_back({mesh.vertices[v].x, mesh.vertices[v].y, mesh.vertices[v].z});
+        for (const std::uint32_t v : f)
+            p.push_back({mesh.vertices[v].x, mesh.vertices[v].y, mesh.vertices[v].z});
         auto clip = [](const std::vector<Vec3d>& in, double z, bool below) {
             std::vector<Vec3d> out;
             for (std::size_t k = 0; k < in.size(); ++k) {
@@ -76,13 +81,16 @@ double room(const Mesh& mesh, double z_top, const Cutter& cutter, double x, doub
             return out;
         };
         const std::vector<Vec3d> kept = clip(p, z_top, true);
-        // A ray straight up from (x, y) just under the cap, or from zc: an odd number of facets above means inside.
-        const double area2 = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (p[1][1] - p[0][1]);
+        // A ray straight up from (x, y) just under the cap, or from zc: an odd number of facets above means
+        // inside.
+        const double area2 =
+            (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (p[1][1] - p[0][1]);
         if (area2 != 0) {
             bool in = true;
             double z = 0;
             for (int k = 0; k < 3; ++k) {
-                const Vec3d &a = p[static_cast<std::size_t>(k)], &b = p[static_cast<std::size_t>((k + 1) % 3)],
+                const Vec3d &a = p[static_cast<std::size_t>(k)],
+                            &b = p[static_cast<std::size_t>((k + 1) % 3)],
                             &c = p[static_cast<std::size_t>((k + 2) % 3)];
                 const double s = (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
                 in &= area2 > 0 ? s > 0 : s < 0;
@@ -97,7 +105,8 @@ double room(const Mesh& mesh, double z_top, const Cutter& cutter, double x, doub
         if (ball)
             for (std::size_t k = 1; k + 1 < kept.size(); ++k) visit({kept[0], kept[k], kept[k + 1]});
     }
-    if (turns % 2 == 1) return -cutter.radius;  // on the axis, or above the cap and nearer than the ball's lower half
+    if (turns % 2 == 1)
+        return -cutter.radius;  // on the axis, or above the cap and nearer than the ball's lower half
     return nearest - cutter.radius;
 }
 
@@ -107,7 +116,8 @@ TEST_P(Cutting, ContoursTouchAndSpareThePart) {
     const auto [seed, profile] = GetParam();
     std::printf("seed %d\n", seed);
     Context context;
-    const Mesh mesh = test::random_height_field(context, 6, 3.0, 12, seed % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(seed));
+    const Mesh mesh = test::random_height_field(context, 6, 3.0, 12, seed % 2 ? 0.5 : 2.0,
+                                                static_cast<std::uint32_t>(seed));
     const double z_top = seed % 3 == 0 ? 8.0 : 12.5;
     const LayerSolid solid = layer_solid(context, mesh.view(), -5, z_top);
     const Cutter cutter{profile, 2.0};
@@ -117,10 +127,12 @@ TEST_P(Cutting, ContoursTouchAndSpareThePart) {
     for (const double tip : {-1.5, 1.0, 2.0, 3.25, 5.0, 7.0, 7.9}) {
         const Plane plane = inside_plane(solid, cutter, tip);
         const std::vector<Section> inside = slice(context, mesh.view(), {&plane, 1});
-        const Contours contours = level_contours(context, solid, inside[0].loops, cutter, tip, fibre_grid(solid, cutter, pitch));
+        const Contours contours =
+            level_contours(context, solid, inside[0].loops, cutter, tip, fibre_grid(solid, cutter, pitch));
         Loops loops;
         for (std::size_t c = 0; c < contours.size(); ++c) {
-            const auto points = std::span(contours.points).subspan(contours.starts[c], contours.starts[c + 1] - contours.starts[c]);
+            const auto points = std::span(contours.points)
+                                    .subspan(contours.starts[c], contours.starts[c + 1] - contours.starts[c]);
             for (std::size_t k = 0; k < points.size(); ++k) {
                 const Point2 a = points[k], b = points[(k + 1) % points.size()];
                 loops.points.push_back(a);
@@ -128,20 +140,25 @@ TEST_P(Cutting, ContoursTouchAndSpareThePart) {
                 if (random() % 8) continue;
                 const double left = room(mesh, z_top - kTopSheet, cutter, to_mm(a.x), to_mm(a.y), tip);
                 EXPECT_GE(left, -2e-4) << to_mm(a.x) << ' ' << to_mm(a.y) << " tip " << tip;
-                // A fibre that only grazes a wall ends where rounding says, up to √(8·r·rounding) from it; the border of the model lies so.
-                const bool grazes = std::abs(std::abs(to_mm(a.x)) - 11) < 1e-9 || std::abs(std::abs(to_mm(a.y)) - 11) < 1e-9;
+                // A fibre that only grazes a wall ends where rounding says, up to √(8·r·rounding) from it;
+                // the border of the model lies so.
+                const bool grazes =
+                    std::abs(std::abs(to_mm(a.x)) - 11) < 1e-9 || std::abs(std::abs(to_mm(a.y)) - 11) < 1e-9;
                 EXPECT_LE(left, grazes ? 0.02 : 2e-4) << to_mm(a.x) << ' ' << to_mm(a.y) << " tip " << tip;
-                EXPECT_GE(room(mesh, z_top - kTopSheet, cutter, 0.5 * to_mm(std::int64_t{a.x} + b.x), 0.5 * to_mm(std::int64_t{a.y} + b.y), tip),
+                EXPECT_GE(room(mesh, z_top - kTopSheet, cutter, 0.5 * to_mm(std::int64_t{a.x} + b.x),
+                               0.5 * to_mm(std::int64_t{a.y} + b.y), tip),
                           -miss);
             }
             loops.close_loop();
         }
         // Nothing is missing: wherever there is clearly room, or clearly none, the contours say the same.
         for (int k = 0; k < 200; ++k) {
-            const double x = static_cast<double>(random() % 2600) / 100 - 13, y = static_cast<double>(random() % 2600) / 100 - 13;
+            const double x = static_cast<double>(random() % 2600) / 100 - 13,
+                         y = static_cast<double>(random() % 2600) / 100 - 13;
             const double r = room(mesh, z_top - kTopSheet, cutter, x, y, tip);
             if (std::abs(r) < 0.05) continue;
-            EXPECT_EQ(winding(loops, {to_units(x), to_units(y)}) != 0, r < 0) << x << ' ' << y << " tip " << tip << " room " << r;
+            EXPECT_EQ(winding(loops, {to_units(x), to_units(y)}) != 0, r < 0)
+                << x << ' ' << y << " tip " << tip << " room " << r;
         }
     }
 }
@@ -152,7 +169,8 @@ TEST_P(Cutting, LevelsTogetherForbidWhatEachDoes) {
     std::mt19937 random(test::seed() + static_cast<std::uint32_t>(number));
     Context context;
     Mesh mesh = number % 3 == 0 ? weld(context, shapes::torus(24, 9, 4))
-                                : test::random_height_field(context, 20, 1.0, 12, number % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
+                                : test::random_height_field(context, 20, 1.0, 12, number % 2 ? 0.5 : 2.0,
+                                                            static_cast<std::uint32_t>(random()));
     const LayerSolid solid = layer_solid(context, mesh.view(), -5, number % 2 ? 3.5 : 12.5);
     const Cutter cutter{profile, 2.0};
     std::vector<double> tips;
@@ -161,11 +179,13 @@ TEST_P(Cutting, LevelsTogetherForbidWhatEachDoes) {
     std::vector<Plane> planes;
     for (const double tip : tips) planes.push_back(inside_plane(solid, cutter, tip));
     std::vector<Section> inside;  // one by one, for planes need not be in order here
-    for (const Plane& plane : planes) inside.push_back(std::move(slice(context, mesh.view(), {&plane, 1}).front()));
+    for (const Plane& plane : planes)
+        inside.push_back(std::move(slice(context, mesh.view(), {&plane, 1}).front()));
     std::vector<FibreLevel> levels;
     for (std::size_t i = 0; i < tips.size(); ++i) levels.push_back({tips[i], &inside[i].loops});
     std::vector<std::int32_t> lines;
-    for (std::int32_t v = -160000; v < 160000; v += 1 + static_cast<std::int32_t>(random() % 9000)) lines.push_back(v);
+    for (std::int32_t v = -160000; v < 160000; v += 1 + static_cast<std::int32_t>(random() % 9000))
+        lines.push_back(v);
     std::size_t compared = 0;
     for (const Axis axis : {Axis::x, Axis::y}) {
         const std::vector<Fibres> together = fibres(context, solid, levels, cutter, axis, lines);
@@ -186,14 +206,16 @@ TEST_P(Cutting, DropRestsOnThePart) {
     const auto [seed, profile] = GetParam();
     std::printf("seed %d\n", seed);
     Context context;
-    const Mesh mesh = test::random_height_field(context, 6, 3.0, 12, seed % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(seed));
+    const Mesh mesh = test::random_height_field(context, 6, 3.0, 12, seed % 2 ? 0.5 : 2.0,
+                                                static_cast<std::uint32_t>(seed));
     const double z_top = seed % 3 == 0 ? 8.0 : 12.5;
     const LayerSolid solid = layer_solid(context, mesh.view(), -5, z_top);
     const Cutter cutter{profile, 2.0};
     const DropIndex index(solid, cutter);
     std::mt19937 random(static_cast<std::uint32_t>(seed));
     for (int k = 0; k < 150; ++k) {
-        const double x = static_cast<double>(random() % 26000) / 1000 - 13, y = static_cast<double>(random() % 26000) / 1000 - 13;
+        const double x = static_cast<double>(random() % 26000) / 1000 - 13,
+                     y = static_cast<double>(random() % 26000) / 1000 - 13;
         const Rest rest = index.drop(x, y);
         if (rest.tip_z < -2.5) {
             EXPECT_GE(room(mesh, z_top - kTopSheet, cutter, x, y, -2.4), 0);
@@ -205,29 +227,36 @@ TEST_P(Cutting, DropRestsOnThePart) {
     }
 }
 
-// Many facets under one cutter, which the solid's tree must leave out or find: tiny ones, large ones beside them, upright walls and equal
-// heights, and all of it a metre away from the origin.
+// Many facets under one cutter, which the solid's tree must leave out or find: tiny ones, large ones beside
+// them, upright walls and equal heights, and all of it a metre away from the origin.
 TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
     const auto [number, profile] = GetParam();
     std::mt19937 random(test::seed() + static_cast<std::uint32_t>(number));
-    auto uniform = [&](double low, double high) { return low + (high - low) * (static_cast<double>(random()) / 4294967296.0); };
+    auto uniform = [&](double low, double high) {
+        return low + (high - low) * (static_cast<double>(random()) / 4294967296.0);
+    };
     Context context;
     Mesh mesh;
     if (number % 2 == 0) {
-        const double a = uniform(0.2, 1.5), b = uniform(0.3, 2), rough = number == 2 ? 0.0 : 0.03, floor = number == 4 ? 2.5 : 0.5;
+        const double a = uniform(0.2, 1.5), b = uniform(0.3, 2), rough = number == 2 ? 0.0 : 0.03,
+                     floor = number == 4 ? 2.5 : 0.5;
         mesh = test::height_field(context, 64, 0.25, [&](double x, double y) {
-            return std::max(floor, 3 + 2 * std::sin(a * x + b * y) + std::cos(b * x) + uniform(-rough, rough));
+            return std::max(floor,
+                            3 + 2 * std::sin(a * x + b * y) + std::cos(b * x) + uniform(-rough, rough));
         });
         // Through it a wall of few facets, which has a tier of its own.
         shapes::Facets facets = shapes::box({-8.5F, 0.6F, -9}, {8.5F, 0.9F, 4.25F});
-        for (const auto& f : mesh.facets) facets.push_back({mesh.vertices[f[0]], mesh.vertices[f[1]], mesh.vertices[f[2]]});
+        for (const auto& f : mesh.facets)
+            facets.push_back({mesh.vertices[f[0]], mesh.vertices[f[1]], mesh.vertices[f[2]]});
         mesh = weld(context, facets);
     } else {
         shapes::Facets facets;
         for (int j = 0; j < 8; ++j)
             for (int i = 0; i < 8; ++i) {
-                const auto x = static_cast<float>(2 * i - 8), y = static_cast<float>(2 * j - 8), z = static_cast<float>(2 + random() % 3);
-                shapes::append(facets, shapes::box({x, y, 0}, {x + static_cast<float>(uniform(0.1, 1.9)), y + 1.25F, z}));
+                const auto x = static_cast<float>(2 * i - 8), y = static_cast<float>(2 * j - 8),
+                           z = static_cast<float>(2 + random() % 3);
+                shapes::append(facets, shapes::box({x, y, 0}, {x + static_cast<float>(uniform(0.1, 1.9)),
+                                                               y + 1.25F, z}));
             }
         mesh = weld(context, facets);
     }
@@ -245,14 +274,17 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
             if (k % 20 == 0) x = away.x + uniform(-8, 8), y = away.y + uniform(-8, 8);
             else x += uniform(-0.1 * r, 0.1 * r), y += uniform(-0.1 * r, 0.1 * r);
             const Rest rest = index.drop(x, y);
-            for (const double z : {rest.tip_z - uniform(0, r), rest.tip_z - 1e-6, rest.tip_z, rest.tip_z + 1e-6, rest.tip_z + uniform(0, r)}) {
-                SCOPED_TRACE(testing::Message() << "r " << r << " at " << x << ' ' << y << ' ' << z << " tip " << rest.tip_z);
+            for (const double z : {rest.tip_z - uniform(0, r), rest.tip_z - 1e-6, rest.tip_z,
+                                   rest.tip_z + 1e-6, rest.tip_z + uniform(0, r)}) {
+                SCOPED_TRACE(testing::Message()
+                             << "r " << r << " at " << x << ' ' << y << ' ' << z << " tip " << rest.tip_z);
                 EXPECT_EQ(index.stands_over(x, y, z, &met), rest.tip_z > z);
                 EXPECT_EQ(index.tip_within(x, y, z, &met), index.tip_within(x, y, z));
                 const std::optional<Rest> told = index.drop_within(x, y, -1e9, z, &met);
                 ASSERT_EQ(told.has_value(), rest.tip_z <= z);
                 for (const Rest& other : {told.value_or(rest), index.drop(x, y, -1e9, &met)})
-                    EXPECT_TRUE(other.tip_z == rest.tip_z && other.nx == rest.nx && other.ny == rest.ny && other.nz == rest.nz);
+                    EXPECT_TRUE(other.tip_z == rest.tip_z && other.nx == rest.nx && other.ny == rest.ny &&
+                                other.nz == rest.nz);
             }
             const double kept_up = met.keep_up(index.cutter(), x, y);
             EXPECT_LE(kept_up, rest.tip_z);
@@ -265,33 +297,45 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
         const DropIndex index(solid, cutter);
         for (int k = 0; k < 40; ++k) {
             // Some of the places lie right over edges and vertices.
-            const double x = away.x + (k % 4 ? uniform(-8 - r, 8 + r) : 0.25 * static_cast<double>(random() % 64) - 8),
-                         y = away.y + (k % 4 ? uniform(-8 - r, 8 + r) : 0.25 * static_cast<double>(random() % 64) - 8);
+            const double x = away.x +
+                             (k % 4 ? uniform(-8 - r, 8 + r) : 0.25 * static_cast<double>(random() % 64) - 8),
+                         y = away.y +
+                             (k % 4 ? uniform(-8 - r, 8 + r) : 0.25 * static_cast<double>(random() % 64) - 8);
             const Rest rest = index.drop(x, y);
-            for (const double z : {-1e9, -r, 0.2 * k, rest.tip_z, std::nextafter(rest.tip_z, -1e9), rest.tip_z + 1e-3, rest.tip_z - 1e-3}) {
-                EXPECT_EQ(index.stands_over(x, y, z), rest.tip_z > z) << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
+            for (const double z : {-1e9, -r, 0.2 * k, rest.tip_z, std::nextafter(rest.tip_z, -1e9),
+                                   rest.tip_z + 1e-3, rest.tip_z - 1e-3}) {
+                EXPECT_EQ(index.stands_over(x, y, z), rest.tip_z > z)
+                    << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
                 const std::optional<double> within = index.tip_within(x, y, z);
-                EXPECT_EQ(within.has_value(), rest.tip_z <= z) << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
+                EXPECT_EQ(within.has_value(), rest.tip_z <= z)
+                    << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
                 if (within) {
                     EXPECT_EQ(*within, rest.tip_z) << x << ' ' << y << ' ' << z;
                 }
                 const std::optional<Rest> told = index.drop_within(x, y, -1e9, z);
-                EXPECT_EQ(told.has_value(), rest.tip_z <= z) << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
+                EXPECT_EQ(told.has_value(), rest.tip_z <= z)
+                    << x << ' ' << y << ' ' << z << " tip " << rest.tip_z;
                 if (told) {
-                    EXPECT_TRUE(told->tip_z == rest.tip_z && told->nx == rest.nx && told->ny == rest.ny && told->nz == rest.nz) << x << ' ' << y;
+                    EXPECT_TRUE(told->tip_z == rest.tip_z && told->nx == rest.nx && told->ny == rest.ny &&
+                                told->nz == rest.nz)
+                        << x << ' ' << y;
                 }
                 const Rest above = index.drop(x, y, z);
-                EXPECT_EQ(above.tip_z, rest.tip_z > z ? rest.tip_z : -std::numeric_limits<double>::infinity()) << x << ' ' << y << ' ' << z;
+                EXPECT_EQ(above.tip_z, rest.tip_z > z ? rest.tip_z : -std::numeric_limits<double>::infinity())
+                    << x << ' ' << y << ' ' << z;
                 if (rest.tip_z <= z) continue;
-                EXPECT_TRUE(above.nx == rest.nx && above.ny == rest.ny && above.nz == rest.nz) << x << ' ' << y << ' ' << z;
+                EXPECT_TRUE(above.nx == rest.nx && above.ny == rest.ny && above.nz == rest.nz)
+                    << x << ' ' << y << ' ' << z;
             }
             if (rest.tip_z < -r) {
                 EXPECT_GE(room(mesh, 100, cutter, x, y, -r + 1e-6), 0) << x << ' ' << y;
                 continue;
             }
             EXPECT_GE(room(mesh, 100, cutter, x, y, rest.tip_z + 1e-6), -1e-6) << x << ' ' << y << " r " << r;
-            const double lower = room(mesh, 100, cutter, x, y, rest.tip_z - 1e-4);  // 0 where a vertex lies on the very rim
-            EXPECT_TRUE(lower < 0 || (k % 4 == 0 && lower == 0)) << x << ' ' << y << " r " << r << " could go lower than " << rest.tip_z;
+            const double lower =
+                room(mesh, 100, cutter, x, y, rest.tip_z - 1e-4);  // 0 where a vertex lies on the very rim
+            EXPECT_TRUE(lower < 0 || (k % 4 == 0 && lower == 0))
+                << x << ' ' << y << " r " << r << " could go lower than " << rest.tip_z;
         }
     }
 }
@@ -299,18 +343,22 @@ TEST_P(Cutting, DropFindsTheOneFacetOfMany) {
 // What the raster asks of a wider end mill for many places at once.
 TEST(Drops, WhereAWiderEndMillMeetsNothingNorDoesANarrowOneAround) {
     std::mt19937 random(test::seed());
-    auto uniform = [&](double low, double high) { return low + (high - low) * (static_cast<double>(random()) / 4294967296.0); };
+    auto uniform = [&](double low, double high) {
+        return low + (high - low) * (static_cast<double>(random()) / 4294967296.0);
+    };
     Context context;
     const Mesh mesh = test::height_field(context, 48, 0.25, [&](double x, double y) {
         return std::abs(x) + std::abs(y) < 2 ? 4.0 : std::max(1.0, 2 * std::sin(1.3 * x) + std::cos(y));
     });
     const LayerSolid solid = layer_solid(context, mesh.view(), -20, 3.5);
     constexpr double r = 0.8, half = 0.6, rounding = 1e-6;
-    const DropIndex narrow(solid, {Cutter::Profile::flat, r}), wide(solid, {Cutter::Profile::flat, r + half + rounding});
+    const DropIndex narrow(solid, {Cutter::Profile::flat, r}),
+        wide(solid, {Cutter::Profile::flat, r + half + rounding});
     int free = 0;
     for (int k = 0; k < 4000; ++k) {
         const double x = uniform(-7, 7), y = uniform(-7, 7), z = k % 2 ? 1.001 : uniform(0, 4);
-        if (std::abs(z - solid.z_top) <= kTopSheet) continue;  // there its upper end stands and its facets do not
+        if (std::abs(z - solid.z_top) <= kTopSheet)
+            continue;  // there its upper end stands and its facets do not
         if (wide.stands_over(x, y, z - rounding)) continue;
         ++free;
         for (const double way : {-half, half, uniform(-half, half)})
@@ -341,15 +389,18 @@ TEST(Drops, SameBytesOnAnyNumberOfThreads) {
 TEST(Drops, CapCellsKnowTheInsideAsWindingDoes) {
     std::mt19937 random(test::seed());
     for (int round = 0; round < 20; ++round) {
-        // Outer loops counter-clockwise and holes clockwise, some crossing each other, all on even coordinates; some have level edges.
+        // Outer loops counter-clockwise and holes clockwise, some crossing each other, all on even
+        // coordinates; some have level edges.
         Loops loops;
         const int size = 1 << (10 + round), corners = 3 + static_cast<int>(random() % 40);
         for (int l = 0; l < 6; ++l) {
-            const double cx = static_cast<double>(random() % 1000) / 1000 * size, cy = static_cast<double>(random() % 1000) / 1000 * size;
+            const double cx = static_cast<double>(random() % 1000) / 1000 * size,
+                         cy = static_cast<double>(random() % 1000) / 1000 * size;
             for (int k = 0; k < corners; ++k) {
                 const double turn = 2 * 3.141592653589793 * k / corners * (l % 3 == 2 ? -1 : 1),
                              d = size * (0.2 + static_cast<double>(random() % 100) / 200);
-                Point2 p{2 * static_cast<std::int32_t>(cx + d * std::cos(turn)), 2 * static_cast<std::int32_t>(cy + d * std::sin(turn))};
+                Point2 p{2 * static_cast<std::int32_t>(cx + d * std::cos(turn)),
+                         2 * static_cast<std::int32_t>(cy + d * std::sin(turn))};
                 if (k % 3 == 1) p.y = loops.points.back().y;
                 loops.points.push_back(p);
             }
@@ -358,7 +409,11 @@ TEST(Drops, CapCellsKnowTheInsideAsWindingDoes) {
         const CapCells cells(loops);
         int inside = 0;
         for (int k = 0; k < 3000; ++k) {
-            const auto at = [&] { return static_cast<std::int32_t>(static_cast<double>(random() % 10000) / 10000 * 4 * size - size) | 1; };
+            const auto at = [&] {
+                return static_cast<std::int32_t>(static_cast<double>(random() % 10000) / 10000 * 4 * size -
+                                                 size) |
+                       1;
+            };
             const Point2 p{at(), at()};
             const bool expected = winding(loops, p) > 0;
             inside += expected;
@@ -368,10 +423,12 @@ TEST(Drops, CapCellsKnowTheInsideAsWindingDoes) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, Cutting, testing::Combine(testing::Range(1, 7), testing::Values(Cutter::Profile::ball, Cutter::Profile::flat)));
+INSTANTIATE_TEST_SUITE_P(Random, Cutting,
+                         testing::Combine(testing::Range(1, 7),
+                                          testing::Values(Cutter::Profile::ball, Cutter::Profile::flat)));
 
-// A flange whose underside float32 puts a hair under the layer's top is no part of the layer: neither are its facets there, nor may its
-// section be, or the contours around it would run off the grid.
+// A flange whose underside float32 puts a hair under the layer's top is no part of the layer: neither are its
+// facets there, nor may its section be, or the contours around it would run off the grid.
 TEST(Fibres, AFlangeThatBeginsAtTheTopIsNoneOfTheLayer) {
     Context context;
     shapes::Facets facets = shapes::box({10, 10, 0}, {20, 20, 10});
@@ -382,7 +439,8 @@ TEST(Fibres, AFlangeThatBeginsAtTheTopIsNoneOfTheLayer) {
     for (const double tip : {4.0, 6.9999, 7.5, 9.5}) {
         const Plane plane = inside_plane(solid, cutter, tip);
         const Contours contours =
-            level_contours(context, solid, slice(context, mesh.view(), {&plane, 1})[0].loops, cutter, tip, fibre_grid(solid, cutter, 2500));
+            level_contours(context, solid, slice(context, mesh.view(), {&plane, 1})[0].loops, cutter, tip,
+                           fibre_grid(solid, cutter, 2500));
         ASSERT_EQ(contours.size(), 1U) << tip;
         const double reach = 3 - std::max(0.0, tip - 7), half = std::sqrt(9 - (3 - reach) * (3 - reach));
         for (const Point2 p : contours.points) {
@@ -399,19 +457,23 @@ TEST(Fibres, WhatACutterCanTouchEndsAllThatIsForbidden) {
     std::size_t compared = 0, turned = 0;
     for (int trial = 0; trial < 48; ++trial) {
         const double size = trial % 4 == 1 ? 0.4 : trial % 4 == 2 ? 1.0 : 3.0, high = trial % 2 ? 3.0 : 12.0;
-        const Mesh mesh = trial % 6 == 5 ? weld(context, shapes::torus(static_cast<int>(20 + random() % 60), 9, 4))
-                                         : test::random_height_field(context, static_cast<int>(24 / size), size, high, high < 4 ? 0.25 : 2.0,
-                                                                     static_cast<std::uint32_t>(random()));
+        const Mesh mesh =
+            trial % 6 == 5
+                ? weld(context, shapes::torus(static_cast<int>(20 + random() % 60), 9, 4))
+                : test::random_height_field(context, static_cast<int>(24 / size), size, high,
+                                            high < 4 ? 0.25 : 2.0, static_cast<std::uint32_t>(random()));
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, trial % 3 == 0 ? 2.5 : 12.5);
         LayerSolid each = solid;
         each.corners.clear();
         for (const GroupCorners& group : solid.corners)
             for (const auto& corner : group.corner.high)
                 for (const std::int8_t up : corner[2]) turned += up > 0 && up < 127;
-        const Cutter cutter{trial < 24 ? Cutter::Profile::ball : Cutter::Profile::flat, trial % 5 == 0 ? 0.7 : 3.0};
+        const Cutter cutter{trial < 24 ? Cutter::Profile::ball : Cutter::Profile::flat,
+                            trial % 5 == 0 ? 0.7 : 3.0};
         std::vector<double> tips;
         for (int k = 0; k < 10; ++k) tips.push_back(static_cast<double>(random() % 12000) / 1000 - 4);
-        if (const float corner = mesh.vertices[random() % mesh.vertices.size()].z; corner < solid.z_top) tips.push_back(corner);
+        if (const float corner = mesh.vertices[random() % mesh.vertices.size()].z; corner < solid.z_top)
+            tips.push_back(corner);
         std::vector<Section> inside;
         for (const double tip : tips) {
             const Plane plane = inside_plane(solid, cutter, tip);
@@ -420,15 +482,18 @@ TEST(Fibres, WhatACutterCanTouchEndsAllThatIsForbidden) {
         std::vector<FibreLevel> levels;
         for (std::size_t i = 0; i < tips.size(); ++i) levels.push_back({tips[i], &inside[i].loops});
         std::vector<std::int32_t> lines;
-        for (std::int32_t v = -170000; v < 170000; v += 1 + static_cast<std::int32_t>(random() % 5000)) lines.push_back(v);
+        for (std::int32_t v = -170000; v < 170000; v += 1 + static_cast<std::int32_t>(random() % 5000))
+            lines.push_back(v);
         for (const Axis axis : {Axis::x, Axis::y}) {
             const std::vector<Fibres> some = fibres(context, solid, levels, cutter, axis, lines),
                                       all = fibres(context, each, levels, cutter, axis, lines);
             for (std::size_t i = 0; i < levels.size(); ++i) {
                 ASSERT_EQ(some[i].starts, all[i].starts) << "trial " << trial << " tip " << tips[i];
                 for (std::size_t k = 0; k < all[i].intervals.size(); ++k, ++compared) {
-                    ASSERT_NEAR(some[i].intervals[k].low, all[i].intervals[k].low, 1e-9) << "trial " << trial << " tip " << tips[i];
-                    ASSERT_NEAR(some[i].intervals[k].high, all[i].intervals[k].high, 1e-9) << "trial " << trial << " tip " << tips[i];
+                    ASSERT_NEAR(some[i].intervals[k].low, all[i].intervals[k].low, 1e-9)
+                        << "trial " << trial << " tip " << tips[i];
+                    ASSERT_NEAR(some[i].intervals[k].high, all[i].intervals[k].high, 1e-9)
+                        << "trial " << trial << " tip " << tips[i];
                 }
             }
         }
@@ -443,7 +508,8 @@ TEST(LayerSolid, CornersHoldTheNormalsAroundThem) {
     Context context;
     std::size_t known = 0, known_aside = 0;
     for (int trial = 0; trial < 6; ++trial) {
-        const Mesh mesh = test::random_height_field(context, 12, 2.0, 5, trial % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
+        const Mesh mesh = test::random_height_field(context, 12, 2.0, 5, trial % 2 ? 0.5 : 2.0,
+                                                    static_cast<std::uint32_t>(random()));
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, trial < 4 ? 100 : 2.5);
         std::map<Vec3d, std::vector<const SolidFacet*>> around;
         for (const SolidFacet& f : solid.facets)
@@ -454,14 +520,19 @@ TEST(LayerSolid, CornersHoldTheNormalsAroundThem) {
             for (std::size_t c = 0; c < 3; ++c) {
                 if ((f.ends >> c & 1) == 0) continue;
                 for (int round = 0; round < 20; ++round) {
-                    Vec3d sum{0, 0, f.p[c][2] >= f.z_max && f.top ? std::uniform_real_distribution<double>(0, 1)(random) : 0.0};
+                    Vec3d sum{0, 0,
+                              f.p[c][2] >= f.z_max && f.top
+                                  ? std::uniform_real_distribution<double>(0, 1)(random)
+                                  : 0.0};
                     for (const SolidFacet* other : around[f.p[c]]) {
-                        const double weight = std::pow(std::uniform_real_distribution<double>(0, 1)(random), 4);
+                        const double weight =
+                            std::pow(std::uniform_real_distribution<double>(0, 1)(random), 4);
                         for (std::size_t k = 0; k < 3; ++k) sum[k] += weight * other->normal[k];
                     }
                     const double length = std::hypot(sum[0], sum[1], sum[2]);
                     for (std::size_t k = 0; k < 3; ++k) {
-                        const int low = corners.low[c][k][i % FacetGroup::kFacets], high = corners.high[c][k][i % FacetGroup::kFacets];
+                        const int low = corners.low[c][k][i % FacetGroup::kFacets],
+                                  high = corners.high[c][k][i % FacetGroup::kFacets];
                         known += high - low < 150;
                         EXPECT_LE(low * SolidFacet::kTurn, sum[k] / length + 1e-9);
                         EXPECT_GE(high * SolidFacet::kTurn, sum[k] / length - 1e-9);
@@ -475,8 +546,9 @@ TEST(LayerSolid, CornersHoldTheNormalsAroundThem) {
                     const Vec3d &m = other->normal, &n = f.normal;
                     const double m_across = std::hypot(m[0], m[1]), n_across = std::hypot(n[0], n[1]);
                     if (m_across > 0) {
-                        EXPECT_LE(std::hypot(m[0] / m_across - n[0] / n_across, m[1] / m_across - n[1] / n_across),
-                                  f.aside[c] * SolidFacet::kTurn + 1e-12);
+                        EXPECT_LE(
+                            std::hypot(m[0] / m_across - n[0] / n_across, m[1] / m_across - n[1] / n_across),
+                            f.aside[c] * SolidFacet::kTurn + 1e-12);
                     }
                 }
             }
@@ -486,19 +558,22 @@ TEST(LayerSolid, CornersHoldTheNormalsAroundThem) {
     EXPECT_GT(known_aside, 500U);
 }
 
-// The normals beside an edge and all between them are told, and a corner in which edges end that are tested is tested by one of its facets.
+// The normals beside an edge and all between them are told, and a corner in which edges end that are tested
+// is tested by one of its facets.
 TEST(LayerSolid, EdgesHoldTheNormalsBetweenTheirFacets) {
     std::mt19937 random(test::seed());
     Context context;
     std::size_t edges = 0, corners = 0, narrow = 0;
     for (int trial = 0; trial < 6; ++trial) {
-        const Mesh mesh = test::random_height_field(context, 12, 2.0, 5, trial % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
+        const Mesh mesh = test::random_height_field(context, 12, 2.0, 5, trial % 2 ? 0.5 : 2.0,
+                                                    static_cast<std::uint32_t>(random()));
         const double z_top = trial < 3 ? 100 : 2.5;
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, z_top);
         std::map<std::pair<Vec3d, Vec3d>, const SolidFacet*> by_edge;
         std::map<Vec3d, int> ends;  // how many facets are to test a corner
         for (const SolidFacet& f : solid.facets)
-            for (std::size_t c = 0; c < 3; ++c) by_edge[{f.p[c], f.p[(c + 1) % 3]}] = &f, ends[f.p[c]] += f.ends >> c & 1;
+            for (std::size_t c = 0; c < 3; ++c)
+                by_edge[{f.p[c], f.p[(c + 1) % 3]}] = &f, ends[f.p[c]] += f.ends >> c & 1;
         for (std::size_t i = 0; i < solid.facets.size(); ++i) {
             const SolidFacet& f = solid.facets[i];
             const GroupCorners& group = solid.corners[i / FacetGroup::kFacets];
@@ -517,10 +592,12 @@ TEST(LayerSolid, EdgesHoldTheNormalsBetweenTheirFacets) {
                 ++edges;
                 for (int step = 0; step <= 20; ++step) {
                     const double s = 0.05 * step;
-                    const Vec3d sum{m[0] + s * (n[0] - m[0]), m[1] + s * (n[1] - m[1]), m[2] + s * (n[2] - m[2])};
+                    const Vec3d sum{m[0] + s * (n[0] - m[0]), m[1] + s * (n[1] - m[1]),
+                                    m[2] + s * (n[2] - m[2])};
                     const double length = std::hypot(sum[0], sum[1], sum[2]);
                     for (std::size_t k = 0; k < 3; ++k) {
-                        const int least = group.edge.low[c][k][i % FacetGroup::kFacets], most = group.edge.high[c][k][i % FacetGroup::kFacets];
+                        const int least = group.edge.low[c][k][i % FacetGroup::kFacets],
+                                  most = group.edge.high[c][k][i % FacetGroup::kFacets];
                         EXPECT_LE(least * SolidFacet::kTurn, sum[k] / length + 1e-9);
                         EXPECT_GE(most * SolidFacet::kTurn, sum[k] / length - 1e-9);
                         narrow += most - least < 60;
@@ -540,14 +617,18 @@ TEST(LayerSolid, WhatIsNearSufficesForTheContoursThere) {
     Context context;
     std::size_t compared = 0, left_out = 0, contours_left_out = 0;
     for (int trial = 0; trial < 8; ++trial) {
-        const Mesh mesh = test::random_height_field(context, 24, 3.0, 12, trial % 2 ? 0.5 : 2.0, static_cast<std::uint32_t>(random()));
+        const Mesh mesh = test::random_height_field(context, 24, 3.0, 12, trial % 2 ? 0.5 : 2.0,
+                                                    static_cast<std::uint32_t>(random()));
         const LayerSolid solid = layer_solid(context, mesh.view(), -5, 12.5);
         const Cutter cutter{trial % 3 == 0 ? Cutter::Profile::flat : Cutter::Profile::ball, 2.0};
         std::vector<SolidFacet> chosen;
         const Vec3d middle = solid.facets[random() % solid.facets.size()].p[0];
         for (const SolidFacet& f : solid.facets)
-            if (std::hypot(f.p[0][0] - middle[0], f.p[0][1] - middle[1]) < 5 && f.nz > 0.5) chosen.push_back(f);
-        const bool ball = cutter.profile == Cutter::Profile::ball;  // where a disc touches two facets in one place, either tells its nz
+            if (std::hypot(f.p[0][0] - middle[0], f.p[0][1] - middle[1]) < 5 && f.nz > 0.5)
+                chosen.push_back(f);
+        const bool ball =
+            cutter.profile ==
+            Cutter::Profile::ball;  // where a disc touches two facets in one place, either tells its nz
         const LayerSolid near = solid_near(context, solid, chosen, 2 * cutter.radius + 2 * 0.25);
         left_out += solid.facets.size() - near.facets.size();
         const FibreGrid grid = fibre_grid(solid, cutter, 2500);
@@ -563,7 +644,8 @@ TEST(LayerSolid, WhatIsNearSufficesForTheContoursThere) {
         auto points = [&](const Contours& contours) {
             std::vector<std::tuple<std::int32_t, std::int32_t, float>> found;
             for (std::size_t k = 0; k < contours.points.size(); ++k)
-                if (beside(contours.points[k])) found.emplace_back(contours.points[k].x, contours.points[k].y, ball ? contours.nz[k] : 0);
+                if (beside(contours.points[k]))
+                    found.emplace_back(contours.points[k].x, contours.points[k].y, ball ? contours.nz[k] : 0);
             std::sort(found.begin(), found.end());
             return found;
         };
@@ -593,7 +675,8 @@ TEST(Fibres, SameBytesOnAnyNumberOfThreads) {
         const Cutter cutter{Cutter::Profile::ball, 3.0};
         const Plane plane = inside_plane(solid, cutter, 4);
         const auto inside = slice(context, mesh.view(), {&plane, 1});
-        results.push_back(level_contours(context, solid, inside[0].loops, cutter, 4, fibre_grid(solid, cutter, 2500)));
+        results.push_back(
+            level_contours(context, solid, inside[0].loops, cutter, 4, fibre_grid(solid, cutter, 2500)));
     }
     for (const Contours& c : results) {
         EXPECT_EQ(c.points, results[0].points);

@@ -34,7 +34,8 @@ TEST(Decimate, KeepsTheShapeOfOwnModels) {
         EXPECT_GT(few.facets.size(), wished * 9 / 10);
         EXPECT_TRUE(closed(few.view()));
         EXPECT_NEAR(volume(few.view()), volume(mesh.view()), 0.003 * volume(mesh.view()));
-        const double error = surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view()));
+        const double error =
+            surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view()));
         const Box3 box = bounds(mesh.view());
         EXPECT_GT(error, 0);
         EXPECT_LT(error, 0.003 * (box.max.x - box.min.x));
@@ -42,7 +43,8 @@ TEST(Decimate, KeepsTheShapeOfOwnModels) {
 }
 
 TEST(Decimate, FlatPlatesNeedFewFacets) {
-    // A plate whose top is a fine grid: all of that is flat, so hardly anything of it is needed, and nothing moves.
+    // A plate whose top is a fine grid: all of that is flat, so hardly anything of it is needed, and nothing
+    // moves.
     std::vector<Facet> facets;
     const int n = 30;
     const auto quad = [&](Vec3f a, Vec3f b, Vec3f c, Vec3f d) {
@@ -67,7 +69,9 @@ TEST(Decimate, FlatPlatesNeedFewFacets) {
     const Mesh few = decimate(context, mesh.view(), 60);
     EXPECT_LE(few.facets.size(), 60u);
     EXPECT_TRUE(closed(few.view()));
-    EXPECT_LT(surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view())), 1e-3);
+    EXPECT_LT(
+        surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view())),
+        1e-3);
     EXPECT_NEAR(volume(few.view()), 5.0 * n * n, 1e-2);
 }
 
@@ -84,11 +88,13 @@ TEST(Decimate, SameOnAnyThreadsAndUntouchedWhenSmall) {
 }
 
 TEST(Decimate, AGridKeepsEdges) {
-    // A block whose sides are fine grids, turned so that no side lies along the cells: merged vertices must go back to its edges and corners.
+    // A block whose sides are fine grids, turned so that no side lies along the cells: merged vertices must
+    // go back to its edges and corners.
     const int n = 60;
     const auto turned = [&](double x, double y, double z) {
         const double c = std::cos(0.4), s = std::sin(0.4), u = c * x - s * y, v = s * x + c * y;
-        return Vec3f{static_cast<float>(u), static_cast<float>(c * v - s * z), static_cast<float>(s * v + c * z)};
+        return Vec3f{static_cast<float>(u), static_cast<float>(c * v - s * z),
+                     static_cast<float>(s * v + c * z)};
     };
     std::vector<Facet> facets;
     for (int side = 0; side < 6; ++side)
@@ -109,7 +115,8 @@ TEST(Decimate, AGridKeepsEdges) {
     const Mesh mesh = welded(one, facets);
     ASSERT_TRUE(closed(mesh.view()));
     // 6000 facets are aimed at: cells of 2.7 mm.
-    const Mesh few = decimate(one, mesh.view(), 5000, 24'000), same = decimate(four, mesh.view(), 5000, 24'000);
+    const Mesh few = decimate(one, mesh.view(), 5000, 24'000),
+               same = decimate(four, mesh.view(), 5000, 24'000);
     EXPECT_EQ(few.vertices, same.vertices);
     EXPECT_EQ(few.facets, same.facets);
     EXPECT_LE(few.facets.size(), 5000u);
@@ -127,7 +134,9 @@ TEST(Decimate, AGridKeepsTheShapeOfOwnModels) {
         const Box3 box = bounds(mesh.view());
         const double area = 2 * (box.max.x - box.min.x) * (box.max.y - box.min.y);
         const double cell = std::sqrt(2 * area / (static_cast<double>(mesh.facets.size()) / 4));
-        EXPECT_LT(surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view())), 3 * cell);
+        EXPECT_LT(
+            surface_deviation(context, StandingPart(context, mesh.view()), StandingPart(context, few.view())),
+            3 * cell);
         EXPECT_NEAR(volume(few.view()), volume(mesh.view()), 0.02 * volume(mesh.view()));
     }
 }
@@ -150,7 +159,9 @@ TEST(Deviation, IsTheDistanceOfShiftedPlanes) {
         a.vertices = {{0, 0, 0}, {10, 0, 0}, {0, 10, 0}};
         b.vertices = {{0, 0, up}, {10, 0, up}, {0, 10, up}};
         a.facets = b.facets = {{0, 1, 2}};
-        EXPECT_NEAR(surface_deviation(context, StandingPart(context, a.view()), StandingPart(context, b.view())), up, 1e-6);
+        EXPECT_NEAR(
+            surface_deviation(context, StandingPart(context, a.view()), StandingPart(context, b.view())), up,
+            1e-6);
     }
 }
 
@@ -192,7 +203,8 @@ TEST(Slopes, OfACone) {
     const float radius = 20, height = static_cast<float>(radius * std::tan(M_PI / 3));
     const auto rim = [&](int i) {
         const double angle = 2 * M_PI * (i % n) / n;
-        return Vec3f{static_cast<float>(radius * std::cos(angle)), static_cast<float>(radius * std::sin(angle)), 0};
+        return Vec3f{static_cast<float>(radius * std::cos(angle)),
+                     static_cast<float>(radius * std::sin(angle)), 0};
     };
     for (int i = 0; i < n; ++i) {
         facets.push_back({Vec3f{0, 0, height}, rim(i), rim(i + 1)});
@@ -221,13 +233,17 @@ TEST(Slopes, AgreeWithBruteForceOnThePumpCover) {
         for (const Index3& f : mesh.facets) {
             const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
             if (std::max({a.z, b.z, c.z}) <= low + 1e-6 || std::min({a.z, b.z, c.z}) >= high - 1e-6) continue;
-            const double nx = (double{b.y} - a.y) * (double{c.z} - a.z) - (double{b.z} - a.z) * (double{c.y} - a.y);
-            const double ny = (double{b.z} - a.z) * (double{c.x} - a.x) - (double{b.x} - a.x) * (double{c.z} - a.z);
-            const double nz = (double{b.x} - a.x) * (double{c.y} - a.y) - (double{b.y} - a.y) * (double{c.x} - a.x);
+            const double nx =
+                (double{b.y} - a.y) * (double{c.z} - a.z) - (double{b.z} - a.z) * (double{c.y} - a.y);
+            const double ny =
+                (double{b.z} - a.z) * (double{c.x} - a.x) - (double{b.x} - a.x) * (double{c.z} - a.z);
+            const double nz =
+                (double{b.x} - a.x) * (double{c.y} - a.y) - (double{b.y} - a.y) * (double{c.x} - a.x);
             if (nz < 0) continue;
             least = std::min(least, std::atan2(std::hypot(nx, ny), nz) * 180 / M_PI);
         }
-        // Flats at a step's very border belong to one side of it; the profile may take them where brute force does not.
+        // Flats at a step's very border belong to one side of it; the profile may take them where brute force
+        // does not.
         EXPECT_LE(profile.least_deg[static_cast<std::size_t>(i)], least + 1e-6) << i;
         if (profile.least_deg[static_cast<std::size_t>(i)] > 0.01) {
             EXPECT_NEAR(profile.least_deg[static_cast<std::size_t>(i)], least, 1e-6) << i;

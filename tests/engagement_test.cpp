@@ -1,4 +1,5 @@
-// The feed that follows from what a roughing cutter meets: straight passes, slots, corners, and the bound that the cap promises.
+// The feed that follows from what a roughing cutter meets: straight passes, slots, corners, and the bound
+// that the cap promises.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +18,9 @@ constexpr double kTop = 19, kDepth = 3, kDiameter = 12;
 constexpr std::uint32_t kFeed = 6000;
 const EngagementCap kCap{0.7, kDiameter, kDepth};
 
-Move to(double x, double y, double z, std::uint32_t feed = kFeed) { return {to_units(x), to_units(y), to_units(z), feed}; }
+Move to(double x, double y, double z, std::uint32_t feed = kFeed) {
+    return {to_units(x), to_units(y), to_units(z), feed};
+}
 EngagedStock slab() { return {{0, 0}, {100, 80}, kTop, kDiameter / 2}; }
 
 std::uint32_t slowest(const std::vector<Move>& moves) {
@@ -63,7 +66,8 @@ TEST(Engagement, PartsOfAWayTakeWhatTheyTakeOneByOne) {
                 for (std::size_t a = 0; a < 3; ++a) next[a] = at[a] + t * (to[a] - at[a]);
             const double volume = pieces.cut(from, next);
             // A cell of a quarter of a square millimetre whose centre lies on an edge goes to either part.
-            EXPECT_NEAR(volumes[k - 1], volume, 0.26 * 9 + 1e-9) << "seed " << seed << ", trial " << trial << ", part " << k;
+            EXPECT_NEAR(volumes[k - 1], volume, 0.26 * 9 + 1e-9)
+                << "seed " << seed << ", trial " << trial << ", part " << k;
             met += volume > 3;
             from = next;
         }
@@ -79,15 +83,18 @@ TEST(Engagement, TakesWhatTheExactSweepTakes) {
     std::uniform_real_distribution<double> ux(-8, 108), uy(-8, 88), uz(kTop - 9, kTop + 1), share(0, 1);
     EngagedStock stock = slab();
     const double cell = kDiameter / 2 / 12;  // as the header says
-    Stock exact({cell / 2, cell / 2, cell, static_cast<int>(std::lround(100 / cell)), static_cast<int>(std::lround(80 / cell))});
+    Stock exact({cell / 2, cell / 2, cell, static_cast<int>(std::lround(100 / cell)),
+                 static_cast<int>(std::lround(80 / cell))});
     exact.add_slab(0, kTop);
     std::array<double, 3> at{ux(random), uy(random), kTop};
     for (int k = 0; k < 400; ++k) {
         if (share(random) < 0.1) at = {ux(random), uy(random), uz(random)};
         const double near = share(random) < 0.5 ? 0.05 : 1;  // short ways and long ones
-        const std::array<double, 3> to{at[0] + near * (ux(random) - at[0]), at[1] + near * (uy(random) - at[1]),
+        const std::array<double, 3> to{at[0] + near * (ux(random) - at[0]),
+                                       at[1] + near * (uy(random) - at[1]),
                                        share(random) < 0.7 ? at[2] : uz(random)};
-        const double removed = exact.cut({CutterEnd::Form::flat, kDiameter / 2, 0}, at, to).removed * cell * cell;
+        const double removed =
+            exact.cut({CutterEnd::Form::flat, kDiameter / 2, 0}, at, to).removed * cell * cell;
         ASSERT_NEAR(stock.cut(at, to), removed, 1e-3 * removed + 0.01) << "move " << k;
         at = to;
     }
@@ -98,7 +105,8 @@ TEST(Engagement, ASlotIsSlowedAndAHalfPassIsNot) {
     EngagedStock stock = slab();
     std::vector<Move> slot{to(-10, 40, z, 0), to(110, 40, z)};
     EXPECT_GT(cap_engagement(context(), slot, stock, kCap), 90);
-    // In the middle of the slab the whole breadth is met: 0.7 of the feed, rounded down to a twentieth, and what cells add to a breadth.
+    // In the middle of the slab the whole breadth is met: 0.7 of the feed, rounded down to a twentieth, and
+    // what cells add to a breadth.
     EXPECT_GE(slowest(slot), 0.6 * kFeed);
     EXPECT_LE(slowest(slot), 0.7 * kFeed);
     EXPECT_EQ(slot[1].feed, kFeed) << "outside the slab";
@@ -117,18 +125,21 @@ TEST(Engagement, ASlotIsSlowedAndAHalfPassIsNot) {
 TEST(Engagement, ACornerIsSlowedWhereTheCutterTurnsIntoIt) {
     const double z = kTop - kDepth;
     EngagedStock stock = slab();
-    // A pass of 0.45 of the diameter along the south and the east of a pocket that has been cleared to within that of its walls.
+    // A pass of 0.45 of the diameter along the south and the east of a pocket that has been cleared to within
+    // that of its walls.
     stock.cut({10, 30, z}, {60, 30, z});
     stock.cut({60, 30, z}, {60, 70, z});
     for (double x = 10; x < 60; x += 5) stock.cut({x, 30, z}, {x, 70, z});
     const double step = 0.45 * kDiameter;
-    std::vector<Move> pass{to(10, 30, z), to(10, 30 - step, z), to(60 + step, 30 - step, z), to(60 + step, 70, z)};
+    std::vector<Move> pass{to(10, 30, z), to(10, 30 - step, z), to(60 + step, 30 - step, z),
+                           to(60 + step, 70, z)};
     stock.cut({10, 30 - step, z}, {10, 30 - step, z});
     cap_engagement(context(), pass, stock, kCap);
     double slowed = 0, last_slow_x = 0;
     for (std::size_t k = 2; k < pass.size(); ++k)
         if (pass[k].feed < kFeed) {
-            slowed += std::hypot(to_mm(pass[k].x) - to_mm(pass[k - 1].x), to_mm(pass[k].y) - to_mm(pass[k - 1].y));
+            slowed +=
+                std::hypot(to_mm(pass[k].x) - to_mm(pass[k - 1].x), to_mm(pass[k].y) - to_mm(pass[k - 1].y));
             last_slow_x = to_mm(pass[k].x);
         }
     EXPECT_GT(slowed, 1);
@@ -136,7 +147,8 @@ TEST(Engagement, ACornerIsSlowedWhereTheCutterTurnsIntoIt) {
     EXPECT_NEAR(last_slow_x, 60 + step, kDiameter);
 }
 
-// Whatever the way: neither its shape nor its volume changes, and no stretch takes more in a minute than the cap allows.
+// Whatever the way: neither its shape nor its volume changes, and no stretch takes more in a minute than the
+// cap allows.
 TEST(Engagement, NoStretchCutsFasterThanTheCapAllows) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
@@ -144,7 +156,8 @@ TEST(Engagement, NoStretchCutsFasterThanTheCapAllows) {
     for (int round = 0; round < 20; ++round) {
         std::vector<Move> way{to(ux(random), uy(random), kTop + 5, 0)};
         for (int k = 0; k < 30; ++k) {
-            if (k % 7 == 0) way.push_back({to_units(ux(random)), to_units(uy(random)), to_units(kTop + 5), 0});
+            if (k % 7 == 0)
+                way.push_back({to_units(ux(random)), to_units(uy(random)), to_units(kTop + 5), 0});
             way.push_back(to(ux(random), uy(random), uz(random)));
         }
         std::vector<Move> capped = way;
@@ -161,20 +174,24 @@ TEST(Engagement, NoStretchCutsFasterThanTheCapAllows) {
             const bool corner = m.x == way[next].x && m.y == way[next].y && m.z == way[next].z;
             if (k > 0 && m.feed > 0) {
                 const Move& from = capped[k - 1];
-                const std::array<double, 3> a{to_mm(from.x), to_mm(from.y), to_mm(from.z)}, b{to_mm(m.x), to_mm(m.y), to_mm(m.z)};
+                const std::array<double, 3> a{to_mm(from.x), to_mm(from.y), to_mm(from.z)},
+                    b{to_mm(m.x), to_mm(m.y), to_mm(m.z)};
                 const double run = std::hypot(b[0] - a[0], b[1] - a[1]), volume = again.cut(a, b);
                 taken += volume;
                 if (m.feed < kFeed) slow += run;
-                // Windows are a quarter of a radius; a stretch of one feed is one or more whole windows, or a move's end.
+                // Windows are a quarter of a radius; a stretch of one feed is one or more whole windows, or a
+                // move's end.
                 if (run > kDiameter) {
-                    EXPECT_LE(volume / run * m.feed, 1.25 * kCap.share * kDiameter * kDepth * kFeed) << "move " << k;
+                    EXPECT_LE(volume / run * m.feed, 1.25 * kCap.share * kDiameter * kDepth * kFeed)
+                        << "move " << k;
                 }
             }
             if (corner) {
                 EXPECT_EQ(m.feed == 0, way[next].feed == 0);
                 if (next > 0 && way[next].feed > 0) {
                     const Move &p = way[next - 1], &q = way[next];
-                    exact += whole.cut({to_mm(p.x), to_mm(p.y), to_mm(p.z)}, {to_mm(q.x), to_mm(q.y), to_mm(q.z)});
+                    exact +=
+                        whole.cut({to_mm(p.x), to_mm(p.y), to_mm(p.z)}, {to_mm(q.x), to_mm(q.y), to_mm(q.z)});
                 }
                 ++next;
             }

@@ -28,7 +28,9 @@ TEST(Facing, EveryCellOfAnyStockComesDownToTheTop) {
             stock.add_slab(0, 19);
             for (std::size_t i = 1; i < op.moves.size(); ++i) {
                 const Move &a = op.moves[i - 1], &b = op.moves[i];
-                if (b.feed > 0) stock.cut(cutter_end(face), {to_mm(a.x), to_mm(a.y), to_mm(a.z)}, {to_mm(b.x), to_mm(b.y), to_mm(b.z)});
+                if (b.feed > 0)
+                    stock.cut(cutter_end(face), {to_mm(a.x), to_mm(a.y), to_mm(a.z)},
+                              {to_mm(b.x), to_mm(b.y), to_mm(b.z)});
             }
             double highest = 0;
             for (std::size_t c = 0; c < stock.grid().count(); ++c) highest = std::max(highest, stock.top(c));

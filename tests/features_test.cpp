@@ -35,7 +35,8 @@ void quad(Facets& t, Vec3f a, Vec3f b, Vec3f c, Vec3f d) {
 void box(Facets& t, Vec3f lo, Vec3f hi, bool hollow = false) {
     Facets mine;
     auto p = [&](int i) { return Vec3f{i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z}; };
-    for (const auto& f : {std::array{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {1, 3, 7, 5}, {3, 2, 6, 7}, {2, 0, 4, 6}})
+    for (const auto& f :
+         {std::array{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {1, 3, 7, 5}, {3, 2, 6, 7}, {2, 0, 4, 6}})
         quad(mine, p(f[0]), p(f[1]), p(f[2]), p(f[3]));
     for (auto f : mine) {
         if (hollow) std::swap(f[1], f[2]);
@@ -48,8 +49,12 @@ using Field = std::vector<std::vector<float>>;
 Facets under(const Field& h) {
     Facets t;
     const std::size_t ny = h.size(), nx = h[0].size();
-    auto top = [&](std::size_t x, std::size_t y) { return Vec3f{static_cast<float>(x), static_cast<float>(y), h[y][x]}; };
-    auto low = [&](std::size_t x, std::size_t y) { return Vec3f{static_cast<float>(x), static_cast<float>(y), 0}; };
+    auto top = [&](std::size_t x, std::size_t y) {
+        return Vec3f{static_cast<float>(x), static_cast<float>(y), h[y][x]};
+    };
+    auto low = [&](std::size_t x, std::size_t y) {
+        return Vec3f{static_cast<float>(x), static_cast<float>(y), 0};
+    };
     for (std::size_t y = 0; y + 1 < ny; ++y)
         for (std::size_t x = 0; x + 1 < nx; ++x) {
             quad(t, top(x, y), top(x + 1, y), top(x + 1, y + 1), top(x, y + 1));
@@ -101,13 +106,22 @@ TEST(Features, BoxHasOneFlatAndItsBaseIsNone) {
     EXPECT_EQ(name(f.found_by), "facets");
 }
 
-// Below the top of a bubble the surface ends going up, as at a peak, but the solid lies around it; at its bottom it begins.
+// Below the top of a bubble the surface ends going up, as at a peak, but the solid lies around it; at its
+// bottom it begins.
 TEST(Features, HollowsAndBulgesAreNoPeaksOrValleys) {
     Facets t;
     box(t, {0, 0, 0}, {30, 30, 30});
-    const std::array<Vec3f, 6> o = {Vec3f{10, 15, 15}, {20, 15, 15}, {15, 10, 15}, {15, 20, 15}, {15, 15, 10}, {15, 15, 20}};
+    const std::array<Vec3f, 6> o = {Vec3f{10, 15, 15}, {20, 15, 15}, {15, 10, 15},
+                                    {15, 20, 15},      {15, 15, 10}, {15, 15, 20}};
     auto octahedron = [&](bool hollow, float dx) {
-        for (const auto& f : {std::array{0, 2, 5}, {2, 1, 5}, {1, 3, 5}, {3, 0, 5}, {2, 0, 4}, {1, 2, 4}, {3, 1, 4}, {0, 3, 4}}) {
+        for (const auto& f : {std::array{0, 2, 5},
+                              {2, 1, 5},
+                              {1, 3, 5},
+                              {3, 0, 5},
+                              {2, 0, 4},
+                              {1, 2, 4},
+                              {3, 1, 4},
+                              {0, 3, 4}}) {
             std::array<Vec3f, 3> facet = {o[f[0]], o[f[1]], o[f[2]]};
             for (Vec3f& p : facet) p.x += dx;
             if (hollow) std::swap(facet[1], facet[2]);
@@ -134,7 +148,8 @@ TEST(Features, ASliverIsNoFlatButTwoFacetsAre) {
     for (const double width : {0.005, 0.5}) {
         const auto w = static_cast<float>(width);
         Facets t;
-        const Vec3f a{0, 0, 0}, b{20, 0, 0}, c{20, 10, 0}, d{0, 10, 0}, r{0, 5, 4}, s{20, 5, 4}, m{10, 5 + w, 4};
+        const Vec3f a{0, 0, 0}, b{20, 0, 0}, c{20, 10, 0}, d{0, 10, 0}, r{0, 5, 4}, s{20, 5, 4},
+            m{10, 5 + w, 4};
         quad(t, a, d, c, b);
         t.push_back({a, b, s});
         t.push_back({a, s, r});
@@ -160,24 +175,29 @@ TEST(Features, PeaksNearAFlatAreDroppedAndFarOnesStay) {
     EXPECT_EQ(of(set, FeatureType::up_flat).size(), 1u);
 }
 
-// Brute force: components of equal height by flooding the grid's own edges, then the heights around them. A rim vertex has
-// the wall's foot among its neighbours, so the rim bears no valleys.
+// Brute force: components of equal height by flooding the grid's own edges, then the heights around them. A
+// rim vertex has the wall's foot among its neighbours, so the rim bears no valleys.
 TEST(Features, ExactScanAgreesWithBruteForceOnRandomFields) {
     const unsigned seed = test::seed();
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     for (int round = 0; round < 40; ++round) {
-        const int nx = 4 + static_cast<int>(random() % 20), ny = 4 + static_cast<int>(random() % 20), levels = round % 2 ? 4 : 100000;
+        const int nx = 4 + static_cast<int>(random() % 20), ny = 4 + static_cast<int>(random() % 20),
+                  levels = round % 2 ? 4 : 100000;
         Field h(static_cast<std::size_t>(ny), std::vector<float>(static_cast<std::size_t>(nx)));
         for (auto& row : h)
-            for (float& z : row) z = 1.0f + static_cast<float>(random() % static_cast<unsigned>(levels)) * (8.0f / static_cast<float>(levels));
+            for (float& z : row)
+                z = 1.0f + static_cast<float>(random() % static_cast<unsigned>(levels)) *
+                               (8.0f / static_cast<float>(levels));
         FeatureOptions o = options();
         o.flat_merge_mm = 0;
         const Facets facets = under(h);
         const FeatureSet set = find(facets, o);
 
         using Node = std::pair<int, int>;
-        auto z = [&](Node n) { return h[static_cast<std::size_t>(n.second)][static_cast<std::size_t>(n.first)]; };
+        auto z = [&](Node n) {
+            return h[static_cast<std::size_t>(n.second)][static_cast<std::size_t>(n.first)];
+        };
         auto around = [&](Node n) {
             std::vector<Node> result;
             for (const auto& [dx, dy] : {Node{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}}) {
@@ -201,7 +221,8 @@ TEST(Features, ExactScanAgreesWithBruteForceOnRandomFields) {
                         higher = higher || z(m) > z(n);
                         lower = lower || z(m) < z(n);
                         if (z(m) != z(n)) continue;
-                        // A level facet of the plateau makes it a flat: both triangles of n's cell, and of the cells beside.
+                        // A level facet of the plateau makes it a flat: both triangles of n's cell, and of
+                        // the cells beside.
                         for (const Node& k : around(n))
                             flat = flat || (k != m && z(k) == z(n) && [&] {
                                        const auto beside = around(m);
@@ -219,11 +240,12 @@ TEST(Features, ExactScanAgreesWithBruteForceOnRandomFields) {
             }
         std::multiset<float> found_peaks, found_valleys;
         for (const Feature& f : of(set, FeatureType::peak)) found_peaks.insert(static_cast<float>(f.z_low));
-        for (const Feature& f : of(set, FeatureType::valley)) found_valleys.insert(static_cast<float>(f.z_low));
+        for (const Feature& f : of(set, FeatureType::valley))
+            found_valleys.insert(static_cast<float>(f.z_low));
         ASSERT_EQ(found_peaks, peaks) << "round " << round;
         ASSERT_EQ(found_valleys, valleys) << "round " << round;
-        // On a sphere peaks and pits outnumber saddles by two, a saddle that joins more than two counting as often; the
-        // base is one pit. No saddle is counted where plateaus were left out as flats.
+        // On a sphere peaks and pits outnumber saddles by two, a saddle that joins more than two counting as
+        // often; the base is one pit. No saddle is counted where plateaus were left out as flats.
         if (levels > 4) {
             const std::size_t saddles = of(set, FeatureType::saddle).size();
             EXPECT_LE(saddles + 1, peaks.size() + valleys.size());
@@ -236,7 +258,8 @@ TEST(Features, SaddleBetweenTwoPeaks) {
     Field h(7, std::vector<float>(11));
     for (std::size_t y = 0; y < 7; ++y)
         for (std::size_t x = 0; x < 11; ++x) {
-            const float dy = static_cast<float>(y) - 3, d1 = static_cast<float>(x) - 2.9f, d2 = static_cast<float>(x) - 8.1f;
+            const float dy = static_cast<float>(y) - 3, d1 = static_cast<float>(x) - 2.9f,
+                        d2 = static_cast<float>(x) - 8.1f;
             h[y][x] = 2 + 10 / (1 + d1 * d1 + dy * dy * 1.01f) + 9 / (1 + d2 * d2 + dy * dy * 1.03f);
         }
     const FeatureSet set = find(under(h));
@@ -268,24 +291,28 @@ TEST(Features, HalvingFindsWhatStandsAloneWithinItsResolution) {
         std::sort(truth.begin(), truth.end());
         std::sort(found.begin(), found.end());
         ASSERT_EQ(found.size(), truth.size());
-        for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_NEAR(found[i], truth[i], o.halving_resolution_mm / 2);
+        for (std::size_t i = 0; i < truth.size(); ++i)
+            EXPECT_NEAR(found[i], truth[i], o.halving_resolution_mm / 2);
     };
     expect_near(FeatureType::peak, peaks);
     expect_near(FeatureType::valley, valleys);
     o.finder = Finder::both;
-    for (const FinderDisagreement& d : find(under(h), o).disagreements) EXPECT_EQ(d.type, FeatureType::saddle);
+    for (const FinderDisagreement& d : find(under(h), o).disagreements)
+        EXPECT_EQ(d.type, FeatureType::saddle);
 }
 
 TEST(Features, BothReportsWhatHalvingMisses) {
     // A pimple that appears and vanishes within one coarse step, on a slope that is no flat.
     Field h(20, std::vector<float>(20));
     for (std::size_t y = 0; y < 20; ++y)
-        for (std::size_t x = 0; x < 20; ++x) h[y][x] = 5 + 0.5f * static_cast<float>(x) + 0.01f * static_cast<float>(y);
+        for (std::size_t x = 0; x < 20; ++x)
+            h[y][x] = 5 + 0.5f * static_cast<float>(x) + 0.01f * static_cast<float>(y);
     h[10][10] += 0.8f;
     const FeatureSet set = find(under(h), options(Finder::both));
     bool reported = false;
     for (const FinderDisagreement& d : set.disagreements)
-        reported = reported || (d.type == FeatureType::peak && d.found_by == FoundBy::exact && std::abs(d.x - 10) < 0.1 && std::abs(d.y - 10) < 0.1);
+        reported = reported || (d.type == FeatureType::peak && d.found_by == FoundBy::exact &&
+                                std::abs(d.x - 10) < 0.1 && std::abs(d.y - 10) < 0.1);
     EXPECT_TRUE(reported);
 }
 
@@ -293,9 +320,11 @@ TEST(Features, ShallowPatchesHaveTheirFacetsRanges) {
     // A ramp of 10° between two of 30°.
     Facets t;
     const double t10 = std::tan(10 * M_PI / 180), t30 = std::tan(30 * M_PI / 180);
-    const std::array<double, 4> x = {0, 10, 30, 40}, z = {5, 5 + 10 * t30, 5 + 10 * t30 + 20 * t10, 5 + 20 * t30 + 20 * t10};
+    const std::array<double, 4> x = {0, 10, 30, 40},
+                                z = {5, 5 + 10 * t30, 5 + 10 * t30 + 20 * t10, 5 + 20 * t30 + 20 * t10};
     auto p = [&](int i, float y) {
-        return Vec3f{static_cast<float>(x[static_cast<std::size_t>(i)]), y, static_cast<float>(z[static_cast<std::size_t>(i)])};
+        return Vec3f{static_cast<float>(x[static_cast<std::size_t>(i)]), y,
+                     static_cast<float>(z[static_cast<std::size_t>(i)])};
     };
     for (int i = 0; i < 3; ++i) quad(t, p(i, 0), p(i + 1, 0), p(i + 1, 10), p(i, 10));
     const FeatureSet set = find(t);
@@ -321,8 +350,8 @@ TEST(Features, SameOnAnyNumberOfThreads) {
         ASSERT_EQ(sets[i].features.size(), sets[0].features.size());
         for (std::size_t k = 0; k < sets[0].features.size(); ++k) {
             const Feature &a = sets[0].features[k], &b = sets[i].features[k];
-            ASSERT_TRUE(a.type == b.type && a.z_low == b.z_low && a.z_high == b.z_high && a.x == b.x && a.y == b.y && a.area == b.area &&
-                        a.facets == b.facets);
+            ASSERT_TRUE(a.type == b.type && a.z_low == b.z_low && a.z_high == b.z_high && a.x == b.x &&
+                        a.y == b.y && a.area == b.area && a.facets == b.facets);
         }
         EXPECT_EQ(sets[i].disagreements.size(), sets[0].disagreements.size());
     }
@@ -332,8 +361,10 @@ TEST(Features, SameOnAnyNumberOfThreads) {
 TEST(Features, OptionsOutOfRangeAreUsageErrors) {
     Facets t;
     box(t, {0, 0, 0}, {1, 1, 1});
-    for (double FeatureOptions::*key : {&FeatureOptions::shallow_limit_rad, &FeatureOptions::halving_coarse_mm,
-                                        &FeatureOptions::halving_resolution_mm, &FeatureOptions::horizontal_rad, &FeatureOptions::flat_merge_mm})
+    for (double FeatureOptions::*key :
+         {&FeatureOptions::shallow_limit_rad, &FeatureOptions::halving_coarse_mm,
+          &FeatureOptions::halving_resolution_mm, &FeatureOptions::horizontal_rad,
+          &FeatureOptions::flat_merge_mm})
         for (const double bad : {-1.0, std::nan("")}) {
             FeatureOptions o;
             o.*key = bad;
@@ -366,12 +397,14 @@ std::vector<UnmadeUndercut> unmade(const Facets& t, std::vector<double> tops) {
 // A beam over a gap: legs 0..10 and 20..30, beam 10..15 mm high.
 Facets bridge() {
     Facets t;
-    const std::array<std::array<float, 2>, 8> p = {{{0, 0}, {10, 0}, {10, 10}, {20, 10}, {20, 0}, {30, 0}, {30, 15}, {0, 15}}};
+    const std::array<std::array<float, 2>, 8> p = {
+        {{0, 0}, {10, 0}, {10, 10}, {20, 10}, {20, 0}, {30, 0}, {30, 15}, {0, 15}}};
     for (std::size_t i = 0; i < p.size(); ++i) {
         const auto a = p[i], b = p[(i + 1) % p.size()];
         quad(t, {a[0], 0, a[1]}, {a[0], 8, a[1]}, {b[0], 8, b[1]}, {b[0], 0, b[1]});
     }
-    for (const auto& f : {std::array<std::size_t, 3>{0, 1, 2}, {0, 2, 7}, {2, 3, 7}, {3, 6, 7}, {3, 4, 5}, {3, 5, 6}}) {
+    for (const auto& f :
+         {std::array<std::size_t, 3>{0, 1, 2}, {0, 2, 7}, {2, 3, 7}, {3, 6, 7}, {3, 4, 5}, {3, 5, 6}}) {
         auto at = [&](std::size_t i, float y) { return Vec3f{p[i][0], y, p[i][1]}; };
         t.push_back({at(f[0], 0), at(f[1], 0), at(f[2], 0)});
         t.push_back({at(f[0], 8), at(f[2], 8), at(f[1], 8)});
@@ -403,7 +436,8 @@ TEST(Undercuts, SolidBelowEndsTheDepth) {
     box(t, {12, 1, 0}, {18, 7, 7});  // a block in the gap
     const auto u = unmade(t, {15});
     ASSERT_EQ(u.size(), 1u);
-    // Nothing stands under the flat's rim: there the layer's bottom ends it, 10 mm down; over the block it would be 3.
+    // Nothing stands under the flat's rim: there the layer's bottom ends it, 10 mm down; over the block it
+    // would be 3.
     EXPECT_NEAR(u[0].depth_mm, 10, 1e-6);
     Facets full = bridge();
     box(full, {10, 0, 0}, {20, 8, 7});
@@ -422,8 +456,8 @@ TEST(Undercuts, AFlatInsideAnotherShellIsNone) {
 // A wall that leans out by `lean` over `height`: the wedge under it stays, as deep as it leans.
 Facets leaning(float lean, float height) {
     Facets t;
-    const Vec3f a{0, 0, 0}, b{50, 0, 0}, c{50, 20, 0}, d{0, 20, 0}, e{0, 0, height}, f{50 + lean, 0, height}, g{50 + lean, 20, height},
-        h{0, 20, height};
+    const Vec3f a{0, 0, 0}, b{50, 0, 0}, c{50, 20, 0}, d{0, 20, 0}, e{0, 0, height}, f{50 + lean, 0, height},
+        g{50 + lean, 20, height}, h{0, 20, height};
     quad(t, a, d, c, b);
     quad(t, e, f, g, h);
     quad(t, a, b, f, e);
@@ -455,26 +489,31 @@ TEST(Undercuts, NearVerticalWallsAreAsDeepAsTheyLean) {
 
 TEST(Undercuts, TopsMustAscend) {
     const Facets t = bridge();
-    for (const std::vector<double>& tops : {std::vector<double>{5, 5}, {5, 4}, {0.0}, {std::nan("")}}) EXPECT_THROW((void)unmade(t, tops), Error);
+    for (const std::vector<double>& tops : {std::vector<double>{5, 5}, {5, 4}, {0.0}, {std::nan("")}})
+        EXPECT_THROW((void)unmade(t, tops), Error);
 }
 
-// Brute force: a solid of random overlapping boxes on a grid of millimetres. In a layer, the cells without solid that have
-// solid straight above them within the layer stay; the deepest run of such cells under a flat is its depth.
+// Brute force: a solid of random overlapping boxes on a grid of millimetres. In a layer, the cells without
+// solid that have solid straight above them within the layer stay; the deepest run of such cells under a flat
+// is its depth.
 TEST(Undercuts, AgreesWithCellsOnRandomBoxes) {
     const unsigned seed = test::seed();
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     constexpr int n = 10;
     for (int round = 0; round < 30; ++round) {
-        // A base plate, then boxes that touch it or one another; disjoint cells become facets, inner faces are left out.
+        // A base plate, then boxes that touch it or one another; disjoint cells become facets, inner faces
+        // are left out.
         std::array<std::array<std::array<bool, n + 2>, n + 2>, n + 2> solid{};
         auto cell = [&](int x, int y, int z) -> bool& {
-            return solid[static_cast<std::size_t>(x + 1)][static_cast<std::size_t>(y + 1)][static_cast<std::size_t>(z + 1)];
+            return solid[static_cast<std::size_t>(x + 1)][static_cast<std::size_t>(y + 1)]
+                        [static_cast<std::size_t>(z + 1)];
         };
         for (int x = 0; x < n; ++x)
             for (int y = 0; y < n; ++y) cell(x, y, 0) = true;
         for (int k = 0; k < 8; ++k) {
-            const int x = static_cast<int>(random() % n), y = static_cast<int>(random() % n), z = static_cast<int>(random() % n);
+            const int x = static_cast<int>(random() % n), y = static_cast<int>(random() % n),
+                      z = static_cast<int>(random() % n);
             for (int i = x; i < std::min<int>(n, x + 3); ++i)
                 for (int j = y; j < std::min<int>(n, y + 4); ++j)
                     for (int l = z; l < std::min<int>(n, z + 2); ++l) cell(i, j, l) = true;
@@ -484,13 +523,16 @@ TEST(Undercuts, AgreesWithCellsOnRandomBoxes) {
             for (int y = 0; y < n; ++y)
                 for (int z = 0; z < n; ++z) {
                     if (!cell(x, y, z)) continue;
-                    const Vec3f lo{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)}, hi{lo.x + 1, lo.y + 1, lo.z + 1};
+                    const Vec3f lo{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)},
+                        hi{lo.x + 1, lo.y + 1, lo.z + 1};
                     Facets whole;
                     box(whole, lo, hi);
-                    const std::array<std::array<int, 3>, 6> out = {{{0, 0, -1}, {0, 0, 1}, {0, -1, 0}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}}};
+                    const std::array<std::array<int, 3>, 6> out = {
+                        {{0, 0, -1}, {0, 0, 1}, {0, -1, 0}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}}};
                     for (std::size_t side = 0; side < 6; ++side)
                         if (!cell(x + out[side][0], y + out[side][1], z + out[side][2]))
-                            t.insert(t.end(), whole.begin() + 2 * static_cast<long>(side), whole.begin() + 2 * static_cast<long>(side) + 2);
+                            t.insert(t.end(), whole.begin() + 2 * static_cast<long>(side),
+                                     whole.begin() + 2 * static_cast<long>(side) + 2);
                 }
         const int split = 1 + static_cast<int>(random() % (n - 1));
         double deepest = 0, area = 0;
@@ -536,7 +578,8 @@ TEST(Undercuts, HundredThousandFacetsAreQuick) {
                      z = u < 0.3   ? 100 * u
                          : u < 0.7 ? 30 + 40 * (u - 0.3)
                                    : 46 + 60 * (u - 0.7);
-        return Vec3f{static_cast<float>(r * std::cos(turn)), static_cast<float>(r * std::sin(turn)), static_cast<float>(z)};
+        return Vec3f{static_cast<float>(r * std::cos(turn)), static_cast<float>(r * std::sin(turn)),
+                     static_cast<float>(z)};
     };
     for (int i = 0; i < around; ++i) {
         const int j = (i + 1) % around;
@@ -565,7 +608,8 @@ TEST(SectionAreas, AgreeWithSlicing) {
         const SectionAreas areas(context, mesh.view());
         std::vector<Plane> planes;
         for (int i = 0; i < 40; ++i) planes.push_back({0.37 * i, Side::above});
-        for (const Section& s : slice(context, mesh.view(), planes)) EXPECT_NEAR(areas(s.plane.z), area(s.loops), 2e-2) << s.plane.z;
+        for (const Section& s : slice(context, mesh.view(), planes))
+            EXPECT_NEAR(areas(s.plane.z), area(s.loops), 2e-2) << s.plane.z;
         EXPECT_EQ(areas(-1), 0);
         EXPECT_EQ(areas(1000), 0);
     }
@@ -577,8 +621,9 @@ TEST(FeaturesCorpus, RealPartsAreFoundQuicklyAndMeasured) {
         std::puts("skipped: SLABWRIGHT_CORPUS is not set");
         return;
     }
-    for (const char* file : {"castings/bearing_block.stl", "castings/valve_body_half.stl", "castings/midget_crankcase_front_pattern.stl",
-                             "relief/mount_st_helens_1980.stl"}) {
+    for (const char* file :
+         {"castings/bearing_block.stl", "castings/valve_body_half.stl",
+          "castings/midget_crankcase_front_pattern.stl", "relief/mount_st_helens_1980.stl"}) {
         SCOPED_TRACE(file);
         std::ifstream in(std::filesystem::path(corpus) / file, std::ios::binary);
         const std::string bytes((std::istreambuf_iterator<char>(in)), {});
@@ -587,7 +632,8 @@ TEST(FeaturesCorpus, RealPartsAreFoundQuicklyAndMeasured) {
         std::memcpy(&count, &bytes[80], 4);
         ASSERT_EQ(bytes.size(), 84 + std::size_t{50} * count);
         Facets t(count);
-        for (std::uint32_t i = 0; i < count; ++i) std::memcpy(&t[i], &bytes[84 + std::size_t{50} * i + 12], 36);
+        for (std::uint32_t i = 0; i < count; ++i)
+            std::memcpy(&t[i], &bytes[84 + std::size_t{50} * i + 12], 36);
         Context context;
         const Mesh mesh = weld(context, t);
         const FeatureSet set = find_features(context, mesh.view(), {});

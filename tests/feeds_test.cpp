@@ -20,7 +20,9 @@
 namespace slabwright {
 namespace {
 
-Move at(double x, double y, double z, std::uint32_t feed) { return {to_units(x), to_units(y), to_units(z), feed}; }
+Move at(double x, double y, double z, std::uint32_t feed) {
+    return {to_units(x), to_units(y), to_units(z), feed};
+}
 
 Plan plate() {
     Plan plan;
@@ -55,7 +57,8 @@ TEST(OpCuts, SlotThenHalfThenAir) {
     StandingSlab slab(plan.stock_min, plan.stock_max, 0, 18, 0.25);
     const double r = flat.diameter / 2;
     const auto pass = [&](double y, double z) {
-        return line(plan, OperationKind::rough, 2, {at(-10, y, 30, 0), at(-10, y, z, 0), at(130, y, z, 5000), at(130, y, 30, 0)});
+        return line(plan, OperationKind::rough, 2,
+                    {at(-10, y, 30, 0), at(-10, y, z, 0), at(130, y, z, 5000), at(130, y, 30, 0)});
     };
     int checked = 0;
     for (const CutStretch& s : stretches(slab, pass(40, 15), flat)) {
@@ -105,7 +108,8 @@ TEST(OpCuts, StretchesHoldWhatWasTakenAway) {
     }
 }
 
-// Of some moves alone: the very stretches that all of them tell there, with what else was cut before, near and far.
+// Of some moves alone: the very stretches that all of them tell there, with what else was cut before, near
+// and far.
 TEST(OpCuts, PartsTellWhatTheWholeTells) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
@@ -122,7 +126,8 @@ TEST(OpCuts, PartsTellWhatTheWholeTells) {
             moves.push_back(at(px, py, pz, 1500));
             for (int k = 0; k < 30; ++k) {
                 px += step(random), py += step(random);
-                if (k % 10 == 9) moves.push_back(at(px = x(random), py = y(random), pz, 4000));  // told in many parts
+                if (k % 10 == 9)
+                    moves.push_back(at(px = x(random), py = y(random), pz, 4000));  // told in many parts
                 moves.push_back(at(px, py, pz, k % 7 == 6 ? 3000 : 4000));
             }
             moves.push_back(at(px, py, 30, 0));
@@ -137,7 +142,8 @@ TEST(OpCuts, PartsTellWhatTheWholeTells) {
             MoveRange part{whole[i].first, whole[i + random() % 6].last};
             for (const CutStretch& s : whole)
                 if (s.first <= part.last) part.last = std::max(part.last, s.last);
-            if (whole[i - 1].last < part.first && (parts.empty() || parts.back().last < part.first)) parts.push_back(part);
+            if (whole[i - 1].last < part.first && (parts.empty() || parts.back().last < part.first))
+                parts.push_back(part);
         }
         ASSERT_FALSE(parts.empty());
         StandingSlab again = before;
@@ -145,7 +151,9 @@ TEST(OpCuts, PartsTellWhatTheWholeTells) {
         again.run_parts(op, cutter, parts, [&](const CutStretch& s) { told.push_back(s); });
         std::size_t next = 0;
         for (const CutStretch& s : whole) {
-            if (std::none_of(parts.begin(), parts.end(), [&](const MoveRange& p) { return s.first >= p.first && s.last <= p.last; })) continue;
+            if (std::none_of(parts.begin(), parts.end(),
+                             [&](const MoveRange& p) { return s.first >= p.first && s.last <= p.last; }))
+                continue;
             ASSERT_LT(next, told.size()) << "seed " << seed;
             const CutStretch& t = told[next++];
             EXPECT_EQ(std::tie(s.first, s.last, s.length, s.low, s.high, s.width, s.left, s.at),
@@ -162,7 +170,8 @@ TEST(Feeds, AStiffCutterKeepsItsFeedAndAnElasticOneSlowsDown) {
     Plan plan = plate();
     plan.job.cutting.adapt_stepdown = false;
     const auto slot = [&](double y) {
-        return line(plan, OperationKind::rough, 2, {at(-10, y, 30, 0), at(-10, y, 14.2, 0), at(130, y, 14.2, 9000), at(130, y, 30, 0)});
+        return line(plan, OperationKind::rough, 2,
+                    {at(-10, y, 30, 0), at(-10, y, 14.2, 0), at(130, y, 14.2, 9000), at(130, y, 30, 0)});
     };
     Context context;
     std::vector<Diagnostic> diagnostics;
@@ -219,21 +228,24 @@ TEST(Feeds, ThinChipsAndAirGoFasterAndThickOnesDoNot) {
     const double r = plan.job.tools[1].diameter / 2;
     // A slot by roughing, then .3 mm off its wall by finishing, and a slot by finishing.
     plan.layers[0].operations = {
-        line(plan, OperationKind::rough, 2, {at(-10, 30, 30, 0), at(-10, 30, 15, 0), at(130, 30, 15, 9000), at(130, 30, 30, 0)}),
+        line(plan, OperationKind::rough, 2,
+             {at(-10, 30, 30, 0), at(-10, 30, 15, 0), at(130, 30, 15, 9000), at(130, 30, 30, 0)}),
         line(plan, OperationKind::finish, 2,
-             {at(-10, 30.3, 30, 0), at(-10, 30.3, 15, 0), at(130, 30.3, 15, 5000), at(130, 30.3, 30, 0), at(-10, 30 + 3 * r, 30, 0),
-              at(-10, 30 + 3 * r, 15, 0), at(130, 30 + 3 * r, 15, 5000), at(130, 30 + 3 * r, 30, 0)})};
+             {at(-10, 30.3, 30, 0), at(-10, 30.3, 15, 0), at(130, 30.3, 15, 5000), at(130, 30.3, 30, 0),
+              at(-10, 30 + 3 * r, 30, 0), at(-10, 30 + 3 * r, 15, 0), at(130, 30 + 3 * r, 15, 5000),
+              at(130, 30 + 3 * r, 30, 0)})};
     rate_layer(context, plan.layers[0], plan, diagnostics);
     const Operation& finish = plan.layers[0].operations[1];
     EXPECT_GT(finish.moves[2].feed, 5000U);
     EXPECT_LE(finish.moves[2].feed, 9000U);
     EXPECT_EQ(finish.moves[6].feed, 5000U);
     EXPECT_EQ(finish.moves[4].feed, 0U);
-    for (const Operation& op : plan.layers[0].operations) EXPECT_LE(op.wall_error_mm, bending_limit(op, plan.job));
+    for (const Operation& op : plan.layers[0].operations)
+        EXPECT_LE(op.wall_error_mm, bending_limit(op, plan.job));
 }
 
-// Over random programs: no feed over tool and machine, few different ones, rapids and plunges as they were, the limit kept
-// wherever the feed is above the floor, and the same bytes on any number of threads.
+// Over random programs: no feed over tool and machine, few different ones, rapids and plunges as they were,
+// the limit kept wherever the feed is above the floor, and the same bytes on any number of threads.
 TEST(Feeds, RandomPrograms) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
@@ -257,10 +269,15 @@ TEST(Feeds, RandomPrograms) {
                         moves.push_back({last.x, last.y, to_units(z(random)), 1500});
                         break;
                     default:
-                        moves.push_back(at(x(random), y(random), last.z == to_units(30) ? 30 : to_mm(last.z), 5000));
+                        moves.push_back(
+                            at(x(random), y(random), last.z == to_units(30) ? 30 : to_mm(last.z), 5000));
                 }
             }
-            operations.push_back(line(plan, i == 0 ? OperationKind::rough : i == 1 ? OperationKind::semi_rough : OperationKind::finish, tool, moves));
+            operations.push_back(line(plan,
+                                      i == 0   ? OperationKind::rough
+                                      : i == 1 ? OperationKind::semi_rough
+                                               : OperationKind::finish,
+                                      tool, moves));
         }
         plan.layers[0].operations = operations;
         Context one({.threads = 1}), two({.threads = 2});
@@ -298,7 +315,8 @@ TEST(Feeds, RandomPrograms) {
     }
 }
 
-// A slot too deep for an elastic cutter at any feed: in several passes it bends as far as it may, and leaves what it would have left.
+// A slot too deep for an elastic cutter at any feed: in several passes it bends as far as it may, and leaves
+// what it would have left.
 TEST(Feeds, WhatIsTooDeepIsCutInPasses) {
     Plan plan = plate();
     Job& job = plan.job;
@@ -306,7 +324,8 @@ TEST(Feeds, WhatIsTooDeepIsCutInPasses) {
     job.tolerances.cusp = 0.01;
     job.tools[1].stickout = 200;
     const Operation slot = line(plan, OperationKind::rough, 2,
-                                {at(-10, 40, 30, 0), at(-10, 40, 13, 0), at(60, 40, 13, 9000), at(130, 40, 13, 9000), at(130, 40, 30, 0)});
+                                {at(-10, 40, 30, 0), at(-10, 40, 13, 0), at(60, 40, 13, 9000),
+                                 at(130, 40, 13, 9000), at(130, 40, 30, 0)});
     plan.layers[0].operations = {slot};
     Context context;
     std::vector<Diagnostic> diagnostics;
@@ -367,7 +386,8 @@ TEST(Feeds, RunsSplitOverArcsComeBackOnTheSameWay) {
     EXPECT_TRUE(std::equal(moves.begin() + 2, moves.end(), split.end() - 4));
 }
 
-// Wood that hangs over: cut where it stands on something it needs nothing; far out, a web thinner than section 9 asks for is reported.
+// Wood that hangs over: cut where it stands on something it needs nothing; far out, a web thinner than
+// section 9 asks for is reported.
 TEST(Feeds, WoodThatHangsOverTooFarIsReported) {
     Plan plan = plate();
     plan.job.cutting.adapt_feed = plan.job.cutting.adapt_stepdown = false;
@@ -377,8 +397,9 @@ TEST(Feeds, WoodThatHangsOverTooFarIsReported) {
     const auto codes = [&](double bottom) {
         plan.layers[0].operations = {
             line(plan, OperationKind::rough, 2,
-                 {at(-10, 40, 30, 0), at(-10, 40, bottom + 3, 0), at(130, 40, bottom + 3, 9000), at(130, 40, bottom + 3, 0), at(130, 40, 30, 0),
-                  at(-10, 40, 30, 0), at(-10, 40, bottom, 0), at(130, 40, bottom, 9000), at(130, 40, 30, 0)})};
+                 {at(-10, 40, 30, 0), at(-10, 40, bottom + 3, 0), at(130, 40, bottom + 3, 9000),
+                  at(130, 40, bottom + 3, 0), at(130, 40, 30, 0), at(-10, 40, 30, 0), at(-10, 40, bottom, 0),
+                  at(130, 40, bottom, 9000), at(130, 40, 30, 0)})};
         std::vector<Diagnostic> diagnostics;
         (void)adapt_layer(context, plan.layers[0], plan, &map, diagnostics);
         std::vector<std::string> found;
@@ -394,7 +415,8 @@ TEST(Feeds, WoodThatHangsOverTooFarIsReported) {
     EXPECT_TRUE(codes(10).empty());                 // ten millimetres under the cut carry it
 }
 
-// What a pass leaves of a slab that is thinner than any step is no slab that could break, also under a tool whose range of steps begins at nothing.
+// What a pass leaves of a slab that is thinner than any step is no slab that could break, also under a tool
+// whose range of steps begins at nothing.
 TEST(Feeds, SliversAreNoSlab) {
     for (const double least : {0.0, 2.0}) {
         Plan plan = plate();
@@ -405,28 +427,36 @@ TEST(Feeds, SliversAreNoSlab) {
         Context context;
         for (const double sliver : {0.0, 0.004, 0.3, 3.0}) {
             const auto slot = [&](double z) {
-                return line(plan, OperationKind::rough, 2, {at(-10, 40, 30, 0), at(-10, 40, z, 0), at(130, 40, z, 9000), at(130, 40, 30, 0)});
+                return line(
+                    plan, OperationKind::rough, 2,
+                    {at(-10, 40, 30, 0), at(-10, 40, z, 0), at(130, 40, z, 9000), at(130, 40, 30, 0)});
             };
             plan.layers[0].operations = {slot(sliver), slot(-1)};
             plan.layers[0].operations[1].purpose = "through";
             std::vector<Diagnostic> diagnostics;
             (void)adapt_layer(context, plan.layers[0], plan, &map, diagnostics);
-            const auto breaks = std::count_if(diagnostics.begin(), diagnostics.end(), [](const Diagnostic& d) {
-                return d.code == "cut.overhang" && d.message.find("through") != std::string::npos;
-            });
-            EXPECT_EQ(breaks, sliver > 2 ? 1 : 0) << sliver << " mm under a tool of at least " << least << " mm";
-            for (const Diagnostic& d : diagnostics) EXPECT_EQ(d.message.find("nan"), std::string::npos) << d.message;
+            const auto breaks =
+                std::count_if(diagnostics.begin(), diagnostics.end(), [](const Diagnostic& d) {
+                    return d.code == "cut.overhang" && d.message.find("through") != std::string::npos;
+                });
+            EXPECT_EQ(breaks, sliver > 2 ? 1 : 0)
+                << sliver << " mm under a tool of at least " << least << " mm";
+            for (const Diagnostic& d : diagnostics)
+                EXPECT_EQ(d.message.find("nan"), std::string::npos) << d.message;
         }
     }
 }
 
-// Wood is cut in several passes where they save it, and only there: farther out, where it breaks all the same, the way stays as it was.
+// Wood is cut in several passes where they save it, and only there: farther out, where it breaks all the
+// same, the way stays as it was.
 TEST(Feeds, PassesForWoodThatTheySave) {
     Plan plan = plate();
     plan.job.cutting.adapt_feed = false;
     OverhangMap map;
     map.low = {0, 0}, map.cell = 1, map.nx = 120, map.ny = 80;
-    const Operation slot = line(plan, OperationKind::rough, 2, {at(-10, 40, 30, 0), at(-10, 40, 4, 0), at(130, 40, 4, 9000), at(130, 40, 30, 0)});
+    const Operation slot =
+        line(plan, OperationKind::rough, 2,
+             {at(-10, 40, 30, 0), at(-10, 40, 4, 0), at(130, 40, 4, 9000), at(130, 40, 30, 0)});
     Context context;
     int saved = 0, lost = 0, held = 0;
     for (int beyond = 0; beyond <= 400; beyond += 10) {
@@ -436,7 +466,8 @@ TEST(Feeds, PassesForWoodThatTheySave) {
         std::vector<Diagnostic> diagnostics;
         (void)adapt_layer(context, plan.layers[0], plan, &map, diagnostics);
         const auto has = [&](const char* code) {
-            return std::any_of(diagnostics.begin(), diagnostics.end(), [&](const Diagnostic& d) { return d.code == code; });
+            return std::any_of(diagnostics.begin(), diagnostics.end(),
+                               [&](const Diagnostic& d) { return d.code == code; });
         };
         const bool split = plan.layers[0].operations[0].moves.size() > slot.moves.size();
         EXPECT_EQ(split, has("stepdown.lowered")) << beyond;
@@ -448,10 +479,13 @@ TEST(Feeds, PassesForWoodThatTheySave) {
     EXPECT_GT(lost, 0);
 }
 
-// In a whole plan: the paths stay as they are, the build takes no longer, and nominal engagement leaves feeds and places alone.
+// In a whole plan: the paths stay as they are, the build takes no longer, and nominal engagement leaves feeds
+// and places alone.
 TEST(Feeds, OfAWholePlan) {
     Context context;
-    const Mesh mesh = test::height_field(context, 12, 5.0, [](double x, double y) { return std::max(std::abs(x), std::abs(y)) < 16 ? 14.0 : 6.0; });
+    const Mesh mesh = test::height_field(context, 12, 5.0, [](double x, double y) {
+        return std::max(std::abs(x), std::abs(y)) < 16 ? 14.0 : 6.0;
+    });
     Job job;
     const Plan adapted = make_plan(context, mesh, {}, job);
     job.cutting.adapt_feed = false;
@@ -463,7 +497,8 @@ TEST(Feeds, OfAWholePlan) {
     for (std::size_t l = 0; l < planned.layers.size(); ++l) {
         ASSERT_EQ(adapted.layers[l].operations.size(), planned.layers[l].operations.size());
         for (std::size_t o = 0; o < planned.layers[l].operations.size(); ++o) {
-            const Operation &a = adapted.layers[l].operations[o], &p = planned.layers[l].operations[o], &n = nominal.layers[l].operations[o];
+            const Operation &a = adapted.layers[l].operations[o], &p = planned.layers[l].operations[o],
+                            &n = nominal.layers[l].operations[o];
             EXPECT_EQ(p.moves, n.moves);
             EXPECT_GT(n.peak_force_n, 0);
             EXPECT_FALSE(n.peak_at);
@@ -492,7 +527,8 @@ TEST(Feeds, AnOperationMayBendItsCutterByWhatItLeaves) {
     op.blend = 0.1;
     EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.3 - (0.1 - kJunction) - 0.02);
     op.kind = OperationKind::semi_rough;
-    EXPECT_DOUBLE_EQ(bending_limit(op, job), job.tolerances.cusp) << "one that leaves nothing bends as little as a finish pass";
+    EXPECT_DOUBLE_EQ(bending_limit(op, job), job.tolerances.cusp)
+        << "one that leaves nothing bends as little as a finish pass";
     op.spare = 0.1;
     EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.1);
     op.kind = OperationKind::finish;

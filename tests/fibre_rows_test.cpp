@@ -29,7 +29,8 @@ CoverRows nothing_covered() {
 // Widens the hulls on all lines at v by a facet with all its edges.
 void meet(const SolidFacet& f, double r, double zc, const Row& v, HullRows& hull) {
     const Vec3d& n = f.normal;
-    PrismTerms prism{n[0], n[1], n[2], n[2] * (zc - f.p[0][2]) - n[0] * f.p[0][0] - n[1] * f.p[0][1], r, {}, {}, {}};
+    PrismTerms prism{n[0], n[1], n[2], n[2] * (zc - f.p[0][2]) - n[0] * f.p[0][0] - n[1] * f.p[0][1],
+                     r,    {},   {},   {}};
     for (std::size_t k = 0; k < 3; ++k) {
         const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
         const Vec3d e{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
@@ -37,20 +38,25 @@ void meet(const SolidFacet& f, double r, double zc, const Row& v, HullRows& hull
         prism.edge_u[k] = m[0];
         prism.edge_v[k] = m[1];
         prism.edge_c[k] = m[2] * (zc - a[2]) - m[0] * a[0] - m[1] * a[1];
-        capsule_rows({a[0], a[1], zc - a[2], b[0], b[1], zc - b[2], r}, v.data(), kLinesTogether, hull.low.data(), hull.high.data(),
-                     hull.nz_low.data(), hull.nz_high.data());
+        capsule_rows({a[0], a[1], zc - a[2], b[0], b[1], zc - b[2], r}, v.data(), kLinesTogether,
+                     hull.low.data(), hull.high.data(), hull.nz_low.data(), hull.nz_high.data());
     }
-    if (n != Vec3d{0, 0, 0}) prism_rows(prism, v.data(), kLinesTogether, hull.low.data(), hull.high.data(), hull.nz_low.data(), hull.nz_high.data());
+    if (n != Vec3d{0, 0, 0})
+        prism_rows(prism, v.data(), kLinesTogether, hull.low.data(), hull.high.data(), hull.nz_low.data(),
+                   hull.nz_high.data());
 }
 
 TEST(FibreRows, FacetsAndGroupsForbidNoMoreThanIsSaid) {
     std::mt19937 random(test::seed());
-    auto within = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+    auto within = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
     Context context;
     const CoverRows none = nothing_covered();
     std::size_t met = 0, narrowed = 0, clipped = 0;
     for (int round = 0; round < 3000; ++round) {
-        const double r = within(0.5, 5), size = r * std::pow(10, within(-2, 0.5)), steep = within(0, 2), away = within(-500, 500);
+        const double r = within(0.5, 5), size = r * std::pow(10, within(-2, 0.5)), steep = within(0, 2),
+                     away = within(-500, 500);
         const double zc = within(-1.2, 1.2) * r;
         const std::array<double, 2> slope{within(-1, 1) * steep, within(-1, 1) * steep};
         std::vector<SolidFacet> facets(FacetGroup::kFacets);
@@ -68,7 +74,8 @@ TEST(FibreRows, FacetsAndGroupsForbidNoMoreThanIsSaid) {
             f.z_max = std::max({f.p[0][2], f.p[1][2], f.p[2][2]});
         }
         Row v{}, low{}, high{}, box_low{}, box_high{};
-        for (std::size_t i = 0; i < v.size(); ++i) v[i] = (static_cast<double>(i) - 31.5) * 1.2 * (r + size) / 32;
+        for (std::size_t i = 0; i < v.size(); ++i)
+            v[i] = (static_cast<double>(i) - 31.5) * 1.2 * (r + size) / 32;
         alignas(64) std::array<std::int64_t, kLinesTogether> state{};
         HullRows together{};
         together.low.fill(kInfinity);
@@ -93,17 +100,20 @@ TEST(FibreRows, FacetsAndGroupsForbidNoMoreThanIsSaid) {
             hull.high.fill(-kInfinity);
             meet(f, r, zc, v, hull);
             meet(f, r, zc, v, together);
-            box_out_rows(box, none, v.data(), 0, kLinesTogether, box_low.data(), box_high.data(), state.data());
+            box_out_rows(box, none, v.data(), 0, kLinesTogether, box_low.data(), box_high.data(),
+                         state.data());
             low = box_low, high = box_high;
             spares(hull);
-            facet_out_rows(box, tangent, none, v.data(), 0, kLinesTogether, low.data(), high.data(), state.data());
+            facet_out_rows(box, tangent, none, v.data(), 0, kLinesTogether, low.data(), high.data(),
+                           state.data());
             spares(hull);
         }
         const FacetGroup group = facet_groups(context, facets).front();
         const double dz = std::max({0.0, group.z_min - zc, zc - group.z_max});
         const BoxTerms box{group.low[0], group.high[0], group.low[1], group.high[1], r * r - dz * dz};
-        const DiscTerms disc{group.middle[0], group.middle[1], zc - group.middle[2], r * r,          group.axis[0],
-                             group.axis[1],   group.axis[2],   group.radius,         group.thickness};
+        const DiscTerms disc{group.middle[0], group.middle[1], zc - group.middle[2],
+                             r * r,           group.axis[0],   group.axis[1],
+                             group.axis[2],   group.radius,    group.thickness};
         box_out_rows(box, none, v.data(), 0, kLinesTogether, box_low.data(), box_high.data(), state.data());
         disc_out_rows(box, disc, none, v.data(), 0, kLinesTogether, low.data(), high.data(), state.data());
         spares(together);
@@ -114,15 +124,19 @@ TEST(FibreRows, FacetsAndGroupsForbidNoMoreThanIsSaid) {
     EXPECT_GT(clipped, 1000U);
 }
 
-// All facets of a group at once, against what each of them forbids; some overhang, and the last group has fewer.
+// All facets of a group at once, against what each of them forbids; some overhang, and the last group has
+// fewer.
 TEST(FibreRows, FacetsOfAGroupForbidNoMoreThanIsSaid) {
     std::mt19937 random(test::seed());
-    auto within = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+    auto within = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
     Context context;
     std::size_t met = 0, covered = 0, left_out = 0;
     auto rows = std::make_unique<GroupRows>();
     for (int round = 0; round < 3000; ++round) {
-        const double r = within(0.5, 5), size = r * std::pow(10, within(-2, 1)), steep = within(0, 3), away = within(-800, 800);
+        const double r = within(0.5, 5), size = r * std::pow(10, within(-2, 1)), steep = within(0, 3),
+                     away = within(-800, 800);
         const double zc = within(-1.2, 1.2) * r;
         const std::array<double, 2> slope{within(-1, 1) * steep, within(-1, 1) * steep};
         std::vector<SolidFacet> facets(round % 3 == 0 ? 5 : FacetGroup::kFacets);
@@ -146,7 +160,8 @@ TEST(FibreRows, FacetsOfAGroupForbidNoMoreThanIsSaid) {
         const std::size_t u = random() % 2, axis = 1 - u;
         const double middle_v = axis == 0 ? away : 0;
         Row v{};
-        for (std::size_t i = 0; i < v.size(); ++i) v[i] = middle_v + (static_cast<double>(i) - 31.5) * 1.2 * (r + size) / 32;
+        for (std::size_t i = 0; i < v.size(); ++i)
+            v[i] = middle_v + (static_cast<double>(i) - 31.5) * 1.2 * (r + size) / 32;
         CoverRows cover = nothing_covered();
         if (round % 2 == 1)
             for (std::size_t i = 0; i < v.size(); ++i) {
@@ -157,8 +172,10 @@ TEST(FibreRows, FacetsOfAGroupForbidNoMoreThanIsSaid) {
         for (std::int64_t& s : state) s = random() % 8 == 0 ? 0 : kReachesOut;
         const std::vector<FacetGroup> groups = facet_groups(context, facets);
         const BulkVector<GroupCorners> corners = group_corners(context, facets, groups);
-        group_out_rows(corners.front(), groups.front(), u, r, zc, cover, v.data(), 3, 61, state.data(), *rows);
-        for (std::size_t k = facets.size(); k < FacetGroup::kFacets; ++k) ASSERT_GE(rows->first[k], rows->last[k]);
+        group_out_rows(corners.front(), groups.front(), u, r, zc, cover, v.data(), 3, 61, state.data(),
+                       *rows);
+        for (std::size_t k = facets.size(); k < FacetGroup::kFacets; ++k)
+            ASSERT_GE(rows->first[k], rows->last[k]);
         for (std::size_t k = 0; k < facets.size(); ++k) {
             SolidFacet f = facets[k];
             left_out += rows->first[k] >= rows->last[k];
@@ -174,8 +191,9 @@ TEST(FibreRows, FacetsOfAGroupForbidNoMoreThanIsSaid) {
                 for (std::size_t c = 0; c < 3; ++c) {
                     const Vec3d &a = f.p[c], &b = f.p[(c + 1) % 3];
                     if (a[2] > zc && b[2] > zc)
-                        capsule_rows({a[0], a[1], 0, b[0], b[1], 0, r, f.nz}, v.data(), kLinesTogether, hull.low.data(), hull.high.data(),
-                                     hull.nz_low.data(), hull.nz_high.data());
+                        capsule_rows({a[0], a[1], 0, b[0], b[1], 0, r, f.nz}, v.data(), kLinesTogether,
+                                     hull.low.data(), hull.high.data(), hull.nz_low.data(),
+                                     hull.nz_high.data());
                 }
             }
             const double middle_u = groups.front().middle[u];
@@ -202,7 +220,9 @@ TEST(FibreRows, FacetsOfAGroupForbidNoMoreThanIsSaid) {
 TEST(FibreRows, WhereABallCanTouchIsTold) {
     Context context;
     std::mt19937 random(test::seed());
-    const auto within = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    const auto within = [&](double a, double b) {
+        return std::uniform_real_distribution<double>(a, b)(random);
+    };
     const auto unit = [](Vec3d v) {
         const double l = std::hypot(v[0], v[1], v[2]);
         return Vec3d{v[0] / l, v[1] / l, v[2] / l};
@@ -212,7 +232,8 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
         const double size = round % 3 == 0 ? 0.3 : 4, r = within(0.5, 8), away = round % 4 == 0 ? 900 : 0;
         std::vector<SolidFacet> facets(1 + random() % FacetGroup::kFacets);
         for (SolidFacet& f : facets) {
-            for (Vec3d& p : f.p) p = {away + within(-size, size), away + within(-size, size), within(-size, size)};
+            for (Vec3d& p : f.p)
+                p = {away + within(-size, size), away + within(-size, size), within(-size, size)};
             f.normal = unit({within(-1, 1), within(-1, 1), within(-0.4, 1)});
             f.nz = static_cast<float>(f.normal[2]);
             f.top = random() % 4 == 0;
@@ -235,14 +256,17 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
         if (part == 0) {
             double a = within(0, 1), b = within(0, 1);
             if (a + b > 1) a = 1 - a, b = 1 - b;
-            for (std::size_t c = 0; c < 3; ++c) place[c] = f.p[0][c] + a * (f.p[1][c] - f.p[0][c]) + b * (f.p[2][c] - f.p[0][c]);
+            for (std::size_t c = 0; c < 3; ++c)
+                place[c] = f.p[0][c] + a * (f.p[1][c] - f.p[0][c]) + b * (f.p[2][c] - f.p[0][c]);
         } else {
             const double a = on_end ? 0 : within(0, 1);
             d = unit({within(-1, 1), within(-1, 1), within(-1, 1)});
             for (std::size_t c = 0; c < 3 && !normals.empty(); ++c) {
                 NormalBox& box = on_end ? normals[k].corner[edge] : normals[k].edge[edge];
-                box.low[c] = static_cast<std::int8_t>(std::max(-127.0, std::floor(d[c] / SolidFacet::kTurn - within(0, 20))));
-                box.high[c] = static_cast<std::int8_t>(std::min(127.0, std::ceil(d[c] / SolidFacet::kTurn + within(0, 20))));
+                box.low[c] = static_cast<std::int8_t>(
+                    std::max(-127.0, std::floor(d[c] / SolidFacet::kTurn - within(0, 20))));
+                box.high[c] = static_cast<std::int8_t>(
+                    std::min(127.0, std::ceil(d[c] / SolidFacet::kTurn + within(0, 20))));
             }
             for (std::size_t c = 0; c < 3; ++c) place[c] = f.p[edge][c] + a * (f.p[next][c] - f.p[edge][c]);
         }
@@ -257,15 +281,20 @@ TEST(FibreRows, WhereABallCanTouchIsTold) {
         GroupTouched touched;
         group_touched(corners.front(), groups.front(), v, r, centre[2], touched);
         const double at = centre[v] - groups.front().middle[v];
-        const GroupTouched::Range& range = part == 0 ? touched.face : part == 1 ? touched.edge[edge] : touched.end[edge];
+        const GroupTouched::Range& range = part == 0   ? touched.face
+                                           : part == 1 ? touched.edge[edge]
+                                                       : touched.end[edge];
         ASSERT_LE(range.low[k], at) << "round " << round << " part " << part;
         ASSERT_GE(range.high[k], at) << "round " << round << " part " << part;
         ASSERT_LE(touched.all.low[k], range.low[k]);
         ASSERT_GE(touched.all.high[k], range.high[k]);
         for (const GroupTouched::Range& each :
-             {touched.face, touched.edge[0], touched.edge[1], touched.edge[2], touched.end[0], touched.end[1], touched.end[2]}) {
-            for (std::size_t i = 0; i < facets.size(); ++i) ++(each.low[i] <= each.high[i] ? told : elsewhere);
-            for (std::size_t i = facets.size(); i < FacetGroup::kFacets; ++i) ASSERT_GT(each.low[i], each.high[i]);
+             {touched.face, touched.edge[0], touched.edge[1], touched.edge[2], touched.end[0], touched.end[1],
+              touched.end[2]}) {
+            for (std::size_t i = 0; i < facets.size(); ++i)
+                ++(each.low[i] <= each.high[i] ? told : elsewhere);
+            for (std::size_t i = facets.size(); i < FacetGroup::kFacets; ++i)
+                ASSERT_GT(each.low[i], each.high[i]);
         }
     }
     EXPECT_GT(told, 3000U);
@@ -291,9 +320,12 @@ TEST(FibreRows, WhatReachesOutOfTheCoverIsTold) {
         const std::int64_t said = cover_rows(cover, low.data(), high.data(), first, last, state.data());
         for (int l = first; l < last; ++l) {
             const auto i = static_cast<std::size_t>(l);
-            std::int64_t wanted = low[i] < cover.low[i] || low[i] >= cover.next[i] ? kLooksElsewhere : high[i] > cover.high[i] ? kReachesOut : 0;
+            std::int64_t wanted = low[i] < cover.low[i] || low[i] >= cover.next[i] ? kLooksElsewhere
+                                  : high[i] > cover.high[i]                        ? kReachesOut
+                                                                                   : 0;
             if (low[i] >= high[i]) wanted = 0;
-            ASSERT_EQ(state[i], wanted) << low[i] << ' ' << high[i] << " of " << cover.low[i] << ' ' << cover.high[i] << ' ' << cover.next[i];
+            ASSERT_EQ(state[i], wanted) << low[i] << ' ' << high[i] << " of " << cover.low[i] << ' '
+                                        << cover.high[i] << ' ' << cover.next[i];
             any |= wanted;
         }
         ASSERT_EQ(said, any);

@@ -1,4 +1,5 @@
-// The flask: its geometry, plans of the own models with one, judged from the emitted text, and what leaves no room for it.
+// The flask: its geometry, plans of the own models with one, judged from the emitted text, and what leaves no
+// room for it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +24,9 @@
 namespace slabwright {
 namespace {
 
-std::string model(const char* name) { return std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl"; }
+std::string model(const char* name) {
+    return std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl";
+}
 
 Job with_flask() {
     Job job;
@@ -38,16 +41,18 @@ double distance_to(const Loops& region, Point2 p) {
         const auto loop = region.loop(l);
         for (std::size_t k = 0; k < loop.size(); ++k) {
             const Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
-            const double dx = to_mm(std::int64_t{b.x} - a.x), dy = to_mm(std::int64_t{b.y} - a.y), x = to_mm(std::int64_t{p.x} - a.x),
-                         y = to_mm(std::int64_t{p.y} - a.y);
-            const double l2 = dx * dx + dy * dy, t = l2 > 0 ? std::clamp((x * dx + y * dy) / l2, 0.0, 1.0) : 0;
+            const double dx = to_mm(std::int64_t{b.x} - a.x), dy = to_mm(std::int64_t{b.y} - a.y),
+                         x = to_mm(std::int64_t{p.x} - a.x), y = to_mm(std::int64_t{p.y} - a.y);
+            const double l2 = dx * dx + dy * dy,
+                         t = l2 > 0 ? std::clamp((x * dx + y * dy) / l2, 0.0, 1.0) : 0;
             nearest = std::min(nearest, std::hypot(x - t * dx, y - t * dy));
         }
     }
     return nearest;
 }
 
-// Against every facet's projection, point by point: tetrahedra at random, which overhang, overlap and leave holes.
+// Against every facet's projection, point by point: tetrahedra at random, which overhang, overlap and leave
+// holes.
 TEST(Silhouette, IsWhatTheFacetsCover) {
     const std::uint32_t seed = test::seed();
     std::mt19937 random(seed);
@@ -57,26 +62,34 @@ TEST(Silhouette, IsWhatTheFacetsCover) {
         for (int k = 0; k < 6; ++k) {
             std::array<Vec3f, 4> p;
             for (Vec3f& v : p) v = {at(), at(), at()};
-            const double ux = p[1].x - p[0].x, uy = p[1].y - p[0].y, uz = p[1].z - p[0].z, vx = p[2].x - p[0].x, vy = p[2].y - p[0].y,
-                         vz = p[2].z - p[0].z, wx = p[3].x - p[0].x, wy = p[3].y - p[0].y, wz = p[3].z - p[0].z;
-            const double volume = ux * (vy * wz - vz * wy) - uy * (vx * wz - vz * wx) + uz * (vx * wy - vy * wx);
+            const double ux = p[1].x - p[0].x, uy = p[1].y - p[0].y, uz = p[1].z - p[0].z,
+                         vx = p[2].x - p[0].x, vy = p[2].y - p[0].y, vz = p[2].z - p[0].z,
+                         wx = p[3].x - p[0].x, wy = p[3].y - p[0].y, wz = p[3].z - p[0].z;
+            const double volume =
+                ux * (vy * wz - vz * wy) - uy * (vx * wz - vz * wx) + uz * (vx * wy - vy * wx);
             if (std::abs(volume) < 1) continue;
             if (volume < 0) std::swap(p[2], p[3]);
-            facets.insert(facets.end(), {Facet{p[0], p[2], p[1]}, {p[0], p[1], p[3]}, {p[1], p[2], p[3]}, {p[0], p[3], p[2]}});
+            facets.insert(
+                facets.end(),
+                {Facet{p[0], p[2], p[1]}, {p[0], p[1], p[3]}, {p[1], p[2], p[3]}, {p[0], p[3], p[2]}});
         }
         Context context;
         const Mesh mesh = weld(context, facets);
         const Loops outline = silhouette(context, mesh.view());
         for (int k = 0; k < 2000; ++k) {
-            const Point2 p{static_cast<std::int32_t>(random() % 640000), static_cast<std::int32_t>(random() % 640000)};
+            const Point2 p{static_cast<std::int32_t>(random() % 640000),
+                           static_cast<std::int32_t>(random() % 640000)};
             bool covered = false;
             for (const Facet& f : facets) {
                 double side[3];
                 for (int e = 0; e < 3; ++e) {
-                    const Vec3f &a = f[static_cast<std::size_t>(e)], &b = f[static_cast<std::size_t>((e + 1) % 3)];
-                    side[e] = (static_cast<double>(b.x) - a.x) * (to_mm(p.y) - a.y) - (static_cast<double>(b.y) - a.y) * (to_mm(p.x) - a.x);
+                    const Vec3f &a = f[static_cast<std::size_t>(e)],
+                                &b = f[static_cast<std::size_t>((e + 1) % 3)];
+                    side[e] = (static_cast<double>(b.x) - a.x) * (to_mm(p.y) - a.y) -
+                              (static_cast<double>(b.y) - a.y) * (to_mm(p.x) - a.x);
                 }
-                covered |= (side[0] >= 0 && side[1] >= 0 && side[2] >= 0) || (side[0] <= 0 && side[1] <= 0 && side[2] <= 0);
+                covered |= (side[0] >= 0 && side[1] >= 0 && side[2] >= 0) ||
+                           (side[0] <= 0 && side[1] <= 0 && side[2] <= 0);
             }
             if (covered == (winding(outline, p) > 0)) continue;
             ASSERT_LT(distance_to(outline, p), 1e-3) << p.x << ' ' << p.y;
@@ -109,13 +122,15 @@ TEST(Flask, KeepsItsDistanceAndWidensUpwards) {
         for (std::size_t i = 0; i < 3; ++i) {
             ASSERT_EQ(flask.inner[i].size(), 1U);
             EXPECT_GT(area(flask.inner[i]), 0);
-            const double wanted = plan.job.flask.gap + 15 * static_cast<double>(i) * std::tan(2 * std::numbers::pi / 180);
+            const double wanted =
+                plan.job.flask.gap + 15 * static_cast<double>(i) * std::tan(2 * std::numbers::pi / 180);
             const auto loop = flask.inner[i].loop(0);
             for (std::size_t k = 0; k < loop.size(); ++k)
                 for (int part = 0; part < 8; ++part) {
                     const Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
-                    const Point2 p{a.x + static_cast<std::int32_t>(part / 8.0 * (static_cast<double>(b.x) - a.x)),
-                                   a.y + static_cast<std::int32_t>(part / 8.0 * (static_cast<double>(b.y) - a.y))};
+                    const Point2 p{
+                        a.x + static_cast<std::int32_t>(part / 8.0 * (static_cast<double>(b.x) - a.x)),
+                        a.y + static_cast<std::int32_t>(part / 8.0 * (static_cast<double>(b.y) - a.y))};
                     ASSERT_EQ(winding(outline, p), 0);
                     ASSERT_GE(distance_to(outline, p), wanted - 0.001);
                     ASSERT_LE(distance_to(outline, p), wanted + 0.5);
@@ -123,7 +138,8 @@ TEST(Flask, KeepsItsDistanceAndWidensUpwards) {
             const Loops frame = flask_frame(flask, i);
             EXPECT_NEAR(area(frame), area(flask.outer) - area(flask.inner[i]), 1e-3);
             if (i > 0) {
-                EXPECT_NEAR(area(subtract(flask.inner[i - 1], flask.inner[i])), 0, 1e-3) << "the sand does not leave upwards";
+                EXPECT_NEAR(area(subtract(flask.inner[i - 1], flask.inner[i])), 0, 1e-3)
+                    << "the sand does not leave upwards";
             }
         }
         EXPECT_NEAR(flask.volume_mm3 + flask.opening_mm3, area(flask.outer) * 45, 1);
@@ -138,7 +154,8 @@ TEST(Flask, OneBoxForSeparatePieces) {
         const Mesh box = test::height_field(context, 1, 20, [](double, double) { return 10.0; });
         for (const Index3& f : box.facets) {
             Facet facet;
-            for (std::size_t k = 0; k < 3; ++k) facet[k] = {box.vertices[f[k]].x + x, box.vertices[f[k]].y, box.vertices[f[k]].z};
+            for (std::size_t k = 0; k < 3; ++k)
+                facet[k] = {box.vertices[f[k]].x + x, box.vertices[f[k]].y, box.vertices[f[k]].z};
             facets.push_back(facet);
         }
     }
@@ -151,7 +168,8 @@ TEST(Flask, OneBoxForSeparatePieces) {
     plan.stock_max = {300, 100};
     const Flask flask = place_flask(context, mesh.view(), plan);
     ASSERT_EQ(flask.inner[0].size(), 1U);
-    EXPECT_GT(winding(flask.inner[0], {to_units(100), 0}), 0) << "the way from post to post is within the box";
+    EXPECT_GT(winding(flask.inner[0], {to_units(100), 0}), 0)
+        << "the way from post to post is within the box";
     EXPECT_NEAR(area(flask.inner[0]), 220 * 20 + 2 * 20.1 * (220 + 20) + std::numbers::pi * 20.1 * 20.1, 30);
 }
 
@@ -166,8 +184,11 @@ TEST_P(FlaskPlan, IsMadeAndStays) {
     const Plan made = plan(context, stl, job);
     ASSERT_TRUE(made.flask);
     for (const Layer& layer : made.layers) {
-        const Loops glued_flask = intersect(layer.glue, flask_frame(*made.flask, static_cast<std::size_t>(layer.index - 1)));
-        EXPECT_GT(area(glued_flask), 0.5 * area(flask_frame(*made.flask, static_cast<std::size_t>(layer.index - 1)))) << "layer " << layer.index;
+        const Loops glued_flask =
+            intersect(layer.glue, flask_frame(*made.flask, static_cast<std::size_t>(layer.index - 1)));
+        EXPECT_GT(area(glued_flask),
+                  0.5 * area(flask_frame(*made.flask, static_cast<std::size_t>(layer.index - 1))))
+            << "layer " << layer.index;
     }
     EXPECT_EQ(made.sequence.back().action, "mould_box");
     for (const Diagnostic& d : made.diagnostics) EXPECT_NE(d.code, "schedule.tips");
@@ -175,9 +196,11 @@ TEST_P(FlaskPlan, IsMadeAndStays) {
     VerifyOptions options;
     options.stl = stl;
     Verification v = verify_folder(context, out, options);
-    for (const Violation& violation : v.report.violations) ADD_FAILURE() << violation.code << ' ' << violation.message << ' ' << violation.file;
+    for (const Violation& violation : v.report.violations)
+        ADD_FAILURE() << violation.code << ' ' << violation.message << ' ' << violation.file;
     ASSERT_FALSE(v.input.layers[0].flask.empty());
-    for (const LayerFindings& f : v.report.layers) EXPECT_LT(f.waste_mm3, 1) << "stock stands between pattern and flask";  // cusps of a tenth
+    for (const LayerFindings& f : v.report.layers)
+        EXPECT_LT(f.waste_mm3, 1) << "stock stands between pattern and flask";  // cusps of a tenth
 
     if (std::string(GetParam()) != "half-sphere") return;  // once is enough for what follows
     // The same programs beside a flask that was said to reach half a millimetre further in: its wall is gone.
@@ -192,14 +215,17 @@ TEST_P(FlaskPlan, IsMadeAndStays) {
     }
     std::ofstream(out + "/plan.json") << document.dump();
     v = verify_folder(context, out, options);
-    const auto cut = std::find_if(v.report.violations.begin(), v.report.violations.end(), [](const Violation& x) { return x.code == "gouge.flask"; });
+    const auto cut = std::find_if(v.report.violations.begin(), v.report.violations.end(),
+                                  [](const Violation& x) { return x.code == "gouge.flask"; });
     ASSERT_NE(cut, v.report.violations.end());
-    // Exactly, by the program that goes nearest, which keeps off it what rings and arcs may add; and its height is gone from the stock.
+    // Exactly, by the program that goes nearest, which keeps off it what rings and arcs may add; and its
+    // height is gone from the stock.
     EXPECT_LE(cut->size, 0.501);
     EXPECT_GE(cut->size, 0.46);
     EXPECT_FALSE(cut->file.empty());
-    const auto gone = std::find_if(v.report.violations.begin(), v.report.violations.end(),
-                                   [](const Violation& x) { return x.code == "gouge.flask" && x.file.empty(); });
+    const auto gone =
+        std::find_if(v.report.violations.begin(), v.report.violations.end(),
+                     [](const Violation& x) { return x.code == "gouge.flask" && x.file.empty(); });
     ASSERT_NE(gone, v.report.violations.end());
     EXPECT_GT(gone->size, 3);
 }
@@ -213,17 +239,20 @@ TEST(FlaskPlan, NoMoveTouchesIt) {
         const Loops frame = flask_frame(*made.flask, static_cast<std::size_t>(layer.index - 1));
         for (const Operation& op : layer.operations) {
             if (op.kind == OperationKind::face) continue;
-            const auto tool = std::find_if(made.job.tools.begin(), made.job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+            const auto tool = std::find_if(made.job.tools.begin(), made.job.tools.end(),
+                                           [&](const Tool& t) { return t.number == op.tool; });
             double nearest = 1e300;
             for (std::size_t k = 1; k < op.moves.size(); ++k) {
                 const Move &a = op.moves[k - 1], &b = op.moves[k];
                 if (to_mm(std::min(a.z, b.z)) >= layer.z_top - 1e-6) continue;
                 const ArcShape shape = b.is_arc() ? arc_shape(a, b) : ArcShape{};
                 for (const double t : {0.25, 0.5, 0.75, 1.0}) {
-                    Point2 p{a.x + static_cast<std::int32_t>(t * (b.x - a.x)), a.y + static_cast<std::int32_t>(t * (b.y - a.y))};
+                    Point2 p{a.x + static_cast<std::int32_t>(t * (b.x - a.x)),
+                             a.y + static_cast<std::int32_t>(t * (b.y - a.y))};
                     if (b.is_arc()) {
                         const double turn = shape.start + t * shape.sweep;
-                        p = {to_units(shape.x + shape.radius * std::cos(turn)), to_units(shape.y + shape.radius * std::sin(turn))};
+                        p = {to_units(shape.x + shape.radius * std::cos(turn)),
+                             to_units(shape.y + shape.radius * std::sin(turn))};
                     }
                     nearest = std::min(nearest, winding(frame, p) > 0 ? 0 : distance_to(frame, p));
                 }
@@ -265,10 +294,13 @@ TEST(FlaskPlan, SaysWhatRoomIsMissing) {
     Job job = with_flask();
     job.flask.draft_deg = 0;
     job.slabs.length = 180;  // half sphere: 100 mm, and 45.25 mm needed on either side
-    EXPECT_NE(refusal(job, "fit.flask", ErrorKind::no_plan).find("5.2 mm more than the slab leaves"), std::string::npos);
+    EXPECT_NE(refusal(job, "fit.flask", ErrorKind::no_plan).find("5.2 mm more than the slab leaves"),
+              std::string::npos);
     job.slabs.length = 1160;
     job.machine.travel_y = 190;
-    EXPECT_NE(refusal(job, "fit.flask", ErrorKind::no_plan).find("in y, 0.2 mm more than the machine's travel leaves"), std::string::npos);
+    EXPECT_NE(refusal(job, "fit.flask", ErrorKind::no_plan)
+                  .find("in y, 0.2 mm more than the machine's travel leaves"),
+              std::string::npos);
     job = with_flask();
     job.flask.gap = 15;
     EXPECT_NE(refusal(job, "job.range", ErrorKind::usage).find("flask.gap"), std::string::npos);

@@ -1,5 +1,5 @@
-// Cutting forces: the double reference against brute-force discs and against the closed form, OpenCL against both, seams
-// between teeth, ranges, the overhang and the deflection of a cutter.
+// Cutting forces: the double reference against brute-force discs and against the closed form, OpenCL against
+// both, seams between teeth, ranges, the overhang and the deflection of a cutter.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,7 +19,9 @@
 
 // PoCL never frees its compiler.
 extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libpocl\nleak:libLLVM\nleak:libOpenCL\nleak:libclang\n"; }
+extern "C" const char* __lsan_default_suppressions() {
+    return "leak:libpocl\nleak:libLLVM\nleak:libOpenCL\nleak:libclang\n";
+}
 
 namespace slabwright {
 namespace {
@@ -35,7 +37,9 @@ const bool kCacheSet = [] {
     return true;
 }();
 
-double drawn(std::mt19937_64& random, double low, double high) { return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53; }
+double drawn(std::mt19937_64& random, double low, double high) {
+    return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+}
 
 CutSegment random_cut(std::mt19937_64& random, CutterProfile profile) {
     CutSegment s;
@@ -45,7 +49,8 @@ CutSegment random_cut(std::mt19937_64& random, CutterProfile profile) {
     s.helix_rad = random() % 5 == 0 ? 0 : drawn(random, 0, kPi / 3);
     s.high_mm = std::exp(drawn(random, std::log(0.01), std::log(3.0))) * s.radius_mm;
     s.low_mm = random() % 3 == 0 ? drawn(random, 0, 0.9) * s.high_mm : 0;
-    s.arc = engagement_arc(s.radius_mm, drawn(random, 0.01, 2.3) * s.radius_mm, random() % 2 ? MillingSense::up : MillingSense::down);
+    s.arc = engagement_arc(s.radius_mm, drawn(random, 0.01, 2.3) * s.radius_mm,
+                           random() % 2 ? MillingSense::up : MillingSense::down);
     s.chip_load_mm = drawn(random, 0, 0.7);
     s.spindle_rpm = drawn(random, 1000, 18000);
     s.coefficients = {drawn(random, 2, 12), drawn(random, 0.2, 9), drawn(random, 0, 6),
@@ -62,7 +67,8 @@ CutSegment slot_of_luo(double helix_lag = kPi / 6) {
     s.arc = engagement_arc(6.35, 12.7, MillingSense::up);
     s.chip_load_mm = 0.635;
     s.spindle_rpm = 4000;
-    s.coefficients = resolve_coefficients({8.8575, 1.1268, 0.6188, 2.4948}, kPi / 6, CoefficientTransform::printed);
+    s.coefficients =
+        resolve_coefficients({8.8575, 1.1268, 0.6188, 2.4948}, kPi / 6, CoefficientTransform::printed);
     return s;
 }
 
@@ -75,7 +81,8 @@ double disc_height(const CutSegment& s, int i, int n, double& db, double& kappa)
     // Equal steps of the edge's slope on a ball, of height on the rest.
     auto edge = [&](double h) {
         if (s.profile == CutterProfile::flat) return h;
-        return h < s.radius_mm ? s.radius_mm * std::acos(1 - h / s.radius_mm) : s.radius_mm * kPi / 2 + h - s.radius_mm;
+        return h < s.radius_mm ? s.radius_mm * std::acos(1 - h / s.radius_mm)
+                               : s.radius_mm * kPi / 2 + h - s.radius_mm;
     };
     const double low = edge(s.low_mm), high = edge(s.high_mm), e = low + (high - low) * (i + 0.5) / n;
     db = (high - low) / n;
@@ -95,7 +102,8 @@ void add_disc(Discs& f, const CutSegment& s, double phi, double kappa, double db
     f.torque += t * s.radius_mm * std::sin(kappa);
 }
 
-// Discs in z, each tooth wrapped into one turn and engaged or not by its angle: as a first implementation would have it.
+// Discs in z, each tooth wrapped into one turn and engaged or not by its angle: as a first implementation
+// would have it.
 Discs discs(const CutSegment& s, double theta, int n) {
     Discs f;
     for (int i = 0; i < n; ++i) {
@@ -110,11 +118,13 @@ Discs discs(const CutSegment& s, double theta, int n) {
     return f;
 }
 
-constexpr double SegmentForces::*kMembers[] = {&SegmentForces::peak_x_n,        &SegmentForces::peak_y_n,         &SegmentForces::peak_z_n,
-                                               &SegmentForces::peak_in_plane_n, &SegmentForces::peak_resultant_n, &SegmentForces::mean_x_n,
-                                               &SegmentForces::mean_y_n,        &SegmentForces::mean_z_n,         &SegmentForces::mean_in_plane_n};
+constexpr double SegmentForces::*kMembers[] = {
+    &SegmentForces::peak_x_n,        &SegmentForces::peak_y_n,         &SegmentForces::peak_z_n,
+    &SegmentForces::peak_in_plane_n, &SegmentForces::peak_resultant_n, &SegmentForces::mean_x_n,
+    &SegmentForces::mean_y_n,        &SegmentForces::mean_z_n,         &SegmentForces::mean_in_plane_n};
 
-// The largest difference of any force, as a share of the peak resultant; torque as a share of that times the radius.
+// The largest difference of any force, as a share of the peak resultant; torque as a share of that times the
+// radius.
 double difference(const SegmentForces& a, const SegmentForces& b, double radius) {
     if (b.peak_resultant_n == 0) return a.peak_resultant_n;
     double worst = 0;
@@ -137,13 +147,16 @@ TEST(Forces, ReferenceAgreesWithDiscs) {
         const int angles = 720;
         for (int k = 0; k < angles; ++k) {
             const Discs d = discs(s, 2 * kPi * (k + 0.37) / angles, 500);
-            peak.x = std::max(peak.x, std::abs(d.x)), peak.y = std::max(peak.y, std::abs(d.y)), peak.z = std::max(peak.z, std::abs(d.z));
+            peak.x = std::max(peak.x, std::abs(d.x)), peak.y = std::max(peak.y, std::abs(d.y)),
+            peak.z = std::max(peak.z, std::abs(d.z));
             peak.torque = std::max(peak.torque, std::abs(d.torque));
             plane = std::max(plane, std::hypot(d.x, d.y)), all = std::max(all, std::hypot(d.x, d.y, d.z));
-            mean.x += d.x / angles, mean.y += d.y / angles, mean.z += d.z / angles, mean.torque += d.torque / angles;
+            mean.x += d.x / angles, mean.y += d.y / angles, mean.z += d.z / angles,
+                mean.torque += d.torque / angles;
             mean_plane += std::hypot(d.x, d.y) / angles;
         }
-        // Discs miss a peak at an engagement limit by up to half a step of 0.5°, and count a disc in or out whole.
+        // Discs miss a peak at an engagement limit by up to half a step of 0.5°, and count a disc in or out
+        // whole.
         const double within = 0.012 * all;
         EXPECT_NEAR(f.peak_x_n, peak.x, within) << i;
         EXPECT_NEAR(f.peak_y_n, peak.y, within) << i;
@@ -173,7 +186,8 @@ TEST(Forces, MeansAreTheIntegralsOverArcAndEdge) {
             double db = 0, kappa = 0;
             (void)disc_height(s, d, n, db, kappa);
             const double arc = s.arc.exit_rad - s.arc.entry_rad, share = arc / n * s.flutes / (2 * kPi);
-            for (int a = 0; a < n; ++a) add_disc(mean, s, s.arc.entry_rad + arc * (a + 0.5) / n, kappa, db * share);
+            for (int a = 0; a < n; ++a)
+                add_disc(mean, s, s.arc.entry_rad + arc * (a + 0.5) / n, kappa, db * share);
         }
         const SegmentForces f = reference_forces(s);
         const double within = 2e-5 * f.peak_resultant_n;
@@ -192,8 +206,9 @@ TEST(Forces, ReferenceIsTheClosedFormWithoutHelix) {
         CutSegment s = random_cut(random, CutterProfile::flat);
         s.helix_rad = 0;
         const SegmentForces a = reference_forces(s, 1e-4), b = closed_form_forces(s, 1e-4);
-        for (const auto member : {&SegmentForces::peak_x_n, &SegmentForces::peak_y_n, &SegmentForces::peak_z_n, &SegmentForces::peak_in_plane_n,
-                                  &SegmentForces::peak_resultant_n})
+        for (const auto member :
+             {&SegmentForces::peak_x_n, &SegmentForces::peak_y_n, &SegmentForces::peak_z_n,
+              &SegmentForces::peak_in_plane_n, &SegmentForces::peak_resultant_n})
             EXPECT_NEAR(a.*member, b.*member, 1e-6 * b.peak_resultant_n) << i;
         EXPECT_NEAR(a.peak_torque_nmm, b.peak_torque_nmm, 1e-6 * b.peak_torque_nmm) << i;
     }
@@ -205,7 +220,8 @@ TEST(Forces, ReferenceIsTheClosedFormWithHelix) {
     for (int i = 0; i < 300; ++i) {
         const CutSegment s = random_cut(random, CutterProfile::flat);
         const SegmentForces a = reference_forces(s, 1e-3), b = closed_form_forces(s, 1e-3);
-        for (const auto member : {&SegmentForces::peak_x_n, &SegmentForces::peak_y_n, &SegmentForces::peak_z_n, &SegmentForces::peak_resultant_n})
+        for (const auto member : {&SegmentForces::peak_x_n, &SegmentForces::peak_y_n,
+                                  &SegmentForces::peak_z_n, &SegmentForces::peak_resultant_n})
             worst = std::max(worst, std::abs(a.*member - b.*member) / b.peak_resultant_n);
     }
     EXPECT_LT(worst, 1e-9);
@@ -237,7 +253,8 @@ TEST(Forces, SeamOfTwoTeethCountsOne) {
 
 TEST(Forces, HelixTooSmallToMatterChangesNothing) {
     for (const double helix : {1e-12, 1e-7, 1e-5, 1e-4, 1e-3}) {
-        const SegmentForces a = closed_form_forces(slot_of_luo(0)), b = closed_form_forces(slot_of_luo(helix));
+        const SegmentForces a = closed_form_forces(slot_of_luo(0)),
+                            b = closed_form_forces(slot_of_luo(helix));
         EXPECT_NEAR(a.peak_resultant_n, b.peak_resultant_n, 2e-3 * a.peak_resultant_n) << helix;
         EXPECT_NEAR(a.mean_z_n, b.mean_z_n, 1e-9) << helix;
     }
@@ -294,7 +311,8 @@ TEST(ForceSolver, DeviceIsTheReferenceWithin1e4OfThePeak) {
     std::mt19937_64 random(seed);
     Context context;
     ForceSolver solver(context);
-    std::printf("device: %s%s%s\n", solver.device().c_str(), solver.note().empty() ? "" : ", ", solver.note().c_str());
+    std::printf("device: %s%s%s\n", solver.device().c_str(), solver.note().empty() ? "" : ", ",
+                solver.note().c_str());
     if (!solver.on_device()) {
         EXPECT_EQ(solver.device(), "reference");
         EXPECT_FALSE(solver.note().empty());
@@ -304,7 +322,8 @@ TEST(ForceSolver, DeviceIsTheReferenceWithin1e4OfThePeak) {
         return;
     }
     std::vector<CutSegment> cuts(10000);
-    for (std::size_t i = 0; i < cuts.size(); ++i) cuts[i] = random_cut(random, i % 2 ? CutterProfile::ball : CutterProfile::flat);
+    for (std::size_t i = 0; i < cuts.size(); ++i)
+        cuts[i] = random_cut(random, i % 2 ? CutterProfile::ball : CutterProfile::flat);
     std::vector<SegmentForces> found(cuts.size());
     solver.solve(context, cuts, found);
     double worst[2] = {0, 0};
@@ -312,16 +331,20 @@ TEST(ForceSolver, DeviceIsTheReferenceWithin1e4OfThePeak) {
         const double d = difference(found[i], reference_forces(cuts[i]), cuts[i].radius_mm);
         ASSERT_LE(d, 1e-4) << "cut " << i;
         worst[i % 2] = std::max(worst[i % 2], d);
-        EXPECT_NEAR(found[i].mean_power_w, found[i].mean_torque_nmm * 2 * kPi * cuts[i].spindle_rpm / 60000, 1e-9 * (1 + found[i].mean_power_w));
+        EXPECT_NEAR(found[i].mean_power_w, found[i].mean_torque_nmm * 2 * kPi * cuts[i].spindle_rpm / 60000,
+                    1e-9 * (1 + found[i].mean_power_w));
     }
-    std::printf("device and reference differ by at most %.1e (flat), %.1e (ball) of the peak resultant\n", worst[0], worst[1]);
+    std::printf("device and reference differ by at most %.1e (flat), %.1e (ball) of the peak resultant\n",
+                worst[0], worst[1]);
 }
 
-// More segments than are on the way at once, an odd number, on one thread and on all, on the device and by reference.
+// More segments than are on the way at once, an odd number, on one thread and on all, on the device and by
+// reference.
 TEST(ForceSolver, StreamsAnyNumberInOrder) {
     std::mt19937_64 random(11);
     std::vector<CutSegment> few(97);
-    for (std::size_t i = 0; i < few.size(); ++i) few[i] = random_cut(random, i % 2 ? CutterProfile::ball : CutterProfile::flat);
+    for (std::size_t i = 0; i < few.size(); ++i)
+        few[i] = random_cut(random, i % 2 ? CutterProfile::ball : CutterProfile::flat);
     std::vector<CutSegment> cuts(100003);
     for (std::size_t i = 0; i < cuts.size(); ++i) cuts[i] = few[i % few.size()];
     Context all, one({.threads = 1});
@@ -333,7 +356,9 @@ TEST(ForceSolver, StreamsAnyNumberInOrder) {
     narrow.solve(one, cuts, again, 1e-2);
     reference.solve(one, few, expected, 1e-2);
     for (std::size_t i = 0; i < cuts.size(); ++i) {
-        ASSERT_LE(difference(found[i], expected[i % few.size()], cuts[i].radius_mm), solver.on_device() ? 1e-4 : 0.0) << i;
+        ASSERT_LE(difference(found[i], expected[i % few.size()], cuts[i].radius_mm),
+                  solver.on_device() ? 1e-4 : 0.0)
+            << i;
         ASSERT_EQ(found[i].peak_resultant_n, again[i].peak_resultant_n) << i;
         ASSERT_EQ(found[i].mean_x_n, found[i % few.size()].mean_x_n) << i;
     }
@@ -376,7 +401,8 @@ TEST(ForceSolver, UnknownDeviceIsAnError) {
     }
 }
 
-// What a device screens and what the double model finds alone are the same cuts, also where many are nearly as hard.
+// What a device screens and what the double model finds alone are the same cuts, also where many are nearly
+// as hard.
 TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
     const unsigned seed = test::seed();
     std::mt19937_64 random(seed);
@@ -386,7 +412,8 @@ TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
         const CutSegment like = random_cut(random, g % 2 ? CutterProfile::ball : CutterProfile::flat);
         const std::size_t n = random() % 300;
         for (std::size_t i = 0; i < n; ++i) {
-            cuts.push_back(g % 3 ? like : random_cut(random, g % 2 ? CutterProfile::ball : CutterProfile::flat));
+            cuts.push_back(g % 3 ? like
+                                 : random_cut(random, g % 2 ? CutterProfile::ball : CutterProfile::flat));
             if (g % 3) cuts.back().chip_load_mm *= 1 - drawn(random, 0, 1e-4);
             if (g % 3 == 2 && i % 2) cuts.back() = cuts[starts.back()];
         }
@@ -396,14 +423,16 @@ TEST(HardestCuts, AreTheSameWithADeviceAndWithout) {
     SolverAhead ahead(context, 0);
     ahead.expect(cuts);
     ASSERT_NE(ahead.solver(), nullptr);
-    const HardestSearch with = hardest_cuts(context, cuts, starts, ahead.solver()), without = hardest_cuts(context, cuts, starts, nullptr);
+    const HardestSearch with = hardest_cuts(context, cuts, starts, ahead.solver()),
+                        without = hardest_cuts(context, cuts, starts, nullptr);
     std::printf("device: %s\n", with.device.c_str());
     EXPECT_TRUE(without.device.empty());
     ASSERT_EQ(with.groups.size(), starts.size() - 1);
     EXPECT_EQ(with.groups, without.groups);
     for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
         double most = 0;
-        for (std::size_t i = starts[g]; i < starts[g + 1]; ++i) most = std::max(most, reference_forces(cuts[i]).peak_y_n);
+        for (std::size_t i = starts[g]; i < starts[g + 1]; ++i)
+            most = std::max(most, reference_forces(cuts[i]).peak_y_n);
         if (starts[g] == starts[g + 1]) EXPECT_EQ(with.groups[g].across, kNoCut);
         else EXPECT_NEAR(reference_forces(cuts[with.groups[g].across]).peak_y_n, most, 1e-9 * most);
     }
@@ -413,7 +442,8 @@ TEST(SolverAhead, OpensOneWhenAllThatIsExpectedIsWorthIt) {
     Context context, without({.device = "reference"});
     std::vector<CutSegment> cuts(1000, slot_of_luo());
     SolverAhead ahead(context), never(without);
-    const auto flats = static_cast<std::size_t>(kDeviceWorthSeconds / 8e-6 / static_cast<double>(cuts.size()));
+    const auto flats =
+        static_cast<std::size_t>(kDeviceWorthSeconds / 8e-6 / static_cast<double>(cuts.size()));
     for (std::size_t i = 0; i + 2 < flats; ++i) ahead.expect(cuts), never.expect(cuts);
     EXPECT_EQ(ahead.solver(), nullptr);
     for (std::size_t i = 0; i < 4; ++i) ahead.expect(cuts), never.expect(cuts);
@@ -446,13 +476,15 @@ TEST(PeakForce, IsThatOfTheClosedFormOrTheReference) {
 
 TEST(Deflection, LengthAndDeflectionAreInverse) {
     for (const double f : {1.0, 33.0, 200.0})
-        for (const double d : {3.175, 6.35, 25.4}) EXPECT_NEAR(cutter_deflection(f, allowed_tool_length(f, 0.0508, d), d), 0.0508, 1e-12);
+        for (const double d : {3.175, 6.35, 25.4})
+            EXPECT_NEAR(cutter_deflection(f, allowed_tool_length(f, 0.0508, d), d), 0.0508, 1e-12);
     // L ∝ d^(4/3) at one force.
     EXPECT_NEAR(allowed_tool_length(10, 0.05, 8) / allowed_tool_length(10, 0.05, 1), 16, 1e-9);
     EXPECT_TRUE(std::isinf(allowed_tool_length(0, 0.05, 8)));
     EXPECT_THROW((void)cutter_deflection(1, 1, 0), Error);
     EXPECT_THROW((void)least_overhang_thickness({}), Error);
-    // A steel-like beam worked by hand: d 10, J = π·8⁴/64 = 201.06 mm⁴; 100 N at 50 mm: 12.5e6 / (3·200e3·201.06) = 0.10362 mm.
+    // A steel-like beam worked by hand: d 10, J = π·8⁴/64 = 201.06 mm⁴; 100 N at 50 mm: 12.5e6 /
+    // (3·200e3·201.06) = 0.10362 mm.
     EXPECT_NEAR(cutter_deflection(100, 50, 10), 0.10362, 1e-5);
 }
 
@@ -470,7 +502,8 @@ Operation straight(OperationKind kind, double stepdown, double stepover, std::ui
 TEST(RateOperation, GrowsWithFeedDepthAndStickout) {
     Job job;
     const Tool flat = job.tools[1];
-    Operation slow = straight(OperationKind::rough, 3, 6.35, 3000), fast = straight(OperationKind::rough, 3, 6.35, 9000),
+    Operation slow = straight(OperationKind::rough, 3, 6.35, 3000),
+              fast = straight(OperationKind::rough, 3, 6.35, 9000),
               deep = straight(OperationKind::rough, 6, 6.35, 3000);
     for (Operation* op : {&slow, &fast, &deep}) rate_operation(*op, flat, job);
     EXPECT_GT(fast.peak_force_n, slow.peak_force_n);
@@ -482,10 +515,12 @@ TEST(RateOperation, GrowsWithFeedDepthAndStickout) {
     s.high_mm = 3;
     s.arc = {0, kPi};
     s.chip_load_mm = 3000.0 / 18000 / 2;
-    s.coefficients = resolve_coefficients({8.8575, 1.1268, 0.6188, 2.4948}, flat.helix_rad, CoefficientTransform::oblique);
+    s.coefficients =
+        resolve_coefficients({8.8575, 1.1268, 0.6188, 2.4948}, flat.helix_rad, CoefficientTransform::oblique);
     const SegmentForces f = closed_form_forces(s, 1e-5);
     EXPECT_NEAR(slow.peak_force_n, f.peak_resultant_n, 1e-12);
-    EXPECT_NEAR(slow.deflection_mm, cutter_deflection(f.peak_in_plane_n, flat.stickout, flat.diameter), 1e-12);
+    EXPECT_NEAR(slow.deflection_mm, cutter_deflection(f.peak_in_plane_n, flat.stickout, flat.diameter),
+                1e-12);
     Tool longer = flat;
     longer.stickout *= 2;
     Operation op = straight(OperationKind::rough, 3, 6.35, 3000);
@@ -495,7 +530,8 @@ TEST(RateOperation, GrowsWithFeedDepthAndStickout) {
 
 TEST(RateOperation, FinishingIsLighterThanRoughing) {
     Job job;
-    Operation rough = straight(OperationKind::rough, 3, 0, 5000), levels = straight(OperationKind::finish, 1, 0, 5000),
+    Operation rough = straight(OperationKind::rough, 3, 0, 5000),
+              levels = straight(OperationKind::finish, 1, 0, 5000),
               raster = straight(OperationKind::finish, 0, 0.8, 5000);
     rate_operation(rough, job.tools[1], job);
     rate_operation(levels, job.tools[2], job);

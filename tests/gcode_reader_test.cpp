@@ -14,7 +14,9 @@ namespace {
 
 const std::string kHead = "(a comment)\nG21 G17 G90 G94 G40 G49 G80\nG54\nT3 M6\nG43 H3\nS18000 M3\nG4 P3\n";
 
-Program read(const std::string& body, const GcodeLimits& limits = {}) { return read_gcode(kHead + body + "M5\nM2\n", "nc/test.ngc", limits); }
+Program read(const std::string& body, const GcodeLimits& limits = {}) {
+    return read_gcode(kHead + body + "M5\nM2\n", "nc/test.ngc", limits);
+}
 
 /// The error's code and place.
 std::string refusal(const std::string& text) {
@@ -64,7 +66,8 @@ TEST(GcodeReader, SpindleAndUnits) {
     EXPECT_DOUBLE_EQ(incremental.steps[3].x, 0);
     const Program stops = read_gcode("G0 Z1\nM2\nthis is never read\n", "x");
     EXPECT_EQ(stops.steps.size(), 1u);
-    const Program small = read_gcode("%\nn10 g0 x 1.5 y-2 (lower case and blanks) z+3 ; the rest\nm30\n%\n", "x");
+    const Program small =
+        read_gcode("%\nn10 g0 x 1.5 y-2 (lower case and blanks) z+3 ; the rest\nm30\n%\n", "x");
     EXPECT_EQ(small.steps.at(0).x, 1.5);
     EXPECT_EQ(small.steps.at(0).z, 3);
 }
@@ -77,7 +80,8 @@ TEST(GcodeReader, HowFarCornersMayBeRounded) {
     EXPECT_EQ(blends(""), std::pair(kJunction, kJunction));
     EXPECT_EQ(blends("G64\n"), std::pair(kJunction, kJunction));
     EXPECT_EQ(blends("G64 P0.1 Q0\n"), std::pair(0.1, 0.1));
-    EXPECT_EQ(blends("G64 P0.1\n"), std::pair(0.1, 0.2)) << "points within P of a straight way are left out too";
+    EXPECT_EQ(blends("G64 P0.1\n"), std::pair(0.1, 0.2))
+        << "points within P of a straight way are left out too";
     EXPECT_EQ(blends("G64 P0.1 Q0.03\n"), std::pair(0.1, 0.1 + 0.03));
     EXPECT_EQ(blends("G64 Q0.03\n"), std::pair(kJunction, kJunction + 0.03));
     EXPECT_EQ(blends("G20\nG64 P0.01 Q0\nG21\n"), std::pair(0.254, 0.254));
@@ -96,10 +100,13 @@ TEST(GcodeReader, ArcsStayWithinTheirTolerance) {
         double cx, cy, r, sweep, end_z;
     };
     constexpr double pi = std::numbers::pi;
-    for (const Case& c : {Case{"G3 X0 Y10 I-10 J0\n", 0, 0, 10, pi / 2, 0}, Case{"G2 X0 Y10 I-10 J0\n", 0, 0, 10, -3 * pi / 2, 0},
-                          Case{"G3 X10 Y0 I-10\n", 0, 0, 10, 2 * pi, 0}, Case{"G2 X10 Y0 I-10 Z-3\n", 0, 0, 10, -2 * pi, -3},
-                          Case{"G3 X0 Y10 R10\n", 0, 0, 10, pi / 2, 0}, Case{"G3 X0 Y10 R-10\n", 10, 10, 10, 3 * pi / 2, 0},
-                          Case{"G2 X0 Y10 R10\n", 10, 10, 10, -pi / 2, 0}, Case{"G90.1 G3 X0 Y10 I0 J0\n", 0, 0, 10, pi / 2, 0}}) {
+    for (const Case& c :
+         {Case{"G3 X0 Y10 I-10 J0\n", 0, 0, 10, pi / 2, 0},
+          Case{"G2 X0 Y10 I-10 J0\n", 0, 0, 10, -3 * pi / 2, 0},
+          Case{"G3 X10 Y0 I-10\n", 0, 0, 10, 2 * pi, 0}, Case{"G2 X10 Y0 I-10 Z-3\n", 0, 0, 10, -2 * pi, -3},
+          Case{"G3 X0 Y10 R10\n", 0, 0, 10, pi / 2, 0}, Case{"G3 X0 Y10 R-10\n", 10, 10, 10, 3 * pi / 2, 0},
+          Case{"G2 X0 Y10 R10\n", 10, 10, 10, -pi / 2, 0},
+          Case{"G90.1 G3 X0 Y10 I0 J0\n", 0, 0, 10, pi / 2, 0}}) {
         const Program p = read("G0 X10 Y0 Z0\nF1000\n" + c.text);
         double length = 0;
         ASSERT_GT(p.steps.size(), 3u) << c.text;
@@ -107,7 +114,8 @@ TEST(GcodeReader, ArcsStayWithinTheirTolerance) {
             const ProgramStep &a = p.steps[i - 1], &b = p.steps[i];
             EXPECT_NEAR(std::hypot(b.x - c.cx, b.y - c.cy), c.r, 1e-9) << c.text;
             // The chord's middle lies inside the circle by at most the tolerance.
-            EXPECT_NEAR(std::hypot((a.x + b.x) / 2 - c.cx, (a.y + b.y) / 2 - c.cy), c.r - 0.00005, 0.000051) << c.text;
+            EXPECT_NEAR(std::hypot((a.x + b.x) / 2 - c.cx, (a.y + b.y) / 2 - c.cy), c.r - 0.00005, 0.000051)
+                << c.text;
             const double turn = (a.x - c.cx) * (b.y - c.cy) - (a.y - c.cy) * (b.x - c.cx);
             EXPECT_GT(turn * c.sweep, 0) << c.text;
             length += std::hypot(b.x - a.x, b.y - a.y);
@@ -136,7 +144,8 @@ TEST(GcodeReader, ArcsStayWithinTheirTolerance) {
         EXPECT_EQ(few.arc_error, p.arc_error);
         EXPECT_EQ(few.close_steps(), p.steps.size());
         for (std::size_t k = 0; k < p.steps.size(); ++k) {
-            const auto [x, y] = few.arcs[0].at(static_cast<double>(k) / static_cast<double>(p.steps.size() - 1));
+            const auto [x, y] =
+                few.arcs[0].at(static_cast<double>(k) / static_cast<double>(p.steps.size() - 1));
             EXPECT_NEAR(x, p.steps[k].x, 1e-9);
             EXPECT_NEAR(y, p.steps[k].y, 1e-9);
         }

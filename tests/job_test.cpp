@@ -1,4 +1,5 @@
-// The job: defaults that are valid, a file that round-trips, and errors that name file, line and the key that was meant.
+// The job: defaults that are valid, a file that round-trips, and errors that name file, line and the key that
+// was meant.
 #include "engine/job.h"
 
 #include <gtest/gtest.h>
@@ -47,12 +48,18 @@ struct Scramble {
     double real(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
     void table(const char*, const char*) {}
     void required() {}
-    void key(const char*, double& value, const char*) { value = value == 0 ? real(0, 1e-3) : value * (1 - real(0, 0.005)); }
+    void key(const char*, double& value, const char*) {
+        value = value == 0 ? real(0, 1e-3) : value * (1 - real(0, 0.005));
+    }
     void key(const char*, int& value, const char*) { value += 1; }
     void key(const char*, bool& value, const char*) { value = !value; }
     void key(const char*, std::string& value, const char*) { value += " \"quoted\" \\ \n\t \xC3\xA4"; }
-    void key(const char*, std::vector<double>& value, const char*) { value = {6.35, 12.7, real(18, 19), 25.4}; }
-    void degrees(const char*, double& value, const char*) { value = std::round(real(0, 40)) * std::numbers::pi / 180; }
+    void key(const char*, std::vector<double>& value, const char*) {
+        value = {6.35, 12.7, real(18, 19), 25.4};
+    }
+    void degrees(const char*, double& value, const char*) {
+        value = std::round(real(0, 40)) * std::numbers::pi / 180;
+    }
     template <class Enum, std::size_t N>
     void word(const char*, Enum& value, const Word<Enum> (&words)[N], const char*) {
         value = words[(static_cast<std::size_t>(value) + 1) % N].value;
@@ -113,9 +120,11 @@ TEST(Job, EveryKeyIsCommented) {
 
 TEST(Job, ValuesAreTaken) {
     const Job job = parse_job(
-        "units = \"in\"\n[slabs]\nthicknesses = [12, 19.05]\n[machine]\nframe = \"layer-top\"\nclearance = 5\n[layers]\nfinder = "
+        "units = \"in\"\n[slabs]\nthicknesses = [12, 19.05]\n[machine]\nframe = \"layer-top\"\nclearance = "
+        "5\n[layers]\nfinder = "
         "\"both\"\nsaddles_constrain = true\n"
-        "[[tool]]\nnumber = 7\nkind = \"ball\"\ndiameter = 3.175\nflute_length = 25\nstickout = 40\nshank_diameter = 3.175\nholder_diameter = "
+        "[[tool]]\nnumber = 7\nkind = \"ball\"\ndiameter = 3.175\nflute_length = 25\nstickout = "
+        "40\nshank_diameter = 3.175\nholder_diameter = "
         "32\nstepdown_max = 1.5\nhelix_deg = 45\n",
         "x");
     EXPECT_EQ(job.units, LengthUnit::inch);
@@ -140,19 +149,23 @@ TEST(Job, UnknownKeysNameTheNearest) {
     error = error_of("\n[machines]\nclearance = 5\n");
     EXPECT_EQ(error.place(), "my.toml:2");
     EXPECT_NE(error.remedy().find("machine"), std::string::npos);
-    EXPECT_EQ(parse_job("[material]\ntransform = \"printed\"\nsource = \"own\"\n", "job").material.transform, CoefficientTransform::printed);
+    EXPECT_EQ(parse_job("[material]\ntransform = \"printed\"\nsource = \"own\"\n", "job").material.transform,
+              CoefficientTransform::printed);
     error = error_of("[material]\nclearance = 5\n");
-    EXPECT_NE(error.remedy().find("machine.clearance"), std::string::npos) << "right key, wrong table: " << error.what();
+    EXPECT_NE(error.remedy().find("machine.clearance"), std::string::npos)
+        << "right key, wrong table: " << error.what();
     error = error_of("[[tool]]\nnumber = 1\ndiametre = 5\n");
     EXPECT_EQ(error.place(), "my.toml:3");
     EXPECT_NE(error.remedy().find("tool.diameter"), std::string::npos);
 }
 
 TEST(Job, WrongTypesAndWordsNameFileAndLine) {
-    for (const char* text : {"\n[machine]\nclearance = \"5\"\n", "\n[machine]\nclearance = true\n", "\n[machine]\nclearance = nan\n",
-                             "\n[machine]\nclearance = inf\n", "\n[machine]\nclearance = [5]\n", "\n[slabs]\nthicknesses = 19\n",
-                             "\n[slabs]\nthicknesses = [19, \"25\"]\n", "\n[machine]\nname = 5\n", "\n[layers]\nsaddles_constrain = 1\n",
-                             "\n\ntool = 5\n", "\n\nmachine = 5\n", "\n\nallow_undercut = \"no\"\n", "\n[machine]\nclearance = 2026-01-01\n"}) {
+    for (const char* text : {"\n[machine]\nclearance = \"5\"\n", "\n[machine]\nclearance = true\n",
+                             "\n[machine]\nclearance = nan\n", "\n[machine]\nclearance = inf\n",
+                             "\n[machine]\nclearance = [5]\n", "\n[slabs]\nthicknesses = 19\n",
+                             "\n[slabs]\nthicknesses = [19, \"25\"]\n", "\n[machine]\nname = 5\n",
+                             "\n[layers]\nsaddles_constrain = 1\n", "\n\ntool = 5\n", "\n\nmachine = 5\n",
+                             "\n\nallow_undercut = \"no\"\n", "\n[machine]\nclearance = 2026-01-01\n"}) {
         const Error error = error_of(text);
         EXPECT_EQ(error.code(), "job.type") << text;
         EXPECT_EQ(error.place(), "my.toml:3") << text << error.what();
@@ -179,7 +192,8 @@ TEST(Job, RangesNameFileAndLine) {
     error = error_of("[slabs]\nthicknesses = []\n");
     EXPECT_EQ(error.place(), "my.toml:2");
     const std::string tool =
-        "[[tool]]\nnumber = 3\nkind = \"flat\"\ndiameter = 6\nflute_length = 25\nstickout = 40\nshank_diameter = 6\nholder_diameter = "
+        "[[tool]]\nnumber = 3\nkind = \"flat\"\ndiameter = 6\nflute_length = 25\nstickout = "
+        "40\nshank_diameter = 6\nholder_diameter = "
         "32\nstepdown_max = 2\n";
     error = error_of(tool + tool);
     EXPECT_EQ(error.place(), "my.toml:11") << "the second tool's number";
@@ -188,8 +202,8 @@ TEST(Job, RangesNameFileAndLine) {
 }
 
 TEST(Job, BrokenTomlNamesTheLine) {
-    for (const char* text :
-         {"[machine\n", "a = = 3\n", "x\n", "[machine]\nclearance = 1\nclearance = 2\n", "units = \"mm\n", "\xFF\xFE\n", "a = 1,5\n"}) {
+    for (const char* text : {"[machine\n", "a = = 3\n", "x\n", "[machine]\nclearance = 1\nclearance = 2\n",
+                             "units = \"mm\n", "\xFF\xFE\n", "a = 1,5\n"}) {
         const Error error = error_of(text);
         EXPECT_EQ(error.code(), "job.syntax") << text;
         EXPECT_EQ(error.place().rfind("my.toml:", 0), 0u) << error.place();
@@ -213,7 +227,9 @@ TEST(Job, GarbageNeverDoesMoreThanAnError) {
                     text.erase(at, 5);
                     break;
                 default:
-                    text.insert(at, text.substr(std::uniform_int_distribution<std::size_t>(0, text.size() - 1)(random), 9));
+                    text.insert(
+                        at, text.substr(
+                                std::uniform_int_distribution<std::size_t>(0, text.size() - 1)(random), 9));
             }
         }
         try {
@@ -259,7 +275,8 @@ TEST(Job, TallestLayerIsTheLeastOfSlabAndTools) {
     EXPECT_DOUBLE_EQ(max_layer_thickness(job), 18.5);
     job.slabs.thicknesses = {12, 50};
     // Ball: 30 mm of flutes less 2 mm of clearance less R(1 - cos 89.5°).
-    EXPECT_NEAR(max_layer_thickness(job), 30 - 2 - 3.175 * (1 - std::cos(89.5 * std::numbers::pi / 180)), 1e-12);
+    EXPECT_NEAR(max_layer_thickness(job), 30 - 2 - 3.175 * (1 - std::cos(89.5 * std::numbers::pi / 180)),
+                1e-12);
     job.tools[2].flute_length = 40;
     job.tools[2].stickout = 50;
     EXPECT_DOUBLE_EQ(max_layer_thickness(job), 30) << "the flat end mill's 32 mm less 2 mm";
@@ -269,13 +286,15 @@ TEST(Job, TallestLayerIsTheLeastOfSlabAndTools) {
 
 TEST(Job, ALayerTallerThanSomeToolsIsLeftToTheOthers) {
     Job job;
-    job.tools.push_back(job.tools[1]), job.tools.back().number = 4, job.tools.back().flute_length = 45;  // a longer flat
+    job.tools.push_back(job.tools[1]), job.tools.back().number = 4,
+                                       job.tools.back().flute_length = 45;  // a longer flat
     EXPECT_DOUBLE_EQ(max_layer_of(job, job.tools[1]), 30);
     EXPECT_DOUBLE_EQ(max_layer_of(job, job.tools[3]), 43);
     EXPECT_DOUBLE_EQ(max_layer_of_longest(job), max_layer_of(job, job.tools[2])) << "no longer ball";
     job.tools.push_back(job.tools[2]), job.tools.back().number = 5, job.tools.back().flute_length = 60;
     EXPECT_DOUBLE_EQ(max_layer_of_longest(job), 43);
-    EXPECT_DOUBLE_EQ(max_bonded_layer_thickness(job), max_layer_of(job, job.tools[2])) << "every tool makes it";
+    EXPECT_DOUBLE_EQ(max_bonded_layer_thickness(job), max_layer_of(job, job.tools[2]))
+        << "every tool makes it";
     EXPECT_EQ(with_tools_for(job, 20).tools.size(), 5U);
     EXPECT_EQ(with_tools_for(job, max_layer_of(job, job.tools[2])).tools.size(), 5U) << "just tall enough";
     const Job fitted = with_tools_for(job, 43);

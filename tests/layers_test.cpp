@@ -16,8 +16,9 @@
 namespace slabwright {
 
 void PrintTo(const LayerCost& c, std::ostream* out) {
-    *out << "type II " << c.broken_type2 << ", type I " << c.broken_type1 << ", thin " << c.thin_layers << ", glue " << c.exposed_glue
-         << ", type III " << c.broken_type3 << ", layers " << c.layers << ", wood " << c.wood << ", -Q " << c.minus_q;
+    *out << "type II " << c.broken_type2 << ", type I " << c.broken_type1 << ", thin " << c.thin_layers
+         << ", glue " << c.exposed_glue << ", type III " << c.broken_type3 << ", layers " << c.layers
+         << ", wood " << c.wood << ", -Q " << c.minus_q;
 }
 
 namespace {
@@ -52,7 +53,8 @@ std::vector<double> tops(const LayerPlacement& p) {
 }
 
 bool has(const LayerPlacement& p, const std::string& code) {
-    return std::any_of(p.diagnostics.begin(), p.diagnostics.end(), [&](const Diagnostic& d) { return d.code == code; });
+    return std::any_of(p.diagnostics.begin(), p.diagnostics.end(),
+                       [&](const Diagnostic& d) { return d.code == code; });
 }
 
 // What every placement must hold, whatever the features.
@@ -77,9 +79,10 @@ void expect_placement(const LayerRequest& r, const LayerPlacement& p) {
 }
 
 TEST(Layers, PrintedAvoidsMeetsAndMoves) {
-    // Up to 18.5 a peak at 20 forbids (15, 20); from 15 on a down-facing flat at 30; from 30 a slope from 45 to 60 holds 48.5.
-    const LayerRequest r =
-        request(70, {level(FeatureType::peak, 20, 0), level(FeatureType::down_flat, 30), feature(FeatureType::shallow, 45, 60, 400)});
+    // Up to 18.5 a peak at 20 forbids (15, 20); from 15 on a down-facing flat at 30; from 30 a slope from 45
+    // to 60 holds 48.5.
+    const LayerRequest r = request(70, {level(FeatureType::peak, 20, 0), level(FeatureType::down_flat, 30),
+                                        feature(FeatureType::shallow, 45, 60, 400)});
     const LayerPlacement p = place_layers_printed(r);
     EXPECT_EQ(tops(p), (std::vector<double>{15, 30, 45, 63.5, 70}));
     expect_placement(r, p);
@@ -99,11 +102,13 @@ TEST(Layers, PrintedKeepsToAShallowRangeWhereMovingWouldNotEnd) {
     expect_placement(r, p);
     ASSERT_EQ(p.diagnostics.size(), 5u);
     EXPECT_EQ(p.diagnostics[0].code, "layers.type3");
-    EXPECT_NE(p.diagnostics[0].message.find("from 2 to 100 mm"), std::string::npos) << p.diagnostics[0].message;
+    EXPECT_NE(p.diagnostics[0].message.find("from 2 to 100 mm"), std::string::npos)
+        << p.diagnostics[0].message;
 }
 
 TEST(Layers, ARegionTallerThanALayerIsCrossedByFewestBoundariesThenLargestQ) {
-    // Flats every 4 mm from 10 to 50 forbid (5, 50). From 5 on, two boundaries inside reach 55 (5 + 18.5 + 18.5 + 18.5 > 55).
+    // Flats every 4 mm from 10 to 50 forbid (5, 50). From 5 on, two boundaries inside reach 55 (5 + 18.5
+    // + 18.5 + 18.5 > 55).
     std::vector<Feature> features;
     for (int z = 10; z <= 50; z += 4) features.push_back(level(FeatureType::up_flat, z));
     LayerRequest r = request(55, features);
@@ -158,15 +163,18 @@ TEST(Layers, PrintedTallRegionsMatchBruteForce) {
         };
         std::size_t fewest = 99;
         double largest = 0;
-        std::function<void(double, std::size_t, std::size_t, double)> walk = [&](double at, std::size_t from, std::size_t count, double sum) {
-            if (height - at <= r.max_layer + kSameHeight && (count < fewest || (count == fewest && sum > largest))) {
-                fewest = count;
-                largest = sum;
-            }
-            if (count >= fewest) return;
-            for (std::size_t i = from; i < candidates.size() && candidates[i] - at <= r.max_layer + kSameHeight; ++i)
-                walk(candidates[i], i + 1, count + 1, sum + q(candidates[i]));
-        };
+        std::function<void(double, std::size_t, std::size_t, double)> walk =
+            [&](double at, std::size_t from, std::size_t count, double sum) {
+                if (height - at <= r.max_layer + kSameHeight &&
+                    (count < fewest || (count == fewest && sum > largest))) {
+                    fewest = count;
+                    largest = sum;
+                }
+                if (count >= fewest) return;
+                for (std::size_t i = from;
+                     i < candidates.size() && candidates[i] - at <= r.max_layer + kSameHeight; ++i)
+                    walk(candidates[i], i + 1, count + 1, sum + q(candidates[i]));
+            };
         walk(start, 0, 0, 0);
         ASSERT_EQ(p.boundaries.size(), fewest + 2) << "round " << round;
         double sum = 0;
@@ -184,8 +192,10 @@ TEST(Layers, TypeTwoSplitsARegion) {
 }
 
 TEST(Layers, CostCountsEachBreach) {
-    LayerRequest r = request(40, {level(FeatureType::up_flat, 20, 300), level(FeatureType::peak, 21, 0), level(FeatureType::down_flat, 30, 70),
-                                  feature(FeatureType::shallow, 10, 18, 50), level(FeatureType::saddle, 19, 40)});
+    LayerRequest r =
+        request(40, {level(FeatureType::up_flat, 20, 300), level(FeatureType::peak, 21, 0),
+                     level(FeatureType::down_flat, 30, 70), feature(FeatureType::shallow, 10, 18, 50),
+                     level(FeatureType::saddle, 19, 40)});
     const LayerCost c = layer_cost(r, {17, 35.5, 40});
     EXPECT_EQ(c.broken_type2, 70);
     EXPECT_EQ(c.broken_type1, 301);  // a peak weighs a square millimetre
@@ -194,7 +204,8 @@ TEST(Layers, CostCountsEachBreach) {
     EXPECT_EQ(c.thin_layers, 0);
     EXPECT_EQ(c.layers, 3);
     EXPECT_EQ(c.wood, 57);
-    // Both ends of the glue's range count, of the others' none; a boundary at a flat's own height shows its glue.
+    // Both ends of the glue's range count, of the others' none; a boundary at a flat's own height shows its
+    // glue.
     EXPECT_EQ(layer_cost(r, {15, 30, 40}).exposed_glue, 300);
     EXPECT_EQ(layer_cost(r, {14.99, 30, 40}).exposed_glue, 0);
     EXPECT_EQ(layer_cost(r, {15, 30, 40}).broken_type1, 0);
@@ -238,7 +249,8 @@ TEST(Layers, RequestsWithoutAnAnswerAreUsageErrors) {
         }
     };
     for (double LayerRequest::*key :
-         {&LayerRequest::height, &LayerRequest::max_layer, &LayerRequest::min_material, &LayerRequest::min_layer, &LayerRequest::facing_allowance})
+         {&LayerRequest::height, &LayerRequest::max_layer, &LayerRequest::min_material,
+          &LayerRequest::min_layer, &LayerRequest::facing_allowance})
         for (const double bad : {-1.0, nan, inf}) {
             LayerRequest r = request(30, {});
             r.*key = bad;
@@ -258,7 +270,8 @@ TEST(Layers, RequestsWithoutAnAnswerAreUsageErrors) {
 
 TEST(Layers, OddRequestsEnd) {
     std::vector<Feature> features;
-    for (int i = 1; i < 40; ++i) features.push_back(level(i % 2 ? FeatureType::peak : FeatureType::up_flat, 1.7 * i));
+    for (int i = 1; i < 40; ++i)
+        features.push_back(level(i % 2 ? FeatureType::peak : FeatureType::up_flat, 1.7 * i));
     for (const double material : {0.0, 5.0, 18.5, 40.0, 500.0})
         for (const double tallest : {0.3, 5.0, 18.5, 200.0}) {
             LayerRequest r = request(66, features);
@@ -288,8 +301,12 @@ TEST(Layers, TallDomesAndReliefsEnd) {
 }
 
 LayerRequest random_request(std::mt19937& random) {
-    auto real = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
-    auto pick = [&](std::initializer_list<double> of) { return *(of.begin() + static_cast<std::ptrdiff_t>(random() % of.size())); };
+    auto real = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    auto pick = [&](std::initializer_list<double> of) {
+        return *(of.begin() + static_cast<std::ptrdiff_t>(random() % of.size()));
+    };
     const double height = pick({5, 18.5, 38.1, real(1, 20), real(20, 150)});
     // Half the sets lie on a coarse grid, so that heights coincide, touch and split one another.
     const double grid = pick({0, 0, 0.5, 2.54});
@@ -301,7 +318,9 @@ LayerRequest random_request(std::mt19937& random) {
     for (std::size_t n = random() % 30; n > 0; --n) {
         const auto type = static_cast<FeatureType>(random() % 7);
         const double low = z(0, height), area = pick({0, 1, real(0, 500)});
-        features.push_back(feature(type, low, type == FeatureType::shallow || type == FeatureType::undercut ? z(low, height) : low, area));
+        features.push_back(feature(
+            type, low, type == FeatureType::shallow || type == FeatureType::undercut ? z(low, height) : low,
+            area));
     }
     LayerRequest r = request(height, features);
     r.max_layer = pick({18.5, 17.78, real(2, 60), 5});
@@ -349,7 +368,8 @@ TEST(Layers, OptimalMatchesBruteForceOverFeatureHeights) {
             if (z > 0.01 && z < r.height - 0.01) heights.push_back(z);
         };
         for (const Feature& f : r.features) {
-            const bool type1 = f.type == FeatureType::peak || f.type == FeatureType::valley || f.type == FeatureType::up_flat;
+            const bool type1 = f.type == FeatureType::peak || f.type == FeatureType::valley ||
+                               f.type == FeatureType::up_flat;
             if (type1 || f.type == FeatureType::down_flat) add(f.z_low);
             if (f.type == FeatureType::shallow && f.z_high - f.z_low > 0.01) {
                 add(f.z_low);
@@ -359,7 +379,9 @@ TEST(Layers, OptimalMatchesBruteForceOverFeatureHeights) {
         }
         for (double z = r.max_layer; z < r.height - 0.01; z += r.max_layer) heights.push_back(z);
         std::sort(heights.begin(), heights.end());
-        heights.erase(std::unique(heights.begin(), heights.end(), [](double a, double b) { return b - a < 0.01; }), heights.end());
+        heights.erase(
+            std::unique(heights.begin(), heights.end(), [](double a, double b) { return b - a < 0.01; }),
+            heights.end());
         if (heights.size() > 11) continue;
         ++compared;
         const LayerPlacement optimal = place_layers_optimal(r);
@@ -376,7 +398,8 @@ TEST(Layers, OptimalMatchesBruteForceOverFeatureHeights) {
             }
             if (fits) {
                 LayerCost cost = layer_cost(r, z);
-                cost.minus_q += 1e-6;  // full layers piled up here are rounded once more than the program's own
+                cost.minus_q +=
+                    1e-6;  // full layers piled up here are rounded once more than the program's own
                 ASSERT_LE(optimal.cost, cost) << "round " << round << " subset " << subset;
             }
         }
@@ -390,8 +413,11 @@ TEST(Layers, FiveThousandFeaturesAreQuick) {
     std::vector<Feature> features;
     for (int i = 0; i < 5000; ++i) {
         const double low = z(random);
-        const FeatureType type = i % 3 == 0 ? FeatureType::shallow : i % 3 == 1 ? FeatureType::peak : FeatureType::up_flat;
-        features.push_back(feature(type, low, type == FeatureType::shallow ? std::min(400.0, low + 1) : low, area(random)));
+        const FeatureType type = i % 3 == 0   ? FeatureType::shallow
+                                 : i % 3 == 1 ? FeatureType::peak
+                                              : FeatureType::up_flat;
+        features.push_back(
+            feature(type, low, type == FeatureType::shallow ? std::min(400.0, low + 1) : low, area(random)));
     }
     const LayerRequest r = request(400, features);
     const auto start = std::chrono::steady_clock::now();

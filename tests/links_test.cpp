@@ -1,4 +1,5 @@
-// Links, entries and leads around a box: down where it is free, over it where it is not, on a ramp into stock, on an arc to a wall.
+// Links, entries and leads around a box: down where it is free, over it where it is not, on a ramp into
+// stock, on an arc to a wall.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,7 +33,8 @@ struct Bench {
 
     static Mesh box(Context& context) {
         Mesh mesh = test::height_field(context, 1, 1.0, [](double, double) { return 1.0; });
-        for (Vec3f& v : mesh.vertices) v = {(v.x + 0.5F) * 20, (v.y + 0.5F) * 20, v.z * static_cast<float>(kTop)};
+        for (Vec3f& v : mesh.vertices)
+            v = {(v.x + 0.5F) * 20, (v.y + 0.5F) * 20, v.z * static_cast<float>(kTop)};
         return mesh;
     }
     Bench()
@@ -55,7 +57,8 @@ struct Bench {
             for (double x = -30; x <= 50; x += 2)
                 if (part.drop(x, y).tip_z <= z) standing.cut(cutter, {x, y, z}, {x, y, z});
         for (double s = -5; s < 25; s += 0.5)
-            for (const auto& [x, y] : {std::pair{s, -5.0}, {s, 25.0}, {-5.0, s}, {25.0, s}}) standing.cut(cutter, {x, y, z}, {x, y, z});
+            for (const auto& [x, y] : {std::pair{s, -5.0}, {s, 25.0}, {-5.0, s}, {25.0, s}})
+                standing.cut(cutter, {x, y, z}, {x, y, z});
     }
     PathBuilder builder() {
         PathBuilder path(operation, tool, 3000, kClearance, kLink);
@@ -73,10 +76,12 @@ std::vector<PathPoint> line(double x0, double y0, double x1, double y1, double z
     return {{to_units(x0), to_units(y0), to_units(z)}, {to_units(x1), to_units(y1), to_units(z)}};
 }
 
-// Whatever is thinned, a ring lies a step from the one before it, and the first on the forbidden region's border.
+// Whatever is thinned, a ring lies a step from the one before it, and the first on the forbidden region's
+// border.
 TEST(Rings, KeepTheirStep) {
     const Bench bench;
-    for (const auto& [waves, blend] : {std::pair{0.0, kJunction}, {5.0, kJunction}, {9.0, kJunction}, {5.0, 0.1}, {9.0, 0.1}}) {
+    for (const auto& [waves, blend] :
+         {std::pair{0.0, kJunction}, {5.0, kJunction}, {9.0, kJunction}, {5.0, 0.1}, {9.0, 0.1}}) {
         // A free place with a wavy border in the middle of what is forbidden.
         Loops hollow, forbidden;
         for (int k = 720; k-- > 0;) {
@@ -84,8 +89,10 @@ TEST(Rings, KeepTheirStep) {
             hollow.points.push_back({to_units(10 + r * std::cos(turn)), to_units(10 + r * std::sin(turn))});
         }
         hollow.close_loop();
-        forbidden.points = {
-            {to_units(-29), to_units(-29)}, {to_units(49), to_units(-29)}, {to_units(49), to_units(49)}, {to_units(-29), to_units(49)}};
+        forbidden.points = {{to_units(-29), to_units(-29)},
+                            {to_units(49), to_units(-29)},
+                            {to_units(49), to_units(49)},
+                            {to_units(-29), to_units(49)}};
         forbidden.close_loop();
         forbidden.points.insert(forbidden.points.end(), hollow.points.begin(), hollow.points.end());
         forbidden.close_loop();
@@ -94,7 +101,8 @@ TEST(Rings, KeepTheirStep) {
         auto away = [](const PathPoint& p, std::span<const PathPoint> line) {
             double nearest = 1e300;
             for (std::size_t k = 1; k < line.size(); ++k) {
-                const double ax = line[k - 1].x, ay = line[k - 1].y, dx = line[k].x - ax, dy = line[k].y - ay, l2 = dx * dx + dy * dy;
+                const double ax = line[k - 1].x, ay = line[k - 1].y, dx = line[k].x - ax, dy = line[k].y - ay,
+                             l2 = dx * dx + dy * dy;
                 const double t = l2 > 0 ? std::clamp(((p.x - ax) * dx + (p.y - ay) * dy) / l2, 0.0, 1.0) : 0;
                 nearest = std::min(nearest, std::hypot(p.x - ax - t * dx, p.y - ay - t * dy));
             }
@@ -105,7 +113,9 @@ TEST(Rings, KeepTheirStep) {
         for (const Point2 p : hollow.points) rings[0].push_back({p.x, p.y, 0});
         rings[0].push_back(rings[0].front());
         for (const RingPlan::Piece& piece : plan.pieces)
-            if (piece.closed && rings.size() < 5 && piece.ring + 1 == rings.size() && piece.box[0] > to_units(-25)) rings.push_back(piece.points);
+            if (piece.closed && rings.size() < 5 && piece.ring + 1 == rings.size() &&
+                piece.box[0] > to_units(-25))
+                rings.push_back(piece.points);
         ASSERT_EQ(rings.size(), 5U) << waves;
         for (const PathPoint& p : rings[1]) EXPECT_LE(away(p, rings[0]), 0.0201);
         for (std::size_t k = 2; k < rings.size(); ++k)
@@ -118,20 +128,23 @@ TEST(Thinning, LosesNoTimeByLongerChords) {
     std::mt19937 random(test::seed());
     Machine machine;
     for (int round = 0; round < 20; ++round) {
-        const double a = 20 + static_cast<double>(random() % 200), b = 3 + static_cast<double>(random() % 20), fine = 0.02 * kUnitsPerMm,
-                     loose = 0.1 * kUnitsPerMm, wave = static_cast<double>(random() % 10);
+        const double a = 20 + static_cast<double>(random() % 200), b = 3 + static_cast<double>(random() % 20),
+                     fine = 0.02 * kUnitsPerMm, loose = 0.1 * kUnitsPerMm,
+                     wave = static_cast<double>(random() % 10);
         std::vector<PathPoint> line;
         for (int k = 0; k <= 4000; ++k) {
-            const double t = 0.0015 * k, x = a * std::cos(t) + b * std::sin(wave * t), y = a * std::sin(t) + (k / 1000 % 2 ? 2 : 0);
+            const double t = 0.0015 * k, x = a * std::cos(t) + b * std::sin(wave * t),
+                         y = a * std::sin(t) + (k / 1000 % 2 ? 2 : 0);
             line.push_back({to_units(x), to_units(y), 0});
         }
         const double feed = 9000;
-        const auto finely = simplify(line, fine), coarsely = simplify(line, fine, loose, fast_turn(machine, feed));
+        const auto finely = simplify(line, fine),
+                   coarsely = simplify(line, fine, loose, fast_turn(machine, feed));
         auto seconds = [&](const std::vector<PathPoint>& points) {
             std::vector<MotionLeg> legs;
             for (std::size_t k = 1; k < points.size(); ++k) {
-                const double dx = to_mm(std::int64_t{points[k].x} - points[k - 1].x), dy = to_mm(std::int64_t{points[k].y} - points[k - 1].y),
-                             l = std::hypot(dx, dy);
+                const double dx = to_mm(std::int64_t{points[k].x} - points[k - 1].x),
+                             dy = to_mm(std::int64_t{points[k].y} - points[k - 1].y), l = std::hypot(dx, dy);
                 legs.push_back({l, feed / 60, {dx / l, dy / l, 0}});
                 legs.back().leaving = legs.back().direction;
             }
@@ -142,8 +155,10 @@ TEST(Thinning, LosesNoTimeByLongerChords) {
         for (const PathPoint& p : line) {
             double nearest = 1e300;
             for (std::size_t k = 1; k < coarsely.size(); ++k) {
-                const double ax = coarsely[k - 1].x, ay = coarsely[k - 1].y, dx = coarsely[k].x - ax, dy = coarsely[k].y - ay;
-                const double t = std::clamp(((p.x - ax) * dx + (p.y - ay) * dy) / (dx * dx + dy * dy), 0.0, 1.0);
+                const double ax = coarsely[k - 1].x, ay = coarsely[k - 1].y, dx = coarsely[k].x - ax,
+                             dy = coarsely[k].y - ay;
+                const double t =
+                    std::clamp(((p.x - ax) * dx + (p.y - ay) * dy) / (dx * dx + dy * dy), 0.0, 1.0);
                 nearest = std::min(nearest, std::hypot(p.x - ax - t * dx, p.y - ay - t * dy));
             }
             ASSERT_LE(nearest, fine + loose + 1);
@@ -200,7 +215,8 @@ TEST(Links, StockIsEnteredOnARamp) {
     double vertical = 0, steepest = 0;
     for (std::size_t k = 1; k < bench.operation.moves.size(); ++k) {
         const Move &a = bench.operation.moves[k - 1], &b = bench.operation.moves[k];
-        const double run = to_mm(1) * std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y),
+        const double run = to_mm(1) *
+                           std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y),
                      fall = to_mm(std::int64_t{a.z} - b.z);
         if (b.feed == 0) continue;
         if (run == 0 && to_mm(b.z) < kTop) vertical += std::max(0.0, fall);
@@ -227,9 +243,10 @@ TEST(Links, AHelixLeadsIntoStockOnTheFreeSideOnly) {
         if (b.z > to_units(8)) {
             ++entry;
             EXPECT_LE(bench.part.drop(to_mm(b.x), to_mm(b.y)).tip_z, 8);
-            EXPECT_LE(
-                to_mm(std::int64_t{a.z} - b.z),
-                std::tan(bench.job.cutting.ramp_deg * std::numbers::pi / 180) * std::hypot(to_mm(b.x) - to_mm(a.x), to_mm(b.y) - to_mm(a.y)) + 1e-3);
+            EXPECT_LE(to_mm(std::int64_t{a.z} - b.z),
+                      std::tan(bench.job.cutting.ramp_deg * std::numbers::pi / 180) *
+                              std::hypot(to_mm(b.x) - to_mm(a.x), to_mm(b.y) - to_mm(a.y)) +
+                          1e-3);
         }
     }
     EXPECT_GT(entry, 24U) << "no helix";
@@ -261,11 +278,14 @@ TEST(Links, ARunWithoutRoomIsLeftByAToolThatDoesNotPlunge) {
     for (const bool plunges : {false, true}) {
         Bench bench;
         bench.tool.plunges = plunges;
-        // A room no wider than the cutter's middle may move: no circle, and a run of half a millimetre is no ramp.
+        // A room no wider than the cutter's middle may move: no circle, and a run of half a millimetre is no
+        // ramp.
         Surroundings around = bench.cut.around(bench.tool, &bench.part);
         Loops room;
-        room.points = {
-            {to_units(-20.5), to_units(-20.5)}, {to_units(-19), to_units(-20.5)}, {to_units(-19), to_units(-19)}, {to_units(-20.5), to_units(-19)}};
+        room.points = {{to_units(-20.5), to_units(-20.5)},
+                       {to_units(-19), to_units(-20.5)},
+                       {to_units(-19), to_units(-19)},
+                       {to_units(-20.5), to_units(-19)}};
         room.close_loop();
         around.room = std::make_shared<const Loops>(room);
         PathBuilder path(bench.operation, bench.tool, 3000, kClearance, kLink);
@@ -292,14 +312,16 @@ TEST(Links, APlaceWithoutRoomForARampIsEnteredFromWhereItIsCleared) {
     path.follow(std::vector<PathPoint>{{to_units(-17), to_units(-20), to_units(10)}});
     EXPECT_TRUE(bench.cut.no_way_in.empty());
     ASSERT_GE(bench.operation.moves.size(), 3U);
-    const Move &last = bench.operation.moves.back(), &beside = bench.operation.moves[bench.operation.moves.size() - 2];
+    const Move &last = bench.operation.moves.back(),
+               &beside = bench.operation.moves[bench.operation.moves.size() - 2];
     EXPECT_EQ(last.x, to_units(-17));
     EXPECT_EQ(last.z, to_units(10));
     // Down where the slot is, and straight across from there.
     EXPECT_EQ(beside.z, to_units(10));
     EXPECT_LE(to_mm(beside.x), -18);
     for (std::size_t k = 0; k + 1 < bench.operation.moves.size(); ++k)
-        EXPECT_TRUE(to_mm(bench.operation.moves[k].z) >= kTop || to_mm(bench.operation.moves[k].x) <= -18) << k;
+        EXPECT_TRUE(to_mm(bench.operation.moves[k].z) >= kTop || to_mm(bench.operation.moves[k].x) <= -18)
+            << k;
 }
 
 TEST(Leads, AreTangentFreeAndOverlapClosedRuns) {
@@ -321,15 +343,21 @@ TEST(Leads, AreTangentFreeAndOverlapClosedRuns) {
         ring.push_back({to_units(x), to_units(y), to_units(5)});
     const std::vector<PathPoint> bare = ring;
     ASSERT_TRUE(add_leads(path, bench.cut, bench.part, 0.4, ring));
-    EXPECT_EQ(ring.front(), (PathPoint{to_units(-7), to_units(3), to_units(5)}));  // 2 mm before and 2 mm off the wall
-    EXPECT_EQ(ring.back(), (PathPoint{to_units(-7), to_units(8), to_units(5)}));   // 1 mm of overlap, then off again
+    EXPECT_EQ(ring.front(),
+              (PathPoint{to_units(-7), to_units(3), to_units(5)}));  // 2 mm before and 2 mm off the wall
+    EXPECT_EQ(ring.back(),
+              (PathPoint{to_units(-7), to_units(8), to_units(5)}));  // 1 mm of overlap, then off again
     const auto start = std::find(ring.begin(), ring.end(), bare.front());
     ASSERT_NE(start, ring.end());
     // The arc comes in nearly along the run, and every place of it is free.
     const PathPoint& last = *(start - 1);
-    EXPECT_LT(std::abs(std::atan2(static_cast<double>(start->x) - last.x, static_cast<double>(start->y) - last.y)), 0.12);
-    for (const PathPoint& p : ring) EXPECT_LE(bench.part.drop(to_mm(p.x), to_mm(p.y)).tip_z, p.x < to_units(-5.001) ? 5 : kTop);
-    EXPECT_EQ(std::count(ring.begin(), ring.end(), PathPoint{to_units(-5), to_units(6), to_units(5)}), 1) << "no overlap";
+    EXPECT_LT(
+        std::abs(std::atan2(static_cast<double>(start->x) - last.x, static_cast<double>(start->y) - last.y)),
+        0.12);
+    for (const PathPoint& p : ring)
+        EXPECT_LE(bench.part.drop(to_mm(p.x), to_mm(p.y)).tip_z, p.x < to_units(-5.001) ? 5 : kTop);
+    EXPECT_EQ(std::count(ring.begin(), ring.end(), PathPoint{to_units(-5), to_units(6), to_units(5)}), 1)
+        << "no overlap";
     // The other way round the box is on the left, and there is no room for an arc.
     std::vector<PathPoint> wrong(bare.rbegin(), bare.rend());
     EXPECT_FALSE(add_leads(path, bench.cut, bench.part, 0.4, wrong));

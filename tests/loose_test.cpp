@@ -1,4 +1,5 @@
-// Pieces that come loose: against flood filling after every move, hand-made moves, and a plan over an open cavity.
+// Pieces that come loose: against flood filling after every move, hand-made moves, and a plan over an open
+// cavity.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +20,10 @@ namespace {
 
 Loops rectangle(double x0, double y0, double x1, double y1) {
     Loops loops;
-    loops.points = {{to_units(x0), to_units(y0)}, {to_units(x1), to_units(y0)}, {to_units(x1), to_units(y1)}, {to_units(x0), to_units(y1)}};
+    loops.points = {{to_units(x0), to_units(y0)},
+                    {to_units(x1), to_units(y0)},
+                    {to_units(x1), to_units(y1)},
+                    {to_units(x0), to_units(y1)}};
     loops.close_loop();
     return loops;
 }
@@ -42,7 +46,8 @@ struct Cover {
     void ring(double inset, double z) {
         op.moves.push_back({to_units(inset), to_units(inset), to_units(30), 0});
         op.moves.push_back(to(inset, inset, z));
-        for (const auto& [x, y] : {std::pair{60 - inset, inset}, {60 - inset, 60 - inset}, {inset, 60 - inset}, {inset, inset}})
+        for (const auto& [x, y] :
+             {std::pair{60 - inset, inset}, {60 - inset, 60 - inset}, {inset, 60 - inset}, {inset, inset}})
             op.moves.push_back(to(x, y, z));
         op.moves.push_back({to_units(inset), to_units(inset), to_units(30), 0});
     }
@@ -123,7 +128,8 @@ TEST(Loose, AgreesWithFillingAfterEveryMove) {
                 for (int i = 0; i < 40; ++i) {
                     const Point2 p{to_units(grid.x(i)), to_units(grid.y(j))};
                     const std::size_t c = grid.index(i, j);
-                    if (there[c] && (winding(slab.kept, p) > 0 || winding(slab.glued, p) > 0)) held[c] = 1, open.push(c);
+                    if (there[c] && (winding(slab.kept, p) > 0 || winding(slab.glued, p) > 0))
+                        held[c] = 1, open.push(c);
                 }
             auto spread = [&](std::queue<std::size_t>& queue, std::vector<char>& mark) {
                 std::size_t count = 0;
@@ -159,10 +165,12 @@ TEST(Loose, AgreesWithFillingAfterEveryMove) {
         for (std::size_t i = 1; i < op.moves.size(); ++i) {
             const Move &a = op.moves[i - 1], &b = op.moves[i];
             if (b.feed == 0) continue;
-            sweep(grid, cutter_end(tool), {to_mm(a.x), to_mm(a.y), 0}, {to_mm(b.x), to_mm(b.y), 0}, [&](std::size_t c, double) { there[c] = 0; });
+            sweep(grid, cutter_end(tool), {to_mm(a.x), to_mm(a.y), 0}, {to_mm(b.x), to_mm(b.y), 0},
+                  [&](std::size_t c, double) { there[c] = 0; });
             for (const std::size_t count : loose_now()) expected.emplace_back(i, count);
         }
-        for (const LoosePiece& p : found) got.emplace_back(p.move, static_cast<std::size_t>(std::lround(p.area_mm2)));
+        for (const LoosePiece& p : found)
+            got.emplace_back(p.move, static_cast<std::size_t>(std::lround(p.area_mm2)));
         std::sort(expected.begin(), expected.end());
         std::sort(got.begin(), got.end());
         EXPECT_EQ(got, expected) << "round " << round;
@@ -171,15 +179,18 @@ TEST(Loose, AgreesWithFillingAfterEveryMove) {
     EXPECT_GT(seen, 20U) << "the moves cut nothing off";
 }
 
-// A box of two layers with a cavity that is open upwards through both: the second slab covers the first one's part of it.
+// A box of two layers with a cavity that is open upwards through both: the second slab covers the first one's
+// part of it.
 TEST(Loose, ACoverOverACavityIsCutFromTheMiddle) {
     std::vector<Facet> facets;
     auto outline = [](double half_x, double half_y) {
-        const std::vector<Corner> corners{{-half_x, -half_y, 10}, {half_x, -half_y, 10}, {half_x, half_y, 10}, {-half_x, half_y, 10}};
+        const std::vector<Corner> corners{
+            {-half_x, -half_y, 10}, {half_x, -half_y, 10}, {half_x, half_y, 10}, {-half_x, half_y, 10}};
         return rounded_polygon(corners, 0.01);
     };
     const Outline outside = outline(60, 50), inside = outline(45, 35);
-    const Ring bottom = ring(outside, {0, 0}), top = ring(outside, {0, 34}), rim = ring(inside, {0, 34}), floor = ring(inside, {0, 5});
+    const Ring bottom = ring(outside, {0, 0}), top = ring(outside, {0, 34}), rim = ring(inside, {0, 34}),
+               floor = ring(inside, {0, 5});
     flat(facets, bottom, {}, false);
     strip(facets, bottom, top);
     flat(facets, top, {rim}, true);
@@ -196,18 +207,22 @@ TEST(Loose, ACoverOverACavityIsCutFromTheMiddle) {
     }
 }
 
-// Posts on a plate, two layers high: what lies between them in the second layer hangs over the first one's pockets, and the face mill clears it in
-// rings, not all of which have another a step farther off beside them all the way round. Begun at the nearest point, rings of five of these
-// patterns cut wedges off.
+// Posts on a plate, two layers high: what lies between them in the second layer hangs over the first one's
+// pockets, and the face mill clears it in rings, not all of which have another a step farther off beside them
+// all the way round. Begun at the nearest point, rings of five of these patterns cut wedges off.
 TEST(Loose, AFaceMillsRingsCloseBesideWhatIsClear) {
     auto outline = [](double x, double y, double half, double radius) {
-        const std::vector<Corner> corners{
-            {x - half, y - half, radius}, {x + half, y - half, radius}, {x + half, y + half, radius}, {x - half, y + half, radius}};
+        const std::vector<Corner> corners{{x - half, y - half, radius},
+                                          {x + half, y - half, radius},
+                                          {x + half, y + half, radius},
+                                          {x - half, y + half, radius}};
         return rounded_polygon(corners, 0.01);
     };
     for (const unsigned seed : {8U, 25U, 27U, 31U, 38U, 41U}) {
         std::mt19937 random(seed);
-        auto among = [&](double low, double high) { return low + (high - low) * static_cast<double>(random() % 1000) / 1000; };
+        auto among = [&](double low, double high) {
+            return low + (high - low) * static_cast<double>(random() % 1000) / 1000;
+        };
         constexpr double half = 190;
         const Outline plate = outline(0, 0, half, 10);
         const Ring bottom = ring(plate, {0, 0}), edge = ring(plate, {0, 5});
@@ -217,8 +232,11 @@ TEST(Loose, AFaceMillsRingsCloseBesideWhatIsClear) {
         strip(facets, bottom, edge);
         std::vector<std::array<double, 3>> posts;
         for (int k = 0; k < 60 && posts.size() < 9; ++k) {
-            const double r = among(15, 30), x = among(-half + r + 5, half - r - 5), y = among(-half + r + 5, half - r - 5);
-            auto too_near = [&](const std::array<double, 3>& p) { return std::hypot(p[0] - x, p[1] - y) < (p[2] + r) * 1.2 + 20; };
+            const double r = among(15, 30), x = among(-half + r + 5, half - r - 5),
+                         y = among(-half + r + 5, half - r - 5);
+            auto too_near = [&](const std::array<double, 3>& p) {
+                return std::hypot(p[0] - x, p[1] - y) < (p[2] + r) * 1.2 + 20;
+            };
             if (std::any_of(posts.begin(), posts.end(), too_near)) continue;
             posts.push_back({x, y, r});
             const Outline post = outline(x, y, r, 0.9 * r);
@@ -232,15 +250,19 @@ TEST(Loose, AFaceMillsRingsCloseBesideWhatIsClear) {
         const Plan plan = make_plan(context, weld(context, facets), {}, {});
         ASSERT_EQ(plan.layers.size(), 2U);
         const std::vector<Operation>& operations = plan.layers[1].operations;
-        EXPECT_TRUE(std::any_of(operations.begin(), operations.end(), [](const Operation& op) { return op.purpose == "open waste"; }));
+        EXPECT_TRUE(std::any_of(operations.begin(), operations.end(),
+                                [](const Operation& op) { return op.purpose == "open waste"; }));
         // And where a run begins in stock, the place beside it is gone to at once.
         for (const Operation& op : operations)
             for (std::size_t k = 2; op.kind == OperationKind::rough && k < op.moves.size(); ++k) {
                 const Move &a = op.moves[k - 2], &b = op.moves[k - 1], &c = op.moves[k];
-                const bool down = b.feed > 0 && a.x == b.x && a.y == b.y && b.z < a.z, up = c.feed == 0 && b.x == c.x && b.y == c.y && c.z > b.z;
-                EXPECT_FALSE(down && up) << op.purpose << ": down for nothing at " << to_mm(b.x) << " " << to_mm(b.y) << " " << to_mm(b.z);
+                const bool down = b.feed > 0 && a.x == b.x && a.y == b.y && b.z < a.z,
+                           up = c.feed == 0 && b.x == c.x && b.y == c.y && c.z > b.z;
+                EXPECT_FALSE(down && up) << op.purpose << ": down for nothing at " << to_mm(b.x) << " "
+                                         << to_mm(b.y) << " " << to_mm(b.z);
             }
-        for (const Diagnostic& d : plan.diagnostics) EXPECT_NE(d.code, "waste.loose") << seed << ": " << d.message;
+        for (const Diagnostic& d : plan.diagnostics)
+            EXPECT_NE(d.code, "waste.loose") << seed << ": " << d.message;
     }
 }
 

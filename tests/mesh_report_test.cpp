@@ -45,8 +45,10 @@ TEST(MeshReport, SoundBox) {
     EXPECT_DOUBLE_EQ(report.area_mm2, 2 * (200 + 300 + 600));
     EXPECT_EQ(report.box.min, (Vec3f{1, 2, 3}));
     EXPECT_EQ(report.box.max, (Vec3f{11, 22, 33}));
-    for (const Finding* finding : {&report.open_edges, &report.open_edges_off_base, &report.non_manifold_edges, &report.misoriented_edges,
-                                   &report.degenerate_facets, &report.duplicate_facets, &report.inverted_components})
+    for (const Finding* finding :
+         {&report.open_edges, &report.open_edges_off_base, &report.non_manifold_edges,
+          &report.misoriented_edges, &report.degenerate_facets, &report.duplicate_facets,
+          &report.inverted_components})
         expect_finding(*finding, 0, 0);
 }
 
@@ -124,7 +126,9 @@ TEST(MeshReport, DuplicateFacets) {
     expect_finding(report.misoriented_edges, 0, 0);
 }
 
-bool operator==(const Finding& a, const Finding& b) { return a.count == b.count && a.first_facet == b.first_facet; }
+bool operator==(const Finding& a, const Finding& b) {
+    return a.count == b.count && a.first_facet == b.first_facet;
+}
 
 /// What weld() says about odd edges must not change the report.
 void expect_same_with_odd(Context& context, const Facets& facets) {
@@ -137,7 +141,8 @@ void expect_same_with_odd(Context& context, const Facets& facets) {
     ASSERT_TRUE(some.non_manifold_edges == all.non_manifold_edges);
     ASSERT_TRUE(some.misoriented_edges == all.misoriented_edges);
     ASSERT_TRUE(some.degenerate_facets == all.degenerate_facets);
-    ASSERT_TRUE(some.duplicate_facets == all.duplicate_facets) << some.duplicate_facets.count << " instead of " << all.duplicate_facets.count;
+    ASSERT_TRUE(some.duplicate_facets == all.duplicate_facets)
+        << some.duplicate_facets.count << " instead of " << all.duplicate_facets.count;
     ASSERT_TRUE(some.inverted_components == all.inverted_components);
     ASSERT_EQ(some.component_of, all.component_of);
     ASSERT_EQ(some.volume_mm3, all.volume_mm3);
@@ -150,7 +155,8 @@ TEST(MeshReport, OddEdgesAreAllThatMatters) {
     static_cast<void>(weld(context, shapes::torus(40), &odd));
     EXPECT_TRUE(odd.empty()) << "a closed mesh has no odd edges";
     for (int round = 0; round < 200; ++round) {
-        // A good mesh, spoilt in a few places; and a body of two facets back to back, whose edges all look good.
+        // A good mesh, spoilt in a few places; and a body of two facets back to back, whose edges all look
+        // good.
         Facets facets = shapes::torus(12);
         for (std::uint64_t fault = random() % 4; fault > 0; --fault) {
             const std::size_t at = random() % facets.size();
@@ -187,7 +193,8 @@ TEST(MeshReport, OddEdgesAreAllThatMatters) {
         Facets fan;
         auto rim = [&](std::size_t i) { return Vec3f{float(i % spokes), float(i % spokes * i % spokes), 1}; };
         for (std::size_t i = 0; i < spokes; ++i) fan.push_back({Vec3f{0.5f, 0.5f, 0}, rim(i), rim(i + 1)});
-        for (std::size_t i = 0; i < spokes; i += 1 + random() % 2) fan.push_back({Vec3f{0.5f, 0.5f, 2}, rim(i + 1), rim(i)});
+        for (std::size_t i = 0; i < spokes; i += 1 + random() % 2)
+            fan.push_back({Vec3f{0.5f, 0.5f, 2}, rim(i + 1), rim(i)});
         expect_same_with_odd(context, fan);
     }
     for (int round = 0; round < 300; ++round) {
@@ -222,9 +229,10 @@ TEST(MeshReport, CountsEqualBruteForceOnRandomSoup) {
         for (std::uint32_t f = 0; f < mesh.facets.size(); ++f) {
             Index3 v = mesh.facets[f];
             const auto& c = facets[f];
-            const double ux = c[1].x - c[0].x, uy = c[1].y - c[0].y, uz = c[1].z - c[0].z, vx = c[2].x - c[0].x, vy = c[2].y - c[0].y,
-                         vz = c[2].z - c[0].z;
-            const double twice = std::sqrt(std::pow(uy * vz - uz * vy, 2) + std::pow(uz * vx - ux * vz, 2) + std::pow(ux * vy - uy * vx, 2));
+            const double ux = c[1].x - c[0].x, uy = c[1].y - c[0].y, uz = c[1].z - c[0].z,
+                         vx = c[2].x - c[0].x, vy = c[2].y - c[0].y, vz = c[2].z - c[0].z;
+            const double twice = std::sqrt(std::pow(uy * vz - uz * vy, 2) + std::pow(uz * vx - ux * vz, 2) +
+                                           std::pow(ux * vy - uy * vx, 2));
             degenerate += twice == 0;
             area += twice / 2;
             if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) continue;
@@ -240,11 +248,14 @@ TEST(MeshReport, CountsEqualBruteForceOnRandomSoup) {
         float base = 1e9f;
         for (const Vec3f& v : mesh.vertices) base = std::min(base, v.z);
         Finding open, off_base, non_manifold, misoriented;
-        auto note = [](Finding& finding, std::uint32_t facet) { ++finding.count, finding.first_facet = std::min(finding.first_facet, facet); };
+        auto note = [](Finding& finding, std::uint32_t facet) {
+            ++finding.count, finding.first_facet = std::min(finding.first_facet, facet);
+        };
         for (const auto& [edge, uses] : edges) {
             const std::size_t n = uses.facets.size();
             if (n == 1) note(open, uses.facets[0]);
-            if (n == 1 && (mesh.vertices[edge.first].z > base || mesh.vertices[edge.second].z > base)) note(off_base, uses.facets[0]);
+            if (n == 1 && (mesh.vertices[edge.first].z > base || mesh.vertices[edge.second].z > base))
+                note(off_base, uses.facets[0]);
             if (n > 2) note(non_manifold, uses.facets[0]);
             if (n > 1 && 2 * uses.forward != static_cast<int>(n)) note(misoriented, uses.facets[0]);
         }
@@ -260,7 +271,8 @@ TEST(MeshReport, CountsEqualBruteForceOnRandomSoup) {
 }
 
 TEST(MeshReport, InsideOutBodiesCavitiesAndIslands) {
-    const Facets outer = shapes::box({0, 0, 0}, {10, 10, 10}), middle = shapes::box({2, 2, 2}, {8, 8, 8}), inner = shapes::box({4, 4, 4}, {6, 6, 6});
+    const Facets outer = shapes::box({0, 0, 0}, {10, 10, 10}), middle = shapes::box({2, 2, 2}, {8, 8, 8}),
+                 inner = shapes::box({4, 4, 4}, {6, 6, 6});
     auto together = [](const Facets& a, const Facets& b, const Facets& c = {}) {
         Facets all = a;
         shapes::append(all, b);
@@ -271,12 +283,20 @@ TEST(MeshReport, InsideOutBodiesCavitiesAndIslands) {
     expect_finding(report_of(together(outer, shapes::flipped(middle))).inverted_components, 0, 0);
     expect_finding(report_of(together(outer, shapes::flipped(middle), inner)).inverted_components, 0, 0);
     // An island inside out in a cavity lies in the block's outline, but in none of its material.
-    expect_finding(report_of(together(outer, shapes::flipped(middle), shapes::flipped(inner))).inverted_components, 1, 24);
+    expect_finding(
+        report_of(together(outer, shapes::flipped(middle), shapes::flipped(inner))).inverted_components, 1,
+        24);
     // Beside a sound body.
-    expect_finding(report_of(together(outer, shapes::flipped(shapes::box({20, 0, 0}, {30, 10, 10})))).inverted_components, 1, 12);
+    expect_finding(report_of(together(outer, shapes::flipped(shapes::box({20, 0, 0}, {30, 10, 10}))))
+                       .inverted_components,
+                   1, 12);
     // Below and above one, where a vertical ray meets it.
-    expect_finding(report_of(together(outer, shapes::flipped(shapes::box({2, 2, 20}, {8, 8, 30})))).inverted_components, 1, 12);
-    expect_finding(report_of(together(outer, shapes::flipped(shapes::box({2, 2, -30}, {8, 8, -20})))).inverted_components, 1, 12);
+    expect_finding(
+        report_of(together(outer, shapes::flipped(shapes::box({2, 2, 20}, {8, 8, 30})))).inverted_components,
+        1, 12);
+    expect_finding(report_of(together(outer, shapes::flipped(shapes::box({2, 2, -30}, {8, 8, -20}))))
+                       .inverted_components,
+                   1, 12);
     // A cavity in a block without a bottom.
     Facets open = outer;
     open.erase(open.begin(), open.begin() + 2);
@@ -295,7 +315,8 @@ TEST(MeshReport, InvertedBodiesOfRandomNestsEqualTheKnownNesting) {
         Facets facets;
         for (int column = 0; column < 3; ++column) {
             for (int row = 0; row < 3; ++row) {
-                Vec3f low{float(40 * column), float(40 * row), float(random() % 30)}, high{low.x + 36, low.y + 36, low.z + 36};
+                Vec3f low{float(40 * column), float(40 * row), float(random() % 30)},
+                    high{low.x + 36, low.y + 36, low.z + 36};
                 int around = 0;
                 for (int depth = 0; depth < 4 && random() % 4 != 0; ++depth) {
                     const int sign = random() % 2 == 0 ? 1 : -1;
@@ -313,7 +334,8 @@ TEST(MeshReport, InvertedBodiesOfRandomNestsEqualTheKnownNesting) {
             const Facets box = shapes::box(body.low, body.high);
             shapes::append(facets, body.sign > 0 ? box : shapes::flipped(box));
             inverted += body.sign < 0 && body.around <= 0;
-            volume += body.sign * double(body.high.x - body.low.x) * double(body.high.y - body.low.y) * double(body.high.z - body.low.z);
+            volume += body.sign * double(body.high.x - body.low.x) * double(body.high.y - body.low.y) *
+                      double(body.high.z - body.low.z);
         }
         std::shuffle(facets.begin(), facets.end(), random);
         const MeshReport report = report_of(facets, 1 + round % 3);
@@ -349,7 +371,9 @@ TEST(MeshReport, SameOnAnyNumberOfThreads) {
         EXPECT_EQ(report.component_of, first.component_of);
         EXPECT_EQ(report.volume_mm3, first.volume_mm3);
         EXPECT_EQ(report.area_mm2, first.area_mm2);
-        auto same = [](const Finding& a, const Finding& b) { return a.count == b.count && a.first_facet == b.first_facet; };
+        auto same = [](const Finding& a, const Finding& b) {
+            return a.count == b.count && a.first_facet == b.first_facet;
+        };
         EXPECT_TRUE(same(report.open_edges, first.open_edges));
         EXPECT_TRUE(same(report.open_edges_off_base, first.open_edges_off_base));
         EXPECT_TRUE(same(report.non_manifold_edges, first.non_manifold_edges));

@@ -38,7 +38,8 @@ Mesh weld_slowly(const Facets& facets) {
         Index3 facet{};
         for (std::size_t k = 0; k < 3; ++k) {
             const Vec3f p = corners[k];
-            const auto [at, fresh] = known.try_emplace({p.x, p.y, p.z}, static_cast<std::uint32_t>(mesh.vertices.size()));
+            const auto [at, fresh] =
+                known.try_emplace({p.x, p.y, p.z}, static_cast<std::uint32_t>(mesh.vertices.size()));
             if (fresh) mesh.vertices.push_back(p);
             facet[k] = at->second;
         }
@@ -49,19 +50,21 @@ Mesh weld_slowly(const Facets& facets) {
 
 bool same_bytes(const Mesh& a, const Mesh& b) {
     auto same = [](const auto& x, const auto& y) {
-        return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(x[0])) == 0);
+        return x.size() == y.size() &&
+               (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(x[0])) == 0);
     };
     return same(a.vertices, b.vertices) && same(a.facets, b.facets) && same(a.neighbours, b.neighbours);
 }
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
-/// What must hold of any adjacency: partners run the other way along the same edge, nobody is anybody's partner twice,
-/// and no two half-edges that could be partners are both left alone.
+/// What must hold of any adjacency: partners run the other way along the same edge, nobody is anybody's
+/// partner twice, and no two half-edges that could be partners are both left alone.
 void check_pairs(const Mesh& mesh) {
     ASSERT_EQ(mesh.neighbours.size(), mesh.facets.size());
-    std::map<Edge, int> alone;                                                   // directed edges without a partner
-    std::map<std::tuple<Edge, std::uint32_t, std::uint32_t>, int> partnerships;  // (directed edge, from facet, to facet)
+    std::map<Edge, int> alone;  // directed edges without a partner
+    std::map<std::tuple<Edge, std::uint32_t, std::uint32_t>, int>
+        partnerships;  // (directed edge, from facet, to facet)
     for (std::uint32_t f = 0; f < mesh.facets.size(); ++f) {
         for (std::size_t k = 0; k < 3; ++k) {
             const Edge edge{mesh.facets[f][k], mesh.facets[f][(k + 1) % 3]};
@@ -79,10 +82,12 @@ void check_pairs(const Mesh& mesh) {
     for (const auto& [key, count] : partnerships) {
         const auto& [edge, f, g] = key;
         const auto back = partnerships.find({Edge{edge.second, edge.first}, g, f});
-        ASSERT_TRUE(back != partnerships.end()) << "facet " << f << " has " << g << " for a neighbour, but not the other way";
+        ASSERT_TRUE(back != partnerships.end())
+            << "facet " << f << " has " << g << " for a neighbour, but not the other way";
         ASSERT_EQ(back->second, count);
     }
-    for (const auto& [edge, count] : alone) ASSERT_EQ(alone.count({edge.second, edge.first}), 0u) << "two that could be partners are alone";
+    for (const auto& [edge, count] : alone)
+        ASSERT_EQ(alone.count({edge.second, edge.first}), 0u) << "two that could be partners are alone";
 }
 
 TEST(MeshWeld, NothingGivesNothing) {
@@ -110,10 +115,12 @@ TEST(MeshWeld, CubeHasEightVerticesAndClosedNeighbours) {
 TEST(MeshWeld, NegativeZeroIsZeroAndTheNextFloatIsNot) {
     Context context({.threads = 1});
     const float next = std::nextafter(1.0f, 2.0f);
-    const Mesh mesh = weld(context, Facets{{Vec3f{0.0f, -0.0f, 0.0f}, {1, 0, 0}, {0, 1, 0}}, {Vec3f{-0.0f, 0.0f, -0.0f}, {0, 1, 0}, {next, 0, 0}}});
+    const Mesh mesh = weld(context, Facets{{Vec3f{0.0f, -0.0f, 0.0f}, {1, 0, 0}, {0, 1, 0}},
+                                           {Vec3f{-0.0f, 0.0f, -0.0f}, {0, 1, 0}, {next, 0, 0}}});
     EXPECT_EQ(mesh.vertices.size(), 4u);
     EXPECT_EQ(mesh.facets[1], (Index3{0, 2, 3}));
-    for (const Vec3f& v : mesh.vertices) EXPECT_FALSE(std::signbit(v.x) || std::signbit(v.y) || std::signbit(v.z));
+    for (const Vec3f& v : mesh.vertices)
+        EXPECT_FALSE(std::signbit(v.x) || std::signbit(v.y) || std::signbit(v.z));
 }
 
 TEST(MeshWeld, EqualsBruteForceOnRandomSoup) {
@@ -124,7 +131,10 @@ TEST(MeshWeld, EqualsBruteForceOnRandomSoup) {
             for (auto& facet : facets)
                 for (Vec3f& p : facet) {
                     auto draw = [&] {
-                        const float value = 0.1f * static_cast<float>(static_cast<int>(random() % static_cast<std::uint64_t>(grid)) - grid / 2);
+                        const float value =
+                            0.1f *
+                            static_cast<float>(static_cast<int>(random() % static_cast<std::uint64_t>(grid)) -
+                                               grid / 2);
                         return value == 0 && random() % 2 == 0 ? -0.0f : value;
                     };
                     p = {draw(), draw(), draw()};
@@ -150,11 +160,14 @@ TEST(MeshWeld, FansOfAnySizeAreSorted) {
     const std::uint32_t origin = 7, width = 400;
     std::vector<EdgeUse> uses;
     for (std::uint32_t v = 0; v < width; ++v)
-        for (std::size_t n = random() % 30; n > 0; --n)  // few upper ends, so that some are equal, and up to the largest number
+        for (std::size_t n = random() % 30; n > 0;
+             --n)  // few upper ends, so that some are equal, and up to the largest number
             uses.push_back({origin + v,
-                            random() % 2 == 0 ? 0xFFFFFFFFu - static_cast<std::uint32_t>(random() % 4) : static_cast<std::uint32_t>(random() % 9),
+                            random() % 2 == 0 ? 0xFFFFFFFFu - static_cast<std::uint32_t>(random() % 4)
+                                              : static_cast<std::uint32_t>(random() % 9),
                             0});
-    for (std::size_t i = 0; i < uses.size(); ++i) uses[i].code = static_cast<std::uint32_t>(7919 * i % uses.size());
+    for (std::size_t i = 0; i < uses.size(); ++i)
+        uses[i].code = static_cast<std::uint32_t>(7919 * i % uses.size());
     std::shuffle(uses.begin(), uses.end(), random);
     std::vector<std::array<std::uint32_t, 3>> expected, sorted;
     for (const EdgeUse& use : uses) expected.push_back({use.low, use.high, use.code});
@@ -173,10 +186,13 @@ TEST(MeshWeld, EdgesArePairedWhereFansArePlain) {
     std::vector<EdgeUse> uses;
     std::uint32_t facets = 0;
     for (std::uint32_t v = 0; v < width; ++v) {
-        const std::uint32_t edges = static_cast<std::uint32_t>(random() % 10), fault = static_cast<std::uint32_t>(random() % 8);
+        const std::uint32_t edges = static_cast<std::uint32_t>(random() % 10),
+                            fault = static_cast<std::uint32_t>(random() % 8);
         const std::size_t begin = uses.size();
         const auto use = [&](std::uint32_t high, std::uint32_t facet, bool reversed) {
-            uses.push_back({origin + v, high, 2 * (3 * facet + static_cast<std::uint32_t>(random() % 3)) + (reversed ? 1u : 0u)});
+            uses.push_back(
+                {origin + v, high,
+                 2 * (3 * facet + static_cast<std::uint32_t>(random() % 3)) + (reversed ? 1u : 0u)});
         };
         std::uint32_t high = origin + v;
         for (std::uint32_t e = 0; e < edges; ++e, facets += 2) {
@@ -192,14 +208,17 @@ TEST(MeshWeld, EdgesArePairedWhereFansArePlain) {
         if (fault == 2) use(any.high, facets++, any.reversed());
         if (fault == 3) use(any.high, facets++, true), use(any.high, facets++, false);
         if (fault == 4 && edges > 1)
-            uses[begin + 2].code = uses[begin].code ^ 1, uses[begin + 3].code = uses[begin + 1].code ^ 1;  // two facets share two edges
+            uses[begin + 2].code = uses[begin].code ^ 1,
+                         uses[begin + 3].code = uses[begin + 1].code ^ 1;  // two facets share two edges
     }
     std::map<std::uint32_t, std::vector<EdgeUse>> fans;  // by brute force
     for (const EdgeUse& use : uses) fans[use.low].push_back(use);
     std::set<std::pair<std::uint32_t, std::uint32_t>> expected, found;
     std::vector<std::uint32_t> odd, handed_out;
     for (auto& [low, fan] : fans) {
-        std::sort(fan.begin(), fan.end(), [](const EdgeUse& a, const EdgeUse& b) { return a.high != b.high ? a.high < b.high : a.code < b.code; });
+        std::sort(fan.begin(), fan.end(), [](const EdgeUse& a, const EdgeUse& b) {
+            return a.high != b.high ? a.high < b.high : a.code < b.code;
+        });
         bool plain = fan.size() <= 16 && fan.size() % 2 == 0;
         std::set<std::pair<std::uint32_t, std::uint32_t>> pairs, of_facets;
         for (const EdgeUse& use : fan) {
@@ -225,7 +244,8 @@ TEST(MeshWeld, EdgesArePairedWhereFansArePlain) {
             const std::vector<EdgeUse>& same = fans[fan[0].low];
             ASSERT_EQ(fan.size(), same.size());
             for (std::size_t i = 0; i < fan.size(); ++i)
-                EXPECT_TRUE(fan[i].low == same[i].low && fan[i].high == same[i].high && fan[i].code == same[i].code);
+                EXPECT_TRUE(fan[i].low == same[i].low && fan[i].high == same[i].high &&
+                            fan[i].code == same[i].code);
         });
     EXPECT_EQ(found, expected);
     EXPECT_EQ(handed_out, odd);
@@ -239,7 +259,9 @@ TEST(MeshWeld, MemoryThatIsKeptIsUsedAgain) {
     char* const first = static_cast<char*>(take_bulk(large));
     std::fill_n(first, large, 'a');
     char* outside = nullptr;
-    std::thread([&] { outside = static_cast<char*>(take_bulk(large)); }).join();  // of a thread that keeps nothing
+    std::thread([&] {
+        outside = static_cast<char*>(take_bulk(large));
+    }).join();  // of a thread that keeps nothing
     release_bulk(first, large);
     std::vector<std::pair<char*, std::size_t>> pieces;
     for (const std::size_t bytes : {large / 4, large / 3 + 1, std::size_t{1000}, large, large / 4 + 12345}) {
@@ -250,8 +272,9 @@ TEST(MeshWeld, MemoryThatIsKeptIsUsedAgain) {
     EXPECT_TRUE(within(pieces[0].first) && within(pieces[1].first) && within(pieces[4].first));
     EXPECT_FALSE(within(pieces[3].first));
     for (std::size_t i = 0; i < pieces.size(); ++i)
-        EXPECT_EQ(std::count(pieces[i].first, pieces[i].first + pieces[i].second, static_cast<char>('b' + i + 1)),
-                  static_cast<std::ptrdiff_t>(pieces[i].second));
+        EXPECT_EQ(
+            std::count(pieces[i].first, pieces[i].first + pieces[i].second, static_cast<char>('b' + i + 1)),
+            static_cast<std::ptrdiff_t>(pieces[i].second));
     std::thread([&] { release_bulk(pieces[0].first, pieces[0].second); }).join();
     for (std::size_t i = 1; i < pieces.size(); ++i) release_bulk(pieces[i].first, pieces[i].second);
     release_bulk(outside, large);
@@ -264,7 +287,8 @@ std::string flags_of(const void* address) {
     for (std::string line; std::getline(maps, line);) {
         std::uintptr_t begin = 0, end = 0;
         if (std::sscanf(line.c_str(), "%" SCNxPTR "-%" SCNxPTR " ", &begin, &end) == 2)
-            within = reinterpret_cast<std::uintptr_t>(address) >= begin && reinterpret_cast<std::uintptr_t>(address) < end;
+            within = reinterpret_cast<std::uintptr_t>(address) >= begin &&
+                     reinterpret_cast<std::uintptr_t>(address) < end;
         else if (within && line.starts_with("VmFlags:")) return line;
     }
     return {};
@@ -301,7 +325,8 @@ TEST(MeshWeld, RecordsAreScaledLoweredAndNotAligned) {
     Facets expected = box;
     for (auto& corners : expected)
         for (Vec3f& p : corners)
-            p = {static_cast<float>(25.4 * double(p.x)), static_cast<float>(25.4 * double(p.y)), static_cast<float>(25.4 * double(p.z) + 50.8)};
+            p = {static_cast<float>(25.4 * double(p.x)), static_cast<float>(25.4 * double(p.y)),
+                 static_cast<float>(25.4 * double(p.z) + 50.8)};
     Context context({.threads = 2});
     const Mesh mesh = weld_records(context, {bytes.data() + 1 + 12, box.size(), 50, 25.4, -50.8});
     ASSERT_EQ(mesh.vertices.size(), 8u);
@@ -309,7 +334,9 @@ TEST(MeshWeld, RecordsAreScaledLoweredAndNotAligned) {
     EXPECT_EQ(mesh.vertices[mesh.facets[0][0]].z, expected[0][0].z);
 }
 
-FacetRecords records_of(const Facets& facets) { return {reinterpret_cast<const char*>(facets.data()), facets.size()}; }
+FacetRecords records_of(const Facets& facets) {
+    return {reinterpret_cast<const char*>(facets.data()), facets.size()};
+}
 
 TEST(MeshWeld, FacetsAreBroughtTogetherInSpace) {
     Facets facets = shapes::torus(300);
@@ -322,26 +349,30 @@ TEST(MeshWeld, FacetsAreBroughtTogetherInSpace) {
     BulkVector<std::array<Vec3f, 3>> first;
     for (const int threads : {1, 2, 4}) {
         Context context({.threads = threads});
-        BulkVector<std::array<Vec3f, 3>> together = in_space(context, records_of(facets), bounds(as_it_lies.view()));
+        BulkVector<std::array<Vec3f, 3>> together =
+            in_space(context, records_of(facets), bounds(as_it_lies.view()));
         ASSERT_EQ(together.size(), facets.size());
         const FacetRecords records{reinterpret_cast<const char*>(together.data()), together.size()};
         EXPECT_TRUE(neighbours_follow(records));
         if (threads == 1) first = together;
         ASSERT_EQ(together, first) << "threads " << threads;
-        const Mesh spans = weld(context, std::span<const std::array<Vec3f, 3>>(together)), moved = weld_and_let_go(context, std::move(together));
+        const Mesh spans = weld(context, std::span<const std::array<Vec3f, 3>>(together)),
+                   moved = weld_and_let_go(context, std::move(together));
         ASSERT_TRUE(same_bytes(spans, moved));
         check_pairs(moved);
         EXPECT_EQ(context.memory_charged(), 0u);
     }
     auto sorted = [](auto all) {
-        std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return std::memcmp(a.data(), b.data(), sizeof a) < 0; });
+        std::sort(all.begin(), all.end(),
+                  [](const auto& a, const auto& b) { return std::memcmp(a.data(), b.data(), sizeof a) < 0; });
         return Facets(all.begin(), all.end());
     };
     EXPECT_EQ(sorted(first), sorted(facets)) << "each facet once, its corners as they were";
     // By cells, and as they were within a cell.
     const MortonGrid grid(bounds(as_it_lies.view()));
-    std::stable_sort(facets.begin(), facets.end(),
-                     [&](const auto& a, const auto& b) { return grid.code(a[0].x, a[0].y, a[0].z) >> 39 < grid.code(b[0].x, b[0].y, b[0].z) >> 39; });
+    std::stable_sort(facets.begin(), facets.end(), [&](const auto& a, const auto& b) {
+        return grid.code(a[0].x, a[0].y, a[0].z) >> 39 < grid.code(b[0].x, b[0].y, b[0].z) >> 39;
+    });
     EXPECT_EQ(Facets(first.begin(), first.end()), facets);
 }
 
@@ -356,7 +387,8 @@ TEST(MeshWeld, CoarseCodesBeginAsCodesDo) {
 }
 
 TEST(MeshWeld, MemoryStaysUnderEightyBytesAFacet) {
-    // Ordered and shuffled, the charge for scratch and the mesh itself together; a limit that is too small is refused.
+    // Ordered and shuffled, the charge for scratch and the mesh itself together; a limit that is too small is
+    // refused.
     Facets facets = shapes::torus(300);
     std::mt19937_64 random(test::seed());
     for (const bool shuffled : {false, true}) {
@@ -387,7 +419,8 @@ TEST(MeshWeld, LargeClosedMeshInAnyFacetOrder) {
                     // The neighbour has the same edge, the other way.
                     bool found = false;
                     for (std::size_t j = 0; j < 3; ++j)
-                        found |= mesh.facets[g][j] == mesh.facets[f][(k + 1) % 3] && mesh.facets[g][(j + 1) % 3] == mesh.facets[f][k] &&
+                        found |= mesh.facets[g][j] == mesh.facets[f][(k + 1) % 3] &&
+                                 mesh.facets[g][(j + 1) % 3] == mesh.facets[f][k] &&
                                  mesh.neighbours[g][j] == f;
                     ASSERT_TRUE(found);
                 }
@@ -445,8 +478,8 @@ TEST(MeshWeld, CubesThatTouchAlongAnEdgeStayTwo) {
 }
 
 TEST(MeshWeld, CavitiesThatTouchAlongAnEdgeJoinAsTheSolidBetweenThemDoes) {
-    // Two cavities that touch along an edge, inside a block: the solid lies on the other two sides of the edge, so the
-    // pairs go from one cavity to the other.
+    // Two cavities that touch along an edge, inside a block: the solid lies on the other two sides of the
+    // edge, so the pairs go from one cavity to the other.
     Context context({.threads = 1});
     Facets facets = shapes::flipped(shapes::box({0, 0, 0}, {1, 1, 1}));
     shapes::append(facets, shapes::flipped(shapes::box({1, 1, 0}, {2, 2, 1})));
@@ -471,7 +504,8 @@ TEST(MeshWeld, CubesThatShareAFaceStayTwo) {
 struct Rotation {
     double m[3][3];
     Vec3f operator()(double x, double y, double z) const {
-        return {static_cast<float>(m[0][0] * x + m[0][1] * y + m[0][2] * z), static_cast<float>(m[1][0] * x + m[1][1] * y + m[1][2] * z),
+        return {static_cast<float>(m[0][0] * x + m[0][1] * y + m[0][2] * z),
+                static_cast<float>(m[1][0] * x + m[1][1] * y + m[1][2] * z),
                 static_cast<float>(m[2][0] * x + m[2][1] * y + m[2][2] * z)};
     }
 };
@@ -488,30 +522,35 @@ Rotation random_rotation(std::mt19937_64& random) {
 }
 
 TEST(MeshWeld, AroundAnEdgeTheSolidLiesBetweenPartners) {
-    // Wedges of solid around a common edge, facets in random order: a facet's partner at the edge is the other side of
-    // its own wedge.
+    // Wedges of solid around a common edge, facets in random order: a facet's partner at the edge is the
+    // other side of its own wedge.
     std::mt19937_64 random(test::seed());
     for (int round = 0; round < 2000; ++round) {
         const std::size_t wedges = 2 + random() % 5;
         std::vector<double> angles(2 * wedges);
         const double offset = std::uniform_real_distribution(0.0, 6.0)(random);
         for (std::size_t i = 0; i < angles.size(); ++i)  // at least 0.05 apart
-            angles[i] = offset + 6.283185307 * (static_cast<double>(i) + std::uniform_real_distribution(0.0, 0.8)(random)) /
-                                     static_cast<double>(angles.size());
+            angles[i] =
+                offset + 6.283185307 *
+                             (static_cast<double>(i) + std::uniform_real_distribution(0.0, 0.8)(random)) /
+                             static_cast<double>(angles.size());
         const Rotation turn = random_rotation(random);
         const Vec3f low = turn(0, 0, -7), high = turn(0, 0, 12);
         std::vector<std::pair<std::size_t, std::array<Vec3f, 3>>> facets;
         for (std::size_t i = 0; i < angles.size(); ++i) {
-            const double r = std::uniform_real_distribution(1.0, 30.0)(random), z = std::uniform_real_distribution(-20.0, 20.0)(random);
+            const double r = std::uniform_real_distribution(1.0, 30.0)(random),
+                         z = std::uniform_real_distribution(-20.0, 20.0)(random);
             const Vec3f p = turn(r * std::cos(angles[i]), r * std::sin(angles[i]), z);
-            // Seen along the edge from low to high, the wedge begins with a facet that has the solid after it.
+            // Seen along the edge from low to high, the wedge begins with a facet that has the solid after
+            // it.
             if (i % 2 == 0) facets.push_back({i / 2, {high, low, p}});
             else facets.push_back({i / 2, {low, high, p}});
         }
         std::shuffle(facets.begin(), facets.end(), random);
         Facets corners;
         for (auto& [wedge, facet] : facets) {
-            std::rotate(facet.begin(), facet.begin() + static_cast<std::ptrdiff_t>(random() % 3), facet.end());
+            std::rotate(facet.begin(), facet.begin() + static_cast<std::ptrdiff_t>(random() % 3),
+                        facet.end());
             corners.push_back(facet);
         }
         Context context({.threads = 1});
@@ -528,8 +567,8 @@ TEST(MeshWeld, AroundAnEdgeTheSolidLiesBetweenPartners) {
 }
 
 TEST(MeshWeld, RandomVoxelSolidsPairWithinTheirVoxelAcrossSharedEdges) {
-    // Boundaries of random voxel sets are full of edges with four facets. There the solid is a quarter on either side:
-    // partners are faces of one voxel. Everything is turned, so that coordinates are rounded.
+    // Boundaries of random voxel sets are full of edges with four facets. There the solid is a quarter on
+    // either side: partners are faces of one voxel. Everything is turned, so that coordinates are rounded.
     std::mt19937_64 random(test::seed());
     constexpr int n = 6;
     for (int round = 0; round < 60; ++round) {
@@ -538,19 +577,23 @@ TEST(MeshWeld, RandomVoxelSolidsPairWithinTheirVoxelAcrossSharedEdges) {
         for (auto& plane : solid)
             for (auto& row : plane)
                 for (bool& cell : row) cell = random() % 2 == 0;
-        auto filled = [&](int x, int y, int z) { return x >= 0 && y >= 0 && z >= 0 && x < n && y < n && z < n && solid[x][y][z]; };
+        auto filled = [&](int x, int y, int z) {
+            return x >= 0 && y >= 0 && z >= 0 && x < n && y < n && z < n && solid[x][y][z];
+        };
         Facets facets;
         std::vector<int> voxel;
         for (int x = 0; x < n; ++x)
             for (int y = 0; y < n; ++y)
                 for (int z = 0; z < n; ++z) {
                     if (!solid[x][y][z]) continue;
-                    const Facets all = shapes::box({float(x), float(y), float(z)}, {float(x + 1), float(y + 1), float(z + 1)});
+                    const Facets all = shapes::box({float(x), float(y), float(z)},
+                                                   {float(x + 1), float(y + 1), float(z + 1)});
                     const bool hidden[6] = {filled(x, y, z - 1), filled(x, y, z + 1), filled(x, y - 1, z),
                                             filled(x, y + 1, z), filled(x - 1, y, z), filled(x + 1, y, z)};
                     for (std::size_t f = 0; f < 12; ++f) {
                         if (hidden[f / 2]) continue;
-                        facets.push_back({turn(all[f][0].x, all[f][0].y, all[f][0].z), turn(all[f][1].x, all[f][1].y, all[f][1].z),
+                        facets.push_back({turn(all[f][0].x, all[f][0].y, all[f][0].z),
+                                          turn(all[f][1].x, all[f][1].y, all[f][1].z),
                                           turn(all[f][2].x, all[f][2].y, all[f][2].z)});
                         voxel.push_back((x * n + y) * n + z);
                     }
@@ -610,7 +653,9 @@ TEST(MeshWeldWithin, EqualsBruteForceClusters) {
         Facets facets(5 + random() % 100);
         for (auto& facet : facets)
             for (Vec3f& p : facet) {
-                auto draw = [&] { return static_cast<float>(std::uniform_real_distribution(-size, size)(random)); };
+                auto draw = [&] {
+                    return static_cast<float>(std::uniform_real_distribution(-size, size)(random));
+                };
                 p = {draw(), draw(), draw()};
             }
         Context context({.threads = 1 + round % 3});

@@ -17,7 +17,8 @@
 namespace slabwright {
 namespace {
 
-// The cutter of LUO 6.5.2 and nothing else: a strip .5 in wide is that of a cutter of 1 in; 3 mm deep, .635 mm a tooth.
+// The cutter of LUO 6.5.2 and nothing else: a strip .5 in wide is that of a cutter of 1 in; 3 mm deep, .635
+// mm a tooth.
 Job specimen() {
     Job job;
     job.material.transform = CoefficientTransform::printed;
@@ -40,8 +41,8 @@ TEST(LeastMaterial, LuoSpecimensOf12BreakAndOf13Hold) {
     EXPECT_NEAR(least, 0.124, 0.0015);
 }
 
-// Of the wood that hangs over, the last level of roughing meets a sliver: where nothing hangs over, or what does would not bear a whole step
-// anyway, any step will do.
+// Of the wood that hangs over, the last level of roughing meets a sliver: where nothing hangs over, or what
+// does would not bear a whole step anyway, any step will do.
 TEST(LeastMaterial, LastStepsAreShallowWhereThatSavesTheWood) {
     const Job job = specimen();
     const Tool& tool = job.tools[0];
@@ -70,13 +71,16 @@ TEST(LeastMaterial, GrowsWithOverhangAndForceAndFallsWithStrength) {
     Job hasty = job;
     hasty.tools[0].max_feed *= 2;
     EXPECT_GT(least_material(hasty, 50), usual);
-    // Any slab at least as thick bears the cut, one a little thinner does not: asked of the strip itself, at the depth cut in it.
+    // Any slab at least as thick bears the cut, one a little thinner does not: asked of the strip itself, at
+    // the depth cut in it.
     for (const double b : {2.0, 20.0, 50.0}) {
         const double least = least_material(job, b);
         for (const double share : {0.97, 1.001, 1.5}) {
             const double t = share * least, depth = std::min(t, job.tools[0].stepdown_max);
             const SegmentForces f = closed_form_forces(hardest_cut(job, job.tools[0], depth));
-            EXPECT_EQ(overhang_holds({f.peak_x_n, f.peak_y_n, f.peak_z_n, b, depth / 2, job.tools[0].diameter / 2, job.material.strength_mpa}, t),
+            EXPECT_EQ(overhang_holds({f.peak_x_n, f.peak_y_n, f.peak_z_n, b, depth / 2,
+                                      job.tools[0].diameter / 2, job.material.strength_mpa},
+                                     t),
                       share > 1)
                 << b << ' ' << share;
         }
@@ -85,7 +89,9 @@ TEST(LeastMaterial, GrowsWithOverhangAndForceAndFallsWithStrength) {
 
 Mesh box(Context& context, double x, double y, double z) {
     Mesh mesh = test::height_field(context, 1, 1.0, [](double, double) { return 1.0; });
-    for (Vec3f& v : mesh.vertices) v = {static_cast<float>((v.x + 0.5) * x), static_cast<float>((v.y + 0.5) * y), static_cast<float>(v.z * z)};
+    for (Vec3f& v : mesh.vertices)
+        v = {static_cast<float>((v.x + 0.5) * x), static_cast<float>((v.y + 0.5) * y),
+             static_cast<float>(v.z * z)};
     return mesh;
 }
 
@@ -113,7 +119,8 @@ TEST(SlabOverhangTest, AFlaskCarriesTheSlab) {
     const double without = slab_overhang(context, mesh.view(), plan).overhangs.front();
     plan.job.flask.enabled = true;
     const SlabOverhang with = slab_overhang(context, mesh.view(), plan);
-    // Nowhere in the gap is it further than half the gap to pattern or flask, but for corners and what the draft adds.
+    // Nowhere in the gap is it further than half the gap to pattern or flask, but for corners and what the
+    // draft adds.
     EXPECT_LT(with.overhangs.front(), 0.3 * without);
     EXPECT_GE(with.overhangs.front(), plan.job.flask.gap / 2 + plan.job.bonding.edge_setback);
     EXPECT_LE(with.overhangs.front(), plan.job.flask.gap / 2 * 1.2 + plan.job.bonding.edge_setback + 2);
@@ -165,7 +172,9 @@ TEST(LeastMaterial, BoundariesKeepWhatTheirHeightAsksFor) {
 
 TEST(LeastMaterial, AComputedThicknessPlans) {
     Context context;
-    Mesh mesh = test::height_field(context, 12, 10.0, [](double x, double y) { return std::max(std::abs(x), std::abs(y)) < 35 ? 24.0 : 12.0; });
+    Mesh mesh = test::height_field(context, 12, 10.0, [](double x, double y) {
+        return std::max(std::abs(x), std::abs(y)) < 35 ? 24.0 : 12.0;
+    });
     Job job;
     job.material.min_thickness = 0;
     const Plan plan = make_plan(context, mesh, {}, job);
@@ -184,12 +193,15 @@ TEST(LeastMaterial, AComputedThicknessPlans) {
 TEST(LeastMaterial, ASlabThatHangsOverTooFarIsReported) {
     Context context;
     // A post of 12 mm on a base of 120 mm: the slabs around the post reach 85 mm past it.
-    const Mesh mesh = test::height_field(context, 20, 6.0, [](double x, double y) { return std::max(std::abs(x), std::abs(y)) < 7 ? 60.0 : 8.0; });
+    const Mesh mesh = test::height_field(context, 20, 6.0, [](double x, double y) {
+        return std::max(std::abs(x), std::abs(y)) < 7 ? 60.0 : 8.0;
+    });
     Job job;
     job.material.min_thickness = 0;
     const auto reported = [&] {
         const Plan plan = make_plan(context, mesh, {}, job);
-        return std::any_of(plan.diagnostics.begin(), plan.diagnostics.end(), [](const Diagnostic& d) { return d.code == "layers.overhang"; });
+        return std::any_of(plan.diagnostics.begin(), plan.diagnostics.end(),
+                           [](const Diagnostic& d) { return d.code == "layers.overhang"; });
     };
     EXPECT_TRUE(reported());
     job.material.strength_mpa = 1000;

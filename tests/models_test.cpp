@@ -34,8 +34,9 @@ std::string why_not_closed(const std::vector<Facet>& facets) {
         const auto back = edges.find({edge.second, edge.first});
         if (count == 1 && back != edges.end() && back->second == 1) continue;
         std::ostringstream words;
-        words << "edge (" << edge.first[0] << ", " << edge.first[1] << ", " << edge.first[2] << ") to (" << edge.second[0] << ", " << edge.second[1]
-              << ", " << edge.second[2] << ") occurs " << count << " times, reversed " << (back == edges.end() ? 0 : back->second);
+        words << "edge (" << edge.first[0] << ", " << edge.first[1] << ", " << edge.first[2] << ") to ("
+              << edge.second[0] << ", " << edge.second[1] << ", " << edge.second[2] << ") occurs " << count
+              << " times, reversed " << (back == edges.end() ? 0 : back->second);
         return words.str();
     }
     return "";
@@ -44,7 +45,8 @@ std::string why_not_closed(const std::vector<Facet>& facets) {
 double volume(const std::vector<Facet>& facets) {
     double six = 0;
     for (const Facet& f : facets) {
-        const double ax = f[0].x, ay = f[0].y, az = f[0].z, bx = f[1].x, by = f[1].y, bz = f[1].z, cx = f[2].x, cy = f[2].y, cz = f[2].z;
+        const double ax = f[0].x, ay = f[0].y, az = f[0].z, bx = f[1].x, by = f[1].y, bz = f[1].z,
+                     cx = f[2].x, cy = f[2].y, cz = f[2].z;
         six += ax * (by * cz - bz * cy) - ay * (bx * cz - bz * cx) + az * (bx * cy - by * cx);
     }
     return six / 6;
@@ -52,7 +54,8 @@ double volume(const std::vector<Facet>& facets) {
 
 /// Twice the signed area seen from above; exact, since coordinates are 24-bit multiples of 1/4096 mm.
 double seen_from_above(const Facet& f) {
-    return (double{f[1].x} - f[0].x) * (double{f[2].y} - f[0].y) - (double{f[1].y} - f[0].y) * (double{f[2].x} - f[0].x);
+    return (double{f[1].x} - f[0].x) * (double{f[2].y} - f[0].y) -
+           (double{f[1].y} - f[0].y) * (double{f[2].x} - f[0].x);
 }
 
 bool level_at(const Facet& f, double z) {
@@ -80,7 +83,8 @@ bool degenerate(const Facet& f) {
     return uy * vz == uz * vy && uz * vx == ux * vz && ux * vy == uy * vx;
 }
 
-/// Closed, without degenerate facets, on z = 0, and nothing but the base (and flats at `down_flats`) faces down.
+/// Closed, without degenerate facets, on z = 0, and nothing but the base (and flats at `down_flats`) faces
+/// down.
 void expect_pattern(const std::vector<Facet>& facets, const std::vector<double>& down_flats = {}) {
     ASSERT_FALSE(facets.empty());
     EXPECT_EQ(why_not_closed(facets), "");
@@ -92,7 +96,8 @@ void expect_pattern(const std::vector<Facet>& facets, const std::vector<double>&
     for (const Facet& f : facets) {
         const double seen = seen_from_above(f);
         (seen > 0 ? up : down) += seen / 2;
-        const bool allowed = level_at(f, 0) || std::any_of(down_flats.begin(), down_flats.end(), [&](double z) { return level_at(f, z); });
+        const bool allowed = level_at(f, 0) || std::any_of(down_flats.begin(), down_flats.end(),
+                                                           [&](double z) { return level_at(f, z); });
         if (seen < 0 && !allowed) ++undercut;
     }
     EXPECT_EQ(undercut, 0u) << "facets face down";
@@ -108,7 +113,8 @@ std::string bytes_of(const std::string& path) {
 
 void expect_committed(const std::string& name, const std::vector<Facet>& facets) {
     const std::string path = std::string(SLABWRIGHT_SOURCE_DIR) + "/tests/data/" + name + ".stl";
-    EXPECT_TRUE(bytes_of(path) == stl_bytes(name, facets)) << path << " differs: run `make_models all tests/data` and look at what changed";
+    EXPECT_TRUE(bytes_of(path) == stl_bytes(name, facets))
+        << path << " differs: run `make_models all tests/data` and look at what changed";
 }
 
 std::vector<Facet> collect(const MetrePattern& pattern) {
@@ -117,8 +123,8 @@ std::vector<Facet> collect(const MetrePattern& pattern) {
     return facets;
 }
 
-/// What Steiner's formula needs of a smooth outline: inset all round by o, its area is area − length·o + π·o², as long as no arc
-/// vanishes.
+/// What Steiner's formula needs of a smooth outline: inset all round by o, its area is area − length·o +
+/// π·o², as long as no arc vanishes.
 struct Measures {
     double area = 0, length = 0;
     /// Of the solid drafted by `degrees` over `height`, the outline being its foot.
@@ -128,16 +134,18 @@ struct Measures {
     }
 };
 
-/// Outline of right angles, its corners rounded: each rounding takes (1 − π/4)·r² off a convex corner, adds it at a concave one, and
-/// shortens the outline by (2 − π/2)·r.
-Measures right_angled(double area, double length, const std::vector<double>& convex, const std::vector<double>& concave) {
+/// Outline of right angles, its corners rounded: each rounding takes (1 − π/4)·r² off a convex corner, adds
+/// it at a concave one, and shortens the outline by (2 − π/2)·r.
+Measures right_angled(double area, double length, const std::vector<double>& convex,
+                      const std::vector<double>& concave) {
     for (const double r : convex) area -= (1 - kPi / 4) * r * r, length -= (2 - kPi / 2) * r;
     for (const double r : concave) area += (1 - kPi / 4) * r * r, length -= (2 - kPi / 2) * r;
     return {area, length};
 }
 
-/// Any outline with its corners {x, y, radius} rounded, counter-clockwise: at a corner that turns by φ the rounding takes (tan φ/2 − φ/2)·r²
-/// off the area, or adds it where φ is negative, and shortens the outline by 2·|tan φ/2 − φ/2|·r.
+/// Any outline with its corners {x, y, radius} rounded, counter-clockwise: at a corner that turns by φ the
+/// rounding takes (tan φ/2 − φ/2)·r² off the area, or adds it where φ is negative, and shortens the outline
+/// by 2·|tan φ/2 − φ/2|·r.
 Measures rounded(const std::vector<std::array<double, 3>>& corners) {
     Measures m;
     const std::size_t n = corners.size();
@@ -146,7 +154,8 @@ Measures rounded(const std::vector<std::array<double, 3>>& corners) {
         const double ux = b[0] - a[0], uy = b[1] - a[1], vx = c[0] - b[0], vy = c[1] - b[1];
         m.area += (b[0] * c[1] - c[0] * b[1]) / 2;
         m.length += std::hypot(vx, vy);
-        const double half = std::atan2(ux * vy - uy * vx, ux * vx + uy * vy) / 2, less = std::tan(half) - half;
+        const double half = std::atan2(ux * vy - uy * vx, ux * vx + uy * vy) / 2,
+                     less = std::tan(half) - half;
         m.area -= less * b[2] * b[2];
         m.length -= 2 * std::abs(less) * b[2];
     }
@@ -166,7 +175,8 @@ TEST(Models, HalfSphereHasTheVolumeOfASphere) {
     const double exact = 2.0 / 3 * kPi * 50 * 50 * 50;
     EXPECT_NEAR(volume(facets), exact, 1e-3 * exact);
     for (const Facet& f : facets)
-        for (const Vec3f& v : f) ASSERT_NEAR(std::sqrt(double{v.x} * v.x + double{v.y} * v.y + double{v.z} * v.z), 50, 5e-4);
+        for (const Vec3f& v : f)
+            ASSERT_NEAR(std::sqrt(double{v.x} * v.x + double{v.y} * v.y + double{v.z} * v.z), 50, 5e-4);
     expect_committed("half-sphere", facets);
 }
 
@@ -176,9 +186,10 @@ TEST(Models, LuoToolSampleHasTheVolumeOfItsDrawing) {
     EXPECT_NEAR(highest(facets), 2 * kInch, 1e-3);
     // Inches.
     const Measures plate = right_angled(8.75 * 6.5, 2 * (8.75 + 6.5), {.5, .5, .5, .5}, {});
-    const Measures letter_h =
-        right_angled(5.2 * 5.9 - 2 * 1.6 * .6, 2 * (5.2 + 5.9) + 4 * 1.6, {.5, .5, .5, .5, .5, .5, .5, .5}, {.15, .15, .15, .15});
-    const Measures letter_c = right_angled(2.8 * 4.7 - 1.7 * .72, 2 * (2.8 + 4.7) + 2 * 1.7, {.3, .3, .3, .3, .3, .3}, {.15, .15});
+    const Measures letter_h = right_angled(5.2 * 5.9 - 2 * 1.6 * .6, 2 * (5.2 + 5.9) + 4 * 1.6,
+                                           {.5, .5, .5, .5, .5, .5, .5, .5}, {.15, .15, .15, .15});
+    const Measures letter_c =
+        right_angled(2.8 * 4.7 - 1.7 * .72, 2 * (2.8 + 4.7) + 2 * 1.7, {.3, .3, .3, .3, .3, .3}, {.15, .15});
     const Measures island{1.4 * 1.6 + kPi * .8 * .8, 2 * 1.4 + 2 * kPi * .8};
     const Measures boss{kPi * .8 * .8, 2 * kPi * .8};
     // The slot from its rim downwards: .238 in wide on its floor, and .170 at the narrow end.
@@ -191,8 +202,9 @@ TEST(Models, LuoToolSampleHasTheVolumeOfItsDrawing) {
                                    {4.0, narrow, .15},
                                    {3.85, wide, .15},
                                    {2.75, wide, wide}});
-    const double exact = plate.drafted_volume(.75, 0) + letter_h.drafted_volume(.75, 3) + island.drafted_volume(1.25, 2) +
-                         boss.drafted_volume(.75, 0) + letter_c.drafted_volume(.5, 3) - slot.drafted_volume(.3, 3);
+    const double exact = plate.drafted_volume(.75, 0) + letter_h.drafted_volume(.75, 3) +
+                         island.drafted_volume(1.25, 2) + boss.drafted_volume(.75, 0) +
+                         letter_c.drafted_volume(.5, 3) - slot.drafted_volume(.3, 3);
     EXPECT_NEAR(volume(facets) / (kInch * kInch * kInch), exact, 1e-3 * exact);
     expect_committed("luo-tool-sample", facets);
 }
@@ -220,7 +232,8 @@ std::vector<Segment> cut(const std::vector<Facet>& facets, double z) {
     return segments;
 }
 
-/// The share of a section's boundary that a disc can touch without overlapping the solid by more than 0.05 mm.
+/// The share of a section's boundary that a disc can touch without overlapping the solid by more than 0.05
+/// mm.
 double reached_share(const std::vector<Segment>& segments, double radius) {
     double all = 0, reached = 0;
     for (const Segment& s : segments) {
@@ -228,10 +241,12 @@ double reached_share(const std::vector<Segment>& segments, double radius) {
         const int samples = std::max(1, static_cast<int>(length / 0.5));
         for (int i = 0; i < samples; ++i) {
             const double t = (i + 0.5) / samples;
-            const double x = s.ax + t * (s.bx - s.ax) + radius * s.nx, y = s.ay + t * (s.by - s.ay) + radius * s.ny;
+            const double x = s.ax + t * (s.bx - s.ax) + radius * s.nx,
+                         y = s.ay + t * (s.by - s.ay) + radius * s.ny;
             const bool free = std::none_of(segments.begin(), segments.end(), [&](const Segment& o) {
                 const double dx = o.bx - o.ax, dy = o.by - o.ay, squared = dx * dx + dy * dy;
-                const double u = squared > 0 ? std::clamp(((x - o.ax) * dx + (y - o.ay) * dy) / squared, 0.0, 1.0) : 0;
+                const double u =
+                    squared > 0 ? std::clamp(((x - o.ax) * dx + (y - o.ay) * dy) / squared, 0.0, 1.0) : 0;
                 return std::hypot(x - o.ax - u * dx, y - o.ay - u * dy) < radius - 0.05;
             });
             all += length / samples;
@@ -243,7 +258,9 @@ double reached_share(const std::vector<Segment>& segments, double radius) {
 
 TEST(Models, LuoToolSampleForcesTheToolsOfThePaper) {
     const std::vector<Facet> facets = luo_tool_sample();
-    const auto share = [&](double z_inch, double diameter_inch) { return reached_share(cut(facets, z_inch * kInch), diameter_inch / 2 * kInch); };
+    const auto share = [&](double z_inch, double diameter_inch) {
+        return reached_share(cut(facets, z_inch * kInch), diameter_inch / 2 * kInch);
+    };
     constexpr double threshold = 0.975;
     // Layer 1: every tool reaches all.
     EXPECT_GT(share(.4, 1.0), 0.9999);
@@ -272,7 +289,8 @@ TEST(Models, PumpCoverIsAPatternWithDraft) {
             low_y = std::min<double>(low_y, v.y), high_y = std::max<double>(high_y, v.y);
         }
         if (f[0].z == f[1].z && f[1].z == f[2].z && f[0].z > 0) flats.insert(f[0].z);
-        // No facet is steeper than the draft allows: its normal leans up by 2° or more. The grid of 1/4096 mm costs up to .1°.
+        // No facet is steeper than the draft allows: its normal leans up by 2° or more. The grid of 1/4096 mm
+        // costs up to .1°.
         const double ux = double{f[1].x} - f[0].x, uy = double{f[1].y} - f[0].y, uz = double{f[1].z} - f[0].z;
         const double vx = double{f[2].x} - f[0].x, vy = double{f[2].y} - f[0].y, vz = double{f[2].z} - f[0].z;
         const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
@@ -317,13 +335,17 @@ TEST(Models, MetrePatternCountsWithinTenPercent) {
 }
 
 TEST(Models, MetrePatternKeepsTheShapeOfItsFacets) {
-    // Under the plate is a fan with one facet to each vertex of its border; it says how many vertices a tile has around, and the count
-    // how many rings. Were one of them to grow alone, times by number of facets would be times of ever longer slivers.
+    // Under the plate is a fan with one facet to each vertex of its border; it says how many vertices a tile
+    // has around, and the count how many rings. Were one of them to grow alone, times by number of facets
+    // would be times of ever longer slivers.
     for (const std::uint64_t wish : {20'000, 100'000, 200'000, 1'000'000}) {
         const std::vector<Facet> facets = collect({1160, 300, wish, 1});
-        const auto under = std::count_if(facets.begin(), facets.end(), [](const Facet& f) { return f[0].z == 0 && f[1].z == 0 && f[2].z == 0; });
+        const auto under = std::count_if(facets.begin(), facets.end(), [](const Facet& f) {
+            return f[0].z == 0 && f[1].z == 0 && f[2].z == 0;
+        });
         const double tiles = 8, around = static_cast<double>(under) / tiles;
-        const double rings = ((static_cast<double>(facets.size()) / around - 3 * tiles) / (tiles * tiles) - 1) / 2;
+        const double rings =
+            ((static_cast<double>(facets.size()) / around - 3 * tiles) / (tiles * tiles) - 1) / 2;
         EXPECT_GT(around / (2 * rings), 0.55) << wish;
         EXPECT_LT(around / (2 * rings), 1.8) << wish;
     }
@@ -339,17 +361,21 @@ TEST(Models, MetrePatternIsTheSameForTheSameSeed) {
 }
 
 TEST(Models, MetrePatternWallsHaveTheirDraft) {
-    // Plane walls lean by 3°. Around corners the chords lie a little closer together than the arcs, which steepens a wall by less
-    // the more chords there are.
+    // Plane walls lean by 3°. Around corners the chords lie a little closer together than the arcs, which
+    // steepens a wall by less the more chords there are.
     double coarse = 0, fine = 0;
     for (const std::uint64_t count : {100'000u, 400'000u}) {
         const std::vector<Facet> facets = collect({1160, 300, count, 3});
         (count == 100'000 ? coarse : fine) = volume(facets);
         std::size_t walls = 0, at_draft = 0;
         for (const Facet& f : facets) {
-            const double ux = double{f[1].x} - f[0].x, uy = double{f[1].y} - f[0].y, uz = double{f[1].z} - f[0].z;
-            const double vx = double{f[2].x} - f[0].x, vy = double{f[2].y} - f[0].y, vz = double{f[2].z} - f[0].z;
-            const double slope = 90 - std::atan2(ux * vy - uy * vx, std::hypot(uy * vz - uz * vy, uz * vx - ux * vz)) * 180 / kPi;
+            const double ux = double{f[1].x} - f[0].x, uy = double{f[1].y} - f[0].y,
+                         uz = double{f[1].z} - f[0].z;
+            const double vx = double{f[2].x} - f[0].x, vy = double{f[2].y} - f[0].y,
+                         vz = double{f[2].z} - f[0].z;
+            const double slope =
+                90 -
+                std::atan2(ux * vy - uy * vx, std::hypot(uy * vz - uz * vy, uz * vx - ux * vz)) * 180 / kPi;
             if (slope > 90 || slope < 86.5) continue;  // the base; flats and most of the domes
             ++walls;
             if (std::abs(slope - 87) < 0.05) ++at_draft;

@@ -20,15 +20,18 @@ double reference_seconds(const std::vector<MotionLeg>& legs, double a, double ju
     std::vector<double> entry(legs.size() + 1, 0);
     for (std::size_t i = 1; i < legs.size(); ++i) {
         const auto &u = legs[i - 1].leaving, &v = legs[i].direction;
-        const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0), half = std::sqrt((1 + cosine) / 2);
+        const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0),
+                     half = std::sqrt((1 + cosine) / 2);
         double corner = 1e9;
         if (half < 1 - 1e-12) {
             const double touches = std::min(legs[i - 1].length, legs[i].length) / 2;
-            corner = std::sqrt(a * std::min(junction_mm * half / (1 - half), touches * half / std::sqrt(1 - half * half)));
+            corner = std::sqrt(
+                a * std::min(junction_mm * half / (1 - half), touches * half / std::sqrt(1 - half * half)));
         }
         entry[i] = std::min({corner, legs[i - 1].speed, legs[i].speed});
     }
-    for (std::size_t i = legs.size(); i-- > 0;) entry[i] = std::min(entry[i], std::sqrt(entry[i + 1] * entry[i + 1] + 2 * a * legs[i].length));
+    for (std::size_t i = legs.size(); i-- > 0;)
+        entry[i] = std::min(entry[i], std::sqrt(entry[i + 1] * entry[i + 1] + 2 * a * legs[i].length));
     double seconds = 0, v = 0;
     for (std::size_t i = 0; i < legs.size(); ++i) {
         const double length = legs[i].length, out = std::min(entry[i + 1], std::sqrt(v * v + 2 * a * length));
@@ -54,8 +57,10 @@ TEST(Travel, LegByLegIsAllAtOnce) {
             double heading = 0;
             Travel travel(acceleration);
             for (std::size_t i = 0; i < count; ++i) {
-                heading += turn * (2 * unit(random) - 1) * (unit(random) < 0.01 ? std::numbers::pi / turn : 1);
-                legs.push_back({size * unit(random), 1 + 150 * unit(random), {std::cos(heading), std::sin(heading), 0}});
+                heading +=
+                    turn * (2 * unit(random) - 1) * (unit(random) < 0.01 ? std::numbers::pi / turn : 1);
+                legs.push_back(
+                    {size * unit(random), 1 + 150 * unit(random), {std::cos(heading), std::sin(heading), 0}});
                 legs.back().leaving = legs.back().direction;
                 travel.add(legs.back());
                 if (i % 7 == 0) travel.add({0, 1, {0, 0, 1}});  // passed over
@@ -70,15 +75,19 @@ TEST(Travel, LegByLegIsAllAtOnce) {
         }
 }
 
-// However fine the chords of a circle are, they are run no faster than v² = a·r; coarse ones no faster than their corners bear.
+// However fine the chords of a circle are, they are run no faster than v² = a·r; coarse ones no faster than
+// their corners bear.
 TEST(Travel, ChordsAreRunNoFasterThanTheirCircle) {
-    const double acceleration = 1000, radius = 6, feed = 150, blend = 0.1, bears = std::sqrt(acceleration * radius);
+    const double acceleration = 1000, radius = 6, feed = 150, blend = 0.1,
+                 bears = std::sqrt(acceleration * radius);
     auto seconds = [&](int chords) {
         std::vector<MotionLeg> legs;
         const int turns = 20;
         for (int k = 0; k < turns * chords; ++k) {
             const double heading = 2 * std::numbers::pi * k / chords;
-            legs.push_back({2 * radius * std::sin(std::numbers::pi / chords), feed, {std::cos(heading), std::sin(heading), 0}});
+            legs.push_back({2 * radius * std::sin(std::numbers::pi / chords),
+                            feed,
+                            {std::cos(heading), std::sin(heading), 0}});
             legs.back().leaving = legs.back().direction;
         }
         return travel_seconds(legs, acceleration, blend) / turns;

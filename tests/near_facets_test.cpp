@@ -1,4 +1,5 @@
-// NearFacets against points sampled on facets and ways: nothing that meets is left out, and little is kept that does not.
+// NearFacets against points sampled on facets and ways: nothing that meets is left out, and little is kept
+// that does not.
 #include "kernels/access/near_facets.h"
 
 #include <gtest/gtest.h>
@@ -17,15 +18,17 @@ namespace {
 
 using P = std::array<double, 3>;
 
-/// The least distance from a way's points and what is above them to a facet's points not higher than `top`: of a cylinder the horizontal one, of what is
-/// higher than the way. Sampled, so it is too great by up to the greatest gap between samples.
+/// The least distance from a way's points and what is above them to a facet's points not higher than `top`:
+/// of a cylinder the horizontal one, of what is higher than the way. Sampled, so it is too great by up to the
+/// greatest gap between samples.
 double sampled_distance(const std::array<P, 3>& v, const P& a, const P& b, bool ball, double top, int steps) {
     double best2 = 1e300;
     for (int i = 0; i <= steps; ++i)
         for (int j = 0; i + j <= steps; ++j) {
             const double s = static_cast<double>(i) / steps, t = static_cast<double>(j) / steps;
             P q;
-            for (std::size_t k = 0; k < 3; ++k) q[k] = v[0][k] + s * (v[1][k] - v[0][k]) + t * (v[2][k] - v[0][k]);
+            for (std::size_t k = 0; k < 3; ++k)
+                q[k] = v[0][k] + s * (v[1][k] - v[0][k]) + t * (v[2][k] - v[0][k]);
             if (q[2] >= top) continue;
             for (int n = 0; n <= steps; ++n) {
                 const double along = static_cast<double>(n) / steps;
@@ -50,11 +53,12 @@ TEST(NearFacets, KeepsAllThatAWayMeetsAndLittleElse) {
     std::size_t met = 0, kept = 0, kept_closely = 0, far = 0, far_closely = 0;
     for (int trial = 0; trial < 300; ++trial) {
         const bool ball = trial % 2 == 0;
-        const double radius = between(0.5, 7), at_least = trial % 3 == 0 ? 0.0 : between(0, 0.01), reach = radius - at_least,
-                     up = ball ? radius : at_least;
+        const double radius = between(0.5, 7), at_least = trial % 3 == 0 ? 0.0 : between(0, 0.01),
+                     reach = radius - at_least, up = ball ? radius : at_least;
         const P corner{between(-300, 300), between(-300, 300), between(-20, 20)};
         P low, high;
-        for (std::size_t k = 0; k < 3; ++k) low[k] = corner[k], high[k] = corner[k] + (trial % 5 == 0 && k == 2 ? 0.0 : between(0, 4));
+        for (std::size_t k = 0; k < 3; ++k)
+            low[k] = corner[k], high[k] = corner[k] + (trial % 5 == 0 && k == 2 ? 0.0 : between(0, 4));
         const double top = high[2] + between(-1, 2 * radius);
         // Facets of all sizes around the box, slivers and points among them, in two lots.
         std::vector<std::array<P, 3>> all;
@@ -70,10 +74,13 @@ TEST(NearFacets, KeepsAllThatAWayMeetsAndLittleElse) {
             for (std::size_t i = 0; i < lot; ++i) {
                 const double size = std::pow(10, between(-2, 0.7));
                 P middle;
-                for (std::size_t k = 0; k < 3; ++k) middle[k] = between(low[k] - 1.5 * radius, high[k] + 1.5 * radius) + (k == 2 ? radius / 2 : 0);
+                for (std::size_t k = 0; k < 3; ++k)
+                    middle[k] =
+                        between(low[k] - 1.5 * radius, high[k] + 1.5 * radius) + (k == 2 ? radius / 2 : 0);
                 std::array<P, 3> v;
                 for (P& p : v)
-                    for (std::size_t k = 0; k < 3; ++k) p[k] = static_cast<float>(middle[k] + between(-size, size));
+                    for (std::size_t k = 0; k < 3; ++k)
+                        p[k] = static_cast<float>(middle[k] + between(-size, size));
                 if (i % 16 == 0) v[2] = v[1];
                 if (i % 16 == 1)
                     for (std::size_t k = 0; k < 3; ++k) v[2][k] = static_cast<float>((v[0][k] + v[1][k]) / 2);
@@ -90,10 +97,15 @@ TEST(NearFacets, KeepsAllThatAWayMeetsAndLittleElse) {
         for (int way = 0; way < 4; ++way) {
             P a, b;
             const double depth = at_least + (way % 2 == 0 ? 0 : 0.05);
-            for (std::size_t k = 0; k < 3; ++k) a[k] = between(low[k], high[k]), b[k] = way == 3 ? a[k] : between(low[k], high[k]);
+            for (std::size_t k = 0; k < 3; ++k)
+                a[k] = between(low[k], high[k]), b[k] = way == 3 ? a[k] : between(low[k], high[k]);
             if (way == 2) b[2] = a[2];
             const double lift = ball ? radius : depth, lowest = std::min(a[2], b[2]), asked = radius - depth;
-            const NearWay asking{{a[0], a[1], a[2] + lift}, {b[0], b[1], b[2] + lift}, asked, lowest + (ball ? radius - asked : depth), 0};
+            const NearWay asking{{a[0], a[1], a[2] + lift},
+                                 {b[0], b[1], b[2] + lift},
+                                 asked,
+                                 lowest + (ball ? radius - asked : depth),
+                                 0};
             std::vector<unsigned char> once, twice, twice_just;
             near.near(asking, false, once);
             near.near(asking, true, twice);
@@ -104,10 +116,10 @@ TEST(NearFacets, KeepsAllThatAWayMeetsAndLittleElse) {
                 const double d = sampled_distance(all[i], asking.a, asking.b, ball, top, kSteps);
                 if (d < asked) {
                     ++met;
-                    EXPECT_TRUE(by_one[i]) << "seed " << seed << " trial " << trial << " way " << way << " facet " << i << " at " << d << " of "
-                                           << asked;
-                    EXPECT_TRUE(by_two[i]) << "seed " << seed << " trial " << trial << " way " << way << " facet " << i << " at " << d << " of "
-                                           << asked;
+                    EXPECT_TRUE(by_one[i]) << "seed " << seed << " trial " << trial << " way " << way
+                                           << " facet " << i << " at " << d << " of " << asked;
+                    EXPECT_TRUE(by_two[i]) << "seed " << seed << " trial " << trial << " way " << way
+                                           << " facet " << i << " at " << d << " of " << asked;
                     // It is kept down to a reach that is just enough.
                     if (met % 8 == 0) {
                         NearWay just = asking;
@@ -116,7 +128,8 @@ TEST(NearFacets, KeepsAllThatAWayMeetsAndLittleElse) {
                         near.near(just, true, twice_just);
                         bool found = false;
                         for_each_kept(twice_just, [&](std::size_t k) { found = found || of[k] == i; });
-                        EXPECT_TRUE(found) << "seed " << seed << " trial " << trial << " way " << way << " facet " << i << " at " << d;
+                        EXPECT_TRUE(found) << "seed " << seed << " trial " << trial << " way " << way
+                                           << " facet " << i << " at " << d;
                     }
                 } else {
                     EXPECT_LE(by_two[i], by_one[i]);
@@ -136,7 +149,8 @@ TEST(NearFacets, KeepsAllThatAWayMeetsAndLittleElse) {
             EXPECT_EQ(added, wanted) << "seed " << seed << " trial " << trial << " way " << way;
         }
     }
-    std::printf("met %zu, kept %zu and %zu closely, of those %zu and %zu far\n", met, kept, kept_closely, far, far_closely);
+    std::printf("met %zu, kept %zu and %zu closely, of those %zu and %zu far\n", met, kept, kept_closely, far,
+                far_closely);
     EXPECT_GT(met, 10000u);
     EXPECT_LT(far_closely, kept_closely / 5);
 }
@@ -155,7 +169,8 @@ TEST(NearFacets, EightsKeepAllThatIsAroundAWay) {
         for (double& v : b) v += between(-length, length);
         if (trial % 5 == 0) b[2] = a[2];
         if (trial % 7 == 0) b[0] = a[0], b[1] = a[1];
-        const double lowest = std::min(a[2], b[2]), top = lowest + between(-radius, 2 * radius), margin = 1e-5 * (620 + radius);
+        const double lowest = std::min(a[2], b[2]), top = lowest + between(-radius, 2 * radius),
+                     margin = 1e-5 * (620 + radius);
         const NearWay way{a, b, radius, ball ? lowest - radius : lowest, 0};
         const WayAround around(way, ball, lowest, top, radius + margin);
         std::array<EightFacets, ManyEights::kMost> eights;
@@ -164,14 +179,20 @@ TEST(NearFacets, EightsKeepAllThatIsAroundAWay) {
         const std::size_t count = 1 + static_cast<std::size_t>(trial) % ManyEights::kMost;
         for (std::size_t i = 0; i < 8 * count; ++i) {
             const double size = std::pow(10, between(-2, 0.7)), along = unit(random);
-            for (P& p : facets[i]) p = {a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1]), a[2] + along * (b[2] - a[2])};
-            const P off{between(-1.5, 1.5) * radius, between(-1.5, 1.5) * radius, between(-1.5, 1.5) * radius};
             for (P& p : facets[i])
-                for (std::size_t k = 0; k < 3; ++k) p[k] = static_cast<float>(p[k] + off[k] + between(-size, size));
+                p = {a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1]),
+                     a[2] + along * (b[2] - a[2])};
+            const P off{between(-1.5, 1.5) * radius, between(-1.5, 1.5) * radius,
+                        between(-1.5, 1.5) * radius};
+            for (P& p : facets[i])
+                for (std::size_t k = 0; k < 3; ++k)
+                    p[k] = static_cast<float>(p[k] + off[k] + between(-size, size));
             if (i % 16 == 0) facets[i][2] = facets[i][1];
             EightFacets& e = eights[i / 8];
             const std::size_t k = i % 8;
-            auto single = [&](std::size_t p, std::size_t axis) { return static_cast<float>(facets[i][p][axis]); };
+            auto single = [&](std::size_t p, std::size_t axis) {
+                return static_cast<float>(facets[i][p][axis]);
+            };
             e.x0[k] = single(0, 0), e.y0[k] = single(0, 1), e.z0[k] = single(0, 2);
             e.x1[k] = single(1, 0), e.y1[k] = single(1, 1), e.z1[k] = single(1, 2);
             e.x2[k] = single(2, 0), e.y2[k] = single(2, 1), e.z2[k] = single(2, 2);
@@ -179,7 +200,9 @@ TEST(NearFacets, EightsKeepAllThatIsAroundAWay) {
         // Facets that there are none of.
         constexpr float none = std::numeric_limits<float>::quiet_NaN();
         EightFacets& last = eights[count - 1];
-        for (auto* row : {&last.x0, &last.y0, &last.z0, &last.x1, &last.y1, &last.z1, &last.x2, &last.y2, &last.z2}) (*row)[7] = none;
+        for (auto* row :
+             {&last.x0, &last.y0, &last.z0, &last.x1, &last.y1, &last.z1, &last.x2, &last.y2, &last.z2})
+            (*row)[7] = none;
         for (std::size_t i = 0; i < count; ++i) many.eights[many.count++] = &eights[i];
         std::array<unsigned, ManyEights::kMost> keep;
         facets_around(many, around, keep);
@@ -197,7 +220,8 @@ TEST(NearFacets, EightsKeepAllThatIsAroundAWay) {
                 const double d = sampled_distance(facets[8 * i + k], a, b, ball, top, 12);
                 met += d < radius;
                 if (d < radius) {
-                    EXPECT_TRUE(is_kept) << "seed " << seed << " trial " << trial << " facet " << 8 * i + k << " at " << d << " of " << radius;
+                    EXPECT_TRUE(is_kept) << "seed " << seed << " trial " << trial << " facet " << 8 * i + k
+                                         << " at " << d << " of " << radius;
                 }
             }
         }
@@ -220,26 +244,31 @@ TEST(NearFacets, LevelWaysKeepAllThatIsNearAndLittleElse) {
         constexpr int kSteps = 60;
         std::vector<P> way;
         P centre{between(-600, 600), between(-600, 600), between(-20, 20)};
-        const double radius = std::pow(10, between(-1, 3)), start = between(-4, 4), turn = std::min(6.3, between(0, 8) / radius);
+        const double radius = std::pow(10, between(-1, 3)), start = between(-4, 4),
+                     turn = std::min(6.3, between(0, 8) / radius);
         if (arc) {
             for (int i = 0; i <= kSteps; ++i) {
                 const double at = start + turn * i / kSteps;
-                way.push_back({centre[0] + radius * std::cos(at), centre[1] + radius * std::sin(at), centre[2]});
+                way.push_back(
+                    {centre[0] + radius * std::cos(at), centre[1] + radius * std::sin(at), centre[2]});
             }
         } else {
             const double length = trial % 6 == 1 ? 0.0 : between(0, 8);
             for (int i = 0; i <= kSteps; ++i)
-                way.push_back({centre[0] + length * std::cos(start) * i / kSteps, centre[1] + length * std::sin(start) * i / kSteps, centre[2]});
+                way.push_back({centre[0] + length * std::cos(start) * i / kSteps,
+                               centre[1] + length * std::sin(start) * i / kSteps, centre[2]});
         }
         const double top = centre[2] + between(-reach / 2, 2 * reach);
         auto within = [&](double limit) {
             if (!arc) return LevelWay(way.front(), way.back(), top, limit);
             const double middle = start + turn * unit(random), tx = -std::sin(middle), ty = std::cos(middle);
-            const P about{centre[0] + radius * std::cos(middle), centre[1] + radius * std::sin(middle), centre[2]};
+            const P about{centre[0] + radius * std::cos(middle), centre[1] + radius * std::sin(middle),
+                          centre[2]};
             double before = 0, after = 0, bow = 0;
             for (const P& p : way) {
                 const double x = p[0] - about[0], y = p[1] - about[1], along = x * tx + y * ty;
-                before = std::max(before, -along), after = std::max(after, along), bow = std::max(bow, y * tx - x * ty);
+                before = std::max(before, -along), after = std::max(after, along),
+                bow = std::max(bow, y * tx - x * ty);
             }
             return LevelWay(centre[0], centre[1], radius, about, before, after, bow, top, limit);
         };
@@ -249,13 +278,18 @@ TEST(NearFacets, LevelWaysKeepAllThatIsNearAndLittleElse) {
             const double size = std::pow(10, between(-2, trial % 4 < 2 ? 0 : 1));
             const P& from = way[static_cast<std::size_t>(unit(random) * kSteps)];
             // About as far away as the reach is, on any side but above.
-            const double side = between(0, 6.3), steep = between(-1.6, 0.3), distance = reach * between(0.85, 1.15);
-            const P middle{from[0] + distance * std::cos(steep) * std::cos(side), from[1] + distance * std::cos(steep) * std::sin(side),
+            const double side = between(0, 6.3), steep = between(-1.6, 0.3),
+                         distance = reach * between(0.85, 1.15);
+            const P middle{from[0] + distance * std::cos(steep) * std::cos(side),
+                           from[1] + distance * std::cos(steep) * std::sin(side),
                            from[2] + distance * std::sin(steep)};
             for (P& p : facets[i])
-                for (std::size_t k = 0; k < 3; ++k) p[k] = static_cast<float>(middle[k] + between(-size, size));
+                for (std::size_t k = 0; k < 3; ++k)
+                    p[k] = static_cast<float>(middle[k] + between(-size, size));
             if (i == 5) facets[i][2] = facets[i][1];
-            auto single = [&](std::size_t p, std::size_t axis) { return static_cast<float>(facets[i][p][axis]); };
+            auto single = [&](std::size_t p, std::size_t axis) {
+                return static_cast<float>(facets[i][p][axis]);
+            };
             e.x0[i] = single(0, 0), e.y0[i] = single(0, 1), e.z0[i] = single(0, 2);
             e.x1[i] = single(1, 0), e.y1[i] = single(1, 1), e.z1[i] = single(1, 2);
             e.x2[i] = single(2, 0), e.y2[i] = single(2, 1), e.z2[i] = single(2, 2);
@@ -274,12 +308,14 @@ TEST(NearFacets, LevelWaysKeepAllThatIsNearAndLittleElse) {
             kept += is_kept, ++all;
             if (d < reach) {
                 ++met;
-                EXPECT_TRUE(is_kept) << "seed " << seed << " trial " << trial << " facet " << i << " at " << d << " of " << reach;
+                EXPECT_TRUE(is_kept) << "seed " << seed << " trial " << trial << " facet " << i << " at " << d
+                                     << " of " << reach;
             } else far += is_kept && d > 1.02 * reach;
             if (d > 1e100) continue;
             std::array<unsigned, ManyEights::kMost> just;
             facets_along(many, within(d + 1e-9), just);
-            EXPECT_TRUE((just[0] >> i & 1) != 0) << "seed " << seed << " trial " << trial << " facet " << i << " at " << d;
+            EXPECT_TRUE((just[0] >> i & 1) != 0)
+                << "seed " << seed << " trial " << trial << " facet " << i << " at " << d;
         }
     }
     std::printf("met %zu, kept %zu of %zu, of those %zu far\n", met, kept, all, far);

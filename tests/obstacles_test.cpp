@@ -13,14 +13,18 @@ using namespace slabwright;
 
 namespace {
 
-constexpr double kRadius = 3, kTolerance = 0.05, kReach = kRadius + kTolerance, kClear = kRadius - kTolerance / 2;
+constexpr double kRadius = 3, kTolerance = 0.05, kReach = kRadius + kTolerance,
+                 kClear = kRadius - kTolerance / 2;
 
 class Random {
 public:
     explicit Random(std::uint64_t seed) : random_(seed) {}
-    double uniform(double a, double b) { return a + (b - a) * static_cast<double>(random_() % 1'000'003) / 1'000'002; }
+    double uniform(double a, double b) {
+        return a + (b - a) * static_cast<double>(random_() % 1'000'003) / 1'000'002;
+    }
     Point3 direction(double lowest) {
-        const double z = uniform(lowest, 1), phi = uniform(0, 2 * std::numbers::pi), across = std::sqrt(1 - z * z);
+        const double z = uniform(lowest, 1), phi = uniform(0, 2 * std::numbers::pi),
+                     across = std::sqrt(1 - z * z);
         return {across * std::cos(phi), across * std::sin(phi), z};
     }
     Point3 point(double size) { return {uniform(-size, size), uniform(-size, size), uniform(-size, size)}; }
@@ -31,8 +35,8 @@ private:
 
 }  // namespace
 
-// A direction in the cap: from whatever point near p a ball is touched by that lies so, it holds the obstacle, or what stands above it. And no
-// cap is smaller than it must be, where it is about p alone.
+// A direction in the cap: from whatever point near p a ball is touched by that lies so, it holds the
+// obstacle, or what stands above it. And no cap is smaller than it must be, where it is about p alone.
 TEST(Obstacles, OfABallAgainstItsPlaces) {
     Random random(test::seed());
     const Obstacles obstacles(Obstacles::Tool::ball, kRadius, kTolerance);
@@ -73,7 +77,9 @@ TEST(Obstacles, TheStrongestOfThoseUsedLast) {
             double most = CapCover::kInside;
             std::size_t best = Obstacles::kMost;
             for (std::size_t k = 0; k < obstacles.size(); ++k)
-                if (const double margin = obstacles.cap(obstacles.point(k), p, u, around).margin(u); margin > most) most = margin, best = k;
+                if (const double margin = obstacles.cap(obstacles.point(k), p, u, around).margin(u);
+                    margin > most)
+                    most = margin, best = k;
             const std::size_t strongest = obstacles.strongest(p, u, around);
             ASSERT_EQ(strongest == Obstacles::kMost, best == Obstacles::kMost);
             if (best < Obstacles::kMost) {
@@ -84,7 +90,8 @@ TEST(Obstacles, TheStrongestOfThoseUsedLast) {
                 ++found;
             }
             if (i % 10 == 0) {
-                const Point3 last = obstacles.size() == Obstacles::kMost ? obstacles.point(Obstacles::kMost - 2) : Point3{};
+                const Point3 last =
+                    obstacles.size() == Obstacles::kMost ? obstacles.point(Obstacles::kMost - 2) : Point3{};
                 const Point3 next = random.point(3);
                 obstacles.remember(next);
                 EXPECT_EQ(obstacles.point(0), next);

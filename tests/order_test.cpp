@@ -29,16 +29,19 @@ TEST(NearestRuns, AgreesWithBruteForce) {
         const std::uint32_t runs = 400;
         std::vector<Beginning> beginnings;
         for (std::uint32_t k = 0; k < runs; ++k)
-            for (std::uint32_t p = 0; p < 1 + k % 3; ++p) beginnings.push_back({{u(random), u(random)}, {u(random), u(random)}, k, p});
+            for (std::uint32_t p = 0; p < 1 + k % 3; ++p)
+                beginnings.push_back({{u(random), u(random)}, {u(random), u(random)}, k, p});
         std::vector<char> done(runs, 0);
         NearestRuns left(beginnings, runs);
         for (std::uint32_t k = 0; k < runs; ++k) {
             ASSERT_FALSE(left.empty());
             const Point2 at{u(random), u(random)};
             const Beginning found = left.nearest(at);
-            const auto best = std::min_element(beginnings.begin(), beginnings.end(), [&](const Beginning& a, const Beginning& b) {
-                return std::tuple(done[a.run], way(a.at, at), a.run, a.place) < std::tuple(done[b.run], way(b.at, at), b.run, b.place);
-            });
+            const auto best = std::min_element(
+                beginnings.begin(), beginnings.end(), [&](const Beginning& a, const Beginning& b) {
+                    return std::tuple(done[a.run], way(a.at, at), a.run, a.place) <
+                           std::tuple(done[b.run], way(b.at, at), b.run, b.place);
+                });
             ASSERT_EQ(found.run, best->run);
             ASSERT_EQ(found.place, best->place);
             EXPECT_EQ(found.at, best->at);
@@ -84,6 +87,7 @@ TEST(NearestRuns, TakesOneHundredThousand) {
         ASSERT_FALSE(seen[order[k].run]++);
         if (k > 0) total += std::sqrt(static_cast<double>(way(order[k - 1].end, order[k].at)));
     }
-    // A tour through n even random places in a square of side L is about 0.71 √n L; the nearest neighbour's is a quarter longer.
+    // A tour through n even random places in a square of side L is about 0.71 √n L; the nearest neighbour's
+    // is a quarter longer.
     EXPECT_LT(total, 1.3 * 0.7124 * std::sqrt(runs) * 11'600'000);
 }

@@ -1,5 +1,5 @@
-// kernels/parallel: the same results as serial code on any number of threads, and the promises on errors, cancel,
-// memory and progress.
+// kernels/parallel: the same results as serial code on any number of threads, and the promises on errors,
+// cancel, memory and progress.
 #include "kernels/parallel/parallel.h"
 #include "kernels/parallel/progress_part.h"
 
@@ -37,7 +37,8 @@ TEST(Parallel, ForVisitsEveryIndexOnceInChunksOfTheGrain) {
                     EXPECT_EQ(end, std::min(n, begin + step));
                     for (std::size_t i = begin; i < end; ++i) ++seen[i];
                 });
-                for (std::size_t i = 0; i < n; ++i) ASSERT_EQ(seen[i].load(), 1) << i << " of " << n << " by " << grain;
+                for (std::size_t i = 0; i < n; ++i)
+                    ASSERT_EQ(seen[i].load(), 1) << i << " of " << n << " by " << grain;
             }
         }
     }
@@ -53,7 +54,8 @@ TEST(Parallel, EachVisitsEveryIndexOnce) {
 TEST(Parallel, NestedLoopsFinish) {
     Context context({.threads = 2});
     std::atomic<int> total{0};
-    parallel_each(context, 20, [&](std::size_t) { parallel_each(context, 20, [&](std::size_t) { ++total; }); });
+    parallel_each(context, 20,
+                  [&](std::size_t) { parallel_each(context, 20, [&](std::size_t) { ++total; }); });
     EXPECT_EQ(total.load(), 400);
 }
 
@@ -72,7 +74,8 @@ TEST(Parallel, ReduceJoinsFromLeftToRight) {
         for (int i = 0; i < 1000; ++i) expected += std::to_string(i) + ",";
         EXPECT_EQ(text, expected);
         EXPECT_EQ(parallel_reduce(
-                      context, 0, 7, 42, [](std::size_t, std::size_t) { return 1; }, [](int a, int b) { return a + b; }),
+                      context, 0, 7, 42, [](std::size_t, std::size_t) { return 1; },
+                      [](int a, int b) { return a + b; }),
                   42);
     }
 }
@@ -87,7 +90,8 @@ TEST(Parallel, SumsOfDoublesHaveTheSameBitsOnAnyNumberOfThreads) {
         sums.push_back(parallel_reduce(
             context, values.size(), 1000, 0.0,
             [&](std::size_t begin, std::size_t end) {
-                return std::accumulate(values.begin() + static_cast<std::ptrdiff_t>(begin), values.begin() + static_cast<std::ptrdiff_t>(end), 0.0);
+                return std::accumulate(values.begin() + static_cast<std::ptrdiff_t>(begin),
+                                       values.begin() + static_cast<std::ptrdiff_t>(end), 0.0);
             },
             [](double a, double b) { return a + b; }));
     }
@@ -104,22 +108,26 @@ TEST(Parallel, SortEqualsStdSort) {
     };
     auto less = [](const Item& a, const Item& b) { return a.key != b.key ? a.key < b.key : a.id < b.id; };
     const std::size_t serial = std::size_t{1} << 14;
-    for (const std::size_t n : {std::size_t{0}, std::size_t{1}, std::size_t{2}, serial - 1, serial, serial + 1, 2 * serial + 1, std::size_t{100000},
-                                std::size_t{1200001}}) {
+    for (const std::size_t n : {std::size_t{0}, std::size_t{1}, std::size_t{2}, serial - 1, serial,
+                                serial + 1, 2 * serial + 1, std::size_t{100000}, std::size_t{1200001}}) {
         for (const std::uint32_t keys : {1u, 5u, 0xFFFFFFFFu}) {
             for (const int order : {0, 1, 2}) {  // as drawn, ascending, descending
                 std::vector<Item> items(n);
                 for (std::size_t i = 0; i < n; ++i)
-                    items[i] = {static_cast<std::uint32_t>(random() % (std::uint64_t{keys} + 1)), static_cast<std::uint32_t>(i)};
+                    items[i] = {static_cast<std::uint32_t>(random() % (std::uint64_t{keys} + 1)),
+                                static_cast<std::uint32_t>(i)};
                 if (order == 1) std::sort(items.begin(), items.end(), less);
-                if (order == 2) std::sort(items.begin(), items.end(), [&](const Item& a, const Item& b) { return less(b, a); });
+                if (order == 2)
+                    std::sort(items.begin(), items.end(),
+                              [&](const Item& a, const Item& b) { return less(b, a); });
                 std::vector<Item> expected = items;
                 std::sort(expected.begin(), expected.end(), less);
                 for (const int threads : kThreads) {
                     std::vector<Item> sorted = items;
                     Context context({.threads = threads});
                     parallel_sort(context, sorted.begin(), sorted.end(), less);
-                    ASSERT_TRUE(sorted == expected) << n << " items, " << keys << " keys, order " << order << ", threads " << threads;
+                    ASSERT_TRUE(sorted == expected)
+                        << n << " items, " << keys << " keys, order " << order << ", threads " << threads;
                 }
                 if (n > 1000000) break;
             }
@@ -180,7 +188,8 @@ TEST(Parallel, CancelFromAnotherThreadStopsSoon) {
         EXPECT_TRUE(cancelled);
         EXPECT_LT(done.load(), 100000u);
         EXPECT_TRUE(context.cancelled());
-        EXPECT_THROW(parallel_each(context, 1, [](std::size_t) {}), Error) << "a cancelled context stays cancelled";
+        EXPECT_THROW(parallel_each(context, 1, [](std::size_t) {}), Error)
+            << "a cancelled context stays cancelled";
     }
 }
 
@@ -241,7 +250,8 @@ TEST(Parallel, ProgressNeverFallsAndStaysInItsPhase) {
 
 TEST(Parallel, PartsOfAPhaseTellAllTheirStepsOnce) {
     std::vector<double> fractions;
-    Context context({.threads = 2, .progress = [&](const Progress& progress) { fractions.push_back(progress.fraction); }});
+    Context context({.threads = 2,
+                     .progress = [&](const Progress& progress) { fractions.push_back(progress.fraction); }});
     context.begin_phase("work", 0.0, 1.0, 300);
     {
         ProgressPart whole(context, 100), first(whole, 0, 0.4), second(whole, 0.4, 1);

@@ -1,4 +1,5 @@
-// plan.json and sequence.json keep their contracts (the schemas beside the writers), and OUT is all or nothing.
+// plan.json and sequence.json keep their contracts (the schemas beside the writers), and OUT is all or
+// nothing.
 #include "io/plan_json.h"
 
 #include <gtest/gtest.h>
@@ -45,8 +46,9 @@ namespace {
 std::string schema_complaint(const std::string& text, const char* schema) {
     TemporaryFolder folder;
     spit(folder.path / "it.json", text);
-    const std::string command = "/usr/bin/python3 -m jsonschema -i '" + (folder.path / "it.json").string() + "' '" SLABWRIGHT_SOURCE_DIR "/io/" +
-                                schema + "' >'" + (folder.path / "log").string() + "' 2>&1 </dev/null";
+    const std::string command = "/usr/bin/python3 -m jsonschema -i '" + (folder.path / "it.json").string() +
+                                "' '" SLABWRIGHT_SOURCE_DIR "/io/" + schema + "' >'" +
+                                (folder.path / "log").string() + "' 2>&1 </dev/null";
     const int status = std::system(command.c_str());
     if (status == 0) return "";
     const std::string log = slurp(folder.path / "log");
@@ -91,7 +93,9 @@ Plan hand_made() {
         layer.press_force_n = 750;
         for (int k = 0; k < 3; ++k) {
             Operation operation;
-            operation.kind = k == 0 ? OperationKind::face : k == 1 ? OperationKind::rough : OperationKind::semi_rough;
+            operation.kind = k == 0   ? OperationKind::face
+                             : k == 1 ? OperationKind::rough
+                                      : OperationKind::semi_rough;
             operation.purpose = "levels";
             operation.tool = k == 2 ? 3 : k + 1;
             operation.stepdown = 2.54;
@@ -147,7 +151,12 @@ TEST(JsonText, NumbersHaveNoExponentAndReadBack) {
     EXPECT_THROW(text.exact(std::numeric_limits<double>::quiet_NaN()), Error);
     EXPECT_THROW(text.rounded(std::numeric_limits<double>::infinity(), 3), Error);
     JsonText zeros;
-    zeros.begin_array(JsonText::Shape::line).exact(-0.0).rounded(-1e-9, 3).rounded(100, 0).rounded(0.125, 9).end();
+    zeros.begin_array(JsonText::Shape::line)
+        .exact(-0.0)
+        .rounded(-1e-9, 3)
+        .rounded(100, 0)
+        .rounded(0.125, 9)
+        .end();
     EXPECT_EQ(zeros.take(), "[0, 0, 100, 0.125]\n");
 }
 
@@ -280,7 +289,8 @@ TEST(Locale, CommasChangeNothing) {
     const support::CommaLocale locale;
     const Plan plan = hand_made();
     const auto everything = [&] {
-        return plan_json(plan) + sequence_json(plan) + tool_table(plan.job) + program_text(plan, plan.layers[1], plan.layers[1].operations[1]) +
+        return plan_json(plan) + sequence_json(plan) + tool_table(plan.job) +
+               program_text(plan, plan.layers[1], plan.layers[1].operations[1]) +
                job_toml(parse_job(job_toml(Job{}), "defaults"));
     };
     const std::string expected = everything();
@@ -303,7 +313,8 @@ TEST(Write, HoldsTheContractAndReplacesOnlyItsOwn) {
     EXPECT_EQ(first.at("plan.json"), plan_json(plan));
     EXPECT_EQ(first.at("tool.tbl"), tool_table(plan.job));
     EXPECT_EQ(first.at("sequence.json"), sequence_json(plan));
-    EXPECT_EQ(first.at("nc/L001_02_rough_T2.ngc"), program_text(plan, plan.layers[0], plan.layers[0].operations[1]));
+    EXPECT_EQ(first.at("nc/L001_02_rough_T2.ngc"),
+              program_text(plan, plan.layers[0], plan.layers[0].operations[1]));
 
     // A plan of ours is replaced whole: the second has one layer less.
     Plan shorter = plan;
@@ -312,7 +323,8 @@ TEST(Write, HoldsTheContractAndReplacesOnlyItsOwn) {
     Context single({.threads = 1, .memory_bytes = 0, .progress = {}});
     write(single, shorter, out.string() + "/");
     EXPECT_EQ(tree(out).size(), 4u + 3u);
-    EXPECT_EQ(std::distance(fs::directory_iterator(out.parent_path()), fs::directory_iterator()), 1) << "nothing stays beside it";
+    EXPECT_EQ(std::distance(fs::directory_iterator(out.parent_path()), fs::directory_iterator()), 1)
+        << "nothing stays beside it";
 
     const auto refused = [&](const fs::path& target) {
         const auto before = tree(folder.path);
@@ -358,7 +370,8 @@ TEST(Write, CancelledAtAnyMomentLeavesTheOldPlan) {
     write(first, plan, out.string());
     const auto before = tree(folder.path);
     plan.input.file = "other.stl";
-    // The sink is called at the phase's start and after every program, so each of these stops the work somewhere else.
+    // The sink is called at the phase's start and after every program, so each of these stops the work
+    // somewhere else.
     for (int stop_at = 1; stop_at <= 6; ++stop_at) {
         int calls = 0;
         Context* context = nullptr;

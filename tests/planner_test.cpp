@@ -1,5 +1,5 @@
-// Whole plans of the project's own models: what fits and what does not, and that no program touches the part, judged by
-// the exact check of engine/simulate from the emitted text.
+// Whole plans of the project's own models: what fits and what does not, and that no program touches the part,
+// judged by the exact check of engine/simulate from the emitted text.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,8 @@ namespace {
 
 Mesh box(Context& context, double x, double y, double z) {
     Mesh mesh = test::height_field(context, 1, 1.0, [](double, double) { return 1.0; });
-    for (Vec3f& v : mesh.vertices) v = {static_cast<float>(v.x * x), static_cast<float>(v.y * y), static_cast<float>(v.z * z)};
+    for (Vec3f& v : mesh.vertices)
+        v = {static_cast<float>(v.x * x), static_cast<float>(v.y * y), static_cast<float>(v.z * z)};
     return mesh;
 }
 
@@ -43,19 +44,28 @@ std::string refusal(const Mesh& mesh, const Job& job, const char* code) {
 TEST(Planner, SaysByHowMuchAPartIsTooLarge) {
     Context context;
     const Job job;
-    EXPECT_NE(refusal(box(context, 1172.5, 100, 20), job, "fit.slab").find("12.5 mm more than the slab's 1160.0 mm"), std::string::npos);
+    EXPECT_NE(refusal(box(context, 1172.5, 100, 20), job, "fit.slab")
+                  .find("12.5 mm more than the slab's 1160.0 mm"),
+              std::string::npos);
     EXPECT_NE(refusal(box(context, 100, 1161, 20), job, "fit.slab").find("1.0 mm more"), std::string::npos);
-    EXPECT_NE(refusal(box(context, 100, 100, 1230), job, "fit.chamber").find("30.0 mm more than the build chamber's 1200.0 mm"), std::string::npos);
+    EXPECT_NE(refusal(box(context, 100, 100, 1230), job, "fit.chamber")
+                  .find("30.0 mm more than the build chamber's 1200.0 mm"),
+              std::string::npos);
     Job short_travel;
     short_travel.machine.travel_x = 400;
-    EXPECT_NE(refusal(box(context, 401, 100, 20), short_travel, "fit.travel").find("1.0 mm more than the machine's travel of 400.0 mm"),
+    EXPECT_NE(refusal(box(context, 401, 100, 20), short_travel, "fit.travel")
+                  .find("1.0 mm more than the machine's travel of 400.0 mm"),
               std::string::npos);
     Job heavy;
     heavy.machine.build_mass_kg = 2;
-    EXPECT_NE(refusal(box(context, 200, 200, 100), heavy, "fit.mass").find("kg more than the build platform carries"), std::string::npos);
+    EXPECT_NE(refusal(box(context, 200, 200, 100), heavy, "fit.mass")
+                  .find("kg more than the build platform carries"),
+              std::string::npos);
     Job low;
     low.machine.travel_z = 15;
-    EXPECT_NE(refusal(box(context, 100, 100, 30), low, "fit.travel").find("leaves the machine's travel in z by"), std::string::npos);
+    EXPECT_NE(
+        refusal(box(context, 100, 100, 30), low, "fit.travel").find("leaves the machine's travel in z by"),
+        std::string::npos);
 }
 
 TEST(Planner, APartThatFillsTheSlabStaysWithinTheTravel) {
@@ -70,7 +80,8 @@ TEST(Planner, APartThatFillsTheSlabStaysWithinTheTravel) {
     ASSERT_NEAR(size.max.x - size.min.x, 1160, 0.01);
     const Plan plan = make_plan(context, mesh, {}, Job{});
     EXPECT_NEAR(plan.stock_max[0] - plan.stock_min[0], 1160, 0.01);
-    const double cx = 0.5 * (plan.stock_min[0] + plan.stock_max[0]), cy = 0.5 * (plan.stock_min[1] + plan.stock_max[1]);
+    const double cx = 0.5 * (plan.stock_min[0] + plan.stock_max[0]),
+                 cy = 0.5 * (plan.stock_min[1] + plan.stock_max[1]);
     std::size_t moves = 0;
     for (const Layer& layer : plan.layers)
         for (const Operation& op : layer.operations)
@@ -98,11 +109,14 @@ TEST(Planner, RapidsTakeNoStockAndMovesStayAboveTheirFloor) {
             ASSERT_GE(op.moves.size(), 3U);
             EXPECT_EQ(to_mm(op.moves.front().z), to_mm(to_units(op.clearance_z)));
             EXPECT_EQ(op.moves.back().z, op.moves.front().z);
-            const Tool& tool = *std::find_if(plan.job.tools.begin(), plan.job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
-            const CutterEnd end{tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0};
+            const Tool& tool = *std::find_if(plan.job.tools.begin(), plan.job.tools.end(),
+                                             [&](const Tool& t) { return t.number == op.tool; });
+            const CutterEnd end{tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat,
+                                tool.diameter / 2, 0};
             for (std::size_t k = 1; k < op.moves.size(); ++k) {
                 const Move &a = op.moves[k - 1], &b = op.moves[k];
-                const CutEffect effect = stock.cut(end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)}, {to_mm(b.x), to_mm(b.y), to_mm(b.z)});
+                const CutEffect effect = stock.cut(end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)},
+                                                   {to_mm(b.x), to_mm(b.y), to_mm(b.z)});
                 if (b.feed == 0) {
                     EXPECT_LE(effect.deepest, 1e-4) << op.purpose << " move " << k;
                     low += to_mm(b.z) < layer.z_top && (a.x != b.x || a.y != b.y);
@@ -114,8 +128,8 @@ TEST(Planner, RapidsTakeNoStockAndMovesStayAboveTheirFloor) {
     EXPECT_GT(low, 10U) << "no rapid makes use of what has been cleared";
 }
 
-// Straight down no tool that does not plunge meets more than a scrape with its middle. The stock is exact at its points; both ways
-// of roughing.
+// Straight down no tool that does not plunge meets more than a scrape with its middle. The stock is exact at
+// its points; both ways of roughing.
 TEST(Planner, OnlyToolsThatPlungeGoStraightDownIntoStock) {
     for (const RoughPattern pattern : {RoughPattern::contour, RoughPattern::zigzag}) {
         Context context;
@@ -131,16 +145,21 @@ TEST(Planner, OnlyToolsThatPlungeGoStraightDownIntoStock) {
         for (const Layer& layer : plan.layers) {
             stock.add_slab(layer.z_bottom, layer.slab_thickness);
             for (const Operation& op : layer.operations) {
-                const Tool& tool = *std::find_if(plan.job.tools.begin(), plan.job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
-                const CutterEnd end{tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0};
+                const Tool& tool = *std::find_if(plan.job.tools.begin(), plan.job.tools.end(),
+                                                 [&](const Tool& t) { return t.number == op.tool; });
+                const CutterEnd end{
+                    tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat,
+                    tool.diameter / 2, 0};
                 const CutterEnd middle{CutterEnd::Form::flat, PathBuilder::kMiddle * tool.diameter / 2, 0};
                 for (std::size_t k = 1; k < op.moves.size(); ++k) {
                     const Move &a = op.moves[k - 1], &b = op.moves[k];
-                    const std::array<double, 3> from{to_mm(a.x), to_mm(a.y), to_mm(a.z)}, to{to_mm(b.x), to_mm(b.y), to_mm(b.z)};
+                    const std::array<double, 3> from{to_mm(a.x), to_mm(a.y), to_mm(a.z)},
+                        to{to_mm(b.x), to_mm(b.y), to_mm(b.z)};
                     const bool vertical = a.x == b.x && a.y == b.y && b.z < a.z;
                     if (vertical && !tool.plunges) {
                         ++down;
-                        EXPECT_LE(stock.cut(middle, from, to).deepest, PathBuilder::kScrape + 1e-3) << op.purpose << " move " << k;
+                        EXPECT_LE(stock.cut(middle, from, to).deepest, PathBuilder::kScrape + 1e-3)
+                            << op.purpose << " move " << k;
                     }
                     sloping += op.kind == OperationKind::rough && !vertical && b.feed > 0 && b.z < a.z;
                     if (b.is_arc()) {
@@ -157,8 +176,9 @@ TEST(Planner, OnlyToolsThatPlungeGoStraightDownIntoStock) {
     }
 }
 
-// What links cost: the cuts of one operation lie near each other, and the cutter stays down or lifts just over what stands.
-// Retracting above the layer after every run, raster and level contours of this part have 57 and 5.5 m of rapids.
+// What links cost: the cuts of one operation lie near each other, and the cutter stays down or lifts just
+// over what stands. Retracting above the layer after every run, raster and level contours of this part have
+// 57 and 5.5 m of rapids.
 TEST(Planner, RapidsAreAFractionOfTheCuts) {
     Context context;
     const Mesh mesh = weld(context, pump_cover());
@@ -167,7 +187,9 @@ TEST(Planner, RapidsAreAFractionOfTheCuts) {
     for (const Layer& layer : plan.layers)
         for (const Operation& op : layer.operations) {
             cutting += op.cutting_mm, rapid += op.rapid_mm;
-            const double most = op.purpose == "projected raster" ? 0.1 : op.purpose == "level contours" ? 0.25 : 1e9;
+            const double most = op.purpose == "projected raster" ? 0.1
+                                : op.purpose == "level contours" ? 0.25
+                                                                 : 1e9;
             EXPECT_LT(op.rapid_mm, most * op.cutting_mm) << op.purpose << " of layer " << layer.index;
         }
     EXPECT_LT(rapid, 0.2 * cutting);
@@ -177,8 +199,9 @@ TEST(Planner, RapidsAreAFractionOfTheCuts) {
 TEST(Planner, TheRasterCutsFloorsWhereNoFlatEndMillStands) {
     for (const double wide : {5.0, 40.0}) {
         Context context;
-        const Mesh mesh =
-            test::height_field(context, 121, 0.5, [&](double x, double y) { return std::abs(x) < wide && std::abs(y) < 20 ? 6.0 : 10.0; });
+        const Mesh mesh = test::height_field(context, 121, 0.5, [&](double x, double y) {
+            return std::abs(x) < wide && std::abs(y) < 20 ? 6.0 : 10.0;
+        });
         double cutting = 0;
         for (const Layer& layer : make_plan(context, mesh, {}, Job{}).layers)
             for (const Operation& op : layer.operations)
@@ -202,7 +225,8 @@ TEST(Planner, NoProgramTouchesTheOwnModels) {
         const VerifyResult result = verify(context, out, stl);
         EXPECT_LE(result.gouge_mm, 0.01);
         EXPECT_GT(result.gouge_mm, 0) << "nothing touches: the check has seen nothing";
-        for (const Diagnostic& d : result.violations)  // what stays on the part is another matter than what touches it
+        for (const Diagnostic& d :
+             result.violations)  // what stays on the part is another matter than what touches it
             EXPECT_TRUE(d.code.starts_with("left.")) << d.code << ' ' << d.message;
     }
 }

@@ -31,7 +31,9 @@ void add(Loops& loops, const std::vector<Point2>& points) {
     loops.close_loop();
 }
 
-std::vector<Point2> rectangle(int x0, int y0, int x1, int y1) { return {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}; }
+std::vector<Point2> rectangle(int x0, int y0, int x1, int y1) {
+    return {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}};
+}
 std::vector<Point2> reversed(std::vector<Point2> points) { return {points.rbegin(), points.rend()}; }
 
 /// One loop by itself.
@@ -52,7 +54,8 @@ double distance_to_boundary(const Loops& loops, Point2 p) {
     double best = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < loops.size(); ++i) {
         const auto loop = loops.loop(i);
-        for (std::size_t k = 0; k < loop.size(); ++k) best = std::min(best, distance_to_segment(p.x, p.y, loop[k], loop[(k + 1) % loop.size()]));
+        for (std::size_t k = 0; k < loop.size(); ++k)
+            best = std::min(best, distance_to_segment(p.x, p.y, loop[k], loop[(k + 1) % loop.size()]));
     }
     return best;
 }
@@ -66,16 +69,21 @@ TEST(Farthest, IsThatOfOnePointAfterAnother) {
         PointRows points;
         for (std::size_t i = 0; i < n; ++i)
             for (std::vector<double>* row : {&points.x, &points.y, &points.z})
-                row->push_back(static_cast<double>(static_cast<int>(random() % static_cast<unsigned>(2 * range + 1)) - range));
+                row->push_back(static_cast<double>(
+                    static_cast<int>(random() % static_cast<unsigned>(2 * range + 1)) - range));
         const std::size_t first = random() % (n - 1), last = first + 1 + random() % (n - 1 - first);
-        if (trial % 5 == 0) points.x[last] = points.x[first], points.y[last] = points.y[first], points.z[last] = points.z[first];
+        if (trial % 5 == 0)
+            points.x[last] = points.x[first], points.y[last] = points.y[first],
+            points.z[last] = points.z[first];
         Farthest expected{-1, first};
         const double ax = points.x[first], ay = points.y[first], az = points.z[first];
-        const double dx = points.x[last] - ax, dy = points.y[last] - ay, dz = points.z[last] - az, l2 = dx * dx + dy * dy + dz * dz;
+        const double dx = points.x[last] - ax, dy = points.y[last] - ay, dz = points.z[last] - az,
+                     l2 = dx * dx + dy * dy + dz * dz;
         for (std::size_t i = first + 1; i < last; ++i) {
             const double wx = points.x[i] - ax, wy = points.y[i] - ay, wz = points.z[i] - az;
             const double t = l2 > 0 ? std::clamp((wx * dx + wy * dy + wz * dz) / l2, 0.0, 1.0) : 0.0;
-            const double ex = wx - t * dx, ey = wy - t * dy, ez = wz - t * dz, d2 = ex * ex + ey * ey + ez * ez;
+            const double ex = wx - t * dx, ey = wy - t * dy, ez = wz - t * dz,
+                         d2 = ex * ex + ey * ey + ez * ez;
             if (d2 > expected.distance2) expected = {d2, i};
         }
         const Farthest found = farthest_between(points, first, last);
@@ -104,7 +112,8 @@ TEST(Polygons, AreaAndWindingOfKnownShapes) {
 }
 
 TEST(Polygons, ExactAtTheEndsOfTheRange) {
-    constexpr std::int32_t low = std::numeric_limits<std::int32_t>::min(), high = std::numeric_limits<std::int32_t>::max();
+    constexpr std::int32_t low = std::numeric_limits<std::int32_t>::min(),
+                           high = std::numeric_limits<std::int32_t>::max();
     Loops loops;
     add(loops, rectangle(low, low, high, high));
     const double side = 4294967295.0 / kUnitsPerMm;
@@ -126,16 +135,19 @@ std::vector<Point2> star(std::mt19937_64& random, double x, double y, double inn
     std::vector<Point2> points;
     for (int k = 0; k < corners; ++k) {
         const double angle = 2 * std::numbers::pi * k / corners, r = radius(random);
-        points.push_back(
-            {static_cast<std::int32_t>(std::lround(x + r * std::cos(angle))), static_cast<std::int32_t>(std::lround(y + r * std::sin(angle)))});
+        points.push_back({static_cast<std::int32_t>(std::lround(x + r * std::cos(angle))),
+                          static_cast<std::int32_t>(std::lround(y + r * std::sin(angle)))});
     }
     return points;
 }
 
-// Inside the spans of a line the winding number is over 0, beside them it is not; many lines at once say the same as each alone.
+// Inside the spans of a line the winding number is over 0, beside them it is not; many lines at once say the
+// same as each alone.
 TEST(Polygons, LineSpansAgreeWithWinding) {
     std::mt19937_64 random(seed_of("LineSpansAgreeWithWinding"));
-    const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+    const auto pick = [&](int low, int high) {
+        return std::uniform_int_distribution<int>(low, high)(random);
+    };
     std::size_t inside = 0, outside = 0;
     for (int trial = 0; trial < 60; ++trial) {
         Loops loops;
@@ -151,12 +163,14 @@ TEST(Polygons, LineSpansAgreeWithWinding) {
         for (std::size_t j = 0; j < lines.size(); ++j) {
             const std::vector<Span> one = line_spans(loops, {&lines[j], 1}).front();
             ASSERT_EQ(all[j].size(), one.size());
-            for (std::size_t k = 0; k < one.size(); ++k) ASSERT_TRUE(all[j][k].low == one[k].low && all[j][k].high == one[k].high);
+            for (std::size_t k = 0; k < one.size(); ++k)
+                ASSERT_TRUE(all[j][k].low == one[k].low && all[j][k].high == one[k].high);
             if (std::floor(lines[j]) != lines[j]) continue;  // points are whole
             for (int x = -42; x <= 42; ++x) {
                 const Point2 p{x, static_cast<std::int32_t>(lines[j])};
                 if (distance_to_boundary(loops, p) < 1e-9) continue;
-                const bool in = std::any_of(all[j].begin(), all[j].end(), [&](const Span& s) { return s.low <= x && x <= s.high; });
+                const bool in = std::any_of(all[j].begin(), all[j].end(),
+                                            [&](const Span& s) { return s.low <= x && x <= s.high; });
                 ASSERT_EQ(in, winding(loops, p) > 0) << "trial " << trial << " at " << x << ' ' << lines[j];
                 ++(in ? inside : outside);
             }
@@ -174,8 +188,10 @@ TEST(Polygons, NestAgreesWithBruteForceOnRandomTrees) {
             int parent;
         };
         std::vector<Made> made;
-        // Stars within discs; children keep within discs that fit their parent's inner disc (corners >= 3: cos 60° = 1/2).
-        std::function<void(double, double, double, int, int)> grow = [&](double x, double y, double r, int parent, int depth) {
+        // Stars within discs; children keep within discs that fit their parent's inner disc (corners >= 3:
+        // cos 60° = 1/2).
+        std::function<void(double, double, double, int, int)> grow = [&](double x, double y, double r,
+                                                                         int parent, int depth) {
             if (r < 40 || depth > 6 || made.size() > 200) return;
             const int self = static_cast<int>(made.size());
             auto points = star(random, x, y, 0.8 * r, r);
@@ -187,12 +203,14 @@ TEST(Polygons, NestAgreesWithBruteForceOnRandomTrees) {
             } else {
                 for (int c = 0; c < children; ++c) {
                     const double angle = 2 * std::numbers::pi * c / children, away = room / 2;
-                    const double most = std::min(room - away, away * std::sin(std::numbers::pi / children)) - 2;
+                    const double most =
+                        std::min(room - away, away * std::sin(std::numbers::pi / children)) - 2;
                     grow(x + away * std::cos(angle), y + away * std::sin(angle), most, self, depth + 1);
                 }
             }
         };
-        for (int root = 0; root < 4; ++root) grow(root * 50000, static_cast<double>(random() % 40000), 20000, -1, 0);
+        for (int root = 0; root < 4; ++root)
+            grow(root * 50000, static_cast<double>(random() % 40000), 20000, -1, 0);
         std::vector<std::size_t> order(made.size());
         for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
         std::shuffle(order.begin(), order.end(), random);
@@ -200,22 +218,26 @@ TEST(Polygons, NestAgreesWithBruteForceOnRandomTrees) {
         std::vector<std::int32_t> place(made.size()), expected(made.size());
         for (std::size_t i = 0; i < order.size(); ++i) {
             auto points = made[order[i]].points;
-            std::rotate(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(random() % points.size()), points.end());
+            std::rotate(points.begin(),
+                        points.begin() + static_cast<std::ptrdiff_t>(random() % points.size()), points.end());
             add(loops, points);
             place[order[i]] = static_cast<std::int32_t>(i);
         }
         for (std::size_t i = 0; i < made.size(); ++i)
-            expected[static_cast<std::size_t>(place[i])] = made[i].parent < 0 ? -1 : place[static_cast<std::size_t>(made[i].parent)];
+            expected[static_cast<std::size_t>(place[i])] =
+                made[i].parent < 0 ? -1 : place[static_cast<std::size_t>(made[i].parent)];
         nest(loops);
         ASSERT_EQ(loops.parents, expected) << "round " << round;
     }
 }
 
-/// The outlines of the filled cells of a grid, solid on the left; where cells touch in corners loops touch in points.
+/// The outlines of the filled cells of a grid, solid on the left; where cells touch in corners loops touch in
+/// points.
 Loops trace(const std::vector<std::vector<int>>& cell, int pitch) {
     const int rows = static_cast<int>(cell.size()), columns = static_cast<int>(cell[0].size());
     auto filled = [&](int i, int j) {
-        return i >= 0 && j >= 0 && i < columns && j < rows && cell[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)] != 0;
+        return i >= 0 && j >= 0 && i < columns && j < rows &&
+               cell[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)] != 0;
     };
     std::multimap<Point2, Point2> edges;  // from, to, in grid corners
     for (int j = 0; j < rows; ++j) {
@@ -239,7 +261,8 @@ Loops trace(const std::vector<std::vector<int>>& cell, int pitch) {
             const auto [first, last] = edges.equal_range(to);
             auto best = first;
             for (auto it = first; it != last; ++it) {
-                const int cross = (to.x - from.x) * (it->second.y - to.y) - (to.y - from.y) * (it->second.x - to.x);
+                const int cross =
+                    (to.x - from.x) * (it->second.y - to.y) - (to.y - from.y) * (it->second.x - to.x);
                 if (cross > 0) best = it;
             }
             from = to;
@@ -251,22 +274,26 @@ Loops trace(const std::vector<std::vector<int>>& cell, int pitch) {
     return loops;
 }
 
-/// The smallest larger loop around a point of loop i that is on no loop: a quarter pitch inside of its first edge.
+/// The smallest larger loop around a point of loop i that is on no loop: a quarter pitch inside of its first
+/// edge.
 std::vector<std::int32_t> brute_parents(const Loops& loops, int pitch) {
     std::vector<std::int32_t> parents(loops.size(), -1);
     for (std::size_t i = 0; i < loops.size(); ++i) {
         const auto loop = loops.loop(i);
         const Point2 a = loop[0], b = loop[1];
-        const int sign = signed_area(loop) > 0 ? 1 : -1;  // the loop's own inside lies left of a counter-clockwise one
+        const int sign =
+            signed_area(loop) > 0 ? 1 : -1;  // the loop's own inside lies left of a counter-clockwise one
         const double length = std::hypot(b.x - a.x, b.y - a.y);
-        const Point2 inside{static_cast<std::int32_t>((a.x + b.x) / 2 - sign * (b.y - a.y) / length * pitch / 4),
-                            static_cast<std::int32_t>((a.y + b.y) / 2 + sign * (b.x - a.x) / length * pitch / 4)};
+        const Point2 inside{
+            static_cast<std::int32_t>((a.x + b.x) / 2 - sign * (b.y - a.y) / length * pitch / 4),
+            static_cast<std::int32_t>((a.y + b.y) / 2 + sign * (b.x - a.x) / length * pitch / 4)};
         EXPECT_NE(winding(alone(loops, i), inside), 0);
         for (std::size_t j = 0; j < loops.size(); ++j) {
             if (j == i || winding(alone(loops, j), inside) == 0) continue;
             const double size = std::abs(signed_area(loops.loop(j)));
             if (size <= std::abs(signed_area(loop))) continue;
-            if (parents[i] < 0 || size < std::abs(signed_area(loops.loop(static_cast<std::size_t>(parents[i])))))
+            if (parents[i] < 0 ||
+                size < std::abs(signed_area(loops.loop(static_cast<std::size_t>(parents[i])))))
                 parents[i] = static_cast<std::int32_t>(j);
         }
     }
@@ -277,7 +304,8 @@ TEST(Polygons, NestAgreesWithBruteForceWhereLoopsTouchInPoints) {
     std::mt19937_64 random(seed_of("nest touching"));
     for (int round = 0; round < 200; ++round) {
         const int size = 3 + static_cast<int>(random() % 22), share = 20 + static_cast<int>(random() % 70);
-        std::vector<std::vector<int>> cell(static_cast<std::size_t>(size), std::vector<int>(static_cast<std::size_t>(size)));
+        std::vector<std::vector<int>> cell(static_cast<std::size_t>(size),
+                                           std::vector<int>(static_cast<std::size_t>(size)));
         for (auto& row : cell)
             for (int& c : row) c = static_cast<int>(random() % 100) < share;
         Loops loops = trace(cell, 8);
@@ -292,7 +320,7 @@ TEST(Polygons, NestWhereLoopsShareEdges) {
     add(loops, rectangle(100, 0, 200, 100));         // beside it, one whole edge in common
     add(loops, reversed(rectangle(0, 0, 50, 100)));  // a hole along the left wall
     add(loops, rectangle(0, 20, 50, 40));            // across the hole, touching both its walls
-    add(loops, {{100, 0}, {200, 50}, {100, 100}});   // a triangle on an edge of its parent, its tip on another
+    add(loops, {{100, 0}, {200, 50}, {100, 100}});  // a triangle on an edge of its parent, its tip on another
     add(loops, rectangle(300, 0, 400, 100));
     add(loops, {{300, 0}, {400, 100}, {300, 100}});  // all its corners are corners of the one before
     nest(loops);
@@ -313,14 +341,16 @@ TEST(Polygons, NestSurvivesCrossingFlatAndEqualLoops) {
             std::vector<Point2> points;
             const int corners = static_cast<int>(random() % 12);
             for (int k = 0; k < corners; ++k)
-                points.push_back({static_cast<std::int32_t>(random() % 40) - 20, static_cast<std::int32_t>(random() % 40) - 20});
+                points.push_back({static_cast<std::int32_t>(random() % 40) - 20,
+                                  static_cast<std::int32_t>(random() % 40) - 20});
             add(loops, points);
             if (i % 7 == 0) add(loops, points);
         }
         nest(loops);
         for (std::size_t i = 0; i < loops.size(); ++i) {
             std::size_t steps = 0;
-            for (std::int32_t p = static_cast<std::int32_t>(i); p >= 0; p = loops.parents[static_cast<std::size_t>(p)])
+            for (std::int32_t p = static_cast<std::int32_t>(i); p >= 0;
+                 p = loops.parents[static_cast<std::size_t>(p)])
                 ASSERT_LE(++steps, loops.size());
         }
     }
@@ -333,12 +363,14 @@ TEST(Polygons, BooleansAgreeWithGridCells) {
         std::vector<std::vector<int>> in_a(size, std::vector<int>(size)), in_b = in_a;
         Loops a, b;
         for (int k = 0; k < 8; ++k) {
-            const int x0 = static_cast<int>(random() % (size - 1)), y0 = static_cast<int>(random() % (size - 1));
+            const int x0 = static_cast<int>(random() % (size - 1)),
+                      y0 = static_cast<int>(random() % (size - 1));
             const int x1 = x0 + 1 + static_cast<int>(random() % static_cast<unsigned>(size - x0 - 1));
             const int y1 = y0 + 1 + static_cast<int>(random() % static_cast<unsigned>(size - y0 - 1));
             add(k % 2 ? a : b, rectangle(x0 * pitch, y0 * pitch, x1 * pitch, y1 * pitch));
             for (int y = y0; y < y1; ++y)
-                for (int x = x0; x < x1; ++x) (k % 2 ? in_a : in_b)[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] = 1;
+                for (int x = x0; x < x1; ++x)
+                    (k % 2 ? in_a : in_b)[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] = 1;
         }
         const Loops results[] = {unite(a, b), intersect(a, b), subtract(a, b), simplify(a)};
         double expected[4] = {};
@@ -346,17 +378,20 @@ TEST(Polygons, BooleansAgreeWithGridCells) {
             for (std::size_t x = 0; x < size; ++x) {
                 const bool p = in_a[y][x] != 0, q = in_b[y][x] != 0;
                 const bool inside[4] = {p || q, p && q, p && !q, p};
-                const Point2 middle{static_cast<std::int32_t>(x * pitch + pitch / 2), static_cast<std::int32_t>(y * pitch + pitch / 2)};
+                const Point2 middle{static_cast<std::int32_t>(x * pitch + pitch / 2),
+                                    static_cast<std::int32_t>(y * pitch + pitch / 2)};
                 for (int r = 0; r < 4; ++r) {
                     expected[r] += inside[r];
-                    ASSERT_EQ(winding(results[r], middle), inside[r] ? 1 : 0) << "round " << round << " operation " << r;
+                    ASSERT_EQ(winding(results[r], middle), inside[r] ? 1 : 0)
+                        << "round " << round << " operation " << r;
                 }
             }
         }
         for (int r = 0; r < 4; ++r) {
             ASSERT_EQ(area(results[r]), expected[r]);
             ASSERT_EQ(results[r].parents.size(), results[r].size());
-            for (std::size_t i = 0; i < results[r].size(); ++i) {  // outer loops and holes alternate from the outside in
+            for (std::size_t i = 0; i < results[r].size();
+                 ++i) {  // outer loops and holes alternate from the outside in
                 const std::int32_t parent = results[r].parents[i];
                 const bool hole = signed_area(results[r].loop(i)) < 0;
                 if (parent < 0) ASSERT_FALSE(hole);
@@ -384,7 +419,8 @@ TEST(Polygons, OffsetOfStraightEdgesIsExact) {
     Loops angle;
     add(angle, {{0, 0}, {100000, 0}, {100000, 50000}, {50000, 50000}, {50000, 100000}, {0, 100000}});
     const double rest = area(offset(angle, -1, 0.001));
-    // Outer square 8 × 8 less the corner square 5 × 5, whose inner corner (1 mm) is rounded away from the region.
+    // Outer square 8 × 8 less the corner square 5 × 5, whose inner corner (1 mm) is rounded away from the
+    // region.
     const double expected = 64 - 25 + (1 - std::numbers::pi / 4);
     EXPECT_GE(rest, expected - 1e-9);
     EXPECT_LE(rest, expected + 0.001 * std::numbers::pi / 2);
@@ -407,27 +443,33 @@ TEST(Polygons, OffsetErrsToTheLargerRegionOnly) {
             }());
         const double tolerance = round % 3 == 0 ? 0.05 : 0.002;  // mm
         const double delta = (round % 4 < 2 ? 1 : -1) * (0.05 + static_cast<double>(random() % 1000) / 300);
-        const Loops outline = simplify(region), moved = round % 5 < 2 ? offset_outline(outline, delta, tolerance) : offset(region, delta, tolerance);
+        const Loops outline = simplify(region), moved = round % 5 < 2
+                                                            ? offset_outline(outline, delta, tolerance)
+                                                            : offset(region, delta, tolerance);
         std::uniform_int_distribution<std::int32_t> coordinate(-80000, 180000);
         const double slack = 2.5;  // units: rounding of the region's crossings and of the result's points
         int tested = 0;
         for (int k = 0; k < 1500; ++k) {
             Point2 p{coordinate(random), coordinate(random)};
-            if (k % 3 != 0 && !moved.empty()) {  // most points near the result's boundary, within 1.5 tolerances
+            if (k % 3 != 0 &&
+                !moved.empty()) {  // most points near the result's boundary, within 1.5 tolerances
                 const Point2 near = moved.points[random() % moved.points.size()];
                 const int reach = static_cast<int>(tolerance * kUnitsPerMm * 1.5) + 4;
                 p = {near.x + static_cast<std::int32_t>(random() % static_cast<unsigned>(2 * reach)) - reach,
                      near.y + static_cast<std::int32_t>(random() % static_cast<unsigned>(2 * reach)) - reach};
             }
             const double boundary = distance_to_boundary(outline, p);
-            const double depth = winding(outline, p) != 0 ? -boundary : boundary;  // signed distance to the region
+            const double depth =
+                winding(outline, p) != 0 ? -boundary : boundary;  // signed distance to the region
             const double past = depth - delta * kUnitsPerMm;
             const bool inside = winding(moved, p) != 0;
             if (past < -slack) {
-                ASSERT_TRUE(inside) << "round " << round << ": too small by " << -past << " units at " << p.x << ", " << p.y;
+                ASSERT_TRUE(inside) << "round " << round << ": too small by " << -past << " units at " << p.x
+                                    << ", " << p.y;
                 ++tested;
             } else if (past > tolerance * kUnitsPerMm + slack) {
-                ASSERT_FALSE(inside) << "round " << round << ": too large by " << past << " units at " << p.x << ", " << p.y;
+                ASSERT_FALSE(inside) << "round " << round << ": too large by " << past << " units at " << p.x
+                                     << ", " << p.y;
                 ++tested;
             }
         }
@@ -460,8 +502,10 @@ TEST(Polygons, RunsInsideAreWhatLiesInside) {
     auto star = [&](double x, double y, double size, int corners) {
         std::vector<Point2> points;
         for (int k = 0; k < corners; ++k) {
-            const double turn = 2 * std::numbers::pi * k / corners, r = size * (0.3 + 0.7 * static_cast<double>(random() % 1000) / 1000);
-            points.push_back({static_cast<std::int32_t>(x + r * std::cos(turn)), static_cast<std::int32_t>(y + r * std::sin(turn))});
+            const double turn = 2 * std::numbers::pi * k / corners,
+                         r = size * (0.3 + 0.7 * static_cast<double>(random() % 1000) / 1000);
+            points.push_back({static_cast<std::int32_t>(x + r * std::cos(turn)),
+                              static_cast<std::int32_t>(y + r * std::sin(turn))});
         }
         return points;
     };
@@ -469,12 +513,14 @@ TEST(Polygons, RunsInsideAreWhatLiesInside) {
     for (int round = 0; round < 60; ++round) {
         Loops parts, lines;
         for (int k = 0; k < 8; ++k)
-            add(parts, star(static_cast<double>(random() % 1'000'000), static_cast<double>(random() % 1'000'000), 200'000,
-                            3 + static_cast<int>(random() % 40)));
+            add(parts,
+                star(static_cast<double>(random() % 1'000'000), static_cast<double>(random() % 1'000'000),
+                     200'000, 3 + static_cast<int>(random() % 40)));
         const Loops region = simplify(parts);
         for (int k = 0; k < 5; ++k)
-            add(lines, star(static_cast<double>(random() % 1'000'000), static_cast<double>(random() % 1'000'000), k % 2 ? 30'000 : 300'000,
-                            3 + static_cast<int>(random() % 60)));
+            add(lines,
+                star(static_cast<double>(random() % 1'000'000), static_cast<double>(random() % 1'000'000),
+                     k % 2 ? 30'000 : 300'000, 3 + static_cast<int>(random() % 60)));
         const std::vector<RunInside> runs = runs_inside(lines, region);
         std::vector<double> inside(lines.size(), 0);  // length of runs by line
         for (const RunInside& run : runs) {
@@ -484,8 +530,9 @@ TEST(Polygons, RunsInsideAreWhatLiesInside) {
                 inside[run.loop] += std::hypot(static_cast<double>(run.points[k + 1].x) - run.points[k].x,
                                                static_cast<double>(run.points[k + 1].y) - run.points[k].y);
             if (run.closed) {
-                inside[run.loop] += std::hypot(static_cast<double>(run.points.front().x) - run.points.back().x,
-                                               static_cast<double>(run.points.front().y) - run.points.back().y);
+                inside[run.loop] +=
+                    std::hypot(static_cast<double>(run.points.front().x) - run.points.back().x,
+                               static_cast<double>(run.points.front().y) - run.points.back().y);
                 continue;
             }
             EXPECT_LT(distance_to_boundary(region, run.points.front()), 2);
@@ -496,11 +543,13 @@ TEST(Polygons, RunsInsideAreWhatLiesInside) {
             const auto loop = lines.loop(l);
             for (std::size_t k = 0; k < loop.size(); ++k) {
                 const Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
-                const double length = std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
+                const double length =
+                    std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
                 const int places = 1 + static_cast<int>(length / 500);
                 for (int i = 0; i < places; ++i) {
                     const double t = (i + 0.5) / places;
-                    if (winding(region, {static_cast<std::int32_t>(a.x + t * (b.x - a.x)), static_cast<std::int32_t>(a.y + t * (b.y - a.y))}) > 0)
+                    if (winding(region, {static_cast<std::int32_t>(a.x + t * (b.x - a.x)),
+                                         static_cast<std::int32_t>(a.y + t * (b.y - a.y))}) > 0)
                         expected += length / places;
                 }
             }

@@ -20,8 +20,12 @@ void add(Loops& loops, const std::vector<std::pair<double, double>>& corners) {
     for (const auto& [x, y] : corners) loops.points.push_back({to_units(x), to_units(y)});
     loops.close_loop();
 }
-void block(Loops& loops, double x0, double y0, double x1, double y1) { add(loops, {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}); }
-void hole(Loops& loops, double x0, double y0, double x1, double y1) { add(loops, {{x0, y0}, {x0, y1}, {x1, y1}, {x1, y0}}); }
+void block(Loops& loops, double x0, double y0, double x1, double y1) {
+    add(loops, {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}});
+}
+void hole(Loops& loops, double x0, double y0, double x1, double y1) {
+    add(loops, {{x0, y0}, {x0, y1}, {x1, y1}, {x1, y0}});
+}
 
 }  // namespace
 
@@ -52,8 +56,9 @@ TEST(PrintedAccessibility, OfASquarePocket) {
     }
 }
 
-// Between two blocks 8 mm apart a tool of 5 mm radius is nowhere in contact with one of them and clear of the other, but for the ends: its
-// centre, 5 mm beside one block, is 3 mm beside the other, so 4 mm past the other's corner it is clear of it.
+// Between two blocks 8 mm apart a tool of 5 mm radius is nowhere in contact with one of them and clear of the
+// other, but for the ends: its centre, 5 mm beside one block, is 3 mm beside the other, so 4 mm past the
+// other's corner it is clear of it.
 TEST(PrintedAccessibility, OfASlot) {
     Loops section;
     block(section, 0, 0, 50, 20);
@@ -72,7 +77,8 @@ TEST(PrintedAccessibility, OfASlot) {
     EXPECT_GE(b.intersecting, 80);
 }
 
-// On an arc of radius ρ > R the corner rule loses R/ρ of the length, though a tool reaches all of it (method.md section 6).
+// On an arc of radius ρ > R the corner rule loses R/ρ of the length, though a tool reaches all of it
+// (method.md section 6).
 TEST(PrintedAccessibility, OfARoundedCorner) {
     constexpr double rho = 10, radius = 4;
     constexpr int steps = 90;  // of a quarter
@@ -81,8 +87,10 @@ TEST(PrintedAccessibility, OfARoundedCorner) {
     const std::pair<double, double> centres[4] = {{10, 50}, {50, 50}, {50, 10}, {10, 10}};
     for (int c = 0; c < 4; ++c)
         for (int i = 0; i <= steps; ++i) {
-            const double angle = std::numbers::pi - c * std::numbers::pi / 2 - i * std::numbers::pi / 2 / steps;
-            walk.push_back({centres[c].first + rho * std::cos(angle), centres[c].second + rho * std::sin(angle)});
+            const double angle =
+                std::numbers::pi - c * std::numbers::pi / 2 - i * std::numbers::pi / 2 / steps;
+            walk.push_back(
+                {centres[c].first + rho * std::cos(angle), centres[c].second + rho * std::sin(angle)});
         }
     Loops section;
     block(section, -20, -20, 80, 80);
@@ -92,7 +100,8 @@ TEST(PrintedAccessibility, OfARoundedCorner) {
     EXPECT_NEAR(a.all, 400 + 160 + arcs, 0.02);
     EXPECT_NEAR(a.corners, arcs * radius / rho, 0.02);
     EXPECT_NEAR(a.intersecting, 0, 1e-9);
-    // Rounded off with less than R: the arcs are lost, and of the walls beside them R − ρ on each side, as in a sharp corner.
+    // Rounded off with less than R: the arcs are lost, and of the walls beside them R − ρ on each side, as in
+    // a sharp corner.
     const PrintedAccessibility b = printed_accessibility(section, 12);
     EXPECT_NEAR(b.corners + b.intersecting, arcs + 8 * (12 - rho), 0.05);
 }

@@ -1,4 +1,5 @@
-// Whether a tool reaches a point, against trying all of its places densely on random small parts, and in closed form.
+// Whether a tool reaches a point, against trying all of its places densely on random small parts, and in
+// closed form.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,11 +21,13 @@ struct Solid {
     void triangle(const Point3& a, const Point3& b, const Point3& c) {
         const auto n = static_cast<std::uint32_t>(mesh.vertices.size());
         for (const auto* p : {&a, &b, &c})
-            mesh.vertices.push_back({static_cast<float>((*p)[0]), static_cast<float>((*p)[1]), static_cast<float>((*p)[2])});
+            mesh.vertices.push_back(
+                {static_cast<float>((*p)[0]), static_cast<float>((*p)[1]), static_cast<float>((*p)[2])});
         mesh.facets.push_back({n, n + 1, n + 2});
     }
     /// Between two convex outlines of as many corners, counter-clockwise, at z = low and high.
-    void prism(const std::vector<std::array<double, 2>>& bottom, const std::vector<std::array<double, 2>>& top, double low, double high) {
+    void prism(const std::vector<std::array<double, 2>>& bottom,
+               const std::vector<std::array<double, 2>>& top, double low, double high) {
         const std::size_t n = bottom.size();
         auto b = [&](std::size_t i) { return Point3{bottom[i % n][0], bottom[i % n][1], low}; };
         auto t = [&](std::size_t i) { return Point3{top[i % n][0], top[i % n][1], high}; };
@@ -35,7 +38,8 @@ struct Solid {
         }
     }
     void box(const Point3& l, const Point3& h) {
-        const std::vector<std::array<double, 2>> outline{{l[0], l[1]}, {h[0], l[1]}, {h[0], h[1]}, {l[0], h[1]}};
+        const std::vector<std::array<double, 2>> outline{
+            {l[0], l[1]}, {h[0], l[1]}, {h[0], h[1]}, {l[0], h[1]}};
         prism(outline, outline, l[2], h[2]);
     }
 };
@@ -48,9 +52,11 @@ Tool tool(ToolKind kind, double diameter) {
     return t;
 }
 
-/// The greatest margin, mm, with which a tool covers a point over places at most `spacing` apart: how far it stays clear of the part.
-/// Negative: it is so deep in the part at best. Places between the tried ones can be better by half the spacing.
-double best_margin(const StandingPart& part, const Tool& t, const Point3& p, double z_bottom, double z_top, double spacing) {
+/// The greatest margin, mm, with which a tool covers a point over places at most `spacing` apart: how far it
+/// stays clear of the part. Negative: it is so deep in the part at best. Places between the tried ones can be
+/// better by half the spacing.
+double best_margin(const StandingPart& part, const Tool& t, const Point3& p, double z_bottom, double z_top,
+                   double spacing) {
     const double R = t.diameter / 2, thicker = 1;
     double best = -1e9;
     auto attempt = [&](const Point3& tip) {
@@ -66,10 +72,12 @@ double best_margin(const StandingPart& part, const Tool& t, const Point3& p, dou
         const int nu = static_cast<int>(std::ceil(R * std::numbers::pi / 2 / (spacing * 0.7)));
         for (int i = 0; i <= nu; ++i) {
             const double u = std::numbers::pi / 2 * i / nu;
-            const int nv = std::max(1, static_cast<int>(std::ceil(2 * std::numbers::pi * R * std::sin(u) / (spacing * 0.7))));
+            const int nv = std::max(
+                1, static_cast<int>(std::ceil(2 * std::numbers::pi * R * std::sin(u) / (spacing * 0.7))));
             for (int k = 0; k < nv; ++k) {
                 const double v = 2 * std::numbers::pi * k / nv;
-                const Point3 tip{p[0] + R * std::sin(u) * std::cos(v), p[1] + R * std::sin(u) * std::sin(v), p[2] + R * std::cos(u) - R};
+                const Point3 tip{p[0] + R * std::sin(u) * std::cos(v), p[1] + R * std::sin(u) * std::sin(v),
+                                 p[2] + R * std::cos(u) - R};
                 if (tip[2] >= floor) attempt(tip);
             }
         }
@@ -79,7 +87,8 @@ double best_margin(const StandingPart& part, const Tool& t, const Point3& p, dou
             for (int i = -n; i <= n; ++i)
                 if (i * i + j * j <= n * n) attempt({p[0] + R * i / n, p[1] + R * j / n, p[2]});
         for (int k = 0; k < 8 * n; ++k)
-            attempt({p[0] + R * std::cos(std::numbers::pi * k / (4 * n)), p[1] + R * std::sin(std::numbers::pi * k / (4 * n)), p[2]});
+            attempt({p[0] + R * std::cos(std::numbers::pi * k / (4 * n)),
+                     p[1] + R * std::sin(std::numbers::pi * k / (4 * n)), p[2]});
     }
     return best;
 }
@@ -99,7 +108,8 @@ TEST(Reach, AgreesWithTryingAllPlaces) {
         for (int k = 0; k < 7; ++k) {
             std::vector<std::array<double, 2>> bottom, top;
             const int n = 3 + k % 4;
-            const double x = uniform(0, 10), y = uniform(0, 10), r = uniform(0.5, 3), s = r * uniform(0.3, 1.1), turn = uniform(0, 6);
+            const double x = uniform(0, 10), y = uniform(0, 10), r = uniform(0.5, 3),
+                         s = r * uniform(0.3, 1.1), turn = uniform(0, 6);
             for (int i = 0; i < n; ++i) {
                 const double a = turn + 2 * std::numbers::pi * i / n;
                 bottom.push_back({x + r * std::cos(a), y + r * std::sin(a)});
@@ -115,10 +125,13 @@ TEST(Reach, AgreesWithTryingAllPlaces) {
         for (int k = 0; k < 60; ++k) {
             // Some alone, some as the neighbours they are in use.
             if (k % 4 == 0) p = {uniform(0, 10), uniform(0, 10), uniform(0, 5)};
-            else p = {p[0] + uniform(-0.3, 0.3), p[1] + uniform(-0.3, 0.3), std::clamp(p[2] + uniform(-0.3, 0.3), 0.0, 6.0)};
+            else
+                p = {p[0] + uniform(-0.3, 0.3), p[1] + uniform(-0.3, 0.3),
+                     std::clamp(p[2] + uniform(-0.3, 0.3), 0.0, 6.0)};
             const double margin = best_margin(part, t, p, 0, z_top, spacing);
             const bool found = reach.reachable(p);
-            // The search must find what is there by more than its resolution, and the spacing bounds what trying can miss.
+            // The search must find what is there by more than its resolution, and the spacing bounds what
+            // trying can miss.
             if (margin > Reach::kResolution) {
                 EXPECT_TRUE(found) << "trial " << trial << ": reached by " << margin;
                 ++yes;
@@ -133,7 +146,8 @@ TEST(Reach, AgreesWithTryingAllPlaces) {
     std::printf("%d reached, %d not, %d too close to tell\n", yes, no, close);
 }
 
-// A ball in an upright corner with a floor: reaches to (√3 − 1)·R from it along the diagonal, to (√2 − 1)·R from an edge, no farther.
+// A ball in an upright corner with a floor: reaches to (√3 − 1)·R from it along the diagonal, to (√2 − 1)·R
+// from an edge, no farther.
 TEST(Reach, CornersInClosedForm) {
     Solid solid;
     solid.box({-5, -5, -1}, {30, 30, 1});
@@ -146,8 +160,10 @@ TEST(Reach, CornersInClosedForm) {
     Reach balls(part, {ball}, 0, 20, -1e9), flats(part, {flat}, 0, 20, -1e9);
     for (const double delta : {-0.01, 0.01}) {
         const bool expected = delta > 0;
-        const double d = (std::sqrt(3.0) - 1) * R + delta, e = (std::sqrt(2.0) - 1) * R + delta, h = std::sqrt(0.5);
-        EXPECT_EQ(balls.reachable({d / std::sqrt(3.0), d / std::sqrt(3.0), 1 + d / std::sqrt(3.0)}), expected);
+        const double d = (std::sqrt(3.0) - 1) * R + delta, e = (std::sqrt(2.0) - 1) * R + delta,
+                     h = std::sqrt(0.5);
+        EXPECT_EQ(balls.reachable({d / std::sqrt(3.0), d / std::sqrt(3.0), 1 + d / std::sqrt(3.0)}),
+                  expected);
         EXPECT_EQ(balls.reachable({e * h, 12, 1 + e * h}), expected) << "along the floor";
         EXPECT_EQ(balls.reachable({e * h, e * h, 9}), expected) << "along the upright edge";
         EXPECT_EQ(flats.reachable({e * h, e * h, 1}), expected);
@@ -164,7 +180,8 @@ TEST(Reach, SlotsAsWideAsTheTool) {
         auto turned = [&](double x, double y) { return std::array<double, 2>{c * x - s * y, s * x + c * y}; };
         for (const double side : {-1.0, 1.0}) {
             const double y0 = side < 0 ? -20 : w, y1 = side < 0 ? -w : 20;
-            const std::vector<std::array<double, 2>> outline{turned(-20, y0), turned(20, y0), turned(20, y1), turned(-20, y1)};
+            const std::vector<std::array<double, 2>> outline{turned(-20, y0), turned(20, y0), turned(20, y1),
+                                                             turned(-20, y1)};
             solid.prism(outline, outline, 0, 10);
         }
         Context context;
@@ -173,7 +190,8 @@ TEST(Reach, SlotsAsWideAsTheTool) {
             Reach reach(part, {tool(kind, 6)}, 0, 10, -1e9);
             for (const double y : {0.0, 1.3, 2.2}) {
                 const auto at = turned(0.7, y);
-                EXPECT_EQ(reach.reachable({at[0], at[1], 4}), narrower == 0) << (kind == ToolKind::ball ? "ball " : "flat ") << narrower << " " << y;
+                EXPECT_EQ(reach.reachable({at[0], at[1], 4}), narrower == 0)
+                    << (kind == ToolKind::ball ? "ball " : "flat ") << narrower << " " << y;
             }
         }
     }
@@ -193,7 +211,8 @@ TEST(Reach, HolderFloorAndBoard) {
     t.stickout = 100;
     Reach slender(part, {t}, 0, 60, -1e9);
     EXPECT_TRUE(slender.reachable({11, 25, 5}));
-    // Against the wall at the bottom the ball passes it by its radius; a board that may not be cut forbids that.
+    // Against the wall at the bottom the ball passes it by its radius; a board that may not be cut forbids
+    // that.
     EXPECT_TRUE(slender.reachable({10, 25, 0}));
     Reach on_board(part, {t}, 0, 60, 0);
     EXPECT_FALSE(on_board.reachable({10, 25, 0}));

@@ -42,8 +42,13 @@ Job quick_job() {
 }
 
 TEST(Base64, AgreesWithTheStandard) {
-    const std::pair<const char*, const char*> vectors[] = {
-        {"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foob", "Zm9vYg=="}, {"fooba", "Zm9vYmE="}, {"foobar", "Zm9vYmFy"}};
+    const std::pair<const char*, const char*> vectors[] = {{"", ""},
+                                                           {"f", "Zg=="},
+                                                           {"fo", "Zm8="},
+                                                           {"foo", "Zm9v"},
+                                                           {"foob", "Zm9vYg=="},
+                                                           {"fooba", "Zm9vYmE="},
+                                                           {"foobar", "Zm9vYmFy"}};
     for (const auto& [bytes, text] : vectors) EXPECT_EQ(base64(std::string(bytes)), text);
     std::string little;
     append_little_endian(little, std::uint16_t{0x1234});
@@ -59,7 +64,8 @@ TEST(ThinnedPath, EveryPointLeftOutLiesNearTheWayThatReplacesIt) {
         Program program;
         ProgramStep at{0, 0, 0, 1000, 1, true};
         for (int i = 0; i < 3000; ++i) {
-            at.x += 0.3 + 0.1 * step(random), at.y = 5 * std::sin(at.x / 7) + 0.01 * step(random), at.z = std::cos(at.x / 5);
+            at.x += 0.3 + 0.1 * step(random), at.y = 5 * std::sin(at.x / 7) + 0.01 * step(random),
+                                              at.z = std::cos(at.x / 5);
             at.feed = i % 400 < 380 ? 1000 : 0;
             program.steps.push_back(at);
         }
@@ -70,7 +76,8 @@ TEST(ThinnedPath, EveryPointLeftOutLiesNearTheWayThatReplacesIt) {
         EXPECT_LT(thinned.size(), whole.size() / 2);
         const std::vector<ReplayPoint> at_once = path_of(program, 12000, tolerance);
         ASSERT_EQ(at_once.size(), thinned.size());
-        for (std::size_t k = 0; k < thinned.size(); ++k) ASSERT_EQ(at_once[k].seconds, thinned[k].seconds) << k;
+        for (std::size_t k = 0; k < thinned.size(); ++k)
+            ASSERT_EQ(at_once[k].seconds, thinned[k].seconds) << k;
         EXPECT_EQ(thinned.front().x, whole.front().x);
         EXPECT_EQ(thinned.back().seconds, whole.back().seconds);
         std::size_t next = 1;
@@ -79,8 +86,11 @@ TEST(ThinnedPath, EveryPointLeftOutLiesNearTheWayThatReplacesIt) {
             const ReplayPoint &a = thinned[next - 1], &b = thinned[next], &p = whole[k];
             EXPECT_EQ(b.rapid, p.rapid) << k;
             const double ux = b.x - a.x, uy = b.y - a.y, uz = b.z - a.z, uu = ux * ux + uy * uy + uz * uz;
-            const double t = std::clamp(((p.x - a.x) * ux + (p.y - a.y) * uy + (p.z - a.z) * uz) / uu, 0.0, 1.0);
-            ASSERT_LE(std::hypot(p.x - a.x - t * ux, p.y - a.y - t * uy, p.z - a.z - t * uz), tolerance + 1e-9) << k;
+            const double t =
+                std::clamp(((p.x - a.x) * ux + (p.y - a.y) * uy + (p.z - a.z) * uz) / uu, 0.0, 1.0);
+            ASSERT_LE(std::hypot(p.x - a.x - t * ux, p.y - a.y - t * uy, p.z - a.z - t * uz),
+                      tolerance + 1e-9)
+                << k;
         }
     }
 }
@@ -111,14 +121,16 @@ TEST(Replay, AStraightSlotIsAsDeepAndAsWideAsItIs) {
     ASSERT_FALSE(found.pieces.empty());
     const ReplayPiece& middle = found.pieces[found.pieces.size() / 2];
     EXPECT_NEAR(middle.depth_mm, 3, 1e-4);
-    EXPECT_NEAR(middle.width_mm, 12.7 * 160 / 200, 1.5);  // one motion: the way includes what is outside the slab
+    EXPECT_NEAR(middle.width_mm, 12.7 * 160 / 200,
+                1.5);  // one motion: the way includes what is outside the slab
     EXPECT_GT(middle.force_n, 1);
     EXPECT_GT(middle.deflection_mm, 0);
     // A second pass on the same way finds nothing.
     const ReplayedProgram again = replay.run(slot(47.5));
     EXPECT_EQ(again.removed_mm3, 0);
     for (const ReplayPiece& piece : again.pieces) EXPECT_EQ(piece.force_n, 0);
-    // What is left stands over the layer's bottom beside the pattern: where the slot went 47.5, elsewhere the slab's top.
+    // What is left stands over the layer's bottom beside the pattern: where the slot went 47.5, elsewhere the
+    // slab's top.
     std::vector<float> left;
     replay.left_over(StandingPart(context, input.mesh), [&](std::size_t layer, const std::vector<float>& of) {
         if (layer == 0) left = of;
@@ -155,7 +167,8 @@ TEST(Report, HoldsWhatLiesInTheFolder) {
     EXPECT_EQ(data["outlines"]["layers"].size(), planned.layers.size());
     EXPECT_EQ(data["left_over"]["layers"].size(), planned.layers.size());
     // Nothing asks for a network.
-    for (const char* asks : {"src=\"http", "href=\"http", "url(http", "@import", "fetch("}) EXPECT_EQ(page.find(asks), std::string::npos) << asks;
+    for (const char* asks : {"src=\"http", "href=\"http", "url(http", "@import", "fetch("})
+        EXPECT_EQ(page.find(asks), std::string::npos) << asks;
 
     (void)verify(one, out, kStl);
     report(one, out, kStl, false);

@@ -1,5 +1,6 @@
-// What cutters leave, cleared on contours: a semi-roughing takes all that stands outside the finish tool's swath and no more than its tool
-// reaches, and a layer whose roughing cutter does not fit everywhere is faster and as well made as on a raster.
+// What cutters leave, cleared on contours: a semi-roughing takes all that stands outside the finish tool's
+// swath and no more than its tool reaches, and a layer whose roughing cutter does not fit everywhere is
+// faster and as well made as on a raster.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,7 +38,15 @@ struct Notch {
     Standing standing;
 
     Notch()
-        : cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, alpha_map(context, mesh.view(), 0, kTop), nullptr, {}},
+        : cut{context,
+              layer,
+              job,
+              layer_solid(context, mesh.view(), 0, kTop),
+              kTop,
+              {},
+              alpha_map(context, mesh.view(), 0, kTop),
+              nullptr,
+              {}},
           standing({-40, -40}, {40, 40}, kTop) {
         job.tools = luo_library();
         layer.mesh = mesh.view();
@@ -58,22 +67,27 @@ struct Notch {
     [[nodiscard]] Tool flat(double inches) const { return tool(ToolKind::flat, inches); }
 };
 
-// However a layer's stock puts the moves of an operation in order, it stands as it does after one move after another.
+// However a layer's stock puts the moves of an operation in order, it stands as it does after one move after
+// another.
 TEST(LayerStock, StandsAsAfterOneMoveAfterAnother) {
     std::mt19937 random(test::seed());
     Notch n;
-    auto somewhere = [&](double low, double high) { return to_units(std::uniform_real_distribution(low, high)(random)); };
+    auto somewhere = [&](double low, double high) {
+        return to_units(std::uniform_real_distribution(low, high)(random));
+    };
     for (const ToolKind kind : {ToolKind::flat, ToolKind::ball}) {
         const Tool tool = tool_of_kind(n.job, kind);
         Operation op;
-        for (const double level : {11.0, 7.5, 4.0, 0.0, 9.0}) {  // a level over others comes last, as finish passes do
+        for (const double level :
+             {11.0, 7.5, 4.0, 0.0, 9.0}) {  // a level over others comes last, as finish passes do
             op.moves.push_back({somewhere(-40, 40), somewhere(-40, 40), to_units(kTop + 2), 0});
             std::int32_t z = to_units(level);
             for (int k = 0; k < 300; ++k) {
                 const Move& at = op.moves.back();
                 if (k % 40 == 39) z = to_units(level) + somewhere(-0.5, 1);
                 op.moves.push_back({std::clamp(at.x + somewhere(-12, 12), to_units(-45), to_units(45)),
-                                    std::clamp(at.y + somewhere(-12, 12), to_units(-45), to_units(45)), z, k % 50 == 49 ? 0U : 1000U});
+                                    std::clamp(at.y + somewhere(-12, 12), to_units(-45), to_units(45)), z,
+                                    k % 50 == 49 ? 0U : 1000U});
             }
         }
         LayerStock together(n.cut, 0.25), singly(n.cut, 0.25), tried(n.cut, 0.25);
@@ -85,7 +99,8 @@ TEST(LayerStock, StandsAsAfterOneMoveAfterAnother) {
             singly.cut(n.cut, one, tool);
         }
         // But for rounding, which the way that several moves are laid together may change near nothing.
-        EXPECT_TRUE(std::ranges::equal(together.heights(), singly.heights(), [](float a, float b) { return std::abs(a - b) < 1e-9F; }));
+        EXPECT_TRUE(std::ranges::equal(together.heights(), singly.heights(),
+                                       [](float a, float b) { return std::abs(a - b) < 1e-9F; }));
         std::size_t cells = 0;
         for (std::size_t c = 0; c < whole.size(); ++c) cells += whole[c] - together.height(c) > kEmpty;
         EXPECT_LE(taken.cells, cells);
@@ -117,14 +132,18 @@ TEST(LayerStock, ATraceOffManyCellsIsNothing) {
 TEST(LayerStock, StandsAsBeforeWhenATrialIsUndone) {
     std::mt19937 random(test::seed());
     Notch n;
-    auto somewhere = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
+    auto somewhere = [&](double low, double high) {
+        return std::uniform_real_distribution(low, high)(random);
+    };
     const Tool tool = tool_of_kind(n.job, ToolKind::ball);
     LayerStock stock(n.cut, 0.25);
     const auto cut = [&] {
-        for (int k = 0; k < 20; ++k) stock.cut_at(cutter_end(tool), somewhere(-45, 45), somewhere(-45, 45), somewhere(0, kTop));
+        for (int k = 0; k < 20; ++k)
+            stock.cut_at(cutter_end(tool), somewhere(-45, 45), somewhere(-45, 45), somewhere(0, kTop));
         Operation op;
         for (int k = 0; k < 10; ++k)
-            op.moves.push_back({to_units(somewhere(-45, 45)), to_units(somewhere(-45, 45)), to_units(somewhere(0, kTop)), k == 0 ? 0U : 1000U});
+            op.moves.push_back({to_units(somewhere(-45, 45)), to_units(somewhere(-45, 45)),
+                                to_units(somewhere(0, kTop)), k == 0 ? 0U : 1000U});
         stock.cut(n.cut, op, tool);
     };
     const auto heights = [&] { return std::vector<float>(stock.heights().begin(), stock.heights().end()); };
@@ -134,7 +153,8 @@ TEST(LayerStock, StandsAsBeforeWhenATrialIsUndone) {
             std::size_t cells = 0;
             for (std::size_t c = 0; c < stock.grid().count(); ++c) cells += stock.left(c) > limit;
             const double cell = stock.grid().cell;
-            EXPECT_NEAR(stock.area_over(n.context, limit), static_cast<double>(cells) * cell * cell, 1e-6) << limit;
+            EXPECT_NEAR(stock.area_over(n.context, limit), static_cast<double>(cells) * cell * cell, 1e-6)
+                << limit;
         }
     };
     for (int round = 0; round < 4; ++round) {
@@ -190,18 +210,22 @@ TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
             const Move &a = op.moves[i - 1], &b = op.moves[i];
             if (b.feed == 0) continue;
             for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-                const double x = to_mm(a.x) + t * (to_mm(b.x) - to_mm(a.x)), y = to_mm(a.y) + t * (to_mm(b.y) - to_mm(a.y)),
+                const double x = to_mm(a.x) + t * (to_mm(b.x) - to_mm(a.x)),
+                             y = to_mm(a.y) + t * (to_mm(b.y) - to_mm(a.y)),
                              z = to_mm(a.z) + t * (to_mm(b.z) - to_mm(a.z));
-                ASSERT_GE(z, part.drop(x, y).tip_z - gouge) << "swath " << swath << " at " << x << ' ' << y << ' ' << z;
+                ASSERT_GE(z, part.drop(x, y).tip_z - gouge)
+                    << "swath " << swath << " at " << x << ' ' << y << ' ' << z;
             }
         }
-        // Of what stood on the notch's floor, the middle is gone; nothing stands that the cutter reaches outside the swath. Facets of the
-        // height field are 1 mm wide, so its walls lean over the cells beside them.
+        // Of what stood on the notch's floor, the middle is gone; nothing stands that the cutter reaches
+        // outside the swath. Facets of the height field are 1 mm wide, so its walls lean over the cells
+        // beside them.
         int stood = 0, left = 0;
         for (int j = 0; j < stock.grid().ny; ++j)
             for (int i = 0; i < stock.grid().nx; ++i) {
                 const std::size_t c = stock.grid().index(i, j);
-                const double x = stock.grid().x(i), y = stock.grid().y(j), wall = std::min(9.0 - std::abs(y), x + 12.0), clear = std::max(swath, 0.3);
+                const double x = stock.grid().x(i), y = stock.grid().y(j),
+                             wall = std::min(9.0 - std::abs(y), x + 12.0), clear = std::max(swath, 0.3);
                 // The corner's round is out of a flat end mill's reach.
                 const double r = semi.diameter / 2, in_x = x + 12, in_y = 9 - std::abs(y);
                 const bool in_corner = in_x < r + 1 && in_y < r + 1;
@@ -214,7 +238,8 @@ TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
     }
 }
 
-// A ball's rings keep off the surface on floors, slopes and walls alike, also where these go on below the layer, and take most of the waste.
+// A ball's rings keep off the surface on floors, slopes and walls alike, also where these go on below the
+// layer, and take most of the waste.
 TEST(RestContours, ABallsRingsKeepOffTheSurface) {
     constexpr double allowance = 0.1;
     auto slopes = [](double x, double y) {  // a valley with one steep and one gentle side, closed at -x
@@ -223,8 +248,9 @@ TEST(RestContours, ABallsRingsKeepOffTheSurface) {
     };
     for (const bool below : {false, true}) {
         Notch n;
-        n.mesh =
-            test::height_field(n.context, 60, 1, [&](double x, double y) { return std::max(slopes(x, y), below ? -4.0 : 0.5) + (below ? 4 : 0); });
+        n.mesh = test::height_field(n.context, 60, 1, [&](double x, double y) {
+            return std::max(slopes(x, y), below ? -4.0 : 0.5) + (below ? 4 : 0);
+        });
         if (below)
             for (Vec3f& v : n.mesh.vertices) v.z -= 4;
         n.layer.mesh = n.mesh.view();
@@ -250,9 +276,11 @@ TEST(RestContours, ABallsRingsKeepOffTheSurface) {
             if (b.feed == 0) continue;
             lowest = std::min(lowest, to_mm(b.z));
             for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-                const double x = to_mm(a.x) + t * (to_mm(b.x) - to_mm(a.x)), y = to_mm(a.y) + t * (to_mm(b.y) - to_mm(a.y)),
+                const double x = to_mm(a.x) + t * (to_mm(b.x) - to_mm(a.x)),
+                             y = to_mm(a.y) + t * (to_mm(b.y) - to_mm(a.y)),
                              z = to_mm(a.z) + t * (to_mm(b.z) - to_mm(a.z));
-                ASSERT_GE(z, part.drop(x, y).tip_z + kept) << "below " << below << " at " << x << ' ' << y << ' ' << z;
+                ASSERT_GE(z, part.drop(x, y).tip_z + kept)
+                    << "below " << below << " at " << x << ' ' << y << ' ' << z;
             }
         }
         EXPECT_EQ(lowest < -0.5, below);
@@ -275,14 +303,17 @@ TEST(RestContours, AWiderSwathLeavesLessToSemiRoughing) {
         const Operation op = semi_rough_layer(n.cut, stock, semi, {"waste", 1.0, swath, 0.3});
         for (std::size_t i = 1; i < op.moves.size(); ++i)
             if (op.moves[i].feed > 0)
-                mm += std::hypot(to_mm(op.moves[i].x) - to_mm(op.moves[i - 1].x), to_mm(op.moves[i].y) - to_mm(op.moves[i - 1].y));
+                mm += std::hypot(to_mm(op.moves[i].x) - to_mm(op.moves[i - 1].x),
+                                 to_mm(op.moves[i].y) - to_mm(op.moves[i - 1].y));
         length.push_back(mm);
     }
-    EXPECT_TRUE(std::is_sorted(length.rbegin(), length.rend())) << length[0] << ' ' << length[1] << ' ' << length[2] << ' ' << length[3];
+    EXPECT_TRUE(std::is_sorted(length.rbegin(), length.rend()))
+        << length[0] << ' ' << length[1] << ' ' << length[2] << ' ' << length[3];
     EXPECT_LT(length.back(), 0.5 * length.front());
 }
 
-// LUO's sample with print's two tools, and with all of them: contours are faster than the raster, and the part is made.
+// LUO's sample with print's two tools, and with all of them: contours are faster than the raster, and the
+// part is made.
 TEST(RestContours, LuosSampleIsFasterOnContoursAndVerifies) {
     Context context;
     const Mesh mesh = weld(context, luo_tool_sample());
@@ -308,9 +339,10 @@ TEST(RestContours, LuosSampleIsFasterOnContoursAndVerifies) {
     EXPECT_TRUE(result.passed) << (result.violations.empty() ? "" : result.violations[0].message);
 }
 
-// Slots hardly wider than the end mill. Seed 2 has one that is .05 mm wider where it is narrowest: the place in it is found by sliding down between
-// walls that its neighbours on either side stand on, and other slots put a dozen lines between these. Seed 6 has a pocket .12 mm wider, whose rim is
-// level: the raster's places on both sides of it stand on that, and nothing shows but what is left.
+// Slots hardly wider than the end mill. Seed 2 has one that is .05 mm wider where it is narrowest: the place
+// in it is found by sliding down between walls that its neighbours on either side stand on, and other slots
+// put a dozen lines between these. Seed 6 has a pocket .12 mm wider, whose rim is level: the raster's places
+// on both sides of it stand on that, and nothing shows but what is left.
 TEST(RestContours, SlotsHardlyWiderAreFound) {
     for (const std::uint64_t seed : {2U, 6U}) {
         const MetrePattern pattern{150, 25, 8000, seed};
@@ -327,7 +359,8 @@ TEST(RestContours, SlotsHardlyWiderAreFound) {
         Context context;
         write(context, plan(context, stl, {}), folder / "out");
         const Verification v = verify_folder(context, folder / "out", {.stl = stl, .write = false});
-        for (const Violation& violation : v.report.violations) ADD_FAILURE() << seed << ": " << violation.code << ": " << violation.message;
+        for (const Violation& violation : v.report.violations)
+            ADD_FAILURE() << seed << ": " << violation.code << ": " << violation.message;
     }
 }
 

@@ -1,5 +1,5 @@
-// Roughing in rings: deep levels first, terraces over slopes and floors after them, rectangles where what stays is far apart. What it
-// leaves is found by cutting its own moves out of a field of cells, one by one.
+// Roughing in rings: deep levels first, terraces over slopes and floors after them, rectangles where what
+// stays is far apart. What it leaves is found by cutting its own moves out of a field of cells, one by one.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,12 +31,20 @@ struct Roughed {
     double met_head_on = 0;      // mm that stood under a face mill's middle where it went straight down
 
     // A height field of 120 by 120 cells around the origin in a stock.
-    Roughed(const std::function<double(double, double)>& surface, std::array<double, 2> stock_low, std::array<double, 2> stock_high,
-            double last_steps, double pitch = 0.5, bool open_waste = false)
+    Roughed(const std::function<double(double, double)>& surface, std::array<double, 2> stock_low,
+            std::array<double, 2> stock_high, double last_steps, double pitch = 0.5, bool open_waste = false)
         : mesh(test::height_field(context, 120, pitch, surface)),
           low(stock_low),
           high(stock_high),
-          cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, alpha_map(context, mesh.view(), 0, kTop), nullptr, {}},
+          cut{context,
+              layer,
+              job,
+              layer_solid(context, mesh.view(), 0, kTop),
+              kTop,
+              {},
+              alpha_map(context, mesh.view(), 0, kTop),
+              nullptr,
+              {}},
           standing(low, high, kTop) {
         job.cutting.open_waste = open_waste;
         layer.mesh = mesh.view();
@@ -56,21 +64,29 @@ struct Roughed {
         for (const Operation& one : all) replay(one);
     }
     [[nodiscard]] double radius_of(const Operation& one) const {
-        return std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == one.tool; })->diameter / 2;
+        return std::find_if(job.tools.begin(), job.tools.end(),
+                            [&](const Tool& t) { return t.number == one.tool; })
+                   ->diameter /
+               2;
     }
     void replay(const Operation& one) {
         const double r = radius_of(one);
         for (std::size_t k = 1; k < one.moves.size(); ++k) {
             const Move &a = one.moves[k - 1], &b = one.moves[k];
-            const double ax = to_mm(a.x), ay = to_mm(a.y), bx = to_mm(b.x), by = to_mm(b.y), z = to_mm(l2_of(a, b) > 0 ? std::max(a.z, b.z) : b.z);
+            const double ax = to_mm(a.x), ay = to_mm(a.y), bx = to_mm(b.x), by = to_mm(b.y),
+                         z = to_mm(l2_of(a, b) > 0 ? std::max(a.z, b.z) : b.z);
             if (z >= kTop) continue;
             const double dx = bx - ax, dy = by - ay, l2 = dx * dx + dy * dy;
-            for (int j = std::max(0, cell(std::min(ay, by) - r, 1)); j <= std::min(ny - 1, cell(std::max(ay, by) + r, 1)); ++j)
-                for (int i = std::max(0, cell(std::min(ax, bx) - r, 0)); i <= std::min(nx - 1, cell(std::max(ax, bx) + r, 0)); ++i) {
-                    const double t = l2 > 0 ? std::clamp(((x(i) - ax) * dx + (y(j) - ay) * dy) / l2, 0.0, 1.0) : 0;
+            for (int j = std::max(0, cell(std::min(ay, by) - r, 1));
+                 j <= std::min(ny - 1, cell(std::max(ay, by) + r, 1)); ++j)
+                for (int i = std::max(0, cell(std::min(ax, bx) - r, 0));
+                     i <= std::min(nx - 1, cell(std::max(ax, bx) + r, 0)); ++i) {
+                    const double t =
+                        l2 > 0 ? std::clamp(((x(i) - ax) * dx + (y(j) - ay) * dy) / l2, 0.0, 1.0) : 0;
                     const double off = std::hypot(x(i) - ax - t * dx, y(j) - ay - t * dy);
                     if (off > r) continue;
-                    if (&one != &all.back() && l2 == 0 && off < PathBuilder::kMiddle * r) met_head_on = std::max(met_head_on, at(i, j) - z);
+                    if (&one != &all.back() && l2 == 0 && off < PathBuilder::kMiddle * r)
+                        met_head_on = std::max(met_head_on, at(i, j) - z);
                     deepest_cut = std::max(deepest_cut, at(i, j) - z), at(i, j) = std::min(at(i, j), z);
                 }
         }
@@ -79,10 +95,15 @@ struct Roughed {
         const std::int64_t dx = std::int64_t{b.x} - a.x, dy = std::int64_t{b.y} - a.y;
         return dx * dx + dy * dy;
     }
-    [[nodiscard]] int cell(double v, int axis) const { return static_cast<int>(std::floor((v - low[static_cast<std::size_t>(axis)]) / kCell)); }
+    [[nodiscard]] int cell(double v, int axis) const {
+        return static_cast<int>(std::floor((v - low[static_cast<std::size_t>(axis)]) / kCell));
+    }
     [[nodiscard]] double x(int i) const { return low[0] + (i + 0.5) * kCell; }
     [[nodiscard]] double y(int j) const { return low[1] + (j + 0.5) * kCell; }
-    double& at(int i, int j) { return height[static_cast<std::size_t>(j) * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i)]; }
+    double& at(int i, int j) {
+        return height[static_cast<std::size_t>(j) * static_cast<std::size_t>(nx) +
+                      static_cast<std::size_t>(i)];
+    }
     // How low the roughing cutter may get over a place at all, with its allowance.
     [[nodiscard]] double least(int i, int j) const {
         const double r = layer.tools.rough.diameter / 2;
@@ -97,12 +118,14 @@ struct Roughed {
         double sum = 0;
         for (std::size_t k = 1; k < op.moves.size(); ++k)
             if ((op.moves[k].feed > 0) == by_feed && op.moves[k].z < to_units(kTop))
-                sum += std::hypot(to_mm(op.moves[k].x - op.moves[k - 1].x), to_mm(op.moves[k].y - op.moves[k - 1].y));
+                sum += std::hypot(to_mm(op.moves[k].x - op.moves[k - 1].x),
+                                  to_mm(op.moves[k].y - op.moves[k - 1].y));
         return sum;
     }
 };
 
-// On the west a slope of 45°, on the south one of 65°, on the east a wall with the draft of 2°, on the north a wall and a ledge before it.
+// On the west a slope of 45°, on the south one of 65°, on the east a wall with the draft of 2°, on the north
+// a wall and a ledge before it.
 double hill(double x, double y) {
     const double west = 12 + (x + 12), south = 12 + std::tan(65 * std::numbers::pi / 180) * (y + 12),
                  east = 12 + (12 - x) / std::tan(2 * std::numbers::pi / 180);
@@ -122,15 +145,18 @@ TEST(Roughing, LeavesStepsOnSlopesAndAllowancesOnFloors) {
         for (int j = 0; j < r.ny; j += 2)
             for (int i = 0; i < r.nx; i += 2) {
                 const double least = r.least(i, j), left = r.at(i, j) - least, x = r.x(i), y = r.y(j);
-                deepest = std::min(deepest, r.at(i, j) - (std::max(std::abs(x), std::abs(y)) < 29.5 ? hill(x, y) : 0));
+                deepest = std::min(deepest,
+                                   r.at(i, j) - (std::max(std::abs(x), std::abs(y)) < 29.5 ? hill(x, y) : 0));
                 worst = std::max(worst, left);
                 if (std::abs(x) < 10 && y > 15 && y < 21) on_ledge = std::max(on_ledge, left);
-                if (least < kTop - 4 && ((std::abs(y) < 9 && x < -13) || (std::abs(x) < 9 && y < -13))) on_slope = std::max(on_slope, left);
+                if (least < kTop - 4 && ((std::abs(y) < 9 && x < -13) || (std::abs(x) < 9 && y < -13)))
+                    on_slope = std::max(on_slope, left);
             }
         EXPECT_GE(deepest, -1e-6) << "nothing of the part is cut";
         EXPECT_LE(worst, tool.stepdown_max + r.job.cutting.floor_allowance + 0.05) << "no place is left out";
         EXPECT_LE(on_ledge, r.job.cutting.floor_allowance + 0.05);
-        EXPECT_LE(on_slope, tool.stepdown_min + r.job.cutting.floor_allowance + 0.1) << "terraces, where a whole level leaves more";
+        EXPECT_LE(on_slope, tool.stepdown_min + r.job.cutting.floor_allowance + 0.1)
+            << "terraces, where a whole level leaves more";
         EXPECT_GT(on_slope, 1);
     }
 }
@@ -146,10 +172,13 @@ TEST(Roughing, LevelsGoAsDeepAsTheToolMayAndTerracesOnlyWhereTheyCut) {
     std::vector<double> at_level;
     for (std::size_t k = 1; k < r.op.moves.size(); ++k) at_level.push_back(to_mm(r.op.moves[k].z));
     for (int k = 1; k < levels; ++k)
-        EXPECT_TRUE(std::any_of(at_level.begin(), at_level.end(), [&](double z) { return std::abs(z - (kTop - kTop * k / levels)) < 1e-3; })) << k;
+        EXPECT_TRUE(std::any_of(at_level.begin(), at_level.end(), [&](double z) {
+            return std::abs(z - (kTop - kTop * k / levels)) < 1e-3;
+        })) << k;
 }
 
-// One small thing in the corner of a wide stock: rectangles leave only what is next to it to rings, and nothing is left.
+// One small thing in the corner of a wide stock: rectangles leave only what is next to it to rings, and
+// nothing is left.
 TEST(Roughing, GoesRoundWhereWhatStaysIsFarApart) {
     const auto boss = [](double x, double y) { return std::max(std::abs(x), std::abs(y)) < 14 ? 14.5 : 0.5; };
     Roughed r(boss, {-45, -45}, {455, 355}, 0);
@@ -166,9 +195,11 @@ TEST(Roughing, GoesRoundWhereWhatStaysIsFarApart) {
     EXPECT_GT(r.way(true), levels * 500 * 400 / (0.5 * r.layer.tools.rough.diameter));
 }
 
-// Two posts with a gap between them that no face mill passes, and a wall around a pocket that one would fit into but cannot come to.
+// Two posts with a gap between them that no face mill passes, and a wall around a pocket that one would fit
+// into but cannot come to.
 double posts_and_pocket(double x, double y) {
-    const bool first = std::abs(x + 70) < 30 && std::abs(y - 60) < 30, second = std::abs(x - 30) < 30 && std::abs(y - 60) < 30;
+    const bool first = std::abs(x + 70) < 30 && std::abs(y - 60) < 30,
+               second = std::abs(x - 30) < 30 && std::abs(y - 60) < 30;
     const double from_middle = std::hypot(x - 50, y + 55);
     return first || second || (from_middle > 40 && from_middle < 52) ? 14.5 : 0.5;
 }
@@ -176,7 +207,8 @@ double posts_and_pocket(double x, double y) {
 TEST(Roughing, FaceMillTakesWhatLiesOpenAndTheEndMillTheRest) {
     for (const double last_steps : {0.0, 2.2}) {
         const std::array<double, 2> low{-160, -150}, high{150, 140};
-        Roughed alone(posts_and_pocket, low, high, last_steps, 2), both(posts_and_pocket, low, high, last_steps, 2, true);
+        Roughed alone(posts_and_pocket, low, high, last_steps, 2),
+            both(posts_and_pocket, low, high, last_steps, 2, true);
         alone.rough(), both.rough();
         ASSERT_EQ(alone.all.size(), 1u);
         ASSERT_EQ(both.all.size(), 2u);
@@ -185,10 +217,13 @@ TEST(Roughing, FaceMillTakesWhatLiesOpenAndTheEndMillTheRest) {
         const double r = both.radius_of(face);
         EXPECT_EQ(r, 25);
         EXPECT_TRUE(both.cut.no_way_in.empty());
-        EXPECT_LE(both.met_head_on, PathBuilder::kScrape) << "it goes down beside the stock, or where it has been";
-        EXPECT_LE(both.deepest_cut, std::max(face.stepdown, both.op.stepdown) + 1e-3) << "what is left to the end mill is known to it";
+        EXPECT_LE(both.met_head_on, PathBuilder::kScrape)
+            << "it goes down beside the stock, or where it has been";
+        EXPECT_LE(both.deepest_cut, std::max(face.stepdown, both.op.stepdown) + 1e-3)
+            << "what is left to the end mill is known to it";
         // It keeps farther off than the end mill, and stays out of the pocket.
-        const DropIndex& part = both.cut.drops({Cutter::Profile::flat, r + both.job.cutting.wall_allowance + 0.9});
+        const DropIndex& part =
+            both.cut.drops({Cutter::Profile::flat, r + both.job.cutting.wall_allowance + 0.9});
         for (std::size_t k = 1; k < face.moves.size(); ++k) {
             const Move &a = face.moves[k - 1], &b = face.moves[k];
             if (b.feed == 0) continue;
@@ -197,8 +232,8 @@ TEST(Roughing, FaceMillTakesWhatLiesOpenAndTheEndMillTheRest) {
                 EXPECT_LE(to_mm(a.z - b.z), 1.01 * way * std::tan(2 * std::numbers::pi / 180) + 1e-3);
             }
             for (int s = 0; s <= 20; ++s) {
-                const double t = s / 20.0, x = to_mm(a.x) + t * to_mm(b.x - a.x), y = to_mm(a.y) + t * to_mm(b.y - a.y),
-                             z = to_mm(a.z) + t * to_mm(b.z - a.z);
+                const double t = s / 20.0, x = to_mm(a.x) + t * to_mm(b.x - a.x),
+                             y = to_mm(a.y) + t * to_mm(b.y - a.y), z = to_mm(a.z) + t * to_mm(b.z - a.z);
                 ASSERT_FALSE(part.stands_over(x, y, z)) << x << " " << y << " " << z;
                 if (z < kTop) {
                     ASSERT_GT(std::hypot(x - 50, y + 55), 45) << "in the pocket";
@@ -219,7 +254,8 @@ TEST(Roughing, FaceMillTakesWhatLiesOpenAndTheEndMillTheRest) {
     }
 }
 
-// Passes of .75 mm take longer than the end mill on whole levels, but not on the shallow last ones: over these, everything must be gone.
+// Passes of .75 mm take longer than the end mill on whole levels, but not on the shallow last ones: over
+// these, everything must be gone.
 TEST(Roughing, FaceMillTakesNoLevelBelowOneThatItLeaves) {
     Roughed r(posts_and_pocket, {-200, -190}, {190, 180}, 1.5, 2, true);
     r.job.cutting.face_depth = 0.75;

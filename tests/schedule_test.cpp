@@ -15,8 +15,10 @@ using namespace slabwright;
 namespace {
 
 void add_rectangle(Loops& loops, double x0, double y0, double x1, double y1, bool hole = false) {
-    std::vector<Point2> points{
-        {to_units(x0), to_units(y0)}, {to_units(x1), to_units(y0)}, {to_units(x1), to_units(y1)}, {to_units(x0), to_units(y1)}};
+    std::vector<Point2> points{{to_units(x0), to_units(y0)},
+                               {to_units(x1), to_units(y0)},
+                               {to_units(x1), to_units(y1)},
+                               {to_units(x0), to_units(y1)}};
     if (hole) std::reverse(points.begin(), points.end());
     loops.points.insert(loops.points.end(), points.begin(), points.end());
     loops.close_loop();
@@ -44,15 +46,16 @@ Plan plan_of_layers(int count) {
         layer.z_top = 18 * i;
         layer.slab_thickness = 19;
         layer.glue_area_mm2 = 5000;
-        layer.operations = {operation(OperationKind::face, 1, 1.5), operation(OperationKind::rough, 2, 4), operation(OperationKind::finish, 3, 6),
-                            operation(OperationKind::finish, 3, 2)};
+        layer.operations = {operation(OperationKind::face, 1, 1.5), operation(OperationKind::rough, 2, 4),
+                            operation(OperationKind::finish, 3, 6), operation(OperationKind::finish, 3, 2)};
         plan.layers.push_back(layer);
     }
     return plan;
 }
 
 bool has(const std::vector<Diagnostic>& diagnostics, const std::string& code) {
-    return std::any_of(diagnostics.begin(), diagnostics.end(), [&](const Diagnostic& d) { return d.code == code; });
+    return std::any_of(diagnostics.begin(), diagnostics.end(),
+                       [&](const Diagnostic& d) { return d.code == code; });
 }
 
 double number(const SequenceStep& step, const std::string& key) {
@@ -95,7 +98,8 @@ TEST(Schedule, StepsNeedOnlyEarlierStepsAndAllLeadToTheUnloading) {
     }
     EXPECT_EQ(plan.sequence.back().action, "unload");
     for (const SequenceStep& step : plan.sequence)
-        EXPECT_TRUE(step.action == "unload" || needed.count(step.id)) << "nothing waits for step " << step.id << " " << step.action;
+        EXPECT_TRUE(step.action == "unload" || needed.count(step.id))
+            << "nothing waits for step " << step.id << " " << step.action;
 }
 
 TEST(Schedule, EachLayerGoesThroughTheMachineInOrder) {
@@ -104,8 +108,9 @@ TEST(Schedule, EachLayerGoesThroughTheMachineInOrder) {
     std::vector<std::string> actions;
     for (const SequenceStep& step : plan.sequence)
         if (step.layer == 2) actions.push_back(step.action);
-    const std::vector<std::string> expected{"take_slab", "clamp",       "glue", "place",       "press", "table", "touch_off", "tool_change",
-                                            "face",      "tool_change", "mill", "tool_change", "mill",  "mill",  "unload"};
+    const std::vector<std::string> expected{"take_slab", "clamp",       "glue",        "place", "press",
+                                            "table",     "touch_off",   "tool_change", "face",  "tool_change",
+                                            "mill",      "tool_change", "mill",        "mill",  "unload"};
     EXPECT_EQ(actions, expected);
     // The next slab may be fetched while this layer is milled, but glue waits for the last program.
     std::map<int, const SequenceStep*> by_id;
@@ -145,7 +150,8 @@ TEST(Schedule, TotalsAddUp) {
 
 TEST(Schedule, ToolIsChangedOnlyWhenTheNextProgramHasAnother) {
     Plan plan = plan_of_layers(2);
-    for (Layer& layer : plan.layers) layer.operations = {operation(OperationKind::rough, 2, 1), operation(OperationKind::finish, 2, 1)};
+    for (Layer& layer : plan.layers)
+        layer.operations = {operation(OperationKind::rough, 2, 1), operation(OperationKind::finish, 2, 1)};
     schedule(plan);
     EXPECT_EQ(plan.totals.tool_changes, 1);
 }
@@ -189,13 +195,15 @@ TEST(Bonding, GlueKeepsItsSetbackAndPressItsPressure) {
     EXPECT_EQ(plan.layers[0].press_force_n, 17000);
 }
 
-// An outline as a section of many facets has it: the glue keeps its distance from it everywhere, with far fewer points.
+// An outline as a section of many facets has it: the glue keeps its distance from it everywhere, with far
+// fewer points.
 TEST(Bonding, GlueOfAnOutlineOfManyPointsKeepsItsSetback) {
     constexpr int points = 40000;
     Plan plan = plan_of_layers(1);
     Loops below;
     for (int k = 0; k < points; ++k) {
-        const double a = 2 * std::numbers::pi * k / points, r = 60 + 8 * std::sin(7 * a) + 0.02 * std::sin(900 * a);
+        const double a = 2 * std::numbers::pi * k / points,
+                     r = 60 + 8 * std::sin(7 * a) + 0.02 * std::sin(900 * a);
         below.points.push_back({to_units(100 + r * std::cos(a)), to_units(80 + r * std::sin(a))});
     }
     below.close_loop();
@@ -211,7 +219,8 @@ TEST(Bonding, GlueOfAnOutlineOfManyPointsKeepsItsSetback) {
         const double dx = to_mm(b.x - a.x), dy = to_mm(b.y - a.y), l2 = dx * dx + dy * dy;
         double nearest = 1e300;
         for (const Point2 p : below.points) {
-            const double x = to_mm(p.x - a.x), y = to_mm(p.y - a.y), t = std::clamp((x * dx + y * dy) / l2, 0.0, 1.0);
+            const double x = to_mm(p.x - a.x), y = to_mm(p.y - a.y),
+                         t = std::clamp((x * dx + y * dy) / l2, 0.0, 1.0);
             nearest = std::min(nearest, std::hypot(x - t * dx, y - t * dy));
         }
         ASSERT_GE(nearest, setback - 1e-3) << "at " << to_mm(a.x) << ' ' << to_mm(a.y);
@@ -227,7 +236,9 @@ TEST(Bonding, MomentsAgreeWithBruteForceOnAFrameWithAHole) {
     RecordProperty("seed", static_cast<int>(seed));
     std::printf("seed %u\n", seed);
     for (int round = 0; round < 20; ++round) {
-        const auto pick = [&](int low, int high) { return static_cast<double>(std::uniform_int_distribution<int>(low, high)(random)); };
+        const auto pick = [&](int low, int high) {
+            return static_cast<double>(std::uniform_int_distribution<int>(low, high)(random));
+        };
         const double x0 = pick(0, 40), y0 = pick(0, 30), x1 = pick(150, 200), y1 = pick(70, 100);
         const double hx0 = pick(60, 70), hy0 = pick(40, 45), hx1 = pick(90, 120), hy1 = pick(55, 60);
         Plan plan = plan_of_layers(1);
@@ -247,7 +258,8 @@ TEST(Bonding, MomentsAgreeWithBruteForceOnAFrameWithAHole) {
             }
         const double cx = sx / a, cy = sy / a, ix = sxx - a * cx * cx, iy = syy - a * cy * cy;
         const double rx = std::max(x1 - cx, cx - x0), ry = std::max(y1 - cy, cy - y0);
-        const double force = a * 0.5 / (1 + std::fabs(100 - cx) * rx * a / ix + std::fabs(50 - cy) * ry * a / iy);
+        const double force =
+            a * 0.5 / (1 + std::fabs(100 - cx) * rx * a / ix + std::fabs(50 - cy) * ry * a / iy);
         EXPECT_NEAR(plan.layers[0].glue_area_mm2, a, 1e-6);
         EXPECT_NEAR(plan.layers[0].glue_centroid[0], cx, 1e-6);
         EXPECT_NEAR(plan.layers[0].glue_centroid[1], cy, 1e-6);
@@ -263,7 +275,8 @@ TEST(Bonding, ARibInACornerTipsTheSlab) {
     bond_layer(plan.layers[0], below, plan, diagnostics);
     EXPECT_TRUE(has(diagnostics, "schedule.tips"));
     EXPECT_GT(plan.layers[0].press_force_n, 0);
-    EXPECT_LT(plan.layers[0].press_force_n, 0.5 * plan.layers[0].glue_area_mm2) << "off its centroid the press must be gentler";
+    EXPECT_LT(plan.layers[0].press_force_n, 0.5 * plan.layers[0].glue_area_mm2)
+        << "off its centroid the press must be gentler";
 
     // Two ribs at the slab's ends carry its middle between them.
     Loops two;

@@ -1,5 +1,5 @@
-// What finishing must not leave where one layer meets the next and at the foot of low walls, wherever these fall between its levels and
-// the lines of its rasters: judged by the simulation of the emitted text.
+// What finishing must not leave where one layer meets the next and at the foot of low walls, wherever these
+// fall between its levels and the lines of its rasters: judged by the simulation of the emitted text.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -17,8 +17,10 @@ namespace {
 constexpr double kDraft = 2, kChord = 0.01;
 
 Outline square(double half, double radius, double shift_y = 0) {
-    const std::vector<Corner> corners{
-        {-half, -half + shift_y, radius}, {half, -half + shift_y, radius}, {half, half + shift_y, radius}, {-half, half + shift_y, radius}};
+    const std::vector<Corner> corners{{-half, -half + shift_y, radius},
+                                      {half, -half + shift_y, radius},
+                                      {half, half + shift_y, radius},
+                                      {-half, half + shift_y, radius}};
     return rounded_polygon(corners, kChord);
 }
 
@@ -32,8 +34,9 @@ std::vector<LayerFindings> findings_of(const std::vector<Facet>& facets, const J
     return verify_folder(context, folder / "out", {.stl = stl, .write = false}).report.layers;
 }
 
-// A block with drafted sides, one layer on another: the lowest level of the upper one must touch the wall where it meets the lower. Its
-// levels are counted from the top, so that another height puts the lowest at another distance from the joint.
+// A block with drafted sides, one layer on another: the lowest level of the upper one must touch the wall
+// where it meets the lower. Its levels are counted from the top, so that another height puts the lowest at
+// another distance from the joint.
 TEST(Seams, DraftedWallsAreCutDownToTheJoint) {
     for (const double height : {28.0, 28.3, 28.6, 28.9}) {
         std::vector<Facet> facets;
@@ -43,12 +46,14 @@ TEST(Seams, DraftedWallsAreCutDownToTheJoint) {
         flat(facets, sweep(facets, outline, wall), {}, true);
         const std::vector<LayerFindings> layers = findings_of(facets, Job{});
         ASSERT_EQ(layers.size(), 2U);
-        for (const LayerFindings& layer : layers) EXPECT_EQ(layer.missed, 0U) << height << " mm high, " << layer.missed_left.size << " mm missed";
+        for (const LayerFindings& layer : layers)
+            EXPECT_EQ(layer.missed, 0U) << height << " mm high, " << layer.missed_left.size << " mm missed";
     }
 }
 
-// A low land on a plate, its foot a small hollow: neither a ball on the plate nor the flat end mill that makes the plate touches its sides,
-// which are left to the rest pass, whose lines are a millimetre apart, so the sides are moved past them.
+// A low land on a plate, its foot a small hollow: neither a ball on the plate nor the flat end mill that
+// makes the plate touches its sides, which are left to the rest pass, whose lines are a millimetre apart, so
+// the sides are moved past them.
 TEST(Seams, LowWallsAreCutWhereverTheyStand) {
     for (const double shift : {0.0, 0.3, 0.55, 0.8}) {
         std::vector<Facet> facets;
@@ -59,7 +64,8 @@ TEST(Seams, LowWallsAreCutWhereverTheyStand) {
         flat(facets, sweep(facets, land, wall), {}, true);
         const std::vector<LayerFindings> layers = findings_of(facets, Job{});
         ASSERT_EQ(layers.size(), 1U);
-        EXPECT_EQ(layers[0].missed, 0U) << "moved by " << shift << " mm, " << layers[0].missed_left.size << " mm missed";
+        EXPECT_EQ(layers[0].missed, 0U)
+            << "moved by " << shift << " mm, " << layers[0].missed_left.size << " mm missed";
     }
 }
 

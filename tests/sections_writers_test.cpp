@@ -19,12 +19,14 @@ namespace {
 
 using namespace slabwright;
 
-/// An outer loop, its hole and an open chain at 12.7; a triangle far out at −0.05, below; nothing at 3e-5; a repeat.
+/// An outer loop, its hole and an open chain at 12.7; a triangle far out at −0.05, below; nothing at 3e-5; a
+/// repeat.
 std::vector<Section> sample() {
     std::vector<Section> sections(4);
     Section& a = sections[0];
     a.plane = {12.7, Side::above};
-    a.loops.points = {{0, 0}, {100000, 0}, {100000, 50001}, {0, 50001}, {20000, 10000}, {20000, 30000}, {45000, 30000}, {45000, 10000}};
+    a.loops.points = {{0, 0},         {100000, 0},    {100000, 50001}, {0, 50001},
+                      {20000, 10000}, {20000, 30000}, {45000, 30000},  {45000, 10000}};
     a.loops.starts = {0, 4, 8};
     a.loops.parents = {-1, 0};
     a.open_chains.points = {{-70000, 5}, {-60000, -123456}, {-50001, 0}};
@@ -59,7 +61,8 @@ TEST(SectionsWriters, DecimalsAreExactAndPlain) {
     for (int i = 0; i < 20000; ++i) {
         const auto units = static_cast<std::int64_t>(random() % 4294967296ULL) - 2147483648LL;
         ASSERT_EQ(std::llround(std::strtod(unit_text(units).c_str(), nullptr) * kUnitsPerMm), units);
-        const double value = std::ldexp(static_cast<double>(random() % 1000003) - 500000, static_cast<int>(random() % 120) - 80);
+        const double value = std::ldexp(static_cast<double>(random() % 1000003) - 500000,
+                                        static_cast<int>(random() % 120) - 80);
         std::string text;
         append_decimal(text, value);
         ASSERT_EQ(std::strtod(text.c_str(), nullptr), value) << text;
@@ -94,7 +97,8 @@ TEST(SectionsWriters, JsonReadsBackExactly) {
         for (std::size_t i = 0; i < sections[s].loops.size(); ++i) {
             const auto& loop = entry["loops"][i];
             const auto points = sections[s].loops.loop(i);
-            EXPECT_EQ(loop.at("parent").is_null() ? -1 : loop.at("parent").get<int>(), sections[s].loops.parents[i]);
+            EXPECT_EQ(loop.at("parent").is_null() ? -1 : loop.at("parent").get<int>(),
+                      sections[s].loops.parents[i]);
             EXPECT_EQ(loop.at("area_mm2").get<double>(), signed_area(points));
             ASSERT_EQ(loop.at("points").size(), points.size());
             for (std::size_t k = 0; k < points.size(); ++k) EXPECT_EQ(read(loop["points"][k]), points[k]);
@@ -103,7 +107,8 @@ TEST(SectionsWriters, JsonReadsBackExactly) {
         for (std::size_t i = 0; i < sections[s].open_chains.size(); ++i) {
             const auto points = sections[s].open_chains.loop(i);
             ASSERT_EQ(entry["open_chains"][i].size(), points.size());
-            for (std::size_t k = 0; k < points.size(); ++k) EXPECT_EQ(read(entry["open_chains"][i][k]), points[k]);
+            for (std::size_t k = 0; k < points.size(); ++k)
+                EXPECT_EQ(read(entry["open_chains"][i][k]), points[k]);
         }
     }
     EXPECT_EQ(nlohmann::json::parse(sections_json({})).at("sections").size(), 0u);
@@ -144,7 +149,8 @@ TEST(SectionsWriters, DxfGroupsReadBack) {
     const auto sections = sample();
     std::istringstream in(sections_dxf(sections));
     std::vector<std::pair<int, std::string>> groups;
-    for (std::string code, value; std::getline(in, code) && std::getline(in, value);) groups.emplace_back(std::stoi(code), value);
+    for (std::string code, value; std::getline(in, code) && std::getline(in, value);)
+        groups.emplace_back(std::stoi(code), value);
     ASSERT_FALSE(groups.empty());
     EXPECT_EQ(groups.back(), (std::pair<int, std::string>(0, "EOF")));
     std::set<std::string> layers;
@@ -157,7 +163,8 @@ TEST(SectionsWriters, DxfGroupsReadBack) {
     for (std::size_t g = 0; g < groups.size(); ++g) {
         const auto& [code, value] = groups[g];
         if (code == 9) variable = value;
-        if (code == 70 && variable == "$INSUNITS" && entity == "SECTION" && section == "HEADER") units = value;
+        if (code == 70 && variable == "$INSUNITS" && entity == "SECTION" && section == "HEADER")
+            units = value;
         if (code == 2 && entity == "SECTION") section = value;
         if (code == 2 && entity == "LAYER") {
             EXPECT_TRUE(layers.insert(value).second) << "twice: " << value;
@@ -165,14 +172,17 @@ TEST(SectionsWriters, DxfGroupsReadBack) {
         if (code == 8) {
             layer = value;
             EXPECT_TRUE(layers.count(value)) << value;
-            EXPECT_EQ(value.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-$"), std::string::npos) << "not a name in R12: " << value;
+            EXPECT_EQ(value.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-$"), std::string::npos)
+                << "not a name in R12: " << value;
         }
         if (code == 70 && entity == "POLYLINE") {
             polyline = value == "1" ? &closed : &open;
             if (value == "1") closed_layers.push_back(layer);
         }
-        if (code == 10 && entity == "VERTEX") vertex.x = static_cast<std::int32_t>(std::llround(std::stod(value) * kUnitsPerMm));
-        if (code == 20 && entity == "VERTEX") vertex.y = static_cast<std::int32_t>(std::llround(std::stod(value) * kUnitsPerMm));
+        if (code == 10 && entity == "VERTEX")
+            vertex.x = static_cast<std::int32_t>(std::llround(std::stod(value) * kUnitsPerMm));
+        if (code == 20 && entity == "VERTEX")
+            vertex.y = static_cast<std::int32_t>(std::llround(std::stod(value) * kUnitsPerMm));
         if (code == 30 && entity == "VERTEX") polyline->points.push_back(vertex);
         if (code == 10 || code == 20 || code == 30) {
             EXPECT_EQ(value.find_first_of("eE"), std::string::npos);
@@ -185,7 +195,8 @@ TEST(SectionsWriters, DxfGroupsReadBack) {
     }
     EXPECT_EQ(units, "4");
     EXPECT_EQ(layers, (std::set<std::string>{"Z_12_7", "Z_12_7_OPEN", "Z_-0_05_BELOW", "Z_0"}));
-    EXPECT_EQ(closed_layers, (std::vector<std::string>{"Z_12_7", "Z_12_7", "Z_-0_05_BELOW", "Z_12_7", "Z_12_7"}));
+    EXPECT_EQ(closed_layers,
+              (std::vector<std::string>{"Z_12_7", "Z_12_7", "Z_-0_05_BELOW", "Z_12_7", "Z_12_7"}));
     Loops expected, expected_open;
     for (const Section& s : sections) {
         for (std::size_t i = 0; i < s.loops.size(); ++i) {
@@ -193,7 +204,8 @@ TEST(SectionsWriters, DxfGroupsReadBack) {
             expected.close_loop();
         }
         for (std::size_t i = 0; i < s.open_chains.size(); ++i) {
-            expected_open.points.insert(expected_open.points.end(), s.open_chains.loop(i).begin(), s.open_chains.loop(i).end());
+            expected_open.points.insert(expected_open.points.end(), s.open_chains.loop(i).begin(),
+                                        s.open_chains.loop(i).end());
             expected_open.close_loop();
         }
     }
@@ -212,7 +224,8 @@ struct CommaPunctuation : std::numpunct<char> {
 
 TEST(SectionsWriters, DoNotDependOnTheLocale) {
     const auto sections = sample();
-    const std::string json = sections_json(sections), svg = sections_svg(sections), dxf = sections_dxf(sections);
+    const std::string json = sections_json(sections), svg = sections_svg(sections),
+                      dxf = sections_dxf(sections);
     const std::locale before = std::locale::global(std::locale(std::locale::classic(), new CommaPunctuation));
     std::ostringstream probe;
     probe << 1234.5;

@@ -1,5 +1,6 @@
-// Rest machining by a dropped cutter: of what is left it takes all that it can. Semi-roughing by one keeps its allowance off the part, its chords are longer for it, and what only the bare cutter
-// enters it clears all the same.
+// Rest machining by a dropped cutter: of what is left it takes all that it can. Semi-roughing by one keeps
+// its allowance off the part, its chords are longer for it, and what only the bare cutter enters it clears
+// all the same.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,7 +38,15 @@ struct Waste {
 
     Waste(const Height& height, const Reshape& reshape)
         : mesh(drawn(context, height, reshape)),
-          cut{context, layer, job, layer_solid(context, mesh.view(), 0, kTop), kTop, {}, alpha_map(context, mesh.view(), 0, kTop), nullptr, {}} {
+          cut{context,
+              layer,
+              job,
+              layer_solid(context, mesh.view(), 0, kTop),
+              kTop,
+              {},
+              alpha_map(context, mesh.view(), 0, kTop),
+              nullptr,
+              {}} {
         layer.mesh = mesh.view();
         layer.job = &job;
         layer.z_bottom = 0;
@@ -51,7 +60,8 @@ struct Waste {
 };
 
 struct Passed {
-    double nearest = 1e300;  // by how much a cutter may be wider and has no room at some place, mm, rounded up to hundredths
+    double nearest = 1e300;  // by how much a cutter may be wider and has no room at some place, mm, rounded
+                             // up to hundredths
     double length = 0;       // mm by feed
     std::size_t moves = 0;   // by feed
     double most_left = 0;    // mm along the normal, within 1 mm of the plane x = 0
@@ -63,7 +73,8 @@ Passed semi_roughed(const Height& height, ToolKind kind, double allowance, const
     tool.kind = kind;
     LayerStock stock(w.cut, 0.2);
     stock.cut(w.cut, rough_layer(w.cut).back(), w.layer.tools.rough);
-    const Operation op = cut_rest(w.cut, stock, tool, {OperationKind::semi_rough, "waste", kLimit, true, 0, allowance});
+    const Operation op =
+        cut_rest(w.cut, stock, tool, {OperationKind::semi_rough, "waste", kLimit, true, 0, allowance});
     EXPECT_FALSE(op.moves.empty());
     Passed passed;
     const double r = tool.diameter / 2;
@@ -78,24 +89,28 @@ Passed semi_roughed(const Height& height, ToolKind kind, double allowance, const
         ++passed.moves;
         const int parts = 1 + static_cast<int>(l / 0.1);
         for (int k = 0; k <= parts; ++k) {
-            const double t = static_cast<double>(k) / parts, x = to_mm(a.x) + t * to_mm(b.x - a.x), y = to_mm(a.y) + t * to_mm(b.y - a.y),
-                         z = to_mm(a.z) + t * to_mm(b.z - a.z);
+            const double t = static_cast<double>(k) / parts, x = to_mm(a.x) + t * to_mm(b.x - a.x),
+                         y = to_mm(a.y) + t * to_mm(b.y - a.y), z = to_mm(a.z) + t * to_mm(b.z - a.z);
             for (std::size_t d = 0; d < wider.size(); ++d) {
                 const double more = 0.01 * (static_cast<double>(d) - 2);
                 if (more > passed.nearest) break;
-                if (wider[d].stands_over(x, y, z - (kind == ToolKind::ball ? more : 0))) passed.nearest = more;
+                if (wider[d].stands_over(x, y, z - (kind == ToolKind::ball ? more : 0)))
+                    passed.nearest = more;
             }
         }
     }
     for (int j = 0; j < stock.grid().ny; ++j)
         for (int i = 0; i < stock.grid().nx; ++i)
             if (std::abs(stock.grid().x(i)) < 1 && std::abs(stock.grid().y(j)) < 12)
-                passed.most_left = std::max(passed.most_left, static_cast<double>(stock.left(stock.grid().index(i, j))));
+                passed.most_left =
+                    std::max(passed.most_left, static_cast<double>(stock.left(stock.grid().index(i, j))));
     return passed;
 }
 
 // A groove of 11 mm with a floor that rises and falls, too narrow for the roughing cutter of 12.7 mm.
-double wavy_groove(double x, double y) { return std::abs(x) < 5.5 && std::abs(y) < 17 ? 4 + 1.5 * std::sin(y / 3) + 0.02 * x * x : kTop; }
+double wavy_groove(double x, double y) {
+    return std::abs(x) < 5.5 && std::abs(y) < 17 ? 4 + 1.5 * std::sin(y / 3) + 0.02 * x * x : kTop;
+}
 
 TEST(SemiRough, KeepsOffThePartAndHasLongerChords) {
     for (const ToolKind kind : {ToolKind::ball, ToolKind::flat}) {
@@ -110,19 +125,24 @@ TEST(SemiRough, KeepsOffThePartAndHasLongerChords) {
             EXPECT_LT(kept.most_left, bare.most_left + 0.2) << "cusps and the allowance";
         }
         EXPECT_LT(kept.moves, 0.5 * static_cast<double>(bare.moves));
-        EXPECT_GT(kept.length / static_cast<double>(kept.moves), 1.2 * bare.length / static_cast<double>(bare.moves));
+        EXPECT_GT(kept.length / static_cast<double>(kept.moves),
+                  1.2 * bare.length / static_cast<double>(bare.moves));
     }
 }
 
-// A slot that is wider than the cutter by less than twice the allowance is cleared to its floor, and no worse than without.
+// A slot that is wider than the cutter by less than twice the allowance is cleared to its floor, and no worse
+// than without.
 TEST(SemiRough, ClearsWhatOnlyTheBareCutterEnters) {
     for (const double wider : {0.04, 0.1, 0.18, 0.3}) {
         const double half = 6.35 / 2 + wider / 2;
         auto slot = [&](double x, double y) { return std::abs(x) < 10 && std::abs(y) < 17 ? 5.0 : kTop; };
-        // The field's facets are half a millimetre wide: it is drawn together so that the slot has upright walls where they should be.
+        // The field's facets are half a millimetre wide: it is drawn together so that the slot has upright
+        // walls where they should be.
         auto narrow = [&](Mesh& mesh) {
             for (Vec3f& v : mesh.vertices)
-                if (std::abs(v.x) <= 10) v.x *= static_cast<float>((half + (std::abs(v.x) < 10 ? 0 : 0.01)) / (std::abs(v.x) < 10 ? 9.5 : 10));
+                if (std::abs(v.x) <= 10)
+                    v.x *= static_cast<float>((half + (std::abs(v.x) < 10 ? 0 : 0.01)) /
+                                              (std::abs(v.x) < 10 ? 9.5 : 10));
         };
         for (const double allowance : {0.0, 0.1}) {
             const Passed passed = semi_roughed(slot, ToolKind::ball, allowance, narrow);
@@ -132,9 +152,10 @@ TEST(SemiRough, ClearsWhatOnlyTheBareCutterEnters) {
     }
 }
 
-// Of the cells on which more than the limit is left, those that the cutter could still lower, from whatever place: dropped a tenth of a millimetre
-// apart, by brute force.
-std::size_t could_be_lowered(const Waste& w, const LayerStock& stock, const Tool& tool, double limit, double worth) {
+// Of the cells on which more than the limit is left, those that the cutter could still lower, from whatever
+// place: dropped a tenth of a millimetre apart, by brute force.
+std::size_t could_be_lowered(const Waste& w, const LayerStock& stock, const Tool& tool, double limit,
+                             double worth) {
     const bool ball = tool.kind == ToolKind::ball;
     const double r = tool.diameter / 2;
     const DropIndex index(w.cut.solid, Cutter{ball ? Cutter::Profile::ball : Cutter::Profile::flat, r});
@@ -142,7 +163,8 @@ std::size_t could_be_lowered(const Waste& w, const LayerStock& stock, const Tool
     constexpr int n = 480;
     std::vector<float> tips;
     for (int j = 0; j < n; ++j)
-        for (int i = 0; i < n; ++i) tips.push_back(static_cast<float>(index.drop(0.1 * i - 24, 0.1 * j - 24).tip_z));
+        for (int i = 0; i < n; ++i)
+            tips.push_back(static_cast<float>(index.drop(0.1 * i - 24, 0.1 * j - 24).tip_z));
     std::size_t count = 0;
     for (int j = 0; j < grid.ny; ++j)
         for (int i = 0; i < grid.nx; ++i) {
@@ -150,12 +172,17 @@ std::size_t could_be_lowered(const Waste& w, const LayerStock& stock, const Tool
             const double x = grid.x(i), y = grid.y(j);
             if (stock.left(c) <= limit || std::abs(x) > 17 || std::abs(y) > 17) continue;
             double lowest = 1e300;
-            for (int v = static_cast<int>((y + 24 - r) / 0.1); v <= static_cast<int>((y + 24 + r) / 0.1) + 1; ++v)
-                for (int u = static_cast<int>((x + 24 - r) / 0.1); u <= static_cast<int>((x + 24 + r) / 0.1) + 1; ++u) {
-                    const double d2 = (0.1 * u - 24 - x) * (0.1 * u - 24 - x) + (0.1 * v - 24 - y) * (0.1 * v - 24 - y);
+            for (int v = static_cast<int>((y + 24 - r) / 0.1); v <= static_cast<int>((y + 24 + r) / 0.1) + 1;
+                 ++v)
+                for (int u = static_cast<int>((x + 24 - r) / 0.1);
+                     u <= static_cast<int>((x + 24 + r) / 0.1) + 1; ++u) {
+                    const double d2 =
+                        (0.1 * u - 24 - x) * (0.1 * u - 24 - x) + (0.1 * v - 24 - y) * (0.1 * v - 24 - y);
                     if (d2 >= r * r) continue;
-                    lowest = std::min(lowest, static_cast<double>(tips[static_cast<std::size_t>(v) * n + static_cast<std::size_t>(u)]) +
-                                                  (ball ? r - std::sqrt(r * r - d2) : 0));
+                    lowest = std::min(
+                        lowest, static_cast<double>(
+                                    tips[static_cast<std::size_t>(v) * n + static_cast<std::size_t>(u)]) +
+                                    (ball ? r - std::sqrt(r * r - d2) : 0));
                 }
             const double z = std::max(lowest, static_cast<double>(stock.surface(c)));
             count += (stock.height(c) - z) * stock.nz(c) > worth;
@@ -165,7 +192,9 @@ std::size_t could_be_lowered(const Waste& w, const LayerStock& stock, const Tool
 
 TEST(RestMachining, LeavesWhatItsCutterCannotTake) {
     // Creases between bumps, steep and flat; a wall that winds over a floor that rises.
-    auto bumps = [](double x, double y) { return 6 + 2.5 * std::abs(std::sin(x / 4)) * std::abs(std::cos(y / 5 + x / 9)) + 0.05 * y; };
+    auto bumps = [](double x, double y) {
+        return 6 + 2.5 * std::abs(std::sin(x / 4)) * std::abs(std::cos(y / 5 + x / 9)) + 0.05 * y;
+    };
     auto wall = [](double x, double y) { return 4 + 0.08 * x + (y > 6 * std::sin(x / 5) ? 6 + 0.1 * y : 0); };
     int kinds = 0;
     for (const Height& height : {Height(bumps), Height(wall)})
@@ -186,8 +215,8 @@ TEST(RestMachining, LeavesWhatItsCutterCannotTake) {
 }
 
 TEST(RestMachining, FollowsChannelsAsFarAsTheyAreWideEnough) {
-    // A channel of 12 mm with a cove along its walls, which lean by 3 degrees: a flat end mill of 12.1 mm fits a millimetre over its floor, off all lines; and
-    // in one that narrows, as far as that goes.
+    // A channel of 12 mm with a cove along its walls, which lean by 3 degrees: a flat end mill of 12.1 mm
+    // fits a millimetre over its floor, off all lines; and in one that narrows, as far as that goes.
     constexpr double width = 12, floor = 4, top = floor + 1.6, limit = 0.06, worth = 0.05;  // mm
     const auto along_y = [](double x, double /*y*/) { return std::abs(x) <= width / 2 ? floor : kTop; };
     const auto along_x = [](double /*x*/, double y) { return std::abs(y) <= width / 2 ? floor : kTop; };
@@ -195,7 +224,8 @@ TEST(RestMachining, FollowsChannelsAsFarAsTheyAreWideEnough) {
         for (Vec3f& v : mesh.vertices) v.x += 0.217F;
     };
     const Reshape narrowing = [](Mesh& mesh) {
-        for (Vec3f& v : mesh.vertices) v.y = (std::abs(v.y) < width / 2 + 1 ? v.y * (1 + 0.03F * v.x) : v.y) + 0.68F;
+        for (Vec3f& v : mesh.vertices)
+            v.y = (std::abs(v.y) < width / 2 + 1 ? v.y * (1 + 0.03F * v.x) : v.y) + 0.68F;
     };
     for (const bool narrows : {false, true}) {
         Waste w(narrows ? Height(along_x) : Height(along_y), narrows ? narrowing : aside);
@@ -218,7 +248,9 @@ TEST(RestMachining, FollowsChannelsAsFarAsTheyAreWideEnough) {
 TEST(RestMachining, DoesNotComeForWhatClingsToAWall) {
     // A plinth whose walls lean by 3 degrees and go on below the layer, where a ball may go too.
     constexpr double base = 7, slope = 0.0524, foot = 10 + slope * kTop, limit = 0.06, stands = 0.165;  // mm
-    const auto plinth = [](double x, double /*y*/) { return std::clamp(kTop - (std::abs(x) - 10) / slope, -base, kTop); };
+    const auto plinth = [](double x, double /*y*/) {
+        return std::clamp(kTop - (std::abs(x) - 10) / slope, -base, kTop);
+    };
     const auto deeper = [](Mesh& mesh) {
         for (Vec3f& v : mesh.vertices)
             if (v.z == 0) v.z = -2 * base;
@@ -229,7 +261,9 @@ TEST(RestMachining, DoesNotComeForWhatClingsToAWall) {
         w.job.cutting.rest_pattern = RestPattern::raster;
         LayerStock stock(w.cut, (25 + foot + beside) / 177.5);
         const CutterEnd wide{CutterEnd::Form::flat, 60, 0};
-        const auto clear = [&](double x0, double y0, double x1, double y1, double z) { stock.cut_along(wide, {x0, y0, z}, {x1, y1, z}); };
+        const auto clear = [&](double x0, double y0, double x1, double y1, double z) {
+            stock.cut_along(wide, {x0, y0, z}, {x1, y1, z});
+        };
         clear(-80, 80.01, 80, 80.01, 0), clear(-80, -80.01, 80, -80.01, 0);
         for (double z = 0; z < kTop; ++z) {  // along the walls, but for the foot of one
             const double edge = foot - slope * z, other = z > 0 ? edge : foot + beside + 0.01;
@@ -238,7 +272,8 @@ TEST(RestMachining, DoesNotComeForWhatClingsToAWall) {
         clear(60 + foot, -80, 60 + foot, 80, stands);
         const auto left = [&] { return stock.area_over(w.context, limit); };
         EXPECT_GT(left(), 39 * stock.grid().cell) << "a column beside the wall";
-        const Operation op = cut_rest(w.cut, stock, w.layer.tools.finish, {OperationKind::finish, "rest", limit, false});
+        const Operation op =
+            cut_rest(w.cut, stock, w.layer.tools.finish, {OperationKind::finish, "rest", limit, false});
         EXPECT_EQ(op.moves.empty(), beside < limit);
         EXPECT_EQ(left() > 0, beside < limit);
     }
@@ -246,7 +281,9 @@ TEST(RestMachining, DoesNotComeForWhatClingsToAWall) {
 
 TEST(SemiRough, ReachesWhatStandsFarFromAnyWall) {
     // Beside one corner of the only peg a lump, and two far away, with nothing to cut between them.
-    const auto peg = [](double x, double y) { return std::abs(x + 15) < 2 && std::abs(y + 15) < 2 ? kTop : 1.0; };
+    const auto peg = [](double x, double y) {
+        return std::abs(x + 15) < 2 && std::abs(y + 15) < 2 ? kTop : 1.0;
+    };
     const std::array<std::array<double, 2>, 3> lumps{{{-11, -11}, {3, 6}, {14, 15}}};
     Waste w(peg, {});
     LayerStock stock(w.cut, 0.2);
@@ -254,8 +291,9 @@ TEST(SemiRough, ReachesWhatStandsFarFromAnyWall) {
     const CutterEnd needle{CutterEnd::Form::flat, 0.1, 0};
     for (int j = 0; j < grid.ny; ++j)
         for (int i = 0; i < grid.nx; ++i) {
-            const bool in_lump =
-                std::any_of(lumps.begin(), lumps.end(), [&](const auto& l) { return std::hypot(grid.x(i) - l[0], grid.y(j) - l[1]) < 1; });
+            const bool in_lump = std::any_of(lumps.begin(), lumps.end(), [&](const auto& l) {
+                return std::hypot(grid.x(i) - l[0], grid.y(j) - l[1]) < 1;
+            });
             if (!in_lump) stock.cut_at(needle, grid.x(i), grid.y(j), stock.surface(grid.index(i, j)));
         }
     const auto left = [&] { return stock.area_over(w.context, kLimit); };

@@ -1,5 +1,5 @@
-// Fewer facets for the same surface: the tolerance is a bound everywhere, what was closed stays closed, planes become as few facets as
-// they need, and the same on any number of threads.
+// Fewer facets for the same surface: the tolerance is a bound everywhere, what was closed stays closed,
+// planes become as few facets as they need, and the same on any number of threads.
 #include "kernels/mesh/simplify.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,8 @@ double farthest(Context& context, MeshView a, MeshView b, std::mt19937& random) 
     return most;
 }
 
-void expect_same_solid(Context& context, MeshView mesh, const Mesh& few, double tolerance, std::mt19937& random) {
+void expect_same_solid(Context& context, MeshView mesh, const Mesh& few, double tolerance,
+                       std::mt19937& random) {
     EXPECT_TRUE(test::closed(few.view()));
     for (const Index3& n : few.neighbours)
         for (const std::uint32_t g : n) ASSERT_NE(g, kNoFacet);
@@ -49,19 +50,23 @@ void expect_same_solid(Context& context, MeshView mesh, const Mesh& few, double 
     EXPECT_NEAR(test::volume(few.view()), test::volume(mesh), 1e-3 * test::volume(mesh));
 }
 
-// Smooth waves of random heights, finely facetted, with a step: the steeper and the rougher the tolerance, the fewer facets stay.
+// Smooth waves of random heights, finely facetted, with a step: the steeper and the rougher the tolerance,
+// the fewer facets stay.
 TEST(Simplify, StaysWithinTheToleranceOnRandomSurfaces) {
     std::mt19937 random(test::seed());
     Context context;
     for (int round = 0; round < 12; ++round) {
         std::uniform_real_distribution<double> between(0, 1);
-        const double amplitude = 0.02 + 2 * between(random), wave = 3 + 20 * between(random), slope = 0.4 * between(random),
-                     step = round % 2 ? 3.0 : 0.0, noise = round % 3 == 0 ? 0.002 : 0.0;
+        const double amplitude = 0.02 + 2 * between(random), wave = 3 + 20 * between(random),
+                     slope = 0.4 * between(random), step = round % 2 ? 3.0 : 0.0,
+                     noise = round % 3 == 0 ? 0.002 : 0.0;
         std::vector<double> rough(64 * 64);
         for (double& r : rough) r = between(random);
         const Mesh mesh = test::height_field(context, 48, 0.5, [&](double x, double y) {
-            return 8 + amplitude * std::sin(x / wave * 6.28) * std::cos(y / wave * 6.28) + slope * x + (x > 3 ? step : 0.0) +
-                   noise * rough[static_cast<std::size_t>(std::lround(2 * x + 24) * 64 + std::lround(2 * y + 24))];
+            return 8 + amplitude * std::sin(x / wave * 6.28) * std::cos(y / wave * 6.28) + slope * x +
+                   (x > 3 ? step : 0.0) +
+                   noise * rough[static_cast<std::size_t>(std::lround(2 * x + 24) * 64 +
+                                                          std::lround(2 * y + 24))];
         });
         std::size_t before = mesh.facets.size();
         for (const double tolerance : {0.001, 0.01, 0.1}) {
@@ -99,12 +104,15 @@ TEST(Simplify, OwnModelsStayTheyAre) {
     }
 }
 
-// A thousandth of a millimetre in height moves the section of a surface that is nearly level by far more, so there nothing moves.
+// A thousandth of a millimetre in height moves the section of a surface that is nearly level by far more, so
+// there nothing moves.
 TEST(Simplify, SectionsOfNearlyLevelSurfacesStay) {
     Context context;
-    const Mesh mesh = test::height_field(context, 64, 0.5, [](double x, double y) { return 10 - 0.002 * x * x - 0.001 * y * y; });
+    const Mesh mesh = test::height_field(
+        context, 64, 0.5, [](double x, double y) { return 10 - 0.002 * x * x - 0.001 * y * y; });
     const std::vector<double> planes{9.3, 9.8};
-    const Mesh kept = simplify(context, mesh.view(), 0.02, planes), moved = simplify(context, mesh.view(), 0.02);
+    const Mesh kept = simplify(context, mesh.view(), 0.02, planes),
+               moved = simplify(context, mesh.view(), 0.02);
     EXPECT_LT(kept.facets.size(), mesh.facets.size() * 9 / 10);
     double most = 0;
     for (const double z : planes) {
@@ -116,12 +124,16 @@ TEST(Simplify, SectionsOfNearlyLevelSurfacesStay) {
     EXPECT_GT(most, 0.01);
 }
 
-// A tetrahedron has nothing to spare; two that touch at a vertex or along an edge are not torn, joined or turned inside out.
+// A tetrahedron has nothing to spare; two that touch at a vertex or along an edge are not torn, joined or
+// turned inside out.
 TEST(Simplify, KeepsSmallAndTouchingBodies) {
     Context context;
     const Vec3f o{0, 0, 0}, x{4, 0, 0}, y{0, 4, 0}, z{0, 0, 4}, u{-4, 0, 0}, v{0, -4, 0};
-    auto body = [](Vec3f a, Vec3f b, Vec3f c, Vec3f d) { return std::vector<Facet>{{a, c, b}, {a, b, d}, {b, c, d}, {c, a, d}}; };
-    const std::vector<Facet> one = body(o, x, y, z), at_edge = body(o, u, v, z);  // both have the edge from o to z
+    auto body = [](Vec3f a, Vec3f b, Vec3f c, Vec3f d) {
+        return std::vector<Facet>{{a, c, b}, {a, b, d}, {b, c, d}, {c, a, d}};
+    };
+    const std::vector<Facet> one = body(o, x, y, z),
+                             at_edge = body(o, u, v, z);  // both have the edge from o to z
     std::vector<Facet> both = one;
     both.insert(both.end(), at_edge.begin(), at_edge.end());
     for (const auto& facets : {one, both}) {
@@ -169,7 +181,8 @@ TEST(Simplify, SameOnAnyThreadsAndInAnyOrderClosed) {
     std::shuffle(facets.begin(), facets.end(), std::mt19937(test::seed()));
     const Mesh shuffled = simplify(one, weld(one, facets).view(), 0.001);
     EXPECT_TRUE(test::closed(shuffled.view()));
-    EXPECT_NEAR(static_cast<double>(shuffled.facets.size()), static_cast<double>(a.facets.size()), 0.05 * static_cast<double>(a.facets.size()));
+    EXPECT_NEAR(static_cast<double>(shuffled.facets.size()), static_cast<double>(a.facets.size()),
+                0.05 * static_cast<double>(a.facets.size()));
 }
 
 TEST(Simplify, RefusesAndCancels) {

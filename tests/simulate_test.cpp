@@ -1,4 +1,5 @@
-// The simulator on a part whose programs are written by hand: the good ones pass, and each corruption is reported as what it is.
+// The simulator on a part whose programs are written by hand: the good ones pass, and each corruption is
+// reported as what it is.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,7 +21,8 @@ struct Solid {
     Mesh mesh;
     void quad(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
         for (const auto* t : {&a, &b, &c, &a, &c, &d}) {
-            mesh.vertices.push_back({static_cast<float>((*t)[0]), static_cast<float>((*t)[1]), static_cast<float>((*t)[2])});
+            mesh.vertices.push_back(
+                {static_cast<float>((*t)[0]), static_cast<float>((*t)[1]), static_cast<float>((*t)[2])});
             if (mesh.vertices.size() % 3 == 0) {
                 const auto n = static_cast<std::uint32_t>(mesh.vertices.size());
                 mesh.facets.push_back({n - 3, n - 2, n - 1});
@@ -53,12 +55,15 @@ struct Writer {
         return *this;
     }
     /// From wherever the machine stands to over (x, y).
-    Writer& start(double x, double y, double clearance) { return to(kUnknown, kUnknown, clearance).to(x, y, clearance); }
+    Writer& start(double x, double y, double clearance) {
+        return to(kUnknown, kUnknown, clearance).to(x, y, clearance);
+    }
 };
 
 constexpr double kClear = 25;
 
-/// A 20 × 20 × 10 block in a 40 × 40 × 12 slab: faced by a 60 mm face mill, then cleared by a 10 mm flat end mill in rectangles.
+/// A 20 × 20 × 10 block in a 40 × 40 × 12 slab: faced by a 60 mm face mill, then cleared by a 10 mm flat end
+/// mill in rectangles.
 struct Block {
     Solid solid;
     SimulationInput input;
@@ -68,9 +73,10 @@ struct Block {
         solid.box({0, 0, 0}, {20, 20, two_layers ? 20.0 : 10.0});
         input.stock_min = {-10, -10};
         input.stock_max = {30, 30};
-        input.tools = {{1, ToolKind::face, "face", 60, 20, 20, 60, 60, 4, 0.0, 12000, 9000, 1000, 0.1, 4.0, 0.6},
-                       {2, ToolKind::flat, "flat", 10, 32, 10, 50, 40, 2, 0.5, 18000, 9000, 1500, 1, 6, 0.5},
-                       {3, ToolKind::ball, "ball", 6, 30, 6, 45, 32, 2, 0.5, 18000, 9000, 1500, 1, 3, 0.5}};
+        input.tools = {
+            {1, ToolKind::face, "face", 60, 20, 20, 60, 60, 4, 0.0, 12000, 9000, 1000, 0.1, 4.0, 0.6},
+            {2, ToolKind::flat, "flat", 10, 32, 10, 50, 40, 2, 0.5, 18000, 9000, 1500, 1, 6, 0.5},
+            {3, ToolKind::ball, "ball", 6, 30, 6, 45, 32, 2, 0.5, 18000, 9000, 1500, 1, 3, 0.5}};
         options.cell = 0.25;
         add_layer(0);
         if (two_layers) add_layer(10);
@@ -180,7 +186,8 @@ TEST(Simulate, AShiftOfTwentyMicrometresIsCaughtWhereNoCellSees) {
     EXPECT_EQ(codes(fine.run()), "") << "within the tolerance";
 }
 
-// A program that lets the machine round its corners is held against the part as far as that may take the cutter.
+// A program that lets the machine round its corners is held against the part as far as that may take the
+// cutter.
 TEST(Simulate, RoundedCornersAreHeldAgainstThePart) {
     Block block;
     block.rough().strays = kJunction;
@@ -202,7 +209,8 @@ TEST(Simulate, RoundedCornersAreHeldAgainstThePart) {
 TEST(Simulate, DroppedRetractIsARapidThroughStock) {
     Block block;
     auto& steps = block.rough().steps;
-    // The first level's retract and the way back, at depth: from inside the cleared ring straight across the block's corner.
+    // The first level's retract and the way back, at depth: from inside the cleared ring straight across the
+    // block's corner.
     for (std::size_t i = 0; i < steps.size(); ++i)
         if (steps[i].rapid() && i > 3 && steps[i].z == kClear) {
             steps[i].z = 5;
@@ -269,7 +277,8 @@ TEST(Simulate, SpindleFlutesShankHolder) {
 
     Block shank;
     shank.input.tools[1].flute_length = 6;
-    shank.input.tools[1].shank_diameter = 12;  // on the lower level it begins at 6, and stands 1 mm into the block's wall
+    shank.input.tools[1].shank_diameter =
+        12;  // on the lower level it begins at 6, and stands 1 mm into the block's wall
     const SimulationReport s = shank.run();
     ASSERT_NE(find(s, "contact.shank"), nullptr) << codes(s);
     EXPECT_NEAR(find(s, "contact.shank")->size, 1, 1e-4);
@@ -281,7 +290,8 @@ TEST(Simulate, SpindleFlutesShankHolder) {
     EXPECT_NE(find(h, "contact.holder"), nullptr) << codes(h);
 }
 
-// Two levels of 5 mm whose rims lie `apart` mm from each other beside the wall at y = 0; the lower one's is just past the points at y = −0.25.
+// Two levels of 5 mm whose rims lie `apart` mm from each other beside the wall at y = 0; the lower one's is
+// just past the points at y = −0.25.
 SimulationReport two_levels(double apart) {
     Block block;
     block.options.cell = 0.5;
@@ -291,7 +301,8 @@ SimulationReport two_levels(double apart) {
     return block.run();
 }
 
-// A cutter's rim that meets the centres of a row, on one level and not on the one above, has cut a micrometre there and no whole row.
+// A cutter's rim that meets the centres of a row, on one level and not on the one above, has cut a micrometre
+// there and no whole row.
 TEST(Simulate, ARimOnARowOfPointsIsNoDeepCut) {
     const SimulationReport r = two_levels(0.002);
     EXPECT_EQ(find(r, "cut.too_deep"), nullptr) << codes(r);
@@ -350,16 +361,19 @@ TEST(Simulate, BoardAndLayersBelow) {
 }
 
 TEST(Simulate, WhatNoToolReachesIsExcusedAndTheRestIsNot) {
-    // A second block beside the first makes a slot of 4 mm: no tool enters it. The rectangles run outside both.
+    // A second block beside the first makes a slot of 4 mm: no tool enters it. The rectangles run outside
+    // both.
     Block slot;
     slot.solid = {};
     slot.solid.box({0, 0, 0}, {8, 20, 10});
     slot.solid.box({12, 0, 0}, {20, 20, 10});
     slot.input.tools.pop_back();  // the ball would dip into it
     SimulationReport r = slot.run();
-    EXPECT_EQ(codes(r), "") << r.layers[0].missed_left.where[0] << " " << r.layers[0].missed_left.where[1] << " " << r.layers[0].missed_left.where[2];
+    EXPECT_EQ(codes(r), "") << r.layers[0].missed_left.where[0] << " " << r.layers[0].missed_left.where[1]
+                            << " " << r.layers[0].missed_left.where[2];
     EXPECT_NEAR(static_cast<double>(r.layers[0].unreachable) * 0.0625, 80, 12);
-    EXPECT_NEAR(r.layers[0].unreachable_left.size, 2, 0.2);  // the middle of the slot is 2 mm from either wall
+    EXPECT_NEAR(r.layers[0].unreachable_left.size, 2,
+                0.2);  // the middle of the slot is 2 mm from either wall
     // A slot of 7 mm lets the ball in: that it was left is the plan's fault.
     Block wide;
     wide.solid = {};
@@ -374,8 +388,9 @@ TEST(Simulate, WhatNoToolReachesIsExcusedAndTheRestIsNot) {
     wide.input.tools[2].stickout = 2;
     r = wide.run();
     EXPECT_LT(r.layers[0].missed_left.size, 3.0);
-    // Even beside the wall some of the stock can still be taken: the tip stays above 8, and a centre between x = 9.328, where the ball
-    // clears the wall's edge, and 9.366 covers the point 0.09 mm below the cell at 6.625.
+    // Even beside the wall some of the stock can still be taken: the tip stays above 8, and a centre between
+    // x = 9.328, where the ball clears the wall's edge, and 9.366 covers the point 0.09 mm below the cell
+    // at 6.625.
     EXPECT_EQ(r.layers[0].unreachable, 0u);
     // With the holder 0.5 mm above the tip it would need x ≥ 8.158 and x ≤ 8.120.
     wide.input.tools[2].stickout = 0.5;
@@ -385,7 +400,8 @@ TEST(Simulate, WhatNoToolReachesIsExcusedAndTheRestIsNot) {
 }
 
 TEST(Simulate, InnerCornersLeaveARoundThatIsExcused) {
-    // An L: its inner corner keeps a round of the end mill's radius 5 (or the ball's 3, which the plan did not use: missed).
+    // An L: its inner corner keeps a round of the end mill's radius 5 (or the ball's 3, which the plan did
+    // not use: missed).
     Block ell;
     ell.solid = {};
     ell.solid.box({0, 0, 0}, {20, 10, 10});
@@ -393,7 +409,12 @@ TEST(Simulate, InnerCornersLeaveARoundThatIsExcused) {
     Writer corner("L1_03", 0, 2, OperationKind::rough);
     corner.start(25, 25, kClear);
     for (const double z : {5.0, 0.0})
-        corner.to(25, 25, z).to(25, 15, z, 3000).to(15, 15, z, 3000).to(15, 25, z, 3000).to(15, 25, kClear).to(25, 25, kClear);
+        corner.to(25, 25, z)
+            .to(25, 15, z, 3000)
+            .to(15, 15, z, 3000)
+            .to(15, 25, z, 3000)
+            .to(15, 25, kClear)
+            .to(25, 25, kClear);
     ell.input.programs.push_back(corner.p);
     SimulationReport r = ell.run();
     EXPECT_GT(r.layers[0].missed, 0u) << "the ball gets deeper into the corner";
@@ -404,8 +425,8 @@ TEST(Simulate, InnerCornersLeaveARoundThatIsExcused) {
     EXPECT_NEAR(r.layers[0].unreachable_left.size, 5 * (1 - std::sqrt(0.5)), 0.3);
 }
 
-// The stock measured at its cells can show no deeper gouge than the exact check of all motions, but for the sheet under a layer's top
-// and the stock's float.
+// The stock measured at its cells can show no deeper gouge than the exact check of all motions, but for the
+// sheet under a layer's top and the stock's float.
 TEST(Simulate, NoCellIsGougedDeeperThanTheExactCheckSays) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
@@ -416,13 +437,16 @@ TEST(Simulate, NoCellIsGougedDeeperThanTheExactCheckSays) {
         block.solid = {};
         // Walls that lean inwards or outwards, over both layers, and one with an undercut below it.
         for (int k = 0; k < 3; ++k) {
-            const double x = uniform(0, 12), y = uniform(0, 12), w = uniform(3, 8), lean = uniform(-2, 2), z0 = k == 2 ? uniform(3, 12) : 0;
+            const double x = uniform(0, 12), y = uniform(0, 12), w = uniform(3, 8), lean = uniform(-2, 2),
+                         z0 = k == 2 ? uniform(3, 12) : 0;
             const double z1 = k == 0 ? 20 : uniform(z0 + 1, 20);
-            const std::array<Point3, 8> c{Point3{x, y, z0},  {x + w, y, z0},        {x + w, y + w, z0},        {x, y + w, z0},
-                                          {x + lean, y, z1}, {x + w + lean, y, z1}, {x + w + lean, y + w, z1}, {x + lean, y + w, z1}};
+            const std::array<Point3, 8> c{
+                Point3{x, y, z0},  {x + w, y, z0},        {x + w, y + w, z0},        {x, y + w, z0},
+                {x + lean, y, z1}, {x + w + lean, y, z1}, {x + w + lean, y + w, z1}, {x + lean, y + w, z1}};
             block.solid.quad(c[0], c[3], c[2], c[1]);
             block.solid.quad(c[4], c[5], c[6], c[7]);
-            for (std::size_t i = 0; i < 4; ++i) block.solid.quad(c[i], c[(i + 1) % 4], c[4 + (i + 1) % 4], c[4 + i]);
+            for (std::size_t i = 0; i < 4; ++i)
+                block.solid.quad(c[i], c[(i + 1) % 4], c[4 + (i + 1) % 4], c[4 + i]);
         }
         block.input.programs.clear();
         Context context;
@@ -433,23 +457,29 @@ TEST(Simulate, NoCellIsGougedDeeperThanTheExactCheckSays) {
             const double top = 10.0 * layer + 10;
             for (int k = 0; k < 30; ++k) {
                 // A cut lowered until it is as deep in the part as it should be, or at the bottom.
-                Point3 from{uniform(-3, 23), uniform(-3, 23), 0}, to{uniform(-3, 23), uniform(-3, 23), uniform(-1, 1)};
+                Point3 from{uniform(-3, 23), uniform(-3, 23), 0},
+                    to{uniform(-3, 23), uniform(-3, 23), uniform(-1, 1)};
                 const double wanted = uniform(0.005, 0.4);
                 double low = 10.0 * layer - (ball ? 2 : 0) + 1, high = top + 2;
                 for (int i = 0; i < 24; ++i) {
                     const double z = (low + high) / 2;
                     const Point3 a{from[0], from[1], z}, b{to[0], to[1], z + to[2]};
-                    const double depth = ball ? part.ball(top, a, b, 3, 0).depth : part.cylinder(top, a, b, 5, 0).depth;
+                    const double depth =
+                        ball ? part.ball(top, a, b, 3, 0).depth : part.cylinder(top, a, b, 5, 0).depth;
                     (depth > wanted ? low : high) = z;
                 }
-                cuts.to(from[0], from[1], kClear).to(from[0], from[1], high, 3000).to(to[0], to[1], high + to[2], 3000).to(to[0], to[1], kClear);
+                cuts.to(from[0], from[1], kClear)
+                    .to(from[0], from[1], high, 3000)
+                    .to(to[0], to[1], high + to[2], 3000)
+                    .to(to[0], to[1], kClear);
             }
             block.input.programs.push_back(cuts.p);
         }
         block.options.cell = uniform(0.25, 0.5);
         const SimulationReport r = block.run();
-        // A point that is d deep in the part and in a ball has, d towards the ball's centre, part that is d deep in the ball. In a
-        // cylinder the depth is the lesser of those from wall and floor, so at its rim d is √2 times the depth.
+        // A point that is d deep in the part and in a ball has, d towards the ball's centre, part that is d
+        // deep in the ball. In a cylinder the depth is the lesser of those from wall and floor, so at its rim
+        // d is √2 times the depth.
         const double bound = (ball ? 1 : std::sqrt(2.0)) * r.gouge_max + StandingPart::kSheet + 1e-5;
         ASSERT_LT(r.gouge_max, 1);
         for (const LayerFindings& l : r.layers) {
@@ -466,7 +496,8 @@ TEST(Simulate, NoCellIsGougedDeeperThanTheExactCheckSays) {
             EXPECT_EQ(a.gouge_cells, b.gouge_cells);
             float deepest = 0;
             std::uint64_t deep = 0;
-            for (const float over : b.map) deepest = std::max(deepest, -over), deep += -over > block.options.gouge;
+            for (const float over : b.map)
+                deepest = std::max(deepest, -over), deep += -over > block.options.gouge;
             EXPECT_EQ(a.gouge_cells, deep) << "trial " << trial;
             EXPECT_EQ(static_cast<float>(a.gouge.size), deepest) << "trial " << trial;
         }
@@ -478,7 +509,8 @@ TEST(Simulate, NoCellIsGougedDeeperThanTheExactCheckSays) {
 TEST(Simulate, ArcsCutWhatTheirChordsCut) {
     std::string text = "T3 M6\nG21 G17 G90\nS12000 M3\nG0 X-5 Y-5 Z25\nZ7\nF3000\n";
     for (const char* z : {"7", "4", "1"})
-        text += std::string("G1 Z") + z + "\nG2 X25 Y25 I15 J15\nG3 X-5 Y-5 I-30 J0\nG2 X-5 Y-5 I4 J2\nG3 X-8 Y20 R40\nG1 X-5 Y-5\n";
+        text += std::string("G1 Z") + z +
+                "\nG2 X25 Y25 I15 J15\nG3 X-5 Y-5 I-30 J0\nG2 X-5 Y-5 I4 J2\nG3 X-8 Y20 R40\nG1 X-5 Y-5\n";
     text += "G0 Z25\nM5\nM2\n";
     Block block;
     Program p = read_gcode(text, "arcs");
@@ -489,7 +521,8 @@ TEST(Simulate, ArcsCutWhatTheirChordsCut) {
     block.rough().arcs.clear();
     const SimulationReport chords = block.run(1);
     EXPECT_GT(arcs.programs[1].removed_mm3, 1000);
-    EXPECT_NEAR(arcs.programs[1].removed_mm3, chords.programs[1].removed_mm3, 1e-4 * chords.programs[1].removed_mm3);
+    EXPECT_NEAR(arcs.programs[1].removed_mm3, chords.programs[1].removed_mm3,
+                1e-4 * chords.programs[1].removed_mm3);
     EXPECT_NEAR(arcs.layers[0].gouge.size, chords.layers[0].gouge.size, 0.002);
     EXPECT_NEAR(arcs.layers[0].left_rms, chords.layers[0].left_rms, 0.002);
     EXPECT_EQ(arcs.gouge_max, chords.gouge_max);
@@ -513,8 +546,10 @@ TEST(Simulate, ArcsCutWhatTheirChordsCut) {
 // An arc is seen to leave the machine's travel though both its ends lie within it, and by how much.
 TEST(Simulate, ArcsBulgeBeyondTheTravel) {
     Block block;
-    Program p = read_gcode("T3 M6\nG21 G17 G90\nS12000 M3\nG0 X-200 Y-150 Z25\nF3000\nG3 X-200 Y-350 I100 J-100\nG0 X0\nM5\nM2\n", "arcs",
-                           {.level_arc_error = 50});
+    Program p = read_gcode(
+        "T3 M6\nG21 G17 G90\nS12000 M3\nG0 X-200 Y-150 Z25\nF3000\nG3 X-200 Y-350 I100 J-100\nG0 "
+        "X0\nM5\nM2\n",
+        "arcs", {.level_arc_error = 50});
     ASSERT_EQ(p.arcs.size(), 1u);
     ASSERT_EQ(p.arcs[0].end - p.arcs[0].begin, 1u) << "its steps do not show where it bulges";
     p.file = "L1_02", p.planned_tool = 3, p.kind = OperationKind::finish;
@@ -531,13 +566,16 @@ TEST(Simulate, ArcsBulgeBeyondTheTravel) {
 
 TEST(Simulate, FlaskMustStay) {
     Block block;
-    for (const auto& loop : {std::array<Point2, 4>{Point2{-95000, -95000}, {295000, -95000}, {295000, 295000}, {-95000, 295000}},
-                             std::array<Point2, 4>{Point2{-70000, -70000}, {-70000, 270000}, {270000, 270000}, {270000, -70000}}}) {
+    for (const auto& loop :
+         {std::array<Point2, 4>{Point2{-95000, -95000}, {295000, -95000}, {295000, 295000}, {-95000, 295000}},
+          std::array<Point2, 4>{
+              Point2{-70000, -70000}, {-70000, 270000}, {270000, 270000}, {270000, -70000}}}) {
         for (const Point2 p : loop) block.input.layers[0].flask.points.push_back(p);
         block.input.layers[0].flask.close_loop();
     }
     const SimulationReport r = block.run();
-    // The roughing cutter runs out over the flask's whole height: its radius deep in the wall, and all of the stock there.
+    // The roughing cutter runs out over the flask's whole height: its radius deep in the wall, and all of the
+    // stock there.
     double wall = 0, stock = 0;
     for (const Violation& v : r.violations)
         if (v.code == "gouge.flask") (v.file.empty() ? stock : wall) = v.size;
@@ -583,7 +621,8 @@ TEST(Simulate, TimeInClosedForm) {
     EXPECT_NEAR(program_seconds(p, m), 2 * leg, 1e-9);
     p.blend = 0.1;
     const double w = std::sqrt(1000 * 0.1 * c / (1 - c));
-    EXPECT_NEAR(program_seconds(p, m), 2 * (50.0 / 100 + (100.0 * 100 + (100 - w) * (100 - w)) / (2 * 1000 * 100)), 1e-9);
+    EXPECT_NEAR(program_seconds(p, m),
+                2 * (50.0 / 100 + (100.0 * 100 + (100 - w) * (100 - w)) / (2 * 1000 * 100)), 1e-9);
     p.blend = 0;  // exactly by the corner: a stop
     EXPECT_NEAR(program_seconds(p, m), 2 * (0.5 + 0.1), 1e-9);
 }

@@ -1,5 +1,6 @@
-// Sections against brute force: closed on closed adjacency at every height, the right area from each side, the same bits on
-// any number of threads. Adjacency is built here, edge by edge, so that nothing of the mesh kernel is trusted.
+// Sections against brute force: closed on closed adjacency at every height, the right area from each side,
+// the same bits on any number of threads. Adjacency is built here, edge by edge, so that nothing of the mesh
+// kernel is trusted.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,14 +31,16 @@ std::mt19937_64 random_of(std::uint64_t seed) {
 
 /// Pairs edges one for one in opposite directions, in the order of the facets.
 void pair_by_brute_force(Mesh& mesh) {
-    std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::pair<std::uint32_t, std::uint32_t>>> waiting;
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::pair<std::uint32_t, std::uint32_t>>>
+        waiting;
     mesh.neighbours.assign(mesh.facets.size(), {kNoFacet, kNoFacet, kNoFacet});
     for (std::uint32_t f = 0; f < mesh.facets.size(); ++f) {
         for (std::uint32_t k = 0; k < 3; ++k) {
             const std::uint32_t a = mesh.facets[f][k], b = mesh.facets[f][(k + 1) % 3];
             if (a == b) continue;
             auto& others = waiting[{b, a}];
-            const auto other = std::find_if(others.begin(), others.end(), [&](const auto& o) { return o.first != f; });
+            const auto other =
+                std::find_if(others.begin(), others.end(), [&](const auto& o) { return o.first != f; });
             if (other == others.end()) {
                 waiting[{a, b}].push_back({f, k});
                 continue;
@@ -82,7 +85,8 @@ struct Builder {
     }
 };
 
-/// Tetrahedra and flat-ended wedges with heights on a coarse grid: many vertices, edges and facets lie in the planes.
+/// Tetrahedra and flat-ended wedges with heights on a coarse grid: many vertices, edges and facets lie in the
+/// planes.
 Mesh random_tetrahedra(std::mt19937_64& random, int count, double reach) {
     Builder builder;
     std::uniform_real_distribution<double> place(-reach, reach), size(-20, 20);
@@ -105,12 +109,15 @@ Mesh random_tetrahedra(std::mt19937_64& random, int count, double reach) {
     return builder.shuffled(random);
 }
 
-/// A height field over n × n quads with heights on a grid of 0.5: plateaus, pits, saddles, ridges, all in the planes.
+/// A height field over n × n quads with heights on a grid of 0.5: plateaus, pits, saddles, ridges, all in the
+/// planes.
 Mesh random_relief(std::mt19937_64& random, int n, double pitch, double x0) {
     Builder builder;
     std::vector<double> z(static_cast<std::size_t>((n + 1) * (n + 1)));
     for (double& h : z) h = 0.5 + 0.5 * static_cast<double>(random() % 6);
-    auto top = [&](int i, int j) { return builder.vertex(x0 + i * pitch, j * pitch, z[static_cast<std::size_t>(j * (n + 1) + i)]); };
+    auto top = [&](int i, int j) {
+        return builder.vertex(x0 + i * pitch, j * pitch, z[static_cast<std::size_t>(j * (n + 1) + i)]);
+    };
     auto bottom = [&](int i, int j) { return builder.vertex(x0 + i * pitch, j * pitch, 0); };
     for (int j = 0; j < n; ++j) {
         for (int i = 0; i < n; ++i) {
@@ -132,21 +139,25 @@ Mesh random_relief(std::mt19937_64& random, int n, double pitch, double x0) {
 Mesh random_boxes(std::mt19937_64& random, int count) {
     Builder builder;
     for (int b = 0; b < count; ++b) {
-        const double x = static_cast<double>(random() % 8), y = static_cast<double>(random() % 8), z = 0.5 * static_cast<double>(random() % 8);
-        builder.box(x, y, z, x + 1 + static_cast<double>(random() % 3), y + 1 + static_cast<double>(random() % 3),
+        const double x = static_cast<double>(random() % 8), y = static_cast<double>(random() % 8),
+                     z = 0.5 * static_cast<double>(random() % 8);
+        builder.box(x, y, z, x + 1 + static_cast<double>(random() % 3),
+                    y + 1 + static_cast<double>(random() % 3),
                     z + 0.5 + 0.5 * static_cast<double>(random() % 4));
     }
     return builder.shuffled(random);
 }
 
-/// Degenerate facets that closed meshes carry: a sliver without area between two neighbours, and one with two equal corners.
+/// Degenerate facets that closed meshes carry: a sliver without area between two neighbours, and one with two
+/// equal corners.
 Mesh with_degenerate_facets(Mesh mesh, std::mt19937_64& random) {
     const std::size_t facets = mesh.facets.size();
     for (std::size_t f = 0; f < facets; ++f) {
         if (random() % 3 != 0) continue;
         const auto [a, b, c] = mesh.facets[f];
         if (random() % 2) {
-            // The edge ab gets a point of a twice over: (a, b, c) becomes (m, b, c), (a, m, c), and the sliver (a, b, m) between.
+            // The edge ab gets a point of a twice over: (a, b, c) becomes (m, b, c), (a, m, c), and the
+            // sliver (a, b, m) between.
             const Vec3f &p = mesh.vertices[a], &q = mesh.vertices[b];
             const auto m = static_cast<std::uint32_t>(mesh.vertices.size());
             mesh.vertices.push_back({(p.x + q.x) / 2, (p.y + q.y) / 2, (p.z + q.z) / 2});
@@ -161,8 +172,8 @@ Mesh with_degenerate_facets(Mesh mesh, std::mt19937_64& random) {
     return mesh;
 }
 
-/// Area of the section in mm² by another way: each facet's segment from its own three corners in double, oriented by the facet's normal;
-/// z must be at no vertex.
+/// Area of the section in mm² by another way: each facet's segment from its own three corners in double,
+/// oriented by the facet's normal; z must be at no vertex.
 double brute_area(const Mesh& mesh, double z) {
     double sum = 0;
     for (const Index3& facet : mesh.facets) {
@@ -178,10 +189,10 @@ double brute_area(const Mesh& mesh, double z) {
         }
         if (n != 2) continue;
         const Vec3f &a = mesh.vertices[facet[0]], &b = mesh.vertices[facet[1]], &c = mesh.vertices[facet[2]];
-        const double nx =
-            (static_cast<double>(b.y) - a.y) * (static_cast<double>(c.z) - a.z) - (static_cast<double>(b.z) - a.z) * (static_cast<double>(c.y) - a.y);
-        const double ny =
-            (static_cast<double>(b.z) - a.z) * (static_cast<double>(c.x) - a.x) - (static_cast<double>(b.x) - a.x) * (static_cast<double>(c.z) - a.z);
+        const double nx = (static_cast<double>(b.y) - a.y) * (static_cast<double>(c.z) - a.z) -
+                          (static_cast<double>(b.z) - a.z) * (static_cast<double>(c.y) - a.y);
+        const double ny = (static_cast<double>(b.z) - a.z) * (static_cast<double>(c.x) - a.x) -
+                          (static_cast<double>(b.x) - a.x) * (static_cast<double>(c.z) - a.z);
         // Solid on the left: outside, the normal, on the right of the segment.
         const double right = (y[1] - y[0]) * nx - (x[1] - x[0]) * ny;
         sum += (right >= 0 ? 0.5 : -0.5) * (x[0] * y[1] - x[1] * y[0]);
@@ -189,9 +200,11 @@ double brute_area(const Mesh& mesh, double z) {
     return sum;
 }
 
-/// The limit at `z` from the side of `step`, where no vertex lies in (z, z + 3 step]: there the area is a parabola in z.
+/// The limit at `z` from the side of `step`, where no vertex lies in (z, z + 3 step]: there the area is a
+/// parabola in z.
 double brute_limit(const Mesh& mesh, double z, double step) {
-    return 3 * brute_area(mesh, z + step) - 3 * brute_area(mesh, z + 2 * step) + brute_area(mesh, z + 3 * step);
+    return 3 * brute_area(mesh, z + step) - 3 * brute_area(mesh, z + 2 * step) +
+           brute_area(mesh, z + 3 * step);
 }
 
 double perimeter(const Loops& loops) {
@@ -216,19 +229,23 @@ void expect_clean(const Section& section) {
     }
 }
 
-/// Every height of a vertex from both sides, and heights between: closed, clean, and of the area that brute force finds.
-/// `reach` in mm bounds |x| and |y|; dropped slivers and rounding may cost what a 0.1 µm ribbon along all segments holds.
+/// Every height of a vertex from both sides, and heights between: closed, clean, and of the area that brute
+/// force finds. `reach` in mm bounds |x| and |y|; dropped slivers and rounding may cost what a 0.1 µm ribbon
+/// along all segments holds.
 void expect_sections_right(const Mesh& mesh, double between) {
     Context context({.threads = 2});
     std::set<double> heights;
     for (const Vec3f& v : mesh.vertices) heights.insert(v.z);
     std::vector<Plane> planes;
     for (const double z : heights)
-        for (const Plane plane : {Plane{z, Side::above}, Plane{z, Side::below}, Plane{z + between, Side::above}}) planes.push_back(plane);
+        for (const Plane plane :
+             {Plane{z, Side::above}, Plane{z, Side::below}, Plane{z + between, Side::above}})
+            planes.push_back(plane);
     std::vector<double> expected;
     std::vector<double> list(heights.begin(), heights.end());
     for (std::size_t i = 0; i < list.size(); ++i) {
-        const double up = i + 1 < list.size() ? (list[i + 1] - list[i]) / 3.5 : 1.0, down = i > 0 ? (list[i] - list[i - 1]) / 3.5 : 1.0;
+        const double up = i + 1 < list.size() ? (list[i + 1] - list[i]) / 3.5 : 1.0,
+                     down = i > 0 ? (list[i] - list[i - 1]) / 3.5 : 1.0;
         expected.push_back(brute_limit(mesh, list[i], up));
         expected.push_back(brute_limit(mesh, list[i], -down));
         expected.push_back(brute_area(mesh, list[i] + between));
@@ -242,7 +259,8 @@ void expect_sections_right(const Mesh& mesh, double between) {
         EXPECT_EQ(sections[i].closed_gaps, 0u);
         expect_clean(sections[i]);
         const double tolerance = 1e-4 * (perimeter(sections[i].loops) + 1) + 1e-6 * std::abs(expected[i]);
-        EXPECT_NEAR(area(sections[i].loops), expected[i], tolerance) << "z " << planes[i].z << (planes[i].side == Side::above ? " above" : " below");
+        EXPECT_NEAR(area(sections[i].loops), expected[i], tolerance)
+            << "z " << planes[i].z << (planes[i].side == Side::above ? " above" : " below");
         met += std::abs(expected[i]);
     }
     EXPECT_GT(met, 0);
@@ -256,7 +274,8 @@ void expect_sections_right(const Mesh& mesh, double between) {
     for (std::size_t i = 0; i < list.size(); ++i) {
         for (std::size_t side = 0; side < 2; ++side) {
             const double z = near[2 * i + side].z;
-            EXPECT_NEAR(area(limits[2 * i + side].loops), brute_area(mesh, z), 1e-4 * (perimeter(limits[2 * i + side].loops) + 1));
+            EXPECT_NEAR(area(limits[2 * i + side].loops), brute_area(mesh, z),
+                        1e-4 * (perimeter(limits[2 * i + side].loops) + 1));
             EXPECT_TRUE(limits[2 * i + side].open_chains.empty());
         }
     }
@@ -287,7 +306,8 @@ TEST(Slicing, HolesRunClockwiseAndAreNested) {
     builder.box(0, 0, 0, 10, 10, 10);
     const std::size_t outer = builder.mesh.facets.size();
     builder.box(2, 2, 2, 8, 8, 8);
-    for (std::size_t f = outer; f < builder.mesh.facets.size(); ++f) std::swap(builder.mesh.facets[f][1], builder.mesh.facets[f][2]);
+    for (std::size_t f = outer; f < builder.mesh.facets.size(); ++f)
+        std::swap(builder.mesh.facets[f][1], builder.mesh.facets[f][2]);
     builder.box(4, 4, 4, 6, 6, 6);
     pair_by_brute_force(builder.mesh);
     Context context;
@@ -305,7 +325,8 @@ TEST(Slicing, HolesRunClockwiseAndAreNested) {
 
 TEST(Slicing, TetrahedraAgreeWithBruteForce) {
     auto random = random_of(11);
-    for (int round = 0; round < 40; ++round) expect_sections_right(random_tetrahedra(random, 1 + round, 100), 0.13);
+    for (int round = 0; round < 40; ++round)
+        expect_sections_right(random_tetrahedra(random, 1 + round, 100), 0.13);
 }
 
 TEST(Slicing, TetrahedraPastOneMetreAgreeWithBruteForce) {
@@ -315,7 +336,8 @@ TEST(Slicing, TetrahedraPastOneMetreAgreeWithBruteForce) {
 
 TEST(Slicing, ReliefsAgreeWithBruteForce) {
     auto random = random_of(13);
-    for (int round = 0; round < 12; ++round) expect_sections_right(random_relief(random, 4 + 2 * round, 1.7, round % 2 ? 1900 : -3), 0.23);
+    for (int round = 0; round < 12; ++round)
+        expect_sections_right(random_relief(random, 4 + 2 * round, 1.7, round % 2 ? 1900 : -3), 0.23);
 }
 
 TEST(Slicing, BoxesAgreeWithBruteForce) {
@@ -347,7 +369,8 @@ TEST(Slicing, BoxSectionsAreTheSumOfTheBoxes) {
         double expected = 0;
         for (const Box& box : boxes) {
             const double z = planes[i].z;
-            if (planes[i].side == Side::above ? box.z0 <= z && z < box.z1 : box.z0 < z && z <= box.z1) expected += box.area;
+            if (planes[i].side == Side::above ? box.z0 <= z && z < box.z1 : box.z0 < z && z <= box.z1)
+                expected += box.area;
         }
         EXPECT_EQ(area(sections[i].loops), expected) << i;
     }
@@ -361,11 +384,15 @@ TEST(Slicing, DegenerateFacetsDoNotBreakLoops) {
     }
 }
 
-bool same(const Loops& a, const Loops& b) { return a.points == b.points && a.starts == b.starts && a.parents == b.parents; }
+bool same(const Loops& a, const Loops& b) {
+    return a.points == b.points && a.starts == b.starts && a.parents == b.parents;
+}
 bool same(const std::vector<Section>& a, const std::vector<Section>& b) {
     if (a.size() != b.size()) return false;
     for (std::size_t i = 0; i < a.size(); ++i) {
-        if (a[i].plane.z != b[i].plane.z || a[i].plane.side != b[i].plane.side || a[i].closed_gaps != b[i].closed_gaps) return false;
+        if (a[i].plane.z != b[i].plane.z || a[i].plane.side != b[i].plane.side ||
+            a[i].closed_gaps != b[i].closed_gaps)
+            return false;
         if (!same(a[i].loops, b[i].loops) || !same(a[i].open_chains, b[i].open_chains)) return false;
     }
     return true;
@@ -376,7 +403,8 @@ TEST(Slicing, SameBitsOnAnyNumberOfThreads) {
     Mesh mesh = random_relief(random, 140, 0.7, -50);  // more facets than one chunk
     ASSERT_GT(mesh.facets.size(), 65536u);
     std::vector<Plane> planes;
-    for (int i = 0; i < 90; ++i) planes.push_back({0.05 * static_cast<double>(random() % 70), i % 2 ? Side::above : Side::below});
+    for (int i = 0; i < 90; ++i)
+        planes.push_back({0.05 * static_cast<double>(random() % 70), i % 2 ? Side::above : Side::below});
     for (const bool open : {false, true}) {
         if (open) {
             std::size_t kept = 0;
@@ -389,7 +417,8 @@ TEST(Slicing, SameBitsOnAnyNumberOfThreads) {
         const auto reference = slice(one, mesh.view(), planes, {.close_gap_mm = 0.5});
         for (const int threads : {2, 4}) {
             Context context({.threads = threads});
-            EXPECT_TRUE(same(reference, slice(context, mesh.view(), planes, {.close_gap_mm = 0.5}))) << threads << " threads";
+            EXPECT_TRUE(same(reference, slice(context, mesh.view(), planes, {.close_gap_mm = 0.5})))
+                << threads << " threads";
         }
         // Nor do the planes know of each other.
         std::vector<Plane> single{planes[13]};
@@ -403,26 +432,32 @@ TEST(PartBetween, HasTheSameSectionsAndNeighboursBetweenItsHeights) {
     Context context({.threads = 2});
     std::size_t smaller = 0;
     for (int round = 0; round < 40; ++round) {
-        Mesh mesh = round % 2 ? random_relief(random, 10 + 2 * round, 1.7, -3) : random_tetrahedra(random, 1 + 3 * round, 100);
+        Mesh mesh = round % 2 ? random_relief(random, 10 + 2 * round, 1.7, -3)
+                              : random_tetrahedra(random, 1 + 3 * round, 100);
         if (round % 5 == 0) {
             std::erase_if(mesh.facets, [&](const Index3&) { return random() % 7 == 0; });
             pair_by_brute_force(mesh);
         }
-        const double low = 0.25 * static_cast<double>(random() % 12), high = low + 0.25 * static_cast<double>(random() % 6);
+        const double low = 0.25 * static_cast<double>(random() % 12),
+                     high = low + 0.25 * static_cast<double>(random() % 6);
         const Mesh part = part_between(context, mesh.view(), low, high);
         smaller += part.facets.size() < mesh.facets.size();
-        std::vector<Plane> planes{{low, Side::below}, {low, Side::above}, {high, Side::below}, {high, Side::above}};
+        std::vector<Plane> planes{
+            {low, Side::below}, {low, Side::above}, {high, Side::below}, {high, Side::above}};
         for (int i = 0; i < 8; ++i)
-            planes.push_back({low + (high - low) * static_cast<double>(random() % 100) / 100, i % 2 ? Side::above : Side::below});
+            planes.push_back({low + (high - low) * static_cast<double>(random() % 100) / 100,
+                              i % 2 ? Side::above : Side::below});
         EXPECT_TRUE(same(slice(context, mesh.view(), planes), slice(context, part.view(), planes))) << round;
 
         const auto corners = [](const Mesh& of, std::uint32_t f) {
-            return std::array{of.vertices[of.facets[f][0]], of.vertices[of.facets[f][1]], of.vertices[of.facets[f][2]]};
+            return std::array{of.vertices[of.facets[f][0]], of.vertices[of.facets[f][1]],
+                              of.vertices[of.facets[f][2]]};
         };
         std::uint32_t at = 0;
         for (std::uint32_t f = 0; f < mesh.facets.size(); ++f) {
             const auto p = corners(mesh, f);
-            const bool reaches = std::max({p[0].z, p[1].z, p[2].z}) >= low && std::min({p[0].z, p[1].z, p[2].z}) <= high;
+            const bool reaches =
+                std::max({p[0].z, p[1].z, p[2].z}) >= low && std::min({p[0].z, p[1].z, p[2].z}) <= high;
             if (at == part.facets.size() || corners(part, at) != p) {
                 EXPECT_FALSE(reaches) << round << ": facet " << f << " is missing or out of order";
                 continue;
@@ -453,12 +488,15 @@ TEST(Slicing, LoopsStartAtTheirLowestFacet) {
     std::map<Point2, std::uint32_t> lowest;
     for (std::uint32_t f = 0; f < mesh.facets.size(); ++f) {
         for (int k = 0; k < 3; ++k) {
-            std::uint32_t i = mesh.facets[f][static_cast<std::size_t>(k)], j = mesh.facets[f][static_cast<std::size_t>((k + 1) % 3)];
+            std::uint32_t i = mesh.facets[f][static_cast<std::size_t>(k)],
+                          j = mesh.facets[f][static_cast<std::size_t>((k + 1) % 3)];
             if (i > j) std::swap(i, j);
             const Vec3f p = mesh.vertices[i], q = mesh.vertices[j];
             if ((p.z > z) == (q.z > z)) continue;
             const double t = (z - p.z) / (static_cast<double>(q.z) - p.z);
-            lowest.emplace(Point2{to_units(p.x + t * (static_cast<double>(q.x) - p.x)), to_units(p.y + t * (static_cast<double>(q.y) - p.y))}, f);
+            lowest.emplace(Point2{to_units(p.x + t * (static_cast<double>(q.x) - p.x)),
+                                  to_units(p.y + t * (static_cast<double>(q.y) - p.y))},
+                           f);
         }
     }
     std::uint32_t last = 0;
@@ -491,7 +529,8 @@ TEST(Slicing, OpenMeshesLeaveOpenChains) {
     EXPECT_TRUE(sections[1].open_chains.empty());
     EXPECT_TRUE(sections[2].open_chains.empty());
     const auto chain = sections[0].open_chains.loop(0);
-    EXPECT_EQ(chain.front(), (Point2{100000, 0}));  // solid on the left: up the right wall, back, down the left
+    EXPECT_EQ(chain.front(),
+              (Point2{100000, 0}));  // solid on the left: up the right wall, back, down the left
     EXPECT_EQ(chain.back(), (Point2{0, 0}));
     // 9.9999 mm are not enough to close it, 10 are.
     EXPECT_TRUE(slice(context, mesh.view(), planes, {.close_gap_mm = 9.9999})[0].loops.empty());
@@ -545,7 +584,8 @@ TEST(Slicing, UnweldedSoupIsClosedWithinTheGap) {
     soup.neighbours.assign(soup.facets.size(), {kNoFacet, kNoFacet, kNoFacet});
     Context context;
     const Plane planes[] = {{0.7, Side::above}, {1.3, Side::above}, {2.2, Side::below}};
-    const auto expected = slice(context, closed.view(), planes), joined = slice(context, soup.view(), planes, {.close_gap_mm = 0.001});
+    const auto expected = slice(context, closed.view(), planes),
+               joined = slice(context, soup.view(), planes, {.close_gap_mm = 0.001});
     for (std::size_t i = 0; i < 3; ++i) {
         EXPECT_TRUE(joined[i].open_chains.empty());
         EXPECT_GT(joined[i].closed_gaps, 10u);
@@ -560,7 +600,8 @@ TEST(Slicing, AdjacencyThatLiesDoesNotHang) {
         for (int k = 0; k < 40; ++k) {
             const std::size_t f = random() % mesh.facets.size();
             mesh.neighbours[f][random() % 3] =
-                k % 4 == 0 ? static_cast<std::uint32_t>(random()) : static_cast<std::uint32_t>(random() % mesh.facets.size());
+                k % 4 == 0 ? static_cast<std::uint32_t>(random())
+                           : static_cast<std::uint32_t>(random() % mesh.facets.size());
         }
         Context context;
         std::vector<Plane> planes;
@@ -589,9 +630,13 @@ TEST(Slicing, EmptyRequestsAndManyPlanes) {
     }
     // Heights that no float holds, and those beside a vertex.
     const double beside = 1 - 1e-12;
-    const Plane odd[] = {
-        {1e300, Side::below},  {-1e300, Side::above}, {beside, Side::above}, {1 + 1e-12, Side::below}, {std::nextafter(0.0, 1.0), Side::below},
-        {3.5e38, Side::above}, {-3.5e38, Side::below}};
+    const Plane odd[] = {{1e300, Side::below},
+                         {-1e300, Side::above},
+                         {beside, Side::above},
+                         {1 + 1e-12, Side::below},
+                         {std::nextafter(0.0, 1.0), Side::below},
+                         {3.5e38, Side::above},
+                         {-3.5e38, Side::below}};
     const auto odds = slice(context, builder.mesh.view(), odd);
     const double areas[] = {0, 0, 1, 0, 1, 0, 0};
     for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(area(odds[i].loops), areas[i]) << i;
@@ -614,9 +659,12 @@ TEST(Slicing, RefusesWhatItCannotCut) {
     };
     const Plane bad[] = {{0.5, Side::above}, {std::nan(""), Side::above}};
     EXPECT_EQ(kind_of(good, bad), std::pair(ErrorKind::usage, std::string("slice.plane")));
-    EXPECT_EQ(kind_of(good, plane, {.close_gap_mm = -1}), std::pair(ErrorKind::usage, std::string("slice.gap")));
-    EXPECT_EQ(kind_of(good, plane, {.close_gap_mm = std::nan("")}), std::pair(ErrorKind::usage, std::string("slice.gap")));
-    for (const float value : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 3e5f}) {
+    EXPECT_EQ(kind_of(good, plane, {.close_gap_mm = -1}),
+              std::pair(ErrorKind::usage, std::string("slice.gap")));
+    EXPECT_EQ(kind_of(good, plane, {.close_gap_mm = std::nan("")}),
+              std::pair(ErrorKind::usage, std::string("slice.gap")));
+    for (const float value :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 3e5f}) {
         Mesh mesh = good;
         mesh.vertices[3].x = value;
         EXPECT_EQ(kind_of(mesh, plane), std::pair(ErrorKind::input, std::string("slice.range")));
@@ -689,7 +737,8 @@ TEST(Slicing, CorpusIsClosedAtEveryHeight) {
         }
         const Mesh& mesh = stl.mesh;
         if (stl.report.open_edges.count != 0 || stl.report.misoriented_edges.count != 0) {
-            std::printf("%s has open or misoriented edges, though the manifest calls it watertight\n", fields[0].c_str());
+            std::printf("%s has open or misoriented edges, though the manifest calls it watertight\n",
+                        fields[0].c_str());
             continue;
         }
         ++files;
@@ -700,7 +749,9 @@ TEST(Slicing, CorpusIsClosedAtEveryHeight) {
         }
         const Box3 box = bounds(mesh.view());
         std::vector<Plane> planes;
-        for (int i = 0; i < 50; ++i) planes.push_back({box.min.z + (static_cast<double>(box.max.z) - box.min.z) * (i + 0.5) / 50, Side::above});
+        for (int i = 0; i < 50; ++i)
+            planes.push_back(
+                {box.min.z + (static_cast<double>(box.max.z) - box.min.z) * (i + 0.5) / 50, Side::above});
         for (const double z : flats) {
             planes.push_back({z, Side::above});
             planes.push_back({z, Side::below});
@@ -713,10 +764,12 @@ TEST(Slicing, CorpusIsClosedAtEveryHeight) {
         const std::size_t stride = std::max<std::size_t>(1, (planes.size() - 50) / 40);
         for (std::size_t i = 0; i < planes.size(); i += i < 50 ? 1 : stride) {
             const double expected = brute_area_at(mesh, planes[i]);
-            EXPECT_NEAR(area(sections[i].loops), expected, 1e-4 * (perimeter(sections[i].loops) + 1) + 1e-9 * std::abs(expected))
+            EXPECT_NEAR(area(sections[i].loops), expected,
+                        1e-4 * (perimeter(sections[i].loops) + 1) + 1e-9 * std::abs(expected))
                 << fields[0] << " at " << planes[i].z;
         }
-        std::printf("%s: %zu facets, %zu flats, %zu planes\n", fields[0].c_str(), mesh.facets.size(), flats.size(), planes.size());
+        std::printf("%s: %zu facets, %zu flats, %zu planes\n", fields[0].c_str(), mesh.facets.size(),
+                    flats.size(), planes.size());
     }
     EXPECT_GT(files, 10);
 }

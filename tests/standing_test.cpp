@@ -25,7 +25,8 @@ TEST(Standing, IsNeverBelowTheExactStockAnywhere) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
     const std::array<double, 2> min{-3.3, 1.7}, max{27.4, 24.9};
-    std::uniform_real_distribution<double> ux(min[0] - 3, max[0] + 3), uy(min[1] - 3, max[1] + 3), uz(2, 20), ur(0.4, 7), step(-2, 2);
+    std::uniform_real_distribution<double> ux(min[0] - 3, max[0] + 3), uy(min[1] - 3, max[1] + 3), uz(2, 20),
+        ur(0.4, 7), step(-2, 2);
     // The points of the exact stock do not fall on the grid of the bound.
     const CellGrid grid{min[0] + 0.003, min[1] + 0.004, 0.0917, static_cast<int>((max[0] - min[0]) / 0.0917),
                         static_cast<int>((max[1] - min[1]) / 0.0917)};
@@ -38,9 +39,9 @@ TEST(Standing, IsNeverBelowTheExactStockAnywhere) {
             const double r = ur(random);
             std::array<double, 3> at{ux(random), uy(random), uz(random)};
             for (int move = 0; move < 20; ++move) {
-                std::array<double, 3> to = move == 0
-                                               ? std::array{ux(random), uy(random), uz(random)}
-                                               : std::array{at[0] + step(random), at[1] + step(random), std::max(0.1, at[2] + step(random) / 2)};
+                std::array<double, 3> to = move == 0 ? std::array{ux(random), uy(random), uz(random)}
+                                                     : std::array{at[0] + step(random), at[1] + step(random),
+                                                                  std::max(0.1, at[2] + step(random) / 2)};
                 if (move % 4 == 1) to[2] = at[2];
                 if (move % 6 == 2) to[0] = at[0], to[1] = at[1];
                 stock.cut({ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, r, 0}, at, to);
@@ -51,7 +52,8 @@ TEST(Standing, IsNeverBelowTheExactStockAnywhere) {
         double loose = 0, cut = 0;
         for (int j = 0; j < grid.ny; ++j)
             for (int i = 0; i < grid.nx; ++i) {
-                const double exact = stock.top(grid.index(i, j)), bound = cell_bound(standing, grid.x(i), grid.y(j));
+                const double exact = stock.top(grid.index(i, j)),
+                             bound = cell_bound(standing, grid.x(i), grid.y(j));
                 ASSERT_GE(bound, exact) << "trial " << trial << " at " << grid.x(i) << ' ' << grid.y(j);
                 if (exact < kTop - 1) cut += 1, loose += bound > exact + 1.5;
             }
@@ -73,7 +75,8 @@ TEST(Standing, StandsAsAfterTheSameWaysInAnyOrder) {
     std::uniform_real_distribution<double> place(-5, 65), step(-9, 9);
     for (int trial = 0; trial < 20; ++trial) {
         const std::array<double, 2> min{0, 0}, max{60, 50};
-        const Cutter flat{Cutter::Profile::flat, trial % 2 == 0 ? 5.0 : 6.35}, other{Cutter::Profile::flat, 3};
+        const Cutter flat{Cutter::Profile::flat, trial % 2 == 0 ? 5.0 : 6.35},
+            other{Cutter::Profile::flat, 3};
         struct Way {
             Cutter cutter;
             std::array<double, 3> from, to;
@@ -94,7 +97,8 @@ TEST(Standing, StandsAsAfterTheSameWaysInAnyOrder) {
         for (const Way& w : ways) shuffled.cut(w.cutter, w.from, w.to);
         for (double y = 0.1; y < 50; y += 0.5)
             for (double x = 0.1; x < 60; x += 0.5)
-                ASSERT_EQ(cell_bound(chained, x, y), cell_bound(shuffled, x, y)) << "trial " << trial << " at " << x << ' ' << y;
+                ASSERT_EQ(cell_bound(chained, x, y), cell_bound(shuffled, x, y))
+                    << "trial " << trial << " at " << x << ' ' << y;
     }
 }
 
@@ -106,18 +110,21 @@ TEST(Standing, KnowsWhatWasCleared) {
     for (double y = 0; y <= 40; y += 4) standing.cut(flat, {-6, y, 12}, {30, y, 12});
     EXPECT_NEAR(standing.top(5, {5, 20}, {24, 20}), 12, 1e-3);
     EXPECT_NEAR(standing.top(5, {5, 20}, {34, 20}), kTop, 1e-3);
-    // Along the wall that the flat left, 5 mm from it: free for the cutter, whatever the wall's own cells say.
+    // Along the wall that the flat left, 5 mm from it: free for the cutter, whatever the wall's own cells
+    // say.
     EXPECT_NEAR(standing.free_tip(flat, {30, 10}, {30, 30}), 12, 1e-3);
     EXPECT_NEAR(standing.top(5, {30, 10}, {30, 30}), kTop, 1e-3);
     EXPECT_NEAR(standing.free_tip(flat, {32, 10}, {32, 30}), kTop, 1e-3);
 }
 
 TEST(Standing, BallsAreBoundedByTheirShape) {
-    // Where a ball went it may go again, lower by nothing and higher by anything; across it meets the cusp between two passes.
+    // Where a ball went it may go again, lower by nothing and higher by anything; across it meets the cusp
+    // between two passes.
     Standing standing({0, 0}, {60, 40}, kTop);
     const Cutter ball{Cutter::Profile::ball, 3};
     for (double y = 10; y <= 30; y += 0.8)
-        for (double x = 5; x < 55; x += 0.4) standing.cut(ball, {x, y, 15 + 0.02 * x}, {x + 0.4, y, 15 + 0.02 * (x + 0.4)});
+        for (double x = 5; x < 55; x += 0.4)
+            standing.cut(ball, {x, y, 15 + 0.02 * x}, {x + 0.4, y, 15 + 0.02 * (x + 0.4)});
     EXPECT_NEAR(standing.free_tip(ball, {10, 20}, {10.4, 20}), 15.2, 0.05);
     const double highest = 15 + 0.02 * 43.4;
     EXPECT_LE(standing.top(3, {20, 20}, {40, 20}), highest + 0.2);

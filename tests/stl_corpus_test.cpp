@@ -1,9 +1,10 @@
 // Every file of the corpus is read as its MANIFEST.tsv says, or refused with a reason.
 //
-// Where our words differ from the manifest's: its `watertight` asks only that no edge has a single facet, as our
-// open_edges does, whatever the orientation; its `shells` are joined across every edge, ours across paired or misoriented
-// edges, which is the same wherever it states them; it reads what is there of files whose header contradicts their length
-// or whose coordinates are not finite, where we refuse; its counts of open edges include those in the base plane.
+// Where our words differ from the manifest's: its `watertight` asks only that no edge has a single facet, as
+// our open_edges does, whatever the orientation; its `shells` are joined across every edge, ours across
+// paired or misoriented edges, which is the same wherever it states them; it reads what is there of files
+// whose header contradicts their length or whose coordinates are not finite, where we refuse; its counts of
+// open edges include those in the base plane.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,7 +31,8 @@ struct Entry {
     /// A number that the note states as name=number.
     [[nodiscard]] std::optional<std::uint64_t> stated(const std::string& name) const {
         const std::size_t at = note.find(name + "=");
-        if (at == std::string::npos || (at > 0 && note[at - 1] != ' ' && note[at - 1] != '[')) return std::nullopt;
+        if (at == std::string::npos || (at > 0 && note[at - 1] != ' ' && note[at - 1] != '['))
+            return std::nullopt;
         return std::stoull(note.substr(at + name.size() + 1));
     }
 };
@@ -79,7 +81,8 @@ const std::map<std::string, std::string> kNoSolids{
     {"nasty/kuka_kr150_base_nonmanifold.stl", "stl.open"},
 };
 
-/// The manifest calls two facets degenerate here whose areas are 4.4e-11 and 1.9e-10 mm²; ours are those without any.
+/// The manifest calls two facets degenerate here whose areas are 4.4e-11 and 1.9e-10 mm²; ours are those
+/// without any.
 constexpr const char* kSlivers = "big/midget_crankcase_front_525k.stl";
 
 TEST(StlCorpus, EveryFileIsAsItsManifestSays) {
@@ -111,7 +114,8 @@ TEST(StlCorpus, EveryFileIsAsItsManifestSays) {
         EXPECT_EQ(report.open_edges.count, entry.stated("open_edges").value_or(0));
         EXPECT_EQ(report.non_manifold_edges.count, entry.stated("nonmanifold_edges").value_or(0));
         EXPECT_EQ(report.misoriented_edges.count, entry.stated("misoriented_edges").value_or(0));
-        EXPECT_EQ(report.degenerate_facets.count, entry.file == kSlivers ? 0 : entry.stated("degenerate").value_or(0));
+        EXPECT_EQ(report.degenerate_facets.count,
+                  entry.file == kSlivers ? 0 : entry.stated("degenerate").value_or(0));
         if (const auto shells = entry.stated("shells")) {
             EXPECT_EQ(report.components, *shells);
         }
@@ -120,7 +124,8 @@ TEST(StlCorpus, EveryFileIsAsItsManifestSays) {
         }
         double size[3];
         ASSERT_EQ(std::sscanf(entry.box.c_str(), "%lfx%lfx%lf", &size[0], &size[1], &size[2]), 3);
-        for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(stl.input.max[k] - stl.input.min[k], size[k], 1e-5 * size[k]);
+        for (std::size_t k = 0; k < 3; ++k)
+            EXPECT_NEAR(stl.input.max[k] - stl.input.min[k], size[k], 1e-5 * size[k]);
         EXPECT_EQ(report.box.min.z, 0.0f);
         EXPECT_EQ(stl.input.sha256.size(), 64u);
         try {
@@ -169,7 +174,8 @@ TEST(StlCorpus, SameBytesOnAnyNumberOfThreads) {
 TEST(StlCorpus, CracksCloseUnderTheWeldThatIsNamed) {
     const std::string folder = corpus();
     if (folder.empty()) return;
-    for (const char* file : {"castings/midget_cylinder_half_pattern_cracks.stl", "nasty/featuretype_unwelded.stl"}) {
+    for (const char* file :
+         {"castings/midget_cylinder_half_pattern_cracks.stl", "nasty/featuretype_unwelded.stl"}) {
         SCOPED_TRACE(file);
         const std::string path = folder + "/" + file;
         Context context({.threads = 2});

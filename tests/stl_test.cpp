@@ -34,7 +34,8 @@ class Stl : public ::testing::Test {
 protected:
     std::string save(const std::string& name, const std::string& bytes) const {
         const std::string path = (folder / name).string();
-        std::filesystem::remove(path);  // a fresh file costs microseconds, truncating a written one milliseconds
+        std::filesystem::remove(
+            path);  // a fresh file costs microseconds, truncating a written one milliseconds
         std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
         return path;
     }
@@ -57,7 +58,8 @@ std::string binary(const Facets& facets, std::string header = "binary", std::uin
 
 Facets corners_of(const Mesh& mesh) {
     Facets facets;
-    for (const Index3& f : mesh.facets) facets.push_back({mesh.vertices[f[0]], mesh.vertices[f[1]], mesh.vertices[f[2]]});
+    for (const Index3& f : mesh.facets)
+        facets.push_back({mesh.vertices[f[0]], mesh.vertices[f[1]], mesh.vertices[f[2]]});
     return facets;
 }
 
@@ -87,7 +89,8 @@ std::string ascii(const Facets& facets, const AsciiStyle& style = {}) {
             word("vertex");
             for (const float c : {p.x, p.y, p.z}) {
                 char number[64];
-                std::snprintf(number, sizeof number, " %s%.17g", c < 0 ? "" : style.plus, static_cast<double>(c));
+                std::snprintf(number, sizeof number, " %s%.17g", c < 0 ? "" : style.plus,
+                              static_cast<double>(c));
                 text += number;
             }
             end();
@@ -114,7 +117,9 @@ Error refusal(const std::string& path, const StlOptions& options = {}, int threa
     return Error(ErrorKind::usage, "none", "none");
 }
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
 
 const Diagnostic* find(const std::vector<Diagnostic>& diagnostics, const std::string& code) {
     for (const Diagnostic& d : diagnostics)
@@ -136,7 +141,8 @@ void expect_box(const StlMesh& stl) {
     EXPECT_TRUE(stl.diagnostics.empty());
 }
 
-// ------------------------------------------------------------------------------------------------- what is read
+// ------------------------------------------------------------------------------------------------- what is
+// read
 
 TEST_F(Stl, Binary) {
     Context context({.threads = 2});
@@ -151,13 +157,18 @@ TEST_F(Stl, Binary) {
 TEST_F(Stl, SolidInABinaryHeaderIsNoProofOfAscii) {
     Context context({.threads = 2});
     expect_box(read_stl(context, save("a.stl", binary(kBox, "solid box"))));
-    expect_box(read_stl(context, save("b.stl", binary(kBox, "solid box\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex "))));
+    expect_box(read_stl(
+        context,
+        save("b.stl", binary(kBox, "solid box\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex "))));
 }
 
 TEST_F(Stl, AsciiInManyStyles) {
     Context context({.threads = 2});
     expect_box(read_stl(context, save("a.stl", ascii(kBox))));
-    expect_box(read_stl(context, save("b.stl", ascii(kBox, {.line = "\r\n", .upper = true, .normal = "NaN nan -nan(ind)", .plus = "+"}))));
+    expect_box(read_stl(
+        context,
+        save("b.stl",
+             ascii(kBox, {.line = "\r\n", .upper = true, .normal = "NaN nan -nan(ind)", .plus = "+"}))));
     expect_box(read_stl(context, save("c.stl", ascii(kBox, {.line = "\r", .name = ""}))));
     expect_box(read_stl(context, save("d.stl", "\xEF\xBB\xBF  \n" + ascii(kBox))));
     expect_box(read_stl(context, save("e.stl", ascii(kBox, {.normal = ""}))));
@@ -170,7 +181,8 @@ TEST_F(Stl, AsciiInManyStyles) {
 TEST_F(Stl, SeveralSolidsInOneFile) {
     Context context({.threads = 2});
     const StlMesh stl = read_stl(context, save("two.stl", ascii(shapes::box({0, 0, 0}, {9, 9, 9})) + "\n" +
-                                                              ascii(shapes::box({20, 0, 0}, {29, 9, 9}), {.upper = true, .name = "second one"})));
+                                                              ascii(shapes::box({20, 0, 0}, {29, 9, 9}),
+                                                                    {.upper = true, .name = "second one"})));
     EXPECT_EQ(stl.report.components, 2u);
     EXPECT_EQ(stl.input.triangles, 24u);
 }
@@ -178,7 +190,8 @@ TEST_F(Stl, SeveralSolidsInOneFile) {
 TEST_F(Stl, NumbersInEverySpelling) {
     Context context({.threads = 1});
     const std::string text =
-        "solid s\nfacet normal 0 0 1 outer loop\nvertex 1e1 +2.5E+00 -.5\nvertex 0010.0 1e-999 .25e1\nvertex -0 7. 5\nendloop endfacet\nendsolid";
+        "solid s\nfacet normal 0 0 1 outer loop\nvertex 1e1 +2.5E+00 -.5\nvertex 0010.0 1e-999 .25e1\nvertex "
+        "-0 7. 5\nendloop endfacet\nendsolid";
     const StlMesh stl = read_stl(context, save("n.stl", text));
     ASSERT_EQ(stl.mesh.vertices.size(), 3u);
     EXPECT_EQ(stl.mesh.vertices[0], (Vec3f{10, 2.5f, 0}));
@@ -221,7 +234,8 @@ TEST_F(Stl, InchesAreScaledInDoubleAndRoundedOnce) {
     EXPECT_EQ(stl.input.min[0], static_cast<double>(0.1f) * 25.4);
     EXPECT_EQ(stl.input.max[2], static_cast<double>(9.7f) * 25.4);
     EXPECT_EQ(stl.report.box.min.x, static_cast<float>(static_cast<double>(0.1f) * 25.4));
-    EXPECT_EQ(stl.report.box.max.z, static_cast<float>(static_cast<double>(9.7f) * 25.4 - static_cast<double>(-7.3f) * 25.4));
+    EXPECT_EQ(stl.report.box.max.z,
+              static_cast<float>(static_cast<double>(9.7f) * 25.4 - static_cast<double>(-7.3f) * 25.4));
     EXPECT_EQ(stl.report.box.min.z, 0.0f);
 }
 
@@ -232,9 +246,12 @@ TEST_F(Stl, UnitsThatLookWrongAreRemarkedOnNotGuessed) {
         LengthUnit unit;
         const char* names;
     };
-    for (const Case& c : {Case{4.9f, LengthUnit::mm, "inches"}, Case{5001, LengthUnit::mm, "inches"}, Case{4.9f, LengthUnit::inch, "millimetres"},
-                          Case{5001, LengthUnit::inch, "millimetres"}, Case{5, LengthUnit::mm, nullptr}, Case{5000, LengthUnit::inch, nullptr}}) {
-        const StlMesh stl = read_stl(context, save("u.stl", binary(shapes::box({0, 0, 0}, {c.size, 1, 1}))), {.units = c.unit});
+    for (const Case& c :
+         {Case{4.9f, LengthUnit::mm, "inches"}, Case{5001, LengthUnit::mm, "inches"},
+          Case{4.9f, LengthUnit::inch, "millimetres"}, Case{5001, LengthUnit::inch, "millimetres"},
+          Case{5, LengthUnit::mm, nullptr}, Case{5000, LengthUnit::inch, nullptr}}) {
+        const StlMesh stl = read_stl(context, save("u.stl", binary(shapes::box({0, 0, 0}, {c.size, 1, 1}))),
+                                     {.units = c.unit});
         const Diagnostic* remark = find(stl.diagnostics, "units.suspicious");
         ASSERT_EQ(remark != nullptr, c.names != nullptr) << c.size;
         if (remark == nullptr) continue;
@@ -246,7 +263,8 @@ TEST_F(Stl, UnitsThatLookWrongAreRemarkedOnNotGuessed) {
 
 TEST_F(Stl, LargeAsciiEqualsItsBinaryOnAnyNumberOfThreads) {
     const Facets torus = shapes::torus(105);  // some 4 MB of text, several pieces
-    const std::string text = ascii(torus), text_path = save("t.stl", text), binary_path = save("b.stl", binary(torus));
+    const std::string text = ascii(torus), text_path = save("t.stl", text),
+                      binary_path = save("b.stl", binary(torus));
     ASSERT_GT(text.size(), std::size_t{3} << 20);
     Context one({.threads = 1});
     const StlMesh expected = read_stl(one, binary_path);
@@ -263,7 +281,8 @@ TEST_F(Stl, LargeAsciiEqualsItsBinaryOnAnyNumberOfThreads) {
     }
 }
 
-// ------------------------------------------------------------------------------------------------- what is refused
+// ------------------------------------------------------------------------------------------------- what is
+// refused
 
 TEST_F(Stl, NoFileAFolderNothing) {
     EXPECT_EQ(refusal((folder / "none.stl").string()).code(), "stl.missing");
@@ -316,7 +335,8 @@ TEST_F(Stl, CoordinatesThatAreNoLengths) {
         EXPECT_EQ(error.code(), std::isfinite(bad) ? "stl.absurd" : "stl.non_finite");
         EXPECT_TRUE(contains(error.place(), "facet 7 ")) << error.place();
         EXPECT_TRUE(contains(error.place(), "y of corner 2")) << error.place();
-        EXPECT_TRUE(contains(error.place(), "offset " + std::to_string(84 + 7 * 50 + 12 + 2 * 12 + 4))) << error.place();
+        EXPECT_TRUE(contains(error.place(), "offset " + std::to_string(84 + 7 * 50 + 12 + 2 * 12 + 4)))
+            << error.place();
         const Error in_text = refusal(save("bad.txt", ascii(facets)));
         EXPECT_EQ(in_text.code(), error.code());
         EXPECT_TRUE(contains(in_text.place(), "facet 7 ")) << in_text.place();
@@ -345,9 +365,11 @@ TEST_F(Stl, TextThatIsNoStl) {
           Case{"vertex 10", "vertex 10 10 10 10", "stl.unparsable", "'10' where 'vertex'", 4},
           Case{"vertex 10", "vertex 0x10", "stl.unparsable", "'0x10'", 4},
           Case{"endloop", "vertex 1 2 3\nendloop", "stl.unparsable", "'vertex' where 'endloop'", 7},
-          Case{"outer", "inner", "stl.unparsable", "'inner'", 3}, Case{"endfacet\n", "", "stl.unparsable", "'facet' where 'endfacet'", 8},
+          Case{"outer", "inner", "stl.unparsable", "'inner'", 3},
+          Case{"endfacet\n", "", "stl.unparsable", "'facet' where 'endfacet'", 8},
           Case{"vertex 10", "vertex \x10\x80", "stl.unparsable", "\\x10\\x80", 4},
-          Case{"endsolid", "endfacet", "stl.unparsable", "'endfacet' where 'solid', 'facet' or 'endsolid'", 86},
+          Case{"endsolid", "endfacet", "stl.unparsable", "'endfacet' where 'solid', 'facet' or 'endsolid'",
+               86},
           Case{"endsolid box\n", "", "stl.truncated", "12 facets without 'endsolid'", 86}}) {
         std::string damaged = text;
         damaged.replace(damaged.find(c.from), std::strlen(c.from), c.to);
@@ -378,13 +400,15 @@ TEST_F(Stl, TheFirstFaultOfALargeTextIsNamedOnAnyNumberOfThreads) {
     for (const int threads : {1, 2, 4}) {
         const Error error = refusal(path, {}, threads);
         EXPECT_TRUE(contains(error.place(), "facet 8000 ")) << error.place();
-        EXPECT_TRUE(contains(error.place(), "line " + std::to_string(1 + 7 * 8000 + 4) + ",")) << error.place();
+        EXPECT_TRUE(contains(error.place(), "line " + std::to_string(1 + 7 * 8000 + 4) + ","))
+            << error.place();
         EXPECT_TRUE(contains(error.message(), "'xvertex' where 'vertex'")) << error.message();
     }
 }
 
 TEST_F(Stl, MemoryAndCancel) {
-    const std::string path = save("t.stl", binary(shapes::torus(100))), text = save("t.txt", ascii(shapes::torus(100)));
+    const std::string path = save("t.stl", binary(shapes::torus(100))),
+                      text = save("t.txt", ascii(shapes::torus(100)));
     for (const std::string& file : {path, text}) {
         Context small({.threads = 2, .memory_bytes = 100000});
         try {
@@ -458,7 +482,7 @@ TEST_F(Stl, RequireSolidAcceptsAnOpenBaseCavitiesAndBlemishes) {
     facets = kBox;
     shapes::append(facets, shapes::flipped(shapes::box({12, 22, 32}, {18, 38, 58})));  // a cavity
     facets.push_back({facets[0][0], facets[0][1], facets[0][0]});                      // without area
-    facets.push_back(facets[3]);                                                       // twice, and once more reversed
+    facets.push_back(facets[3]);  // twice, and once more reversed
     facets.push_back({facets[3][0], facets[3][2], facets[3][1]});
     save("p.stl", binary(facets));
     stl = read_stl(context, path);
@@ -476,7 +500,9 @@ TEST_F(Stl, TheWeldThatIsNamedCloses) {
         Facets facets = shapes::torus(24, 30, 10);
         for (auto& facet : facets)
             for (Vec3f& p : facet)
-                for (float* c : {&p.x, &p.y, &p.z}) *c = static_cast<float>(*c + 115 * crack * std::uniform_real_distribution(-1.0, 1.0)(random));
+                for (float* c : {&p.x, &p.y, &p.z})
+                    *c = static_cast<float>(*c +
+                                            115 * crack * std::uniform_real_distribution(-1.0, 1.0)(random));
         const std::string path = (folder / "cracks.stl").string();
         const Error error = not_solid(facets, path);
         EXPECT_EQ(error.code(), "stl.open");
@@ -511,7 +537,8 @@ TEST_F(Stl, ShuffledFacetsAreReadAsOrderedOnes) {
     Facets shuffled = facets;
     std::shuffle(shuffled.begin(), shuffled.end(), random);
     Context context({.threads = 2});
-    const StlMesh ordered = read_stl(context, save("ordered.stl", binary(facets))), mixed = read_stl(context, save("mixed.stl", binary(shuffled)));
+    const StlMesh ordered = read_stl(context, save("ordered.stl", binary(facets))),
+                  mixed = read_stl(context, save("mixed.stl", binary(shuffled)));
     EXPECT_EQ(mixed.mesh.vertices.size(), ordered.mesh.vertices.size());
     EXPECT_EQ(mixed.report.open_edges.count, 0U);
     EXPECT_EQ(mixed.report.components, 1U);
@@ -547,7 +574,8 @@ TEST_F(Stl, WrittenAndReadBackIsTheSame) {
     ASSERT_EQ(back.mesh.vertices.size(), mesh.vertices.size());
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
         EXPECT_EQ(back.mesh.vertices[v].x, mesh.vertices[v].x);
-        EXPECT_EQ(back.mesh.vertices[v].z, static_cast<float>(double(mesh.vertices[v].z) - back.input.min[2]));
+        EXPECT_EQ(back.mesh.vertices[v].z,
+                  static_cast<float>(double(mesh.vertices[v].z) - back.input.min[2]));
     }
     // The normals are right as well.
     for (std::size_t f = 0; f < mesh.facets.size(); ++f) {
@@ -572,7 +600,8 @@ TEST_F(Stl, WritingWhereNothingCanBeWritten) {
     EXPECT_EQ(files, 1u);
 }
 
-// ------------------------------------------------------------------------------------------------- damage at random
+// ------------------------------------------------------------------------------------------------- damage at
+// random
 
 /// Reads a damaged file: a mesh or a refusal, never anything else.
 void survive(const std::string& path) {
@@ -593,7 +622,8 @@ TEST_F(Stl, DamagedFilesAreRefusedOrRead) {
     std::mt19937_64 random(test::seed());
     Facets facets = shapes::box({0, 0, 0}, {10, 10, 10});
     shapes::append(facets, shapes::box({10, 10, 0}, {20, 20, 10}));
-    const std::string originals[] = {binary(facets), binary(facets, "solid"), ascii(facets), ascii(facets, {.line = "\r\n", .upper = true})};
+    const std::string originals[] = {binary(facets), binary(facets, "solid"), ascii(facets),
+                                     ascii(facets, {.line = "\r\n", .upper = true})};
     for (int round = 0; round < 6000; ++round) {
         std::string bytes = originals[round % 4];
         for (std::uint64_t change = 1 + random() % 4; change > 0 && !bytes.empty(); --change) {
@@ -615,7 +645,8 @@ TEST_F(Stl, DamagedFilesAreRefusedOrRead) {
                     bytes.insert(at, bytes.substr(random() % bytes.size(), random() % 120));
                     break;
                 default:
-                    bytes.replace(at, std::min<std::size_t>(4, bytes.size() - at), std::string(4, static_cast<char>(random() % 2 == 0 ? 0xFF : 0)));
+                    bytes.replace(at, std::min<std::size_t>(4, bytes.size() - at),
+                                  std::string(4, static_cast<char>(random() % 2 == 0 ? 0xFF : 0)));
                     break;
             }
         }
@@ -636,7 +667,8 @@ TEST_F(Stl, EveryTruncationIsRefusedOrRead) {
         }
 }
 
-// ------------------------------------------------------------------------------------------------- the digest
+// ------------------------------------------------------------------------------------------------- the
+// digest
 
 TEST(Sha256, KnownVectors) {
     auto both = [](const std::string& text, const std::string& digest) {
@@ -645,7 +677,8 @@ TEST(Sha256, KnownVectors) {
     };
     both("", "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
     both("abc", "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-    both("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq", "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+    both("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq",
+         "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
     both(std::string(1000000, 'a'), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 

@@ -15,7 +15,8 @@ using namespace slabwright;
 namespace {
 
 double end_height(const CutterEnd& end, double r) {
-    if (end.form == CutterEnd::Form::ball) return end.radius - std::sqrt(std::max(0.0, end.radius * end.radius - r * r));
+    if (end.form == CutterEnd::Form::ball)
+        return end.radius - std::sqrt(std::max(0.0, end.radius * end.radius - r * r));
     return end.form == CutterEnd::Form::cone ? r * end.slope : 0;
 }
 
@@ -39,23 +40,27 @@ TEST(Sweep, AgreesWithBruteForce) {
         });
         const int samples = 4000;
         for (int k = 0; k <= samples; ++k) {
-            const double t = static_cast<double>(k) / samples, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]),
-                         z = a[2] + t * (b[2] - a[2]);
+            const double t = static_cast<double>(k) / samples, x = a[0] + t * (b[0] - a[0]),
+                         y = a[1] + t * (b[1] - a[1]), z = a[2] + t * (b[2] - a[2]);
             for (int j = 0; j < grid.ny; ++j)
                 for (int i = 0; i < grid.nx; ++i) {
                     const double r = std::hypot(grid.x(i) - x, grid.y(j) - y);
-                    if (r <= end.radius) brute[grid.index(i, j)] = std::min(brute[grid.index(i, j)], z + end_height(end, r));
+                    if (r <= end.radius)
+                        brute[grid.index(i, j)] = std::min(brute[grid.index(i, j)], z + end_height(end, r));
                 }
         }
         const double step = std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]) / samples;
-        const double run = std::hypot(b[0] - a[0], b[1] - a[1]), slope = run > 0 ? std::abs(b[2] - a[2]) / run : 0;
+        const double run = std::hypot(b[0] - a[0], b[1] - a[1]),
+                     slope = run > 0 ? std::abs(b[2] - a[2]) / run : 0;
         for (std::size_t c = 0; c < grid.count(); ++c) {
-            // Brute force can miss a cell that the way only grazes, and is never lower. How much higher it may be at the ball's steep rim
-            // is bounded by the sagitta that one step makes there, elsewhere by the way's slope.
+            // Brute force can miss a cell that the way only grazes, and is never lower. How much higher it
+            // may be at the ball's steep rim is bounded by the sagitta that one step makes there, elsewhere
+            // by the way's slope.
             if (brute[c] < 1e8) {
                 ASSERT_LT(exact[c], 1e8) << "trial " << trial;
                 EXPECT_LE(exact[c], brute[c] + 1e-9) << "trial " << trial;
-                EXPECT_GE(exact[c], brute[c] - (step * (1 + slope) + std::sqrt(2 * end.radius * step) + 1e-9)) << "trial " << trial;
+                EXPECT_GE(exact[c], brute[c] - (step * (1 + slope) + std::sqrt(2 * end.radius * step) + 1e-9))
+                    << "trial " << trial;
             }
         }
     }
@@ -65,12 +70,16 @@ TEST(Sweep, AgreesWithBruteForce) {
 TEST(Sweep, ArcsAgreeWithChords) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
-    std::uniform_real_distribution<double> u(-2, 12), ur(0.4, 4), ua(-2 * std::numbers::pi, 2 * std::numbers::pi);
+    std::uniform_real_distribution<double> u(-2, 12), ur(0.4, 4),
+        ua(-2 * std::numbers::pi, 2 * std::numbers::pi);
     const CellGrid grid{0.1, 0.2, 0.31, 30, 28};
     for (int trial = 0; trial < 200; ++trial) {
         const CutterEnd end{static_cast<CutterEnd::Form>(trial % 3), ur(random), 0.6};
-        LevelArc arc{u(random), u(random), 1.5, trial % 4 == 0 ? 30 * ur(random) : ur(random), ua(random), ua(random)};
-        if (trial % 4 == 0) arc.x -= arc.radius * std::cos(arc.start), arc.y -= arc.radius * std::sin(arc.start), arc.turn /= 20;
+        LevelArc arc{u(random),  u(random), 1.5, trial % 4 == 0 ? 30 * ur(random) : ur(random),
+                     ua(random), ua(random)};
+        if (trial % 4 == 0)
+            arc.x -= arc.radius * std::cos(arc.start), arc.y -= arc.radius * std::sin(arc.start),
+                arc.turn /= 20;
         if (trial % 5 == 0) arc.turn = trial % 2 == 0 ? 2 * std::numbers::pi : -2 * std::numbers::pi;
         std::vector<double> exact(grid.count(), 1e9), chords(grid.count(), 1e9);
         sweep(grid, end, arc, [&](std::size_t c, double z) {
@@ -82,9 +91,11 @@ TEST(Sweep, ArcsAgreeWithChords) {
         for (int k = 0; k < n; ++k) {
             auto at = [&](int i) {
                 const double a = arc.start + arc.turn * i / n;
-                return std::array<double, 3>{arc.x + arc.radius * std::cos(a), arc.y + arc.radius * std::sin(a), arc.z};
+                return std::array<double, 3>{arc.x + arc.radius * std::cos(a),
+                                             arc.y + arc.radius * std::sin(a), arc.z};
             };
-            sweep(grid, end, at(k), at(k + 1), [&](std::size_t c, double z) { chords[c] = std::min(chords[c], z); });
+            sweep(grid, end, at(k), at(k + 1),
+                  [&](std::size_t c, double z) { chords[c] = std::min(chords[c], z); });
         }
         std::vector<double> standing(grid.count());
         for (double& s : standing) s = 1 + u(random) / 4;
@@ -98,11 +109,13 @@ TEST(Sweep, ArcsAgreeWithChords) {
         for (std::size_t c = 0; c < grid.count(); ++c) {
             EXPECT_EQ(given[c] != 0, exact[c] < standing[c]);
             if ((exact[c] > 1e8) != (chords[c] > 1e8)) {  // only where the arc grazes it
-                const double d =
-                    std::hypot(grid.x(static_cast<int>(c) % grid.nx) - arc.x, grid.y(static_cast<int>(c) / grid.nx) - arc.y) - arc.radius;
+                const double d = std::hypot(grid.x(static_cast<int>(c) % grid.nx) - arc.x,
+                                            grid.y(static_cast<int>(c) / grid.nx) - arc.y) -
+                                 arc.radius;
                 EXPECT_NEAR(std::abs(d), end.radius, 2 * error + 1e-9) << "trial " << trial;
             } else if (exact[c] < 1e8) {
-                EXPECT_NEAR(exact[c], chords[c], std::sqrt(2 * end.radius * error) + error + 1e-9) << "trial " << trial;
+                EXPECT_NEAR(exact[c], chords[c], std::sqrt(2 * end.radius * error) + error + 1e-9)
+                    << "trial " << trial;
             }
         }
     }
@@ -129,7 +142,8 @@ TEST(Sweep, LeavesOutWhatStandsLower) {
                 EXPECT_EQ(z, all[c]);
                 given[c] = 1;
             });
-        for (std::size_t c = 0; c < grid.count(); ++c) EXPECT_EQ(given[c] != 0, all[c] < standing[c]) << "trial " << trial;
+        for (std::size_t c = 0; c < grid.count(); ++c)
+            EXPECT_EQ(given[c] != 0, all[c] < standing[c]) << "trial " << trial;
         // Given as heights over a level, which are compared many at once.
         const double bottom = uz(random);
         std::vector<float> heights(grid.count());
@@ -144,26 +158,31 @@ TEST(Sweep, LeavesOutWhatStandsLower) {
     }
 }
 
-// What is told of many spans at once is what each cell says, at the rows' ends as well; and the level in floats parts heights as doubles do.
+// What is told of many spans at once is what each cell says, at the rows' ends as well; and the level in
+// floats parts heights as doubles do.
 TEST(Sweep, SpansAgreeWithTheirCells) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(0, 1);
     for (int trial = 0; trial < 400; ++trial) {
-        const int nx = 1 + static_cast<int>(random() % 40), rows = 1 + static_cast<int>(random() % RowSpans::kRows);
+        const int nx = 1 + static_cast<int>(random() % 40),
+                  rows = 1 + static_cast<int>(random() % RowSpans::kRows);
         const double bottom = trial % 4 == 0 ? 0 : 40 * u(random), share = std::pow(u(random), 3);
         std::vector<float> heights(static_cast<std::size_t>(nx * rows));
         for (float& h : heights) h = u(random) < share ? static_cast<float>(3 * u(random)) : 0.5F;
         // Often the level is that of a cell, to the last bit.
         const float some = heights[random() % heights.size()];
-        const double z = trial % 3 == 0 ? bottom + 3 * u(random) : bottom + static_cast<double>(some), level_z = trial % 7 == 0 ? bottom : z;
+        const double z = trial % 3 == 0 ? bottom + 3 * u(random) : bottom + static_cast<double>(some),
+                     level_z = trial % 7 == 0 ? bottom : z;
         const float level = level_over(bottom, level_z);
         EXPECT_LE(bottom + static_cast<double>(level), level_z);
         EXPECT_GT(bottom + static_cast<double>(std::nextafter(level, 1e30F)), level_z);
         RowSpans spans;
         const auto some_span = [&](std::int32_t& first, std::int32_t& last) {
             first = static_cast<std::int32_t>(random() % static_cast<unsigned>(nx + 1));
-            last = random() % 3 == 0 ? first - 1 : std::min<std::int32_t>(nx - 1, first + static_cast<std::int32_t>(random() % 24));
+            last = random() % 3 == 0
+                       ? first - 1
+                       : std::min<std::int32_t>(nx - 1, first + static_cast<std::int32_t>(random() % 24));
         };
         for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k)
             some_span(spans.low[k], spans.left[k]), some_span(spans.right[k], spans.high[k]);
@@ -188,28 +207,35 @@ TEST(Sweep, SpansAgreeWithTheirCells) {
                 }
                 return found;
             };
-            EXPECT_EQ((over.left >> row & 1) != 0, any(spans.low[row], spans.left[row])) << "trial " << trial << " row " << k;
-            EXPECT_EQ((over.right >> row & 1) != 0, any(spans.right[row], spans.high[row])) << "trial " << trial << " row " << k;
+            EXPECT_EQ((over.left >> row & 1) != 0, any(spans.low[row], spans.left[row]))
+                << "trial " << trial << " row " << k;
+            EXPECT_EQ((over.right >> row & 1) != 0, any(spans.right[row], spans.high[row]))
+                << "trial " << trial << " row " << k;
         }
-        EXPECT_EQ(highest_in(under_zero.data(), static_cast<std::size_t>(nx), rows, spans), highest) << "trial " << trial;
+        EXPECT_EQ(highest_in(under_zero.data(), static_cast<std::size_t>(nx), rows, spans), highest)
+            << "trial " << trial;
         EXPECT_EQ(deep, expected_deep) << "trial " << trial;
         EXPECT_EQ(lowered, expected) << "trial " << trial;
     }
     EXPECT_EQ(level_over(1e300, 5), -std::numeric_limits<float>::infinity());
 }
 
-// Of rows beside a point those cells are named whose centres lie in both strips, and within the radius if it is about the point.
+// Of rows beside a point those cells are named whose centres lie in both strips, and within the radius if it
+// is about the point.
 TEST(Sweep, StripsOfRowsHoldTheirCells) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
-    std::uniform_real_distribution<double> u(-4, 14), turn(-std::numbers::pi, std::numbers::pi), wide(-3, 5), length(0.2, 8);
+    std::uniform_real_distribution<double> u(-4, 14), turn(-std::numbers::pi, std::numbers::pi), wide(-3, 5),
+        length(0.2, 8);
     std::size_t inside = 0, about = 0;
     for (int trial = 0; trial < 1000; ++trial) {
         const CellGrid grid{0.1, 0.2, 0.31, 1 + trial % 40, 75};
         const std::array<double, 2> from{u(random), u(random)};
         const auto strips = [&] {
             const auto strip = [&](double& rise) {
-                const double angle = trial % 5 == 0 ? std::numbers::pi / 2 * std::round(turn(random)) : turn(random), least = wide(random) - 3;
+                const double angle = trial % 5 == 0 ? std::numbers::pi / 2 * std::round(turn(random))
+                                                    : turn(random),
+                             least = wide(random) - 3;
                 rise = std::sin(angle);
                 return Strip(std::cos(angle), least, least + wide(random) + 2);
             };
@@ -230,7 +256,8 @@ TEST(Sweep, StripsOfRowsHoldTheirCells) {
         RowSpans spans;
         const bool has_near = trial % 3 != 0;
         const int first_row = trial % 12, rows = 1 + trial % RowSpans::kRows;
-        strips_of_rows(grid, first_row, rows, from, way, low, high, has_near ? &near : nullptr, radius, spans);
+        strips_of_rows(grid, first_row, rows, from, way, low, high, has_near ? &near : nullptr, radius,
+                       spans);
         for (int k = 0; k < rows; ++k) {
             const auto at = static_cast<std::size_t>(k);
             if (spans.low[at] <= spans.left[at]) {
@@ -243,14 +270,17 @@ TEST(Sweep, StripsOfRowsHoldTheirCells) {
                 constexpr double hair = 1e-6;
                 const double px = grid.x(i) - from[0], py = grid.y(first_row + k) - from[1];
                 const double in = std::min({within(way, px, py), px - low, high - px});
-                const double in_near = has_near ? std::min(within(near, px, py), radius - std::hypot(px, py)) : -1;
-                const bool named = i >= spans.low[at] && i <= spans.left[at], named_near = i >= spans.right[at] && i <= spans.high[at];
+                const double in_near =
+                    has_near ? std::min(within(near, px, py), radius - std::hypot(px, py)) : -1;
+                const bool named = i >= spans.low[at] && i <= spans.left[at],
+                           named_near = i >= spans.right[at] && i <= spans.high[at];
                 inside += named, about += named_near;
                 if (std::abs(in) > hair) {
                     EXPECT_EQ(named, in > 0) << "trial " << trial << ", row " << k << ", cell " << i;
                 }
                 if (std::abs(in_near) > hair) {
-                    EXPECT_EQ(named_near, in_near > 0) << "trial " << trial << ", row " << k << ", cell " << i;
+                    EXPECT_EQ(named_near, in_near > 0)
+                        << "trial " << trial << ", row " << k << ", cell " << i;
                 }
             }
         }
@@ -272,18 +302,24 @@ TEST(Rows, SayOnWhichCellsMoreThanALimitIsLeft) {
         const double wide = trial % 3 == 0 ? 0.01 : 1;
         for (std::size_t k = 0; k < n; ++k) {
             surface[k] = static_cast<float>(3 * u(random));
-            stands[k] = random() % 3 == 0 ? surface[k] : surface[k] + static_cast<float>(wide * (u(random) - 0.2));
+            stands[k] =
+                random() % 3 == 0 ? surface[k] : surface[k] + static_cast<float>(wide * (u(random) - 0.2));
             nz[k] = static_cast<std::uint8_t>(1 + random() % 255);
         }
         // Often what one cell has left, to the last bit.
         const float one = (stands[0] - surface[0]) * (static_cast<float>(nz[0]) / 255.0F);
         const float most = trial % 2 == 0 && one >= 0 ? one : static_cast<float>(0.5 * wide * u(random));
         std::uint64_t expected = 0;
-        for (std::size_t k = 0; k < n; ++k) expected |= std::uint64_t{(stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F) > most} << k;
-        ASSERT_EQ(cells_left(stands.data(), surface.data(), nz.data(), static_cast<int>(n), most), expected) << "seed " << seed << " trial " << trial;
+        for (std::size_t k = 0; k < n; ++k)
+            expected |= std::uint64_t{(stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F) > most}
+                        << k;
+        ASSERT_EQ(cells_left(stands.data(), surface.data(), nz.data(), static_cast<int>(n), most), expected)
+            << "seed " << seed << " trial " << trial;
         float greatest = 0;
-        for (std::size_t k = 0; k < n; ++k) greatest = std::max(greatest, (stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F));
-        ASSERT_EQ(most_left(stands.data(), surface.data(), nz.data(), static_cast<int>(n)), greatest) << "seed " << seed << " trial " << trial;
+        for (std::size_t k = 0; k < n; ++k)
+            greatest = std::max(greatest, (stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F));
+        ASSERT_EQ(most_left(stands.data(), surface.data(), nz.data(), static_cast<int>(n)), greatest)
+            << "seed " << seed << " trial " << trial;
     }
 }
 
@@ -300,10 +336,14 @@ TEST(Sweep, RowsAgreeWithTheirCells) {
         std::array<double, 64> h{};
         for (double& z : h) z = random() % 5 == 0 ? kUncovered : random() % 4 == 0 ? 2.0 : 4 * u(random) - 1;
         // Often some stand by the least to the last bit.
-        const double floor = trial % 2 == 0 ? 0 : -10, level = h[0], by = std::max(0.1, stands[0] - std::max(floor, h[0]));
-        const double least = trial % 3 == 0 ? std::numeric_limits<double>::denorm_min() : std::isfinite(by) ? by : 0.4;
+        const double floor = trial % 2 == 0 ? 0 : -10, level = h[0],
+                     by = std::max(0.1, stands[0] - std::max(floor, h[0]));
+        const double least = trial % 3 == 0      ? std::numeric_limits<double>::denorm_min()
+                             : std::isfinite(by) ? by
+                                                 : 0.4;
         const double bottom = trial % 2 == 0 ? 0 : 7.3, over_bottom = bottom + static_cast<double>(stands[0]);
-        const std::uint64_t over = cells_over(stands.data(), n, h.data(), floor, least), over_level = cells_over(stands.data(), n, level, least);
+        const std::uint64_t over = cells_over(stands.data(), n, h.data(), floor, least),
+                            over_level = cells_over(stands.data(), n, level, least);
         std::uint64_t expected = 0, expected_level = 0;
         bool any = false;
         std::array<double, 64> kept = h;
@@ -334,7 +374,8 @@ TEST(Sweep, RowsAgreeWithTheirCells) {
         EXPECT_NEAR(lost.sum, expected_lost.sum, 1e-5 * (1 + expected_lost.sum)) << "trial " << trial;
         EXPECT_EQ(lost.cells, expected_lost.cells) << "trial " << trial;
         const int rows = n % 4 == 0 ? 4 : 1;
-        EXPECT_EQ(highest_of(stands.data(), size / static_cast<std::size_t>(rows), n / rows, rows), top) << "trial " << trial;
+        EXPECT_EQ(highest_of(stands.data(), size / static_cast<std::size_t>(rows), n / rows, rows), top)
+            << "trial " << trial;
     }
 }
 
@@ -342,7 +383,9 @@ TEST(Sweep, RowsAgreeWithTheirCells) {
 constexpr double kBottom = -20;
 struct RowsOver {
     float* height;
-    void operator()(std::size_t cell, double z) const { height[cell] = std::min(height[cell], static_cast<float>(z - kBottom)); }
+    void operator()(std::size_t cell, double z) const {
+        height[cell] = std::min(height[cell], static_cast<float>(z - kBottom));
+    }
     void row(std::size_t first, int n, const double* h, double lowest) const {
         for (int k = 0; k < n; ++k) {
             EXPECT_GE(h[k], lowest - 1e-12);
@@ -376,7 +419,8 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
             way.push_back(next);
         }
         std::vector<double> alone(grid.count(), 1), chained(grid.count(), 1), followed(grid.count(), 1);
-        std::vector<float> rows_chained(grid.count(), static_cast<float>(1 - kBottom)), rows_followed = rows_chained;
+        std::vector<float> rows_chained(grid.count(), static_cast<float>(1 - kBottom)),
+            rows_followed = rows_chained;
         for (std::size_t k = 1; k < way.size(); ++k) {
             auto into = [&](std::vector<double>& height, std::size_t& asked) {
                 return std::pair{[&height, &asked](std::size_t c) { return ++asked, height[c]; },
@@ -392,11 +436,14 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
             const auto [stands_followed, take_followed] = into(followed, asked_followed);
             sweep_above(grid, end, way[k - 1], way[k], stands_followed, take_followed, {.been = k > 1});
             // Given as heights over a level, of which rows are taken at once.
-            for (auto& [height, of] : {std::pair{&rows_chained, chain}, {&rows_followed, ChainedSweep{.been = k > 1}}})
-                sweep_above(grid, end, way[k - 1], way[k], StandingHeights{height->data(), kBottom}, RowsOver{height->data()}, of);
+            for (auto& [height, of] :
+                 {std::pair{&rows_chained, chain}, {&rows_followed, ChainedSweep{.been = k > 1}}})
+                sweep_above(grid, end, way[k - 1], way[k], StandingHeights{height->data(), kBottom},
+                            RowsOver{height->data()}, of);
         }
         for (std::size_t c = 0; c < grid.count(); ++c) {
-            for (const std::vector<float>* rows : {&rows_chained, &rows_followed}) unlike_rows += std::abs((*rows)[c] + kBottom - alone[c]) > 1e-5;
+            for (const std::vector<float>* rows : {&rows_chained, &rows_followed})
+                unlike_rows += std::abs((*rows)[c] + kBottom - alone[c]) > 1e-5;
         }
         for (std::size_t c = 0; c < grid.count(); ++c)
             if (std::abs(alone[c] - followed[c]) > 1e-9) ++unlike;
@@ -406,12 +453,17 @@ TEST(Sweep, AChainLeavesWhatItsMotionsLeave) {
             double nearest = 1e300;
             const double x = grid.x(static_cast<int>(c) % grid.nx), y = grid.y(static_cast<int>(c) / grid.nx);
             for (std::size_t k = 1; k < way.size(); ++k) {
-                const double dx = way[k][0] - way[k - 1][0], dy = way[k][1] - way[k - 1][1], l2 = dx * dx + dy * dy;
-                const double t = l2 > 0 ? std::clamp(((x - way[k - 1][0]) * dx + (y - way[k - 1][1]) * dy) / l2, 0.0, 1.0) : 0.0;
-                nearest = std::min(nearest, std::abs(std::hypot(x - way[k - 1][0] - t * dx, y - way[k - 1][1] - t * dy) - end.radius));
+                const double dx = way[k][0] - way[k - 1][0], dy = way[k][1] - way[k - 1][1],
+                             l2 = dx * dx + dy * dy;
+                const double t =
+                    l2 > 0 ? std::clamp(((x - way[k - 1][0]) * dx + (y - way[k - 1][1]) * dy) / l2, 0.0, 1.0)
+                           : 0.0;
+                nearest = std::min(
+                    nearest, std::abs(std::hypot(x - way[k - 1][0] - t * dx, y - way[k - 1][1] - t * dy) -
+                                      end.radius));
             }
-            EXPECT_LE(nearest, 1e-9) << "trial " << trial << ", form " << static_cast<int>(end.form) << ", cell " << c << ": " << alone[c] << " and "
-                                     << chained[c];
+            EXPECT_LE(nearest, 1e-9) << "trial " << trial << ", form " << static_cast<int>(end.form)
+                                     << ", cell " << c << ": " << alone[c] << " and " << chained[c];
         }
     }
     EXPECT_LT(4 * asked_chained, 3 * asked_alone);
@@ -434,9 +486,11 @@ TEST(Stock, EffectsAreThoseOfTheCells) {
         stock.add_slab(4, 6);
         for (int k = 0; k < 12; ++k) {
             const CutterEnd end{static_cast<CutterEnd::Form>(k % 2), ur(random), 0};
-            const std::array<double, 3> a{u(random), u(random), uz(random)}, b{u(random), u(random), k % 3 == 0 ? uz(random) : a[2]};
+            const std::array<double, 3> a{u(random), u(random), uz(random)},
+                b{u(random), u(random), k % 3 == 0 ? uz(random) : a[2]};
             std::vector<std::array<double, 2>> before;
-            for (std::size_t c = 0; c < grid.count(); ++c) before.push_back({stock.surface(0, c), stock.surface(1, c)});
+            for (std::size_t c = 0; c < grid.count(); ++c)
+                before.push_back({stock.surface(0, c), stock.surface(1, c)});
             const CutEffect effect = stock.cut(end, a, b, deep);
             double removed = 0, deepest = 0, highest = -1e300, lowest = 1e300;
             std::uint64_t deep_cells = 0;
@@ -460,7 +514,8 @@ TEST(Stock, EffectsAreThoseOfTheCells) {
             EXPECT_NEAR(effect.removed, removed, 1e-9 * (1 + removed)) << "seed " << seed;
             EXPECT_EQ(effect.deepest, deepest);
             EXPECT_EQ(effect.deep_cells, deep_cells);
-            EXPECT_EQ(effect.deep_across, deep_cells == 0 ? 0 : static_cast<double>(deep_cells) / static_cast<double>(longer));
+            EXPECT_EQ(effect.deep_across,
+                      deep_cells == 0 ? 0 : static_cast<double>(deep_cells) / static_cast<double>(longer));
             EXPECT_EQ(effect.highest, highest);
             if (std::min(a[2], b[2]) >= 0) {
                 EXPECT_EQ(effect.lowest, lowest);
@@ -472,7 +527,8 @@ TEST(Stock, EffectsAreThoseOfTheCells) {
     EXPECT_GT(lowered, 100000U);
 }
 
-// Ways of a disc at one height, taken as one region, leave what they leave one after another, and what they took together is the same.
+// Ways of a disc at one height, taken as one region, leave what they leave one after another, and what they
+// took together is the same.
 TEST(Stock, ARegionIsCutAsItsWaysAre) {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
@@ -482,24 +538,29 @@ TEST(Stock, ARegionIsCutAsItsWaysAre) {
     LevelRegion region(grid);
     for (int trial = 0; trial < 300; ++trial) {
         Stock alone(grid), together(grid);
-        for (Stock* const stock : {&alone, &together}) stock->add_slab(0, 5), stock->add_slab(trial % 3 == 0 ? 4 : 5, 6);
+        for (Stock* const stock : {&alone, &together})
+            stock->add_slab(0, 5), stock->add_slab(trial % 3 == 0 ? 4 : 5, 6);
         for (int k = 0; k < 4; ++k) {  // an uneven surface, cut through to the slab below here and there
-            const std::array<double, 3> a{u(random), u(random), uz(random)}, b{u(random), u(random), trial % 2 == 0 ? a[2] : uz(random)};
+            const std::array<double, 3> a{u(random), u(random), uz(random)},
+                b{u(random), u(random), trial % 2 == 0 ? a[2] : uz(random)};
             const CutterEnd ball{CutterEnd::Form::ball, ur(random), 0};
             for (Stock* const stock : {&alone, &together}) stock->cut(ball, a, b);
         }
-        const double radius = ur(random), z = trial % 10 == 0 ? uz(random) : 5 + uz(random) / 2, most = trial % 4 == 0 ? 2 : 1e300;
+        const double radius = ur(random), z = trial % 10 == 0 ? uz(random) : 5 + uz(random) / 2,
+                     most = trial % 4 == 0 ? 2 : 1e300;
         std::vector<std::array<double, 2>> way{{u(random), u(random)}};
         double angle = turn(random);
         for (int k = 0; k < 1 + trial % 40; ++k) {
             angle += turn(random) / 9;
             const double length = trial % 5 == 0 ? ur(random) : k % 9 == 2 ? 0 : 0.7;
-            way.push_back({way.back()[0] + length * std::cos(angle), way.back()[1] + length * std::sin(angle)});
+            way.push_back(
+                {way.back()[0] + length * std::cos(angle), way.back()[1] + length * std::sin(angle)});
             if (k % 17 == 16) way.push_back({u(random), u(random)});
         }
         double removed = 0, deepest = 0, lowest = 1e300;
         for (std::size_t k = 1; k < way.size(); ++k) {
-            const CutEffect e = alone.cut({CutterEnd::Form::flat, radius, 0}, {way[k - 1][0], way[k - 1][1], z}, {way[k][0], way[k][1], z});
+            const CutEffect e = alone.cut({CutterEnd::Form::flat, radius, 0},
+                                          {way[k - 1][0], way[k - 1][1], z}, {way[k][0], way[k][1], z});
             removed += e.removed, deepest = std::max(deepest, e.deepest), lowest = std::min(lowest, e.lowest);
             region.add(way[k - 1], way[k], radius);
         }
@@ -518,13 +579,16 @@ TEST(Stock, ARegionIsCutAsItsWaysAre) {
         EXPECT_EQ(effect->deepest, deepest);
         EXPECT_EQ(effect->lowest, lowest);
         double top = -1e300;
-        for (std::size_t c = 0; c < grid.count(); ++c) unlike += together.surface(1, c) != alone.surface(1, c), top = std::max(top, together.top(c));
+        for (std::size_t c = 0; c < grid.count(); ++c)
+            unlike += together.surface(1, c) != alone.surface(1, c), top = std::max(top, together.top(c));
         EXPECT_EQ(together.highest(), top);
         for (int k = 0; k < 8; ++k) {
-            const double x0 = u(random), y0 = u(random), x1 = x0 + ur(random), y1 = y0 + ur(random), over = 5 + uz(random) / 2;
+            const double x0 = u(random), y0 = u(random), x1 = x0 + ur(random), y1 = y0 + ur(random),
+                         over = 5 + uz(random) / 2;
             double within = -1e300, all = -1e300;
             for (std::size_t c = 0; c < grid.count(); ++c) {
-                const double x = grid.x(static_cast<int>(c) % grid.nx), y = grid.y(static_cast<int>(c) / grid.nx), stands = together.surface(1, c);
+                const double x = grid.x(static_cast<int>(c) % grid.nx),
+                             y = grid.y(static_cast<int>(c) / grid.nx), stands = together.surface(1, c);
                 all = std::max(all, stands);
                 if (x >= x0 && x <= x1 && y >= y0 && y <= y1) within = std::max(within, stands);
             }
@@ -533,7 +597,8 @@ TEST(Stock, ARegionIsCutAsItsWaysAre) {
                 EXPECT_LE(within, over) << "seed " << seed << ", trial " << trial;
             }
             cleared += clear && all > over;
-            EXPECT_EQ(together.clear(-1e3, 1e3, -1e3, 1e3, over), all <= over) << "seed " << seed << ", trial " << trial;
+            EXPECT_EQ(together.clear(-1e3, 1e3, -1e3, 1e3, over), all <= over)
+                << "seed " << seed << ", trial " << trial;
         }
     }
     EXPECT_EQ(unlike, 0U);
@@ -548,7 +613,8 @@ TEST(Stock, CuspOfLevelPassesOnAPlane) {
     const double sd = 2 * std::sqrt(2 * R * cusp - cusp * cusp) * std::sin(alpha);
     ASSERT_LE(sd, 2 * (R - cusp) * std::cos(alpha));
     const double cell = cusp / 20;
-    // The plane z = x·tan α. The ball touches it from above: centre at distance R along the normal (−sin α, 0, cos α).
+    // The plane z = x·tan α. The ball touches it from above: centre at distance R along the normal (−sin α,
+    // 0, cos α).
     Stock stock({1, 0, cell, 1200, 1});
     stock.add_slab(-20, 60);
     for (double tip = -8; tip < 20; tip += sd) {
@@ -557,7 +623,8 @@ TEST(Stock, CuspOfLevelPassesOnAPlane) {
     }
     double most = 0, least = 1e9;
     for (std::size_t i = 0; i < 1200; ++i) {
-        const double x = 1 + static_cast<double>(i) * cell, over = (stock.surface(0, i) - x * std::tan(alpha)) * std::cos(alpha);
+        const double x = 1 + static_cast<double>(i) * cell,
+                     over = (stock.surface(0, i) - x * std::tan(alpha)) * std::cos(alpha);
         most = std::max(most, over);
         least = std::min(least, over);
     }
@@ -568,7 +635,8 @@ TEST(Stock, CuspOfLevelPassesOnAPlane) {
 // Where the shank of the lower pass cuts too: L = R(1 − sin α) + (SD − √(2Ru − u²))·cos α with u = SD·cot α.
 TEST(Stock, CuspWhereTheShankCutsToo) {
     const double R = 3.175, alpha = 87 * std::numbers::pi / 180, sd = 0.0639 * 25.4;
-    const double u = sd / std::tan(alpha), expected = R * (1 - std::sin(alpha)) + (sd - std::sqrt(2 * R * u - u * u)) * std::cos(alpha);
+    const double u = sd / std::tan(alpha),
+                 expected = R * (1 - std::sin(alpha)) + (sd - std::sqrt(2 * R * u - u * u)) * std::cos(alpha);
     const double cell = 0.0002;
     Stock stock({0.5, 0, cell, 3000, 1});
     stock.add_slab(-20, 80);
@@ -578,29 +646,35 @@ TEST(Stock, CuspWhereTheShankCutsToo) {
     }
     double most = 0;
     for (std::size_t i = 300; i < 2700; ++i)
-        most = std::max(most, (stock.surface(0, i) - (0.5 + static_cast<double>(i) * cell) * std::tan(alpha)) * std::cos(alpha));
+        most =
+            std::max(most, (stock.surface(0, i) - (0.5 + static_cast<double>(i) * cell) * std::tan(alpha)) *
+                               std::cos(alpha));
     EXPECT_NEAR(expected, 0.002 * 25.4, 0.02 * expected);  // LUO's example
     EXPECT_NEAR(most, expected, 0.01 * expected);
 }
 
-// On a cone of the same slope the passes are circles, and the cusp along a meridian is the plane's (the ball's section through the
-// axis is the same circle, but for the cone's curvature across, which does not reach the meridian plane).
+// On a cone of the same slope the passes are circles, and the cusp along a meridian is the plane's (the
+// ball's section through the axis is the same circle, but for the cone's curvature across, which does not
+// reach the meridian plane).
 TEST(Stock, CuspOnAConeByChords) {
     const double R = 3.175, alpha = 40 * std::numbers::pi / 180, cusp = 0.1, height = 30;
     const double sd = 2 * std::sqrt(2 * R * cusp - cusp * cusp) * std::sin(alpha), cell = cusp / 20;
     Stock stock({8, 0, cell, 1000, 1});
     stock.add_slab(-30, 80);
     for (double tip = 10; tip < 24; tip += sd) {
-        const double zc = tip + R, r = (height - zc) / std::tan(alpha) + R / std::sin(alpha);  // the centre's circle
-        const int n = 4000;                                                                    // chords miss the circle by r(π/n)²/2 < 1e-5
+        const double zc = tip + R,
+                     r = (height - zc) / std::tan(alpha) + R / std::sin(alpha);  // the centre's circle
+        const int n = 4000;  // chords miss the circle by r(π/n)²/2 < 1e-5
         for (int k = -n / 4; k < n / 4; ++k) {
             const double a = 2 * std::numbers::pi * k / n, b = 2 * std::numbers::pi * (k + 1) / n;
-            stock.cut({CutterEnd::Form::ball, R, 0}, {r * std::cos(a), r * std::sin(a), tip}, {r * std::cos(b), r * std::sin(b), tip});
+            stock.cut({CutterEnd::Form::ball, R, 0}, {r * std::cos(a), r * std::sin(a), tip},
+                      {r * std::cos(b), r * std::sin(b), tip});
         }
     }
     double most = 0, least = 1e9;
     for (std::size_t i = 0; i < 1000; ++i) {
-        const double x = 8 + static_cast<double>(i) * cell, over = (stock.surface(0, i) - (height - x * std::tan(alpha))) * std::cos(alpha);
+        const double x = 8 + static_cast<double>(i) * cell,
+                     over = (stock.surface(0, i) - (height - x * std::tan(alpha))) * std::cos(alpha);
         most = std::max(most, over);
         least = std::min(least, over);
     }
@@ -608,11 +682,12 @@ TEST(Stock, CuspOnAConeByChords) {
     EXPECT_NEAR(most, cusp, 0.01 * cusp);
 }
 
-// A ball of radius r over a sphere of radius S in level circles: neighbours' centres lie on the sphere S + r an angle δ apart, and
-// between them the ball leaves (S + r)·cos(δ/2) − √(r² − (S + r)²·sin²(δ/2)) − S.
+// A ball of radius r over a sphere of radius S in level circles: neighbours' centres lie on the sphere S + r
+// an angle δ apart, and between them the ball leaves (S + r)·cos(δ/2) − √(r² − (S + r)²·sin²(δ/2)) − S.
 TEST(Stock, CuspOnASphere) {
     const double S = 30, r = 3, delta = 0.03, cell = 0.002;
-    const double expected = (S + r) * std::cos(delta / 2) - std::sqrt(r * r - std::pow((S + r) * std::sin(delta / 2), 2)) - S;
+    const double expected =
+        (S + r) * std::cos(delta / 2) - std::sqrt(r * r - std::pow((S + r) * std::sin(delta / 2), 2)) - S;
     Stock stock({12, 0, cell, 5000, 1});
     stock.add_slab(0, 40);
     for (double polar = 0.3; polar < 1.0; polar += delta) {

@@ -50,7 +50,8 @@ TEST(Tools, LuosLibrary) {
 
 TEST(Tools, LevelsAreEvenDownToEveryFloor) {
     const std::vector<double> floors{4, 9.5, 30};
-    EXPECT_EQ(even_levels(12, 0, floors, 2), (std::vector<double>{10.75, 9.5, 9.5 - 5.5 / 3, 9.5 - 11.0 / 3, 4, 2, 0}));
+    EXPECT_EQ(even_levels(12, 0, floors, 2),
+              (std::vector<double>{10.75, 9.5, 9.5 - 5.5 / 3, 9.5 - 11.0 / 3, 4, 2, 0}));
     EXPECT_EQ(even_levels(12, 0, {}, 20), (std::vector<double>{0}));
     for (const double step : {0.3, 1.0, 3.7}) {
         double z = 12;
@@ -75,7 +76,9 @@ TEST(Tools, ALayerIsNeverSlowerThanWithTheFixedSet) {
     const Plan chosen = make_plan(context, mesh, {}, job);
     job.selection.mode = SelectionMode::fixed;
     const Plan fixed = make_plan(context, mesh, {}, job);
-    auto minutes = [](const Plan& plan) { return plan.totals.cutting_minutes + plan.totals.tool_change_minutes; };
+    auto minutes = [](const Plan& plan) {
+        return plan.totals.cutting_minutes + plan.totals.tool_change_minutes;
+    };
     EXPECT_LE(minutes(chosen), minutes(fixed) + 1e-6);
     for (const Layer& layer : chosen.layers) {
         ASSERT_TRUE(layer.selection.has_value());
@@ -83,7 +86,8 @@ TEST(Tools, ALayerIsNeverSlowerThanWithTheFixedSet) {
         ASSERT_GE(sets.size(), 2U);
         EXPECT_EQ(sets.front().name, "fixed") << "the others are measured by it";
         EXPECT_EQ(sets[1].name, "selected");
-        EXPECT_EQ(std::count_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.name == "fixed"; }), 1);
+        EXPECT_EQ(std::count_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.name == "fixed"; }),
+                  1);
         EXPECT_EQ(std::count_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.chosen; }), 1);
         const auto taken = std::find_if(sets.begin(), sets.end(), [](const ToolSet& s) { return s.chosen; });
         EXPECT_LE(taken->minutes, sets.front().minutes);
@@ -101,13 +105,14 @@ TEST(Tools, ALayerIsNeverSlowerThanWithTheFixedSet) {
     for (const Layer& layer : fixed.layers) EXPECT_FALSE(layer.selection.has_value());
 }
 
-// One narrow place does not decide for the layer: the small tools cut there and nowhere else, and with their changes counted the layer
-// takes less time than if they cut all of it.
+// One narrow place does not decide for the layer: the small tools cut there and nowhere else, and with their
+// changes counted the layer takes less time than if they cut all of it.
 TEST(Tools, ANarrowSlotIsCutBySmallToolsAlone) {
     Context context;
     // A wide wavy field, and in it a slot of 4 mm at y = 25 that no tool over 1/8 in enters.
     const Mesh mesh = test::height_field(context, 40, 2, [](double x, double y) {
-        return std::abs(y - 25) < 3 && std::abs(x) < 16 ? 3.0 : 10 + 2.5 * std::cos(x / 11) * std::cos(y / 11);
+        return std::abs(y - 25) < 3 && std::abs(x) < 16 ? 3.0
+                                                        : 10 + 2.5 * std::cos(x / 11) * std::cos(y / 11);
     });
     Job job;
     job.tools = luo_library();
@@ -118,7 +123,9 @@ TEST(Tools, ANarrowSlotIsCutBySmallToolsAlone) {
     const Layer& layer = plan.layers.front();
     constexpr double small = 4;
     auto diameter = [&](int number) {
-        return std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == number; })->diameter;
+        return std::find_if(job.tools.begin(), job.tools.end(),
+                            [&](const Tool& t) { return t.number == number; })
+            ->diameter;
     };
     int in_slot = 0, elsewhere = 0;
     double minutes = 0;
@@ -148,10 +155,13 @@ TEST(Tools, ANarrowSlotIsCutBySmallToolsAlone) {
     ASSERT_NE(chosen, sets.end());
     EXPECT_NEAR(chosen->minutes, minutes, 1e-6);
     EXPECT_EQ(chosen->reason, "takes the least time of those that leave no more");
-    EXPECT_TRUE(std::any_of(chosen->tools.begin(), chosen->tools.end(), [&](int t) { return diameter(t) < small; }));
+    EXPECT_TRUE(
+        std::any_of(chosen->tools.begin(), chosen->tools.end(), [&](int t) { return diameter(t) < small; }));
 
     Job only_small = job;
-    std::erase_if(only_small.tools, [](const Tool& t) { return (t.kind == ToolKind::flat || t.kind == ToolKind::ball) && t.diameter > small; });
+    std::erase_if(only_small.tools, [](const Tool& t) {
+        return (t.kind == ToolKind::flat || t.kind == ToolKind::ball) && t.diameter > small;
+    });
     ASSERT_EQ(only_small.tools.size(), 3U);
     const Plan everywhere = make_plan(context, mesh, {}, only_small);
     EXPECT_LT(plan.totals.cutting_minutes + plan.totals.tool_change_minutes,

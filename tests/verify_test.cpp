@@ -1,4 +1,5 @@
-// verify on folders: one written by hand, one by the planner; good ones pass, and every corruption is reported as what it is.
+// verify on folders: one written by hand, one by the planner; good ones pass, and every corruption is
+// reported as what it is.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -33,7 +34,8 @@ void spill(const fs::path& path, const std::string& text) {
 /// A folder of its own for each test, gone at its end.
 struct Folder {
     fs::path path;
-    explicit Folder(const std::string& name) : path(fs::temp_directory_path() / ("slabwright_verify_" + name + "_" + std::to_string(::getpid()))) {
+    explicit Folder(const std::string& name)
+        : path(fs::temp_directory_path() / ("slabwright_verify_" + name + "_" + std::to_string(::getpid()))) {
         fs::remove_all(path);
         fs::create_directories(path);
     }
@@ -46,7 +48,8 @@ Mesh block() {
     const float h = 20, z = 10;
     Mesh m;
     m.vertices = {{0, 0, 0}, {h, 0, 0}, {h, h, 0}, {0, h, 0}, {0, 0, z}, {h, 0, z}, {h, h, z}, {0, h, z}};
-    m.facets = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+    m.facets = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
+                {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
     return m;
 }
 
@@ -57,7 +60,8 @@ std::string head(int tool) {
     return text;
 }
 
-/// A block of 20 × 20 × 10 in a slab of 40 × 40 × 12, cleared in two steps by a ring with round corners, and its corners.
+/// A block of 20 × 20 × 10 in a slab of 40 × 40 × 12, cleared in two steps by a ring with round corners, and
+/// its corners.
 void write_block(const fs::path& out) {
     write_stl((out / "block.stl").string(), block());
     Context context;
@@ -76,7 +80,9 @@ void write_block(const fs::path& out) {
     std::string rough = head(2) + "G0 Z25\nX-20 Y-9\n";
     for (const char* z : {"5", "0"}) {
         rough += std::string("Z") + z + "\nG1 X29 Y-9 F5000\nY29\nX-9\nY-9\n";
-        rough += "X-5 Y0\nG3 X0 Y-5 I5 J0\nG1 X20\nG3 X25 Y0 I0 J5\nG1 Y20\nG3 X20 Y25 I-5 J0\nG1 X0\nG3 X-5 Y20 I0 J-5\nG1 Y0\n";
+        rough +=
+            "X-5 Y0\nG3 X0 Y-5 I5 J0\nG1 X20\nG3 X25 Y0 I0 J5\nG1 Y20\nG3 X20 Y25 I-5 J0\nG1 X0\nG3 X-5 Y20 "
+            "I0 J-5\nG1 Y0\n";
         rough += "G0 Z25\nX-20 Y-9\n";
     }
     spill(out / "nc/L1_02.ngc", rough + "M5\nM2\n");
@@ -93,11 +99,14 @@ std::string verdict(const fs::path& out, double cell = 0.5) {
         return codes;
     } catch (const Error& e) {
         const std::string place = e.place();
-        return "error " + e.code() + " " + place.substr(place.rfind('/') == std::string::npos ? 0 : place.rfind('/') + 1);
+        return "error " + e.code() + " " +
+               place.substr(place.rfind('/') == std::string::npos ? 0 : place.rfind('/') + 1);
     }
 }
 
-bool has(const std::string& codes, const std::string& code) { return (" " + codes + " ").find(" " + code + " ") != std::string::npos; }
+bool has(const std::string& codes, const std::string& code) {
+    return (" " + codes + " ").find(" " + code + " ") != std::string::npos;
+}
 
 /// Replaces the first place, or the last.
 void replace(const fs::path& file, const std::string& from, const std::string& to, bool last = false) {
@@ -138,18 +147,22 @@ TEST(Verify, AGoodFolderPassesAndWritesItsReport) {
 TEST(Verify, MapsShowEachLayer) {
     Folder f("maps");
     write_block(f.path);
-    // The second level's first straight cut is gone: the strip beside the block stays 5 mm high. And the top is faced too deep.
+    // The second level's first straight cut is gone: the strip beside the block stays 5 mm high. And the top
+    // is faced too deep.
     replace(f.path / "nc/L1_02.ngc", "G1 X29 Y-9 F5000\nY29\nX-9\nY-9", "G1 F5000\nY29\nX-9\nY-9", true);
     replace(f.path / "nc/L1_01.ngc", "Z10", "Z9.9");
     Context context;
-    const Verification v = verify_folder(context, f.path.string(), {.stl = {}, .cell = 0.5, .maps_directory = (f.path / "pictures/of").string()});
+    const Verification v =
+        verify_folder(context, f.path.string(),
+                      {.stl = {}, .cell = 0.5, .maps_directory = (f.path / "pictures/of").string()});
     const std::string text = slurp(f.path / "pictures/of/layer_01.ppm"), start = "P6\n80 80\n255\n";
     ASSERT_EQ(text.size(), start.size() + 80 * 80 * 3);
     EXPECT_EQ(text.substr(0, start.size()), start);
     auto pixel = [&](double x, double y) {
         const auto i = static_cast<std::size_t>((x + 10) / 0.5), j = static_cast<std::size_t>((30 - y) / 0.5);
         std::array<int, 3> c{};
-        for (std::size_t k = 0; k < 3; ++k) c[k] = static_cast<unsigned char>(text[start.size() + (j * 80 + i) * 3 + k]);
+        for (std::size_t k = 0; k < 3; ++k)
+            c[k] = static_cast<unsigned char>(text[start.size() + (j * 80 + i) * 3 + k]);
         return c;
     };
     EXPECT_EQ(pixel(10.1, 10.1), (std::array<int, 3>{220, 0, 0})) << "gouged";
@@ -161,7 +174,8 @@ TEST(Verify, MapsShowEachLayer) {
     EXPECT_EQ(missed, l.missed);
     spill(f.path / "file", "");
     try {
-        (void)verify_folder(context, f.path.string(), {.stl = {}, .cell = 0.5, .maps_directory = (f.path / "file").string()});
+        (void)verify_folder(context, f.path.string(),
+                            {.stl = {}, .cell = 0.5, .maps_directory = (f.path / "file").string()});
         FAIL() << "a file is no folder";
     } catch (const Error& e) {
         EXPECT_EQ(e.code(), "verify.write");
@@ -175,8 +189,11 @@ TEST(Verify, LayerTopFrameMeansTheSame) {
     EXPECT_NE(verdict(f.path), "");  // the programs still count from the bottom: now 10 mm too high
     spill(f.path / "nc/L1_01.ngc", head(1) + "G0 Z15\nX-45 Y10\nZ0\nG1 X65 F5000\nG0 Z15\nM5\nM2\n");
     std::string rough = slurp(f.path / "nc/L1_02.ngc");
-    for (const auto& [from, to] : {std::pair<std::string, std::string>{"Z25\n", "Z15\n"}, {"Z5\n", "Z-5\n"}, {"Z0\n", "Z-10\n"}})
-        for (std::size_t at = rough.find(from); at != std::string::npos; at = rough.find(from, at + to.size())) rough.replace(at, from.size(), to);
+    for (const auto& [from, to] :
+         {std::pair<std::string, std::string>{"Z25\n", "Z15\n"}, {"Z5\n", "Z-5\n"}, {"Z0\n", "Z-10\n"}})
+        for (std::size_t at = rough.find(from); at != std::string::npos;
+             at = rough.find(from, at + to.size()))
+            rough.replace(at, from.size(), to);
     spill(f.path / "nc/L1_02.ngc", rough);
     EXPECT_EQ(verdict(f.path), "");
 }
@@ -189,28 +206,56 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
     };
     auto nc = [](const char* file) { return std::string("nc/") + file; };
     const std::vector<Case> cases{
-        {"lowered z", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "\nZ10\n", "\nZ9.9\n"); }, "gouge.cutter"},
-        {"lowered z in stock", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "\nZ10\n", "\nZ9.9\n"); }, "gouge.stock"},
-        {"dropped retract", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G0 Z25\nX-20 Y-9\nZ0\n", "G0 Z5\nX-20 Y-9\nX40 Y40\nZ0\n"); },
+        {"lowered z", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "\nZ10\n", "\nZ9.9\n"); },
          "gouge.cutter"},
-        {"rapid through stock", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "Z5\nG1 X29 Y-9 F5000", "Z5\nX29 Y-9\nG1 F5000"); },
+        {"lowered z in stock",
+         [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "\nZ10\n", "\nZ9.9\n"); }, "gouge.stock"},
+        {"dropped retract",
+         [&](const fs::path& p) {
+             replace(p / nc("L1_02.ngc"), "G0 Z25\nX-20 Y-9\nZ0\n", "G0 Z5\nX-20 Y-9\nX40 Y40\nZ0\n");
+         },
+         "gouge.cutter"},
+        {"rapid through stock",
+         [&](const fs::path& p) {
+             replace(p / nc("L1_02.ngc"), "Z5\nG1 X29 Y-9 F5000", "Z5\nX29 Y-9\nG1 F5000");
+         },
          "rapid.through_stock"},
-        {"wrong tool", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "T2 M6\nG43 H2", "T3 M6\nG43 H3"); }, "tool.wrong"},
-        {"unknown tool", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "T2 M6\nG43 H2", "T9 M6\nG43 H9"); }, "tool.unknown"},
-        {"flipped arc", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G3 X25 Y0", "G2 X25 Y0"); }, "gouge.cutter"},
-        {"deleted line", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "\nY29\nX-9\n", "\nX-9\n", true); }, "left.too_much"},
-        {"deleted line above", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "\nY29\nX-9\n", "\nX-9\n"); }, "cut.too_deep"},
-        {"deleted return", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "X-9\nY-9\nX-5 Y0", "X-9\nX-5 Y0", true); }, "left.too_much"},
+        {"wrong tool",
+         [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "T2 M6\nG43 H2", "T3 M6\nG43 H3"); },
+         "tool.wrong"},
+        {"unknown tool",
+         [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "T2 M6\nG43 H2", "T9 M6\nG43 H9"); },
+         "tool.unknown"},
+        {"flipped arc", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G3 X25 Y0", "G2 X25 Y0"); },
+         "gouge.cutter"},
+        {"deleted line",
+         [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "\nY29\nX-9\n", "\nX-9\n", true); },
+         "left.too_much"},
+        {"deleted line above",
+         [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "\nY29\nX-9\n", "\nX-9\n"); }, "cut.too_deep"},
+        {"deleted return",
+         [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "X-9\nY-9\nX-5 Y0", "X-9\nX-5 Y0", true); },
+         "left.too_much"},
         {"inches", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G21", "G20"); }, "left.too_much"},
-        {"inches travel", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "G21", "G20"); }, "travel.exceeded"},
-        {"incremental", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G90", "G91"); }, "error gcode.unknown_place L1_02.ngc:7"},
-        {"spindle never started", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "S12000 M3", "S12000"); }, "spindle.off"},
-        {"spindle backwards", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "M3", "M4"); }, "error gcode.spindle L1_02.ngc:5"},
-        {"low start", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "G0 Z25\nX", "G0 Z11\nX"); }, "rapid.unknown_start"},
-        {"emptied", [&](const fs::path& p) { spill(p / nc("L1_01.ngc"), head(1) + "G0 Z25\nX-45 Y10\nM5\nM2\n"); }, "operation.empty"},
-        {"cut off", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "M5\nM2\n", ""); }, "error gcode.no_end L1_01.ngc:11"},
-        {"exponent", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "X65", "X6.5e1"); }, "error gcode.unknown_word L1_01.ngc:10"},
-        {"offset word", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "G54", "G92 X0"); }, "error gcode.unknown_word L1_01.ngc:2"},
+        {"inches travel", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "G21", "G20"); },
+         "travel.exceeded"},
+        {"incremental", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G90", "G91"); },
+         "error gcode.unknown_place L1_02.ngc:7"},
+        {"spindle never started",
+         [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "S12000 M3", "S12000"); }, "spindle.off"},
+        {"spindle backwards", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "M3", "M4"); },
+         "error gcode.spindle L1_02.ngc:5"},
+        {"low start", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "G0 Z25\nX", "G0 Z11\nX"); },
+         "rapid.unknown_start"},
+        {"emptied",
+         [&](const fs::path& p) { spill(p / nc("L1_01.ngc"), head(1) + "G0 Z25\nX-45 Y10\nM5\nM2\n"); },
+         "operation.empty"},
+        {"cut off", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "M5\nM2\n", ""); },
+         "error gcode.no_end L1_01.ngc:11"},
+        {"exponent", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "X65", "X6.5e1"); },
+         "error gcode.unknown_word L1_01.ngc:10"},
+        {"offset word", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "G54", "G92 X0"); },
+         "error gcode.unknown_word L1_01.ngc:2"},
         {"program missing", [&](const fs::path& p) { fs::remove(p / nc("L1_01.ngc")); }, "program.missing"},
         {"stranger", [&](const fs::path& p) { spill(p / nc("L1_03.ngc"), "M2\n"); }, "program.unplanned"},
         {"order",
@@ -220,18 +265,31 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
          },
          "program.order"},
         {"tool table", [&](const fs::path& p) { replace(p / "tool.tbl", "D10", "D12.7"); }, "tool.table"},
-        {"tool table lacks", [&](const fs::path& p) { replace(p / "tool.tbl", "T3 P3 D6 Z0 ;ball\n", ""); }, "tool.table"},
-        {"tool table broken", [&](const fs::path& p) { replace(p / "tool.tbl", "D10", "Dten"); }, "error verify.tool_table tool.tbl:2"},
-        {"thinner slab", [&](const fs::path& p) { replace(p / "plan.json", "\"slab_thickness\": 12", "\"slab_thickness\": 9"); }, "stack.thin"},
-        {"lower layer", [&](const fs::path& p) { replace(p / "plan.json", "\"z_top\": 10", "\"z_top\": 9"); }, "stack.short"},
-        {"other pattern", [&](const fs::path& p) { spill(p / "block.stl", slurp(p / "block.stl").replace(100, 1, "x")); },
+        {"tool table lacks", [&](const fs::path& p) { replace(p / "tool.tbl", "T3 P3 D6 Z0 ;ball\n", ""); },
+         "tool.table"},
+        {"tool table broken", [&](const fs::path& p) { replace(p / "tool.tbl", "D10", "Dten"); },
+         "error verify.tool_table tool.tbl:2"},
+        {"thinner slab",
+         [&](const fs::path& p) {
+             replace(p / "plan.json", "\"slab_thickness\": 12", "\"slab_thickness\": 9");
+         },
+         "stack.thin"},
+        {"lower layer", [&](const fs::path& p) { replace(p / "plan.json", "\"z_top\": 10", "\"z_top\": 9"); },
+         "stack.short"},
+        {"other pattern",
+         [&](const fs::path& p) { spill(p / "block.stl", slurp(p / "block.stl").replace(100, 1, "x")); },
          "error verify.other_pattern block.stl"},
         {"no pattern", [&](const fs::path& p) { fs::remove(p / "block.stl"); }, "error verify.no_pattern"},
         {"no plan", [&](const fs::path& p) { fs::remove(p / "plan.json"); }, "error verify.plan plan.json"},
-        {"no JSON", [&](const fs::path& p) { replace(p / "plan.json", "{", "["); }, "error verify.plan plan.json"},
-        {"other schema", [&](const fs::path& p) { replace(p / "plan.json", "plan/1", "plan/2"); }, "error verify.plan plan.json"},
-        {"missing key", [&](const fs::path& p) { replace(p / "plan.json", "\"z_top\"", "\"top\""); }, "error verify.plan plan.json"},
-        {"file outside", [&](const fs::path& p) { replace(p / "plan.json", "nc/L1_01.ngc", "nc/../plan.json"); }, "error verify.plan plan.json"},
+        {"no JSON", [&](const fs::path& p) { replace(p / "plan.json", "{", "["); },
+         "error verify.plan plan.json"},
+        {"other schema", [&](const fs::path& p) { replace(p / "plan.json", "plan/1", "plan/2"); },
+         "error verify.plan plan.json"},
+        {"missing key", [&](const fs::path& p) { replace(p / "plan.json", "\"z_top\"", "\"top\""); },
+         "error verify.plan plan.json"},
+        {"file outside",
+         [&](const fs::path& p) { replace(p / "plan.json", "nc/L1_01.ngc", "nc/../plan.json"); },
+         "error verify.plan plan.json"},
     };
     for (const Case& c : cases) {
         Folder f("bad");
@@ -241,7 +299,8 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
         if (expected.rfind("error", 0) == 0) {
             EXPECT_EQ(found.substr(0, expected.size()), expected) << c.name;
         } else {
-            EXPECT_TRUE(has(found, expected)) << c.name << ": expected " << expected << ", found \"" << found << "\"";
+            EXPECT_TRUE(has(found, expected))
+                << c.name << ": expected " << expected << ", found \"" << found << "\"";
             EXPECT_EQ(nlohmann::json::parse(slurp(f.path / "verify.json"))["passed"], false) << c.name;
         }
     }
@@ -263,7 +322,8 @@ TEST(Verify, PlannedHalfSphere) {
         spill(nc, text);
         std::string codes;
         try {
-            const Verification v = verify_folder(context, (f.path / "out").string(), {.stl = stl, .cell = 0.4, .write = false});
+            const Verification v =
+                verify_folder(context, (f.path / "out").string(), {.stl = stl, .cell = 0.4, .write = false});
             for (const Violation& w : v.report.violations) codes += (codes.empty() ? "" : " ") + w.code;
         } catch (const Error& e) {
             codes = "error " + e.code();
@@ -286,7 +346,8 @@ TEST(Verify, PlannedHalfSphere) {
     EXPECT_TRUE(has(check(finish,
                           [](auto& all) {
                               for (std::size_t i = all.size() / 2; i < all.size(); ++i)
-                                  if (const std::size_t z = all[i].find('Z'); z != std::string::npos && all[i].find("G0") == std::string::npos) {
+                                  if (const std::size_t z = all[i].find('Z');
+                                      z != std::string::npos && all[i].find("G0") == std::string::npos) {
                                       std::size_t used = 0;
                                       const double value = std::stod(all[i].substr(z + 1), &used);
                                       all[i].replace(z + 1, used, std::to_string(value - 0.5));
@@ -317,10 +378,15 @@ TEST(Verify, PlannedHalfSphere) {
         for (std::size_t k = 1; k + 1 < rises.size(); ++k) all[rises[k]] = "G0";
     });
     EXPECT_TRUE(has(dropped, "rapid.through_stock") || has(dropped, "gouge.cutter")) << dropped;
-    // Facing goes around the edge only. (One line of it or of roughing nobody may miss: what it leaves, others take.)
+    // Facing goes around the edge only. (One line of it or of roughing nobody may miss: what it leaves,
+    // others take.)
     const std::string stopped = check(face, [](auto& all) {
-        const auto is_move = [](const std::string& line) { return !line.empty() && (line[0] == 'X' || line[0] == 'Y'); };
-        const auto first = std::find_if(all.begin(), all.end(), [](const std::string& line) { return line.rfind("G1 Z", 0) == 0; }) + 5;
+        const auto is_move = [](const std::string& line) {
+            return !line.empty() && (line[0] == 'X' || line[0] == 'Y');
+        };
+        const auto first = std::find_if(all.begin(), all.end(),
+                                        [](const std::string& line) { return line.rfind("G1 Z", 0) == 0; }) +
+                           5;
         all.erase(std::remove_if(first, all.end(), is_move), all.end());
     });
     EXPECT_TRUE(has(stopped, "cut.too_deep")) << stopped;

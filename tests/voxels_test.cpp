@@ -1,4 +1,5 @@
-// AS on voxels (LUO 5.5.2; method.md section 7): closed forms of slots and corners, and brute force over every cell.
+// AS on voxels (LUO 5.5.2; method.md section 7): closed forms of slots and corners, and brute force over
+// every cell.
 #include "kernels/voxels/voxels.h"
 #include "tests/support/seed.h"
 
@@ -13,7 +14,10 @@ namespace slabwright {
 namespace {
 
 void add_rectangle(Loops& loops, double x0, double y0, double x1, double y1, bool hole = false) {
-    std::vector<Point2> p{{to_units(x0), to_units(y0)}, {to_units(x1), to_units(y0)}, {to_units(x1), to_units(y1)}, {to_units(x0), to_units(y1)}};
+    std::vector<Point2> p{{to_units(x0), to_units(y0)},
+                          {to_units(x1), to_units(y0)},
+                          {to_units(x1), to_units(y1)},
+                          {to_units(x0), to_units(y1)}};
     if (hole) std::swap(p[1], p[3]);
     loops.points.insert(loops.points.end(), p.begin(), p.end());
     loops.close_loop();
@@ -43,7 +47,8 @@ TEST(Voxels, ASlotStaysWhereTheCutterIsTooWide) {
     Context context;
     LayerVoxels slot = pocket(context, 8, 0.25);
     EXPECT_NEAR(slot.left(context, {4.5, 0, {0}, {}}, 0).rough_area, 8 * 40, 1e-9) << "nothing is cleared";
-    EXPECT_NEAR(slot.left(context, {3.5, 0, {0}, {}}, 0).rough_area, corners(3.5), 2.5) << "but for four corners";
+    EXPECT_NEAR(slot.left(context, {3.5, 0, {0}, {}}, 0).rough_area, corners(3.5), 2.5)
+        << "but for four corners";
     EXPECT_NEAR(slot.left(context, {3.5, 0.6, {0}, {}}, 1).area, 6 * 38, 2.5) << "the allowance closes it";
     // 3 mm from either wall and end leave a strip of 2 × 34 in the middle.
     const RoughLeft left = slot.left(context, {4.5, 0, {0}, {}}, 3);
@@ -60,7 +65,8 @@ TEST(Voxels, WhatADiscTouches) {
     LayerVoxels slot = pocket(context, 8, 0.25);
     constexpr double outside = 2 * (100 + 60), inside = 2 * (8 + 40);
     EXPECT_NEAR(slot.reached_share(context, 4.5, 4), outside / (outside + inside), 0.01);
-    // A disc that lies in a corner touches either wall at r from it; nearer than half a voxel it lies from r − √(r·voxel) on.
+    // A disc that lies in a corner touches either wall at r from it; nearer than half a voxel it lies from r
+    // − √(r·voxel) on.
     const double r = 3, apart = r - std::sqrt(r * 0.25);
     EXPECT_NEAR(slot.reached_share(context, r, 4), (outside + inside - 8 * apart) / (outside + inside), 0.01);
     EXPECT_GT(slot.reached_share(context, 0.3, 4), 0.99);
@@ -69,13 +75,16 @@ TEST(Voxels, WhatADiscTouches) {
 TEST(Voxels, CornersOfASquarePocket) {
     Context context;
     for (const double r : {3.0, 6.35, 12.7}) {
-        const double within_cell = 4 * r * 0.125 + 0.5;  // the cutter may stand up to a cell off either wall of a corner
+        const double within_cell =
+            4 * r * 0.125 + 0.5;  // the cutter may stand up to a cell off either wall of a corner
         LayerVoxels square = pocket(context, 40, 0.125, 1);
         const RoughLeft left = square.left(context, {r, 0, {0}, {}}, 0);
         EXPECT_NEAR(left.rough_area, corners(r), within_cell) << r;
         // Farther than s from both walls of a corner there stays what a corner of the middle r - s leaves.
         const double s = 0.15 * r, a = r - s;
-        const double cut = std::acos(a / r), within = a * a - (0.5 * r * r * (std::numbers::pi / 2 - 2 * cut) + a * r * std::sin(cut));
+        const double cut = std::acos(a / r),
+                     within =
+                         a * a - (0.5 * r * r * (std::numbers::pi / 2 - 2 * cut) + a * r * std::sin(cut));
         EXPECT_NEAR(square.left(context, {r, 0, {0}, {}}, s).area, 4 * within, within_cell) << r;
     }
 }
@@ -85,7 +94,8 @@ TEST(Voxels, StepsOnASlopeLeaveTriangles) {
     Context context;
     const VoxelBox box = voxel_box({0, 0, 0}, {40, 20, 12}, 0.25);
     std::vector<Loops> sections(static_cast<std::size_t>(box.nz));
-    for (int k = 0; k < box.nz; ++k) add_rectangle(sections[static_cast<std::size_t>(k)], -20, -20, 20 - box.z(k), 40);
+    for (int k = 0; k < box.nz; ++k)
+        add_rectangle(sections[static_cast<std::size_t>(k)], -20, -20, 20 - box.z(k), 40);
     LayerVoxels slope(context, box, sections, 10);
     const RoughLeft left = slope.left(context, {5, 0, {9, 6, 3, 0}, {}}, 0);
     EXPECT_NEAR(left.rough_area, 20 * 3, 20 * 0.5);
@@ -100,9 +110,12 @@ struct Scene {
     std::vector<Loops> sections;
     explicit Scene(unsigned seed) : sections(static_cast<std::size_t>(box.nz)) {
         std::mt19937 random(seed);
-        auto real = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+        auto real = [&](double low, double high) {
+            return std::uniform_real_distribution<double>(low, high)(random);
+        };
         for (int n = 0; n < 6; ++n) {
-            const double x = real(0, 24), y = real(0, 20), w = real(1, 6), d = real(1, 6), low = real(0, 3), high = real(3, 6);
+            const double x = real(0, 24), y = real(0, 20), w = real(1, 6), d = real(1, 6), low = real(0, 3),
+                         high = real(3, 6);
             const bool round = n % 2 == 0;
             for (int k = 0; k < box.nz; ++k) {
                 if (box.z(k) < low || box.z(k) > high) continue;
@@ -133,13 +146,16 @@ TEST(Voxels, EveryCellAsByBruteForce) {
         std::vector<std::vector<char>> kept(static_cast<std::size_t>(box.nz));
         for (int k = 0; k < box.nz; ++k)
             for (int j = -border; j < box.ny + border; ++j)
-                for (int i = -border; i < box.nx + border; ++i) kept[static_cast<std::size_t>(k)].push_back(inside(k, i, j));
+                for (int i = -border; i < box.nx + border; ++i)
+                    kept[static_cast<std::size_t>(k)].push_back(inside(k, i, j));
         auto near = [&](const std::vector<char>& cells, int i, int j, double within, bool strict) {
             const int n = static_cast<int>(within / h) + 1;
             for (int b = std::max(0, j - n); b <= std::min(ny - 1, j + n); ++b)
                 for (int a = std::max(0, i - n); a <= std::min(nx - 1, i + n); ++a) {
                     const double d = h * std::hypot(a - i, b - j);
-                    if (cells[static_cast<std::size_t>(b * nx + a)] && (strict ? d < within - 1e-6 : d <= within + 1e-9)) return true;
+                    if (cells[static_cast<std::size_t>(b * nx + a)] &&
+                        (strict ? d < within - 1e-6 : d <= within + 1e-9))
+                        return true;
                 }
             return false;
         };
@@ -148,7 +164,8 @@ TEST(Voxels, EveryCellAsByBruteForce) {
         for (int k = 0; k < box.nz; ++k) {
             int level = -1;
             for (const double tip : tips)
-                if (box.z(k) >= tip && level < 0) level = static_cast<int>(std::ceil((tip - box.min[2]) / h - 0.5 - 1e-6));
+                if (box.z(k) >= tip && level < 0)
+                    level = static_cast<int>(std::ceil((tip - box.min[2]) / h - 0.5 - 1e-6));
             const auto& bar = kept[static_cast<std::size_t>(std::max(0, level))];
             std::vector<char> places;
             for (int j = 0; j < ny; ++j)
@@ -156,7 +173,9 @@ TEST(Voxels, EveryCellAsByBruteForce) {
             int outside = 0;
             for (int j = border; j < ny - border; ++j)
                 for (int i = border; i < nx - border; ++i) {
-                    if (kept[static_cast<std::size_t>(k)][static_cast<std::size_t>(j * nx + i)] || near(places, i, j, r + h / 2, false)) continue;
+                    if (kept[static_cast<std::size_t>(k)][static_cast<std::size_t>(j * nx + i)] ||
+                        near(places, i, j, r + h / 2, false))
+                        continue;
                     ++left;
                     const int below = std::max(0, k - static_cast<int>(swath / h + 1e-6));
                     outside += !near(kept[static_cast<std::size_t>(k)], i, j, swath + h / 2, false) &&

@@ -1,5 +1,6 @@
-// How the command and the benchmarks take memory from the system: by jemalloc, in huge pages. A plan of 10 M facets touches new pages half a million times less, which
-// on a virtual machine is a sixth of its time. The library leaves this to the program that embeds it.
+// How the command and the benchmarks take memory from the system: by jemalloc, in huge pages. A plan of 10 M
+// facets touches new pages half a million times less, which on a virtual machine is a sixth of its time. The
+// library leaves this to the program that embeds it.
 #include "tools/allocator.h"
 
 #include <fcntl.h>
@@ -11,10 +12,12 @@
 #include <cstdio>
 #include <string>
 
-// jemalloc reads it as it starts; the environment's MALLOC_CONF goes before. Its rule that large pieces go back to the system at once
-// (oversize_threshold) would have every array of a layer cleared anew for the next one.
+// jemalloc reads it as it starts; the environment's MALLOC_CONF goes before. Its rule that large pieces go
+// back to the system at once (oversize_threshold) would have every array of a layer cleared anew for the next
+// one.
 extern "C" {
-__attribute__((visibility("default"))) const char* malloc_conf = "thp:always,oversize_threshold:0,dirty_decay_ms:3000";
+__attribute__((visibility("default"))) const char* malloc_conf =
+    "thp:always,oversize_threshold:0,dirty_decay_ms:3000";
 }
 
 namespace slabwright {
@@ -23,17 +26,21 @@ namespace {
 
 constexpr std::int64_t kForever = -1;
 
-// For arenas that are there and those that are to come. An arena that nobody uses yet has none of its own to set.
+// For arenas that are there and those that are to come. An arena that nobody uses yet has none of its own to
+// set.
 void keep_given_back(std::int64_t ms) {
     ssize_t value = ms;
     mallctl("arenas.dirty_decay_ms", nullptr, nullptr, &value, sizeof value);
     unsigned arenas = 0;
     std::size_t size = sizeof arenas;
     mallctl("arenas.narenas", &arenas, &size, nullptr, 0);
-    for (unsigned i = 0; i < arenas; ++i) mallctl(("arena." + std::to_string(i) + ".dirty_decay_ms").c_str(), nullptr, nullptr, &value, sizeof value);
+    for (unsigned i = 0; i < arenas; ++i)
+        mallctl(("arena." + std::to_string(i) + ".dirty_decay_ms").c_str(), nullptr, nullptr, &value,
+                sizeof value);
 }
 
-// Bytes of the process that lie in the machine's memory, but for those of mapped files, as /proc/self/statm says; 0 where it does not.
+// Bytes of the process that lie in the machine's memory, but for those of mapped files, as /proc/self/statm
+// says; 0 where it does not.
 std::uint64_t held(int statm) {
     char text[128];
     const ssize_t got = ::pread(statm, text, sizeof text - 1, 0);
@@ -55,7 +62,8 @@ KeptWithin::KeptWithin(std::uint64_t bytes) {
         while (!ends_.wait_for(lock, std::chrono::milliseconds(50), [&] { return ended_; })) {
             if (held(statm) <= bytes) continue;
             keep_given_back(kKeptMs);
-            mallctl(("arena." + std::to_string(MALLCTL_ARENAS_ALL) + ".purge").c_str(), nullptr, nullptr, nullptr, 0);
+            mallctl(("arena." + std::to_string(MALLCTL_ARENAS_ALL) + ".purge").c_str(), nullptr, nullptr,
+                    nullptr, 0);
             break;
         }
         ::close(statm);

@@ -8,8 +8,9 @@
 
 namespace slabwright {
 
-/// While one lives, memory that is given back is kept, so that the system need not clear those pages again; from the first time on that the process
-/// holds more than `bytes`, for kKeptMs only, as without one. A thread of its own looks every 50 ms.
+/// While one lives, memory that is given back is kept, so that the system need not clear those pages again;
+/// from the first time on that the process holds more than `bytes`, for kKeptMs only, as without one. A
+/// thread of its own looks every 50 ms.
 class KeptWithin {
 public:
     explicit KeptWithin(std::uint64_t bytes);

@@ -1,4 +1,5 @@
-// The `slabwright` command: plan, verify, report, inspect, slice, job. Errors are one line on stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, report, inspect, slice, job. Errors are one line on stderr, their
+// kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -38,7 +39,8 @@ struct Options {
     std::string stl, out, maps, access_maps, job_file, units, strategy, finder, device, library;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
-    bool allow_undercut = false, no_verify = false, json = false, quiet = false, defaults = false, weld_given = false, no_3d = false;
+    bool allow_undercut = false, no_verify = false, json = false, quiet = false, defaults = false,
+         weld_given = false, no_3d = false;
 };
 
 /// A bar with phase and time left, redrawn at most ten times a second on a terminal's last line.
@@ -54,11 +56,12 @@ public:
         std::string left;
         const double elapsed = std::chrono::duration<double>(now - start_).count();
         if (progress.fraction > 0.02 && elapsed > 1) {
-            const long seconds = static_cast<long>(elapsed * (1 - progress.fraction) / progress.fraction + 0.5);
+            const long seconds =
+                static_cast<long>(elapsed * (1 - progress.fraction) / progress.fraction + 0.5);
             left = fmt::format("{}:{:02} left", seconds / 60, seconds % 60);
         }
-        const std::string line =
-            fmt::format("\r\x1b[K[{:#<{}}{:.<{}}] {:3.0f} %  {}  {}", "", full, "", width - full, 100 * progress.fraction, progress.phase, left);
+        const std::string line = fmt::format("\r\x1b[K[{:#<{}}{:.<{}}] {:3.0f} %  {}  {}", "", full, "",
+                                             width - full, 100 * progress.fraction, progress.phase, left);
         std::fwrite(line.data(), 1, line.size(), stderr);
     }
     void clear() {
@@ -101,7 +104,8 @@ int complain(const Error& error, bool as_json) {
         line = fmt::format("slabwright: {}", error.what());
         // One error, one line, whatever a file name or a parser's message holds.
         std::replace_if(
-            line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }, ' ');
+            line.begin(), line.end(),
+            [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }, ' ');
         line += '\n';
     }
     std::fwrite(line.data(), 1, line.size(), stderr);
@@ -128,14 +132,17 @@ std::string duration(double minutes) {
 /// What the person at the router needs to know before the build: how long, what to load, what to mind.
 std::string summary(const Plan& plan, const std::string& out) {
     const Totals& t = plan.totals;
-    std::string text = fmt::format("{}: {} {}, {} programs, {} in all (cutting {}, bonding {}, tool changes {})\n", out, t.layers,
-                                   t.layers == 1 ? "layer" : "layers", t.operations, duration(t.build_minutes), duration(t.cutting_minutes),
-                                   duration(t.bonding_minutes), duration(t.tool_change_minutes));
-    text += fmt::format("stock   {} x {} mm, {} kg with the base board\n", number(plan.stock_max[0] - plan.stock_min[0], 1),
+    std::string text = fmt::format(
+        "{}: {} {}, {} programs, {} in all (cutting {}, bonding {}, tool changes {})\n", out, t.layers,
+        t.layers == 1 ? "layer" : "layers", t.operations, duration(t.build_minutes),
+        duration(t.cutting_minutes), duration(t.bonding_minutes), duration(t.tool_change_minutes));
+    text += fmt::format("stock   {} x {} mm, {} kg with the base board\n",
+                        number(plan.stock_max[0] - plan.stock_min[0], 1),
                         number(plan.stock_max[1] - plan.stock_min[1], 1), number(t.stack_mass_kg, 1));
     std::map<double, int> slabs;
     for (const Layer& layer : plan.layers) ++slabs[layer.slab_thickness];
-    for (const auto& [thickness, count] : slabs) text += fmt::format("slabs   {} of {} mm {}\n", count, number(thickness, 3), plan.job.material.name);
+    for (const auto& [thickness, count] : slabs)
+        text += fmt::format("slabs   {} of {} mm {}\n", count, number(thickness, 3), plan.job.material.name);
     for (const Tool& tool : plan.job.tools) {
         double minutes = 0;
         int programs = 0;
@@ -143,35 +150,41 @@ std::string summary(const Plan& plan, const std::string& out) {
             for (const Operation& operation : layer.operations)
                 if (operation.tool == tool.number) minutes += operation.minutes, ++programs;
         if (programs > 0)
-            text += fmt::format("tool    T{} {}, {} in {} {}\n", tool.number, tool.name, duration(minutes), programs,
-                                programs == 1 ? "program" : "programs");
+            text += fmt::format("tool    T{} {}, {} in {} {}\n", tool.number, tool.name, duration(minutes),
+                                programs, programs == 1 ? "program" : "programs");
     }
     for (const Layer& layer : plan.layers)
-        text += fmt::format("layer   {}: {} to {} mm, {}\n", layer.index, number(layer.z_bottom, 3), number(layer.z_top, 3), layer.reason);
+        text += fmt::format("layer   {}: {} to {} mm, {}\n", layer.index, number(layer.z_bottom, 3),
+                            number(layer.z_top, 3), layer.reason);
     for (const Severity severity : {Severity::error, Severity::warning}) {
-        // The same finding can come a hundred times; the first few of each code are told, plan.json holds all.
+        // The same finding can come a hundred times; the first few of each code are told, plan.json holds
+        // all.
         std::map<std::string, int> seen;
         for (const Diagnostic& d : plan.diagnostics) {
             if (d.severity != severity || ++seen[d.code] > 5) continue;
             text += fmt::format("{}: {}", name(severity), d.message);
-            if (d.where) text += fmt::format(" (x {} y {} z {})", number((*d.where)[0], 1), number((*d.where)[1], 1), number((*d.where)[2], 1));
+            if (d.where)
+                text += fmt::format(" (x {} y {} z {})", number((*d.where)[0], 1), number((*d.where)[1], 1),
+                                    number((*d.where)[2], 1));
             text += '\n';
         }
         for (const auto& [code, count] : seen)
-            if (count > 5) text += fmt::format("{}: {} more of {} in plan.json\n", name(severity), count - 5, code);
+            if (count > 5)
+                text += fmt::format("{}: {} more of {} in plan.json\n", name(severity), count - 5, code);
     }
     return text;
 }
 
 /// What the simulation of the programs says.
 std::string verdict(const VerifyResult& result, const std::string& out) {
-    std::string text =
-        fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, {}\n", out, result.passed ? "makes the part" : "does NOT make the part",
-                    result.gouge_mm, result.cell_mm, duration(result.minutes));
+    std::string text = fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, {}\n", out,
+                                   result.passed ? "makes the part" : "does NOT make the part",
+                                   result.gouge_mm, result.cell_mm, duration(result.minutes));
     constexpr std::size_t shown = 20;  // verify.json holds them all
     for (std::size_t i = 0; i < std::min(shown, result.violations.size()); ++i)
         text += fmt::format("{}: {}\n", result.violations[i].code, result.violations[i].message);
-    if (result.violations.size() > shown) text += fmt::format("{} more in verify.json\n", result.violations.size() - shown);
+    if (result.violations.size() > shown)
+        text += fmt::format("{} more in verify.json\n", result.violations.size() - shown);
     return text;
 }
 
@@ -213,7 +226,8 @@ void with_context(const Options& options, Body&& body) {
     settings.threads = options.threads;
     settings.device = options.device;
     settings.memory_bytes = static_cast<std::uint64_t>(options.memory_gib * (1u << 30));
-    if (!options.quiet && !options.json && isatty(STDERR_FILENO) != 0) settings.progress = [&](const Progress& progress) { bar.show(progress); };
+    if (!options.quiet && !options.json && isatty(STDERR_FILENO) != 0)
+        settings.progress = [&](const Progress& progress) { bar.show(progress); };
     Context context(std::move(settings));
 #ifdef SLABWRIGHT_JEMALLOC
     const KeptWithin kept(context.memory_limit() / 2);
@@ -245,7 +259,8 @@ bool run_plan(const Options& options) {
         if (!options.no_verify) context.share_progress(0, kPlanningShare);
         std::shared_ptr<Pattern> pattern = read_pattern(context, options.stl, job);
         const Plan result = plan(context, *pattern, job);
-        if (!options.access_maps.empty()) write_access_maps(context, result, options.stl, options.access_maps);
+        if (!options.access_maps.empty())
+            write_access_maps(context, result, options.stl, options.access_maps);
         if (options.no_verify) {
             pattern.reset();
             write(context, result, options.out, options.stl);
@@ -253,18 +268,20 @@ bool run_plan(const Options& options) {
         }
         const VerifyResult found = write_verified(context, result, options.out, pattern, options.cell);
         passed = found.passed;
-        return options.json ? summary_json(result, options.out, &found) : summary(result, options.out) + verdict(found, options.out);
+        return options.json ? summary_json(result, options.out, &found)
+                            : summary(result, options.out) + verdict(found, options.out);
     });
     return passed;
 }
 
-/// A report that lies in the folder is made again, as light or as full as it was, so that it tells what the simulation found. What keeps it
-/// from being made is told, and changes no verdict. Empty when all went well.
+/// A report that lies in the folder is made again, as light or as full as it was, so that it tells what the
+/// simulation found. What keeps it from being made is told, and changes no verdict. Empty when all went well.
 std::string refresh_report(Context& context, const Options& options) {
     const std::string page = options.out + "/report.html";
     std::ifstream file(page, std::ios::binary);
     if (!file) return {};
-    std::string head(1 << 20, '\0');  // the page's own parts lie in its first half megabyte, what it shows behind them
+    std::string head(1 << 20,
+                     '\0');  // the page's own parts lie in its first half megabyte, what it shows behind them
     file.read(head.data(), static_cast<std::streamsize>(head.size()));
     file.close();
     try {
@@ -315,11 +332,15 @@ void run_slice(const Options& options) {
 }
 
 void add_limits(CLI::App& command, Options& options) {
-    command.add_option("--threads", options.threads, "threads to use; all that the machine has if not given")->check(CLI::Range(1, 1024));
-    command.add_option("--memory", options.memory_gib, "GiB of memory that may be used; 60 % of the machine's if not given")
+    command.add_option("--threads", options.threads, "threads to use; all that the machine has if not given")
+        ->check(CLI::Range(1, 1024));
+    command
+        .add_option("--memory", options.memory_gib,
+                    "GiB of memory that may be used; 60 % of the machine's if not given")
         ->check(CLI::Range(0.001, 1e6));
     command.add_option("--device", options.device,
-                       "OpenCL device for cutting forces: auto (the fastest that passes a test), reference (none), or a part of its name");
+                       "OpenCL device for cutting forces: auto (the fastest that passes a test), reference "
+                       "(none), or a part of its name");
     command.add_flag("--json", options.json, "errors as JSON on stderr, results as JSON on stdout");
     command.add_flag("--quiet", options.quiet, "no progress bar, nothing on stdout");
 }
@@ -344,47 +365,68 @@ void add_common(CLI::App& command, Options& options) {
 int main(int argc, char** argv) {
 #if defined(__x86_64__) && defined(__AVX2__)
     if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("bmi2")) {
-        std::fputs("slabwright: this machine lacks AVX2, for which this program was built; build it here, or with -DSLABWRIGHT_X86_LEVEL=baseline\n",
-                   stderr);
+        std::fputs(
+            "slabwright: this machine lacks AVX2, for which this program was built; build it here, or with "
+            "-DSLABWRIGHT_X86_LEVEL=baseline\n",
+            stderr);
         return static_cast<int>(ErrorKind::usage);
     }
 #endif
     Options options;
-    CLI::App app("Plans Rapid Pattern Manufacturing: from the STL of a foundry pattern to layers, tool paths, G-code and the build sequence.",
-                 "slabwright");
+    CLI::App app(
+        "Plans Rapid Pattern Manufacturing: from the STL of a foundry pattern to layers, tool paths, G-code "
+        "and the build sequence.",
+        "slabwright");
     app.set_version_flag("--version", "slabwright " + version());
     app.require_subcommand(1);
 
-    CLI::App* plan_command = app.add_subcommand("plan", "plan the build of a pattern and write it to a folder");
+    CLI::App* plan_command =
+        app.add_subcommand("plan", "plan the build of a pattern and write it to a folder");
     plan_command->add_option("STL", options.stl, "the pattern")->required();
-    plan_command->add_option("-o,--out", options.out, "folder for the plan; a plan in it is replaced")->required();
+    plan_command->add_option("-o,--out", options.out, "folder for the plan; a plan in it is replaced")
+        ->required();
     add_common(*plan_command, options);
-    plan_command->add_option("--strategy", options.strategy, "of layer placement: optimal, printed or combined")
+    plan_command
+        ->add_option("--strategy", options.strategy, "of layer placement: optimal, printed or combined")
         ->check(CLI::IsMember({"optimal", "printed", "combined"}));
-    plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")->check(CLI::IsMember({"exact", "halving", "both"}));
+    plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")
+        ->check(CLI::IsMember({"exact", "halving", "both"}));
     plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
 
-    plan_command->add_option("--access-maps", options.access_maps, "folder for what each tool reaches of each layer's facets, as PLY");
-    plan_command->add_flag("--no-verify", options.no_verify, "write the plan without simulating its programs");
+    plan_command->add_option("--access-maps", options.access_maps,
+                             "folder for what each tool reaches of each layer's facets, as PLY");
+    plan_command->add_flag("--no-verify", options.no_verify,
+                           "write the plan without simulating its programs");
 
-    CLI::App* verify_command = app.add_subcommand("verify", "simulate the programs of a plan against the pattern");
+    CLI::App* verify_command =
+        app.add_subcommand("verify", "simulate the programs of a plan against the pattern");
     verify_command->add_option("OUT", options.out, "folder of the plan")->required();
-    verify_command->add_option("--stl", options.stl, "the pattern; the file that plan.json names, if not given");
+    verify_command->add_option("--stl", options.stl,
+                               "the pattern; the file that plan.json names, if not given");
     for (CLI::App* command : {plan_command, verify_command})
-        command->add_option("--cell", options.cell, "mm between the points of the simulated stock; as fine as the cusp asks for if not given")
+        command
+            ->add_option(
+                "--cell", options.cell,
+                "mm between the points of the simulated stock; as fine as the cusp asks for if not given")
             ->check(CLI::Range(0.01, 10.0));
-    verify_command->add_option("--maps", options.maps, "folder for a picture of each layer: left over, missed, unreachable, gouged");
+    verify_command->add_option("--maps", options.maps,
+                               "folder for a picture of each layer: left over, missed, unreachable, gouged");
     add_limits(*verify_command, options);
 
-    CLI::App* report_command = app.add_subcommand("report", "make OUT/report.html again: the build to be seen before the wood is cut");
+    CLI::App* report_command = app.add_subcommand(
+        "report", "make OUT/report.html again: the build to be seen before the wood is cut");
     report_command->add_option("OUT", options.out, "folder of the plan")->required();
-    report_command->add_option("--stl", options.stl, "the pattern; the file that plan.json names, if not given");
+    report_command->add_option("--stl", options.stl,
+                               "the pattern; the file that plan.json names, if not given");
     report_command->add_flag("--no-3d", options.no_3d, "a light page: no model, no paths");
-    report_command->add_option("--size-limit", options.size_limit_mb, "MB that the page may have; detail is left out to keep to it")
+    report_command
+        ->add_option("--size-limit", options.size_limit_mb,
+                     "MB that the page may have; detail is left out to keep to it")
         ->check(CLI::Range(0.1, 1000.0));
     add_limits(*report_command, options);
 
-    CLI::App* inspect_command = app.add_subcommand("inspect", "report on the mesh, its features and undercuts");
+    CLI::App* inspect_command =
+        app.add_subcommand("inspect", "report on the mesh, its features and undercuts");
     inspect_command->add_option("STL", options.stl, "the pattern")->required();
     add_common(*inspect_command, options);
     inspect_command->add_option("--finder", options.finder, "of features: exact, halving or both")
@@ -397,18 +439,21 @@ int main(int argc, char** argv) {
     add_common(*slice_command, options);
 
     CLI::App* job_command = app.add_subcommand("job", "job files");
-    job_command->add_flag("--defaults", options.defaults, "print every key with its default and a comment")->required();
+    job_command->add_flag("--defaults", options.defaults, "print every key with its default and a comment")
+        ->required();
     job_command->add_option("--library", options.library, "with these tools: default, or luo (Luo table 5.4)")
         ->check(CLI::IsMember({"default", "luo"}));
     job_command->add_flag("--json", options.json, "errors as JSON on stderr");
 
     // An error of the command line comes before its options are known, so --json is looked for by hand.
-    const bool json_wanted = std::any_of(argv + 1, argv + argc, [](const char* argument) { return std::string_view(argument) == "--json"; });
+    const bool json_wanted = std::any_of(
+        argv + 1, argv + argc, [](const char* argument) { return std::string_view(argument) == "--json"; });
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-        return complain(Error(ErrorKind::usage, "usage", error.what(), "", "see slabwright --help"), json_wanted);
+        return complain(Error(ErrorKind::usage, "usage", error.what(), "", "see slabwright --help"),
+                        json_wanted);
     }
     try {
         if (*plan_command) return run_plan(options) ? 0 : static_cast<int>(ErrorKind::verification);
@@ -421,6 +466,8 @@ int main(int argc, char** argv) {
     } catch (const Error& error) {
         return complain(error, options.json);
     } catch (const std::exception& error) {
-        return complain(Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"), options.json);
+        return complain(
+            Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"),
+            options.json);
     }
 }

@@ -1,4 +1,5 @@
-// CGAL as a peer: reads a binary STL, welds it and fills a surface mesh; then cuts it by planes with a tree of its edges.
+// CGAL as a peer: reads a binary STL, welds it and fills a surface mesh; then cuts it by planes with a tree
+// of its edges.
 //     cgal_peer FILE.stl PLANES      (0 planes: only load)
 // Prints seconds and counts, a line each, as all peers do.
 #include <CGAL/AABB_face_graph_triangle_primitive.h>
@@ -32,7 +33,9 @@ using Surface = CGAL::Surface_mesh<Point>;
 
 double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double seconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 [[noreturn]] void stop(const char* why) {
     std::fprintf(stderr, "cgal_peer: %s\n", why);
@@ -40,7 +43,8 @@ double seconds() { return std::chrono::duration<double>(std::chrono::steady_cloc
 }
 
 /// The facets as they lie in the file; welding is left to CGAL.
-void read_facets(const char* path, std::vector<Point>& points, std::vector<std::array<std::size_t, 3>>& facets) {
+void read_facets(const char* path, std::vector<Point>& points,
+                 std::vector<std::array<std::size_t, 3>>& facets) {
     std::ifstream file(path, std::ios::binary);
     std::array<char, 84> head{};
     std::uint32_t count = 0;
@@ -73,8 +77,8 @@ int main(int argc, char** argv) {
         CGAL::Polygon_mesh_processing::polygon_soup_to_polygon_mesh(points, facets, mesh);
     }
     if (!CGAL::is_closed(mesh) || num_faces(mesh) == 0) stop("the mesh is empty or not closed");
-    std::printf("facets %zu\nvertices %zu\nload_s %.4f\n", static_cast<std::size_t>(num_faces(mesh)), static_cast<std::size_t>(num_vertices(mesh)),
-                seconds() - begin);
+    std::printf("facets %zu\nvertices %zu\nload_s %.4f\n", static_cast<std::size_t>(num_faces(mesh)),
+                static_cast<std::size_t>(num_vertices(mesh)), seconds() - begin);
     if (planes == 0) return 0;
 
     double low = 1e300, high = -1e300;
@@ -100,7 +104,7 @@ int main(int argc, char** argv) {
         for (const auto& line : polylines) segments += line.size() - 1;
     }
     if (segments == 0) stop("the sections are empty");
-    std::printf("slice_s %.4f\nslice_processor_s %.4f\nsegments %zu\nloops %zu\n", seconds() - begin, processor_seconds() - processor, segments,
-                loops);
+    std::printf("slice_s %.4f\nslice_processor_s %.4f\nsegments %zu\nloops %zu\n", seconds() - begin,
+                processor_seconds() - processor, segments, loops);
     return 0;
 }

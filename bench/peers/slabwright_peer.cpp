@@ -1,4 +1,5 @@
-// This engine in the form of its peers: reads an STL into a mesh with adjacency, then cuts it by planes into closed loops.
+// This engine in the form of its peers: reads an STL into a mesh with adjacency, then cuts it by planes into
+// closed loops.
 //     slabwright_peer FILE.stl PLANES [THREADS]      (0 planes: only load; 0 threads: all)
 // Prints seconds and counts, a line each, as all peers do.
 #include <chrono>
@@ -18,17 +19,22 @@ using namespace slabwright;
 /// Of all threads of this process.
 double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double seconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 void load_and_slice(const char* path, int planes, int threads) {
     Context context({.threads = threads});
     double begin = seconds();
     const Mesh mesh = read_mesh(context, path);
-    std::printf("facets %zu\nvertices %zu\nload_s %.4f\n", mesh.facets.size(), mesh.vertices.size(), seconds() - begin);
+    std::printf("facets %zu\nvertices %zu\nload_s %.4f\n", mesh.facets.size(), mesh.vertices.size(),
+                seconds() - begin);
     if (planes == 0) return;
     const Box3 box = bounds(mesh.view());
     std::vector<Plane> request;
-    for (int i = 0; i < planes; ++i) request.push_back({box.min.z + (static_cast<double>(box.max.z) - box.min.z) * (i + 0.5) / planes, Side::above});
+    for (int i = 0; i < planes; ++i)
+        request.push_back(
+            {box.min.z + (static_cast<double>(box.max.z) - box.min.z) * (i + 0.5) / planes, Side::above});
     begin = seconds();
     const double processor = processor_seconds();
     const std::vector<Section> sections = slice(context, mesh.view(), request);
@@ -37,10 +43,12 @@ void load_and_slice(const char* path, int planes, int threads) {
     for (const Section& section : sections) {
         segments += section.loops.points.size();
         loops += section.loops.size();
-        if (section.open_chains.size() != 0) throw Error(ErrorKind::input, "peer.open", "the sections are not closed", path);
+        if (section.open_chains.size() != 0)
+            throw Error(ErrorKind::input, "peer.open", "the sections are not closed", path);
     }
     if (segments == 0) throw Error(ErrorKind::input, "peer.empty", "the sections are empty", path);
-    std::printf("slice_s %.4f\nslice_processor_s %.4f\nsegments %zu\nloops %zu\n", took, processor_took, segments, loops);
+    std::printf("slice_s %.4f\nslice_processor_s %.4f\nsegments %zu\nloops %zu\n", took, processor_took,
+                segments, loops);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// VTK as a peer: reads a binary STL and merges its points, then cuts it by planes and joins the pieces into lines.
+// VTK as a peer: reads a binary STL and merges its points, then cuts it by planes and joins the pieces into
+// lines.
 //     vtk_peer FILE.stl PLANES      (0 planes: only load)
 // Prints seconds and counts, a line each, as all peers do.
 #include <vtkCellArray.h>
@@ -19,7 +20,9 @@ namespace {
 
 double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double seconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 [[noreturn]] void stop(const char* why) {
     std::fprintf(stderr, "vtk_peer: %s\n", why);
@@ -55,7 +58,8 @@ int main(int argc, char** argv) {
     plane->SetNormal(0, 0, 1);
     plane->SetOrigin(0, 0, 0);
     long long segments = 0, loops = 0;
-    // A plane at a time: all of them in one cutter would let the stripper join what lies at different heights.
+    // A plane at a time: all of them in one cutter would let the stripper join what lies at different
+    // heights.
     for (int i = 0; i < planes; ++i) {
         vtkNew<vtkCutter> cutter;
         cutter->SetInputData(mesh);
@@ -70,7 +74,7 @@ int main(int argc, char** argv) {
         segments += lines->GetNumberOfConnectivityIds() - lines->GetNumberOfCells();
     }
     if (segments == 0) stop("the sections are empty");
-    std::printf("slice_s %.4f\nslice_processor_s %.4f\nsegments %lld\nloops %lld\n", seconds() - begin, processor_seconds() - processor, segments,
-                loops);
+    std::printf("slice_s %.4f\nslice_processor_s %.4f\nsegments %lld\nloops %lld\n", seconds() - begin,
+                processor_seconds() - processor, segments, loops);
     return 0;
 }

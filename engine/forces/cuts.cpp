@@ -6,7 +6,8 @@
 namespace slabwright {
 
 ForceCoefficients coefficients_of(const Material& material, double helix_rad) {
-    return resolve_coefficients({material.ktc, material.kte, material.kfc, material.kfe}, helix_rad, material.transform);
+    return resolve_coefficients({material.ktc, material.kte, material.kfc, material.kfe}, helix_rad,
+                                material.transform);
 }
 
 CutSegment idle_cut(const Job& job, const Tool& tool) {
@@ -31,9 +32,11 @@ CutSegment slot_cut(const Job& job, const Tool& tool, double depth_mm) {
 CutSegment hardest_cut(const Job& job, const Tool& tool, double depth_mm) {
     CutSegment cut = slot_cut(job, tool, depth_mm);
     if (tool.kind != ToolKind::ball) return cut;
-    cut.chip_load_mm = std::min({tool.max_feed, job.machine.max_feed, job.cutting.finish_feed}) / (cut.spindle_rpm * tool.flutes);
+    cut.chip_load_mm = std::min({tool.max_feed, job.machine.max_feed, job.cutting.finish_feed}) /
+                       (cut.spindle_rpm * tool.flutes);
     const double r = cut.radius_mm, circle = depth_mm < r ? std::sqrt(depth_mm * (2 * r - depth_mm)) : r;
-    cut.arc = engagement_arc(circle, job.cutting.wall_allowance + job.tolerances.rough_cusp, MillingSense::up);
+    cut.arc =
+        engagement_arc(circle, job.cutting.wall_allowance + job.tolerances.rough_cusp, MillingSense::up);
     return cut;
 }
 

@@ -30,9 +30,11 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kLeastDepth = 0.01;      // mm: shallower cuts are taken as this deep
-constexpr double kAccuracy = 0.01;        // of peaks that feeds are chosen by, as a share: far finer than the classes are
-constexpr double kClassSlack = 0.9;       // a coarse class that bears less than this share of a limit stands for all its cuts
+constexpr double kLeastDepth = 0.01;  // mm: shallower cuts are taken as this deep
+constexpr double kAccuracy =
+    0.01;  // of peaks that feeds are chosen by, as a share: far finer than the classes are
+constexpr double kClassSlack =
+    0.9;  // a coarse class that bears less than this share of a limit stands for all its cuts
 constexpr double kLeastShare = 0.125;     // of the planned feed: slower, a cutter rubs
 constexpr double kLeastRun = 20;          // mm that a faster feed must last
 constexpr int kMostPasses = 4;            // into which a cut is divided at once
@@ -62,7 +64,8 @@ struct ClassAndFeed {
 struct HashClassAndFeed {
     std::size_t operator()(const ClassAndFeed& key) const {
         const auto word = [](std::int16_t v) { return std::uint64_t{static_cast<std::uint16_t>(v)}; };
-        std::uint64_t h = word(key.of.low) | word(key.of.depth) << 16U | word(key.of.width) << 32U | std::uint64_t{key.of.left} << 48U;
+        std::uint64_t h = word(key.of.low) | word(key.of.depth) << 16U | word(key.of.width) << 32U |
+                          std::uint64_t{key.of.left} << 48U;
         h = (h ^ h >> 29U) * 0x9E3779B97F4A7C15U + std::bit_cast<std::uint64_t>(key.feed);
         return (h ^ h >> 32U) * 0xD6E8FEB86659FD93U >> 16U;
     }
@@ -70,35 +73,43 @@ struct HashClassAndFeed {
 template <class T>
 using ByClassAndFeed = std::unordered_map<ClassAndFeed, T, HashClassAndFeed>;
 
-double depth_of(int depth, ClassSteps steps) { return kLeastDepth * std::exp2(static_cast<double>(depth) / steps.depth); }
+double depth_of(int depth, ClassSteps steps) {
+    return kLeastDepth * std::exp2(static_cast<double>(depth) / steps.depth);
+}
 
 CutClass class_of(const CutStretch& s, const Tool& tool, ClassSteps steps) {
     CutClass c;
     const double r = tool.diameter / 2;
-    if (tool.kind == ToolKind::ball) c.low = static_cast<std::int16_t>(std::floor(std::min(s.low, r) / r * steps.low));
-    const double low = c.low * r / steps.low, depth = std::clamp(s.high - low, kLeastDepth, 30 * tool.diameter);
+    if (tool.kind == ToolKind::ball)
+        c.low = static_cast<std::int16_t>(std::floor(std::min(s.low, r) / r * steps.low));
+    const double low = c.low * r / steps.low,
+                 depth = std::clamp(s.high - low, kLeastDepth, 30 * tool.diameter);
     c.depth = static_cast<std::int16_t>(std::ceil(std::log2(depth / kLeastDepth) * steps.depth - 1e-9));
     // The class is deeper than the cut; its width is that of the same cross-section.
     const double width = s.width * (s.high - s.low) / (s.high - low);
-    c.width = static_cast<std::int16_t>(std::clamp(std::ceil(width / tool.diameter * steps.width - 1e-9), 1.0, static_cast<double>(steps.width)));
+    c.width = static_cast<std::int16_t>(std::clamp(std::ceil(width / tool.diameter * steps.width - 1e-9), 1.0,
+                                                   static_cast<double>(steps.width)));
     c.left = s.left;
     return c;
 }
 
 /// One of so many passes of it.
 CutClass shallower(CutClass c, int passes) {
-    c.depth = static_cast<std::int16_t>(std::max(0.0, c.depth - std::floor(kCoarse.depth * std::log2(passes))));
+    c.depth =
+        static_cast<std::int16_t>(std::max(0.0, c.depth - std::floor(kCoarse.depth * std::log2(passes))));
     return c;
 }
 
-CutSegment segment_of(const CutClass& c, const CutSegment& idle, const Tool& tool, double feed, ClassSteps steps) {
+CutSegment segment_of(const CutClass& c, const CutSegment& idle, const Tool& tool, double feed,
+                      ClassSteps steps) {
     CutSegment cut = idle;
     const double r = tool.diameter / 2;
     cut.low_mm = c.low * r / steps.low;
     cut.high_mm = cut.low_mm + depth_of(c.depth, steps);
     const bool cap = cut.profile == CutterProfile::ball && cut.high_mm < r;
     const double circle = cap ? std::sqrt(cut.high_mm * (2 * r - cut.high_mm)) : r;
-    cut.arc = engagement_arc(circle, c.width * tool.diameter / steps.width, c.left ? MillingSense::up : MillingSense::down);
+    cut.arc = engagement_arc(circle, c.width * tool.diameter / steps.width,
+                             c.left ? MillingSense::up : MillingSense::down);
     cut.chip_load_mm = feed / (cut.spindle_rpm * tool.flutes);
     return cut;
 }
@@ -121,13 +132,16 @@ struct Seen {
     CutClass coarse, fine;
     std::uint32_t first = 0, last = 0;
     bool cuts = false;
-    float depth = 0;               ///< over the tip, mm
-    float height = 0;              ///< of the cut's middle above the joint, mm
-    float wood = 0, overhang = 0;  ///< what carries the cut, and how far from what carries it; 0 where nothing hangs over
+    float depth = 0;   ///< over the tip, mm
+    float height = 0;  ///< of the cut's middle above the joint, mm
+    float wood = 0,
+          overhang =
+              0;  ///< what carries the cut, and how far from what carries it; 0 where nothing hangs over
     std::array<float, 3> at{};
-    std::uint32_t feed = 0;      ///< that was chosen for it; 0: none yet
-    const Bent* bent = nullptr;  ///< what it bears at that feed, of its coarse class; null where nothing is cut
-    double wood_load = 0;        ///< and the wood, as a share of what there is
+    std::uint32_t feed = 0;  ///< that was chosen for it; 0: none yet
+    const Bent* bent =
+        nullptr;           ///< what it bears at that feed, of its coarse class; null where nothing is cut
+    double wood_load = 0;  ///< and the wood, as a share of what there is
     [[nodiscard]] std::array<double, 3> place() const { return {at[0], at[1], at[2]}; }
 };
 
@@ -148,7 +162,8 @@ struct KnownCuts::Impl {
     };
     std::shared_mutex mutex;
     std::map<Of, ByClassAndFeed<Bent>> known;
-    Spares<SeenMemory> memory;  // which layers leave to each other: to fill it is little against what new memory of that size costs
+    Spares<SeenMemory> memory;  // which layers leave to each other: to fill it is little against what new
+                                // memory of that size costs
 
     std::optional<Bent> find(const Of& of, const ClassAndFeed& key) {
         const std::shared_lock lock(mutex);
@@ -180,9 +195,12 @@ public:
     /// Of a fine class, as the plan will state it.
     const Bent& stated(const CutClass& c, double feed) { return find(stated_, c, feed, true); }
 
-    /// How thick the wood must be that carries a cut at this height above the joint, so far from what carries the wood, mm.
+    /// How thick the wood must be that carries a cut at this height above the joint, so far from what carries
+    /// the wood, mm.
     [[nodiscard]] double needed_wood(const Bent& b, double height, double overhang) const {
-        return least_overhang_thickness({b.x_n, b.y_n, b.z_n, overhang, height, tool_.diameter / 2, job_.material.strength_mpa}).least_mm;
+        return least_overhang_thickness(
+                   {b.x_n, b.y_n, b.z_n, overhang, height, tool_.diameter / 2, job_.material.strength_mpa})
+            .least_mm;
     }
 
     /// The thickest chip, as a share of the feed per tooth.
@@ -205,9 +223,11 @@ private:
             if (const std::optional<Bent> told = shared_->impl().find(of, key)) return it->second = *told;
         const CutSegment cut = segment_of(c, idle_, tool_, feed, fine ? kFine : kCoarse);
         const double accuracy = fine ? kStatedAccuracy : kAccuracy;
-        const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut, accuracy) : reference_forces(cut, accuracy);
-        it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter), cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter),
-                      f.peak_x_n, f.peak_y_n, f.peak_z_n};
+        const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut, accuracy)
+                                                                   : reference_forces(cut, accuracy);
+        it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter),
+                      cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter), f.peak_x_n,
+                      f.peak_y_n, f.peak_z_n};
         if (shared_ != nullptr) shared_->impl().add(of, key, it->second);
         return it->second;
     }
@@ -222,20 +242,22 @@ private:
 bool roughs(OperationKind kind) { return kind == OperationKind::rough || kind == OperationKind::face; }
 
 /// Gives the moves of `level` the feeds that are wanted, faster ones only where they last.
-void set_feeds(Context& context, Operation& op, std::vector<std::uint32_t> wanted, const std::vector<char>& level) {
+void set_feeds(Context& context, Operation& op, std::vector<std::uint32_t> wanted,
+               const std::vector<char>& level) {
     const std::size_t n = op.moves.size();
     std::vector<double> way(n, 0);  // up to and with each move
     for (std::size_t k = 1; k < n; ++k) {
         const Move &a = op.moves[k - 1], &b = op.moves[k];
-        way[k] = way[k - 1] + (b.is_arc() ? arc_shape(a, b).length() : std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z)));
+        way[k] = way[k - 1] + (b.is_arc() ? arc_shape(a, b).length()
+                                          : std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z)));
     }
     std::vector<std::uint32_t> steps;
     for (std::size_t k = 1; k < n; ++k)
         if (level[k]) steps.push_back(wanted[k]);
     std::sort(steps.begin(), steps.end(), std::greater<>());
     steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
-    // From the fastest step down: a stretch at least that fast that is too short goes as fast as its faster neighbour, which
-    // is slower. Where it has none, between rapids, it goes no faster than planned.
+    // From the fastest step down: a stretch at least that fast that is too short goes as fast as its faster
+    // neighbour, which is slower. Where it has none, between rapids, it goes no faster than planned.
     for (const std::uint32_t step : steps) {
         context.throw_if_cancelled();
         for (std::size_t k = 1; k < n;) {
@@ -249,7 +271,8 @@ void set_feeds(Context& context, Operation& op, std::vector<std::uint32_t> wante
                 std::uint32_t beside = 0;
                 if (k > 1 && level[k - 1]) beside = wanted[k - 1];
                 if (end < n && level[end]) beside = std::max(beside, wanted[end]);
-                for (std::size_t m = k; m < end; ++m) wanted[m] = beside > 0 ? beside : std::min(wanted[m], op.moves[m].feed);
+                for (std::size_t m = k; m < end; ++m)
+                    wanted[m] = beside > 0 ? beside : std::min(wanted[m], op.moves[m].feed);
             }
             k = end;
         }
@@ -260,8 +283,9 @@ void set_feeds(Context& context, Operation& op, std::vector<std::uint32_t> wante
 
 /// @param seen  gets all stretches
 /// @param parts only these moves; none: all
-void run_through(Context& context, StandingSlab& slab, const Operation& op, const Tool& tool, const Layer& layer, const OverhangMap* overhang,
-                 double setback, std::vector<Seen>& seen, std::span<const MoveRange> parts = {}) {
+void run_through(Context& context, StandingSlab& slab, const Operation& op, const Tool& tool,
+                 const Layer& layer, const OverhangMap* overhang, double setback, std::vector<Seen>& seen,
+                 std::span<const MoveRange> parts = {}) {
     seen.clear();
     const auto see = [&](const CutStretch& s) {
         if (seen.size() % 1024 == 0) context.throw_if_cancelled();
@@ -272,13 +296,20 @@ void run_through(Context& context, StandingSlab& slab, const Operation& op, cons
             now.coarse = class_of(s, tool, kCoarse), now.fine = class_of(s, tool, kFine);
             now.depth = static_cast<float>(s.high);
             now.height = static_cast<float>(std::max(0.0, s.at[2] - layer.z_bottom + (s.low + s.high) / 2));
-            // Roughing is carried by the slab that stands, floors by what stays under them. Thinner than the least step it is no slab but
-            // a sliver that tears off; and what a ball or a wall's finishing has under its tip is not what carries it.
-            const bool floor = op.kind == OperationKind::finish && tool.kind == ToolKind::flat && op.stepdown == 0;
-            const double under = s.at[2] - layer.z_bottom, wood = roughs(op.kind) ? under + s.high : floor ? under : 0;
+            // Roughing is carried by the slab that stands, floors by what stays under them. Thinner than the
+            // least step it is no slab but a sliver that tears off; and what a ball or a wall's finishing has
+            // under its tip is not what carries it.
+            const bool floor =
+                op.kind == OperationKind::finish && tool.kind == ToolKind::flat && op.stepdown == 0;
+            const double under = s.at[2] - layer.z_bottom, wood = roughs(op.kind) ? under + s.high
+                                                                  : floor         ? under
+                                                                                  : 0;
             const double beyond =
-                overhang && wood >= (floor ? kLeastDepth : std::max(kLeastDepth, least_slab(tool))) ? overhang->at(s.at[0], s.at[1]) : 0;
-            if (beyond > 0) now.wood = static_cast<float>(wood), now.overhang = static_cast<float>(beyond + setback);
+                overhang && wood >= (floor ? kLeastDepth : std::max(kLeastDepth, least_slab(tool)))
+                    ? overhang->at(s.at[0], s.at[1])
+                    : 0;
+            if (beyond > 0)
+                now.wood = static_cast<float>(wood), now.overhang = static_cast<float>(beyond + setback);
         }
         seen.push_back(now);
     };
@@ -303,15 +334,16 @@ bool any_halved(const std::vector<Seen>& seen, std::span<const DeepRun> runs) {
     std::size_t r = 0;
     for (const Seen& s : seen) {
         while (r < runs.size() && runs[r].last < s.first) ++r;
-        if (r < runs.size() && runs[r].first <= s.last && (s.first < runs[r].first || s.last > runs[r].last)) return true;
+        if (r < runs.size() && runs[r].first <= s.last && (s.first < runs[r].first || s.last > runs[r].last))
+            return true;
     }
     return false;
 }
 
 /// What was seen before runs were split, with `anew` in place of what was seen of the runs.
 /// @param parts where the runs lie now
-void replaced(const std::vector<Seen>& seen, std::span<const DeepRun> runs, std::span<const MoveRange> parts, const std::vector<Seen>& anew,
-              std::vector<Seen>& all) {
+void replaced(const std::vector<Seen>& seen, std::span<const DeepRun> runs, std::span<const MoveRange> parts,
+              const std::vector<Seen>& anew, std::vector<Seen>& all) {
     all.clear();
     all.reserve(seen.size() + anew.size());
     std::size_t r = 0, next = 0;  // runs passed, and of what was seen anew
@@ -329,7 +361,8 @@ void replaced(const std::vector<Seen>& seen, std::span<const DeepRun> runs, std:
     while (r < runs.size()) take();
 }
 
-/// By how much a cut passes what it may do: its wall error, the cutter's stress and the wood's, the largest as a share of its limit.
+/// By how much a cut passes what it may do: its wall error, the cutter's stress and the wood's, the largest
+/// as a share of its limit.
 struct Load {
     double cutter = 0, wood = 0;
     [[nodiscard]] double worst() const { return std::max(cutter, wood); }
@@ -347,10 +380,13 @@ int passes_for_wood(const Seen& s, int least, LoadOf&& load) {
 /// Runs of stretches that no feed makes light enough and that several passes would.
 /// @param load what a stretch bears in so many passes, in the lowest of them, which the least wood carries
 template <class LoadOf>
-std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, double diameter, int round, LoadOf&& load) {
-    // Wood that no passes save, as over a wide cavity, is not worth their time: neither where it breaks nor, on levels above, where it will.
+std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, double diameter, int round,
+                               LoadOf&& load) {
+    // Wood that no passes save, as over a wide cavity, is not worth their time: neither where it breaks nor,
+    // on levels above, where it will.
     const auto column = [&](const Seen& s) {
-        return std::pair{static_cast<int>(std::floor(s.at[0] / diameter)), static_cast<int>(std::floor(s.at[1] / diameter))};
+        return std::pair{static_cast<int>(std::floor(s.at[0] / diameter)),
+                         static_cast<int>(std::floor(s.at[1] / diameter))};
     };
     std::set<std::pair<int, int>> lost;
     for (const Seen& s : seen)
@@ -360,12 +396,15 @@ std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& o
         if (!s.cuts || s.depth < 4 * kLeastDepth) continue;
         const Load whole = load(s, 1);
         int passes = 0;
-        if (whole.cutter > 1) passes = std::clamp(static_cast<int>(std::ceil(whole.cutter)) + round, 2, kMostPasses);
-        if (whole.wood > 1 && !lost.contains(column(s))) passes = std::max(passes, passes_for_wood(s, passes, load));
+        if (whole.cutter > 1)
+            passes = std::clamp(static_cast<int>(std::ceil(whole.cutter)) + round, 2, kMostPasses);
+        if (whole.wood > 1 && !lost.contains(column(s)))
+            passes = std::max(passes, passes_for_wood(s, passes, load));
         if (passes == 0) continue;
         if (!runs.empty() && s.first <= runs.back().last + 1) {
             DeepRun& run = runs.back();
-            run.last = std::max(run.last, s.last), run.depth_mm = std::max(run.depth_mm, static_cast<double>(s.depth)),
+            run.last = std::max(run.last, s.last),
+            run.depth_mm = std::max(run.depth_mm, static_cast<double>(s.depth)),
             run.passes = std::max(run.passes, passes);
         } else {
             runs.push_back({s.first, s.last, s.depth, passes});
@@ -384,7 +423,8 @@ double way_of(const Operation& op, std::uint32_t first, std::uint32_t last) {
     double way = 0;
     for (std::uint32_t k = first; k <= last; ++k) {
         const Move &a = op.moves[k - 1], &b = op.moves[k];
-        way += b.is_arc() ? arc_shape(a, b).length() : std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z));
+        way += b.is_arc() ? arc_shape(a, b).length()
+                          : std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z));
     }
     return way;
 }
@@ -402,16 +442,16 @@ double bending_limit(const Operation& operation, const Job& job) {
         case OperationKind::semi_rough:
             return std::max(operation.spare, job.tolerances.cusp);
         case OperationKind::rough:
-            return std::max(
-                std::min(job.cutting.wall_allowance, job.cutting.floor_allowance) - (operation.blend - kJunction) - rough_fit(job.cutting),
-                job.tolerances.cusp);
+            return std::max(std::min(job.cutting.wall_allowance, job.cutting.floor_allowance) -
+                                (operation.blend - kJunction) - rough_fit(job.cutting),
+                            job.tolerances.cusp);
         default:
             return job.tolerances.cusp;
     }
 }
 
-LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const OverhangMap* overhang, std::vector<Diagnostic>& diagnostics,
-                      KnownCuts* known_cuts) {
+LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const OverhangMap* overhang,
+                      std::vector<Diagnostic>& diagnostics, KnownCuts* known_cuts) {
     const Job& job = plan.job;
     StandingSlab slab(plan.stock_min, plan.stock_max, layer.z_bottom, layer.z_bottom + layer.slab_thickness,
                       StandingSlab::cell_for(job, plan.stock_min, plan.stock_max));
@@ -427,10 +467,12 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         op.peak_at.reset();
         op.peak_move.reset();
         result.starts.push_back(result.cuts.size());
-        const Tool& tool = *std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+        const Tool& tool = *std::find_if(job.tools.begin(), job.tools.end(),
+                                         [&](const Tool& t) { return t.number == op.tool; });
         if (tool.kind == ToolKind::drill) continue;
         if (!(op.spindle_rpm > 0))
-            throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest", op.purpose, "give the tool a speed");
+            throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest",
+                        op.purpose, "give the tool a speed");
         BentCutter cutting(job, op, tool, known_cuts);
         const double limit = bending_limit(op, job);
         std::size_t looked_at = 0;
@@ -455,10 +497,11 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             return load_of(lowest, cutting.at(lowest.coarse, s.feed));
         };
 
-        const auto fastest = static_cast<std::uint32_t>(std::floor(std::min(tool.max_feed, job.machine.max_feed)));
-        // The fastest step that all limits bear. Where none does: the slowest that is allowed, when it is the cutter that bears too
-        // much; as planned, when it is the wood.
-        // The steps of a class, fastest first, are the same wherever it is met.
+        const auto fastest =
+            static_cast<std::uint32_t>(std::floor(std::min(tool.max_feed, job.machine.max_feed)));
+        // The fastest step that all limits bear. Where none does: the slowest that is allowed, when it is the
+        // cutter that bears too much; as planned, when it is the wood. The steps of a class, fastest first,
+        // are the same wherever it is met.
         struct ClassFeeds {
             std::vector<FeedStep> steps;
             FeedStep* chosen = nullptr;  // where nothing hangs over
@@ -473,14 +516,19 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             if (fresh) {
                 // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
                 const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
-                const double chip = std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.coarse)));
+                const double chip =
+                    std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.coarse)));
                 std::vector<FeedStep>& steps = it->second.steps;
                 // What is planned is a step too, so that a cut that needs no other feed keeps its own.
                 steps.push_back({planned, nullptr});
-                for (int k = 1; k <= kFeedSteps; ++k) steps.push_back({fastest * static_cast<std::uint32_t>(k) / kFeedSteps, nullptr});
-                std::erase_if(steps, [&](const FeedStep& f) { return f.feed > chip || f.feed < 1 || f.feed < kLeastShare * planned; });
+                for (int k = 1; k <= kFeedSteps; ++k)
+                    steps.push_back({fastest * static_cast<std::uint32_t>(k) / kFeedSteps, nullptr});
+                std::erase_if(steps, [&](const FeedStep& f) {
+                    return f.feed > chip || f.feed < 1 || f.feed < kLeastShare * planned;
+                });
                 if (steps.empty()) steps.push_back({planned, nullptr});
-                std::sort(steps.begin(), steps.end(), [](const FeedStep& x, const FeedStep& y) { return x.feed > y.feed; });
+                std::sort(steps.begin(), steps.end(),
+                          [](const FeedStep& x, const FeedStep& y) { return x.feed > y.feed; });
             }
             last_key = key, last = &it->second;
             return *last;
@@ -498,7 +546,8 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             }
             return for_cutter != nullptr ? for_cutter : &steps.back();
         };
-        // A coarse class may bear a little less than a cut of it does: near the limit, what the plan will state decides.
+        // A coarse class may bear a little less than a cut of it does: near the limit, what the plan will
+        // state decides.
         const auto as_stated = [&](const Seen& s, std::vector<FeedStep>& steps, FeedStep* step) {
             const double bears = cutter_share(bent_at(s, *step));
             if (bears < kClassSlack || bears > 1) return step;
@@ -550,8 +599,11 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                     divided_at = {to_mm(end.x), to_mm(end.y), to_mm(end.z)};
                 }
             }
-            op.moves = split_runs(op.moves, runs, static_cast<std::uint32_t>(std::max(1.0, std::min(tool.plunge_feed, job.machine.max_feed))));
-            // After a run there stands what stood after it before, so only the runs themselves are looked at anew.
+            op.moves = split_runs(
+                op.moves, runs,
+                static_cast<std::uint32_t>(std::max(1.0, std::min(tool.plunge_feed, job.machine.max_feed))));
+            // After a run there stands what stood after it before, so only the runs themselves are looked at
+            // anew.
             again = before;
             if (any_halved(seen, runs)) {
                 run_through(context, again, op, tool, layer, overhang, job.bonding.edge_setback, seen);
@@ -563,12 +615,13 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             }
         }
         if (divided > 0)
-            diagnostics.push_back(
-                {Severity::note, "stepdown.lowered",
-                 fmt::format("layer {}, {}: {} cut{} of {:.0f} mm in all {} taken in several passes, the deepest of {:.2f} mm in {}, where "
-                             "cutter or wood would bear too much at any feed",
-                             layer.index, op.purpose, divided, divided == 1 ? "" : "s", divided_way, divided == 1 ? "is" : "are", deepest, passes),
-                 divided_at});
+            diagnostics.push_back({Severity::note, "stepdown.lowered",
+                                   fmt::format("layer {}, {}: {} cut{} of {:.0f} mm in all {} taken in "
+                                               "several passes, the deepest of {:.2f} mm in {}, where "
+                                               "cutter or wood would bear too much at any feed",
+                                               layer.index, op.purpose, divided, divided == 1 ? "" : "s",
+                                               divided_way, divided == 1 ? "is" : "are", deepest, passes),
+                                   divided_at});
 
         if (job.cutting.adapt_feed) {
             std::vector<std::uint32_t> wanted(op.moves.size(), 0);
@@ -583,15 +636,18 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                 }
                 if (feed < planned) {
                     ++way;
-                    if (const double share = static_cast<double>(feed) / planned; share < lowest_share) lowest_share = share, worst = &s;
+                    if (const double share = static_cast<double>(feed) / planned; share < lowest_share)
+                        lowest_share = share, worst = &s;
                 }
             }
             if (worst)
                 diagnostics.push_back(
                     {Severity::note, "feed.lowered",
-                     fmt::format("layer {}, {}: the feed is lowered in {:.1f} % of the way, to {:.0f} % of what was planned where cutter "
+                     fmt::format("layer {}, {}: the feed is lowered in {:.1f} % of the way, to {:.0f} % of "
+                                 "what was planned where cutter "
                                  "or wood would bear most",
-                                 layer.index, op.purpose, 100 * way / static_cast<double>(seen.size()), 100 * lowest_share),
+                                 layer.index, op.purpose, 100 * way / static_cast<double>(seen.size()),
+                                 100 * lowest_share),
                      worst->place()});
             set_feeds(context, op, std::move(wanted), level);
         }
@@ -608,7 +664,9 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             std::uint32_t feed = 0;
             for (std::uint32_t k = s.first; k <= s.last; ++k) feed = std::max(feed, op.moves[k].feed);
             if (s.overhang > 0)
-                if (const double wood = feed == s.feed ? s.wood_load : wood_load(s, cutting.at(s.coarse, feed)); wood > 1) {
+                if (const double wood =
+                        feed == s.feed ? s.wood_load : wood_load(s, cutting.at(s.coarse, feed));
+                    wood > 1) {
                     ++broken;
                     if (wood > most) most = wood, breaks = &s, needed = wood * s.wood;
                 }
@@ -618,18 +676,20 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             result.moves.push_back(s.last);
         }
         if (breaks)
-            diagnostics.push_back(
-                {Severity::warning, "cut.overhang",
-                 fmt::format("layer {}, {}: {:.2f} mm of wood hang over by {:.1f} mm where they are cut, and would need {:.2f} mm to hold "
-                             "({} such place{}); a flask would carry them",
-                             layer.index, op.purpose, breaks->wood, breaks->overhang, needed, broken, broken == 1 ? "" : "s"),
-                 breaks->place()});
+            diagnostics.push_back({Severity::warning, "cut.overhang",
+                                   fmt::format("layer {}, {}: {:.2f} mm of wood hang over by {:.1f} mm where "
+                                               "they are cut, and would need {:.2f} mm to hold "
+                                               "({} such place{}); a flask would carry them",
+                                               layer.index, op.purpose, breaks->wood, breaks->overhang,
+                                               needed, broken, broken == 1 ? "" : "s"),
+                                   breaks->place()});
     }
     result.starts.push_back(result.cuts.size());
     return result;
 }
 
-std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, std::span<const LayerCuts> layers, ForceSolver* solver) {
+std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan,
+                                                 std::span<const LayerCuts> layers, ForceSolver* solver) {
     const Job& job = plan.job;
     std::vector<std::size_t> starts, bases;
     std::size_t count = 0;
@@ -639,23 +699,29 @@ std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, s
         count += layer.cuts.size();
     }
     starts.push_back(count);
-    const MemoryCharge memory(context, count * (sizeof(CutSegment) + sizeof(SegmentForces)), "the cuts of a plan");
+    const MemoryCharge memory(context, count * (sizeof(CutSegment) + sizeof(SegmentForces)),
+                              "the cuts of a plan");
     RawArray<CutSegment> cuts(count);
-    parallel_each(context, layers.size(), [&](std::size_t l) { std::copy(layers[l].cuts.begin(), layers[l].cuts.end(), cuts.data() + bases[l]); });
+    parallel_each(context, layers.size(), [&](std::size_t l) {
+        std::copy(layers[l].cuts.begin(), layers[l].cuts.end(), cuts.data() + bases[l]);
+    });
     const HardestSearch hardest = hardest_cuts(context, cuts.span(), starts, solver);
     std::vector<std::vector<Diagnostic>> found(layers.size());
     if (!hardest.note.empty())
-        plan.diagnostics.push_back({Severity::note,
-                                    "forces.no_device",
-                                    fmt::format("the forces of {} cuts were computed without an OpenCL device: {}", cuts.size(), hardest.note),
-                                    {}});
+        plan.diagnostics.push_back(
+            {Severity::note,
+             "forces.no_device",
+             fmt::format("the forces of {} cuts were computed without an OpenCL device: {}", cuts.size(),
+                         hardest.note),
+             {}});
     std::size_t group = 0;
     for (std::size_t l = 0; l < layers.size(); ++l) {
         const std::size_t base = bases[l];
         for (Operation& op : plan.layers[l].operations) {
             const HardestCuts& h = hardest.groups[group++];
             if (h.resultant == kNoCut) continue;
-            const Tool& tool = *std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+            const Tool& tool = *std::find_if(job.tools.begin(), job.tools.end(),
+                                             [&](const Tool& t) { return t.number == op.tool; });
             const auto exact = [&](std::size_t i) {
                 return cuts[i].profile == CutterProfile::flat ? closed_form_forces(cuts[i], kStatedAccuracy)
                                                               : reference_forces(cuts[i], kStatedAccuracy);
@@ -672,16 +738,18 @@ std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, s
             op.wall_error_mm = cutter_deflection(exact(h.across).peak_y_n, tool.stickout, tool.diameter);
             const int index = plan.layers[l].index;
             if (const double limit = bending_limit(op, job); op.wall_error_mm > limit)
-                found[l].push_back(
-                    {Severity::warning, "cut.deflection",
-                     fmt::format("layer {}, {}: the cutter may bend by {:.4f} mm, more than the {:.4f} mm allowed; use a shorter or thicker "
-                                 "tool or a smaller stepdown",
-                                 index, op.purpose, op.wall_error_mm, limit),
-                     place(h.across)});
-            if (const double stress = cutter_stress(in_plane, tool.stickout, tool.diameter); tool.strength_mpa > 0 && stress > tool.strength_mpa)
+                found[l].push_back({Severity::warning, "cut.deflection",
+                                    fmt::format("layer {}, {}: the cutter may bend by {:.4f} mm, more than "
+                                                "the {:.4f} mm allowed; use a shorter or thicker "
+                                                "tool or a smaller stepdown",
+                                                index, op.purpose, op.wall_error_mm, limit),
+                                    place(h.across)});
+            if (const double stress = cutter_stress(in_plane, tool.stickout, tool.diameter);
+                tool.strength_mpa > 0 && stress > tool.strength_mpa)
                 found[l].push_back({Severity::warning, "cut.strength",
-                                    fmt::format("layer {}, {}: the cutter would bear {:.0f} MPa in bending, more than its {:.0f} MPa", index,
-                                                op.purpose, stress, tool.strength_mpa),
+                                    fmt::format("layer {}, {}: the cutter would bear {:.0f} MPa in bending, "
+                                                "more than its {:.0f} MPa",
+                                                index, op.purpose, stress, tool.strength_mpa),
                                     place(h.in_plane)});
         }
     }

@@ -12,14 +12,14 @@
 
 namespace slabwright {
 
-/// The cut of a stretch at this feed (mm/min). Depth and width are rounded up to classes (64 to a doubling of the depth, a 240th of the diameter),
-/// so that a layer of any length has some thousands of different cuts. A ball that engages no higher than its radius is as wide as its
-/// circle there.
+/// The cut of a stretch at this feed (mm/min). Depth and width are rounded up to classes (64 to a doubling of
+/// the depth, a 240th of the diameter), so that a layer of any length has some thousands of different cuts. A
+/// ball that engages no higher than its radius is as wide as its circle there.
 [[nodiscard]] CutSegment cut_of(const CutStretch& stretch, const Tool& tool, const Job& job, double feed);
 
-/// What an operation may bend its cutter, normal to the way, mm: roughing as much as it leaves for finishing, less what wider
-/// corners than a finish pass's (Operation::blend) and arcs (rough_fit) may take of that, semi-roughing what it leaves itself (Operation::spare), finishing the cusp,
-/// facing what facing takes off.
+/// What an operation may bend its cutter, normal to the way, mm: roughing as much as it leaves for finishing,
+/// less what wider corners than a finish pass's (Operation::blend) and arcs (rough_fit) may take of that,
+/// semi-roughing what it leaves itself (Operation::spare), finishing the cusp, facing what facing takes off.
 [[nodiscard]] double bending_limit(const Operation& operation, const Job& job);
 
 /// Feeds come in this many steps of the fastest that tool and machine allow.
@@ -33,8 +33,8 @@ struct LayerCuts {
     std::vector<std::size_t> starts;           ///< of each operation's, and their end
 };
 
-/// What the cuts of a plan's tools bear, for the layers of one plan to tell each other: most of a layer's cuts are met in others too. Several threads
-/// may use it at once.
+/// What the cuts of a plan's tools bear, for the layers of one plan to tell each other: most of a layer's
+/// cuts are met in others too. Several threads may use it at once.
 class KnownCuts {
 public:
     KnownCuts();
@@ -48,37 +48,48 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-/// Runs a layer's operations, in their order, through a standing slab. Three things are looked at for every stretch: what the bending cutter leaves on
-/// a wall against the operation's limit, the cutter's stress against its strength where the job states one, and, where the slab hangs
-/// over, the wood against what the cut needs (section 9): roughing is carried by what stands, floors by what stays under them.
-///   * Where the job adapts feeds, every move gets the fastest of kFeedSteps steps at which all three hold, but not under an eighth of what was planned,
-///     and at which the thickest chip is no thicker than planned: that of a slot at the planned feed, the finish feed or the tool's. A faster feed is
-///     taken only where it lasts for at least 20 mm; roughing, facing and entries at the plunge feed are never made faster than planned.
-///     Where it is the wood that holds at no feed, the planned one stays: slower, it would break as well.
-///   * Where the job adapts stepdowns, what holds at no feed is cut in several passes (split_cuts.h); for wood only where the lowest of them then holds, and where none of the operation's cuts
+/// Runs a layer's operations, in their order, through a standing slab. Three things are looked at for every
+/// stretch: what the bending cutter leaves on a wall against the operation's limit, the cutter's stress
+/// against its strength where the job states one, and, where the slab hangs over, the wood against what the
+/// cut needs (section 9): roughing is carried by what stands, floors by what stays under them.
+///   * Where the job adapts feeds, every move gets the fastest of kFeedSteps steps at which all three hold,
+///   but not under an eighth of what was planned,
+///     and at which the thickest chip is no thicker than planned: that of a slot at the planned feed, the
+///     finish feed or the tool's. A faster feed is taken only where it lasts for at least 20 mm; roughing,
+///     facing and entries at the plunge feed are never made faster than planned. Where it is the wood that
+///     holds at no feed, the planned one stays: slower, it would break as well.
+///   * Where the job adapts stepdowns, what holds at no feed is cut in several passes (split_cuts.h); for
+///   wood only where the lowest of them then holds, and where none of the operation's cuts
 ///     breaks it all the same.
 /// Drills are left alone.
 /// @param overhang    how far each place lies from what carries this slab; null: nothing hangs over
 /// @param known of this very plan, or null
-/// @param diagnostics gets, per operation, "stepdown.lowered" (how many, how long, the deepest), "feed.lowered" (where and how far), and
+/// @param diagnostics gets, per operation, "stepdown.lowered" (how many, how long, the deepest),
+/// "feed.lowered" (where and how far), and
 ///                    "cut.overhang" where the wood would break all the same
-/// @throws Error(usage, "forces.spindle") when an operation mills with its spindle at rest; Error(usage, "forces.segment"); Error(cancelled)
-[[nodiscard]] LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const OverhangMap* overhang,
-                                    std::vector<Diagnostic>& diagnostics, KnownCuts* known = nullptr);
+/// @throws Error(usage, "forces.spindle") when an operation mills with its spindle at rest; Error(usage,
+/// "forces.segment"); Error(cancelled)
+[[nodiscard]] LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan,
+                                    const OverhangMap* overhang, std::vector<Diagnostic>& diagnostics,
+                                    KnownCuts* known = nullptr);
 
-/// Sets of every operation peak_force_n (resultant), deflection_mm (of the tip, in the plane), wall_error_mm (normal to the way), peak_at and
-/// peak_move, from the closed form or the double reference; many cuts are screened on a device, and the plan says so when there was none.
+/// Sets of every operation peak_force_n (resultant), deflection_mm (of the tip, in the plane), wall_error_mm
+/// (normal to the way), peak_at and peak_move, from the closed form or the double reference; many cuts are
+/// screened on a device, and the plan says so when there was none.
 /// @param layers as adapt_layer gave them, one for each layer of the plan
 /// @param solver a SolverAhead's (kernels/forces/hardest.h); none: the double model looks at all
-/// @returns for each layer "cut.deflection" and "cut.strength", per operation, where a limit is passed all the same
+/// @returns for each layer "cut.deflection" and "cut.strength", per operation, where a limit is passed all
+/// the same
 /// @throws Error(usage, "forces.segment"), Error(usage, "forces.device"), Error(cancelled)
-[[nodiscard]] std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan, std::span<const LayerCuts> layers, ForceSolver* solver);
+[[nodiscard]] std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan,
+                                                               std::span<const LayerCuts> layers,
+                                                               ForceSolver* solver);
 
 /// adapt_layer and rate_layers of one layer over nothing that hangs over.
 void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Diagnostic>& diagnostics);
 
-/// The longest that the operation's tool might be, mm from holder to tip: where it would bend by the operation's limit (LUO eq. 11); 0
-/// where it bends nowhere.
+/// The longest that the operation's tool might be, mm from holder to tip: where it would bend by the
+/// operation's limit (LUO eq. 11); 0 where it bends nowhere.
 [[nodiscard]] double allowed_length(const Operation& operation, const Tool& tool, const Job& job);
 
 }  // namespace slabwright

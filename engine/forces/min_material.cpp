@@ -22,7 +22,8 @@ constexpr std::size_t kHeights = 128;  // at which sections are taken
 
 OverhangThickness thickness_at(const Job& job, const Tool& tool, double depth, double overhang) {
     const CutSegment cut = hardest_cut(job, tool, depth);
-    const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut) : reference_forces(cut);
+    const SegmentForces f =
+        cut.profile == CutterProfile::flat ? closed_form_forces(cut) : reference_forces(cut);
     OverhangCut slab;
     slab.force_x_n = f.peak_x_n;
     slab.force_y_n = f.peak_y_n;
@@ -34,9 +35,10 @@ OverhangThickness thickness_at(const Job& job, const Tool& tool, double depth, d
     return least_overhang_thickness(slab);
 }
 
-// Squared distances, in cells, to the nearest marked cell of one row or column: the lower envelope of parabolas
-// (Felzenszwalb and Huttenlocher), in place.
-void distances(std::vector<double>& f, std::vector<double>& scratch, std::vector<int>& roots, std::vector<double>& bounds) {
+// Squared distances, in cells, to the nearest marked cell of one row or column: the lower envelope of
+// parabolas (Felzenszwalb and Huttenlocher), in place.
+void distances(std::vector<double>& f, std::vector<double>& scratch, std::vector<int>& roots,
+               std::vector<double>& bounds) {
     const int n = static_cast<int>(f.size());
     scratch = f;
     roots.assign(f.size(), 0);
@@ -47,7 +49,8 @@ void distances(std::vector<double>& f, std::vector<double>& scratch, std::vector
         double s = -1e300;
         while (k >= 0) {
             const int v = roots[static_cast<std::size_t>(k)];
-            s = ((scratch[static_cast<std::size_t>(q)] + double{1} * q * q) - (scratch[static_cast<std::size_t>(v)] + double{1} * v * v)) /
+            s = ((scratch[static_cast<std::size_t>(q)] + double{1} * q * q) -
+                 (scratch[static_cast<std::size_t>(v)] + double{1} * v * v)) /
                 (2.0 * (q - v));
             if (s > bounds[static_cast<std::size_t>(k)]) break;
             --k;
@@ -75,13 +78,15 @@ double OverhangMap::at(double x, double y) const {
 
 double OverhangMap::largest() const { return *std::max_element(mm.begin(), mm.end()); }
 
-OverhangMap overhang_map(std::span<const Loops* const> regions, const std::array<double, 2>& low, const std::array<double, 2>& high) {
+OverhangMap overhang_map(std::span<const Loops* const> regions, const std::array<double, 2>& low,
+                         const std::array<double, 2>& high) {
     OverhangMap map;
     const double cell = std::max(high[0] - low[0], high[1] - low[1]) / kCells;
     const int nx = std::max(1, static_cast<int>(std::ceil((high[0] - low[0]) / cell))),
               ny = std::max(1, static_cast<int>(std::ceil((high[1] - low[1]) / cell)));
     map.low = low, map.cell = cell, map.nx = nx, map.ny = ny;
-    std::vector<std::vector<double>> rows(static_cast<std::size_t>(ny), std::vector<double>(static_cast<std::size_t>(nx), 1e18));
+    std::vector<std::vector<double>> rows(static_cast<std::size_t>(ny),
+                                          std::vector<double>(static_cast<std::size_t>(nx), 1e18));
     std::vector<double> scratch, bounds, column(static_cast<std::size_t>(ny));
     std::vector<int> roots;
     std::vector<double> heights;
@@ -92,7 +97,8 @@ OverhangMap overhang_map(std::span<const Loops* const> regions, const std::array
         std::vector<double>& row = rows[static_cast<std::size_t>(j)];
         for (const std::vector<std::vector<Span>>& of_region : spans)
             for (const Span& s : of_region[static_cast<std::size_t>(j)])
-                for (int i = std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - low[0]) / cell - 0.5)));
+                for (int i = std::max(
+                         0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - low[0]) / cell - 0.5)));
                      i < nx && (i + 0.5) * cell + low[0] <= s.high / kUnitsPerMm; ++i)
                     row[static_cast<std::size_t>(i)] = 0;
         distances(row, scratch, roots, bounds);
@@ -103,7 +109,8 @@ OverhangMap overhang_map(std::span<const Loops* const> regions, const std::array
         distances(column, scratch, roots, bounds);
         for (std::size_t j = 0; j < rows.size(); ++j)
             map.mm[j * static_cast<std::size_t>(nx) + i] =
-                static_cast<float>(column[j] >= 1e18 ? std::hypot(high[0] - low[0], high[1] - low[1]) : std::sqrt(column[j]) * cell);
+                static_cast<float>(column[j] >= 1e18 ? std::hypot(high[0] - low[0], high[1] - low[1])
+                                                     : std::sqrt(column[j]) * cell);
     }
     return map;
 }
@@ -114,7 +121,8 @@ double least_material(const Job& job, double overhang_mm) {
         if (tool.kind != ToolKind::flat && tool.kind != ToolKind::ball) continue;
         double high = thickness_at(job, tool, tool.stepdown_max, overhang_mm).least_mm;
         if (high < tool.stepdown_max) {
-            // Slabs thinner than the step are cut through at once, with less force: the thinnest that bears its own thickness.
+            // Slabs thinner than the step are cut through at once, with less force: the thinnest that bears
+            // its own thickness.
             double low = 0;
             high = tool.stepdown_max;
             for (int i = 0; i < 40 && high - low > 1e-6; ++i) {
@@ -129,7 +137,9 @@ double least_material(const Job& job, double overhang_mm) {
 
 double last_rough_steps(const Job& job, const Tool& tool, double overhang_mm, double layer_mm) {
     constexpr double kSliver = 0.9;  // of the thinnest slab
-    return overhang_mm > 0 && thickness_at(job, tool, tool.stepdown_max, overhang_mm / 2).least_mm <= layer_mm ? kSliver * least_slab(tool) : 0;
+    return overhang_mm > 0 && thickness_at(job, tool, tool.stepdown_max, overhang_mm / 2).least_mm <= layer_mm
+               ? kSliver * least_slab(tool)
+               : 0;
 }
 
 SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {
@@ -143,7 +153,8 @@ SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {
     heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
     if (heights.size() > kHeights) {
         std::vector<double> spread;
-        for (std::size_t i = 0; i < kHeights; ++i) spread.push_back(heights[i * (heights.size() - 1) / (kHeights - 1)]);
+        for (std::size_t i = 0; i < kHeights; ++i)
+            spread.push_back(heights[i * (heights.size() - 1) / (kHeights - 1)]);
         heights = std::move(spread);
     }
     std::vector<Plane> planes;
@@ -167,8 +178,10 @@ SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {
         const std::array<const Loops*, 2> regions{&sections[i].loops, &frame};
         // Half a cell's diagonal at the slab's edge and as much at the section's.
         const OverhangMap map = overhang_map(regions, plan.stock_min, plan.stock_max);
-        const double most = std::hypot(plan.stock_max[0] - plan.stock_min[0], plan.stock_max[1] - plan.stock_min[1]);
-        result.overhangs[i] = std::min(map.largest() + std::numbers::sqrt2 * map.cell, most) + slope * heights[i] + plan.job.bonding.edge_setback;
+        const double most =
+            std::hypot(plan.stock_max[0] - plan.stock_min[0], plan.stock_max[1] - plan.stock_min[1]);
+        result.overhangs[i] = std::min(map.largest() + std::numbers::sqrt2 * map.cell, most) +
+                              slope * heights[i] + plan.job.bonding.edge_setback;
     });
     return result;
 }
@@ -176,9 +189,11 @@ SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {
 std::function<double(double)> min_material(Context& context, MeshView mesh, const Plan& plan) {
     const SlabOverhang overhang = slab_overhang(context, mesh, plan);
     std::vector<double> least(overhang.heights.size());
-    parallel_each(context, least.size(), [&](std::size_t i) { least[i] = least_material(plan.job, overhang.overhangs[i]); });
+    parallel_each(context, least.size(),
+                  [&](std::size_t i) { least[i] = least_material(plan.job, overhang.overhangs[i]); });
     return [heights = overhang.heights, least = std::move(least)](double z) {
-        const auto above = static_cast<std::size_t>(std::lower_bound(heights.begin(), heights.end(), z) - heights.begin());
+        const auto above =
+            static_cast<std::size_t>(std::lower_bound(heights.begin(), heights.end(), z) - heights.begin());
         return std::max(least[std::min(above, least.size() - 1)], least[above == 0 ? 0 : above - 1]);
     };
 }

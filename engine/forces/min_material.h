@@ -1,4 +1,5 @@
-// How thick the wood above a layer boundary must be to bear being cut where its slab hangs over (LUO 6.3; method.md section 9).
+// How thick the wood above a layer boundary must be to bear being cut where its slab hangs over (LUO 6.3;
+// method.md section 9).
 #pragma once
 
 #include <array>
@@ -12,16 +13,18 @@
 
 namespace slabwright {
 
-/// The thinnest slab, mm, that bears the hardest cut of every end mill of the job `overhang_mm` from where it is glued: LUO's strip
-/// as wide as the cutter's radius, cut as deep as the cutter may step or as it is thick, whichever is less, the force in the
-/// middle of that depth above the joint. In LUO 6.5.2 (2 in, 3 mm deep) that is .124 in.
+/// The thinnest slab, mm, that bears the hardest cut of every end mill of the job `overhang_mm` from where it
+/// is glued: LUO's strip as wide as the cutter's radius, cut as deep as the cutter may step or as it is
+/// thick, whichever is less, the force in the middle of that depth above the joint. In LUO 6.5.2 (2 in, 3 mm
+/// deep) that is .124 in.
 /// @throws Error(usage, "forces.segment") for a tool or material that the force model does not take
 [[nodiscard]] double least_material(const Job& job, double overhang_mm);
 
-/// How far down the last two levels of roughing go where a slab hangs over by up to `overhang_mm`, mm: the last one cuts through no more
-/// than a sliver that tears off (least_slab), for a slab as thin as a whole step would bend, and the one before it meets no more than the
-/// wood then bears. 0, any step, where nothing hangs over, and where the whole layer would not bear a full step even half as far out: what
-/// breaks there breaks anyway.
+/// How far down the last two levels of roughing go where a slab hangs over by up to `overhang_mm`, mm: the
+/// last one cuts through no more than a sliver that tears off (least_slab), for a slab as thin as a whole
+/// step would bend, and the one before it meets no more than the wood then bears. 0, any step, where nothing
+/// hangs over, and where the whole layer would not bear a full step even half as far out: what breaks there
+/// breaks anyway.
 /// @throws Error(usage, "forces.segment") as least_material
 [[nodiscard]] double last_rough_steps(const Job& job, const Tool& tool, double overhang_mm, double layer_mm);
 
@@ -30,20 +33,23 @@ struct OverhangMap {
     std::array<double, 2> low{};
     double cell = 1;
     int nx = 0, ny = 0;
-    std::vector<float> mm;  ///< row by row; 0 over a region, the stock's diagonal everywhere when there is none
+    std::vector<float>
+        mm;  ///< row by row; 0 over a region, the stock's diagonal everywhere when there is none
     /// At a place, by the cell that it lies in or, outside of the stock, the nearest one.
     [[nodiscard]] double at(double x, double y) const;
     [[nodiscard]] double largest() const;
 };
 
 /// @param carried the regions that carry, by cells whose middle they hold
-[[nodiscard]] OverhangMap overhang_map(std::span<const Loops* const> carried, const std::array<double, 2>& stock_min,
+[[nodiscard]] OverhangMap overhang_map(std::span<const Loops* const> carried,
+                                       const std::array<double, 2>& stock_min,
                                        const std::array<double, 2>& stock_max);
 
-/// How far, in mm, the slab that is glued at height z reaches past what carries it there: the largest distance of any place of the
-/// stock's rectangle from the section just below z, or from the flask where there is one, and the glue's setback on top of it.
-/// The section is drawn on a grid of 1/256 of the stock's longer side, so the answer is too large by up to three of its
-/// cells. Taken at the features' heights (at most 128); between two of them it is the larger of the two.
+/// How far, in mm, the slab that is glued at height z reaches past what carries it there: the largest
+/// distance of any place of the stock's rectangle from the section just below z, or from the flask where
+/// there is one, and the glue's setback on top of it. The section is drawn on a grid of 1/256 of the stock's
+/// longer side, so the answer is too large by up to three of its cells. Taken at the features' heights (at
+/// most 128); between two of them it is the larger of the two.
 struct SlabOverhang {
     std::vector<double> heights, overhangs;  ///< mm, heights ascending
 };

@@ -18,7 +18,8 @@ struct Met {
     double volume = 0, low = 1e300, high = -1e300, side = 0;
 };
 
-// Lowers cells, and tells the part of the way on which the cutter's edge comes to each of them, or the first if it is there already.
+// Lowers cells, and tells the part of the way on which the cutter's edge comes to each of them, or the first
+// if it is there already.
 struct Meeting {
     const CellGrid& grid;
     float* height;
@@ -29,13 +30,15 @@ struct Meeting {
 
     void operator()(std::size_t cell, double z) { level(cell, 1, z); }
     void row(std::size_t first, int n, const double* h, double /*lowest*/) {
-        take(first, cells_over(height + first, n, h, 0, kLeastTaken), [&](std::size_t k) { return std::max(0.0, h[k]); });
+        take(first, cells_over(height + first, n, h, 0, kLeastTaken),
+             [&](std::size_t k) { return std::max(0.0, h[k]); });
     }
     void level(std::size_t first, int n, double z) {
         const double left = std::max(0.0, z);
         for (int k = 0; k < n; k += kSweptTogether) {
             const std::size_t begin = first + static_cast<std::size_t>(k);
-            take(begin, cells_over(height + begin, std::min(kSweptTogether, n - k), left, kLeastTaken), [&](std::size_t) { return left; });
+            take(begin, cells_over(height + begin, std::min(kSweptTogether, n - k), left, kLeastTaken),
+                 [&](std::size_t) { return left; });
         }
     }
     // Lowers the cells whose bits are set, counted from the first, to left(k).
@@ -45,8 +48,9 @@ struct Meeting {
         const auto nx = static_cast<std::size_t>(grid.nx);
         std::array<std::int32_t, kSweptTogether> part;
         std::array<double, kSweptTogether> across;
-        edge_parts(way, grid.x(static_cast<int>(first % nx)) - from[0], grid.cell, grid.y(static_cast<int>(first / nx)) - from[1],
-                   64 - std::countl_zero(cells), part.data(), across.data());
+        edge_parts(way, grid.x(static_cast<int>(first % nx)) - from[0], grid.cell,
+                   grid.y(static_cast<int>(first / nx)) - from[1], 64 - std::countl_zero(cells), part.data(),
+                   across.data());
         const double area = grid.cell * grid.cell;
         std::int32_t p = part[static_cast<std::size_t>(std::countr_zero(cells))];
         Met m = parts[static_cast<std::size_t>(p)];
@@ -69,12 +73,15 @@ struct Meeting {
     }
 };
 
-CutterEnd end_of(const Tool& tool) { return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0}; }
+CutterEnd end_of(const Tool& tool) {
+    return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2,
+            0};
+}
 
 // Smallest x and y, largest x and y of a move and the cutter on it, mm.
 std::array<double, 4> box_of(const Move& from, const Move& move, double radius) {
-    std::array<double, 4> box{to_mm(std::min(from.x, move.x)), to_mm(std::min(from.y, move.y)), to_mm(std::max(from.x, move.x)),
-                              to_mm(std::max(from.y, move.y))};
+    std::array<double, 4> box{to_mm(std::min(from.x, move.x)), to_mm(std::min(from.y, move.y)),
+                              to_mm(std::max(from.x, move.x)), to_mm(std::max(from.y, move.y))};
     if (move.is_arc()) box = arc_shape(from, move).box();
     return {box[0] - radius, box[1] - radius, box[2] + radius, box[3] + radius};
 }
@@ -82,7 +89,8 @@ std::array<double, 4> box_of(const Move& from, const Move& move, double radius) 
 // The surroundings of some moves, as tiles of the grid.
 class Surrounded {
 public:
-    Surrounded(const CellGrid& grid, const Operation& operation, std::span<const MoveRange> parts, double radius)
+    Surrounded(const CellGrid& grid, const Operation& operation, std::span<const MoveRange> parts,
+               double radius)
         : grid_(grid),
           radius_(radius + grid.cell),
           nx_(grid.nx / kTile + 1),
@@ -95,17 +103,20 @@ public:
                     for (int i = i0; i <= i1; ++i) sums_[at(i + 1, j + 1)] = 1;
             }
         for (int j = 1; j <= ny_; ++j)
-            for (int i = 1; i <= nx_; ++i) sums_[at(i, j)] += sums_[at(i - 1, j)] + sums_[at(i, j - 1)] - sums_[at(i - 1, j - 1)];
+            for (int i = 1; i <= nx_; ++i)
+                sums_[at(i, j)] += sums_[at(i - 1, j)] + sums_[at(i, j - 1)] - sums_[at(i - 1, j - 1)];
     }
     [[nodiscard]] bool near(const Move& from, const Move& move) const {
         const auto [i0, j0, i1, j1] = tiles(from, move);
-        return sums_[at(i1 + 1, j1 + 1)] - sums_[at(i0, j1 + 1)] - sums_[at(i1 + 1, j0)] + sums_[at(i0, j0)] > 0;
+        return sums_[at(i1 + 1, j1 + 1)] - sums_[at(i0, j1 + 1)] - sums_[at(i1 + 1, j0)] + sums_[at(i0, j0)] >
+               0;
     }
 
 private:
     static constexpr int kTile = 4;  // cells
     [[nodiscard]] std::size_t at(int i, int j) const {
-        return static_cast<std::size_t>(j) * (static_cast<std::size_t>(nx_) + 1) + static_cast<std::size_t>(i);
+        return static_cast<std::size_t>(j) * (static_cast<std::size_t>(nx_) + 1) +
+               static_cast<std::size_t>(i);
     }
     // First and last; what lies beside the grid counts to its border.
     [[nodiscard]] std::array<int, 4> tiles(const Move& from, const Move& move) const {
@@ -113,7 +124,8 @@ private:
         const auto tile = [&](double v, double begin, int n) {
             return static_cast<int>(std::clamp(std::floor((v - begin) / (kTile * grid_.cell)), 0.0, n - 1.0));
         };
-        return {tile(box[0], grid_.x0, nx_), tile(box[1], grid_.y0, ny_), tile(box[2], grid_.x0, nx_), tile(box[3], grid_.y0, ny_)};
+        return {tile(box[0], grid_.x0, nx_), tile(box[1], grid_.y0, ny_), tile(box[2], grid_.x0, nx_),
+                tile(box[3], grid_.y0, ny_)};
     }
     const CellGrid& grid_;
     double radius_;
@@ -123,18 +135,22 @@ private:
 
 }  // namespace
 
-double StandingSlab::cell_for(const Job& job, std::array<double, 2> stock_min, std::array<double, 2> stock_max) {
+double StandingSlab::cell_for(const Job& job, std::array<double, 2> stock_min,
+                              std::array<double, 2> stock_max) {
     const double plane = (stock_max[0] - stock_min[0]) * (stock_max[1] - stock_min[1]);
     return std::max({kFinestCell, std::min(job.cutting.wall_allowance, 0.5), std::sqrt(plane / kMostCells)});
 }
 
-StandingSlab::StandingSlab(std::array<double, 2> stock_min, std::array<double, 2> stock_max, double bottom, double top, double cell)
-    : grid_{stock_min[0] + cell / 2, stock_min[1] + cell / 2, cell, std::max(1, static_cast<int>(std::lround((stock_max[0] - stock_min[0]) / cell))),
+StandingSlab::StandingSlab(std::array<double, 2> stock_min, std::array<double, 2> stock_max, double bottom,
+                           double top, double cell)
+    : grid_{stock_min[0] + cell / 2, stock_min[1] + cell / 2, cell,
+            std::max(1, static_cast<int>(std::lround((stock_max[0] - stock_min[0]) / cell))),
             std::max(1, static_cast<int>(std::lround((stock_max[1] - stock_min[1]) / cell)))},
       bottom_(bottom),
       height_(grid_.count(), static_cast<float>(top - bottom)) {}
 
-void StandingSlab::run(const Operation& operation, const Tool& tool, const std::function<void(const CutStretch&)>& stretch) {
+void StandingSlab::run(const Operation& operation, const Tool& tool,
+                       const std::function<void(const CutStretch&)>& stretch) {
     run(operation, tool, {}, true, stretch);
 }
 
@@ -143,8 +159,8 @@ void StandingSlab::run_parts(const Operation& operation, const Tool& tool, std::
     run(operation, tool, parts, false, stretch);
 }
 
-void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<const MoveRange> parts, bool all,
-                       const std::function<void(const CutStretch&)>& stretch) {
+void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<const MoveRange> parts,
+                       bool all, const std::function<void(const CutStretch&)>& stretch) {
     const CutterEnd end = end_of(tool);
     std::optional<Surrounded> around;
     if (!all) around.emplace(grid_, operation, parts, end.radius);
@@ -156,7 +172,8 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
         if (now.length > 0) {
             if (met.volume > 0) {
                 now.low = std::max(0.0, met.low), now.high = met.high;
-                now.width = std::min(tool.diameter, met.volume / (std::max(now.length, 2 * grid_.cell) * (now.high - now.low)));
+                now.width = std::min(tool.diameter, met.volume / (std::max(now.length, 2 * grid_.cell) *
+                                                                  (now.high - now.low)));
                 now.left = met.side > 0;
             }
             stretch(now);
@@ -164,31 +181,37 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
         now = {};
         met = {};
     };
-    // One straight way, told in equal parts. A cell is met when the cutter's leading edge comes to it, or at the way's begin.
+    // One straight way, told in equal parts. A cell is met when the cutter's leading edge comes to it, or at
+    // the way's begin.
     std::vector<Met> by_part;
     bool been = false;  // the cutter has cut where the way begins
-    const auto step = [&](std::uint32_t move, const std::array<double, 3>& from, const std::array<double, 3>& to, std::size_t count) {
-        const double length = std::hypot(to[0] - from[0], to[1] - from[1]), slope = length > 0 ? (to[2] - from[2]) / length : 0;
+    const auto step = [&](std::uint32_t move, const std::array<double, 3>& from,
+                          const std::array<double, 3>& to, std::size_t count) {
+        const double length = std::hypot(to[0] - from[0], to[1] - from[1]),
+                     slope = length > 0 ? (to[2] - from[2]) / length : 0;
         const double part = length / static_cast<double>(count);
         by_part.assign(count, {});
-        Meeting meeting{grid_, height_.data(), {}, {from[0], from[1]}, from[2] - bottom_, slope * part, by_part};
+        Meeting meeting{grid_,        height_.data(), {}, {from[0], from[1]}, from[2] - bottom_,
+                        slope * part, by_part};
         if (length > 0)
-            meeting.way = {(to[0] - from[0]) / length, (to[1] - from[1]) / length, end.radius, static_cast<double>(count) / length,
-                           static_cast<int>(count)};
-        sweep_above(grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_}, StandingHeights{height_.data(), 0}, meeting,
-                    {.been = been});
+            meeting.way = {(to[0] - from[0]) / length, (to[1] - from[1]) / length, end.radius,
+                           static_cast<double>(count) / length, static_cast<int>(count)};
+        sweep_above(grid_, end, {from[0], from[1], from[2] - bottom_}, {to[0], to[1], to[2] - bottom_},
+                    StandingHeights{height_.data(), 0}, meeting, {.been = been});
         been = true;
         if (length == 0 || !told) return;
         for (std::size_t p = 0; p < count; ++p) {
             const Met& m = by_part[p];
-            met = {met.volume + m.volume, std::min(met.low, m.low), std::max(met.high, m.high), met.side + m.side};
+            met = {met.volume + m.volume, std::min(met.low, m.low), std::max(met.high, m.high),
+                   met.side + m.side};
             if (now.length == 0) now.first = move;
             now.last = move;
             now.length += part;
             const double t = static_cast<double>(p + 1) / static_cast<double>(count);
-            now.at = p + 1 == count
-                         ? to
-                         : std::array<double, 3>{from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1]), from[2] + t * (to[2] - from[2])};
+            now.at = p + 1 == count ? to
+                                    : std::array<double, 3>{from[0] + t * (to[0] - from[0]),
+                                                            from[1] + t * (to[1] - from[1]),
+                                                            from[2] + t * (to[2] - from[2])};
             if (now.length >= enough || count > 1) finish();
         }
     };
@@ -208,7 +231,8 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
             been = false;
             continue;
         }
-        const std::array<double, 3> from{to_mm(a.x), to_mm(a.y), to_mm(a.z)}, to{to_mm(b.x), to_mm(b.y), to_mm(b.z)};
+        const std::array<double, 3> from{to_mm(a.x), to_mm(a.y), to_mm(a.z)},
+            to{to_mm(b.x), to_mm(b.y), to_mm(b.z)};
         const auto move = static_cast<std::uint32_t>(k);
         if (now.length > 0 && operation.moves[now.last].feed != b.feed) finish();
         if (a.x == b.x && a.y == b.y) {
@@ -219,13 +243,16 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
         if (b.is_arc()) {
             // Chords that miss the arc by less than a tenth of a cell, and are no longer than a stretch.
             const ArcShape arc = arc_shape(a, b);
-            const double most = std::min({2 * std::acos(std::max(0.0, 1 - 0.1 * grid_.cell / arc.radius)), enough / arc.radius, 0.5});
+            const double most = std::min(
+                {2 * std::acos(std::max(0.0, 1 - 0.1 * grid_.cell / arc.radius)), enough / arc.radius, 0.5});
             const int chords = std::max(1, static_cast<int>(std::ceil(std::abs(arc.sweep) / most)));
             std::array<double, 3> last = from;
             for (int p = 1; p <= chords; ++p) {
                 const double angle = arc.start + arc.sweep * p / chords;
                 const std::array<double, 3> next =
-                    p == chords ? to : std::array<double, 3>{arc.x + arc.radius * std::cos(angle), arc.y + arc.radius * std::sin(angle), to[2]};
+                    p == chords ? to
+                                : std::array<double, 3>{arc.x + arc.radius * std::cos(angle),
+                                                        arc.y + arc.radius * std::sin(angle), to[2]};
                 step(move, last, next, 1);
                 last = next;
             }

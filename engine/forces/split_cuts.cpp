@@ -11,8 +11,8 @@ Move raised(Move m, std::int32_t by) {
     return m;
 }
 
-// The move that leads from the end of `move` back to `from`. The centre of an arc counts from where it begins; being the shorter
-// arc either way, it turns the other way round by itself.
+// The move that leads from the end of `move` back to `from`. The centre of an arc counts from where it
+// begins; being the shorter arc either way, it turns the other way round by itself.
 Move backward(const Move& from, const Move& move) {
     Move back = from;
     back.feed = move.feed;
@@ -23,12 +23,14 @@ Move backward(const Move& from, const Move& move) {
 
 }  // namespace
 
-std::vector<Move> split_runs(const std::vector<Move>& moves, std::span<const DeepRun> runs, std::uint32_t plunge_feed) {
+std::vector<Move> split_runs(const std::vector<Move>& moves, std::span<const DeepRun> runs,
+                             std::uint32_t plunge_feed) {
     std::vector<Move> result;
     result.reserve(moves.size());
     std::size_t next = 0;
     for (const DeepRun& run : runs) {
-        result.insert(result.end(), moves.begin() + static_cast<std::ptrdiff_t>(next), moves.begin() + run.first);
+        result.insert(result.end(), moves.begin() + static_cast<std::ptrdiff_t>(next),
+                      moves.begin() + run.first);
         next = run.first;
         Move start = moves[run.first - 1];
         start.feed = plunge_feed;
@@ -37,7 +39,8 @@ std::vector<Move> split_runs(const std::vector<Move>& moves, std::span<const Dee
             const std::int32_t up = to_units(run.depth_mm * (run.passes - pass) / run.passes);
             result.push_back(raised(start, up));
             for (std::uint32_t k = run.first; k <= run.last; ++k) result.push_back(raised(moves[k], up));
-            for (std::uint32_t k = run.last; k >= run.first; --k) result.push_back(raised(backward(moves[k - 1], moves[k]), up));
+            for (std::uint32_t k = run.last; k >= run.first; --k)
+                result.push_back(raised(backward(moves[k - 1], moves[k]), up));
         }
         result.push_back(start);
     }

@@ -17,11 +17,13 @@ struct DeepRun {
     friend bool operator==(const DeepRun&, const DeepRun&) = default;
 };
 
-/// The moves with `passes` − 1 more passes before each run: the same way, raised by equal shares of the depth, highest first; after each the
-/// cutter goes back on the raised way, where it has just cut, and down where it stood before the run. A cutter that
-/// may be somewhere may be anywhere straight above it, so nothing else need be known of part, flask and holder, and what stands
-/// after the run is what would have stood. Vertical ways go at `plunge_feed`, mm/min, backward ways at the run's own feeds.
+/// The moves with `passes` − 1 more passes before each run: the same way, raised by equal shares of the
+/// depth, highest first; after each the cutter goes back on the raised way, where it has just cut, and down
+/// where it stood before the run. A cutter that may be somewhere may be anywhere straight above it, so
+/// nothing else need be known of part, flask and holder, and what stands after the run is what would have
+/// stood. Vertical ways go at `plunge_feed`, mm/min, backward ways at the run's own feeds.
 /// @param runs ascending, apart from each other, none with move 0
-[[nodiscard]] std::vector<Move> split_runs(const std::vector<Move>& moves, std::span<const DeepRun> runs, std::uint32_t plunge_feed);
+[[nodiscard]] std::vector<Move> split_runs(const std::vector<Move>& moves, std::span<const DeepRun> runs,
+                                           std::uint32_t plunge_feed);
 
 }  // namespace slabwright

@@ -16,12 +16,14 @@ bool same_tops(const LayerPlacement& a, const LayerPlacement& b) {
 
 }  // namespace
 
-std::vector<LayerCandidate> layer_candidates(Context& context, MeshView mesh, const Job& job, const LayerRequest& request) {
+std::vector<LayerCandidate> layer_candidates(Context& context, MeshView mesh, const Job& job,
+                                             const LayerRequest& request) {
     std::vector<LayerCandidate> tried;
     tried.push_back({"optimal", request.max_layer, place_layers_optimal(request)});
     const LayerCost usual = tried[0].placement.cost;
     const auto add = [&](const char* name, double max_layer, LayerPlacement placement, bool any) {
-        if (!any && (placement.cost.broken_type2 > usual.broken_type2 || placement.cost.broken_type1 > usual.broken_type1 ||
+        if (!any && (placement.cost.broken_type2 > usual.broken_type2 ||
+                     placement.cost.broken_type1 > usual.broken_type1 ||
                      placement.cost.thin_layers > usual.thin_layers))
             return;
         for (const LayerCandidate& t : tried)

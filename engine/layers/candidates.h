@@ -16,11 +16,13 @@ struct LayerCandidate {
     LayerPlacement placement;
 };
 
-/// What the other strategies give, so that none of these is ever faster, and beside them what slabs bonded to any thickness allow: layers as
-/// tall as every tool makes them, and those of the tool map (LUO 6.4.2), each as tall as its own finish tool is allowed to be long. Left out is what
-/// has the boundaries of one before it, and of the bonded ones what breaks more down-facing flats or Type I features, or has more
-/// thin layers, than `optimal`: no gain, however fast it is made.
+/// What the other strategies give, so that none of these is ever faster, and beside them what slabs bonded to
+/// any thickness allow: layers as tall as every tool makes them, and those of the tool map (LUO 6.4.2), each
+/// as tall as its own finish tool is allowed to be long. Left out is what has the boundaries of one before
+/// it, and of the bonded ones what breaks more down-facing flats or Type I features, or has more thin layers,
+/// than `optimal`: no gain, however fast it is made.
 /// @throws Error(usage, "layers.request"), and what tool_map() throws
-[[nodiscard]] std::vector<LayerCandidate> layer_candidates(Context& context, MeshView mesh, const Job& job, const LayerRequest& request);
+[[nodiscard]] std::vector<LayerCandidate> layer_candidates(Context& context, MeshView mesh, const Job& job,
+                                                           const LayerRequest& request);
 
 }  // namespace slabwright

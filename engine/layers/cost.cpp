@@ -27,15 +27,20 @@ std::vector<std::int64_t> running_sums(const std::vector<Level>& levels) {
 }
 
 // Sum of the weights of levels in [from, to].
-std::int64_t weight_between(const std::vector<Level>& levels, const std::vector<std::int64_t>& sums, Ticks from, Ticks to) {
+std::int64_t weight_between(const std::vector<Level>& levels, const std::vector<std::int64_t>& sums,
+                            Ticks from, Ticks to) {
     if (from > to) return 0;
-    const auto first = std::lower_bound(levels.begin(), levels.end(), from, [](const Level& l, Ticks z) { return l.z < z; });
-    const auto last = std::upper_bound(levels.begin(), levels.end(), to, [](Ticks z, const Level& l) { return z < l.z; });
-    return sums[static_cast<std::size_t>(last - levels.begin())] - sums[static_cast<std::size_t>(first - levels.begin())];
+    const auto first =
+        std::lower_bound(levels.begin(), levels.end(), from, [](const Level& l, Ticks z) { return l.z < z; });
+    const auto last =
+        std::upper_bound(levels.begin(), levels.end(), to, [](Ticks z, const Level& l) { return z < l.z; });
+    return sums[static_cast<std::size_t>(last - levels.begin())] -
+           sums[static_cast<std::size_t>(first - levels.begin())];
 }
 
 std::int64_t weight_up_to(const std::vector<std::pair<Ticks, std::int64_t>>& ends, Ticks z) {
-    const auto it = std::upper_bound(ends.begin(), ends.end(), z, [](Ticks t, const auto& e) { return t < e.first; });
+    const auto it =
+        std::upper_bound(ends.begin(), ends.end(), z, [](Ticks t, const auto& e) { return t < e.first; });
     return it == ends.begin() ? 0 : std::prev(it)->second;
 }
 
@@ -60,23 +65,30 @@ std::string feature_words(FeatureType type) {
 }
 
 void check(const LayerRequest& r) {
-    auto fail = [](const std::string& what, const std::string& remedy) { throw Error(ErrorKind::usage, "layers.request", what, {}, remedy); };
+    auto fail = [](const std::string& what, const std::string& remedy) {
+        throw Error(ErrorKind::usage, "layers.request", what, {}, remedy);
+    };
     if (!(r.height > 0) || !std::isfinite(r.height) || r.height > 1e6)
         fail("the pattern's height is not a usable length", "check the mesh and its units");
     if (!(r.max_layer > mm_of(kSame)) || !std::isfinite(r.max_layer) || r.max_layer > 1e6)
         fail("no layer can be cut: the tallest is " + words_mm(r.max_layer) + " mm",
              "use thicker slabs, a longer flute or a smaller facing allowance");
     if (r.height / r.max_layer > 1e6) fail("more than a million layers", "use thicker slabs");
-    if (!(r.min_material >= 0) || !(r.min_material <= 1e6)) fail("the minimum material thickness is not a length", "give a value from 0");
-    if (!(r.min_layer >= 0) || !(r.min_layer <= 1e6)) fail("the minimum layer thickness is not a length", "give a value from 0");
-    if (!(r.facing_allowance >= 0) || !(r.facing_allowance <= 1e6)) fail("the facing allowance is not a length", "give a value from 0");
-    if (!std::isfinite(r.alpha) || !std::isfinite(r.beta)) fail("alpha or beta is not a number", "give finite values");
+    if (!(r.min_material >= 0) || !(r.min_material <= 1e6))
+        fail("the minimum material thickness is not a length", "give a value from 0");
+    if (!(r.min_layer >= 0) || !(r.min_layer <= 1e6))
+        fail("the minimum layer thickness is not a length", "give a value from 0");
+    if (!(r.facing_allowance >= 0) || !(r.facing_allowance <= 1e6))
+        fail("the facing allowance is not a length", "give a value from 0");
+    if (!std::isfinite(r.alpha) || !std::isfinite(r.beta))
+        fail("alpha or beta is not a number", "give finite values");
     for (const double s : r.slab_thicknesses)
         if (!(s > 0) || !std::isfinite(s) || (r.max_layer + r.facing_allowance) / s > 1000)
-            fail("a slab thickness of " + words_mm(s) + " mm is unusable", "give thicknesses near the layers'");
+            fail("a slab thickness of " + words_mm(s) + " mm is unusable",
+                 "give thicknesses near the layers'");
     for (const Feature& f : r.features)
-        if (!std::isfinite(f.z_low) || !std::isfinite(f.z_high) || !(f.area >= 0) || !std::isfinite(f.area) || std::abs(f.z_low) > 1e7 ||
-            std::abs(f.z_high) > 1e7 || f.area > 1e11)
+        if (!std::isfinite(f.z_low) || !std::isfinite(f.z_high) || !(f.area >= 0) || !std::isfinite(f.area) ||
+            std::abs(f.z_low) > 1e7 || std::abs(f.z_high) > 1e7 || f.area > 1e11)
             fail("a feature has no usable height or area", "check the mesh");
 }
 
@@ -84,7 +96,8 @@ void check(const LayerRequest& r) {
 
 std::string words_mm(double mm) {
     std::array<char, 64> text{};
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), mm, std::chars_format::fixed, 3).ptr;
+    const auto end =
+        std::to_chars(text.data(), text.data() + text.size(), mm, std::chars_format::fixed, 3).ptr;
     std::string words(text.data(), end);
     if (words.find('.') != std::string::npos) {
         while (words.back() == '0') words.pop_back();
@@ -107,8 +120,14 @@ CostUnits& CostUnits::operator+=(const CostUnits& o) {
 
 LayerCost CostUnits::in_mm() const {
     auto area = [](std::int64_t units) { return static_cast<double>(units) / kAreaUnits; };
-    return {area(broken_type2),       area(broken_type1), static_cast<int>(thin_layers),         area(exposed_glue), area(broken_type3),
-            static_cast<int>(layers), mm_of(wood),        static_cast<double>(minus_q) / kQUnits};
+    return {area(broken_type2),
+            area(broken_type1),
+            static_cast<int>(thin_layers),
+            area(exposed_glue),
+            area(broken_type3),
+            static_cast<int>(layers),
+            mm_of(wood),
+            static_cast<double>(minus_q) / kQUnits};
 }
 
 LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
@@ -130,19 +149,23 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
             case FeatureType::up_flat:
                 if (low <= kSame || low > height_ + kSame) break;
                 type1_.push_back({low, weight_of(f), i});
-                if (f.type == FeatureType::up_flat) up_flats_.push_back({low, std::llround(f.area * kAreaUnits), i});
+                if (f.type == FeatureType::up_flat)
+                    up_flats_.push_back({low, std::llround(f.area * kAreaUnits), i});
                 break;
             case FeatureType::down_flat:
                 if (low > kSame && low < height_ - kSame) down.push_back({low, weight_of(f), i});
                 break;
             case FeatureType::shallow:
-                if (high - low > 2 * kSame && high > kSame && low < height_ - kSame) type3_.push_back({low, high, weight_of(f), i});
+                if (high - low > 2 * kSame && high > kSame && low < height_ - kSame)
+                    type3_.push_back({low, high, weight_of(f), i});
                 break;
             case FeatureType::undercut:
                 break;
         }
     }
-    auto by_height = [](const Level& a, const Level& b) { return a.z != b.z ? a.z < b.z : a.feature < b.feature; };
+    auto by_height = [](const Level& a, const Level& b) {
+        return a.z != b.z ? a.z < b.z : a.feature < b.feature;
+    };
     std::sort(type1_.begin(), type1_.end(), by_height);
     std::sort(up_flats_.begin(), up_flats_.end(), by_height);
     std::sort(down.begin(), down.end(), by_height);
@@ -198,19 +221,25 @@ double LayerRules::slab_for(double thickness_mm) const {
         if (to_ticks(s) >= need && (best == 0 || s < best)) best = s;
     }
     if (best > 0) return best;
-    if (thickest == 0) return request_.max_layer + request_.facing_allowance;  // no stock named: slabs made to fit the tallest layer
+    if (thickest == 0)
+        return request_.max_layer +
+               request_.facing_allowance;  // no stock named: slabs made to fit the tallest layer
     const Ticks slabs = (need + to_ticks(thickest) - 1) / to_ticks(thickest);
     return thickest * static_cast<double>(slabs);
 }
 
 std::size_t LayerRules::class_of(Ticks thickness) const {
-    return static_cast<std::size_t>(std::lower_bound(class_limits_.begin(), class_limits_.end(), thickness) - class_limits_.begin());
+    return static_cast<std::size_t>(std::lower_bound(class_limits_.begin(), class_limits_.end(), thickness) -
+                                    class_limits_.begin());
 }
 
-Ticks LayerRules::min_material(Ticks z) const { return request_.min_material_at ? to_ticks(request_.min_material_at(mm_of(z))) : min_material_; }
+Ticks LayerRules::min_material(Ticks z) const {
+    return request_.min_material_at ? to_ticks(request_.min_material_at(mm_of(z))) : min_material_;
+}
 
 Ticks LayerRules::highest_below(Ticks h) const {
-    // MTmin falls or rises slowly with height, so a few steps find where z + MTmin(z) is h; the last is taken downwards.
+    // MTmin falls or rises slowly with height, so a few steps find where z + MTmin(z) is h; the last is taken
+    // downwards.
     Ticks z = h - min_material(h);
     if (!request_.min_material_at) return z;
     for (int i = 0; i < 4 && z + min_material(z) != h; ++i) z = h - min_material(z);
@@ -241,7 +270,8 @@ CostUnits LayerRules::layer(Ticks bottom, Ticks top) const {
 }
 
 Ticks LayerRules::above(Ticks z) const {
-    const auto it = std::upper_bound(type1_.begin(), type1_.end(), z + kSame, [](Ticks t, const Level& l) { return t < l.z; });
+    const auto it = std::upper_bound(type1_.begin(), type1_.end(), z + kSame,
+                                     [](Ticks t, const Level& l) { return t < l.z; });
     return (it == type1_.end() ? height_ : it->z) - z;
 }
 
@@ -259,7 +289,8 @@ std::int64_t LayerRules::minus_q(Ticks z) const {
     if (largest_section_ < 0) {
         // The largest of sixteen sections is large enough to scale by, and is the same for every placement.
         largest_section_ = 0;
-        for (int i = 0; i < 16; ++i) largest_section_ = std::max(largest_section_, section_area(height_ / 16 * i));
+        for (int i = 0; i < 16; ++i)
+            largest_section_ = std::max(largest_section_, section_area(height_ / 16 * i));
     }
     const Ticks least = min_material(z);
     const double dt = mm_of(above(z)) / (least > 0 ? mm_of(least) : 1.0);
@@ -267,7 +298,9 @@ std::int64_t LayerRules::minus_q(Ticks z) const {
     return -std::llround((request_.alpha * dt + request_.beta * a) * kQUnits);
 }
 
-double LayerRules::printed_q(Ticks z) const { return request_.alpha * mm_of(above(z)) / kInch + request_.beta * section_area(z) / (kInch * kInch); }
+double LayerRules::printed_q(Ticks z) const {
+    return request_.alpha * mm_of(above(z)) / kInch + request_.beta * section_area(z) / (kInch * kInch);
+}
 
 CostUnits LayerRules::cost(const std::vector<double>& tops) const {
     CostUnits total;
@@ -295,27 +328,35 @@ std::string LayerRules::describe(Ticks below, Ticks z) const {
     auto is = [](Ticks a, Ticks b) { return std::abs(a - b) <= kSame; };
     if (is(z, height_)) return "top of the pattern";
     for (const Level& l : type2_)
-        if (is(l.z, z)) return "at the down-facing flat at " + words_mm(request_.features[l.feature].z_low) + " mm";
-    const Level* best = nullptr;  // the weightiest feature that has just its minimum thickness (or hardly more) above z
+        if (is(l.z, z))
+            return "at the down-facing flat at " + words_mm(request_.features[l.feature].z_low) + " mm";
+    const Level* best =
+        nullptr;  // the weightiest feature that has just its minimum thickness (or hardly more) above z
     const Ticks least = min_material(z);
     constexpr Ticks hardly = static_cast<Ticks>(0.02 * kTicksPerMm);
     for (const Level& l : type1_)
-        if (l.z >= z + least - kSame && l.z <= z + least + hardly && (!best || l.weight > best->weight)) best = &l;
+        if (l.z >= z + least - kSame && l.z <= z + least + hardly && (!best || l.weight > best->weight))
+            best = &l;
     if (best) return below_words(z, *best);
-    if (is(z - below, max_layer_)) return "as high as a layer may be (" + words_mm(request_.max_layer) + " mm)";
+    if (is(z - below, max_layer_))
+        return "as high as a layer may be (" + words_mm(request_.max_layer) + " mm)";
     for (const Range& r : type3_) {
         const Feature& f = request_.features[r.feature];
-        const std::string range = " end of the shallow slope from " + words_mm(f.z_low) + " to " + words_mm(f.z_high) + " mm";
+        const std::string range =
+            " end of the shallow slope from " + words_mm(f.z_low) + " to " + words_mm(f.z_high) + " mm";
         if (is(z, r.low)) return "at the lower" + range;
         if (is(z, r.high)) return "at the upper" + range;
     }
-    const auto it = std::lower_bound(type1_.begin(), type1_.end(), z - kSame, [](const Level& l, Ticks t) { return l.z < t; });
+    const auto it = std::lower_bound(type1_.begin(), type1_.end(), z - kSame,
+                                     [](const Level& l, Ticks t) { return l.z < t; });
     return it == type1_.end() ? words_mm(mm_of(height_ - z)) + " mm below the top" : below_words(z, *it);
 }
 
 std::vector<Diagnostic> LayerRules::diagnose(const std::vector<double>& tops) const {
     std::vector<Diagnostic> found;
-    auto others = [](std::size_t n, const char* what) { return n == 0 ? std::string{} : " and " + std::to_string(n) + " more " + what; };
+    auto others = [](std::size_t n, const char* what) {
+        return n == 0 ? std::string{} : " and " + std::to_string(n) + " more " + what;
+    };
     auto place = [&](std::size_t feature, double z) {
         const Feature& f = request_.features[feature];
         return std::array<double, 3>{f.x, f.y, z};
@@ -328,45 +369,53 @@ std::vector<Diagnostic> LayerRules::diagnose(const std::vector<double>& tops) co
         if (z - bottom < min_layer_ - kSame)
             found.push_back({Severity::warning,
                              "layers.thin",
-                             "the layer from " + words_mm(mm_of(bottom)) + " to " + words_mm(tops[i]) + " mm is thinner than the minimum of " +
-                                 words_mm(request_.min_layer) + " mm",
+                             "the layer from " + words_mm(mm_of(bottom)) + " to " + words_mm(tops[i]) +
+                                 " mm is thinner than the minimum of " + words_mm(request_.min_layer) + " mm",
                              {}});
         if (!request_.slab_thicknesses.empty()) {
             const double slab = slab_for(mm_of(z - bottom)),
-                         thickest = *std::max_element(request_.slab_thicknesses.begin(), request_.slab_thicknesses.end());
+                         thickest = *std::max_element(request_.slab_thicknesses.begin(),
+                                                      request_.slab_thicknesses.end());
             if (slab > thickest)
                 found.push_back({Severity::note,
                                  "layers.bonded",
-                                 "the layer up to " + words_mm(tops[i]) + " mm needs " + words_mm(std::round(slab / thickest)) + " slabs of " +
+                                 "the layer up to " + words_mm(tops[i]) + " mm needs " +
+                                     words_mm(std::round(slab / thickest)) + " slabs of " +
                                      words_mm(thickest) + " mm bonded into one",
                                  {}});
         }
         for (const Level& l : type2_)
             if (l.z > bottom + kSame && l.z < z - kSame)
                 found.push_back({Severity::error, "layers.type2",
-                                 "no boundary lies at the down-facing flat at " + words_mm(mm_of(l.z)) + " mm (" +
-                                     square(static_cast<double>(l.weight) / kAreaUnits) + ")",
+                                 "no boundary lies at the down-facing flat at " + words_mm(mm_of(l.z)) +
+                                     " mm (" + square(static_cast<double>(l.weight) / kAreaUnits) + ")",
                                  place(l.feature, mm_of(l.z))});
         bottom = z;
         if (i + 1 == tops.size()) break;
 
-        const auto first = std::upper_bound(type1_.begin(), type1_.end(), z + kSame, [](Ticks t, const Level& l) { return t < l.z; });
+        const auto first = std::upper_bound(type1_.begin(), type1_.end(), z + kSame,
+                                            [](Ticks t, const Level& l) { return t < l.z; });
         const Ticks least = min_material(z);
-        const auto last = std::lower_bound(first, type1_.end(), z + least - kSame, [](const Level& l, Ticks t) { return l.z < t; });
+        const auto last = std::lower_bound(first, type1_.end(), z + least - kSame,
+                                           [](const Level& l, Ticks t) { return l.z < t; });
         if (first < last) {
-            const auto worst = std::max_element(first, last, [](const Level& a, const Level& b) { return a.weight < b.weight; });
+            const auto worst = std::max_element(
+                first, last, [](const Level& a, const Level& b) { return a.weight < b.weight; });
             found.push_back({Severity::warning, "layers.type1",
-                             boundary + "leaves less than " + words_mm(mm_of(least)) + " mm of material: it is " + below_words(z, *worst) +
+                             boundary + "leaves less than " + words_mm(mm_of(least)) +
+                                 " mm of material: it is " + below_words(z, *worst) +
                                  others(static_cast<std::size_t>(last - first) - 1, "features"),
                              place(worst->feature, tops[i])});
         }
         const Level* flat = nullptr;
-        for (auto it = std::lower_bound(up_flats_.begin(), up_flats_.end(), z - kSame, [](const Level&l, Ticks t) { return l.z < t; });
+        for (auto it = std::lower_bound(up_flats_.begin(), up_flats_.end(), z - kSame,
+                                        [](const Level&l, Ticks t) { return l.z < t; });
              it != up_flats_.end() && it->z <= z + kSame; ++it)
             if (!flat || it->weight > flat->weight) flat = &*it;
         if (flat)
             found.push_back({Severity::warning, "layers.exposed_glue",
-                             boundary + "lies at an up-facing flat of " + square(request_.features[flat->feature].area) + ", which shows the glue",
+                             boundary + "lies at an up-facing flat of " +
+                                 square(request_.features[flat->feature].area) + ", which shows the glue",
                              place(flat->feature, tops[i])});
         const Range* shallow = nullptr;
         std::size_t count = 0;
@@ -379,8 +428,9 @@ std::vector<Diagnostic> LayerRules::diagnose(const std::vector<double>& tops) co
         if (shallow) {
             const Feature& f = request_.features[shallow->feature];
             found.push_back({Severity::warning, "layers.type3",
-                             boundary + "lies in the shallow slope from " + words_mm(f.z_low) + " to " + words_mm(f.z_high) + " mm (" +
-                                 square(f.area) + ")" + others(count - 1, "slopes"),
+                             boundary + "lies in the shallow slope from " + words_mm(f.z_low) + " to " +
+                                 words_mm(f.z_high) + " mm (" + square(f.area) + ")" +
+                                 others(count - 1, "slopes"),
                              place(shallow->feature, tops[i])});
         }
     }
@@ -398,6 +448,8 @@ void finish_placement(const LayerRules& rules, LayerPlacement& placement) {
     placement.diagnostics = rules.diagnose(tops);
 }
 
-LayerCost layer_cost(const LayerRequest& request, const std::vector<double>& tops) { return LayerRules(request).cost(tops).in_mm(); }
+LayerCost layer_cost(const LayerRequest& request, const std::vector<double>& tops) {
+    return LayerRules(request).cost(tops).in_mm();
+}
 
 }  // namespace slabwright

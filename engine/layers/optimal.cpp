@@ -1,12 +1,13 @@
 // The best placement over a finite set of heights, by dynamic programming.
 //
-// Cost is a sum over joints (what a boundary breaks) and over layers (one more layer, thin or not, its slab). A layer's cost
-// depends on its thickness only, by classes, so the best predecessor of a boundary is the cheapest one in each of a few windows
-// that slide upwards with it: the whole search is linear in the number of candidates. No layer may pass a Type II height,
-// since meeting them all is always possible and comes first.
+// Cost is a sum over joints (what a boundary breaks) and over layers (one more layer, thin or not, its slab).
+// A layer's cost depends on its thickness only, by classes, so the best predecessor of a boundary is the
+// cheapest one in each of a few windows that slide upwards with it: the whole search is linear in the number
+// of candidates. No layer may pass a Type II height, since meeting them all is always possible and comes
+// first.
 //
-// Q comes last, and its section areas are dear. So the search runs without Q first, from below and from above; the
-// candidates through which some cheapest placement runs are searched again with it.
+// Q comes last, and its section areas are dear. So the search runs without Q first, from below and from
+// above; the candidates through which some cheapest placement runs are searched again with it.
 #include <algorithm>
 #include <deque>
 
@@ -27,8 +28,10 @@ struct Search {
     std::vector<std::uint8_t> reached;
 };
 
-// Candidates ascend, the first is where layers start, the last where they end; `stops` are Type II heights, ascending.
-Search search(const LayerRules& rules, const std::vector<Candidate>& candidates, const std::vector<Ticks>& stops) {
+// Candidates ascend, the first is where layers start, the last where they end; `stops` are Type II heights,
+// ascending.
+Search search(const LayerRules& rules, const std::vector<Candidate>& candidates,
+              const std::vector<Ticks>& stops) {
     const std::size_t n = candidates.size(), classes = rules.classes() - 1;
     Search s{std::vector<CostUnits>(n), std::vector<std::size_t>(n, 0), std::vector<std::uint8_t>(n, 0)};
     s.reached[0] = 1;
@@ -43,7 +46,8 @@ Search search(const LayerRules& rules, const std::vector<Candidate>& candidates,
         }
         for (std::size_t c = 0; c < classes; ++c) {
             const std::size_t end = c == 0 ? b : begins[c - 1];
-            while (begins[c] < b && rules.class_of(candidates[b].z - candidates[begins[c]].z) > c) ++begins[c];
+            while (begins[c] < b && rules.class_of(candidates[b].z - candidates[begins[c]].z) > c)
+                ++begins[c];
             auto& window = windows[c];
             for (std::size_t a = std::max(pushed[c], begins[c]); a < end; ++a) {
                 if (!s.reached[a]) continue;
@@ -76,15 +80,17 @@ std::vector<Ticks> candidate_heights(const LayerRules& rules, const LayerPlaceme
         add(rules.highest_below(l.z));
     }
     // Glue counts as exposed up to and with MTmin under a flat, so a boundary 0.01 mm lower exposes none.
-    for (const Level& l : rules.up_flats()) add(rules.highest_below(l.z) - static_cast<Ticks>(0.01 * kTicksPerMm));
+    for (const Level& l : rules.up_flats())
+        add(rules.highest_below(l.z) - static_cast<Ticks>(0.01 * kTicksPerMm));
     for (const Range& r : rules.type3()) {
         add(r.low);
         add(r.high);
     }
     std::sort(heights.begin(), heights.end());
     heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
-    // Closed under + LTmax: whole columns from the base, from Type II heights and from print's boundaries, which make sure that
-    // every stretch can be crossed; from the others as far up as keeps the set within bounds.
+    // Closed under + LTmax: whole columns from the base, from Type II heights and from print's boundaries,
+    // which make sure that every stretch can be crossed; from the others as far up as keeps the set within
+    // bounds.
     constexpr std::size_t most = 1'000'000;
     const std::size_t own = heights.size();
     std::size_t levels = own == 0 ? 0 : most / own;
@@ -134,7 +140,8 @@ LayerPlacement place_layers_optimal(const LayerRequest& request) {
     for (std::size_t i = 0; i < candidates.size(); ++i) {
         const std::size_t j = candidates.size() - 1 - i;
         if (!up.reached[i] || !down.reached[j]) continue;
-        if (up.cost[i] + down.cost[j] != up.cost.back() + candidates[i].joint) continue;  // both ways counted the joint
+        if (up.cost[i] + down.cost[j] != up.cost.back() + candidates[i].joint)
+            continue;  // both ways counted the joint
         tied.push_back(candidates[i]);
         if (i > 0 && i + 1 < candidates.size()) tied.back().joint.minus_q = rules.minus_q(candidates[i].z);
     }
@@ -143,7 +150,8 @@ LayerPlacement place_layers_optimal(const LayerRequest& request) {
     LayerPlacement placement;
     Ticks below = 0;
     for (const Ticks z : way(last, tied)) {
-        placement.boundaries.push_back({z == top ? request.height : static_cast<double>(z) / kTicksPerMm, 0, rules.describe(below, z)});
+        placement.boundaries.push_back(
+            {z == top ? request.height : static_cast<double>(z) / kTicksPerMm, 0, rules.describe(below, z)});
         below = z;
     }
     finish_placement(rules, placement);

@@ -1,9 +1,11 @@
-// Print's placement (LUO 4.2.4–4.2.5): bottom-up, each boundary as high as it may be, non-deposition regions of Type I features
-// avoided, down-facing flats met, shallow ranges avoided where that costs nothing. Corrections: method.md section 4.
+// Print's placement (LUO 4.2.4–4.2.5): bottom-up, each boundary as high as it may be, non-deposition regions
+// of Type I features avoided, down-facing flats met, shallow ranges avoided where that costs nothing.
+// Corrections: method.md section 4.
 //
-// Print searches the boundaries inside a tall region by branch and bound. Fewest boundaries first and the largest sum of Q
-// among those is a shortest path over the candidates, so a dynamic program with a sliding window finds the same optimum in
-// linear time; branch and bound takes exponential time on a relief with thousands of peaks.
+// Print searches the boundaries inside a tall region by branch and bound. Fewest boundaries first and the
+// largest sum of Q among those is a shortest path over the candidates, so a dynamic program with a sliding
+// window finds the same optimum in linear time; branch and bound takes exponential time on a relief with
+// thousands of peaks.
 #include <algorithm>
 #include <deque>
 #include <map>
@@ -20,7 +22,8 @@ struct Region {
     [[nodiscard]] bool holds(Ticks z) const { return z > low + kSame && z < high - kSame; }
 };
 
-// Regions (h − MTmin, h), cut at the base, overlapping ones merged, and split where a Type II height lies inside.
+// Regions (h − MTmin, h), cut at the base, overlapping ones merged, and split where a Type II height lies
+// inside.
 std::vector<Region> non_deposition_regions(const LayerRules& rules) {
     std::vector<Region> merged;
     const auto& levels = rules.type1();
@@ -52,7 +55,8 @@ std::vector<Region> non_deposition_regions(const LayerRules& rules) {
 }
 
 const Region* region_around(const std::vector<Region>& regions, Ticks z) {
-    auto it = std::upper_bound(regions.begin(), regions.end(), z, [](Ticks t, const Region& r) { return t < r.low; });
+    auto it = std::upper_bound(regions.begin(), regions.end(), z,
+                               [](Ticks t, const Region& r) { return t < r.low; });
     return it != regions.begin() && std::prev(it)->holds(z) ? &*std::prev(it) : nullptr;
 }
 
@@ -60,15 +64,17 @@ const Region* region_around(const std::vector<Region>& regions, Ticks z) {
 std::vector<Region> shallow_ranges(const LayerRules& rules) {
     std::vector<Region> ranges;
     for (const Range& r : rules.type3()) {
-        if (!ranges.empty() && r.low < ranges.back().high - kSame) ranges.back().high = std::max(ranges.back().high, r.high);
+        if (!ranges.empty() && r.low < ranges.back().high - kSame)
+            ranges.back().high = std::max(ranges.back().high, r.high);
         else ranges.push_back({r.low, r.high, 0, 0});
     }
     return ranges;
 }
 
-// Boundaries inside a region taller than a layer, ascending: from its lower end on, none further apart than a layer, the
-// last near enough to `next`, the next height that must be a boundary; or, where that is too far, to the region's upper
-// end, from where more layers lead to `next` and are counted. Fewest layers first, then the largest sum of Q.
+// Boundaries inside a region taller than a layer, ascending: from its lower end on, none further apart than a
+// layer, the last near enough to `next`, the next height that must be a boundary; or, where that is too far,
+// to the region's upper end, from where more layers lead to `next` and are counted. Fewest layers first, then
+// the largest sum of Q.
 std::vector<Ticks> boundaries_within(const LayerRules& rules, const Region& region, Ticks next) {
     const Ticks step = rules.max_layer();
     std::vector<Ticks> wanted{region.low};
@@ -97,7 +103,8 @@ std::vector<Ticks> boundaries_within(const LayerRules& rules, const Region& regi
             while (candidates[i] - candidates[window.front()] > step + kSame) window.pop_front();
             before[i] = window.front();
             const double q = std::clamp(rules.printed_q(candidates[i]), -1e6, 1e6);
-            best[i] = {best[before[i]].count + 1, best[before[i]].minus_q - static_cast<std::int64_t>(q * 1e6)};
+            best[i] = {best[before[i]].count + 1,
+                       best[before[i]].minus_q - static_cast<std::int64_t>(q * 1e6)};
         }
         while (!window.empty() && best[window.back()] > best[i]) window.pop_back();
         window.push_back(i);
@@ -150,7 +157,9 @@ LayerPlacement place_printed(const LayerRules& rules) {
     }
 
     LayerPlacement placement;
-    auto place = [&](Ticks z, std::string reason) { placement.boundaries.push_back({static_cast<double>(z) / kTicksPerMm, 0, std::move(reason)}); };
+    auto place = [&](Ticks z, std::string reason) {
+        placement.boundaries.push_back({static_cast<double>(z) / kTicksPerMm, 0, std::move(reason)});
+    };
     for (Ticks below = 0;;) {
         Ticks z = below + step;
         std::string reason;
@@ -160,7 +169,8 @@ LayerPlacement place_printed(const LayerRules& rules) {
             reason = must->second;
         } else if (z >= top - kSame) break;
         else if (const Region* r = region_around(regions, z)) {
-            // A lower end at or under the layer below would never end: then the height stays, and the diagnostics tell.
+            // A lower end at or under the layer below would never end: then the height stays, and the
+            // diagnostics tell.
             if (r->low > below + kSame) {
                 z = r->low;
                 reason = rules.below_words(z, rules.type1()[r->first]);
@@ -168,7 +178,9 @@ LayerPlacement place_printed(const LayerRules& rules) {
             } else reason = rules.describe(below, z);
         } else {
             if (const Region* range = region_around(shallow, z))
-                if (range->low >= below + std::max(rules.min_material(below), kSame + 1) && !region_around(regions, range->low)) z = range->low;
+                if (range->low >= below + std::max(rules.min_material(below), kSame + 1) &&
+                    !region_around(regions, range->low))
+                    z = range->low;
             reason = rules.describe(below, z);
         }
         place(z, std::move(reason));
@@ -180,6 +192,8 @@ LayerPlacement place_printed(const LayerRules& rules) {
     return placement;
 }
 
-LayerPlacement place_layers_printed(const LayerRequest& request) { return place_printed(LayerRules(request)); }
+LayerPlacement place_layers_printed(const LayerRequest& request) {
+    return place_printed(LayerRules(request));
+}
 
 }  // namespace slabwright

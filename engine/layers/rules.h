@@ -1,7 +1,8 @@
-// A LayerRequest made ready for asking: what one boundary breaks, and what one layer costs. Internal to layers.
+// A LayerRequest made ready for asking: what one boundary breaks, and what one layer costs. Internal to
+// layers.
 //
-// Heights are counted in ticks (0.1 nm) and costs in whole units, so that sums, windows and comparisons are exact: the
-// dynamic program, the comparison of two placements and layer_cost() then agree to the last digit.
+// Heights are counted in ticks (0.1 nm) and costs in whole units, so that sums, windows and comparisons are
+// exact: the dynamic program, the comparison of two placements and layer_cost() then agree to the last digit.
 #pragma once
 
 #include <compare>
@@ -24,7 +25,8 @@ inline constexpr Ticks kSame = 1000;  ///< kSameHeight in ticks
 
 /// LayerCost in whole numbers: 0.001 mm², ticks of slab, 1e-9 of Q.
 struct CostUnits {
-    std::int64_t broken_type2 = 0, broken_type1 = 0, thin_layers = 0, exposed_glue = 0, broken_type3 = 0, layers = 0, wood = 0, minus_q = 0;
+    std::int64_t broken_type2 = 0, broken_type1 = 0, thin_layers = 0, exposed_glue = 0, broken_type3 = 0,
+                 layers = 0, wood = 0, minus_q = 0;
     friend auto operator<=>(const CostUnits&, const CostUnits&) = default;
     CostUnits& operator+=(const CostUnits& o);
     friend CostUnits operator+(CostUnits a, const CostUnits& b) { return a += b; }
@@ -55,9 +57,11 @@ public:
     [[nodiscard]] Ticks min_material(Ticks z) const;
     /// The highest boundary under a feature at h that leaves MTmin below it, or near enough to that.
     [[nodiscard]] Ticks highest_below(Ticks h) const;
-    [[nodiscard]] const std::vector<Level>& type1() const { return type1_; }        ///< ascending
-    [[nodiscard]] const std::vector<Level>& type2() const { return type2_; }        ///< ascending, equal heights merged
-    [[nodiscard]] const std::vector<Range>& type3() const { return type3_; }        ///< ascending by low, then high
+    [[nodiscard]] const std::vector<Level>& type1() const { return type1_; }  ///< ascending
+    [[nodiscard]] const std::vector<Level>& type2() const {
+        return type2_;
+    }  ///< ascending, equal heights merged
+    [[nodiscard]] const std::vector<Range>& type3() const { return type3_; }  ///< ascending by low, then high
     [[nodiscard]] const std::vector<Level>& up_flats() const { return up_flats_; }  ///< ascending
 
     /// What a boundary (a glue joint) at z breaks, without Q.
@@ -67,14 +71,15 @@ public:
     /// Q as printed, per inch and per square inch.
     [[nodiscard]] double printed_q(Ticks z) const;
 
-    /// Thickness classes: within one class every layer costs the same. Classes ascend with thickness; the last stands for
-    /// all that is thicker than max_layer.
+    /// Thickness classes: within one class every layer costs the same. Classes ascend with thickness; the
+    /// last stands for all that is thicker than max_layer.
     [[nodiscard]] std::size_t classes() const { return class_costs_.size(); }
     [[nodiscard]] std::size_t class_of(Ticks thickness) const;
     /// Cost of a layer of that class, Type II heights apart. @pre not the last class
     [[nodiscard]] const CostUnits& class_cost(std::size_t c) const { return class_costs_[c]; }
     [[nodiscard]] CostUnits layer(Ticks bottom, Ticks top) const;  ///< Type II included, any thickness
-    [[nodiscard]] double slab_for(double thickness_mm) const;      ///< several of the thickest, where one does not do
+    [[nodiscard]] double slab_for(
+        double thickness_mm) const;  ///< several of the thickest, where one does not do
 
     [[nodiscard]] CostUnits cost(const std::vector<double>& tops) const;
     [[nodiscard]] std::vector<Diagnostic> diagnose(const std::vector<double>& tops) const;
@@ -92,8 +97,9 @@ private:
     std::vector<Level> type1_, type2_, up_flats_;
     std::vector<Range> type3_;
     std::vector<std::int64_t> type1_sums_, type2_sums_, up_flat_sums_;  // of weights, one more than levels
-    std::vector<std::pair<Ticks, std::int64_t>> lows_, highs_;          // of Type III: end, sum of weights up to and with it
-    std::vector<Ticks> class_limits_;                                   // thickest layer of each class but the last
+    std::vector<std::pair<Ticks, std::int64_t>> lows_,
+        highs_;                        // of Type III: end, sum of weights up to and with it
+    std::vector<Ticks> class_limits_;  // thickest layer of each class but the last
     std::vector<CostUnits> class_costs_;
     mutable double largest_section_ = -1;
     mutable std::unordered_map<Ticks, double> areas_;

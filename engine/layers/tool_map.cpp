@@ -19,8 +19,8 @@ constexpr double kSlices = 64;
 constexpr double kTouch = 0.05;  // mm: a wall so near to what the tool leaves is reached
 constexpr double kSample = 0.5;  // mm, along walls
 
-// The share of a section's border that a disc of this radius reaches from outside: what it leaves standing is the section closed by it,
-// and a place is reached where that has its border too.
+// The share of a section's border that a disc of this radius reaches from outside: what it leaves standing is
+// the section closed by it, and a place is reached where that has its border too.
 double reached_share(const Loops& section, double radius) {
     constexpr double tolerance = kTouch / 25;
     const Loops left = offset(offset(section, radius, tolerance), -radius - kTouch, tolerance);
@@ -46,11 +46,13 @@ double reached_share(const Loops& section, double radius) {
 }  // namespace
 
 double allowed_layer(const Job& job, const Tool& tool) {
-    const double across = (tool.kind == ToolKind::ball ? reference_forces(hardest_cut(job, tool, tool.stepdown_max))
-                                                       : closed_form_forces(hardest_cut(job, tool, tool.stepdown_max)))
-                              .peak_y_n;
+    const double across =
+        (tool.kind == ToolKind::ball ? reference_forces(hardest_cut(job, tool, tool.stepdown_max))
+                                     : closed_form_forces(hardest_cut(job, tool, tool.stepdown_max)))
+            .peak_y_n;
     Tool short_enough = tool;
-    short_enough.flute_length = std::min(tool.flute_length, allowed_tool_length(across, job.tolerances.cusp, tool.diameter));
+    short_enough.flute_length =
+        std::min(tool.flute_length, allowed_tool_length(across, job.tolerances.cusp, tool.diameter));
     return std::max(job.layers.min_layer, max_layer_of(job, short_enough));
 }
 
@@ -59,7 +61,8 @@ ToolMap tool_map(Context& context, MeshView mesh, const Job& job, const std::vec
     for (const Tool& tool : job.tools)
         if (tool.kind == ToolKind::ball) map.tools.push_back(tool);
     if (map.tools.empty()) (void)tool_of_kind(job, ToolKind::ball);  // throws
-    std::stable_sort(map.tools.begin(), map.tools.end(), [](const Tool& a, const Tool& b) { return a.diameter < b.diameter; });
+    std::stable_sort(map.tools.begin(), map.tools.end(),
+                     [](const Tool& a, const Tool& b) { return a.diameter < b.diameter; });
     for (const Tool& tool : map.tools) map.allowed_mm.push_back(allowed_layer(job, tool));
     const double height = bounds(mesh).max.z;
     if (map.tools.size() == 1) {
@@ -70,18 +73,24 @@ ToolMap tool_map(Context& context, MeshView mesh, const Job& job, const std::vec
     const double step = std::max(kThinnestSlice, height / kSlices);
     for (double z = step; z < height - 0.5 * step; z += step) heights.push_back(z);
     for (const Feature& f : features)
-        if (f.type == FeatureType::up_flat || f.type == FeatureType::down_flat) heights.push_back(std::clamp<double>(f.z_low, 0, height));
+        if (f.type == FeatureType::up_flat || f.type == FeatureType::down_flat)
+            heights.push_back(std::clamp<double>(f.z_low, 0, height));
     std::sort(heights.begin(), heights.end());
-    heights.erase(std::unique(heights.begin(), heights.end(), [](double a, double b) { return b - a < 0.1; }), heights.end());
-    if (height - heights.back() > 0) heights.back() = height;  // the last of near ones stays the pattern's height
+    heights.erase(std::unique(heights.begin(), heights.end(), [](double a, double b) { return b - a < 0.1; }),
+                  heights.end());
+    if (height - heights.back() > 0)
+        heights.back() = height;  // the last of near ones stays the pattern's height
 
     std::vector<Plane> planes;
-    for (std::size_t i = 0; i + 1 < heights.size(); ++i) planes.push_back({(heights[i] + heights[i + 1]) / 2, Side::above});
+    for (std::size_t i = 0; i + 1 < heights.size(); ++i)
+        planes.push_back({(heights[i] + heights[i + 1]) / 2, Side::above});
     const std::vector<Section> sections = slice(context, mesh, planes, {job.tolerances.gap});
     map.slices.resize(planes.size());
     parallel_each(context, planes.size(), [&](std::size_t i) {
         std::size_t chosen = map.tools.size() - 1;
-        while (chosen > 0 && reached_share(sections[i].loops, map.tools[chosen].diameter / 2) < job.selection.threshold) --chosen;
+        while (chosen > 0 &&
+               reached_share(sections[i].loops, map.tools[chosen].diameter / 2) < job.selection.threshold)
+            --chosen;
         map.slices[i] = {heights[i], heights[i + 1], chosen};
     });
     return map;

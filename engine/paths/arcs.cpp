@@ -1,5 +1,5 @@
-// Greedy: from every point the longest arc that fits, found by doubling and bisection. The centre is rounded to 0.1 µm and
-// the arc judged as rounded, so the program says exactly what was judged.
+// Greedy: from every point the longest arc that fits, found by doubling and bisection. The centre is rounded
+// to 0.1 µm and the arc judged as rounded, so the program says exactly what was judged.
 #include "engine/paths/arcs.h"
 
 #include <algorithm>
@@ -24,21 +24,27 @@ struct Vector {
 };
 double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y; }
 double cross(Vector a, Vector b) { return a.x * b.y - a.y * b.x; }
-double length(Vector a) { return std::sqrt(dot(a, a)); }  // of whole numbers of 0.1 µm: their squares add up exactly
+double length(Vector a) {
+    return std::sqrt(dot(a, a));
+}  // of whole numbers of 0.1 µm: their squares add up exactly
 
-/// The arc through the first and the last point that lies within the tolerance of all chords between, if there is one.
-/// Its centre lies on the chord's bisector at the height h that is best in the least squares of |q − c|² − r², taken along the
-/// chords (Simpson's rule); that is linear in h: with q from the chord's middle and n its normal, |q|² − L²/4 − 2h·n·q.
+/// The arc through the first and the last point that lies within the tolerance of all chords between, if
+/// there is one. Its centre lies on the chord's bisector at the height h that is best in the least squares of
+/// |q − c|² − r², taken along the chords (Simpson's rule); that is linear in h: with q from the chord's
+/// middle and n its normal, |q|² − L²/4 − 2h·n·q.
 std::optional<Centre> arc_through(std::span<const PathPoint> line, const ArcFit& fit) {
     const PathPoint &first = line.front(), &last = line.back();
-    auto from_first = [&](const PathPoint& p) { return Vector{static_cast<double>(p.x) - first.x, static_cast<double>(p.y) - first.y}; };
+    auto from_first = [&](const PathPoint& p) {
+        return Vector{static_cast<double>(p.x) - first.x, static_cast<double>(p.y) - first.y};
+    };
     const Vector end = from_first(last), middle{end.x / 2, end.y / 2};
     const double chord = length(end);
     if (chord == 0) return std::nullopt;
     const Vector normal{-end.y / chord, end.x / chord};
     double ww = 0, wb = 0;
     for (std::size_t m = 1; m < line.size(); ++m) {
-        const Vector a = from_first(line[m - 1]) - middle, b = from_first(line[m]) - middle, half{(a.x + b.x) / 2, (a.y + b.y) / 2};
+        const Vector a = from_first(line[m - 1]) - middle, b = from_first(line[m]) - middle,
+                     half{(a.x + b.x) / 2, (a.y + b.y) / 2};
         const double share = length(b - a);
         for (const auto& [q, simpson] : {std::pair{a, 1.0}, {half, 4.0}, {b, 1.0}}) {
             const double w = 2 * dot(normal, q);
@@ -58,8 +64,9 @@ std::optional<Centre> arc_through(std::span<const PathPoint> line, const ArcFit&
     const double sweep = std::atan2(turn * cross(begin, end - c), dot(begin, end - c));
     if (radius < fit.min_radius || slack <= 0 || !(sweep > 0) || sweep > fit.max_sweep) return std::nullopt;
     if (radius * (1 - std::cos(sweep / 2)) <= fit.tolerance) return std::nullopt;  // a chord does
-    // Each chord goes on round the centre and the whole stays under half a turn, so arc and chords can be compared angle
-    // by angle; a chord is farthest from the centre at an end, nearest at the foot of the perpendicular or at an end.
+    // Each chord goes on round the centre and the whole stays under half a turn, so arc and chords can be
+    // compared angle by angle; a chord is farthest from the centre at an end, nearest at the foot of the
+    // perpendicular or at an end.
     Vector before = begin;
     for (std::size_t m = 1; m < line.size(); ++m) {
         const Vector p = from_first(line[m]) - c, way = p - before;
@@ -74,13 +81,15 @@ std::optional<Centre> arc_through(std::span<const PathPoint> line, const ArcFit&
     return centre;
 }
 
-/// The path of one chain as it is put together: arcs at once, chords when the next arc or the end shows how far they go.
+/// The path of one chain as it is put together: arcs at once, chords when the next arc or the end shows how
+/// far they go.
 class Chain {
 public:
     Chain(std::vector<Move>& out, std::span<const PathPoint> line, std::uint32_t feed, const ArcFit& fit)
         : out_(out), line_(line), feed_(feed), fit_(fit) {
         const double speed = feed / 60.0;  // mm/s
-        if (fit.acceleration > 0) fit_.min_radius = std::max(fit.min_radius, speed * speed / fit.acceleration * kUnitsPerMm);
+        if (fit.acceleration > 0)
+            fit_.min_radius = std::max(fit.min_radius, speed * speed / fit.acceleration * kUnitsPerMm);
     }
 
     void run() {
@@ -135,7 +144,8 @@ private:
         while (from < to) {
             const std::size_t end = std::min(to, from + piece);
             const std::vector<PathPoint> kept = simplify(line_.subspan(from, end - from + 1), fit_.tolerance);
-            for (std::size_t m = 1; m < kept.size(); ++m) out_.push_back({kept[m].x, kept[m].y, kept[m].z, feed_});
+            for (std::size_t m = 1; m < kept.size(); ++m)
+                out_.push_back({kept[m].x, kept[m].y, kept[m].z, feed_});
             from = end;
         }
     }
@@ -159,7 +169,8 @@ void fit_arcs(std::vector<Move>& moves, const ArcFit& fit) {
             continue;
         }
         line.assign(1, {moves[m - 1].x, moves[m - 1].y, moves[m - 1].z});
-        for (; m < moves.size() && moves[m].feed == feed && !moves[m].is_arc(); ++m) line.push_back({moves[m].x, moves[m].y, moves[m].z});
+        for (; m < moves.size() && moves[m].feed == feed && !moves[m].is_arc(); ++m)
+            line.push_back({moves[m].x, moves[m].y, moves[m].z});
         Chain(out, line, feed, fit).run();
     }
     out.shrink_to_fit();

@@ -12,17 +12,22 @@ namespace {
 
 Point2 flat_of(const PathPoint& p) { return {p.x, p.y}; }
 
-double way(const PathPoint& a, Point2 b) { return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y); }
+double way(const PathPoint& a, Point2 b) {
+    return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
+}
 
 // The places between two along the surface; none where the way climbs onto the top.
-std::optional<std::vector<PathPoint>> slide_between(const PathPoint& from, const PathPoint& to, const Slide& slide) {
+std::optional<std::vector<PathPoint>> slide_between(const PathPoint& from, const PathPoint& to,
+                                                    const Slide& slide) {
     std::vector<PathPoint> link{from};
-    const auto n = static_cast<std::size_t>(std::ceil(way(from, flat_of(to)) / (0.75 * slide.chord * kUnitsPerMm)));
+    const auto n =
+        static_cast<std::size_t>(std::ceil(way(from, flat_of(to)) / (0.75 * slide.chord * kUnitsPerMm)));
     for (std::size_t i = 1; i < n; ++i) {
         const double t = static_cast<double>(i) / static_cast<double>(n);
         PathPoint p{static_cast<std::int32_t>(from.x + t * (static_cast<double>(to.x) - from.x)),
                     static_cast<std::int32_t>(from.y + t * (static_cast<double>(to.y) - from.y)), 0};
-        const double lerp = from.z + t * (static_cast<double>(to.z) - from.z), matters = std::min(lerp / kUnitsPerMm, slide.top) - slide.under - 0.01,
+        const double lerp = from.z + t * (static_cast<double>(to.z) - from.z),
+                     matters = std::min(lerp / kUnitsPerMm, slide.top) - slide.under - 0.01,
                      rest = slide.part->drop(to_mm(p.x), to_mm(p.y), matters).tip_z + slide.under;
         if (rest >= slide.top - 1e-3) return std::nullopt;
         p.z = static_cast<std::int32_t>(std::ceil(std::max(lerp, rest * kUnitsPerMm))) + 1;
@@ -48,8 +53,8 @@ std::vector<Beginning> both_ends(const std::vector<std::vector<PathPoint>>& runs
 void append_free(std::vector<PathPoint>& line, PathPoint p, const Slide& slide) {
     if (!line.empty()) {
         const PathPoint& q = line.back();
-        const double dx = static_cast<double>(p.x) - q.x, dy = static_cast<double>(p.y) - q.y, dz = static_cast<double>(p.z) - q.z,
-                     chord = slide.chord * kUnitsPerMm;
+        const double dx = static_cast<double>(p.x) - q.x, dy = static_cast<double>(p.y) - q.y,
+                     dz = static_cast<double>(p.z) - q.z, chord = slide.chord * kUnitsPerMm;
         if (slide.ball ? dx * dx + dy * dy + dz * dz > chord * chord : dz != 0) {
             const PathPoint corner = dz > 0 ? PathPoint{q.x, q.y, p.z} : PathPoint{p.x, p.y, q.z};
             if (!(corner == q) && !(corner == p)) line.push_back(corner);

@@ -13,8 +13,8 @@ namespace {
 constexpr double kCellsARadius = 12;
 constexpr int kFeeds = 20;  // steps between a feed and rest: finer ones only lengthen the program
 
-// The equal parts of every move, told apart by their numbers through all moves; of each only the steps of its move's feed that are left to it are kept,
-// for there is one for every millimetre or so of the way.
+// The equal parts of every move, told apart by their numbers through all moves; of each only the steps of its
+// move's feed that are left to it are kept, for there is one for every millimetre or so of the way.
 struct Way {
     std::vector<std::uint8_t> steps;    // by part
     std::vector<std::uint32_t> starts;  // by move: its first part
@@ -24,7 +24,9 @@ struct Way {
         starts.push_back(static_cast<std::uint32_t>(steps.size())), lengths.push_back(length);
         steps.resize(steps.size() + static_cast<std::size_t>(parts), kFeeds);
     }
-    [[nodiscard]] std::size_t end(std::size_t move) const { return move + 1 < starts.size() ? starts[move + 1] : steps.size(); }
+    [[nodiscard]] std::size_t end(std::size_t move) const {
+        return move + 1 < starts.size() ? starts[move + 1] : steps.size();
+    }
 };
 
 // Lowers cells and adds up by how much, by the part of the way on which the cutter's edge comes to them.
@@ -53,8 +55,8 @@ struct Taking {
             std::uint64_t over = cells_over(row, cells, z, any);
             if (over == 0) continue;
             if (way.count > 1)
-                edge_parts(way, grid.x(static_cast<int>(first % nx) + begin) - from[0], grid.cell, py, 64 - std::countl_zero(over), part.data(),
-                           across.data());
+                edge_parts(way, grid.x(static_cast<int>(first % nx) + begin) - from[0], grid.cell, py,
+                           64 - std::countl_zero(over), part.data(), across.data());
             std::int32_t p = part[static_cast<std::size_t>(std::countr_zero(over))];
             double sum = sums[static_cast<std::size_t>(p)];
             for (; over != 0; over &= over - 1) {
@@ -77,8 +79,10 @@ std::array<double, 3> place(const Move& m) { return {to_mm(m.x), to_mm(m.y), to_
 
 EngagedStock::EngagedStock(std::array<double, 2> min, std::array<double, 2> max, double top, double radius)
     : end_{CutterEnd::Form::flat, radius, 0}, top_(top) {
-    const double cell = std::max(radius / kCellsARadius, std::sqrt((max[0] - min[0]) * (max[1] - min[1]) / kMostCells));
-    grid_ = {min[0] + cell / 2, min[1] + cell / 2, cell, std::max(1, static_cast<int>(std::lround((max[0] - min[0]) / cell))),
+    const double cell =
+        std::max(radius / kCellsARadius, std::sqrt((max[0] - min[0]) * (max[1] - min[1]) / kMostCells));
+    grid_ = {min[0] + cell / 2, min[1] + cell / 2, cell,
+             std::max(1, static_cast<int>(std::lround((max[0] - min[0]) / cell))),
              std::max(1, static_cast<int>(std::lround((max[1] - min[1]) / cell)))};
     height_.assign(grid_.count(), 0.0F);
 }
@@ -89,27 +93,30 @@ double EngagedStock::cut(const std::array<double, 3>& from, const std::array<dou
     return volume.front();
 }
 
-void EngagedStock::cut(const std::array<double, 3>& from, const std::array<double, 3>& to, std::vector<double>& volumes) {
+void EngagedStock::cut(const std::array<double, 3>& from, const std::array<double, 3>& to,
+                       std::vector<double>& volumes) {
     const auto count = static_cast<int>(volumes.size());
     if (count > 1 && from[2] != to[2]) {  // a ramp, part by part
         std::array<double, 3> at = from;
         for (int k = 1; k <= count; ++k) {
             const double t = static_cast<double>(k) / count;
-            const std::array<double, 3> next{from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1]), from[2] + t * (to[2] - from[2])};
+            const std::array<double, 3> next{from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1]),
+                                             from[2] + t * (to[2] - from[2])};
             volumes[static_cast<std::size_t>(k - 1)] = cut(at, k == count ? to : next);
             at = next;
         }
         return;
     }
-    // At one height only the cells between where the cutter is and where it gets need a look: under it nothing stands any more.
+    // At one height only the cells between where the cutter is and where it gets need a look: under it
+    // nothing stands any more.
     const bool been = from == last_;
     last_ = to;
     const double dx = to[0] - from[0], dy = to[1] - from[1], run = std::hypot(dx, dy);
     std::fill(volumes.begin(), volumes.end(), 0.0);
     Taking taking{grid_, height_.data(), {}, {from[0], from[1]}, volumes};
     if (run > 0) taking.way = {dx / run, dy / run, end_.radius, count / run, count};
-    sweep_above(grid_, end_, {from[0], from[1], from[2] - top_}, {to[0], to[1], to[2] - top_}, StandingHeights{height_.data(), 0}, taking,
-                {.been = been});
+    sweep_above(grid_, end_, {from[0], from[1], from[2] - top_}, {to[0], to[1], to[2] - top_},
+                StandingHeights{height_.data(), 0}, taking, {.been = been});
     for (double& volume : volumes) volume *= grid_.cell * grid_.cell;
 }
 
@@ -118,7 +125,8 @@ void EngagedStock::change_cutter(double radius) {
     last_.fill(1e300);
 }
 
-double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& stock, const EngagementCap& cap) {
+double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& stock,
+                      const EngagementCap& cap) {
     if (moves.size() < 2) return 0;
     const double window = cap.diameter / 8, slot = cap.diameter * cap.stepdown;
     Way way;
@@ -131,7 +139,8 @@ double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& 
         // The cutter is slowed by what it has met over the whole window.
         const double section = length > 0 ? volume / length : 0;
         int steps = kFeeds;
-        if (section > cap.share * slot) steps = std::max(1, static_cast<int>(std::floor(kFeeds * cap.share * slot / section)));
+        if (section > cap.share * slot)
+            steps = std::max(1, static_cast<int>(std::floor(kFeeds * cap.share * slot / section)));
         for (; begun < end; ++begun) way.steps[begun] = static_cast<std::uint8_t>(steps);
         volume = length = 0;
     };
@@ -172,7 +181,8 @@ double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& 
             while (at < way.starts.size() && way.end(at) <= next) ++at;
             return at < way.starts.size() && way.lengths[at] > 0;
         };
-        while (cuts() && way.steps[next] == kFeeds && between <= 2 * window) between += way.lengths[at], ++next;
+        while (cuts() && way.steps[next] == kFeeds && between <= 2 * window)
+            between += way.lengths[at], ++next;
         if (next > k + 1 && cuts() && way.steps[next] < kFeeds)
             for (std::size_t j = k + 1; j < next; ++j) way.steps[j] = std::max(way.steps[k], way.steps[next]);
         k = next;
@@ -191,7 +201,8 @@ double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& 
             Move m = moves[i];
             if (!last) {
                 const double t = static_cast<double>(k + 1 - first) / static_cast<double>(end - first);
-                m.x = to_units(a[0] + t * (b[0] - a[0])), m.y = to_units(a[1] + t * (b[1] - a[1])), m.z = to_units(a[2] + t * (b[2] - a[2]));
+                m.x = to_units(a[0] + t * (b[0] - a[0])), m.y = to_units(a[1] + t * (b[1] - a[1])),
+                m.z = to_units(a[2] + t * (b[2] - a[2]));
             }
             if (steps < kFeeds) m.feed = std::max<std::uint32_t>(1, moves[i].feed * steps / kFeeds);
             result.push_back(m);

@@ -1,5 +1,5 @@
-// Face milling: from the bonded slab down to the layer's top, in rectangles from outside in, clockwise, so that the
-// cutter always climbs and never lifts an edge that hangs over.
+// Face milling: from the bonded slab down to the layer's top, in rectangles from outside in, clockwise, so
+// that the cutter always climbs and never lifts an edge that hangs over.
 #include <algorithm>
 #include <cmath>
 
@@ -8,7 +8,8 @@
 namespace slabwright {
 
 double face_step(const Job& job, const Tool& face) {
-    return face.stepdown_max > 0 ? std::min(job.cutting.face_depth, face.stepdown_max) : job.cutting.face_depth;
+    return face.stepdown_max > 0 ? std::min(job.cutting.face_depth, face.stepdown_max)
+                                 : job.cutting.face_depth;
 }
 
 Operation face_layer(const LayerCut& cut) {
@@ -21,7 +22,8 @@ Operation face_layer(const LayerCut& cut) {
     op.stepdown = depth / steps;
     op.stepover = stepover;
     const double clearance = cut.stock_top + cut.job.machine.clearance;
-    PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance, cut.stock_top + 2);
+    PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance,
+                     cut.stock_top + 2);
     const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
     for (int step = 1; step <= steps; ++step) {
         const std::int32_t z = to_units(step == steps ? cut.layer.z_top : cut.stock_top - op.stepdown * step);
@@ -31,9 +33,12 @@ Operation face_layer(const LayerCut& cut) {
         path.sink(z);
         for (;; inset += stepover) {
             const double w = hi[0] - lo[0] - 2 * inset, d = hi[1] - lo[1] - 2 * inset;
-            const double left = std::max(lo[0] + inset, cut.low(0, r)), right = std::min(hi[0] - inset, cut.high(0, r));
-            const double south = std::max(lo[1] + inset, cut.low(1, r)), north = std::min(hi[1] - inset, cut.high(1, r));
-            if (w <= 0 || d <= 0) {  // what is left is narrower than two step-overs: along its middle, if only to its centre
+            const double left = std::max(lo[0] + inset, cut.low(0, r)),
+                         right = std::min(hi[0] - inset, cut.high(0, r));
+            const double south = std::max(lo[1] + inset, cut.low(1, r)),
+                         north = std::min(hi[1] - inset, cut.high(1, r));
+            if (w <= 0 || d <= 0) {  // what is left is narrower than two step-overs: along its middle, if
+                                     // only to its centre
                 const double cx = 0.5 * (lo[0] + hi[0]), cy = 0.5 * (lo[1] + hi[1]);
                 if (w > d) {
                     path.cut({to_units(std::min(left, cx)), to_units(cy)}, z);

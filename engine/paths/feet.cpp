@@ -18,7 +18,9 @@ constexpr double kMostFeet = 6;
 
 }  // namespace
 
-bool lies_on_floor(const SolidFacet& facet, double z) { return facet.z_min >= z - kSameFloor && facet.z_max <= z && facet.normal[2] >= 0.9999; }
+bool lies_on_floor(const SolidFacet& facet, double z) {
+    return facet.z_min >= z - kSameFloor && facet.z_max <= z && facet.normal[2] >= 0.9999;
+}
 
 std::vector<SolidFacet> floor_facets(const LayerCut& cut, double z) {
     std::vector<SolidFacet> facets;
@@ -28,14 +30,17 @@ std::vector<SolidFacet> floor_facets(const LayerCut& cut, double z) {
 }
 
 NearFloor::NearFloor(const LayerCut& cut, std::span<const SolidFacet> facets, double r, const FibreGrid& grid)
-    : grid_(grid), x_(covering(cut.context, facets, r, Axis::x, grid.y)), y_(covering(cut.context, facets, r, Axis::y, grid.x)) {}
+    : grid_(grid),
+      x_(covering(cut.context, facets, r, Axis::x, grid.y)),
+      y_(covering(cut.context, facets, r, Axis::y, grid.x)) {}
 
 bool NearFloor::operator()(Point2 p) const {
     const bool on_row = p.y % grid_.pitch == 0;
     const std::int32_t line = (on_row ? p.y - grid_.y[0] : p.x - grid_.x[0]) / grid_.pitch;
     const double along = to_mm(on_row ? p.x : p.y);
     const auto near = (on_row ? x_ : y_).line(static_cast<std::size_t>(line));
-    return std::any_of(near.begin(), near.end(), [&](const Forbidden& f) { return f.low < along && along < f.high; });
+    return std::any_of(near.begin(), near.end(),
+                       [&](const Forbidden& f) { return f.low < along && along < f.high; });
 }
 
 namespace {
@@ -44,7 +49,8 @@ namespace {
 struct Box2 {
     std::array<double, 2> low{1e300, 1e300}, high{-1e300, -1e300};
     void add(const Box2& other) {
-        for (std::size_t k = 0; k < 2; ++k) low[k] = std::min(low[k], other.low[k]), high[k] = std::max(high[k], other.high[k]);
+        for (std::size_t k = 0; k < 2; ++k)
+            low[k] = std::min(low[k], other.low[k]), high[k] = std::max(high[k], other.high[k]);
     }
 };
 
@@ -55,15 +61,19 @@ public:
         for (const FacetGroup& g : groups) all_.add({{g.low[0], g.low[1]}, {g.high[0], g.high[1]}});
         for (const FacetGroup& g : groups)
             for (std::size_t j = tile(g.low[1], 1); j <= tile(g.high[1], 1); ++j)
-                for (std::size_t i = tile(g.low[0], 0); i <= tile(g.high[0], 0); ++i) before_[(j + 1) * (kTiles + 1) + i + 1] = 1;
+                for (std::size_t i = tile(g.low[0], 0); i <= tile(g.high[0], 0); ++i)
+                    before_[(j + 1) * (kTiles + 1) + i + 1] = 1;
         for (std::size_t j = 1; j <= kTiles; ++j)
-            for (std::size_t i = 1; i <= kTiles; ++i) before_[at(i, j)] += before_[at(i - 1, j)] + before_[at(i, j - 1)] - before_[at(i - 1, j - 1)];
+            for (std::size_t i = 1; i <= kTiles; ++i)
+                before_[at(i, j)] +=
+                    before_[at(i - 1, j)] + before_[at(i, j - 1)] - before_[at(i - 1, j - 1)];
     }
     [[nodiscard]] const Box2& box() const { return all_; }
     [[nodiscard]] bool meets(const Box2& b) const {
         for (std::size_t k = 0; k < 2; ++k)
             if (b.low[k] > all_.high[k] || b.high[k] < all_.low[k]) return false;
-        const std::size_t i0 = tile(b.low[0], 0), i1 = tile(b.high[0], 0) + 1, j0 = tile(b.low[1], 1), j1 = tile(b.high[1], 1) + 1;
+        const std::size_t i0 = tile(b.low[0], 0), i1 = tile(b.high[0], 0) + 1, j0 = tile(b.low[1], 1),
+                          j1 = tile(b.high[1], 1) + 1;
         return before_[at(i1, j1)] - before_[at(i0, j1)] - before_[at(i1, j0)] + before_[at(i0, j0)] != 0;
     }
 
@@ -72,7 +82,9 @@ private:
     [[nodiscard]] static std::size_t at(std::size_t i, std::size_t j) { return j * (kTiles + 1) + i; }
     [[nodiscard]] std::size_t tile(double v, std::size_t axis) const {
         const double extent = all_.high[axis] - all_.low[axis];
-        return extent > 0 ? static_cast<std::size_t>(std::clamp((v - all_.low[axis]) / extent * kTiles, 0.0, kTiles - 1.0)) : 0;
+        return extent > 0 ? static_cast<std::size_t>(
+                                std::clamp((v - all_.low[axis]) / extent * kTiles, 0.0, kTiles - 1.0))
+                          : 0;
     }
     Box2 all_;
     std::vector<std::uint32_t> before_;  // occupied tiles before a corner
@@ -103,8 +115,9 @@ std::vector<std::int32_t> lines_between(const std::vector<std::int32_t>& lines, 
 
 }  // namespace
 
-std::vector<Contours> contours_near(Context& context, const LayerSolid& around, std::span<const double> tips, std::span<const Section> inside,
-                                    const Cutter& cutter, const FibreGrid& grid) {
+std::vector<Contours> contours_near(Context& context, const LayerSolid& around, std::span<const double> tips,
+                                    std::span<const Section> inside, const Cutter& cutter,
+                                    const FibreGrid& grid) {
     if (around.groups.empty()) return std::vector<Contours>(tips.size());
     const Occupied occupied(around.groups);
     Box2 all = occupied.box();
@@ -119,9 +132,11 @@ std::vector<Contours> contours_near(Context& context, const LayerSolid& around, 
 }
 
 std::vector<double> foot_heights(const LayerCut& cut, double floor) {
-    const double cusp = cut.job.tolerances.cusp, r = cut.layer.tools.finish.diameter / 2, alpha = cut.least_slope(floor, floor + r, kSteepFoot);
+    const double cusp = cut.job.tolerances.cusp, r = cut.layer.tools.finish.diameter / 2,
+                 alpha = cut.least_slope(floor, floor + r, kSteepFoot);
     if (alpha >= cut.job.cutting.vertical_deg * kDegree) return {};
-    const double high = r * (1 - std::cos(alpha)) - std::sqrt(2 * r * cusp), steps = std::ceil(high / flat_level_stepdown(alpha, cusp));
+    const double high = r * (1 - std::cos(alpha)) - std::sqrt(2 * r * cusp),
+                 steps = std::ceil(high / flat_level_stepdown(alpha, cusp));
     std::vector<double> heights;
     if (steps > kMostFeet) return heights;
     for (double k = steps - 1; k > 0.5; --k) heights.push_back(high * k / steps);
@@ -129,10 +144,12 @@ std::vector<double> foot_heights(const LayerCut& cut, double floor) {
 }
 
 void append_foot_runs(const LayerCut& cut, const Tool& tool, double floor, const FibreGrid& grid,
-                      std::span<const std::pair<const DropIndex*, double>> wider, std::vector<std::vector<LevelRun>>& levels) {
+                      std::span<const std::pair<const DropIndex*, double>> wider,
+                      std::vector<std::vector<LevelRun>>& levels) {
     const std::vector<double> heights = foot_heights(cut, floor);
     if (heights.empty()) return;
-    const double r = tool.diameter / 2, wall_nz = std::cos(cut.job.cutting.vertical_deg * kDegree), foot_nz = std::cos(kSteepFoot);
+    const double r = tool.diameter / 2, wall_nz = std::cos(cut.job.cutting.vertical_deg * kDegree),
+                 foot_nz = std::cos(kSteepFoot);
     const Cutter cutter{Cutter::Profile::flat, r};
     const std::vector<SolidFacet> facets = floor_facets(cut, floor);
     const NearFloor near(cut, facets, r, grid);
@@ -149,16 +166,20 @@ void append_foot_runs(const LayerCut& cut, const Tool& tool, double floor, const
             const std::size_t first = foot.starts[c], n = foot.starts[c + 1] - first;
             std::vector<char> wanted(n, 0);
             for (std::size_t k = 0; k < n; ++k) {
-                const Point2 a = foot.points[first + (k + n - 1) % n], p = foot.points[first + k], b = foot.points[first + (k + 1) % n];
+                const Point2 a = foot.points[first + (k + n - 1) % n], p = foot.points[first + k],
+                             b = foot.points[first + (k + 1) % n];
                 if (foot.nz[first + k] <= wall_nz || foot.nz[first + k] > foot_nz || !near(p)) continue;
                 wanted[k] = 1;
-                const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y, l = std::hypot(dx, dy);
+                const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y,
+                             l = std::hypot(dx, dy);
                 for (const auto& [drops, radius] : wider)
                     // The solid is on the right, so the free side is on the left.
-                    if (l > 0 && !drops->stands_over(to_mm(p.x) - dy / l * (radius + 0.02 - r), to_mm(p.y) + dx / l * (radius + 0.02 - r), tip))
+                    if (l > 0 && !drops->stands_over(to_mm(p.x) - dy / l * (radius + 0.02 - r),
+                                                     to_mm(p.y) + dx / l * (radius + 0.02 - r), tip))
                         wanted[k] = 0;
             }
-            append_level_runs(foot, c, to_units(tip), wanted, simplify_tolerance_units(cut.job.tolerances.gouge), levels.back());
+            append_level_runs(foot, c, to_units(tip), wanted,
+                              simplify_tolerance_units(cut.job.tolerances.gouge), levels.back());
         }
     }
 }

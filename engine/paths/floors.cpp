@@ -16,8 +16,8 @@ Operation finish_floors(const LayerCut& cut) {
     const std::vector<double>& heights = cut.floors;
     if (heights.empty()) return op;
     const std::vector<Section> inside = cut.insides(cutter, heights);
-    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
-                     cut.layer.z_top + 2);
+    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
+                     cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     const DropIndex& part = cut.drops(cutter);
     path.know(cut.around(tool, &part));
     op.stepover = tool.stepover * tool.diameter;
@@ -33,21 +33,25 @@ Operation finish_floors(const LayerCut& cut) {
         std::vector<std::int32_t> lines;
         for (int k = 0; k <= gaps; ++k) lines.push_back(to_units(y_low + (y_high - y_low) * k / gaps));
         lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
-        const Fibres forbidden = fibres(cut.context, cut.solid, inside[i].loops, cutter, heights[i], Axis::x, lines);
+        const Fibres forbidden =
+            fibres(cut.context, cut.solid, inside[i].loops, cutter, heights[i], Axis::x, lines);
         const Fibres reach = covering(cut.context, facets, r, Axis::x, lines);
         std::vector<std::vector<Stretch>> free(lines.size());
         for (std::size_t l = 0; l < lines.size(); ++l)
             for (const Forbidden& near : reach.line(l))
                 for (const Stretch& s :
-                     free_stretches(forbidden.line(l), std::max(near.low, cut.low(0, r + 2)), std::min(near.high, cut.high(0, r + 2)), 0.01))
+                     free_stretches(forbidden.line(l), std::max(near.low, cut.low(0, r + 2)),
+                                    std::min(near.high, cut.high(0, r + 2)), 0.01))
                     free[l].push_back(s);
-        zigzag(path, cut, tool, lines, free, heights[i],
-               [&](std::span<const std::int32_t> at) { return fibres(cut.context, cut.solid, inside[i].loops, cutter, heights[i], Axis::y, at); });
+        zigzag(path, cut, tool, lines, free, heights[i], [&](std::span<const std::int32_t> at) {
+            return fibres(cut.context, cut.solid, inside[i].loops, cutter, heights[i], Axis::y, at);
+        });
         // Once along the border of the free region, where the zigzag's ends leave scallops.
         const std::int32_t pitch = safe_pitch(r, cut.job.tolerances.gouge), z = to_units(heights[i]);
         const FibreGrid grid = fibre_grid(cut.solid, cutter, pitch);
         const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(pitch)));
-        const Contours border = std::move(contours_near(cut.context, around, {&heights[i], 1}, {&inside[i], 1}, cutter, grid).front());
+        const Contours border = std::move(
+            contours_near(cut.context, around, {&heights[i], 1}, {&inside[i], 1}, cutter, grid).front());
         const NearFloor near_floor(cut, facets, r, grid);
         std::vector<std::vector<PathPoint>> runs;
         for (std::size_t c = 0; c < border.size(); ++c) {
@@ -58,7 +62,8 @@ Operation finish_floors(const LayerCut& cut) {
                 if (!(wanted[k] = near_floor(border.points[first + k]))) start = k;
             std::vector<PathPoint> run;
             auto close = [&] {
-                if (run.size() > 1) runs.push_back(simplify(run, simplify_tolerance_units(cut.job.tolerances.gouge)));
+                if (run.size() > 1)
+                    runs.push_back(simplify(run, simplify_tolerance_units(cut.job.tolerances.gouge)));
                 run.clear();
             };
             for (std::size_t k = 0; k <= n; ++k) {
@@ -70,7 +75,10 @@ Operation finish_floors(const LayerCut& cut) {
         }
         std::vector<Beginning> beginnings;
         for (const std::vector<PathPoint>& run : runs)
-            beginnings.push_back({{run.front().x, run.front().y}, {run.back().x, run.back().y}, static_cast<std::uint32_t>(beginnings.size()), 0});
+            beginnings.push_back({{run.front().x, run.front().y},
+                                  {run.back().x, run.back().y},
+                                  static_cast<std::uint32_t>(beginnings.size()),
+                                  0});
         for (const Beginning& next : nearest_order(std::move(beginnings), runs.size(), path.at())) {
             add_leads(path, cut, part, safe_chord_mm(r, cut.job.tolerances.gouge), runs[next.run]);
             path.follow(runs[next.run]);

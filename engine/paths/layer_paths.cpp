@@ -18,7 +18,8 @@ namespace slabwright {
 
 double safe_chord_mm(double radius, double gouge) { return std::sqrt(8 * radius * 0.65 * gouge); }
 std::int32_t safe_pitch(double radius, double gouge) {
-    return static_cast<std::int32_t>(std::floor(safe_chord_mm(radius, gouge) / std::numbers::sqrt2 * kUnitsPerMm));
+    return static_cast<std::int32_t>(
+        std::floor(safe_chord_mm(radius, gouge) / std::numbers::sqrt2 * kUnitsPerMm));
 }
 double simplify_tolerance_units(double gouge) { return 0.12 * gouge * kUnitsPerMm; }
 
@@ -29,9 +30,10 @@ double arc_tolerance_units(const Job& job, OperationKind kind) {
 
 FinishSlopes finish_slopes(const Cutting& cutting) {
     constexpr double degree = std::numbers::pi / 180, none = 2;
-    // Contours of what is as good as level run anywhere; a ball's place over a wall is decided by the last bit.
-    const double level = 0.5 * degree, wall = std::min(cutting.vertical_deg, 89.9) * degree, limit = cutting.steep_limit_deg * degree,
-                 overlap = cutting.overlap_deg * degree;
+    // Contours of what is as good as level run anywhere; a ball's place over a wall is decided by the last
+    // bit.
+    const double level = 0.5 * degree, wall = std::min(cutting.vertical_deg, 89.9) * degree,
+                 limit = cutting.steep_limit_deg * degree, overlap = cutting.overlap_deg * degree;
     switch (cutting.finish_strategy) {
         case FinishStrategy::levels:
             return {level, level, -1, -1};
@@ -48,16 +50,19 @@ FinishSlopes finish_slopes(const Cutting& cutting) {
 // The machine's travel is centred on the stock; the planner has made sure that the stock lies within it.
 double LayerCut::low(int axis, double beyond) const {
     const double travel = axis == 0 ? job.machine.travel_x : job.machine.travel_y;
-    return std::max(layer.stock_min[axis] - beyond, 0.5 * (layer.stock_min[axis] + layer.stock_max[axis] - travel));
+    return std::max(layer.stock_min[axis] - beyond,
+                    0.5 * (layer.stock_min[axis] + layer.stock_max[axis] - travel));
 }
 double LayerCut::high(int axis, double beyond) const {
     const double travel = axis == 0 ? job.machine.travel_x : job.machine.travel_y;
-    return std::min(layer.stock_max[axis] + beyond, 0.5 * (layer.stock_min[axis] + layer.stock_max[axis] + travel));
+    return std::min(layer.stock_max[axis] + beyond,
+                    0.5 * (layer.stock_min[axis] + layer.stock_max[axis] + travel));
 }
 
 Loops LayerCut::stock_outline() const {
     Loops stock;
-    const Point2 low{to_units(layer.stock_min[0]), to_units(layer.stock_min[1])}, high{to_units(layer.stock_max[0]), to_units(layer.stock_max[1])};
+    const Point2 low{to_units(layer.stock_min[0]), to_units(layer.stock_min[1])},
+        high{to_units(layer.stock_max[0]), to_units(layer.stock_max[1])};
     stock.points = {low, {high.x, low.y}, high, {low.x, high.y}};
     stock.close_loop();
     return stock;
@@ -69,7 +74,8 @@ std::vector<Section> LayerCut::insides(const Cutter& cutter, std::span<const dou
     return slice(context, layer.mesh, planes, {job.tolerances.gap});
 }
 
-std::vector<Contours> LayerCut::contours(const Cutter& cutter, std::span<const double> tip_z, std::int32_t pitch) const {
+std::vector<Contours> LayerCut::contours(const Cutter& cutter, std::span<const double> tip_z,
+                                         std::int32_t pitch) const {
     const std::vector<Section> inside = insides(cutter, tip_z);
     std::vector<FibreLevel> levels;
     for (std::size_t i = 0; i < tip_z.size(); ++i) levels.push_back({tip_z[i], &inside[i].loops});
@@ -84,7 +90,8 @@ const DropIndex& LayerCut::drops(const Cutter& cutter) const {
 }
 
 Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
-    const Cutter cutter{tool.kind == ToolKind::ball ? Cutter::Profile::ball : Cutter::Profile::flat, tool.diameter / 2};
+    const Cutter cutter{tool.kind == ToolKind::ball ? Cutter::Profile::ball : Cutter::Profile::flat,
+                        tool.diameter / 2};
     Surroundings around{standing, part, cutter};
     // Where the places are those of a wider cutter, half of what it is wider by may go.
     const double wider = part != nullptr ? part->cutter().radius - cutter.radius : 0;
@@ -108,16 +115,19 @@ Operation LayerCut::operation(OperationKind kind, const char* purpose, const Too
 
 namespace {
 
-// Of a ball's diameter, what its level contours sweep beside a wall: what it leaves at the far side of that on a floor, two tenths of its
-// radius, is no more than one cut.
+// Of a ball's diameter, what its level contours sweep beside a wall: what it leaves at the far side of that
+// on a floor, two tenths of its radius, is no more than one cut.
 constexpr double kSwathShare = 0.5;
 
-double minutes_of(const Operation& op, const Machine& machine) { return motion_time(op.moves, machine, op.blend).minutes; }
+double minutes_of(const Operation& op, const Machine& machine) {
+    return motion_time(op.moves, machine, op.blend).minutes;
+}
 
 // What is cut while it lives can be undone, in all that operations leave to each other.
 class Attempt {
 public:
-    Attempt(const LayerCut& cut, LayerStock& stock) : cut_(cut), stood_(*cut.standing), no_ways_(cut.no_way_in.size()), trial_(stock) {}
+    Attempt(const LayerCut& cut, LayerStock& stock)
+        : cut_(cut), stood_(*cut.standing), no_ways_(cut.no_way_in.size()), trial_(stock) {}
     void undo() {
         *cut_.standing = std::move(stood_);
         cut_.no_way_in.resize(no_ways_);
@@ -131,11 +141,13 @@ private:
     LayerStock::Trial trial_;
 };
 
-// Waste between walls. What lies within the swath of the level contours beside a wall may be left to them, which then meet more and go slower: it is
-// left where that spares this operation most of its time, as along upright walls; where slopes are gentle it spares little or none.
+// Waste between walls. What lies within the swath of the level contours beside a wall may be left to them,
+// which then meet more and go slower: it is left where that spares this operation most of its time, as along
+// upright walls; where slopes are gentle it spares little or none.
 // @param before minutes of the layer's operations so far: of those a small part is not worth a second look
 Operation clear_between(const LayerCut& cut, LayerStock& stock, RestPass pass, double before) {
-    constexpr double kSwath = 0.35;   // of the cutter's radius: wider, and the contours meet more than they bear at a good feed
+    constexpr double kSwath =
+        0.35;  // of the cutter's radius: wider, and the contours meet more than they bear at a good feed
     constexpr double kLittle = 0.03;  // of the minutes before
     constexpr double kSpared = 0.6;   // of the time without
     const Tool& tool = cut.layer.tools.finish;
@@ -171,8 +183,10 @@ void report_loose(const LayerCut& cut, LayerResult& result) {
     }
     for (const LoosePiece& piece : loose_pieces(cut.context, slab, result.operations, cut.job.tools))
         result.diagnostics.push_back({Severity::warning, "waste.loose",
-                                      fmt::format("layer {}: a piece of waste of {:.0f} mm², up to {:.1f} mm thick, comes loose while the {} are cut",
-                                                  layer.index, piece.area_mm2, piece.thickness_mm, result.operations[piece.operation].purpose),
+                                      fmt::format("layer {}: a piece of waste of {:.0f} mm², up to {:.1f} mm "
+                                                  "thick, comes loose while the {} are cut",
+                                                  layer.index, piece.area_mm2, piece.thickness_mm,
+                                                  result.operations[piece.operation].purpose),
                                       std::array<double, 3>{piece.x, piece.y, layer.z_bottom}});
 }
 
@@ -191,18 +205,25 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     for (const Flat& flat : layer.flats)
         if (flat.highest < layer.z_top) cut.floors.push_back(flat.highest);
     std::sort(cut.floors.begin(), cut.floors.end(), std::greater<>());
-    cut.floors.erase(std::unique(cut.floors.begin(), cut.floors.end(), [](double a, double b) { return a - b < kSameFloor; }), cut.floors.end());
+    cut.floors.erase(std::unique(cut.floors.begin(), cut.floors.end(),
+                                 [](double a, double b) { return a - b < kSameFloor; }),
+                     cut.floors.end());
 
     // What stands once the slab has been faced; every operation after that cuts its moves into it.
     Standing standing(layer.stock_min, layer.stock_max, std::min(cut.stock_top, layer.z_top));
     cut.standing = &standing;
-    // Level contours take their time by the facets that a cutter meets, all else by moves and areas: `share` of that is done.
-    const double facets_mm2 = static_cast<double>(cut.solid.facets.size()) /
-                              std::max(1.0, (layer.stock_max[0] - layer.stock_min[0]) * (layer.stock_max[1] - layer.stock_min[1]));
-    const double levels_against_rest = 0.25 + 0.6 * facets_mm2, levels_share = levels_against_rest / (1 + levels_against_rest);
+    // Level contours take their time by the facets that a cutter meets, all else by moves and areas: `share`
+    // of that is done.
+    const double facets_mm2 =
+        static_cast<double>(cut.solid.facets.size()) /
+        std::max(1.0, (layer.stock_max[0] - layer.stock_min[0]) * (layer.stock_max[1] - layer.stock_min[1]));
+    const double levels_against_rest = 0.25 + 0.6 * facets_mm2,
+                 levels_share = levels_against_rest / (1 + levels_against_rest);
     bool levels_done = false;
     const auto reached = [&](double share) {
-        if (layer.progress) layer.progress->reach(kPathsShare * ((1 - levels_share) * share + (levels_done ? levels_share : 0)));
+        if (layer.progress)
+            layer.progress->reach(kPathsShare *
+                                  ((1 - levels_share) * share + (levels_done ? levels_share : 0)));
     };
 
     LayerResult result;
@@ -212,7 +233,8 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     };
     auto fit = [&](Operation& op) {
         ArcFit how{.tolerance = arc_tolerance_units(cut.job, op.kind), .arcs = cut.job.cutting.arcs};
-        // Roughing may round more off its corners (Operation::blend): where an arc would be run slower, its chords are not.
+        // Roughing may round more off its corners (Operation::blend): where an arc would be run slower, its
+        // chords are not.
         if (op.kind == OperationKind::rough) how.acceleration = cut.job.machine.acceleration;
         fit_arcs(op.moves, how);
     };
@@ -221,7 +243,8 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         for (const Operation& op : operations) sum += minutes_of(op, cut.job.machine);
         return sum;
     };
-    // Whether the operations so far, which all stay, take too long. Arcs may be run faster than the straight moves they are made of.
+    // Whether the operations so far, which all stay, take too long. Arcs may be run faster than the straight
+    // moves they are made of.
     auto hopeless = [&] {
         if (std::isinf(layer.most_minutes)) return false;
         if (minutes(result.operations) <= layer.most_minutes) return false;
@@ -246,8 +269,9 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         done(levels);
         take(std::move(levels));
         if (hopeless()) return;
-        Operation projected =
-            cut.job.cutting.projection == Projection::offset ? finish_offsets(cut, result.diagnostics) : finish_raster(cut, result.diagnostics);
+        Operation projected = cut.job.cutting.projection == Projection::offset
+                                  ? finish_offsets(cut, result.diagnostics)
+                                  : finish_raster(cut, result.diagnostics);
         reached(0.75);
         done(projected);
         take(std::move(projected));
@@ -256,8 +280,9 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         finish([](const Operation&) {});
         if (result.given_up) return result;
     } else {
-        // What stands now decides the rest: waste where the roughing cutter does not fit before the ball finishes, and after it
-        // the corners that the ball leaves, by the flat end mill, and what is left of the cusps' limit anywhere.
+        // What stands now decides the rest: waste where the roughing cutter does not fit before the ball
+        // finishes, and after it the corners that the ball leaves, by the flat end mill, and what is left of
+        // the cusps' limit anywhere.
         const LayerTools& tools = layer.tools;
         Spares<StockMemory> own;
         Spares<StockMemory>& spares = layer.stock_memory != nullptr ? *layer.stock_memory : own;
@@ -272,7 +297,8 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         } const leaving{spares, std::move(memory), stock};
         std::vector<Operation> useful;
         for (Operation& op : result.operations) {
-            const Tool& tool = op.tool == tools.rough.number ? tools.rough : tool_of_kind(cut.job, ToolKind::face);
+            const Tool& tool =
+                op.tool == tools.rough.number ? tools.rough : tool_of_kind(cut.job, ToolKind::face);
             const bool idle = op.kind != OperationKind::face && stock.cut(cut, op, tool).nothing();
             // A floor's cutter may have taken the whole wall beside it.
             if (!idle || op.kind != OperationKind::finish) useful.push_back(std::move(op));
@@ -282,26 +308,38 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         constexpr double kWaste = 1.0;  // mm: what is thicker is cut in steps
         const double finish_swath = kSwathShare * tools.finish.diameter;
         auto waste = [&](const Tool& tool, const char* purpose) {
-            return RestPass{OperationKind::semi_rough, purpose, kWaste, true, 0, semi_rough_allowance(cut.job, tool, kWaste)};
+            return RestPass{OperationKind::semi_rough,
+                            purpose,
+                            kWaste,
+                            true,
+                            0,
+                            semi_rough_allowance(cut.job, tool, kWaste)};
         };
         auto semi_rough = [&](const Tool& tool, double swath) {
             constexpr const char* purpose = "waste beside the roughing cutter";
-            if (contours) take(semi_rough_layer(cut, stock, tool, {purpose, kWaste, swath, cut.job.cutting.wall_allowance}));
+            if (contours)
+                take(semi_rough_layer(cut, stock, tool,
+                                      {purpose, kWaste, swath, cut.job.cutting.wall_allowance}));
             else take(cut_rest(cut, stock, tool, waste(tool, purpose)));
         };
         for (std::size_t s = 0; s < tools.semi_rough.size(); ++s)
             semi_rough(tools.semi_rough[s],
-                       s + 1 < tools.semi_rough.size() ? tools.semi_rough[s + 1].diameter + cut.job.cutting.wall_allowance : finish_swath);
+                       s + 1 < tools.semi_rough.size()
+                           ? tools.semi_rough[s + 1].diameter + cut.job.cutting.wall_allowance
+                           : finish_swath);
         // A tool between others is worth its change where much is left for it.
         constexpr double kWasteWorthAChange = 1000, kCornersWorthAChange = 150;  // mm²
         auto last_of_kind = [&](const Tool& tool) {
-            return std::none_of(&tool + 1, tools.rest.data() + tools.rest.size(), [&](const Tool& t) { return t.kind == tool.kind; });
+            return std::none_of(&tool + 1, tools.rest.data() + tools.rest.size(),
+                                [&](const Tool& t) { return t.kind == tool.kind; });
         };
         for (const Tool& tool : tools.rest)
-            if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() && stock.area_over(context, 1.0) > kWasteWorthAChange)
+            if (tool.kind == ToolKind::flat && !last_of_kind(tool) && tools.semi_rough.empty() &&
+                stock.area_over(context, 1.0) > kWasteWorthAChange)
                 semi_rough(tool, finish_swath);
         const RestPass between = waste(tools.finish, "waste between walls");
-        take(contours ? clear_between(cut, stock, between, minutes(result.operations)) : cut_rest(cut, stock, tools.finish, between));
+        take(contours ? clear_between(cut, stock, between, minutes(result.operations))
+                      : cut_rest(cut, stock, tools.finish, between));
         reached(0.56);
         if (hopeless()) return result;
         finish([&](Operation& op) {
@@ -309,22 +347,30 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         });
         if (result.given_up || hopeless()) return result;
         const double limit = cut.job.tolerances.cusp + 0.02;
-        // A smaller flat reaches every corner that the roughing cutter reaches, so where one follows it cuts them all.
-        const bool smaller = std::any_of(tools.rest.begin(), tools.rest.end(), [](const Tool& t) { return t.kind == ToolKind::flat; });
-        if (!smaller) take(cut_rest(cut, stock, tools.rough, {OperationKind::corner, "corners", limit, false}));
+        // A smaller flat reaches every corner that the roughing cutter reaches, so where one follows it cuts
+        // them all.
+        const bool smaller = std::any_of(tools.rest.begin(), tools.rest.end(),
+                                         [](const Tool& t) { return t.kind == ToolKind::flat; });
+        if (!smaller)
+            take(cut_rest(cut, stock, tools.rough, {OperationKind::corner, "corners", limit, false}));
         take(cut_rest(cut, stock, tools.finish, {OperationKind::finish, "what is left", limit, false}));
         reached(0.94);
         for (const Tool& tool : tools.rest) {
             const double left = stock.area_over(context, limit);
             if (!last_of_kind(tool) && left < kCornersWorthAChange) continue;
-            // What a tool between others is for is only seen when it has cut; where that is little it has not.
+            // What a tool between others is for is only seen when it has cut; where that is little it has
+            // not.
             std::optional<Attempt> attempt;
             const std::size_t operations = result.operations.size();
             if (contours && !last_of_kind(tool)) attempt.emplace(cut, stock);
-            if (contours && tool.kind == ToolKind::flat) take(semi_rough_layer(cut, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
+            if (contours && tool.kind == ToolKind::flat)
+                take(semi_rough_layer(cut, stock, tool, {"waste in narrow places", kWaste, 0, 0}));
             else take(cut_rest(cut, stock, tool, waste(tool, "waste in narrow places")));
-            if (tool.kind == ToolKind::flat) take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
-            else take(cut_rest(cut, stock, tool, {OperationKind::finish, "what is left in narrow places", limit, false}));
+            if (tool.kind == ToolKind::flat)
+                take(cut_rest(cut, stock, tool, {OperationKind::corner, "narrow corners", limit, false}));
+            else
+                take(cut_rest(cut, stock, tool,
+                              {OperationKind::finish, "what is left in narrow places", limit, false}));
             if (!attempt || left - stock.area_over(context, limit) >= kCornersWorthAChange) continue;
             attempt->undo();
             result.operations.resize(operations);
@@ -332,10 +378,11 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         result.left_mm2 = stock.area_over(context, limit);
     }
     if (!cut.no_way_in.empty())
-        result.diagnostics.push_back({Severity::note, "entry.no_room",
-                                      fmt::format("layer {}: {} cut{} left to a tool that plunges: no room for a helix or a ramp", layer.index,
-                                                  cut.no_way_in.size(), cut.no_way_in.size() == 1 ? "" : "s"),
-                                      cut.no_way_in.front()});
+        result.diagnostics.push_back(
+            {Severity::note, "entry.no_room",
+             fmt::format("layer {}: {} cut{} left to a tool that plunges: no room for a helix or a ramp",
+                         layer.index, cut.no_way_in.size(), cut.no_way_in.size() == 1 ? "" : "s"),
+             cut.no_way_in.front()});
     reached(0.95);
     report_loose(cut, result);
     // Last, so that everything before has straight moves only to think of.

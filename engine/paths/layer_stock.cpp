@@ -35,9 +35,13 @@ struct Box {
 struct Lowering {
     float* height;
     std::size_t nx;
-    void operator()(std::size_t cell, double z) { height[cell] = std::min(height[cell], static_cast<float>(std::max(0.0, z))); }
+    void operator()(std::size_t cell, double z) {
+        height[cell] = std::min(height[cell], static_cast<float>(std::max(0.0, z)));
+    }
     void row(std::size_t first, int n, const double* h, double /*lowest*/) { lower_to(height + first, n, h); }
-    void spans(std::size_t first, int rows, const RowSpans& s, double z) { lower_spans(height + first, nx, rows, s, z); }
+    void spans(std::size_t first, int rows, const RowSpans& s, double z) {
+        lower_spans(height + first, nx, rows, s, z);
+    }
 };
 
 // What stands at most in the tiles of a band of rows: a bound, as near as kStale cuts of a tile ago.
@@ -47,15 +51,20 @@ public:
         : height_(height),
           band_(band),
           nx_((band.nx + kTile - 1) / kTile),
-          tops_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>((band.ny + kTile - 1) / kTile), std::numeric_limits<float>::infinity()),
+          tops_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>((band.ny + kTile - 1) / kTile),
+                std::numeric_limits<float>::infinity()),
           cuts_(tops_.size(), kStale) {}
 
-    // Whether anything may stand over a level within a rectangle, mm, of the band; if so it counts as cut. `cells` gets the columns and
-    // the rows of its cells.
-    [[nodiscard]] bool cut_over(double x0, double x1, double y0, double y1, double level, std::array<int, 4>& cells) {
-        const int i0 = tile((x0 - band_.x0) / band_.cell, band_.nx), i1 = tile((x1 - band_.x0) / band_.cell, band_.nx);
-        const int j0 = tile((y0 - band_.y0) / band_.cell, band_.ny), j1 = tile((y1 - band_.y0) / band_.cell, band_.ny);
-        cells = {i0 * kTile, std::min((i1 + 1) * kTile, band_.nx) - 1, j0 * kTile, std::min((j1 + 1) * kTile, band_.ny) - 1};
+    // Whether anything may stand over a level within a rectangle, mm, of the band; if so it counts as cut.
+    // `cells` gets the columns and the rows of its cells.
+    [[nodiscard]] bool cut_over(double x0, double x1, double y0, double y1, double level,
+                                std::array<int, 4>& cells) {
+        const int i0 = tile((x0 - band_.x0) / band_.cell, band_.nx),
+                  i1 = tile((x1 - band_.x0) / band_.cell, band_.nx);
+        const int j0 = tile((y0 - band_.y0) / band_.cell, band_.ny),
+                  j1 = tile((y1 - band_.y0) / band_.cell, band_.ny);
+        cells = {i0 * kTile, std::min((i1 + 1) * kTile, band_.nx) - 1, j0 * kTile,
+                 std::min((j1 + 1) * kTile, band_.ny) - 1};
         const bool over = any_over(i0, i1, j0, j1, level);
         for (int j = j0; j <= j1 && over; ++j)
             for (int i = i0; i <= i1; ++i) {
@@ -66,8 +75,10 @@ public:
     }
     // Whether anything may stand over a level where a cutter comes that stays within a box.
     [[nodiscard]] bool any_over(const Box& box, double radius, double level) {
-        return any_over(tile((box.x0 - radius - band_.x0) / band_.cell, band_.nx), tile((box.x1 + radius - band_.x0) / band_.cell, band_.nx),
-                        tile((box.y0 - radius - band_.y0) / band_.cell, band_.ny), tile((box.y1 + radius - band_.y0) / band_.cell, band_.ny), level);
+        return any_over(tile((box.x0 - radius - band_.x0) / band_.cell, band_.nx),
+                        tile((box.x1 + radius - band_.x0) / band_.cell, band_.nx),
+                        tile((box.y0 - radius - band_.y0) / band_.cell, band_.ny),
+                        tile((box.y1 + radius - band_.y0) / band_.cell, band_.ny), level);
     }
 
 private:
@@ -75,7 +86,8 @@ private:
     static constexpr std::uint8_t kStale = 4;
 
     [[nodiscard]] bool any_over(int i0, int i1, int j0, int j1, double level) {
-        const float most = std::max(0.0F, static_cast<float>(level));  // no height that is lowered to it gets under this
+        const float most =
+            std::max(0.0F, static_cast<float>(level));  // no height that is lowered to it gets under this
         for (int j = j0; j <= j1; ++j) {
             // By what was known last, which nothing has come to stand over since: many tiles at once.
             const float* const known = tops_.data() + index(0, j);
@@ -87,7 +99,9 @@ private:
         return false;
     }
 
-    static int tile(double cell, int cells) { return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(cells - 1))) / kTile; }
+    static int tile(double cell, int cells) {
+        return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(cells - 1))) / kTile;
+    }
     [[nodiscard]] std::size_t index(int i, int j) const {
         return static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i);
     }
@@ -95,9 +109,11 @@ private:
         float& top = tops_[index(i, j)];
         std::uint8_t& cuts = cuts_[index(i, j)];
         if (cuts == kStale) {
-            const int first = std::max(0, std::min(i * kTile, band_.nx - kTile)), n = std::min(kTile, band_.nx);
+            const int first = std::max(0, std::min(i * kTile, band_.nx - kTile)),
+                      n = std::min(kTile, band_.nx);
             const int row = j * kTile;
-            top = highest_of(height_ + band_.index(first, row), static_cast<std::size_t>(band_.nx), n, std::min(kTile, band_.ny - row));
+            top = highest_of(height_ + band_.index(first, row), static_cast<std::size_t>(band_.nx), n,
+                             std::min(kTile, band_.ny - row));
             cuts = 0;
         }
         return top > level;
@@ -129,7 +145,9 @@ void KeptTiles::keep(const float* height, int i0, int i1, int j0, int j1) {
             const int n = std::min(kTile, nx_ - ti * kTile);
             float* kept = memory_.data() + t * kCells;
             for (int j = tj * kTile; j < std::min(ny_, (tj + 1) * kTile); ++j, kept += kTile)
-                std::copy_n(height + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(ti) * kTile, n, kept);
+                std::copy_n(height + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) +
+                                static_cast<std::size_t>(ti) * kTile,
+                            n, kept);
         }
 }
 
@@ -177,7 +195,8 @@ std::vector<double> rows_of(const CellGrid& grid) {
 namespace {
 
 double cell_for(double finest, double cusp, double plane) {
-    return std::clamp(std::max(std::sqrt(2 * (finest / 2) * cusp) / 2, std::sqrt(plane / kStockCells)), 0.05, 1.0);
+    return std::clamp(std::max(std::sqrt(2 * (finest / 2) * cusp) / 2, std::sqrt(plane / kStockCells)), 0.05,
+                      1.0);
 }
 
 }  // namespace
@@ -186,7 +205,8 @@ double stock_cell(const LayerCut& cut) {
     double finest = cut.layer.tools.finish.diameter;
     for (const Tool& tool : cut.layer.tools.rest)
         if (tool.kind == ToolKind::ball) finest = std::min(finest, tool.diameter);
-    const double width = cut.layer.stock_max[0] - cut.layer.stock_min[0], depth = cut.layer.stock_max[1] - cut.layer.stock_min[1];
+    const double width = cut.layer.stock_max[0] - cut.layer.stock_min[0],
+                 depth = cut.layer.stock_max[1] - cut.layer.stock_min[1];
     return cell_for(finest, cut.job.tolerances.cusp, width * depth);
 }
 
@@ -198,11 +218,16 @@ std::uint64_t LayerStock::bytes(const Job& job, double plane_mm2) {
     return static_cast<std::uint64_t>(13 * plane_mm2 / (cell * cell));
 }
 
-CutterEnd cutter_end(const Tool& tool) { return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2, 0}; }
+CutterEnd cutter_end(const Tool& tool) {
+    return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2,
+            0};
+}
 
-LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory) : z_bottom_(cut.layer.z_bottom), memory_(std::move(memory)) {
+LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory)
+    : z_bottom_(cut.layer.z_bottom), memory_(std::move(memory)) {
     const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
-    grid_ = {lo[0] + cell / 2, lo[1] + cell / 2, cell, std::max(1, static_cast<int>(std::ceil((hi[0] - lo[0]) / cell - 0.5))),
+    grid_ = {lo[0] + cell / 2, lo[1] + cell / 2, cell,
+             std::max(1, static_cast<int>(std::ceil((hi[0] - lo[0]) / cell - 0.5))),
              std::max(1, static_cast<int>(std::ceil((hi[1] - lo[1]) / cell - 0.5)))};
     const double top = cut.layer.z_top - z_bottom_;
     // Cleared first, so that nothing is copied where there must be more room.
@@ -215,19 +240,23 @@ LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory) : z
     most_left_.assign(words_ * static_cast<std::size_t>(grid_.ny), std::numeric_limits<float>::infinity());
     // Facets by the bands of rows that they meet, so that bands can be drawn in parallel.
     const int bands = (grid_.ny + kBand - 1) / kBand;
-    auto band_of = [&](double y) { return std::clamp(static_cast<int>((y - grid_.y0) / cell) / kBand, 0, bands - 1); };
+    auto band_of = [&](double y) {
+        return std::clamp(static_cast<int>((y - grid_.y0) / cell) / kBand, 0, bands - 1);
+    };
     std::vector<std::uint32_t> starts(static_cast<std::size_t>(bands) + 1, 0), members;
     auto rows = [&](const SolidFacet& f) { return std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]}); };
     auto matters = [&](const SolidFacet& f) { return f.normal[2] > 0 && f.z_max > z_bottom_; };
     for (const SolidFacet& f : cut.solid.facets)
         if (matters(f))
-            for (int b = band_of(rows(f).first); b <= band_of(rows(f).second); ++b) ++starts[static_cast<std::size_t>(b) + 1];
+            for (int b = band_of(rows(f).first); b <= band_of(rows(f).second); ++b)
+                ++starts[static_cast<std::size_t>(b) + 1];
     for (std::size_t b = 1; b < starts.size(); ++b) starts[b] += starts[b - 1];
     members.resize(starts.back());
     std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
     for (std::size_t i = 0; i < cut.solid.facets.size(); ++i)
         if (matters(cut.solid.facets[i]))
-            for (int b = band_of(rows(cut.solid.facets[i]).first); b <= band_of(rows(cut.solid.facets[i]).second); ++b)
+            for (int b = band_of(rows(cut.solid.facets[i]).first);
+                 b <= band_of(rows(cut.solid.facets[i]).second); ++b)
                 members[next[static_cast<std::size_t>(b)]++] = static_cast<std::uint32_t>(i);
     const std::vector<std::vector<Span>> capped = line_spans(cut.solid.cap, rows_of(grid_));
     parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
@@ -241,7 +270,8 @@ LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory) : z
             const auto [y_low, y_high] = rows(f);
             const int j0 = std::max(first, static_cast<int>(std::ceil((y_low - grid_.y0) / cell)));
             const int j1 = std::min(last, static_cast<int>(std::floor((y_high - grid_.y0) / cell)));
-            const auto share = static_cast<std::uint8_t>(std::lround(255 * std::clamp(f.normal[2], 0.0, 1.0)));
+            const auto share =
+                static_cast<std::uint8_t>(std::lround(255 * std::clamp(f.normal[2], 0.0, 1.0)));
             for (int j = j0; j <= j1; ++j) {
                 const double y = grid_.y(j);
                 double low = 1e300, high = -1e300;
@@ -252,9 +282,12 @@ LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory) : z
                     low = std::min(low, x), high = std::max(high, x);
                 }
                 const int i0 = std::max(0, static_cast<int>(std::ceil((low - grid_.x0) / cell)));
-                const int i1 = std::min<int>(grid_.nx - 1, static_cast<int>(std::floor((high - grid_.x0) / cell)));
+                const int i1 =
+                    std::min<int>(grid_.nx - 1, static_cast<int>(std::floor((high - grid_.x0) / cell)));
                 for (int i = i0; i <= i1; ++i) {
-                    const double z = f.p[0][2] - (f.normal[0] * (grid_.x(i) - f.p[0][0]) + f.normal[1] * (y - f.p[0][1])) / f.normal[2];
+                    const double z =
+                        f.p[0][2] - (f.normal[0] * (grid_.x(i) - f.p[0][0]) + f.normal[1] * (y - f.p[0][1])) /
+                                        f.normal[2];
                     const auto rise = static_cast<float>(std::min(z, f.z_max) - z_bottom_);
                     const std::size_t c = grid_.index(i, j);
                     if (rise > surface[c]) surface[c] = rise, nz[c] = std::max<std::uint8_t>(1, share);
@@ -263,9 +296,12 @@ LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory) : z
         }
         for (int j = first; j <= last; ++j)
             for (const Span& s : capped[static_cast<std::size_t>(j)]) {
-                const int i0 = std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid_.x0) / cell)));
-                const int i1 = std::min<int>(grid_.nx - 1, static_cast<int>(std::floor((s.high / kUnitsPerMm - grid_.x0) / cell)));
-                for (int i = i0; i <= i1; ++i) surface[grid_.index(i, j)] = static_cast<float>(top), nz[grid_.index(i, j)] = 255;
+                const int i0 =
+                    std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid_.x0) / cell)));
+                const int i1 = std::min<int>(
+                    grid_.nx - 1, static_cast<int>(std::floor((s.high / kUnitsPerMm - grid_.x0) / cell)));
+                for (int i = i0; i <= i1; ++i)
+                    surface[grid_.index(i, j)] = static_cast<float>(top), nz[grid_.index(i, j)] = 255;
             }
     });
     if (cut.layer.opening.empty()) return;
@@ -277,9 +313,11 @@ LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory) : z
         std::vector<char> free(static_cast<std::size_t>(grid_.nx), 0);
         for (const Span& s : open[static_cast<std::size_t>(j)])
             for (int i = 0; i < grid_.nx; ++i)
-                if (const double x = grid_.x(i) * kUnitsPerMm; x >= s.low && x <= s.high) free[static_cast<std::size_t>(i)] = 1;
+                if (const double x = grid_.x(i) * kUnitsPerMm; x >= s.low && x <= s.high)
+                    free[static_cast<std::size_t>(i)] = 1;
         for (int i = 0; i < grid_.nx; ++i)
-            if (!free[static_cast<std::size_t>(i)]) surface[grid_.index(i, j)] = static_cast<float>(top), nz[grid_.index(i, j)] = 255;
+            if (!free[static_cast<std::size_t>(i)])
+                surface[grid_.index(i, j)] = static_cast<float>(top), nz[grid_.index(i, j)] = 255;
     }
 }
 
@@ -288,18 +326,21 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
     if (moves.size() < 2) return {};
     const CutterEnd end = cutter_end(tool);
     const double r = end.radius, top = cut.layer.z_top, cell_mm2 = grid_.cell * grid_.cell;
-    auto over_bottom = [&](const Move& m) { return std::array<double, 3>{to_mm(m.x), to_mm(m.y), to_mm(m.z) - z_bottom_}; };
+    auto over_bottom = [&](const Move& m) {
+        return std::array<double, 3>{to_mm(m.x), to_mm(m.y), to_mm(m.z) - z_bottom_};
+    };
     std::vector<Box> boxes((moves.size() + kBlock - 1) / kBlock), parts((moves.size() + kPart - 1) / kPart);
     for (std::size_t i = 0; i < moves.size(); ++i) {
         parts[i / kPart].add(moves[i]);
         if (i % kPart == 0 && i > 0) parts[i / kPart].add(moves[i - 1]);
     }
     for (std::size_t i = 0; i < parts.size(); ++i) boxes[i / (kBlock / kPart)].add(parts[i]);
-    // The lowest first, whatever their order is: of what they leave a cell keeps the least, and over places cut low the higher levels of a
-    // roughing need not be looked at cell by cell.
+    // The lowest first, whatever their order is: of what they leave a cell keeps the least, and over places
+    // cut low the higher levels of a roughing need not be looked at cell by cell.
     std::vector<std::uint32_t> upwards(boxes.size());
     std::iota(upwards.begin(), upwards.end(), 0U);
-    std::stable_sort(upwards.begin(), upwards.end(), [&](std::uint32_t a, std::uint32_t b) { return boxes[a].z0 < boxes[b].z0; });
+    std::stable_sort(upwards.begin(), upwards.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return boxes[a].z0 < boxes[b].z0; });
     const int bands = (grid_.ny + kBand - 1) / kBand;
     std::vector<Taken> taken(static_cast<std::size_t>(bands));
     if (trial_ != nullptr) trial_->kept_.make_room();
@@ -319,13 +360,17 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         Lost lost;
         const auto count_lost = [&] {
             lost = {};
-            before.rows([&](const float* kept, std::size_t cell, int n) { add_lost(kept, height + cell, nz + cell, n, kEmpty, lost); });
+            before.rows([&](const float* kept, std::size_t cell, int n) {
+                add_lost(kept, height + cell, nz + cell, n, kEmpty, lost);
+            });
         };
-        bool keeps = true;    // what the operation comes to, for a trial or until so much is taken that more is not asked for
+        bool keeps = true;  // what the operation comes to, for a trial or until so much is taken that more is
+                            // not asked for
         unsigned looked = 0;  // moves that were cut until then
         for (const std::uint32_t b : upwards) {
             if (misses(boxes[b])) continue;
-            for (std::size_t i = std::max<std::size_t>(1, b * kBlock); i < std::min(moves.size(), (b + 1) * kBlock); ++i) {
+            for (std::size_t i = std::max<std::size_t>(1, b * kBlock);
+                 i < std::min(moves.size(), (b + 1) * kBlock); ++i) {
                 if (i == 1 || i % kPart == 0) {
                     const Box& part_box = parts[i / kPart];
                     if (misses(part_box) || !tops.any_over(part_box, r, part_box.z0 - z_bottom_)) {
@@ -336,18 +381,21 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
                 const Move &p = moves[i - 1], &q = moves[i];
                 if (q.feed == 0) continue;
                 if (std::max(p.y, q.y) < y_low || std::min(p.y, q.y) > y_high) continue;
-                const double px = to_mm(p.x), qx = to_mm(q.x), py = to_mm(p.y), qy = to_mm(q.y), pz = to_mm(p.z), qz = to_mm(q.z);
+                const double px = to_mm(p.x), qx = to_mm(q.x), py = to_mm(p.y), qy = to_mm(q.y),
+                             pz = to_mm(p.z), qz = to_mm(q.z);
                 if (std::min(pz, qz) >= top) continue;
                 std::array<int, 4> cells{};
-                if (!tops.cut_over(std::min(px, qx) - r, std::max(px, qx) + r, std::min(py, qy) - r, std::max(py, qy) + r,
-                                   std::min(pz, qz) - z_bottom_, cells))
+                if (!tops.cut_over(std::min(px, qx) - r, std::max(px, qx) + r, std::min(py, qy) - r,
+                                   std::max(py, qy) + r, std::min(pz, qz) - z_bottom_, cells))
                     continue;
                 if (keeps) before.keep(height, cells[0], cells[1], cells[2], cells[3]);
                 std::array<double, 3> previous{}, next{};
                 ChainedSweep chain;
                 if (p.feed != 0 && i > 1) previous = over_bottom(moves[i - 2]), chain.before = &previous;
-                if (i + 1 < moves.size() && moves[i + 1].feed != 0) next = over_bottom(moves[i + 1]), chain.after = &next;
-                sweep_above(part, end, over_bottom(p), over_bottom(q), StandingHeights{height, 0}, lowering, chain);
+                if (i + 1 < moves.size() && moves[i + 1].feed != 0)
+                    next = over_bottom(moves[i + 1]), chain.after = &next;
+                sweep_above(part, end, over_bottom(p), over_bottom(q), StandingHeights{height, 0}, lowering,
+                            chain);
                 if (!keeps || trial_ != nullptr || !std::has_single_bit(++looked)) continue;
                 count_lost();
                 keeps = lost.cells < Taken::kFew || lost.sum * cell_mm2 < Taken::kTrace;
@@ -358,7 +406,8 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
         if (trial_ != nullptr) trial_->kept_.add(first / KeptTiles::kTile, before);
     });
     Taken all;
-    for (const Taken& t : taken) all.most = std::max(all.most, t.most), all.mm3 += t.mm3, all.cells += t.cells;
+    for (const Taken& t : taken)
+        all.most = std::max(all.most, t.most), all.mm3 += t.mm3, all.cells += t.cells;
     return all;
 }
 
@@ -367,34 +416,46 @@ double LayerStock::area_over(Context& context, double limit) const {
         context, static_cast<std::size_t>(grid_.ny), std::size_t{16}, std::size_t{0},
         [&](std::size_t begin, std::size_t end) {
             std::size_t over = 0;
-            for (std::size_t j = begin; j < end; ++j) each_left(static_cast<int>(j), limit, [&](int) { ++over; });
+            for (std::size_t j = begin; j < end; ++j)
+                each_left(static_cast<int>(j), limit, [&](int) { ++over; });
             return over;
         },
         std::plus<>());
     return static_cast<double>(cells) * grid_.cell * grid_.cell;
 }
 
-void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) { cut_along(end, {x, y, tip_z}, {x, y, tip_z}); }
+void LayerStock::cut_at(const CutterEnd& end, double x, double y, double tip_z) {
+    cut_along(end, {x, y, tip_z}, {x, y, tip_z});
+}
 
-void LayerStock::cut_along(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to) {
+void LayerStock::cut_along(const CutterEnd& end, const std::array<double, 3>& from,
+                           const std::array<double, 3>& to) {
     float* const height = memory_.height.data();
     if (trial_ != nullptr) {
         const auto cell = [&](double mm, double begin, int cells) {
-            return static_cast<int>(std::clamp((mm - begin) / grid_.cell, 0.0, static_cast<double>(cells - 1)));
+            return static_cast<int>(
+                std::clamp((mm - begin) / grid_.cell, 0.0, static_cast<double>(cells - 1)));
         };
-        trial_->kept_.keep(
-            height, cell(std::min(from[0], to[0]) - end.radius, grid_.x0, grid_.nx), cell(std::max(from[0], to[0]) + end.radius, grid_.x0, grid_.nx),
-            cell(std::min(from[1], to[1]) - end.radius, grid_.y0, grid_.ny), cell(std::max(from[1], to[1]) + end.radius, grid_.y0, grid_.ny));
+        trial_->kept_.keep(height, cell(std::min(from[0], to[0]) - end.radius, grid_.x0, grid_.nx),
+                           cell(std::max(from[0], to[0]) + end.radius, grid_.x0, grid_.nx),
+                           cell(std::min(from[1], to[1]) - end.radius, grid_.y0, grid_.ny),
+                           cell(std::max(from[1], to[1]) + end.radius, grid_.y0, grid_.ny));
     }
-    const auto lower = [&](std::size_t c, double z) { height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_))); };
+    const auto lower = [&](std::size_t c, double z) {
+        height[c] = std::min(height[c], static_cast<float>(std::max(0.0, z - z_bottom_)));
+    };
     if (end.form != CutterEnd::Form::ball) return sweep(grid_, end, from, to, lower);
     // What stands a hair higher is asked too: heights over this bottom are compared, not z.
     constexpr double hair = 1e-3;
     struct LoweringTo {
         float* height;
         double bottom;
-        void operator()(std::size_t cell, double z) { height[cell] = std::min(height[cell], static_cast<float>(std::max(0.0, z - bottom))); }
-        void row(std::size_t first, int n, const double* h, double /*lowest*/) { lower_to(height + first, n, h, bottom); }
+        void operator()(std::size_t cell, double z) {
+            height[cell] = std::min(height[cell], static_cast<float>(std::max(0.0, z - bottom)));
+        }
+        void row(std::size_t first, int n, const double* h, double /*lowest*/) {
+            lower_to(height + first, n, h, bottom);
+        }
     } lowering{height, z_bottom_};
     sweep_above(grid_, end, from, to, StandingHeights{height, z_bottom_ + hair}, lowering);
 }

@@ -10,9 +10,10 @@ namespace slabwright {
 
 namespace {
 
-// Runs that lie within `reach` (0.1 µm) of each other, on whichever level, belong to one region, and so do those that a chain
-// of such neighbours joins (some that lie up to four times as far apart as well). Regions may be cut one after the other, each
-// from its top down. Gives the lowest run of each run's region, runs counted through all levels.
+// Runs that lie within `reach` (0.1 µm) of each other, on whichever level, belong to one region, and so do
+// those that a chain of such neighbours joins (some that lie up to four times as far apart as well). Regions
+// may be cut one after the other, each from its top down. Gives the lowest run of each run's region, runs
+// counted through all levels.
 std::vector<std::uint32_t> regions(const std::vector<std::vector<LevelRun>>& levels, std::int32_t reach) {
     std::vector<std::uint32_t> parent;
     auto root = [&](std::uint32_t k) {
@@ -35,19 +36,27 @@ std::vector<std::uint32_t> regions(const std::vector<std::vector<LevelRun>>& lev
             parent.push_back(id);
             for (std::size_t k = 0; k < run.points.size(); ++k) {
                 const PathPoint &p = run.points[k], &q = run.points[k == 0 ? 0 : k - 1];
-                const int steps = 1 + static_cast<int>(std::hypot(static_cast<double>(p.x) - q.x, static_cast<double>(p.y) - q.y) / reach * 2);
+                const int steps = 1 + static_cast<int>(std::hypot(static_cast<double>(p.x) - q.x,
+                                                                  static_cast<double>(p.y) - q.y) /
+                                                       reach * 2);
                 for (int s = 0; s < steps; ++s) {
                     const double t = static_cast<double>(s) / steps;
-                    const Visit v{cell(p.x + t * (static_cast<double>(q.x) - p.x)), cell(p.y + t * (static_cast<double>(q.y) - p.y)), id};
-                    if (cells.empty() || cells.back().x != v.x || cells.back().y != v.y || cells.back().run != id) cells.push_back(v);
+                    const Visit v{cell(p.x + t * (static_cast<double>(q.x) - p.x)),
+                                  cell(p.y + t * (static_cast<double>(q.y) - p.y)), id};
+                    if (cells.empty() || cells.back().x != v.x || cells.back().y != v.y ||
+                        cells.back().run != id)
+                        cells.push_back(v);
                 }
             }
         }
-    std::sort(cells.begin(), cells.end(), [](const Visit& a, const Visit& b) { return std::tie(a.x, a.y, a.run) < std::tie(b.x, b.y, b.run); });
+    std::sort(cells.begin(), cells.end(), [](const Visit& a, const Visit& b) {
+        return std::tie(a.x, a.y, a.run) < std::tie(b.x, b.y, b.run);
+    });
     auto first_of = [&](std::int32_t x, std::int32_t y) {
-        return std::lower_bound(cells.begin(), cells.end(), std::pair{x, y}, [](const Visit& v, const std::pair<std::int32_t, std::int32_t>& at) {
-            return std::pair{v.x, v.y} < at;
-        });
+        return std::lower_bound(cells.begin(), cells.end(), std::pair{x, y},
+                                [](const Visit& v, const std::pair<std::int32_t, std::int32_t>& at) {
+                                    return std::pair{v.x, v.y} < at;
+                                });
     };
     for (std::size_t k = 0; k < cells.size(); ++k) {
         if (k > 0 && cells[k - 1].x == cells[k].x && cells[k - 1].y == cells[k].y) {
@@ -56,16 +65,19 @@ std::vector<std::uint32_t> regions(const std::vector<std::vector<LevelRun>>& lev
         }
         for (const auto& [dx, dy] : {std::pair{0, 1}, {1, -1}, {1, 0}, {1, 1}}) {
             const auto near = first_of(cells[k].x + dx, cells[k].y + dy);
-            if (near != cells.end() && near->x == cells[k].x + dx && near->y == cells[k].y + dy) join(near->run, cells[k].run);
+            if (near != cells.end() && near->x == cells[k].x + dx && near->y == cells[k].y + dy)
+                join(near->run, cells[k].run);
         }
     }
     for (std::uint32_t k = 0; k < parent.size(); ++k) parent[k] = root(k);
     return parent;
 }
 
-// One level of one region, the nearest run first; `runs` has as many entries as there are beginnings of theirs. Open runs keep
-// their direction, with the part on the right; closed ones are begun at their point nearest to the tool.
-void cut_level(PathBuilder& path, const LayerCut& cut, const DropIndex& part, double chord, bool leads, std::vector<LevelRun*>& runs) {
+// One level of one region, the nearest run first; `runs` has as many entries as there are beginnings of
+// theirs. Open runs keep their direction, with the part on the right; closed ones are begun at their point
+// nearest to the tool.
+void cut_level(PathBuilder& path, const LayerCut& cut, const DropIndex& part, double chord, bool leads,
+               std::vector<LevelRun*>& runs) {
     std::vector<Beginning> beginnings;
     for (std::uint32_t i = 0; i < runs.size(); ++i) {
         const std::vector<PathPoint>& points = runs[i]->points;
@@ -75,7 +87,9 @@ void cut_level(PathBuilder& path, const LayerCut& cut, const DropIndex& part, do
         }
         double since = 1e300;
         for (std::uint32_t p = 0; p + 1 < points.size(); ++p) {
-            if (p > 0) since += std::hypot(static_cast<double>(points[p].x) - points[p - 1].x, static_cast<double>(points[p].y) - points[p - 1].y);
+            if (p > 0)
+                since += std::hypot(static_cast<double>(points[p].x) - points[p - 1].x,
+                                    static_cast<double>(points[p].y) - points[p - 1].y);
             if (since < 2 * kUnitsPerMm) continue;
             since = 0;
             const Point2 at{points[p].x, points[p].y};
@@ -97,7 +111,8 @@ void cut_level(PathBuilder& path, const LayerCut& cut, const DropIndex& part, do
             for (std::size_t attempt = 0; attempt <= tries; ++attempt) {
                 const std::size_t first = (next.place + attempt % tries * n / tries) % n;
                 points.assign(run.points.begin(), run.points.end() - 1);
-                std::rotate(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(first), points.end());
+                std::rotate(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(first),
+                            points.end());
                 points.push_back(points.front());
                 if (!leads || add_leads(path, cut, part, chord, points)) break;
             }
@@ -108,8 +123,8 @@ void cut_level(PathBuilder& path, const LayerCut& cut, const DropIndex& part, do
 
 }  // namespace
 
-void append_level_runs(const Contours& contours, std::size_t c, std::int32_t z, const std::vector<char>& wanted, double tolerance,
-                       std::vector<LevelRun>& out) {
+void append_level_runs(const Contours& contours, std::size_t c, std::int32_t z,
+                       const std::vector<char>& wanted, double tolerance, std::vector<LevelRun>& out) {
     const std::size_t first = contours.starts[c], n = contours.starts[c + 1] - first;
     if (n < 2) return;
     std::size_t start = n;
@@ -140,8 +155,8 @@ void append_level_runs(const Contours& contours, std::size_t c, std::int32_t z, 
     }
 }
 
-void cut_levels(PathBuilder& path, const LayerCut& cut, const Tool& tool, const DropIndex& part, std::vector<std::vector<LevelRun>>& levels,
-                bool leads) {
+void cut_levels(PathBuilder& path, const LayerCut& cut, const Tool& tool, const DropIndex& part,
+                std::vector<std::vector<LevelRun>>& levels, bool leads) {
     const double chord = safe_chord_mm(tool.diameter / 2, cut.job.tolerances.gouge);
     const std::vector<std::uint32_t> region = regions(levels, to_units(tool.diameter));
     struct Member {
@@ -152,15 +167,19 @@ void cut_levels(PathBuilder& path, const LayerCut& cut, const Tool& tool, const 
     std::vector<Member> members;
     for (std::size_t l = 0; l < levels.size(); ++l)
         for (LevelRun& run : levels[l]) members.push_back({region[members.size()], l, &run});
-    std::stable_sort(members.begin(), members.end(),
-                     [](const Member& a, const Member& b) { return std::tie(a.region, a.level) < std::tie(b.region, b.level); });
+    std::stable_sort(members.begin(), members.end(), [](const Member& a, const Member& b) {
+        return std::tie(a.region, a.level) < std::tie(b.region, b.level);
+    });
     std::vector<std::size_t> first;
     std::vector<Beginning> beginnings;
     for (std::size_t k = 0; k < members.size(); ++k) {
         if (k == 0 || members[k].region != members[k - 1].region) first.push_back(k);
         if (members[k].level != members[first.back()].level) continue;
         const PathPoint& p = members[k].run->points.front();
-        beginnings.push_back({{p.x, p.y}, {p.x, p.y}, static_cast<std::uint32_t>(first.size() - 1), static_cast<std::uint32_t>(k)});
+        beginnings.push_back({{p.x, p.y},
+                              {p.x, p.y},
+                              static_cast<std::uint32_t>(first.size() - 1),
+                              static_cast<std::uint32_t>(k)});
     }
     NearestRuns left(std::move(beginnings), first.size());
     first.push_back(members.size());

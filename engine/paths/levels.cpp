@@ -1,5 +1,5 @@
-// Finishing by level contours: the ball end mill on slopes of 45° and more, the flat end mill on vertical walls. Of every
-// contour only the stretches are cut whose contact lies on such a surface, within the layer.
+// Finishing by level contours: the ball end mill on slopes of 45° and more, the flat end mill on vertical
+// walls. Of every contour only the stretches are cut whose contact lies on such a surface, within the layer.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -17,14 +17,17 @@ namespace slabwright {
 
 namespace {
 
-// Whether a ball that touches a wall this far over the layer's bottom, and none below, leaves more than the cusp where the wall
-// reaches the bottom: the pass under it is needed then, though its contact lies in the layer below, on the wall that is there already.
+// Whether a ball that touches a wall this far over the layer's bottom, and none below, leaves more than the
+// cusp where the wall reaches the bottom: the pass under it is needed then, though its contact lies in the
+// layer below, on the wall that is there already.
 bool leaves_foot(double r, double nz, double above_bottom, double cusp) {
     const double along = above_bottom / std::sqrt(1 - nz * nz);
     return along > 0 && (along >= r || r - std::sqrt(r * r - along * along) > cusp);
 }
 
-double vertical_nz(const LayerCut& cut) { return std::cos(cut.job.cutting.vertical_deg * std::numbers::pi / 180); }
+double vertical_nz(const LayerCut& cut) {
+    return std::cos(cut.job.cutting.vertical_deg * std::numbers::pi / 180);
+}
 
 }  // namespace
 
@@ -34,7 +37,9 @@ Operation finish_walls(const LayerCut& cut) {
     const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut);
     double low = 1e300, high = -1e300;  // of the vertical facets
     for (const SolidFacet& f : cut.solid.facets) {
-        if (f.nz > vertical || f.z_max <= cut.layer.z_bottom || (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0)) continue;
+        if (f.nz > vertical || f.z_max <= cut.layer.z_bottom ||
+            (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0))
+            continue;
         low = std::min(low, std::max(f.z_min, cut.layer.z_bottom));
         high = std::max(high, f.z_max);
     }
@@ -60,8 +65,8 @@ Operation finish_walls(const LayerCut& cut) {
     }
     const Cutter cutter{Cutter::Profile::flat, r};
     const std::vector<Contours> contours = cut.contours(cutter, tips, safe_pitch(r, gouge));
-    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
-                     cut.layer.z_top + 2);
+    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
+                     cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     const DropIndex& part = cut.drops(cutter);
     path.know(cut.around(tool, &part));
     std::vector<std::vector<LevelRun>> runs(tips.size());
@@ -69,8 +74,10 @@ Operation finish_walls(const LayerCut& cut) {
         for (std::size_t c = 0; c < contours[i].size(); ++c) {
             std::vector<char> wanted;
             for (std::size_t k = contours[i].starts[c]; k < contours[i].starts[c + 1]; ++k)
-                wanted.push_back(contours[i].nz[k] <= vertical);  // under an overhang the shadow's border is the wall
-            append_level_runs(contours[i], c, to_units(tips[i]), wanted, simplify_tolerance_units(gouge), runs[i]);
+                wanted.push_back(contours[i].nz[k] <=
+                                 vertical);  // under an overhang the shadow's border is the wall
+            append_level_runs(contours[i], c, to_units(tips[i]), wanted, simplify_tolerance_units(gouge),
+                              runs[i]);
         }
     cut_levels(path, cut, tool, part, runs, true);
     path.finish();
@@ -87,14 +94,18 @@ struct SpacedLevel {
 };
 
 // Bands of α of the layer in which levels cut.
-std::vector<StepBand> bands_of(const LayerCut& cut, std::span<const SpacedLevel> levels, double at_least, double least_height) {
+std::vector<StepBand> bands_of(const LayerCut& cut, std::span<const SpacedLevel> levels, double at_least,
+                               double least_height) {
     constexpr double same = std::numbers::pi / 180;
     std::vector<StepBand> bands;
     for (const AlphaMap::Band& band : cut.alpha.bands(at_least, same, least_height)) {
         double step = 0;
         for (const SpacedLevel& level : levels)
-            if (level.cuts && level.contact >= band.z_low && level.contact < band.z_high) step = std::max(step, level.step);
-        if (step > 0) bands.push_back({std::max(band.z_low, cut.layer.z_bottom), band.z_high, band.alpha * 180 / std::numbers::pi, step});
+            if (level.cuts && level.contact >= band.z_low && level.contact < band.z_high)
+                step = std::max(step, level.step);
+        if (step > 0)
+            bands.push_back({std::max(band.z_low, cut.layer.z_bottom), band.z_high,
+                             band.alpha * 180 / std::numbers::pi, step});
     }
     std::erase_if(bands, [](const StepBand& band) { return band.z_low >= band.z_high; });
     return bands;
@@ -105,7 +116,9 @@ std::vector<double> foot_floors(const LayerCut& cut) {
     std::vector<double> floors;
     for (const Flat& flat : cut.layer.feet) floors.push_back(flat.highest);
     std::sort(floors.begin(), floors.end(), std::greater<>());
-    floors.erase(std::unique(floors.begin(), floors.end(), [](double a, double b) { return a - b < kSameFloor; }), floors.end());
+    floors.erase(
+        std::unique(floors.begin(), floors.end(), [](double a, double b) { return a - b < kSameFloor; }),
+        floors.end());
     return floors;
 }
 
@@ -114,14 +127,17 @@ std::vector<double> foot_floors(const LayerCut& cut) {
 Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
     const Tool& tool = cut.layer.tools.finish;
     Operation op = cut.operation(OperationKind::finish, "level contours", tool);
-    const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut), degree = std::numbers::pi / 180;
+    const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut),
+                 degree = std::numbers::pi / 180;
     const FinishSlopes slopes = finish_slopes(cut.job.cutting);
     const double split = slopes.levels_from;
     if (split > std::numbers::pi / 2) return op;
     double low = 1e300, high = -1e300;
     bool any_vertical = false;
     for (const SolidFacet& f : cut.solid.facets) {
-        if (f.nz > std::cos(split) || f.z_max <= cut.layer.z_bottom || (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0)) continue;
+        if (f.nz > std::cos(split) || f.z_max <= cut.layer.z_bottom ||
+            (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0))
+            continue;
         any_vertical |= f.nz <= vertical;
         low = std::min(low, std::max(f.z_min, cut.layer.z_bottom));
         high = std::max(high, f.z_max);
@@ -135,7 +151,8 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     double bite = 0;
     for (double z = high; z > lowest;) {
         const bool everywhere = cut.job.cutting.uniform_steps;
-        const double alpha = cut.least_slope(everywhere ? low : z - tool.stepdown_max, everywhere ? high : std::min(high, z + r), slopes.levels_keep);
+        const double alpha = cut.least_slope(everywhere ? low : z - tool.stepdown_max,
+                                             everywhere ? high : std::min(high, z + r), slopes.levels_keep);
         double step = std::min(ball_level_stepdown(r, alpha, cut.job.tolerances.cusp), tool.stepdown_max);
         if (step < cut.job.cutting.min_stepdown) {
             bite = std::max(bite, ball_level_cusp(r, alpha, cut.job.cutting.min_stepdown));
@@ -149,11 +166,12 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const double foot_nz = std::cos(80 * degree);
 
     if (bite > 0)
-        diagnostics.push_back({Severity::warning,
-                               "finish.stepdown_floor",
-                               fmt::format("layer {}: the smallest stepdown {:.2f} mm leaves a cusp of up to {:.3f} mm", cut.layer.index,
-                                           cut.job.cutting.min_stepdown, bite),
-                               {}});
+        diagnostics.push_back(
+            {Severity::warning,
+             "finish.stepdown_floor",
+             fmt::format("layer {}: the smallest stepdown {:.2f} mm leaves a cusp of up to {:.3f} mm",
+                         cut.layer.index, cut.job.cutting.min_stepdown, bite),
+             {}});
 
     const Cutter cutter{Cutter::Profile::ball, r};
     const FibreGrid grid = fibre_grid(cut.solid, cutter, safe_pitch(r, gouge));
@@ -165,8 +183,10 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         flat_r = cut.layer.tools.rough.diameter / 2;
         flat = std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
     }
-    // What of a level is cut: `above`, the tip one level higher, where there is one; `floor`, on whose walls' feet alone, where it is for them.
-    auto append_wanted = [&](const Contours& level, double tip, std::optional<double> above, const NearFloor* floor, std::vector<LevelRun>& out) {
+    // What of a level is cut: `above`, the tip one level higher, where there is one; `floor`, on whose walls'
+    // feet alone, where it is for them.
+    auto append_wanted = [&](const Contours& level, double tip, std::optional<double> above,
+                             const NearFloor* floor, std::vector<LevelRun>& out) {
         for (std::size_t c = 0; c < level.size(); ++c) {
             const std::size_t first = level.starts[c], n = level.starts[c + 1] - first;
             std::vector<char> wanted(n, 0);
@@ -174,25 +194,32 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 const double nz = std::max(0.0F, level.nz[first + k]), contact = tip + r * (1 - nz);
                 if (nz > std::cos(split) || contact > cut.layer.z_top + 1e-6) continue;
                 if (contact < cut.layer.z_bottom - 0.05 &&
-                    (!above || !leaves_foot(r, nz, *above + r * (1 - nz) - cut.layer.z_bottom, cut.job.tolerances.cusp)))
+                    (!above || !leaves_foot(r, nz, *above + r * (1 - nz) - cut.layer.z_bottom,
+                                            cut.job.tolerances.cusp)))
                     continue;
                 if (floor && (nz < foot_nz || !(*floor)(level.points[first + k]))) continue;
                 wanted[k] = 1;
                 if (!flat || nz > vertical) continue;
-                const Point2 a = level.points[first + (k + n - 1) % n], p = level.points[first + k], b = level.points[first + (k + 1) % n];
-                const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y, l = std::hypot(dx, dy);
+                const Point2 a = level.points[first + (k + n - 1) % n], p = level.points[first + k],
+                             b = level.points[first + (k + 1) % n];
+                const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y,
+                             l = std::hypot(dx, dy);
                 if (l == 0) continue;
                 // The solid is on the right, so the free side is on the left.
-                if (!flat->stands_over(to_mm(p.x) - dy / l * (flat_r - r), to_mm(p.y) + dx / l * (flat_r - r), contact)) wanted[k] = 0;
+                if (!flat->stands_over(to_mm(p.x) - dy / l * (flat_r - r), to_mm(p.y) + dx / l * (flat_r - r),
+                                       contact))
+                    wanted[k] = 0;
             }
             append_level_runs(level, c, to_units(tip), wanted, simplify_tolerance_units(gouge), out);
         }
     };
     std::vector<std::vector<LevelRun>> runs(tips.size());
-    parallel_each(cut.context, tips.size(),
-                  [&](std::size_t i) { append_wanted(contours[i], tips[i], i > 0 ? std::optional(tips[i - 1]) : std::nullopt, nullptr, runs[i]); });
-    // The foot of a wall on a floor is a hollow: the ball turns from wall to floor within a small part of a step. Levels
-    // close above every floor cut what lies there, and only that.
+    parallel_each(cut.context, tips.size(), [&](std::size_t i) {
+        append_wanted(contours[i], tips[i], i > 0 ? std::optional(tips[i - 1]) : std::nullopt, nullptr,
+                      runs[i]);
+    });
+    // The foot of a wall on a floor is a hollow: the ball turns from wall to floor within a small part of a
+    // step. Levels close above every floor cut what lies there, and only that.
     struct FootLevel {
         double tip;
         std::vector<LevelRun> runs;
@@ -220,18 +247,21 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         const NearFloor near(cut, facets, r, grid);
         const LayerSolid around = solid_near(cut.context, cut.solid, facets, 2 * (r + to_mm(grid.pitch)));
         const std::vector<Contours> level =
-            contours_near(cut.context, around, close, std::span(foot_inside).subspan(foot.first, close.size()), cutter, grid);
+            contours_near(cut.context, around, close,
+                          std::span(foot_inside).subspan(foot.first, close.size()), cutter, grid);
         const std::size_t begin = feet.size();
         for (const double tip : close) feet.push_back({tip, {}});
-        parallel_each(cut.context, close.size(),
-                      [&](std::size_t i) { append_wanted(level[i], close[i], std::nullopt, &near, feet[begin + i].runs); });
+        parallel_each(cut.context, close.size(), [&](std::size_t i) {
+            append_wanted(level[i], close[i], std::nullopt, &near, feet[begin + i].runs);
+        });
     }
-    std::stable_sort(feet.begin(), feet.end(), [](const FootLevel& a, const FootLevel& b) { return a.tip > b.tip; });
+    std::stable_sort(feet.begin(), feet.end(),
+                     [](const FootLevel& a, const FootLevel& b) { return a.tip > b.tip; });
     for (FootLevel& foot : feet) runs.push_back(std::move(foot.runs));
     for (std::size_t i = 0; i < tips.size(); ++i) spaced[i].cuts = !runs[i].empty();
     op.bands = bands_of(cut, spaced, slopes.levels_keep, tool.stepdown_max);
-    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
-                     cut.layer.z_top + 2);
+    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
+                     cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     const DropIndex& part = cut.drops(cutter);
     path.know(cut.around(tool, &part));
     cut_levels(path, cut, tool, part, runs, true);

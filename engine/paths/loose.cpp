@@ -1,6 +1,7 @@
-// Backwards in time the slab grows: every move puts back what it cut through. Pieces only ever join, so a union-find follows them. A
-// piece that hangs on nothing, and is joined to what is held by putting back one move's cut, is what that move cut off. All that is held is
-// one piece from the start, and nearly every cell is put back beside it.
+// Backwards in time the slab grows: every move puts back what it cut through. Pieces only ever join, so a
+// union-find follows them. A piece that hangs on nothing, and is joined to what is held by putting back one
+// move's cut, is what that move cut off. All that is held is one piece from the start, and nearly every cell
+// is put back beside it.
 #include "engine/paths/loose.h"
 
 #include <algorithm>
@@ -31,7 +32,8 @@ struct CutThrough {
     }
 };
 
-// Pieces of cells that are there, joined as they grow; what is held is the first of them, whose cells are not counted.
+// Pieces of cells that are there, joined as they grow; what is held is the first of them, whose cells are not
+// counted.
 class Pieces {
 public:
     static constexpr std::uint32_t kNone = kNever, kHeld = 0;
@@ -71,23 +73,27 @@ private:
 
 }  // namespace
 
-std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std::span<const Operation> operations, std::span<const Tool> tools,
+std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab,
+                                     std::span<const Operation> operations, std::span<const Tool> tools,
                                      double smallest_mm2, double cell) {
     const double width = slab.max[0] - slab.min[0], depth = slab.max[1] - slab.min[1];
     if (!(cell > 0)) cell = std::max(1.0, std::sqrt(width * depth / kMostCells));
-    const CellGrid grid{slab.min[0] + cell / 2, slab.min[1] + cell / 2, cell, std::max(1, static_cast<int>(std::ceil(width / cell - 0.5))),
+    const CellGrid grid{slab.min[0] + cell / 2, slab.min[1] + cell / 2, cell,
+                        std::max(1, static_cast<int>(std::ceil(width / cell - 0.5))),
                         std::max(1, static_cast<int>(std::ceil(depth / cell - 0.5)))};
     const auto nx = static_cast<std::size_t>(grid.nx);
-    const MemoryCharge memory(context, grid.count() * (3 * sizeof(std::uint32_t) + sizeof(float) + 1), "loose pieces");
+    const MemoryCharge memory(context, grid.count() * (3 * sizeof(std::uint32_t) + sizeof(float) + 1),
+                              "loose pieces");
 
     BulkVector<std::uint32_t> when(grid.count(), kNever);
     std::vector<std::pair<std::size_t, std::size_t>> place;  // of each counted move
-    double web = slab.z_top - slab.z_bottom;                 // how thick the slab still is when the last level begins
+    double web = slab.z_top - slab.z_bottom;  // how thick the slab still is when the last level begins
     {
         BulkVector<float> uncut(grid.count(), std::numeric_limits<float>::max());
         for (std::size_t o = 0; o < operations.size(); ++o) {
             const Operation& op = operations[o];
-            const auto tool = std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+            const auto tool =
+                std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == op.tool; });
             if (op.kind == OperationKind::face || tool == tools.end()) continue;
             context.throw_if_cancelled();
             const CutterEnd end = cutter_end(*tool);
@@ -97,12 +103,15 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
                 const double low = to_mm(std::min(a.z, b.z)) - slab.z_bottom;
                 if (op.kind == OperationKind::rough && a.z == b.z && low > kThrough) web = std::min(web, low);
                 if (low > kThrough) continue;
-                CutThrough through{when.data(), uncut.data(), slab.z_bottom + kThrough, static_cast<std::uint32_t>(place.size())};
+                CutThrough through{when.data(), uncut.data(), slab.z_bottom + kThrough,
+                                   static_cast<std::uint32_t>(place.size())};
                 place.emplace_back(o, i);
-                // Where a level move of a flat cutter begins, the move before it has cut all that the cutter covers.
+                // Where a level move of a flat cutter begins, the move before it has cut all that the cutter
+                // covers.
                 const bool been = i > 1 && op.moves[i - 1].feed != 0 && a.z == b.z;
-                sweep_above(grid, end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)}, {to_mm(b.x), to_mm(b.y), to_mm(b.z)}, StandingHeights{uncut.data(), 0},
-                            through, {.been = been && end.form == CutterEnd::Form::flat});
+                sweep_above(grid, end, {to_mm(a.x), to_mm(a.y), to_mm(a.z)},
+                            {to_mm(b.x), to_mm(b.y), to_mm(b.z)}, StandingHeights{uncut.data(), 0}, through,
+                            {.been = been && end.form == CutterEnd::Form::flat});
             }
         }
     }
@@ -112,14 +121,18 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
         const std::vector<std::vector<Span>> held = line_spans(*region, rows_of(grid));
         for (int j = 0; j < grid.ny; ++j)
             for (const Span& s : held[static_cast<std::size_t>(j)]) {
-                const int i0 = std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid.x0) / cell)));
-                const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((s.high / kUnitsPerMm - grid.x0) / cell)));
+                const int i0 =
+                    std::max(0, static_cast<int>(std::ceil((s.low / kUnitsPerMm - grid.x0) / cell)));
+                const int i1 = std::min(
+                    grid.nx - 1, static_cast<int>(std::floor((s.high / kUnitsPerMm - grid.x0) / cell)));
                 if (i0 <= i1) std::fill_n(holds.data() + grid.index(i0, j), i1 - i0 + 1, char{1});
             }
     }
 
     Pieces pieces;
-    BulkVector<std::uint32_t> of(grid.count(), Pieces::kNone);  // by cell: its piece, or what has become a part of one; none: not there yet
+    BulkVector<std::uint32_t> of(
+        grid.count(),
+        Pieces::kNone);  // by cell: its piece, or what has become a part of one; none: not there yet
     // Cells that are never cut through are there from the start, stretch by stretch of a row.
     for (std::size_t row = 0; row < grid.count(); row += nx)
         for (std::size_t i = 0; i < nx;) {
@@ -129,7 +142,8 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
             }
             const std::size_t begin = i;
             while (i < nx && when[row + i] == kNever) ++i;
-            const bool held = std::find(holds.data() + row + begin, holds.data() + row + i, char{1}) != holds.data() + row + i;
+            const bool held = std::find(holds.data() + row + begin, holds.data() + row + i, char{1}) !=
+                              holds.data() + row + i;
             std::uint32_t piece = held ? Pieces::kHeld : Pieces::kNone;
             std::uint32_t last = Pieces::kNone;
             for (std::size_t k = begin; k < i && row > 0; ++k) {
@@ -154,7 +168,8 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
         for (std::size_t t = 1; t < begins.size(); ++t) begins[t] += begins[t - 1];
         order.resize(begins.back());
         for (std::size_t c = 0; c < when.size(); ++c)
-            if (when[c] != kNever) order[begins[place.size() - 1 - when[c]]++] = static_cast<std::uint32_t>(c);
+            if (when[c] != kNever)
+                order[begins[place.size() - 1 - when[c]]++] = static_cast<std::uint32_t>(c);
     }
     const auto each_neighbour = [&](std::size_t c, std::size_t i, auto&& fn) {
         if (i > 0 && of[c - 1] != Pieces::kNone) fn(of[c - 1]);
@@ -198,7 +213,8 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std
             const double area = cells * cell * cell;
             if (area < smallest_mm2 || pieces.root(beside[k]) != Pieces::kHeld) continue;
             const auto [o, i] = place[now];
-            found.push_back({area, p.cut_at_all ? web : slab.z_top - slab.z_bottom, grid.x0 + cell * (static_cast<double>(p.i) / cells),
+            found.push_back({area, p.cut_at_all ? web : slab.z_top - slab.z_bottom,
+                             grid.x0 + cell * (static_cast<double>(p.i) / cells),
                              grid.y0 + cell * (static_cast<double>(p.j) / cells), o, i});
         }
         first = last;

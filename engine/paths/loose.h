@@ -1,5 +1,6 @@
-// Pieces of waste that come loose while a layer is cut (method.md section 11, Breakthrough). Nothing of how the paths were made
-// is known here: the slab just above its layer's bottom is drawn on a grid, and the moves that cut it through are run backwards.
+// Pieces of waste that come loose while a layer is cut (method.md section 11, Breakthrough). Nothing of how
+// the paths were made is known here: the slab just above its layer's bottom is drawn on a grid, and the moves
+// that cut it through are run backwards.
 #pragma once
 
 #include <array>
@@ -30,11 +31,15 @@ struct LoosePiece {
 /// Pieces smaller than this are chips, mm².
 inline constexpr double kChip = 20;
 
-/// The pieces of at least `smallest_mm2` that the operations cut off, in the order in which they come loose. Waste is held
-/// when it hangs together, side by side, with what stays or with waste that lies on what is below.
-/// @param operations of one layer in the order of execution, straight moves only; face milling cuts nothing through
+/// The pieces of at least `smallest_mm2` that the operations cut off, in the order in which they come loose.
+/// Waste is held when it hangs together, side by side, with what stays or with waste that lies on what is
+/// below.
+/// @param operations of one layer in the order of execution, straight moves only; face milling cuts nothing
+/// through
 /// @param cell mm between the grid's points; 0: 1 mm, coarser over slabs of more than 4 m²
-[[nodiscard]] std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab, std::span<const Operation> operations,
-                                                   std::span<const Tool> tools, double smallest_mm2 = kChip, double cell = 0);
+[[nodiscard]] std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab,
+                                                   std::span<const Operation> operations,
+                                                   std::span<const Tool> tools, double smallest_mm2 = kChip,
+                                                   double cell = 0);
 
 }  // namespace slabwright

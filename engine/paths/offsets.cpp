@@ -1,5 +1,5 @@
-// Finishing by projected offsets (SHAPING 3): the border of what is to be finished is offset inwards again and again by one
-// step-over, and the ball is dropped on the surface along these curves.
+// Finishing by projected offsets (SHAPING 3): the border of what is to be finished is offset inwards again
+// and again by one step-over, and the ball is dropped on the surface along these curves.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -24,19 +24,23 @@ Loops outline(const MeshView& mesh, const std::vector<std::uint32_t>& chosen) {
     for (const std::uint32_t f : chosen)
         for (int k = 0; k < 3; ++k) edges.push_back({mesh.facets[f][k], mesh.facets[f][(k + 1) % 3]});
     auto key = [](const Edge& e) { return std::pair(std::min(e.from, e.to), std::max(e.from, e.to)); };
-    std::sort(edges.begin(), edges.end(), [&](const Edge& a, const Edge& b) { return std::pair(key(a), a.from) < std::pair(key(b), b.from); });
+    std::sort(edges.begin(), edges.end(), [&](const Edge& a, const Edge& b) {
+        return std::pair(key(a), a.from) < std::pair(key(b), b.from);
+    });
     std::vector<Edge> border;
     for (std::size_t i = 0; i < edges.size();) {
         std::size_t end = i;
         std::ptrdiff_t forward = 0;
-        for (; end < edges.size() && key(edges[end]) == key(edges[i]); ++end) forward += edges[end].from < edges[end].to ? 1 : -1;
+        for (; end < edges.size() && key(edges[end]) == key(edges[i]); ++end)
+            forward += edges[end].from < edges[end].to ? 1 : -1;
         const auto [low, high] = key(edges[i]);
         for (; forward > 0; --forward) border.push_back({low, high});
         for (; forward < 0; ++forward) border.push_back({high, low});
         i = end;
     }
     // As many edges of the border leave a vertex as come to it, so any chain that goes on closes.
-    std::sort(border.begin(), border.end(), [](const Edge& a, const Edge& b) { return std::pair(a.from, a.to) < std::pair(b.from, b.to); });
+    std::sort(border.begin(), border.end(),
+              [](const Edge& a, const Edge& b) { return std::pair(a.from, a.to) < std::pair(b.from, b.to); });
     std::vector<char> used(border.size(), 0);
     Loops loops;
     for (std::size_t i = 0; i < border.size(); ++i) {
@@ -45,9 +49,11 @@ Loops outline(const MeshView& mesh, const std::vector<std::uint32_t>& chosen) {
             used[at] = 1;
             const Vec3f& v = mesh.vertices[border[at].from];
             loops.points.push_back({to_units(v.x), to_units(v.y)});
-            auto next =
-                std::lower_bound(border.begin(), border.end(), border[at].to, [](const Edge& e, std::uint32_t value) { return e.from < value; });
-            while (next != border.end() && next->from == border[at].to && used[static_cast<std::size_t>(next - border.begin())]) ++next;
+            auto next = std::lower_bound(border.begin(), border.end(), border[at].to,
+                                         [](const Edge& e, std::uint32_t value) { return e.from < value; });
+            while (next != border.end() && next->from == border[at].to &&
+                   used[static_cast<std::size_t>(next - border.begin())])
+                ++next;
             if (next == border.end() || next->from != border[at].to) break;
             at = static_cast<std::size_t>(next - border.begin());
         }
@@ -84,7 +90,8 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
         }
         const auto [low, high] = std::minmax({p[0][2], p[1][2], p[2][2]});
         if (high <= cut.layer.z_bottom || low >= cut.layer.z_top) continue;
-        const Vec3d a{p[1][0] - p[0][0], p[1][1] - p[0][1], p[1][2] - p[0][2]}, b{p[2][0] - p[0][0], p[2][1] - p[0][1], p[2][2] - p[0][2]};
+        const Vec3d a{p[1][0] - p[0][0], p[1][1] - p[0][1], p[1][2] - p[0][2]},
+            b{p[2][0] - p[0][0], p[2][1] - p[0][1], p[2][2] - p[0][2]};
         const Vec3d n{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
         const double area = std::hypot(n[0], n[1], n[2]), nz = area > 0 ? n[2] / area : -1;
         if (nz < keep_nz) continue;
@@ -98,7 +105,9 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
         diagnostics.push_back(
             {Severity::warning,
              "finish.stepover_floor",
-             fmt::format("layer {}: the offsets' step-over was kept at {:.2f} mm, cusps there exceed {:.3f} mm", cut.layer.index, d, cusp),
+             fmt::format(
+                 "layer {}: the offsets' step-over was kept at {:.2f} mm, cusps there exceed {:.3f} mm",
+                 cut.layer.index, d, cusp),
              {}});
     }
     op.stepover = d;
@@ -112,13 +121,15 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
         travel.points.push_back({to_units(x), to_units(y)});
     travel.close_loop();
     constexpr double fine = 0.001;
-    const Loops region = intersect(offset(outline(mesh, chosen), r * std::sqrt(1 - keep_nz * keep_nz), fine), travel);
+    const Loops region =
+        intersect(offset(outline(mesh, chosen), r * std::sqrt(1 - keep_nz * keep_nz), fine), travel);
     const double across = std::hypot(cut.high(0, r) - cut.low(0, r), cut.high(1, r) - cut.low(1, r));
     std::vector<Loops> curves;
     Loops outer = region;
     for (int k = 1; !outer.empty() && (k - 1) * d <= across; ++k) {
         Loops inner = offset(region, -k * d, fine);
-        // What lies farther than half a step from both curves, in their corners and where the inner one ends: once around it.
+        // What lies farther than half a step from both curves, in their corners and where the inner one ends:
+        // once around it.
         const Loops far = subtract(offset(outer, -d / 2, fine), offset(inner, d / 2, fine));
         Loops between = offset(offset(far, -0.02, fine), 0.02, fine);
         curves.push_back(std::move(outer));
@@ -130,15 +141,18 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
     const DropIndex flat(cut.solid, {Cutter::Profile::flat, cut.layer.tools.rough.diameter / 2 - 0.02});
     const double chord = safe_chord_mm(r, gouge);
     auto floor_done = [&](double z) {
-        return std::any_of(cut.floors.begin(), cut.floors.end(), [&](double floor) { return z <= floor + 1e-6 && z >= floor - kSameFloor; });
+        return std::any_of(cut.floors.begin(), cut.floors.end(),
+                           [&](double floor) { return z <= floor + 1e-6 && z >= floor - kSameFloor; });
     };
     auto place = [&](Point2 at) {
         const double x = to_mm(at.x), y = to_mm(at.y);
         const Rest rest = ball.drop(x, y);
         const double contact = rest.contact_z(r);
         Place p{at.x, at.y, 0, rest.tip_z, false, rest.tip_z >= cut.layer.floor_below && !rest.on_cap, false};
-        p.wanted = p.reachable && rest.nz >= keep_nz && contact >= cut.layer.z_bottom - 0.02 && contact < cut.layer.z_top - 1e-6;
-        if (p.wanted && rest.nz > level_nz && floor_done(contact) && !flat.stands_over(x, y, contact + 1e-3)) p.wanted = false;
+        p.wanted = p.reachable && rest.nz >= keep_nz && contact >= cut.layer.z_bottom - 0.02 &&
+                   contact < cut.layer.z_top - 1e-6;
+        if (p.wanted && rest.nz > level_nz && floor_done(contact) && !flat.stands_over(x, y, contact + 1e-3))
+            p.wanted = false;
         if (p.reachable) p.z = to_units(p.tip) + 1;
         return p;
     };
@@ -148,9 +162,10 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
             const Place& a = line.back();
             const double way = std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
             const bool both = a.reachable && b.reachable;
-            const bool apart =
-                way > 0.75 * chord * kUnitsPerMm ||
-                (way > 2 * finest && (both ? std::hypot(to_mm(static_cast<std::int64_t>(way)), a.tip - b.tip) > chord : a.reachable != b.reachable));
+            const bool apart = way > 0.75 * chord * kUnitsPerMm ||
+                               (way > 2 * finest && (both ? std::hypot(to_mm(static_cast<std::int64_t>(way)),
+                                                                       a.tip - b.tip) > chord
+                                                          : a.reachable != b.reachable));
             if (apart) {
                 self(self, line, place({a.x + (b.x - a.x) / 2, a.y + (b.y - a.y) / 2}));
                 self(self, line, b);
@@ -165,13 +180,15 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
         const Loops& loops = curves[c];
         for (std::size_t l = 0; l + 1 < loops.starts.size(); ++l) {
             std::vector<Place> ring;
-            for (std::size_t k = loops.starts[l]; k < loops.starts[l + 1]; ++k) append_places(append_places, ring, place(loops.points[k]));
+            for (std::size_t k = loops.starts[l]; k < loops.starts[l + 1]; ++k)
+                append_places(append_places, ring, place(loops.points[k]));
             append_places(append_places, ring, Place(ring.front()));
             ring.pop_back();
             const std::size_t n = ring.size();
             std::size_t start = n;
             for (std::size_t k = 0; k < n; ++k) {
-                ring[k].cut = ring[k].wanted || (ring[k].reachable && (ring[(k + 1) % n].wanted || ring[(k + n - 1) % n].wanted));
+                ring[k].cut = ring[k].wanted || (ring[k].reachable &&
+                                                 (ring[(k + 1) % n].wanted || ring[(k + n - 1) % n].wanted));
                 if (!ring[k].cut && start == n) start = k;
             }
             const bool closed = start == n;
@@ -192,8 +209,8 @@ Operation finish_offsets(const LayerCut& cut, std::vector<Diagnostic>& diagnosti
     for (auto& group : runs)
         for (auto& run : group) inwards.push_back(std::move(run));
 
-    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
-                     cut.layer.z_top + 2);
+    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
+                     cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     path.know(cut.around(tool, &ball));
     follow_nearest(path, chained(std::move(inwards), slide));
     path.finish();

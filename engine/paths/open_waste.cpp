@@ -7,13 +7,17 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kCollar = 1.5;        // mm that stay of the waste beside what the end mill spares, less ring_tolerance(): one light cut of it
+constexpr double kCollar = 1.5;        // mm that stay of the waste beside what the end mill spares, less
+                                       // ring_tolerance(): one light cut of it
 constexpr double kOverlap = 0.1;       // mm: more than a border ring and offsets may leave their lines by
 constexpr double kOffsetError = 0.01;  // mm
-constexpr double kRamp = 2;            // degrees: a face mill's teeth are at its rim, so it goes down gently where it must
-constexpr double kWorth = 1;           // minutes
+constexpr double kRamp =
+    2;  // degrees: a face mill's teeth are at its rim, so it goes down gently where it must
+constexpr double kWorth = 1;  // minutes
 
-double feed_of(const LayerCut& cut, const Tool& tool) { return std::min(tool.max_feed, cut.job.machine.max_feed); }
+double feed_of(const LayerCut& cut, const Tool& tool) {
+    return std::min(tool.max_feed, cut.job.machine.max_feed);
+}
 
 // A region without its holes, and without what lies in them.
 Loops filled(const Loops& region) {
@@ -41,26 +45,36 @@ RingPlan lifted(const RingPlan& plan, double by) {
 }  // namespace
 
 const Tool* open_waste_tool(const LayerCut& cut) {
-    if (!cut.job.cutting.open_waste || cut.job.cutting.rough_pattern != RoughPattern::contour || !cut.layer.opening.empty()) return nullptr;
+    if (!cut.job.cutting.open_waste || cut.job.cutting.rough_pattern != RoughPattern::contour ||
+        !cut.layer.opening.empty())
+        return nullptr;
     const Tool& face = tool_of_kind(cut.job, ToolKind::face);
     const double deep = cut.layer.z_top - cut.layer.z_bottom;
     // Its shank goes down beside what stands; its holder does not.
-    const double holder = face.stickout - cut.job.cutting.holder_clearance, shank = face.shank_diameter > face.diameter ? face.flute_length : holder;
-    return face.diameter > cut.layer.tools.rough.diameter && deep <= std::min(holder, shank) ? &face : nullptr;
+    const double holder = face.stickout - cut.job.cutting.holder_clearance,
+                 shank = face.shank_diameter > face.diameter ? face.flute_length : holder;
+    return face.diameter > cut.layer.tools.rough.diameter && deep <= std::min(holder, shank) ? &face
+                                                                                             : nullptr;
 }
 
-OpenLevel plan_open_level(const LayerCut& cut, const Tool& face, const Tool& tool, const Loops& forbidden, double tip_z, double above_z, bool hold) {
+OpenLevel plan_open_level(const LayerCut& cut, const Tool& face, const Tool& tool, const Loops& forbidden,
+                          double tip_z, double above_z, bool hold) {
     OpenLevel level;
     level.whole = true;
     level.above = above_z;
     if (forbidden.empty()) return level;
     const double wider = (face.diameter - tool.diameter) / 2;
     const double blend = rough_blend(cut.job.cutting);
-    const Loops kept = simplify(thinned_rings(cut, face, filled(offset_outline(forbidden, wider + kCollar, kOffsetError)), blend));
+    const Loops kept = simplify(
+        thinned_rings(cut, face, filled(offset_outline(forbidden, wider + kCollar, kOffsetError)), blend));
     level.left = offset_outline(kept, kOverlap - wider, kOffsetError);
-    const double open = area(subtract(cut.stock_outline(), level.left)), passes = std::ceil((above_z - tip_z) / face_step(cut.job, face) - 1e-9);
-    level.saved = open / (ring_step(tool) * feed_of(cut, tool)) - passes * open / (ring_step(face) * feed_of(cut, face));
-    if (level.saved > 0) level.rings = plan_rings(cut, face, kept, tip_z, blend, hold), level.rings.from_open = !hold && level.rings.strips.empty();
+    const double open = area(subtract(cut.stock_outline(), level.left)),
+                 passes = std::ceil((above_z - tip_z) / face_step(cut.job, face) - 1e-9);
+    level.saved = open / (ring_step(tool) * feed_of(cut, tool)) -
+                  passes * open / (ring_step(face) * feed_of(cut, face));
+    if (level.saved > 0)
+        level.rings = plan_rings(cut, face, kept, tip_z, blend, hold),
+        level.rings.from_open = !hold && level.rings.strips.empty();
     if (level.rings.pieces.empty()) level.left = {};
     return level;
 }
@@ -74,7 +88,8 @@ void leave_below_first_gap(std::span<OpenLevel> levels) {
     }
 }
 
-Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<OpenLevel> levels, EngagedStock* stock) {
+Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<OpenLevel> levels,
+                           EngagedStock* stock) {
     Operation op = cut.operation(OperationKind::rough, "open waste", face);
     op.blend = rough_blend(cut.job.cutting);
     const bool in_spindle = to_units(cut.stock_top - cut.layer.z_top) > 0;
@@ -82,8 +97,10 @@ Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<Open
     for (const OpenLevel& level : levels)
         if (!level.rings.pieces.empty()) saved += level.saved;
     if (saved < kWorth) return op;
-    PathBuilder path(op, face, feed_of(cut, face), cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
-    const DropIndex part(cut.solid, {Cutter::Profile::flat, face.diameter / 2 + cut.job.cutting.wall_allowance});
+    PathBuilder path(op, face, feed_of(cut, face), cut.layer.z_top + cut.job.machine.clearance,
+                     cut.layer.z_top + 2);
+    const DropIndex part(cut.solid,
+                         {Cutter::Profile::flat, face.diameter / 2 + cut.job.cutting.wall_allowance});
     Surroundings around = cut.around(face, &part);
     around.ramp_deg = std::min(around.ramp_deg, kRamp);
     around.from_side = true;
@@ -96,7 +113,8 @@ Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<Open
         const int passes = std::max(1, static_cast<int>(std::ceil(deep / face_step(cut.job, face) - 1e-9)));
         op.stepdown = std::max(op.stepdown, deep / passes);
         op.stepover = std::max(op.stepover, level.rings.widest_step());
-        for (int pass = 1; pass < passes; ++pass) clear_from_afar(path, cut, lifted(level.rings, deep * (passes - pass) / passes));
+        for (int pass = 1; pass < passes; ++pass)
+            clear_from_afar(path, cut, lifted(level.rings, deep * (passes - pass) / passes));
         clear_from_afar(path, cut, std::move(level.rings));
     }
     path.finish();
@@ -106,7 +124,8 @@ Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<Open
     }
     if (stock != nullptr && !op.moves.empty()) {
         stock->change_cutter(face.diameter / 2);
-        cap_engagement(cut.context, op.moves, *stock, {cut.job.cutting.max_engagement, face.diameter, op.stepdown});
+        cap_engagement(cut.context, op.moves, *stock,
+                       {cut.job.cutting.max_engagement, face.diameter, op.stepdown});
     }
     return op;
 }

@@ -5,9 +5,11 @@
 
 namespace slabwright {
 
-NearestRuns::NearestRuns(std::vector<Beginning> beginnings, std::size_t runs) : nodes_(std::move(beginnings)) {
+NearestRuns::NearestRuns(std::vector<Beginning> beginnings, std::size_t runs)
+    : nodes_(std::move(beginnings)) {
     const std::size_t n = nodes_.size();
-    low_.assign(n, kNone), high_.assign(n, kNone), parent_.assign(n, kNone), left_.assign(n, 0), gone_.assign(n, 0);
+    low_.assign(n, kNone), high_.assign(n, kNone), parent_.assign(n, kNone), left_.assign(n, 0),
+        gone_.assign(n, 0);
     root_ = build(0, static_cast<std::uint32_t>(n), false, kNone);
     starts_.assign(runs + 1, 0);
     for (const Beginning& b : nodes_) ++starts_[b.run + 1];
@@ -20,10 +22,11 @@ NearestRuns::NearestRuns(std::vector<Beginning> beginnings, std::size_t runs) : 
 std::uint32_t NearestRuns::build(std::uint32_t first, std::uint32_t last, bool by_y, std::uint32_t parent) {
     if (first == last) return kNone;
     const std::uint32_t middle = first + (last - first) / 2;
-    std::nth_element(nodes_.begin() + first, nodes_.begin() + middle, nodes_.begin() + last, [&](const Beginning& a, const Beginning& b) {
-        const std::int32_t ka = by_y ? a.at.y : a.at.x, kb = by_y ? b.at.y : b.at.x;
-        return std::tie(ka, a.run, a.place) < std::tie(kb, b.run, b.place);
-    });
+    std::nth_element(nodes_.begin() + first, nodes_.begin() + middle, nodes_.begin() + last,
+                     [&](const Beginning& a, const Beginning& b) {
+                         const std::int32_t ka = by_y ? a.at.y : a.at.x, kb = by_y ? b.at.y : b.at.x;
+                         return std::tie(ka, a.run, a.place) < std::tie(kb, b.run, b.place);
+                     });
     parent_[middle] = parent;
     left_[middle] = last - first;
     low_[middle] = build(first, middle, !by_y, middle);
@@ -40,7 +43,8 @@ Beginning NearestRuns::nearest(Point2 to) const {
         const std::int64_t dx = std::int64_t{b.at.x} - to.x, dy = std::int64_t{b.at.y} - to.y;
         if (!gone_[node]) {
             const std::int64_t way = dx * dx + dy * dy;
-            if (way < best_way || (way == best_way && std::tie(b.run, b.place) < std::tie(nodes_[best].run, nodes_[best].place)))
+            if (way < best_way || (way == best_way &&
+                                   std::tie(b.run, b.place) < std::tie(nodes_[best].run, nodes_[best].place)))
                 best_way = way, best = node;
         }
         const std::int64_t across = by_y ? dy : dx;

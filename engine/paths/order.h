@@ -8,15 +8,16 @@
 
 namespace slabwright {
 
-/// A place (0.1 µm) at which a run may begin, and the one where it then ends; `place` says which of its places, in the
-/// caller's words.
+/// A place (0.1 µm) at which a run may begin, and the one where it then ends; `place` says which of its
+/// places, in the caller's words.
 struct Beginning {
     Point2 at{}, end{};
     std::uint32_t run = 0, place = 0;
 };
 
-/// Answers for the nearest beginning of the runs that are left. Of equals that of the lowest run, then the lowest place: the
-/// order of a path must not depend on anything but its runs. n beginnings take O(n log n) to set up.
+/// Answers for the nearest beginning of the runs that are left. Of equals that of the lowest run, then the
+/// lowest place: the order of a path must not depend on anything but its runs. n beginnings take O(n log n)
+/// to set up.
 class NearestRuns {
 public:
     NearestRuns(std::vector<Beginning> beginnings, std::size_t runs);
@@ -37,6 +38,7 @@ private:
 };
 
 /// Everything in one go from `at`: for each run, in the order of visits, where it begins. Always the nearest.
-[[nodiscard]] std::vector<Beginning> nearest_order(std::vector<Beginning> beginnings, std::size_t runs, Point2 at);
+[[nodiscard]] std::vector<Beginning> nearest_order(std::vector<Beginning> beginnings, std::size_t runs,
+                                                   Point2 at);
 
 }  // namespace slabwright

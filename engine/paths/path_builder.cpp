@@ -11,19 +11,23 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kBallMiddle = 0.75;                // of a ball's radius: what counts as head-on
-constexpr std::array kHelixRadii{0.9, 0.65, 0.45};  // of the cutter's radius: under it, so that no post is left in the middle
-constexpr int kSideRings = 6, kSideWays = 16;       // places looked at beside a run that no helix and no ramp reaches
-constexpr double kSideStep = 0.4;                   // of the cutter's radius, between their rings
+constexpr double kBallMiddle = 0.75;  // of a ball's radius: what counts as head-on
+constexpr std::array kHelixRadii{
+    0.9, 0.65, 0.45};  // of the cutter's radius: under it, so that no post is left in the middle
+constexpr int kSideRings = 6,
+              kSideWays = 16;      // places looked at beside a run that no helix and no ramp reaches
+constexpr double kSideStep = 0.4;  // of the cutter's radius, between their rings
 
 // The middle of a cutter: what stands there is entered head-on.
 Cutter middle(const Cutter& cutter) {
-    return {cutter.profile, (cutter.profile == Cutter::Profile::ball ? kBallMiddle : PathBuilder::kMiddle) * cutter.radius};
+    return {cutter.profile,
+            (cutter.profile == Cutter::Profile::ball ? kBallMiddle : PathBuilder::kMiddle) * cutter.radius};
 }
 
 }  // namespace
 
-PathBuilder::PathBuilder(Operation& operation, const Tool& tool, double feed, double clearance_z, double link_z)
+PathBuilder::PathBuilder(Operation& operation, const Tool& tool, double feed, double clearance_z,
+                         double link_z)
     : operation_(operation),
       feed_(static_cast<std::uint32_t>(std::lround(std::min(feed, tool.max_feed)))),
       plunge_feed_(static_cast<std::uint32_t>(std::lround(tool.plunge_feed))),
@@ -36,15 +40,19 @@ PathBuilder::PathBuilder(Operation& operation, const Tool& tool, double feed, do
 
 void PathBuilder::add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t feed) {
     if (started_ && x == x_ && y == y_ && z == z_) return;
-    if (feed > 0 && !operation_.moves.empty()) {  // one long move instead of two that go on the same way along one axis
+    if (feed > 0 &&
+        !operation_.moves.empty()) {  // one long move instead of two that go on the same way along one axis
         Move& last = operation_.moves.back();
         const std::size_t n = operation_.moves.size();
         if (n >= 2 && last.feed == feed) {
             const Move& before = operation_.moves[n - 2];
-            const std::int64_t ax = std::int64_t{last.x} - before.x, ay = std::int64_t{last.y} - before.y, az = std::int64_t{last.z} - before.z;
-            const std::int64_t bx = std::int64_t{x} - last.x, by = std::int64_t{y} - last.y, bz = std::int64_t{z} - last.z;
+            const std::int64_t ax = std::int64_t{last.x} - before.x, ay = std::int64_t{last.y} - before.y,
+                               az = std::int64_t{last.z} - before.z;
+            const std::int64_t bx = std::int64_t{x} - last.x, by = std::int64_t{y} - last.y,
+                               bz = std::int64_t{z} - last.z;
             const int axes = (ax != 0) + (ay != 0) + (az != 0);
-            const bool same = axes == 1 && (ax == 0) == (bx == 0) && (ay == 0) == (by == 0) && (az == 0) == (bz == 0);
+            const bool same =
+                axes == 1 && (ax == 0) == (bx == 0) && (ay == 0) == (by == 0) && (az == 0) == (bz == 0);
             if (same && (ax > 0) == (bx > 0) && (ay > 0) == (by > 0) && (az > 0) == (bz > 0)) {
                 last = {x, y, z, feed};
                 learnt_ = std::min(learnt_, n - 1);
@@ -63,8 +71,8 @@ void PathBuilder::know(const Surroundings& around) {
     learnt_ = operation_.moves.size();
 }
 
-// Cuts the moves made since the last question into what stands. Of moves much shorter than a cell only some are needed:
-// whatever is left out, the bound stays a bound.
+// Cuts the moves made since the last question into what stands. Of moves much shorter than a cell only some
+// are needed: whatever is left out, the bound stays a bound.
 void PathBuilder::learn() {
     const std::vector<Move>& moves = operation_.moves;
     double since = 0;
@@ -93,7 +101,8 @@ double PathBuilder::standing_middle(Point2 at) {
     const std::array<double, 2> p{to_mm(at.x), to_mm(at.y)};
     // Of a flat end every cell counts that its middle may touch; the walls beside the cutter are farther off.
     const Cutter inner = middle(around_.cutter);
-    return inner.profile == Cutter::Profile::flat ? around_.standing->top(inner.radius, p, p) : around_.standing->free_tip(inner, p, p);
+    return inner.profile == Cutter::Profile::flat ? around_.standing->top(inner.radius, p, p)
+                                                  : around_.standing->free_tip(inner, p, p);
 }
 
 void PathBuilder::go_above(Point2 p) {
@@ -104,7 +113,8 @@ void PathBuilder::go_above(Point2 p) {
         if (down_) retract();
     } else if (p.x != x_ || p.y != y_) {
         learn();
-        const double top = around_.standing->top(around_.cutter.radius, {to_mm(x_), to_mm(y_)}, {to_mm(p.x), to_mm(p.y)});
+        const double top =
+            around_.standing->top(around_.cutter.radius, {to_mm(x_), to_mm(y_)}, {to_mm(p.x), to_mm(p.y)});
         const double lowest = std::max({top + kOver, to_mm(z_), around_.lowest_rapid});
         const std::int32_t over = lowest < to_mm(link_) ? to_units(lowest) : std::max(z_, link_);
         add(x_, y_, over, 0);
@@ -113,7 +123,8 @@ void PathBuilder::go_above(Point2 p) {
     down_ = false;
     if (around_.standing == nullptr) return add(p.x, p.y, link_, 0);
     learn();
-    const double top = around_.standing->top(around_.cutter.radius, {to_mm(p.x), to_mm(p.y)}, {to_mm(p.x), to_mm(p.y)});
+    const double top =
+        around_.standing->top(around_.cutter.radius, {to_mm(p.x), to_mm(p.y)}, {to_mm(p.x), to_mm(p.y)});
     above_ = std::min(link_, to_units(std::max(top + kStop, around_.lowest_rapid)));
 }
 
@@ -122,7 +133,8 @@ bool PathBuilder::straight_is_free(Point2 to, std::int32_t z) {
     const std::array<double, 2> a{to_mm(x_), to_mm(y_)}, b{to_mm(to.x), to_mm(to.y)};
     if (std::hypot(b[0] - a[0], b[1] - a[1]) > kLongestWay) return false;
     learn();
-    return around_.standing->free_tip(around_.cutter, a, b) <= to_mm(z) + kBite && part_leaves_way({x_, y_}, to, z);
+    return around_.standing->free_tip(around_.cutter, a, b) <= to_mm(z) + kBite &&
+           part_leaves_way({x_, y_}, to, z);
 }
 
 // The same of the part alone, between two free places.
@@ -130,8 +142,11 @@ bool PathBuilder::part_leaves_way(Point2 from, Point2 to, std::int32_t z) const 
     const std::array<double, 2> a{to_mm(from.x), to_mm(from.y)}, b{to_mm(to.x), to_mm(to.y)};
     const int steps = static_cast<int>(std::ceil(std::hypot(b[0] - a[0], b[1] - a[1]) / around_.chord));
     for (int k = 1; k < steps; ++k) {
-        const double t = static_cast<double>(k) / steps, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
-        if (around_.part->stands_over(x, y, to_mm(z) - around_.under) || !has_room({to_units(x), to_units(y)})) return false;
+        const double t = static_cast<double>(k) / steps, x = a[0] + t * (b[0] - a[0]),
+                     y = a[1] + t * (b[1] - a[1]);
+        if (around_.part->stands_over(x, y, to_mm(z) - around_.under) ||
+            !has_room({to_units(x), to_units(y)}))
+            return false;
     }
     return true;
 }
@@ -151,8 +166,8 @@ void PathBuilder::descend(const PathPoint& to) {
     if (std::max(met, to.z) < z_) sink(std::max(met, to.z));
 }
 
-// From above the start of a run down to it. A slice along a wall is no plunge: only what stands under the middle of the
-// cutter asks for a helix or a ramp. Says whether there was a way in.
+// From above the start of a run down to it. A slice along a wall is no plunge: only what stands under the
+// middle of the cutter asks for a helix or a ramp. Says whether there was a way in.
 bool PathBuilder::enter(std::span<const PathPoint> run) {
     const PathPoint& first = run.front();
     descend(first);
@@ -164,8 +179,9 @@ bool PathBuilder::enter(std::span<const PathPoint> run) {
     return true;
 }
 
-// Around a circle on the left of the run, where it is free, that ends in the run's direction. The part lies on the right of a
-// run that climbs, so the circle's room is looked for on the other side. Whole turns, none steeper than the ramp.
+// Around a circle on the left of the run, where it is free, that ends in the run's direction. The part lies
+// on the right of a run that climbs, so the circle's room is looked for on the other side. Whole turns, none
+// steeper than the ramp.
 bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
     if (around_.part == nullptr || around_.cutter.profile != Cutter::Profile::flat) return false;
     const PathPoint& first = run.front();
@@ -178,15 +194,18 @@ bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
     if (length == 0) return false;
     ux /= length, uy /= length;
     for (const double share : kHelixRadii) {
-        const double radius = share * around_.cutter.radius, cx = to_mm(first.x) - radius * uy, cy = to_mm(first.y) + radius * ux;
-        // Chords that the machine takes as fast as the circle: no farther from it than it may pass by a corner.
+        const double radius = share * around_.cutter.radius, cx = to_mm(first.x) - radius * uy,
+                     cy = to_mm(first.y) + radius * ux;
+        // Chords that the machine takes as fast as the circle: no farther from it than it may pass by a
+        // corner.
         const double chord = std::min(around_.chord, std::sqrt(8 * radius * operation_.blend));
         const int chords = static_cast<int>(std::ceil(2 * std::numbers::pi * radius / chord));
         std::vector<std::array<double, 2>> circle;
         bool free = true;
         for (int k = 0; k <= chords && free; ++k) {
             // The first place lies at the angle of the run's right side, seen from the centre.
-            const double turn = 2 * std::numbers::pi * (k % chords) / chords, c = std::cos(turn), s = std::sin(turn);
+            const double turn = 2 * std::numbers::pi * (k % chords) / chords, c = std::cos(turn),
+                         s = std::sin(turn);
             circle.push_back({cx + radius * (uy * c + ux * s), cy + radius * (-ux * c + uy * s)});
             free = k == 0 || k == chords ||
                    (!around_.part->stands_over(circle.back()[0], circle.back()[1], to_mm(first.z)) &&
@@ -195,17 +214,21 @@ bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
         if (!free) continue;
         double top = standing_middle({first.x, first.y});
         for (int k = 0; k < chords; ++k)
-            top = std::max(top,
-                           around_.standing->free_tip(around_.cutter, circle[static_cast<std::size_t>(k)], circle[static_cast<std::size_t>(k) + 1]));
+            top =
+                std::max(top, around_.standing->free_tip(around_.cutter, circle[static_cast<std::size_t>(k)],
+                                                         circle[static_cast<std::size_t>(k) + 1]));
         const double drop = (top + 0.1 - to_mm(first.z)) * kUnitsPerMm;
-        const double turns = std::ceil(drop / (2 * std::numbers::pi * radius * kUnitsPerMm * std::tan(around_.ramp_deg * std::numbers::pi / 180)));
+        const double turns = std::ceil(drop / (2 * std::numbers::pi * radius * kUnitsPerMm *
+                                               std::tan(around_.ramp_deg * std::numbers::pi / 180)));
         if (turns > 100) return false;
         sink(first.z + static_cast<std::int32_t>(drop));
         const int places = static_cast<int>(turns) * chords;
         for (int k = 1; k <= places; ++k) {
             const std::array<double, 2>& p = circle[static_cast<std::size_t>(k % chords)];
-            const Point2 at = k % chords == 0 ? Point2{first.x, first.y} : Point2{to_units(p[0]), to_units(p[1])};
-            cut(at, first.z + static_cast<std::int32_t>(std::ceil(drop * (1 - static_cast<double>(k) / places))));
+            const Point2 at =
+                k % chords == 0 ? Point2{first.x, first.y} : Point2{to_units(p[0]), to_units(p[1])};
+            cut(at,
+                first.z + static_cast<std::int32_t>(std::ceil(drop * (1 - static_cast<double>(k) / places))));
         }
         return true;
     }
@@ -228,11 +251,13 @@ bool PathBuilder::enter_on_ramp(std::span<const PathPoint> run) {
                  p.y + static_cast<std::int32_t>(t * (static_cast<double>(q.y) - p.y)), std::max(p.z, q.z)};
         }
         length += std::min(way, longest - length);
-        height = std::max(height, around_.standing->free_tip(middle(around_.cutter), {to_mm(p.x), to_mm(p.y)}, {to_mm(q.x), to_mm(q.y)}) -
+        height = std::max(height, around_.standing->free_tip(middle(around_.cutter), {to_mm(p.x), to_mm(p.y)},
+                                                             {to_mm(q.x), to_mm(q.y)}) -
                                       to_mm(std::min(p.z, q.z)));
         stretch.push_back(q);
     }
-    const double drop = (height + 0.1) * kUnitsPerMm, slope = std::tan(around_.ramp_deg * std::numbers::pi / 180);
+    const double drop = (height + 0.1) * kUnitsPerMm,
+                 slope = std::tan(around_.ramp_deg * std::numbers::pi / 180);
     const double legs = length > kUnitsPerMm ? 2 * std::ceil(drop / (2 * length * slope)) : 0;
     if (legs <= 0 || legs >= 1000) return false;
     sink(first.z + static_cast<std::int32_t>(drop));
@@ -242,26 +267,31 @@ bool PathBuilder::enter_on_ramp(std::span<const PathPoint> run) {
         for (std::size_t k = 1; k < stretch.size(); ++k) {
             const PathPoint &p = stretch[k - 1], &q = stretch[k];
             done += std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
-            cut({q.x, q.y}, q.z + static_cast<std::int32_t>(std::ceil(std::max(0.0, drop * (1 - done / (length * legs))))));
+            cut({q.x, q.y}, q.z + static_cast<std::int32_t>(
+                                      std::ceil(std::max(0.0, drop * (1 - done / (length * legs))))));
         }
     }
     return true;
 }
 
-// The nearest place beside a run's beginning where the cutter is free and its middle meets nothing, and from which it may go straight across; of
-// places as near the one nearest to where the tool is.
+// The nearest place beside a run's beginning where the cutter is free and its middle meets nothing, and from
+// which it may go straight across; of places as near the one nearest to where the tool is.
 std::optional<Point2> PathBuilder::place_beside(const PathPoint& first) {
     if (around_.part == nullptr) return std::nullopt;
     std::optional<Point2> best;
     double least = 1e300;
     for (int ring = 1; ring <= kSideRings && !best; ++ring)
         for (int k = 0; k < kSideWays; ++k) {
-            const double turn = 2 * std::numbers::pi * k / kSideWays, far = ring * kSideStep * around_.cutter.radius * kUnitsPerMm;
+            const double turn = 2 * std::numbers::pi * k / kSideWays,
+                         far = ring * kSideStep * around_.cutter.radius * kUnitsPerMm;
             const Point2 beside{first.x + static_cast<std::int32_t>(std::lround(far * std::cos(turn))),
                                 first.y + static_cast<std::int32_t>(std::lround(far * std::sin(turn)))};
-            const double way = std::hypot(static_cast<double>(beside.x) - x_, static_cast<double>(beside.y) - y_);
-            if (way >= least || !has_room(beside) || around_.part->stands_over(to_mm(beside.x), to_mm(beside.y), to_mm(first.z) - around_.under) ||
-                standing_middle(beside) > to_mm(first.z) + kScrape || !part_leaves_way(beside, {first.x, first.y}, first.z))
+            const double way =
+                std::hypot(static_cast<double>(beside.x) - x_, static_cast<double>(beside.y) - y_);
+            if (way >= least || !has_room(beside) ||
+                around_.part->stands_over(to_mm(beside.x), to_mm(beside.y), to_mm(first.z) - around_.under) ||
+                standing_middle(beside) > to_mm(first.z) + kScrape ||
+                !part_leaves_way(beside, {first.x, first.y}, first.z))
                 continue;
             least = way, best = beside;
         }
@@ -279,7 +309,8 @@ bool PathBuilder::enter_from_side(const PathPoint& first) {
     return true;
 }
 
-// Where the tool is down, at its height or that of a cut, whichever is higher, to over that, if the way is free.
+// Where the tool is down, at its height or that of a cut, whichever is higher, to over that, if the way is
+// free.
 bool PathBuilder::go_straight(Point2 to, std::int32_t z) {
     const std::int32_t level = std::max(z_, z);
     if (!started_ || z_ >= link_ || around_.part == nullptr || !straight_is_free(to, level)) return false;
@@ -296,10 +327,12 @@ void PathBuilder::follow(std::span<const PathPoint> run) {
         plunge(run.front().z);
     } else {
         const double most = plunges_ ? kPlunge : kScrape;
-        const bool from_side = around_.from_side && standing_middle(first) > to_mm(run.front().z) + most && enter_from_side(run.front());
+        const bool from_side = around_.from_side && standing_middle(first) > to_mm(run.front().z) + most &&
+                               enter_from_side(run.front());
         if (!from_side && !go_straight(first, run.front().z)) go_above(first);
         if (!from_side && !enter(run)) {
-            if (around_.no_way_in != nullptr) around_.no_way_in->push_back({to_mm(first.x), to_mm(first.y), to_mm(run.front().z)});
+            if (around_.no_way_in != nullptr)
+                around_.no_way_in->push_back({to_mm(first.x), to_mm(first.y), to_mm(run.front().z)});
             return;
         }
     }
@@ -370,8 +403,8 @@ std::vector<PathPoint> kept_points(std::span<const PathPoint> line, std::span<co
 
 // The change of direction from a to b to c, seen from above; none where two of them are one.
 double turn_at(const PathPoint& a, const PathPoint& b, const PathPoint& c) {
-    const double ux = static_cast<double>(b.x) - a.x, uy = static_cast<double>(b.y) - a.y, vx = static_cast<double>(c.x) - b.x,
-                 vy = static_cast<double>(c.y) - b.y;
+    const double ux = static_cast<double>(b.x) - a.x, uy = static_cast<double>(b.y) - a.y,
+                 vx = static_cast<double>(c.x) - b.x, vy = static_cast<double>(c.y) - b.y;
     return std::abs(std::atan2(ux * vy - uy * vx, ux * vx + uy * vy));
 }
 
@@ -412,11 +445,14 @@ std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, do
         const double sharp = turn_at(finely[a], finely[b], finely[c]);
         // A corner of the line itself is no less sharp between short chords.
         if (sharp <= turn || turn_at(finely[b - 1], finely[b], finely[b + 1]) > 0.9 * sharp) continue;
-        std::fill(keep.begin() + static_cast<std::ptrdiff_t>(a), keep.begin() + static_cast<std::ptrdiff_t>(c), 1);
+        std::fill(keep.begin() + static_cast<std::ptrdiff_t>(a),
+                  keep.begin() + static_cast<std::ptrdiff_t>(c), 1);
     }
     return kept_points(finely, keep);
 }
 
-double fast_turn(const Machine& machine, double feed, double blend) { return std::sqrt(8 * machine.acceleration * blend) * 60 / feed; }
+double fast_turn(const Machine& machine, double feed, double blend) {
+    return std::sqrt(8 * machine.acceleration * blend) * 60 / feed;
+}
 
 }  // namespace slabwright

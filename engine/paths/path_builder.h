@@ -1,5 +1,5 @@
-// Puts moves one after another into an operation: rapids only above the stock, down by feed. A builder that knows what
-// stands around it links its cuts by the shortest way that it can prove.
+// Puts moves one after another into an operation: rapids only above the stock, down by feed. A builder that
+// knows what stands around it links its cuts by the shortest way that it can prove.
 #pragma once
 
 #include <memory>
@@ -14,16 +14,20 @@ namespace slabwright {
 
 /// What a cutter must know of its surroundings to go straight from one cut to the next.
 struct Surroundings {
-    Standing* standing = nullptr;     ///< what may stand; the builder cuts its own moves into it
-    const DropIndex* part = nullptr;  ///< drops of this very cutter, or of a wider one; none: it never stays down
+    Standing* standing = nullptr;  ///< what may stand; the builder cuts its own moves into it
+    const DropIndex* part =
+        nullptr;  ///< drops of this very cutter, or of a wider one; none: it never stays down
     Cutter cutter;
-    double under = 0;                     ///< mm that the tip of `part`'s cutter lies under this one's where their ends are concentric
-    double chord = 0;                     ///< mm: longest chord between places where `part` is free that is safe (safe_chord_mm)
+    double under =
+        0;  ///< mm that the tip of `part`'s cutter lies under this one's where their ends are concentric
+    double chord = 0;  ///< mm: longest chord between places where `part` is free that is safe (safe_chord_mm)
     double ramp_deg = 5;                  ///< entry into stock
     std::shared_ptr<const Loops> room{};  ///< where the cutter's middle may be beside a flask; none: anywhere
     double lowest_rapid = -1e9;           ///< mm: rapids go no deeper
-    bool from_side = false;               ///< comes from beside a run where that is possible, rather than on a helix or a ramp
-    /// Gets where a run begins that was left out: neither helix nor ramp has room, and the tool does not cut straight down.
+    bool from_side =
+        false;  ///< comes from beside a run where that is possible, rather than on a helix or a ramp
+    /// Gets where a run begins that was left out: neither helix nor ramp has room, and the tool does not cut
+    /// straight down.
     std::vector<std::array<double, 3>>* no_way_in = nullptr;
 };
 
@@ -42,24 +46,28 @@ public:
     /// From now on links are as low as what stands allows. Before this, rapids run at the link height.
     void know(const Surroundings& around);
 
-    /// Rapid to above (x, y), if not there already (0.1 µm): as low as is proven to be air on the way and over the target,
-    /// else at the link height.
+    /// Rapid to above (x, y), if not there already (0.1 µm): as low as is proven to be air on the way and
+    /// over the target, else at the link height.
     void go_above(Point2 at);
-    /// From where the tool is to the first point of a run, then along it. Straight at the height of the higher end where that
-    /// way is free of the part and of standing stock; else above what stands. What stands at the run's start is entered on a
-    /// helix that ends along the run, on its left, where the part leaves room for one; else on a ramp along the run, to and fro;
-    /// up to kPlunge of it straight down, or kScrape by a tool that does not plunge. Where a run is too short for a ramp, a tool
-    /// that plunges does; others come from beside it, where they have room already, or else the run is left out
+    /// From where the tool is to the first point of a run, then along it. Straight at the height of the
+    /// higher end where that way is free of the part and of standing stock; else above what stands. What
+    /// stands at the run's start is entered on a helix that ends along the run, on its left, where the part
+    /// leaves room for one; else on a ramp along the run, to and fro; up to kPlunge of it straight down, or
+    /// kScrape by a tool that does not plunge. Where a run is too short for a ramp, a tool that plunges does;
+    /// others come from beside it, where they have room already, or else the run is left out
     /// (Surroundings::no_way_in).
-    /// Every point of the run must be free, and so must be what lies straight above it (as of a drop or a level contour).
+    /// Every point of the run must be free, and so must be what lies straight above it (as of a drop or a
+    /// level contour).
     void follow(std::span<const PathPoint> run);
     /// Straight down (or up) by plunge feed to z.
     void plunge(std::int32_t z);
-    /// Fast down to z through air that is known to be empty: space already cut, or beside the stock. Still by feed.
+    /// Fast down to z through air that is known to be empty: space already cut, or beside the stock. Still by
+    /// feed.
     void sink(std::int32_t z);
     /// Cuts to a point.
     void cut(Point2 to, std::int32_t z);
-    /// Done with this cut: up to the link height, or, with known surroundings, as far up as the next link needs.
+    /// Done with this cut: up to the link height, or, with known surroundings, as far up as the next link
+    /// needs.
     void retract();
     /// Ends the program; drops it when nothing was cut. Returns whether something was.
     bool finish();
@@ -69,16 +77,21 @@ public:
     [[nodiscard]] std::int32_t z() const { return z_; }
     /// Whether a flask leaves room for the cutter's middle here.
     [[nodiscard]] bool has_room(Point2 at) const { return !around_.room || winding(*around_.room, at) > 0; }
-    /// How low the cutter gets over a place before it meets what is known to stand; −infinity when nothing is.
+    /// How low the cutter gets over a place before it meets what is known to stand; −infinity when nothing
+    /// is.
     [[nodiscard]] double standing_tip(Point2 at);
-    /// The same for the cutter's middle: what stands there would be entered head-on, not sliced from its side.
+    /// The same for the cutter's middle: what stands there would be entered head-on, not sliced from its
+    /// side.
     [[nodiscard]] double standing_middle(Point2 at);
 
-    static constexpr double kOver = 1.0;         ///< mm of air under a rapid that goes across
-    static constexpr double kStop = 0.5;         ///< mm of air where a rapid or fast feed goes down
-    static constexpr double kPlunge = 0.5;       ///< mm of stock that a tool that plunges enters straight down rather than on a ramp
-    static constexpr double kScrape = 0.2;       ///< mm of stock that the middle of any other may meet on its way down
-    static constexpr double kMiddle = 0.6;       ///< of a flat end mill's radius: what it does not enter straight down
+    static constexpr double kOver = 1.0;  ///< mm of air under a rapid that goes across
+    static constexpr double kStop = 0.5;  ///< mm of air where a rapid or fast feed goes down
+    static constexpr double kPlunge =
+        0.5;  ///< mm of stock that a tool that plunges enters straight down rather than on a ramp
+    static constexpr double kScrape =
+        0.2;  ///< mm of stock that the middle of any other may meet on its way down
+    static constexpr double kMiddle =
+        0.6;  ///< of a flat end mill's radius: what it does not enter straight down
     static constexpr double kBite = 0.1;         ///< mm that a tool may meet where it stays down
     static constexpr double kLongestWay = 40.0;  ///< mm that it stays down; above, lifting is quicker
 
@@ -97,8 +110,9 @@ private:
     [[nodiscard]] bool part_leaves_way(Point2 from, Point2 to, std::int32_t z) const;
     Operation& operation_;
     Surroundings around_;
-    std::size_t learnt_ = 0;          // moves that have been cut into what stands
-    std::int32_t above_ = INT32_MIN;  // where the air ends over the place that go_above() went to, as far as is proven
+    std::size_t learnt_ = 0;  // moves that have been cut into what stands
+    std::int32_t above_ =
+        INT32_MIN;  // where the air ends over the place that go_above() went to, as far as is proven
     std::uint32_t feed_, plunge_feed_, sink_feed_;
     std::int32_t clearance_, link_;
     std::int32_t x_ = 0, y_ = 0, z_ = 0;
@@ -106,19 +120,22 @@ private:
 };
 
 /// Leaves out points of a polyline that lie within `tolerance` (0.1 µm units) of the chord between kept ones
-/// (Ramer–Douglas–Peucker in three dimensions). First and last stay. Every point of the result lies within `tolerance`
-/// of the polyline given.
+/// (Ramer–Douglas–Peucker in three dimensions). First and last stay. Every point of the result lies within
+/// `tolerance` of the polyline given.
 [[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double tolerance);
 
-/// The same of closed loops, `mm` at most from the chords between the points that stay; loops of fewer than three points then are left out.
-/// Loops may cross where they come nearer to each other than twice that.
+/// The same of closed loops, `mm` at most from the chords between the points that stay; loops of fewer than
+/// three points then are left out. Loops may cross where they come nearer to each other than twice that.
 [[nodiscard]] Loops thinned(const Loops& loops, double mm);
 
-/// The same of a line to two tolerances: to `loose` (0.1 µm) where the line then turns by no more than `turn` (radians) at a point, to `fine`
-/// elsewhere. A machine slows down in sharper turns (travel_seconds), so where it need not, no time is lost by longer chords.
-[[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, double loose, double turn);
+/// The same of a line to two tolerances: to `loose` (0.1 µm) where the line then turns by no more than `turn`
+/// (radians) at a point, to `fine` elsewhere. A machine slows down in sharper turns (travel_seconds), so
+/// where it need not, no time is lost by longer chords.
+[[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, double loose,
+                                              double turn);
 
-/// The turn at a point, radians, that a machine takes at a feed (mm/min) without slowing down: θ = √(8aδ)/v (travel_seconds).
+/// The turn at a point, radians, that a machine takes at a feed (mm/min) without slowing down: θ = √(8aδ)/v
+/// (travel_seconds).
 [[nodiscard]] double fast_turn(const Machine& machine, double feed, double blend = kJunction);
 
 }  // namespace slabwright

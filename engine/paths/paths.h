@@ -1,4 +1,5 @@
-// The tool paths of one layer (SHAPING, FINISH; method.md sections 5 and 11), with the tools that were chosen for it.
+// The tool paths of one layer (SHAPING, FINISH; method.md sections 5 and 11), with the tools that were chosen
+// for it.
 #pragma once
 
 #include "engine/plan.h"
@@ -23,32 +24,39 @@ struct Flat {
 
 /// A layer's work is a value in and a value out.
 struct LayerJob {
-    /// The pattern, pattern-base, or a lighter one that lies as near to it as the job's `gouge` leaves room for; the whole of it, or what of it
-    /// the layer's cutters may meet (part_between).
+    /// The pattern, pattern-base, or a lighter one that lies as near to it as the job's `gouge` leaves room
+    /// for; the whole of it, or what of it the layer's cutters may meet (part_between).
     MeshView mesh;
     const Job* job = nullptr;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
-    double floor_below = 0;                          ///< the lowest z that a tip may reach: z_bottom less what may be cut under it
+    double floor_below = 0;  ///< the lowest z that a tip may reach: z_bottom less what may be cut under it
     std::array<double, 2> stock_min{}, stock_max{};  ///< mm
     int index = 0;
     LayerTools tools;
-    Loops opening;                                                  ///< of the flask in this layer; empty: no flask
-    std::vector<Flat> flats;                                        ///< strictly between z_bottom and z_top
-    ProgressPart* progress = nullptr;                               ///< told how far the paths are, up to kPathsShare; the rest is the caller's
-    std::vector<Flat> feet;                                         ///< on which walls of this layer may stand: `flats` and those just below
-    double most_minutes = std::numeric_limits<double>::infinity();  ///< when its programs so far take longer than this, the layer is given up
-    double last_steps = 0;                        ///< mm that the last two levels of roughing may go down, for the wood's sake; 0: any step
-    Spares<StockMemory>* stock_memory = nullptr;  ///< which layers leave to each other; null: this one has its own
+    Loops opening;            ///< of the flask in this layer; empty: no flask
+    std::vector<Flat> flats;  ///< strictly between z_bottom and z_top
+    ProgressPart* progress =
+        nullptr;             ///< told how far the paths are, up to kPathsShare; the rest is the caller's
+    std::vector<Flat> feet;  ///< on which walls of this layer may stand: `flats` and those just below
+    double most_minutes = std::numeric_limits<double>::infinity();  ///< when its programs so far take longer
+                                                                    ///< than this, the layer is given up
+    double last_steps =
+        0;  ///< mm that the last two levels of roughing may go down, for the wood's sake; 0: any step
+    Spares<StockMemory>* stock_memory =
+        nullptr;  ///< which layers leave to each other; null: this one has its own
 };
 
 struct LayerResult {
     std::vector<Operation> operations;  ///< in the order of execution
     std::vector<Diagnostic> diagnostics;
-    double left_mm2 = 0;    ///< plan view of what is left over the cusp's limit; 0 where it is not followed (Cutting::uniform_steps)
-    bool given_up = false;  ///< the operations are the first ones only, and take longer than `most_minutes`; left_mm2 is not known
+    double left_mm2 = 0;    ///< plan view of what is left over the cusp's limit; 0 where it is not followed
+                            ///< (Cutting::uniform_steps)
+    bool given_up = false;  ///< the operations are the first ones only, and take longer than `most_minutes`;
+                            ///< left_mm2 is not known
 };
 
-/// Face, rough, floors, walls, levels and raster of one layer, and what these leave. Operations that would remove nothing are left out.
+/// Face, rough, floors, walls, levels and raster of one layer, and what these leave. Operations that would
+/// remove nothing are left out.
 [[nodiscard]] LayerResult plan_layer_paths(Context& context, const LayerJob& layer);
 
 }  // namespace slabwright

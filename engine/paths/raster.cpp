@@ -1,5 +1,6 @@
-// Finishing by a projected raster: the ball is dropped on the surface along parallel lines wherever its contact lies on
-// a slope under 45°. The step-over is chosen for every pass from the slopes under it (FINISH eq. 9).
+// Finishing by a projected raster: the ball is dropped on the surface along parallel lines wherever its
+// contact lies on a slope under 45°. The step-over is chosen for every pass from the slopes under it (FINISH
+// eq. 9).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,9 +21,11 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kOverFloor = 1e-3;  // mm: a line this near to a floor's facets, seen from above, passes over them
-constexpr double kOnFloor = 1e-3;    // mm: a flat end mill that meets nothing this far over a floor stands on it
-constexpr double kRounding = 1e-6;   // mm: what is nearer may be found by one question and missed by another
+constexpr double kOverFloor =
+    1e-3;  // mm: a line this near to a floor's facets, seen from above, passes over them
+constexpr double kOnFloor =
+    1e-3;  // mm: a flat end mill that meets nothing this far over a floor stands on it
+constexpr double kRounding = 1e-6;  // mm: what is nearer may be found by one question and missed by another
 // Places of a line of which a wider end mill is asked before they are asked one by one.
 constexpr std::array<std::int32_t, 2> kTogether{16, 4};
 
@@ -36,55 +39,68 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     if (slopes.projection_to < 0) return op;
     // Steeper than step_nz the cusp is kept by the level contours, where both cut everything.
     const double keep_nz = std::cos(slopes.projection_to), step_nz = std::cos(slopes.projection_keep) - 1e-9;
-    const bool uniform = cut.job.cutting.uniform_steps, steeper = slopes.projection_keep < slopes.projection_to;
+    const bool uniform = cut.job.cutting.uniform_steps,
+               steeper = slopes.projection_keep < slopes.projection_to;
 
     std::vector<SolidFacet> shallow;
     for (const SolidFacet& f : cut.solid.facets)
-        if (f.nz >= keep_nz && f.z_max > cut.layer.z_bottom && !(f.z_min == cut.layer.z_top)) shallow.push_back(f);
+        if (f.nz >= keep_nz && f.z_max > cut.layer.z_bottom && !(f.z_min == cut.layer.z_top))
+            shallow.push_back(f);
     if (shallow.empty()) return op;
 
-    // How far the shallow facets face along y, by strips of y: that decides the step-over of the passes over them.
+    // How far the shallow facets face along y, by strips of y: that decides the step-over of the passes over
+    // them.
     double y_low = 1e300, y_high = -1e300;
     for (const SolidFacet& f : shallow)
         for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
     constexpr double strip = 0.5;
-    std::vector<float> facing(static_cast<std::size_t>((y_high - y_low) / strip) + 1, -1);  // −1: nothing shallow there
+    std::vector<float> facing(static_cast<std::size_t>((y_high - y_low) / strip) + 1,
+                              -1);  // −1: nothing shallow there
     for (const SolidFacet& f : shallow) {
         if (f.nz < step_nz) continue;
         const auto [low, high] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
-        for (auto s = static_cast<std::size_t>((low - y_low) / strip), e = static_cast<std::size_t>((high - y_low) / strip); s <= e; ++s)
+        for (auto s = static_cast<std::size_t>((low - y_low) / strip),
+                  e = static_cast<std::size_t>((high - y_low) / strip);
+             s <= e; ++s)
             facing[s] = std::max(facing[s], static_cast<float>(std::abs(f.normal[1])));
     }
     std::vector<std::int32_t> lines;
     bool floor_bites = false;
     const float worst = *std::max_element(facing.begin(), facing.end());
-    const double reach_beside = r * std::sqrt(1 - keep_nz * keep_nz);  // how far the ball stands from its contact
+    const double reach_beside =
+        r * std::sqrt(1 - keep_nz * keep_nz);  // how far the ball stands from its contact
     for (double y = y_low - reach_beside; y <= y_high + reach_beside;) {
         lines.push_back(to_units(y));
-        // The ball at y touches within r of it; the pass must be near enough for the steepest face in between.
+        // The ball at y touches within r of it; the pass must be near enough for the steepest face in
+        // between.
         const auto index = [&](double v) {
-            return std::clamp<long>(static_cast<long>(std::floor((v - y_low) / strip)), 0, static_cast<long>(facing.size()) - 1);
+            return std::clamp<long>(static_cast<long>(std::floor((v - y_low) / strip)), 0,
+                                    static_cast<long>(facing.size()) - 1);
         };
         float most = uniform ? std::max(worst, 0.0F) : 0;
-        for (long s = index(y - r); s <= index(y + r); ++s) most = std::max(most, facing[static_cast<std::size_t>(s)]);
+        for (long s = index(y - r); s <= index(y + r); ++s)
+            most = std::max(most, facing[static_cast<std::size_t>(s)]);
         double d = raster_stepover(r, cusp, most);
         if (d < cut.job.cutting.min_stepover) d = cut.job.cutting.min_stepover, floor_bites = true;
         op.stepover = std::max(op.stepover, d);
         y += d;
     }
     if (floor_bites)
-        diagnostics.push_back({Severity::warning,
-                               "finish.stepover_floor",
-                               fmt::format("layer {}: the raster's step-over was kept at {:.2f} mm, cusps there exceed {:.3f} mm", cut.layer.index,
-                                           cut.job.cutting.min_stepover, cusp),
-                               {}});
+        diagnostics.push_back(
+            {Severity::warning,
+             "finish.stepover_floor",
+             fmt::format(
+                 "layer {}: the raster's step-over was kept at {:.2f} mm, cusps there exceed {:.3f} mm",
+                 cut.layer.index, cut.job.cutting.min_stepover, cusp),
+             {}});
 
     const DropIndex& ball = cut.drops({Cutter::Profile::ball, r});
     // The flat end mills that have finished floors; semi-roughing does so on contours only.
     std::vector<std::pair<double, std::unique_ptr<DropIndex>>> flats;
     auto add_flat = [&](const Tool& one) {
         const double flat_r = one.diameter / 2;
-        flats.emplace_back(flat_r, std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02}));
+        flats.emplace_back(
+            flat_r, std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02}));
     };
     add_flat(cut.layer.tools.rough);
     if (clears_on_contours(cut.job))
@@ -93,7 +109,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     // Samples stand on multiples of one step, so that those of neighbouring lines are neighbours.
     const auto step = static_cast<std::int32_t>(0.75 * chord * kUnitsPerMm);
     auto is_floor = [&](const SolidFacet& f) {
-        return std::any_of(cut.floors.begin(), cut.floors.end(), [&](double z) { return lies_on_floor(f, z); });
+        return std::any_of(cut.floors.begin(), cut.floors.end(),
+                           [&](double z) { return lies_on_floor(f, z); });
     };
     auto floor_done = [&](double z) {
         for (const double floor : cut.floors)
@@ -104,13 +121,16 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     // The rim of the layer's flat top, where the facets end (kTopSheet), is made by the walls under it.
     const double top = cut.layer.z_top - 1.5 * kTopSheet;
 
-    // Whether the flat end mill finishes a floor's place: from right over it, or with its rim from beside a wall.
+    // Whether the flat end mill finishes a floor's place: from right over it, or with its rim from beside a
+    // wall.
     auto flat_covers = [&](double x, double y, double z, MetPoints& met) {
         for (const auto& [flat_r, flat] : flats) {
             if (!flat->stands_over(x, y, z + kOnFloor, &met)) return true;
             for (int k = 0; k < 8; ++k) {
                 const double turn = k * std::numbers::pi / 4, beside = 0.95 * flat_r;
-                if (!flat->stands_over(x + beside * std::cos(turn), y + beside * std::sin(turn), z + kOnFloor, &met)) return true;
+                if (!flat->stands_over(x + beside * std::cos(turn), y + beside * std::sin(turn), z + kOnFloor,
+                                       &met))
+                    return true;
             }
         }
         return false;
@@ -127,7 +147,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             for (const Forbidden& f : over.line(l)) floor_spans[l].push_back({f.low, f.high, floor});
     }
     for (std::vector<FloorSpan>& spans : floor_spans)
-        std::sort(spans.begin(), spans.end(), [](const FloorSpan& a, const FloorSpan& b) { return a.low < b.low; });
+        std::sort(spans.begin(), spans.end(),
+                  [](const FloorSpan& a, const FloorSpan& b) { return a.low < b.low; });
 
     // A place of the ball on the surface: tip and contact.
     struct Sample {
@@ -150,16 +171,19 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         s.steep = steeper && rest.nz < step_nz;
         s.contact = {x - r * rest.nx, y - r * rest.ny, rest.contact_z(r)};
         const double contact = s.contact[2];
-        s.wanted = rest.nz >= keep_nz && !rest.on_cap && contact >= cut.layer.z_bottom - 0.02 && contact < top && rest.tip_z >= cut.layer.floor_below;
+        s.wanted = rest.nz >= keep_nz && !rest.on_cap && contact >= cut.layer.z_bottom - 0.02 &&
+                   contact < top && rest.tip_z >= cut.layer.floor_below;
         // Nor is the rim of a finished floor worth a visit: floor and wall make it.
-        if (s.wanted && floor_done(contact) && flat_covers(s.contact[0], s.contact[1], contact, met.flat)) s.wanted = false;
+        if (s.wanted && floor_done(contact) && flat_covers(s.contact[0], s.contact[1], contact, met.flat))
+            s.wanted = false;
         s.tip = rest.tip_z;
         s.reachable = s.tip >= cut.layer.floor_below && !rest.on_cap;
         if (s.reachable) s.z = to_units(s.tip) + 1;
         return s;
     };
-    // Where a flat end mill no narrower than the ball has stood on a floor the ball would rest on that floor as well (or on something less than
-    // kOnFloor higher), and has nothing to cut. Where an end mill that is wider yet meets nothing, nor does this one anywhere around.
+    // Where a flat end mill no narrower than the ball has stood on a floor the ball would rest on that floor
+    // as well (or on something less than kOnFloor higher), and has nothing to cut. Where an end mill that is
+    // wider yet meets nothing, nor does this one anywhere around.
     struct FloorMill {
         const DropIndex* narrow;
         std::array<std::unique_ptr<DropIndex>, kTogether.size()> wide;
@@ -170,7 +194,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         FloorMill& mill = floor_mills.emplace_back(FloorMill{flat.get(), {}});
         for (std::size_t w = 0; w < kTogether.size(); ++w) {
             const double wide = flat->cutter().radius + 0.5 * to_mm((kTogether[w] - 1) * step) + kRounding;
-            if (wide <= FacetTree::kWidestCutter) mill.wide[w] = std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, wide});
+            if (wide <= FacetTree::kWidestCutter)
+                mill.wide[w] = std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, wide});
         }
     }
     struct FloorWalk {
@@ -187,17 +212,20 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             if (k < walk.ask[w]) continue;
             const double middle = to_mm(k * step) + 0.5 * to_mm((kTogether[w] - 1) * step);
             if (std::any_of(floor_mills.begin(), floor_mills.end(), [&](const FloorMill& mill) {
-                    return mill.wide[w] && !mill.wide[w]->stands_over(middle, y, floor + kOnFloor - kRounding, &walk.met.flat);
+                    return mill.wide[w] && !mill.wide[w]->stands_over(middle, y, floor + kOnFloor - kRounding,
+                                                                      &walk.met.flat);
                 })) {
                 walk.floor = floor, walk.stood = k + kTogether[w];
                 return true;
             }
             walk.ask[w] = k + kTogether[w];
         }
-        return std::any_of(floor_mills.begin(), floor_mills.end(),
-                           [&](const FloorMill& mill) { return !mill.narrow->stands_over(to_mm(k * step), y, floor + kOnFloor, &walk.met.flat); });
+        return std::any_of(floor_mills.begin(), floor_mills.end(), [&](const FloorMill& mill) {
+            return !mill.narrow->stands_over(to_mm(k * step), y, floor + kOnFloor, &walk.met.flat);
+        });
     };
-    auto finished = [&](FloorWalk& walk, std::int32_t k, std::int32_t uy, double floor) -> std::optional<Sample> {
+    auto finished = [&](FloorWalk& walk, std::int32_t k, std::int32_t uy,
+                        double floor) -> std::optional<Sample> {
         if (!flat_stands(walk, k, uy, floor)) return std::nullopt;
         Sample s;
         s.x = k * step;
@@ -207,16 +235,19 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         if (s.reachable) s.z = to_units(s.tip) + 1;
         return s;
     };
-    // Between two places of the ball a cusp of about c·δ/(8r) stays, c the way between the contacts and δ the way of the
-    // ball: on a plane both are the same, in a hollow the contacts run ahead of the ball.
+    // Between two places of the ball a cusp of about c·δ/(8r) stays, c the way between the contacts and δ the
+    // way of the ball: on a plane both are the same, in a hollow the contacts run ahead of the ball.
     auto too_far = [&](const Sample& a, std::int32_t ya, const Sample& b, std::int32_t yb) {
-        if (!a.reachable || !b.reachable || (a.steep && b.steep) || (a.contact[2] < cut.layer.z_bottom && b.contact[2] < cut.layer.z_bottom))
+        if (!a.reachable || !b.reachable || (a.steep && b.steep) ||
+            (a.contact[2] < cut.layer.z_bottom && b.contact[2] < cut.layer.z_bottom))
             return false;
-        const double c = std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
+        const double c =
+            std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
         const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(ya) - to_mm(yb), a.tip - b.tip);
         return c * d > 8 * r * cusp * 1.5;
     };
-    // Where walls are projected too, a line follows them in safe chords, down to the last place that the ball reaches.
+    // Where walls are projected too, a line follows them in safe chords, down to the last place that the ball
+    // reaches.
     const bool walls = cut.job.cutting.finish_strategy != FinishStrategy::split;
     const std::int32_t finest = to_units(walls ? 0.005 : 0.02);
     auto apart = [&](const Sample& a, const Sample& b) {
@@ -234,22 +265,27 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         line.push_back(b);
     };
 
-    // What the ball may make: the shallow surface, but for floors. Of these it makes the places where no flat end mill stood.
+    // What the ball may make: the shallow surface, but for floors. Of these it makes the places where no flat
+    // end mill stood.
     std::vector<SolidFacet> made;
     for (const SolidFacet& f : shallow)
         if (f.z_min < top && !is_floor(f)) made.push_back(f);
     const Fibres reach = covering(cut.context, made, r, Axis::x, lines);
     const double low_limit = cut.low(0, r) * kUnitsPerMm, high_limit = cut.high(0, r) * kUnitsPerMm;
-    std::vector<std::vector<std::array<std::int32_t, 2>>> unfinished(lines.size());  // places on floors, in steps, first and last of a row
+    std::vector<std::vector<std::array<std::int32_t, 2>>> unfinished(
+        lines.size());  // places on floors, in steps, first and last of a row
     parallel_each(cut.context, lines.size(), [&](std::size_t l) {
         FloorWalk walk;
         std::int32_t next = INT32_MIN;
         for (const FloorSpan& span : floor_spans[l]) {
-            const auto first = static_cast<std::int32_t>(std::ceil(std::max(span.low * kUnitsPerMm, low_limit) / step)),
-                       last = static_cast<std::int32_t>(std::floor(std::min(span.high * kUnitsPerMm, high_limit) / step));
+            const auto first = static_cast<std::int32_t>(
+                           std::ceil(std::max(span.low * kUnitsPerMm, low_limit) / step)),
+                       last = static_cast<std::int32_t>(
+                           std::floor(std::min(span.high * kUnitsPerMm, high_limit) / step));
             for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                 next = k + 1;
-                if (flat_stands(walk, k, lines[l], span.z) || flat_covers(to_mm(k * step), to_mm(lines[l]), span.z, walk.met.flat) ||
+                if (flat_stands(walk, k, lines[l], span.z) ||
+                    flat_covers(to_mm(k * step), to_mm(lines[l]), span.z, walk.met.flat) ||
                     !sample(k * step, lines[l], walk.met).wanted)
                     continue;
                 if (!unfinished[l].empty() && unfinished[l].back()[1] + 1 == k) unfinished[l].back()[1] = k;
@@ -265,27 +301,34 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         for (const Forbidden& f : reach.line(l)) spans.push_back({f.low * kUnitsPerMm, f.high * kUnitsPerMm});
         const double reaches = r * kUnitsPerMm;
         auto near = std::lower_bound(lines.begin(), lines.end(), lines[l] - to_units(r)) - lines.begin();
-        for (auto n = static_cast<std::size_t>(near); n < lines.size() && lines[n] <= lines[l] + to_units(r); ++n)
-            for (const auto& [from, to] : unfinished[n]) spans.push_back({from * step - reaches, to * step + reaches});
+        for (auto n = static_cast<std::size_t>(near); n < lines.size() && lines[n] <= lines[l] + to_units(r);
+             ++n)
+            for (const auto& [from, to] : unfinished[n])
+                spans.push_back({from * step - reaches, to * step + reaches});
         std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
         std::int32_t next = INT32_MIN;
         auto floor = floor_spans[l].begin();
         FloorWalk walk;
         for (const Span& span : spans) {
-            const auto first = static_cast<std::int32_t>(std::ceil(std::max(span.low - step, low_limit) / step)),
-                       last = static_cast<std::int32_t>(std::floor(std::min(span.high + step, high_limit) / step));
+            const auto first =
+                           static_cast<std::int32_t>(std::ceil(std::max(span.low - step, low_limit) / step)),
+                       last = static_cast<std::int32_t>(
+                           std::floor(std::min(span.high + step, high_limit) / step));
             for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                 next = k + 1;
                 const double x = to_mm(k * step);
                 while (floor != floor_spans[l].end() && floor->high < x) ++floor;
-                const std::optional<Sample> done =
-                    floor != floor_spans[l].end() && floor->low < x ? finished(walk, k, lines[l], floor->z) : std::nullopt;
-                append_between(append_between, samples[l], done ? *done : sample(k * step, lines[l], walk.met), lines[l], walk.met);
+                const std::optional<Sample> done = floor != floor_spans[l].end() && floor->low < x
+                                                       ? finished(walk, k, lines[l], floor->z)
+                                                       : std::nullopt;
+                append_between(append_between, samples[l],
+                               done ? *done : sample(k * step, lines[l], walk.met), lines[l], walk.met);
             }
         }
     });
     auto at = [](const Line& line, std::int32_t x) -> const Sample* {
-        const auto it = std::lower_bound(line.begin(), line.end(), x, [](const Sample& s, std::int32_t v) { return s.x < v; });
+        const auto it = std::lower_bound(line.begin(), line.end(), x,
+                                         [](const Sample& s, std::int32_t v) { return s.x < v; });
         return it != line.end() && it->x == x ? &*it : nullptr;
     };
     // One sample and one line beyond what is wanted, so that the cusp at its rim is cut as well.
@@ -310,7 +353,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     };
     std::vector<std::vector<Between>> between(lines.size());
     parallel_each(cut.context, uniform ? 0 : lines.size() - 1, [&](std::size_t l) {
-        auto refine = [&](auto&& self, const Line& a, std::int32_t ya, const Line& b, std::int32_t yb) -> void {
+        auto refine = [&](auto&& self, const Line& a, std::int32_t ya, const Line& b,
+                          std::int32_t yb) -> void {
             if (yb - ya < 2 * finest) return;
             const std::int32_t y = ya + (yb - ya) / 2;
             Line middle;
@@ -369,8 +413,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     for (const auto& group : between)
         for (const Between& b : group) append_runs(b.line, b.y);
 
-    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed), cut.layer.z_top + cut.job.machine.clearance,
-                     cut.layer.z_top + 2);
+    PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
+                     cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     path.know(cut.around(tool, &ball));
     follow_nearest(path, chained(std::move(runs), slide));
     path.finish();

@@ -16,16 +16,18 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kStepShare = 0.45;      // of the diameter, between rings
-constexpr double kRingTolerance = 0.02;  // mm, of the ring that keeps off the finished surface by its allowance
-constexpr double kSample = 0.4;          // mm between places of a ring that are looked at
-constexpr float kStands = 0.05F;         // mm over the tip: less is nothing to cut
-constexpr double kEdge = 0.05;           // mm: what only the cutter's very edge meets was cut on the ring before
-constexpr double kWorthOfBall = 0.5;     // mm that a ball must lower a cell by: its rings leave ridges
-constexpr int kLevelsAStep = 2;          // of a ball
-constexpr int kTile = 16;                // cells
+constexpr double kStepShare = 0.45;  // of the diameter, between rings
+constexpr double kRingTolerance =
+    0.02;                             // mm, of the ring that keeps off the finished surface by its allowance
+constexpr double kSample = 0.4;       // mm between places of a ring that are looked at
+constexpr float kStands = 0.05F;      // mm over the tip: less is nothing to cut
+constexpr double kEdge = 0.05;        // mm: what only the cutter's very edge meets was cut on the ring before
+constexpr double kWorthOfBall = 0.5;  // mm that a ball must lower a cell by: its rings leave ridges
+constexpr int kLevelsAStep = 2;       // of a ball
+constexpr int kTile = 16;             // cells
 constexpr int kMostRings = 4000;
-constexpr std::size_t kMostPairs = 4'000'000;  // of cells and edges whose distance is asked for at once: some milliseconds
+constexpr std::size_t kMostPairs =
+    4'000'000;  // of cells and edges whose distance is asked for at once: some milliseconds
 
 // Where the rows of a grid run inside a region (winding number over 0): first and last cell of each stretch.
 std::vector<std::vector<std::array<int, 2>>> rows_inside(const CellGrid& grid, const Loops& region) {
@@ -39,7 +41,8 @@ std::vector<std::vector<std::array<int, 2>>> rows_inside(const CellGrid& grid, c
             const double ax = to_mm(a.x), ay = to_mm(a.y), bx = to_mm(b.x), by = to_mm(b.y);
             const int j0 = std::max(0, static_cast<int>(std::ceil((ay - grid.y0) / grid.cell)));
             for (int j = j0; j < grid.ny && grid.y(j) < by; ++j)
-                crossings[static_cast<std::size_t>(j)].emplace_back(ax + (bx - ax) * (grid.y(j) - ay) / (by - ay), turn);
+                crossings[static_cast<std::size_t>(j)].emplace_back(
+                    ax + (bx - ax) * (grid.y(j) - ay) / (by - ay), turn);
         }
     }
     std::vector<std::vector<std::array<int, 2>>> rows(crossings.size());
@@ -70,20 +73,25 @@ public:
           ball_(tool.kind == ToolKind::ball),
           reach_(1 + (static_cast<int>(radius_ / stock.grid().cell) + 1) / kTile),
           tiles_x_((stock.grid().nx + kTile - 1) / kTile),
-          tiles_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>((stock.grid().ny + kTile - 1) / kTile), 0),
+          tiles_(static_cast<std::size_t>(tiles_x_) *
+                     static_cast<std::size_t>((stock.grid().ny + kTile - 1) / kTile),
+                 0),
           near_(tiles_.size(), 0),
           marked_(tiles_.size() * kTile, 0) {
         // What is not left over now will not be on any level.
         const CellGrid& grid = stock.grid();
         std::vector<std::vector<LeftOver>> rows(static_cast<std::size_t>(grid.ny));
         parallel_each(context, rows.size(), [&](std::size_t j) {
-            stock.each_left(static_cast<int>(j), limit, [&, row = static_cast<int>(j)](int i) { rows[j].push_back({i, row}); });
+            stock.each_left(static_cast<int>(j), limit, [&, row = static_cast<int>(j)](int i) {
+                rows[j].push_back({i, row});
+            });
         });
         for (const auto& row : rows) left_over_.insert(left_over_.end(), row.begin(), row.end());
     }
     [[nodiscard]] bool none() const { return left_over_.empty(); }
     [[nodiscard]] std::uint64_t bytes() const {
-        return marked_.size() * sizeof(marked_[0]) + left_over_.size() * (sizeof(left_over_[0]) + sizeof(cells_[0]));
+        return marked_.size() * sizeof(marked_[0]) +
+               left_over_.size() * (sizeof(left_over_[0]) + sizeof(cells_[0]));
     }
 
     /// From here on cells are left alone on levels on which they lie within the swath of walls.
@@ -94,7 +102,8 @@ public:
         const CellGrid& grid = stock_.grid();
         const auto on_floor = [&](std::size_t c) {
             const double z = stock_.z_bottom() + stock_.surface(c);
-            return std::any_of(floors.begin(), floors.end(), [&](double f) { return z <= f + 1e-3 && z >= f - kSameFloor - 1e-3; });
+            return std::any_of(floors.begin(), floors.end(),
+                               [&](double f) { return z <= f + 1e-3 && z >= f - kSameFloor - 1e-3; });
         };
         constexpr std::size_t grain = 512;
         parallel_for(context, left_over_.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -102,7 +111,8 @@ public:
             for (std::size_t k = begin; k < end; ++k) {
                 LeftOver& cell = left_over_[k];
                 if (on_floor(grid.index(cell.i, cell.j))) continue;
-                const double tip = wall.drop(grid.x(cell.i), grid.y(cell.j), stock_.z_bottom() + lowest, &met).tip_z;
+                const double tip =
+                    wall.drop(grid.x(cell.i), grid.y(cell.j), stock_.z_bottom() + lowest, &met).tip_z;
                 cell.wall = static_cast<float>(tip - stock_.z_bottom());
             }
         });
@@ -110,8 +120,9 @@ public:
 
     /// Whether a level has any, as things are. @param tip, over as for mark()
     [[nodiscard]] bool any(double tip, double over) const {
-        return std::any_of(left_over_.begin(), left_over_.end(),
-                           [&](const LeftOver& cell) { return is_target(cell, static_cast<float>(tip), over); });
+        return std::any_of(left_over_.begin(), left_over_.end(), [&](const LeftOver& cell) {
+            return is_target(cell, static_cast<float>(tip), over);
+        });
     }
 
     /// Marks the cells of a level.
@@ -123,7 +134,8 @@ public:
         for (const std::size_t t : near_tiles_) near_[t] = 0;
         cells_.clear(), near_tiles_.clear();
         tip_ = static_cast<float>(tip);
-        std::erase_if(left_over_, [&](const LeftOver& c) { return stock_.left(grid.index(c.i, c.j)) <= limit_; });
+        std::erase_if(left_over_,
+                      [&](const LeftOver& c) { return stock_.left(grid.index(c.i, c.j)) <= limit_; });
         for (const LeftOver& cell : left_over_) {
             if (!is_target(cell, tip_, over)) continue;
             const auto [i, j, wall] = cell;
@@ -135,10 +147,13 @@ public:
     }
     [[nodiscard]] const std::vector<std::array<int, 2>>& cells() const { return cells_; }
 
-    // Whether a cutter whose middle is here meets one that still stands; a ball, one that it lowers by enough.
+    // Whether a cutter whose middle is here meets one that still stands; a ball, one that it lowers by
+    // enough.
     [[nodiscard]] bool met(double x, double y) {
         const CellGrid& grid = stock_.grid();
-        const auto cell = [&](double at, double from, int n) { return static_cast<int>(std::clamp((at - from) / grid.cell + 0.5, 0.0, n - 1.0)); };
+        const auto cell = [&](double at, double from, int n) {
+            return static_cast<int>(std::clamp((at - from) / grid.cell + 0.5, 0.0, n - 1.0));
+        };
         if (!near_[tile(cell(x, grid.x0, grid.nx), cell(y, grid.y0, grid.ny))]) return false;
         const double r = std::max(radius_ - kEdge, radius_ / 2);
         if (meets_as_before(x, y, r)) return true;
@@ -148,23 +163,30 @@ public:
         const int i1 = std::min(grid.nx - 1, static_cast<int>(std::floor((x + r - grid.x0) / grid.cell)));
         for (int tj = j0 / kTile; tj <= j1 / kTile && j0 <= j1; ++tj)
             for (int ti = i0 / kTile; ti <= i1 / kTile && i0 <= i1; ++ti) {
-                if (!tiles_[static_cast<std::size_t>(tj) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(ti)]) continue;
+                if (!tiles_[static_cast<std::size_t>(tj) * static_cast<std::size_t>(tiles_x_) +
+                            static_cast<std::size_t>(ti)])
+                    continue;
                 std::uint16_t* const rows = &marked_[row_of(ti * kTile, tj * kTile)];
                 for (int j = std::max(j0, tj * kTile); j <= std::min(j1, tj * kTile + kTile - 1); ++j) {
                     if (rows[j % kTile] == 0) continue;
                     const double dy = grid.y(j) - y, w = std::sqrt(std::max(0.0, r * r - dy * dy));
-                    const int first = std::max(ti * kTile, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
-                    const int last = std::min({ti * kTile + kTile - 1, grid.nx - 1, static_cast<int>(std::floor((x + w - grid.x0) / grid.cell))});
+                    const int first =
+                        std::max(ti * kTile, static_cast<int>(std::ceil((x - w - grid.x0) / grid.cell)));
+                    const int last = std::min({ti * kTile + kTile - 1, grid.nx - 1,
+                                               static_cast<int>(std::floor((x + w - grid.x0) / grid.cell))});
                     if (first > last) continue;
-                    const std::uint32_t asked = ((2U << (last % kTile)) - 1U) & ~((1U << (first % kTile)) - 1U);
+                    const std::uint32_t asked =
+                        ((2U << (last % kTile)) - 1U) & ~((1U << (first % kTile)) - 1U);
                     for (std::uint32_t left = rows[j % kTile] & asked; left != 0; left &= left - 1) {
                         const int i = ti * kTile + std::countr_zero(left);
                         const std::size_t c = grid.index(i, j);
                         if (stock_.height(c) <= tip_ + kStands || (ball_ && !lowers_enough(c, 0, tip_))) {
-                            rows[j % kTile] &= static_cast<std::uint16_t>(~(left & -left));  // nor does any place of the level lower it
+                            rows[j % kTile] &= static_cast<std::uint16_t>(
+                                ~(left & -left));  // nor does any place of the level lower it
                             continue;
                         }
-                        if (ball_ && !lowers_enough(c, (grid.x(i) - x) * (grid.x(i) - x) + dy * dy, tip_)) continue;
+                        if (ball_ && !lowers_enough(c, (grid.x(i) - x) * (grid.x(i) - x) + dy * dy, tip_))
+                            continue;
                         met_ = {i, j};
                         return true;
                     }
@@ -176,19 +198,24 @@ public:
 private:
     struct LeftOver {
         int i = 0, j = 0;
-        float wall = -std::numeric_limits<float>::infinity();  // mm above the layer's bottom: on a level below, a wall is near
+        float wall = -std::numeric_limits<float>::infinity();  // mm above the layer's bottom: on a level
+                                                               // below, a wall is near
     };
     [[nodiscard]] bool is_target(const LeftOver& cell, float tip, double over) const {
         const std::size_t c = stock_.grid().index(cell.i, cell.j);
-        return stock_.height(c) > tip + kStands && stock_.surface(c) <= std::max(tip, 0.0F) + kStands && stock_.surface(c) > over + kStands &&
-               (!ball_ || lowers_enough(c, 0, tip)) && tip >= cell.wall;
+        return stock_.height(c) > tip + kStands && stock_.surface(c) <= std::max(tip, 0.0F) + kStands &&
+               stock_.surface(c) > over + kStands && (!ball_ || lowers_enough(c, 0, tip)) && tip >= cell.wall;
     }
     [[nodiscard]] std::size_t tile(int i, int j) const {
-        return static_cast<std::size_t>(j / kTile) * static_cast<std::size_t>(tiles_x_) + static_cast<std::size_t>(i / kTile);
+        return static_cast<std::size_t>(j / kTile) * static_cast<std::size_t>(tiles_x_) +
+               static_cast<std::size_t>(i / kTile);
     }
     // Of a cell's tile, the row that it is in.
-    [[nodiscard]] std::size_t row_of(int i, int j) const { return tile(i, j) * kTile + static_cast<std::size_t>(j % kTile); }
-    // Whether a ball at a level's height, its axis so far from a cell's middle (mm²), lowers it by what is worth it.
+    [[nodiscard]] std::size_t row_of(int i, int j) const {
+        return tile(i, j) * kTile + static_cast<std::size_t>(j % kTile);
+    }
+    // Whether a ball at a level's height, its axis so far from a cell's middle (mm²), lowers it by what is
+    // worth it.
     [[nodiscard]] bool lowers_enough(std::size_t c, double away2, float tip) const {
         const double most = stock_.height(c) - kWorthOfBall;
         if (stock_.surface(c) >= most || tip >= most) return false;
@@ -210,7 +237,8 @@ private:
         const int tiles_y = static_cast<int>(tiles_.size()) / tiles_x_;
         for (int j = std::max(0, tj - reach_); j <= std::min(tiles_y - 1, tj + reach_); ++j)
             for (int i = std::max(0, ti - reach_); i <= std::min(tiles_x_ - 1, ti + reach_); ++i)
-                if (const std::size_t t = tile(i * kTile, j * kTile); !near_[t]) near_[t] = 1, near_tiles_.push_back(t);
+                if (const std::size_t t = tile(i * kTile, j * kTile); !near_[t])
+                    near_[t] = 1, near_tiles_.push_back(t);
     }
     const LayerStock& stock_;
     double limit_, radius_;
@@ -234,10 +262,12 @@ double nearest(const CellGrid& grid, std::span<const std::array<int, 2>> cells, 
         const auto loop = outline.loop(l);
         for (std::size_t k = 0; k < loop.size(); ++k) {
             const Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
-            const double ax = to_mm(a.x), ay = to_mm(a.y), ux = to_mm(b.x) - ax, uy = to_mm(b.y) - ay, length2 = ux * ux + uy * uy;
+            const double ax = to_mm(a.x), ay = to_mm(a.y), ux = to_mm(b.x) - ax, uy = to_mm(b.y) - ay,
+                         length2 = ux * ux + uy * uy;
             const double share = length2 > 0 ? 1 / length2 : 0;
             for (const auto& [i, j] : cells) {
-                const double x = grid.x(i) - ax, y = grid.y(j) - ay, t = std::clamp((x * ux + y * uy) * share, 0.0, 1.0);
+                const double x = grid.x(i) - ax, y = grid.y(j) - ay,
+                             t = std::clamp((x * ux + y * uy) * share, 0.0, 1.0);
                 const double dx = x - t * ux, dy = y - t * uy;
                 least2 = std::min(least2, dx * dx + dy * dy);
             }
@@ -260,10 +290,11 @@ std::vector<RingPlace> places_of(std::span<const Point2> loop, std::int32_t z) {
         const int parts = std::max(1, static_cast<int>(std::ceil(l / (kSample * kUnitsPerMm))));
         for (int s = 1; s <= parts; ++s) {
             const double t = static_cast<double>(s) / parts;
-            places.push_back({{static_cast<std::int32_t>(std::lround(a.x + t * (static_cast<double>(b.x) - a.x))),
-                               static_cast<std::int32_t>(std::lround(a.y + t * (static_cast<double>(b.y) - a.y))), z},
-                              s == parts,
-                              false});
+            places.push_back(
+                {{static_cast<std::int32_t>(std::lround(a.x + t * (static_cast<double>(b.x) - a.x))),
+                  static_cast<std::int32_t>(std::lround(a.y + t * (static_cast<double>(b.y) - a.y))), z},
+                 s == parts,
+                 false});
         }
     }
     return places;
@@ -272,7 +303,12 @@ std::vector<RingPlace> places_of(std::span<const Point2> loop, std::int32_t z) {
 class SemiRougher {
 public:
     SemiRougher(const LayerCut& cut, LayerStock& stock, const Tool& tool, const SemiRoughPass& pass)
-        : cut_(cut), stock_(stock), tool_(tool), pass_(pass), ball_(tool.kind == ToolKind::ball), r_(tool.diameter / 2) {}
+        : cut_(cut),
+          stock_(stock),
+          tool_(tool),
+          pass_(pass),
+          ball_(tool.kind == ToolKind::ball),
+          r_(tool.diameter / 2) {}
 
     Operation run() {
         Operation op = cut_.operation(OperationKind::semi_rough, pass_.purpose, tool_);
@@ -286,16 +322,20 @@ public:
         for (const Level& l : levels) tips.push_back(l.tip);
         const auto tip_over = [&](double z) { return z - stock_.z_bottom(); };
         if (pass_.swath > 0)
-            targets.leave_walls(cut_.context, cut_.drops({Cutter::Profile::flat, pass_.swath}), tip_over(*std::min_element(tips.begin(), tips.end())),
-                                cut_.floors);
+            targets.leave_walls(cut_.context, cut_.drops({Cutter::Profile::flat, pass_.swath}),
+                                tip_over(*std::min_element(tips.begin(), tips.end())), cut_.floors);
         // What no level has now none will have.
         std::vector<char> wanted(tips.size());
-        parallel_each(cut_.context, tips.size(), [&](std::size_t i) { wanted[i] = targets.any(tip_over(tips[i]), tip_over(levels[i].over)); });
+        parallel_each(cut_.context, tips.size(), [&](std::size_t i) {
+            wanted[i] = targets.any(tip_over(tips[i]), tip_over(levels[i].over));
+        });
         const bool flask = !cut_.layer.opening.empty();
         const Loops room = flask ? flask_room(cut_, r_ + pass_.allowance) : Loops{};
         const Loops beyond = flask ? beyond_room(cut_, r_ + pass_.allowance, room) : Loops{};
         // A floor is finished with its level, so there a flat end mill goes up to the walls.
-        const auto on_floor = [&](double tip) { return !ball_ && std::find(cut_.floors.begin(), cut_.floors.end(), tip) != cut_.floors.end(); };
+        const auto on_floor = [&](double tip) {
+            return !ball_ && std::find(cut_.floors.begin(), cut_.floors.end(), tip) != cut_.floors.end();
+        };
         std::vector<double> allowances;
         for (const double tip : tips) allowances.push_back(on_floor(tip) ? 0 : pass_.allowance);
         std::vector<std::optional<Contours>> borders(tips.size());
@@ -333,40 +373,56 @@ public:
 
 private:
     struct Level {
-        double tip = 0, over = -1e300;  // mm: what lies over a surface that is no higher than `over` is left to other levels
+        double
+            tip = 0,
+            over =
+                -1e300;  // mm: what lies over a surface that is no higher than `over` is left to other levels
     };
-    // In the order in which they are cut. A flat end mill's lie on floors too. Between two of a ball's lie others, for the waste that does not
-    // reach down to the next.
+    // In the order in which they are cut. A flat end mill's lie on floors too. Between two of a ball's lie
+    // others, for the waste that does not reach down to the next.
     [[nodiscard]] std::vector<Level> levels_of() const {
         std::vector<Level> levels;
         if (!ball_) {
             for (const RoughLevel& l : rough_levels(cut_, tool_, 0)) levels.push_back({l.tip});
             return levels;
         }
-        // As far below the layer as its rings leave ridges between them, so that none stays there as a film that comes loose.
+        // As far below the layer as its rings leave ridges between them, so that none stays there as a film
+        // that comes loose.
         const double half_step = kStepShare * r_, ridge = r_ - std::sqrt(r_ * r_ - half_step * half_step);
-        const double deepest = std::min(cut_.layer.z_bottom, cut_.layer.floor_below + pass_.allowance), top = cut_.layer.z_top,
+        const double deepest = std::min(cut_.layer.z_bottom, cut_.layer.floor_below + pass_.allowance),
+                     top = cut_.layer.z_top,
                      bottom = std::max(cut_.layer.z_bottom - ridge - kStands, deepest);
-        const int steps = tool_.stepdown_max > 0 ? std::max(1, static_cast<int>(std::ceil((top - bottom) / tool_.stepdown_max - 1e-9))) : 1;
+        const int steps =
+            tool_.stepdown_max > 0
+                ? std::max(1, static_cast<int>(std::ceil((top - bottom) / tool_.stepdown_max - 1e-9)))
+                : 1;
         auto at = [&](double step) { return top - (top - bottom) * step / steps; };
         for (int k = 0; k < steps; ++k) {
-            for (int part = 1; part < kLevelsAStep; ++part) levels.push_back({at(k + static_cast<double>(part) / kLevelsAStep), at(k + 1)});
+            for (int part = 1; part < kLevelsAStep; ++part)
+                levels.push_back({at(k + static_cast<double>(part) / kLevelsAStep), at(k + 1)});
             levels.push_back({at(k + 1)});
         }
         // Walls that go on below the layer are met by its lower half too.
-        if (const double under = std::max(cut_.layer.z_bottom - r_ + pass_.limit, deepest); under < bottom - kStands) levels.push_back({under});
+        if (const double under = std::max(cut_.layer.z_bottom - r_ + pass_.limit, deepest);
+            under < bottom - kStands)
+            levels.push_back({under});
         return levels;
     }
 
-    [[nodiscard]] Cutter wider_by(double allowance) const { return {ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_ + allowance}; }
+    [[nodiscard]] Cutter wider_by(double allowance) const {
+        return {ball_ ? Cutter::Profile::ball : Cutter::Profile::flat, r_ + allowance};
+    }
     [[nodiscard]] FibreGrid grid_of(double allowance) const {
         const double gouge = cut_.job.tolerances.gouge;
-        return fibre_grid(cut_.solid, wider_by(allowance), safe_pitch(r_, allowance > 0 ? std::max(gouge, 0.2 * allowance) : gouge));
+        return fibre_grid(cut_.solid, wider_by(allowance),
+                          safe_pitch(r_, allowance > 0 ? std::max(gouge, 0.2 * allowance) : gouge));
     }
 
-    // What the wider cutter must not enter, on this level and those of the same allowance that follow and are wanted: each is found from the one above.
-    void borders_from(std::size_t first, std::span<const double> tips, std::span<const double> allowances, std::span<const char> wanted,
-                      const FibreGrid& grid, std::vector<std::optional<Contours>>& borders) const {
+    // What the wider cutter must not enter, on this level and those of the same allowance that follow and are
+    // wanted: each is found from the one above.
+    void borders_from(std::size_t first, std::span<const double> tips, std::span<const double> allowances,
+                      std::span<const char> wanted, const FibreGrid& grid,
+                      std::vector<std::optional<Contours>>& borders) const {
         const double allowance = allowances[first];
         const Cutter cutter = wider_by(allowance);
         std::vector<std::size_t> which;
@@ -384,13 +440,15 @@ private:
     }
 
     // From the farthest ring whose cutter meets a target inwards; what a ring cuts the next need not.
-    void cut_rings(LevelTargets& targets, const Loops& border, double tip, bool keeps_off, std::vector<std::vector<LevelRun>>& runs) {
+    void cut_rings(LevelTargets& targets, const Loops& border, double tip, bool keeps_off,
+                   std::vector<std::vector<LevelRun>>& runs) {
         const CellGrid& grid = stock_.grid();
         const double step = kStepShare * tool_.diameter;
         std::vector<Loops> rings{border};
         const double loose = ring_tolerance(tool_);
         const Loops thin = thinned(border, kRingTolerance);
-        const double reach = r_ + loose + kSample;  // how far at most from a ring's distance to the border it meets a target
+        const double reach =
+            r_ + loose + kSample;  // how far at most from a ring's distance to the border it meets a target
         std::vector<std::array<int, 2>> outside = targets.cells();
         double passed = 0;  // mm from the border: no target that a ring went past lies farther
         for (int k = 1; k < kMostRings; ++k) {
@@ -398,7 +456,8 @@ private:
             const auto inside = rows_inside(grid, rings.back());
             const std::size_t gone = std::erase_if(outside, [&](const std::array<int, 2>& c) {
                 const auto& row = inside[static_cast<std::size_t>(c[1])];
-                return std::any_of(row.begin(), row.end(), [&](const std::array<int, 2>& s) { return s[0] <= c[0] && c[0] <= s[1]; });
+                return std::any_of(row.begin(), row.end(),
+                                   [&](const std::array<int, 2>& s) { return s[0] <= c[0] && c[0] <= s[1]; });
             });
             if (outside.empty()) break;
             if (gone > 0) passed = (k - 1) * step;
@@ -414,39 +473,46 @@ private:
         for (std::size_t k = rings.size(); k-- > 0;) {
             cut_.context.throw_if_cancelled();
             runs.emplace_back();
-            const double tolerance = k > 0 || keeps_off ? kRingTolerance * kUnitsPerMm : simplify_tolerance_units(cut_.job.tolerances.gouge);
+            const double tolerance = k > 0 || keeps_off ? kRingTolerance * kUnitsPerMm
+                                                        : simplify_tolerance_units(cut_.job.tolerances.gouge);
             const double most = k > 0 ? loose * kUnitsPerMm : tolerance;
             for (std::size_t l = 0; l < rings[k].size(); ++l) {
                 std::vector<RingPlace> places = places_of(rings[k].loop(l), z);
-                for (RingPlace& p : places) p.useful = within_travel(p.at) && targets.met(to_mm(p.at.x), to_mm(p.at.y));
+                for (RingPlace& p : places)
+                    p.useful = within_travel(p.at) && targets.met(to_mm(p.at.x), to_mm(p.at.y));
                 append_useful(places, tolerance, most, runs.back());
             }
             for (const LevelRun& run : runs.back())
                 for (std::size_t p = 1; p < run.points.size(); ++p) {
                     const PathPoint &a = run.points[p - 1], &b = run.points[p];
-                    stock_.cut_along(end, {to_mm(a.x), to_mm(a.y), to_mm(z)}, {to_mm(b.x), to_mm(b.y), to_mm(z)});
+                    stock_.cut_along(end, {to_mm(a.x), to_mm(a.y), to_mm(z)},
+                                     {to_mm(b.x), to_mm(b.y), to_mm(z)});
                 }
         }
     }
 
     [[nodiscard]] bool within_travel(const PathPoint& p) const {
-        return to_mm(p.x) >= cut_.low(0, r_ + 2) && to_mm(p.x) <= cut_.high(0, r_ + 2) && to_mm(p.y) >= cut_.low(1, r_ + 2) &&
-               to_mm(p.y) <= cut_.high(1, r_ + 2);
+        return to_mm(p.x) >= cut_.low(0, r_ + 2) && to_mm(p.x) <= cut_.high(0, r_ + 2) &&
+               to_mm(p.y) >= cut_.low(1, r_ + 2) && to_mm(p.y) <= cut_.high(1, r_ + 2);
     }
 
-    // Useful stretches with a place before and after them; short gaps are travelled along the ring, which is free.
-    void append_useful(std::vector<RingPlace>& places, double tolerance, double most, std::vector<LevelRun>& out) const {
+    // Useful stretches with a place before and after them; short gaps are travelled along the ring, which is
+    // free.
+    void append_useful(std::vector<RingPlace>& places, double tolerance, double most,
+                       std::vector<LevelRun>& out) const {
         const double turn = fast_turn(cut_.job.machine, feed());
         const std::size_t n = places.size();
         std::vector<std::size_t> useful;
         for (std::size_t k = 0; k < n; ++k)
             if (places[k].useful) useful.push_back(k);
         if (useful.empty()) return;
-        auto way = [&](std::size_t from, std::size_t to) {  // 0.1 µm along the ring; the whole ring where they are one
+        auto way = [&](std::size_t from,
+                       std::size_t to) {  // 0.1 µm along the ring; the whole ring where they are one
             double sum = 0;
             for (std::size_t k = from;;) {
                 const std::size_t next = (k + 1) % n;
-                sum += std::hypot(static_cast<double>(places[next].at.x) - places[k].at.x, static_cast<double>(places[next].at.y) - places[k].at.y);
+                sum += std::hypot(static_cast<double>(places[next].at.x) - places[k].at.x,
+                                  static_cast<double>(places[next].at.y) - places[k].at.y);
                 if ((k = next) == to) return sum;
             }
         };
@@ -455,7 +521,8 @@ private:
             const std::size_t next = useful[(u + 1) % useful.size()];
             if ((useful[u] + 1) % n == next && useful.size() > 1) continue;
             bool travels = true;
-            for (std::size_t k = (useful[u] + 1) % n; k != next && travels; k = (k + 1) % n) travels = within_travel(places[k].at);
+            for (std::size_t k = (useful[u] + 1) % n; k != next && travels; k = (k + 1) % n)
+                travels = within_travel(places[k].at);
             if (!travels || way(useful[u], next) > 2 * r_ * kUnitsPerMm) ends.push_back(u);
         }
         auto append = [&](std::size_t from, std::size_t count, bool closed) {
@@ -471,7 +538,8 @@ private:
         };
         if (ends.empty()) return append(0, n, true);
         for (std::size_t e = 0; e < ends.size(); ++e) {
-            const std::size_t first = useful[(ends[e == 0 ? ends.size() - 1 : e - 1] + 1) % useful.size()], last = useful[ends[e]];
+            const std::size_t first = useful[(ends[e == 0 ? ends.size() - 1 : e - 1] + 1) % useful.size()],
+                              last = useful[ends[e]];
             std::size_t from = (first + n - 1) % n, count = (last + n - first) % n + 3;
             if (!within_travel(places[from].at)) from = first, --count;
             if (!within_travel(places[(last + 1) % n].at)) --count;
@@ -486,8 +554,10 @@ private:
     }
 
     void emit(Operation& op, std::vector<std::vector<LevelRun>>& runs) const {
-        PathBuilder path(op, tool_, feed(), cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
-        const DropIndex& part = cut_.drops(ball_ ? Cutter{Cutter::Profile::ball, r_ + pass_.allowance} : Cutter{Cutter::Profile::flat, r_});
+        PathBuilder path(op, tool_, feed(), cut_.layer.z_top + cut_.job.machine.clearance,
+                         cut_.layer.z_top + 2);
+        const DropIndex& part = cut_.drops(ball_ ? Cutter{Cutter::Profile::ball, r_ + pass_.allowance}
+                                                 : Cutter{Cutter::Profile::flat, r_});
         path.know(cut_.around(tool_, &part));
         cut_levels(path, cut_, tool_, part, runs, false);
         path.finish();
@@ -503,7 +573,8 @@ private:
 
 }  // namespace
 
-Operation semi_rough_layer(const LayerCut& cut, LayerStock& stock, const Tool& tool, const SemiRoughPass& pass) {
+Operation semi_rough_layer(const LayerCut& cut, LayerStock& stock, const Tool& tool,
+                           const SemiRoughPass& pass) {
     return SemiRougher(cut, stock, tool, pass).run();
 }
 

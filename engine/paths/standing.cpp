@@ -10,19 +10,21 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kRounding = 2e-5;  // mm: what rounding a height to float and a place to the grid may take away
+constexpr double kRounding =
+    2e-5;  // mm: what rounding a height to float and a place to the grid may take away
 constexpr std::size_t kTable = 512;
 
 }  // namespace
 
 double Standing::cell_size(std::array<double, 2> min, std::array<double, 2> max) {
-    return std::max(kFinestCell, std::sqrt((max[0] - min[0]) * (max[1] - min[1]) / static_cast<double>(kMostCells)));
+    return std::max(kFinestCell,
+                    std::sqrt((max[0] - min[0]) * (max[1] - min[1]) / static_cast<double>(kMostCells)));
 }
 
 std::uint64_t Standing::bytes(std::array<double, 2> min, std::array<double, 2> max) {
     const double cell = cell_size(min, max);
-    return static_cast<std::uint64_t>(std::ceil((max[0] - min[0]) / cell)) * static_cast<std::uint64_t>(std::ceil((max[1] - min[1]) / cell)) *
-           sizeof(float);
+    return static_cast<std::uint64_t>(std::ceil((max[0] - min[0]) / cell)) *
+           static_cast<std::uint64_t>(std::ceil((max[1] - min[1]) / cell)) * sizeof(float);
 }
 
 Standing::Standing(std::array<double, 2> min, std::array<double, 2> max, double top)
@@ -41,24 +43,28 @@ Standing::BallTable Standing::made_table(double radius) const {
     if (reach <= 0) return table;
     table.scale = kTable / (reach * reach);
     for (std::size_t k = 0; k <= kTable; ++k) {
-        const double rho = std::min(radius, std::min(reach, std::sqrt((static_cast<double>(k) + 1) / table.scale)) + d_);
+        const double rho =
+            std::min(radius, std::min(reach, std::sqrt((static_cast<double>(k) + 1) / table.scale)) + d_);
         table.height[k] = static_cast<float>(radius - std::sqrt(radius * radius - rho * rho));
     }
     return table;
 }
 
 const Standing::BallTable& Standing::ball_table(double radius) const {
-    const auto found = std::find_if(tables_.begin(), tables_.end(), [&](const BallTable& t) { return t.radius == radius; });
+    const auto found =
+        std::find_if(tables_.begin(), tables_.end(), [&](const BallTable& t) { return t.radius == radius; });
     return found != tables_.end() ? *found : tables_.emplace_back(made_table(radius));
 }
 
-// Calls take(first row, rows, spans) for the cells whose centres lie within `radius` of the segment from a to b, some rows at a time;
-// `been`: without those within it of a.
+// Calls take(first row, rows, spans) for the cells whose centres lie within `radius` of the segment from a to
+// b, some rows at a time; `been`: without those within it of a.
 template <class Spans>
-void Standing::each_spans(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, bool been, Spans&& take) const {
+void Standing::each_spans(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b,
+                          bool been, Spans&& take) const {
     if (radius <= 0) return;
     const CellGrid grid{x0_, y0_, cell_, nx_, ny_};
-    const auto [first, last] = rows_between(grid, std::min(a[1], b[1]) - radius, std::max(a[1], b[1]) + radius);
+    const auto [first, last] =
+        rows_between(grid, std::min(a[1], b[1]) - radius, std::max(a[1], b[1]) + radius);
     RowSpans spans;
     for (int j = first; j <= last; j += RowSpans::kRows) {
         const int together = std::min(RowSpans::kRows, last - j + 1);
@@ -69,7 +75,8 @@ void Standing::each_spans(double radius, const std::array<double, 2>& a, const s
 
 // Calls row(j, first, last) for all of them.
 template <class Row>
-void Standing::rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, Row&& row) const {
+void Standing::rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b,
+                    Row&& row) const {
     each_spans(radius, a, b, false, [&](int j, int together, const RowSpans& spans) {
         for (std::size_t k = 0; k < static_cast<std::size_t>(together); ++k)
             if (spans.low[k] <= spans.left[k]) row(j + static_cast<int>(k), spans.low[k], spans.left[k]);
@@ -86,8 +93,8 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
         const auto z = static_cast<float>((l2 > 0 ? high : low) - top_ + kRounding);
         const bool level = from[2] == to[2], been = level && from == last_ && cutter.radius == last_radius_;
         each_spans(cutter.radius - d_, a, b, been, [&](int j, int together, const RowSpans& spans) {
-            lower_spans(height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_), static_cast<std::size_t>(nx_), together, spans,
-                        z);
+            lower_spans(height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_),
+                        static_cast<std::size_t>(nx_), together, spans, z);
         });
         if (level) last_ = to, last_radius_ = cutter.radius;
         return;
@@ -95,9 +102,10 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
     const BallTable& table = ball_table(cutter.radius);
     const float* const profile = table.height.data();
     const double scale = table.scale;
-    // The place of the way nearest to the cell's centre: on steep ways others may be lower, but this one is sure.
-    const double z0 = (l2 > 0 ? from[2] : low) - top_ + kRounding, rise = l2 > 0 ? to[2] - from[2] : 0.0, fx = l2 > 0 ? dx / l2 : 0.0,
-                 fy = l2 > 0 ? dy / l2 : 0.0;
+    // The place of the way nearest to the cell's centre: on steep ways others may be lower, but this one is
+    // sure.
+    const double z0 = (l2 > 0 ? from[2] : low) - top_ + kRounding, rise = l2 > 0 ? to[2] - from[2] : 0.0,
+                 fx = l2 > 0 ? dx / l2 : 0.0, fy = l2 > 0 ? dy / l2 : 0.0;
     rows(cutter.radius - d_, a, b, [&](int j, int first, int last) {
         float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
         const double py = y0_ + j * cell_ - a[1];
@@ -113,13 +121,15 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
 double Standing::top(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b) const {
     float most = -std::numeric_limits<float>::infinity();
     each_spans(radius + d_, a, b, false, [&](int j, int together, const RowSpans& spans) {
-        most = std::max(most, highest_in(height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_), static_cast<std::size_t>(nx_),
-                                         together, spans));
+        most = std::max(
+            most, highest_in(height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_),
+                             static_cast<std::size_t>(nx_), together, spans));
     });
     return top_ + static_cast<double>(most);
 }
 
-double Standing::free_tip(const Cutter& cutter, const std::array<double, 2>& a, const std::array<double, 2>& b) const {
+double Standing::free_tip(const Cutter& cutter, const std::array<double, 2>& a,
+                          const std::array<double, 2>& b) const {
     if (cutter.profile == Cutter::Profile::flat) return top(cutter.radius - 2 * d_, a, b);
     const BallTable& table = ball_table(cutter.radius);
     const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
@@ -128,7 +138,8 @@ double Standing::free_tip(const Cutter& cutter, const std::array<double, 2>& a, 
         const float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
         const double py = y0_ + j * cell_ - a[1];
         for (int i = first; i <= last; ++i) {
-            const double px = x0_ + i * cell_ - a[0], t = l2 > 0 ? std::clamp((px * dx + py * dy) / l2, 0.0, 1.0) : 0.0;
+            const double px = x0_ + i * cell_ - a[0],
+                         t = l2 > 0 ? std::clamp((px * dx + py * dy) / l2, 0.0, 1.0) : 0.0;
             const double ex = px - t * dx, ey = py - t * dy;
             const auto bin = std::min(kTable, static_cast<std::size_t>((ex * ex + ey * ey) * table.scale));
             most = std::max(most, static_cast<double>(h[i] - table.height[bin]));

@@ -9,28 +9,34 @@
 
 namespace slabwright {
 
-/// A height for every cell of a grid over the stock that nothing in the whole cell exceeds, not only at its centre.
+/// A height for every cell of a grid over the stock that nothing in the whole cell exceeds, not only at its
+/// centre.
 ///
-/// With d half the diagonal of a cell, a position of a flat end of radius R clears every cell whose centre lies within R − d
-/// of it down to its tip. A ball of radius R clears there down to tip + R − √(R² − (ρ + d)²), ρ being the distance of the
-/// centre, for no point of the cell is farther from the axis than ρ + d. Every cell takes the height from one position of
-/// the cutter that really was there, so leaving cuts out, or giving them in another order, keeps the bound a bound.
+/// With d half the diagonal of a cell, a position of a flat end of radius R clears every cell whose centre
+/// lies within R − d of it down to its tip. A ball of radius R clears there down to tip + R − √(R² − (ρ +
+/// d)²), ρ being the distance of the centre, for no point of the cell is farther from the axis than ρ + d.
+/// Every cell takes the height from one position of the cutter that really was there, so leaving cuts out, or
+/// giving them in another order, keeps the bound a bound.
 class Standing {
 public:
-    /// The rectangle [min, max] of stock (mm), full up to `top`; cells of kFinestCell, or larger ones where there would be
-    /// more than kMostCells.
+    /// The rectangle [min, max] of stock (mm), full up to `top`; cells of kFinestCell, or larger ones where
+    /// there would be more than kMostCells.
     Standing(std::array<double, 2> min, std::array<double, 2> max, double top);
 
     /// The cutter goes straight from `from` to `to`, tips in mm.
     void cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to);
 
-    /// Nothing over the disc of `radius` that goes straight from a to b exceeds this; −infinity beside the stock.
-    [[nodiscard]] double top(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b) const;
+    /// Nothing over the disc of `radius` that goes straight from a to b exceeds this; −infinity beside the
+    /// stock.
+    [[nodiscard]] double top(double radius, const std::array<double, 2>& a,
+                             const std::array<double, 2>& b) const;
 
-    /// How low the cutter's tip may go all along the way from a to b without meeting what is known to stand. Cells that
-    /// reach beyond the cutter do not count: within a cell's diagonal of the cutter's rim something may stand all the same.
-    /// (Beside a finished wall the cells of the wall itself would forbid everything.) −infinity beside the stock.
-    [[nodiscard]] double free_tip(const Cutter& cutter, const std::array<double, 2>& a, const std::array<double, 2>& b) const;
+    /// How low the cutter's tip may go all along the way from a to b without meeting what is known to stand.
+    /// Cells that reach beyond the cutter do not count: within a cell's diagonal of the cutter's rim
+    /// something may stand all the same. (Beside a finished wall the cells of the wall itself would forbid
+    /// everything.) −infinity beside the stock.
+    [[nodiscard]] double free_tip(const Cutter& cutter, const std::array<double, 2>& a,
+                                  const std::array<double, 2>& b) const;
 
     [[nodiscard]] double cell() const { return cell_; }
     [[nodiscard]] static std::uint64_t bytes(std::array<double, 2> min, std::array<double, 2> max);
@@ -49,7 +55,8 @@ private:
     /// The table of this radius, made when it is first asked for; until the next call.
     [[nodiscard]] const BallTable& ball_table(double radius) const;
     template <class Spans>
-    void each_spans(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, bool been, Spans&& take) const;
+    void each_spans(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, bool been,
+                    Spans&& take) const;
     template <class Row>
     void rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, Row&& row) const;
 

@@ -25,7 +25,8 @@ struct Link {
 }  // namespace
 
 void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<const std::int32_t> line_y,
-            const std::vector<std::vector<Stretch>>& free, double tip_z, const std::function<Fibres(std::span<const std::int32_t>)>& links) {
+            const std::vector<std::vector<Stretch>>& free, double tip_z,
+            const std::function<Fibres(std::span<const std::int32_t>)>& links) {
     std::vector<Node> nodes;
     std::vector<std::size_t> first(line_y.size() + 1, 0);
     for (std::size_t i = 0; i < line_y.size(); ++i) {
@@ -44,7 +45,8 @@ void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<
     for (std::size_t i = 0; i + 1 < line_y.size(); ++i)
         for (std::size_t a = first[i]; a < first[i + 1]; ++a)
             for (std::size_t b = first[i + 1]; b < first[i + 2]; ++b) {
-                const std::int32_t low = std::max(nodes[a].low, nodes[b].low), high = std::min(nodes[a].high, nodes[b].high);
+                const std::int32_t low = std::max(nodes[a].low, nodes[b].low),
+                                   high = std::min(nodes[a].high, nodes[b].high);
                 if (low > high) continue;
                 pairs.push_back({a, b, low, high});
                 at.insert(at.end(), {low, high});
@@ -53,7 +55,8 @@ void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<
     at.erase(std::unique(at.begin(), at.end()), at.end());
     const Fibres across = links(at);
     auto is_free = [&](std::int32_t x, std::size_t line) {
-        const std::size_t k = static_cast<std::size_t>(std::lower_bound(at.begin(), at.end(), x) - at.begin());
+        const std::size_t k =
+            static_cast<std::size_t>(std::lower_bound(at.begin(), at.end(), x) - at.begin());
         const double y0 = to_mm(line_y[line]), y1 = to_mm(line_y[line + 1]);
         for (const Forbidden& f : across.line(k))
             if (f.low < y1 - 1e-4 && f.high > y0 + 1e-4) return false;
@@ -98,7 +101,8 @@ void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<
                     if (!(high ? l.high_free : l.low_free)) continue;
                     const std::int32_t x = high ? l.x_high : l.x_low;
                     const std::int64_t way = std::abs(std::int64_t{x} - chain.back().x) +
-                                             std::min(std::abs(std::int64_t{x} - nodes[l.b].low), std::abs(std::int64_t{x} - nodes[l.b].high));
+                                             std::min(std::abs(std::int64_t{x} - nodes[l.b].low),
+                                                      std::abs(std::int64_t{x} - nodes[l.b].high));
                     if (!best || way < best_way) best = &l, best_x = x, best_way = way;
                 }
             }
@@ -107,7 +111,8 @@ void zigzag(PathBuilder& path, const LayerCut& cut, const Tool& tool, std::span<
             n = best->b;
             go(best_x);
             // From here to the nearer end first, then all the way to the other.
-            upward = std::abs(std::int64_t{best_x} - nodes[n].low) <= std::abs(std::int64_t{nodes[n].high} - best_x);
+            upward = std::abs(std::int64_t{best_x} - nodes[n].low) <=
+                     std::abs(std::int64_t{nodes[n].high} - best_x);
             go(upward ? nodes[n].low : nodes[n].high);
         }
         chains.push_back(std::move(chain));

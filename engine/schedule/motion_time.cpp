@@ -11,16 +11,19 @@ void Travel::add(const MotionLeg& leg) {
     double entry = 0;
     if (begun_) {
         const auto &u = leaving_, &v = leg.direction;
-        const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0), half = std::sqrt((1 + cosine) / 2);
+        const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0),
+                     half = std::sqrt((1 + cosine) / 2);
         double corner = 1e9;
         if (half < 1 - 1e-12) {
             const double touches = std::min(length_, leg.length) / 2;
-            corner = std::sqrt(acceleration_ * std::min(junction_mm_ * half / (1 - half), touches * half / std::sqrt(1 - half * half)));
+            corner = std::sqrt(acceleration_ * std::min(junction_mm_ * half / (1 - half),
+                                                        touches * half / std::sqrt(1 - half * half)));
         }
         entry = std::min({corner, speed_, leg.speed});
     }
     begun_ = true, length_ = leg.length, speed_ = leg.speed, leaving_ = leg.leaving;
-    // A leg on which one can stop from the highest speed of its start is entered at that speed, whatever follows.
+    // A leg on which one can stop from the highest speed of its start is entered at that speed, whatever
+    // follows.
     if (legs_.size() >= kTogether && entry <= std::sqrt(2 * acceleration_ * leg.length)) settle(entry);
     legs_.push_back({leg.length, leg.speed, entry});
 }
@@ -32,7 +35,8 @@ double Travel::seconds() {
     return std::exchange(seconds_, 0.0);
 }
 
-// Backwards: nobody may enter a leg faster than he can leave it. Forwards: nor faster than he can have become.
+// Backwards: nobody may enter a leg faster than he can leave it. Forwards: nor faster than he can have
+// become.
 void Travel::settle(double next) {
     const double a = acceleration_, last = next;
     for (std::size_t i = legs_.size(); i-- > 0;) {
@@ -63,14 +67,16 @@ MotionTime motion_time(std::span<const Move> moves, const Machine& machine, doub
     Travel travel(machine.acceleration, junction_mm);
     for (std::size_t i = 1; i < moves.size(); ++i) {
         const Move &a = moves[i - 1], &b = moves[i];
-        const std::array<double, 3> d{to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y), to_mm(std::int64_t{b.z} - a.z)};
+        const std::array<double, 3> d{to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y),
+                                      to_mm(std::int64_t{b.z} - a.z)};
         const double length = std::hypot(d[0], d[1], d[2]);
         if (length == 0) continue;
         const bool rapid = b.feed == 0;
         if (b.is_arc()) {
             const ArcShape arc = arc_shape(a, b);
             const double side = arc.sweep > 0 ? 1 : -1, end = arc.start + arc.sweep;
-            const double speed = std::min(std::min<double>(b.feed, machine.max_feed) / 60, std::sqrt(machine.acceleration * arc.radius));
+            const double speed = std::min(std::min<double>(b.feed, machine.max_feed) / 60,
+                                          std::sqrt(machine.acceleration * arc.radius));
             total.cutting_mm += arc.length();
             travel.add({arc.length(),
                         speed,
@@ -79,8 +85,9 @@ MotionTime motion_time(std::span<const Move> moves, const Machine& machine, doub
             continue;
         }
         (rapid ? total.rapid_mm : total.cutting_mm) += length;
-        travel.add(
-            {length, (rapid ? machine.rapid_feed : std::min<double>(b.feed, machine.max_feed)) / 60, {d[0] / length, d[1] / length, d[2] / length}});
+        travel.add({length,
+                    (rapid ? machine.rapid_feed : std::min<double>(b.feed, machine.max_feed)) / 60,
+                    {d[0] / length, d[1] / length, d[2] / length}});
     }
     total.minutes = travel.seconds() / 60;
     return total;

@@ -20,7 +20,8 @@ struct MotionLeg {
 /// The time of legs that are told one after the other, without keeping them all: see travel_seconds.
 class Travel {
 public:
-    explicit Travel(double acceleration, double junction_mm = kJunction) : acceleration_(acceleration), junction_mm_(junction_mm) {}
+    explicit Travel(double acceleration, double junction_mm = kJunction)
+        : acceleration_(acceleration), junction_mm_(junction_mm) {}
     void add(const MotionLeg& leg);
     /// Of all so far, s, at rest after the last; without legs then.
     [[nodiscard]] double seconds();
@@ -40,19 +41,23 @@ private:
     double speed_now_ = 0, seconds_ = 0;  ///< where legs_ begins
 };
 
-/// Every leg is a trapezoid of speed under one acceleration (mm/s²); where two legs meet, the speed is limited to what the widest arc bears
-/// that touches both, each no farther off than its middle, and passes the corner by δ = `junction_mm` at most: v² = a·r,
-/// r = min(δ·c / (1 − c), l / 2 · c / s), c and s cosine and sine of θ/2, θ the change of direction, l the shorter leg. So chords of a circle are run
-/// no faster than the circle. Starts and ends at rest. Legs without length are passed over.
-[[nodiscard]] double travel_seconds(std::span<const MotionLeg> legs, double acceleration, double junction_mm = kJunction);
+/// Every leg is a trapezoid of speed under one acceleration (mm/s²); where two legs meet, the speed is
+/// limited to what the widest arc bears that touches both, each no farther off than its middle, and passes
+/// the corner by δ = `junction_mm` at most: v² = a·r, r = min(δ·c / (1 − c), l / 2 · c / s), c and s cosine
+/// and sine of θ/2, θ the change of direction, l the shorter leg. So chords of a circle are run no faster
+/// than the circle. Starts and ends at rest. Legs without length are passed over.
+[[nodiscard]] double travel_seconds(std::span<const MotionLeg> legs, double acceleration,
+                                    double junction_mm = kJunction);
 
 struct MotionTime {
     double cutting_mm = 0, rapid_mm = 0;
     double minutes = 0;
 };
 
-/// Of a program's moves, the first of which is where it starts. On an arc the speed is also limited to what its radius bears
-/// under the machine's acceleration: v² = a·r. Corners are rounded by `junction_mm` at most, as in travel_seconds.
-[[nodiscard]] MotionTime motion_time(std::span<const Move> moves, const Machine& machine, double junction_mm = kJunction);
+/// Of a program's moves, the first of which is where it starts. On an arc the speed is also limited to what
+/// its radius bears under the machine's acceleration: v² = a·r. Corners are rounded by `junction_mm` at most,
+/// as in travel_seconds.
+[[nodiscard]] MotionTime motion_time(std::span<const Move> moves, const Machine& machine,
+                                     double junction_mm = kJunction);
 
 }  // namespace slabwright

@@ -29,10 +29,12 @@ CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job&
     const double feed = fastest_feed(operation);
     if (feed == 0 || tool.kind == ToolKind::drill) return s;
     if (!(operation.spindle_rpm > 0))
-        throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest", operation.purpose, "give the tool a speed");
+        throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest",
+                    operation.purpose, "give the tool a speed");
     s.chip_load_mm = feed / (operation.spindle_rpm * tool.flutes);
 
-    const double steps = s.profile == CutterProfile::ball ? job.tolerances.rough_cusp : 0, slot = 2 * s.radius_mm;
+    const double steps = s.profile == CutterProfile::ball ? job.tolerances.rough_cusp : 0,
+                 slot = 2 * s.radius_mm;
     double depth = operation.stepdown, width = operation.stepover;
     switch (operation.kind) {
         case OperationKind::rough:
@@ -49,7 +51,8 @@ CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job&
     if (!(width > 0)) width = slot;
     s.high_mm = depth;
     const bool cap = s.profile == CutterProfile::ball && depth < s.radius_mm;
-    s.arc = engagement_arc(cap ? std::sqrt(depth * (2 * s.radius_mm - depth)) : s.radius_mm, width, MillingSense::up);
+    s.arc = engagement_arc(cap ? std::sqrt(depth * (2 * s.radius_mm - depth)) : s.radius_mm, width,
+                           MillingSense::up);
     return s;
 }
 

@@ -6,21 +6,24 @@
 
 namespace slabwright {
 
-/// The heaviest nominal cut of an operation: its fastest feed among the moves that travel in the plane (mm/min over spindle
-/// speed and flutes), its largest stepdown, and its width.
+/// The heaviest nominal cut of an operation: its fastest feed among the moves that travel in the plane
+/// (mm/min over spindle speed and flutes), its largest stepdown, and its width.
 ///   * rough and semi-rough: a slot, for a clearing program opens with one;
 ///   * face: its stepover; where that is unknown, a slot;
-///   * finish, corner, edge: what the tool before left. With a stepdown, the wall allowance wide; with a stepover, the floor
+///   * finish, corner, edge: what the tool before left. With a stepdown, the wall allowance wide; with a
+///   stepover, the floor
 ///     allowance deep; a ball meets the steps of roughing too (the job's rough cusp).
-/// A ball that cuts less deep than its radius engages over the arc that its width has on the circle at that depth.
-/// Coefficients by the job's transform of its material at the tool's helix. No moves that mill, or a drill (it
-/// does not mill): a segment without depth.
+/// A ball that cuts less deep than its radius engages over the arc that its width has on the circle at that
+/// depth. Coefficients by the job's transform of its material at the tool's helix. No moves that mill, or a
+/// drill (it does not mill): a segment without depth.
 /// @throws Error(usage, "forces.spindle") when it mills with a spindle speed of 0
 [[nodiscard]] CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job& job);
 
-/// Fills peak_force_n (the resultant), deflection_mm and wall_error_mm (both of the tip, by the largest force in the plane, over the tool's
-/// stickout) from the closed form or the double reference, so that they are the same on every device.
-/// @throws as heaviest_cut; Error(usage, "forces.segment") for a tool or material that the force model does not take
+/// Fills peak_force_n (the resultant), deflection_mm and wall_error_mm (both of the tip, by the largest force
+/// in the plane, over the tool's stickout) from the closed form or the double reference, so that they are the
+/// same on every device.
+/// @throws as heaviest_cut; Error(usage, "forces.segment") for a tool or material that the force model does
+/// not take
 void rate_operation(Operation& operation, const Tool& tool, const Job& job);
 
 }  // namespace slabwright

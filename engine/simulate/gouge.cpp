@@ -28,8 +28,8 @@ GougeReport join(GougeReport a, const GougeReport& b) {
 
 }  // namespace
 
-GougeReport check_gouge(Context& context, const StandingPart& part, double z_top, const Tool& tool, const Program& program,
-                        const GougeOptions& options) {
+GougeReport check_gouge(Context& context, const StandingPart& part, double z_top, const Tool& tool,
+                        const Program& program, const GougeOptions& options) {
     const std::size_t n = program.steps.size();
     if (n < 2) return {};
     const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
@@ -41,7 +41,8 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
             std::vector<StandingPart::Motion> motions;
             std::vector<std::uint32_t> lines;
             std::vector<StandingPart::Chords> chords;
-            auto arc = std::partition_point(program.arcs.begin(), program.arcs.end(), [&](const ProgramArc& a) { return a.end <= begin + 1; });
+            auto arc = std::partition_point(program.arcs.begin(), program.arcs.end(),
+                                            [&](const ProgramArc& a) { return a.end <= begin + 1; });
             bool in_arc = false;
             for (std::size_t i = begin; i < end; ++i) {
                 const ProgramStep &from = program.steps[i], &to = program.steps[i + 1];
@@ -49,8 +50,10 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 for (; arc != program.arcs.end() && arc->end <= i + 1; ++arc) in_arc = false;
                 // Of an arc the close chords that begin on this step's share of it.
                 const bool of_arc = arc != program.arcs.end() && arc->begin <= i + 1;
-                const std::size_t steps = of_arc ? arc->end - arc->begin : 1, close = of_arc ? arc->close_chords() : 1,
-                                  step = of_arc ? i + 1 - arc->begin : 0, first = step * close / steps, last = (step + 1) * close / steps;
+                const std::size_t steps = of_arc ? arc->end - arc->begin : 1,
+                                  close = of_arc ? arc->close_chords() : 1,
+                                  step = of_arc ? i + 1 - arc->begin : 0, first = step * close / steps,
+                                  last = (step + 1) * close / steps;
                 const auto end_of = [&](std::size_t k) -> Point3 {
                     if (k == close) return {to.x, to.y, to.z};
                     const auto [x, y] = arc->at(static_cast<double>(k) / static_cast<double>(close));
@@ -60,10 +63,13 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 for (std::size_t k = first; k < last; ++k) {
                     const Point3 b = end_of(k + 1);
                     ++r.motions;
-                    r.length_mm += std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
+                    r.length_mm += std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) +
+                                             (b[2] - a[2]) * (b[2] - a[2]));
                     if (std::min(a[2], b[2]) < z_top) {
                         if (of_arc) {
-                            if (!in_arc) chords.push_back({motions.size(), motions.size(), arc->arc.x, arc->arc.y, arc->arc.radius});
+                            if (!in_arc)
+                                chords.push_back({motions.size(), motions.size(), arc->arc.x, arc->arc.y,
+                                                  arc->arc.radius});
                             chords.back().last = motions.size() + 1;
                             in_arc = true;
                         }
@@ -73,17 +79,22 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                     a = b;
                 }
             }
-            auto check = [&](StandingPart::Form form, double thick, GougePlace& place, std::atomic<double>* known) {
-                StandingPart::Found found = part.deepest(form, z_top, motions, thick, options.ignore, options.tolerance, known, chords);
+            auto check = [&](StandingPart::Form form, double thick, GougePlace& place,
+                             std::atomic<double>* known) {
+                StandingPart::Found found = part.deepest(form, z_top, motions, thick, options.ignore,
+                                                         options.tolerance, known, chords);
                 if (found.most.found) place = {found.most.depth, lines[found.motion], found.most.tip};
                 return std::move(found.beyond);
             };
             const bool ball = tool.kind == ToolKind::ball;
-            r.gouges = check(ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter, ball ? &deepest : nullptr).size();
+            r.gouges = check(ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter,
+                             ball ? &deepest : nullptr)
+                           .size();
             std::vector<std::uint32_t> touched;
             double raised = 0;
             auto follow = [&](GougePlace& place, double thick, double above) {
-                for (StandingPart::Motion& m : motions) m.from[2] += above - raised, m.to[2] += above - raised;
+                for (StandingPart::Motion& m : motions)
+                    m.from[2] += above - raised, m.to[2] += above - raised;
                 raised = above;
                 const auto beyond = check(StandingPart::Form::cylinder, thick, place, nullptr);
                 touched.insert(touched.end(), beyond.begin(), beyond.end());
@@ -91,7 +102,8 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
             if (shank > radius) follow(r.shank, shank, tool.flute_length);
             if (nose > radius) follow(r.holder, nose, tool.stickout);
             std::sort(touched.begin(), touched.end());
-            r.contacts = static_cast<std::uint64_t>(std::unique(touched.begin(), touched.end()) - touched.begin());
+            r.contacts =
+                static_cast<std::uint64_t>(std::unique(touched.begin(), touched.end()) - touched.begin());
             return r;
         },
         join);

@@ -1,5 +1,5 @@
-// The exact check: how deep does any motion of a program take its cutter into the part? No grid, no sampling; nothing of
-// it is shared with the code that plans paths.
+// The exact check: how deep does any motion of a program take its cutter into the part? No grid, no sampling;
+// nothing of it is shared with the code that plans paths.
 #pragma once
 
 #include <cstdint>
@@ -34,9 +34,11 @@ struct GougeOptions {
 };
 
 /// Checks every motion, feed or rapid, from known place to known place. The error of a depth is at most
-/// StandingPart::kSheet under the layer's top and StandingPart::kNumericalError elsewhere, and more by Program::arc_error where arcs are.
-/// Drills are checked as cylinders of their diameter, which can only overstate.
-[[nodiscard]] GougeReport check_gouge(Context& context, const StandingPart& part, double z_top, const Tool& tool, const Program& program,
+/// StandingPart::kSheet under the layer's top and StandingPart::kNumericalError elsewhere, and more by
+/// Program::arc_error where arcs are. Drills are checked as cylinders of their diameter, which can only
+/// overstate.
+[[nodiscard]] GougeReport check_gouge(Context& context, const StandingPart& part, double z_top,
+                                      const Tool& tool, const Program& program,
                                       const GougeOptions& options = {});
 
 }  // namespace slabwright

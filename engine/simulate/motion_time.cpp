@@ -15,9 +15,12 @@ double program_seconds(const Program& program, const Machine& machine) {
         if (arc != program.arcs.end() && arc->begin == i) {  // as in motion_time()
             const LevelArc& a = arc->arc;
             const double side = a.turn > 0 ? 1 : -1, end = a.start + a.turn,
-                         speed = std::min(std::min(program.steps[i].feed, machine.max_feed) / 60, std::sqrt(machine.acceleration * a.radius));
-            travel.add(
-                {a.length(), speed, {-side * std::sin(a.start), side * std::cos(a.start), 0}, {-side * std::sin(end), side * std::cos(end), 0}});
+                         speed = std::min(std::min(program.steps[i].feed, machine.max_feed) / 60,
+                                          std::sqrt(machine.acceleration * a.radius));
+            travel.add({a.length(),
+                        speed,
+                        {-side * std::sin(a.start), side * std::cos(a.start), 0},
+                        {-side * std::sin(end), side * std::cos(end), 0}});
             i = arc->end - 1;
             ++arc;
             continue;
@@ -28,8 +31,9 @@ double program_seconds(const Program& program, const Machine& machine) {
             if (!std::isfinite(v)) v = 0;  // from an unknown place: what it takes cannot be known
         const double length = std::hypot(d[0], d[1], d[2]);
         if (length <= 0) continue;
-        travel.add(
-            {length, (to.rapid() ? machine.rapid_feed : std::min(to.feed, machine.max_feed)) / 60, {d[0] / length, d[1] / length, d[2] / length}});
+        travel.add({length,
+                    (to.rapid() ? machine.rapid_feed : std::min(to.feed, machine.max_feed)) / 60,
+                    {d[0] / length, d[1] / length, d[2] / length}});
     }
     return program.dwell_s + machine.tool_change_s + travel.seconds();
 }

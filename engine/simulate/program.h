@@ -1,4 +1,5 @@
-// A program as the machine would run it: straight motions of the tool's tip, in the order of their lines, and which of them are arcs.
+// A program as the machine would run it: straight motions of the tool's tip, in the order of their lines, and
+// which of them are arcs.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +17,8 @@ namespace slabwright {
 
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// The tip goes straight to (x, y, z), mm, from wherever the step before ended. A coordinate that no line has set
-/// yet is kUnknown: a program begins wherever the machine stood.
+/// The tip goes straight to (x, y, z), mm, from wherever the step before ended. A coordinate that no line has
+/// set yet is kUnknown: a program begins wherever the machine stood.
 struct ProgramStep {
     double x = kUnknown, y = kUnknown, z = kUnknown;
     double feed = 0;  ///< mm/min; 0: rapid
@@ -28,12 +29,14 @@ struct ProgramStep {
     [[nodiscard]] bool known() const { return std::isfinite(x) && std::isfinite(y) && std::isfinite(z); }
 };
 
-/// Steps [begin, end) are chords of a level arc, which starts where step begin − 1 ended: their ends lie on it, and no point
-/// of it is farther from them than Program::chord_error. What can, takes the arc itself, or as many chords as it wants of it.
+/// Steps [begin, end) are chords of a level arc, which starts where step begin − 1 ended: their ends lie on
+/// it, and no point of it is farther from them than Program::chord_error. What can, takes the arc itself, or
+/// as many chords as it wants of it.
 struct ProgramArc {
     std::size_t begin = 0, end = 0;
     LevelArc arc;
-    std::size_t close = 0;  ///< even chords that lie within GcodeLimits::arc_error of it; fewer than its steps: those do
+    std::size_t close =
+        0;  ///< even chords that lie within GcodeLimits::arc_error of it; fewer than its steps: those do
 
     [[nodiscard]] std::size_t close_chords() const { return std::max(close, end - begin); }
     /// Where it is after a share of its way.
@@ -53,8 +56,10 @@ struct Program {
     double planned_stepdown = 0;  ///< mm, that the plan names for it; 0: none
     double spindle_rpm = 0;       ///< highest
     double dwell_s = 0;           ///< of all G4 together
-    double blend = kJunction;     ///< mm by which the machine may round the corners (G64 P; 0: G61), the least that the program names
-    double strays = kJunction;    ///< mm by which it may leave the path at most: P, and Q for points that it leaves out (P where no Q is given)
+    double blend = kJunction;   ///< mm by which the machine may round the corners (G64 P; 0: G61), the least
+                                ///< that the program names
+    double strays = kJunction;  ///< mm by which it may leave the path at most: P, and Q for points that it
+                                ///< leaves out (P where no Q is given)
     std::vector<ProgramStep> steps;
     std::vector<ProgramArc> arcs;  ///< in the order of their steps
     double chord_error = 0;        ///< mm: how far any arc is from its steps at most

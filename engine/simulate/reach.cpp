@@ -9,20 +9,21 @@
 namespace slabwright {
 
 namespace {
-constexpr double kRests = 1e-3;              // mm: a floor this near under a flat end mill is touched, not cut
-constexpr double kCovered = Reach::kTouch;   // mm by which covering a point may fall short
-constexpr std::size_t kPlaces = 12;          // free places remembered
-constexpr std::size_t kObstacles = 48;       // obstacles remembered
-constexpr int kSettlings = 3;                // narrowest places that are settled into, of one tool and point
-constexpr int kRounds = 30;                  // of settling
-constexpr double kStuck = 0.99;              // of the round before: settling has ended
+constexpr double kRests = 1e-3;             // mm: a floor this near under a flat end mill is touched, not cut
+constexpr double kCovered = Reach::kTouch;  // mm by which covering a point may fall short
+constexpr std::size_t kPlaces = 12;         // free places remembered
+constexpr std::size_t kObstacles = 48;      // obstacles remembered
+constexpr int kSettlings = 3;               // narrowest places that are settled into, of one tool and point
+constexpr int kRounds = 30;                 // of settling
+constexpr double kStuck = 0.99;             // of the round before: settling has ended
 constexpr std::size_t kMostPatches = 20000;  // of one tool and point; a dozen to some hundreds are usual
 
 double length(const Point3& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
-/// All places of a tool that may be worth trying for one point: for a ball its centre on the upper half sphere about the point (lower
-/// ones are more in the way, higher ones do not cover it); for a flat end mill the middle of its floor on the disc about the
-/// point, at the point's height. A patch is a range of the polar angle, or of the distance, and one of the azimuth.
+/// All places of a tool that may be worth trying for one point: for a ball its centre on the upper half
+/// sphere about the point (lower ones are more in the way, higher ones do not cover it); for a flat end mill
+/// the middle of its floor on the disc about the point, at the point's height. A patch is a range of the
+/// polar angle, or of the distance, and one of the azimuth.
 struct Patch {
     double u, v;    // middle: polar angle or distance, azimuth
     double du, dv;  // half the ranges
@@ -39,11 +40,13 @@ public:
         for (int k = 0; k < 3; ++k) groups_[count_ / kLanes][k][count_ % kLanes] = q[k];
         ++count_;
     }
-    /// mm²; what lies higher than a ball's centre counts as even with it, and all counts so for a flat end mill.
+    /// mm²; what lies higher than a ball's centre counts as even with it, and all counts so for a flat end
+    /// mill.
     [[nodiscard]] double distance2(const Point3& c, bool ball) const {
         Doubles least = Doubles{} + std::numeric_limits<double>::infinity();
         for (const auto& [x, y, z] : groups_) {
-            const Doubles dx = c[0] - x, dy = c[1] - y, below = c[2] - z, dz = ball ? (below > 0.0 ? below : Doubles{}) : Doubles{};
+            const Doubles dx = c[0] - x, dy = c[1] - y, below = c[2] - z,
+                          dz = ball ? (below > 0.0 ? below : Doubles{}) : Doubles{};
             const Doubles d2 = dx * dx + dy * dy + dz * dz;
             least = d2 < least ? d2 : least;
         }
@@ -58,14 +61,18 @@ private:
     std::size_t count_ = 0;
 };
 
-bool worse(const Patch& a, const Patch& b) { return a.nearest != b.nearest ? a.nearest < b.nearest : a.spread < b.spread; }
+bool worse(const Patch& a, const Patch& b) {
+    return a.nearest != b.nearest ? a.nearest < b.nearest : a.spread < b.spread;
+}
 }  // namespace
 
-Reach::Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_bottom, double z_top, double lowest)
+Reach::Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_bottom, double z_top,
+             double lowest)
     : part_(part), z_bottom_(z_bottom), z_top_(z_top), lowest_(lowest) {
     for (const Tool& tool : tools)
         if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball) tools_.push_back(tool);
-    std::stable_sort(tools_.begin(), tools_.end(), [](const Tool& a, const Tool& b) { return a.diameter < b.diameter; });
+    std::stable_sort(tools_.begin(), tools_.end(),
+                     [](const Tool& a, const Tool& b) { return a.diameter < b.diameter; });
 }
 
 bool Reach::reachable(const Point3& point) {
@@ -89,7 +96,8 @@ void Reach::remember(const Point3& obstacle) {
 }
 
 bool Reach::holder_free(const Tool& tool, const Point3& tip) const {
-    for (const auto& [radius, above] : {std::pair{tool.shank_diameter / 2, tool.flute_length}, std::pair{tool.holder_diameter / 2, tool.stickout}}) {
+    for (const auto& [radius, above] : {std::pair{tool.shank_diameter / 2, tool.flute_length},
+                                        std::pair{tool.holder_diameter / 2, tool.stickout}}) {
         if (radius <= tool.diameter / 2 || above <= 0) continue;
         const Point3 at{tip[0], tip[1], tip[2] + above};
         if (part_.cylinder(z_top_, at, at, radius, kTouch).found) return false;
@@ -97,9 +105,10 @@ bool Reach::holder_free(const Tool& tool, const Point3& tip) const {
     return true;
 }
 
-// Branch and bound. Each place that is tried and found blocked yields an obstacle, a point with part at or above it, which blocks every
-// place nearer to it than the radius: patches that lie wholly in one obstacle's sphere are gone, others are halved. Obstacles hold for all
-// points and tools of the layer, so those of the neighbours mostly decide before the part itself is asked.
+// Branch and bound. Each place that is tried and found blocked yields an obstacle, a point with part at or
+// above it, which blocks every place nearer to it than the radius: patches that lie wholly in one obstacle's
+// sphere are gone, others are halved. Obstacles hold for all points and tools of the layer, so those of the
+// neighbours mostly decide before the part itself is asked.
 bool Reach::by(std::size_t index, const Point3& point) {
     const Tool& tool = tools_[index];
     const double R = tool.diameter / 2;
@@ -110,7 +119,9 @@ bool Reach::by(std::size_t index, const Point3& point) {
     Near near;  // obstacles that can be in the way
     auto add = [&](const Point3& q) {
         const double dx = q[0] - point[0], dy = q[1] - point[1], dz = q[2] - point[2];
-        if (ball ? dx * dx + dy * dy + std::pow(std::max(0.0, -dz), 2) < 4 * R * R : dz >= kRests && dx * dx + dy * dy < 4 * R * R) near.add(q);
+        if (ball ? dx * dx + dy * dy + std::pow(std::max(0.0, -dz), 2) < 4 * R * R
+                 : dz >= kRests && dx * dx + dy * dy < 4 * R * R)
+            near.add(q);
     };
     for (const Point3& q : obstacles_) add(q);
     auto clearance = [&](const Point3& c) {
@@ -118,7 +129,8 @@ bool Reach::by(std::size_t index, const Point3& point) {
         return part_.beside({c[0], c[1], c[2] + kRests}, z_top_, R);  // what it stands on is not in its way
     };
     auto met = [&](const Point3& c, const StandingPart::Clearance& found) {
-        const Point3 q{c[0] - found.away[0], c[1] - found.away[1], ball ? c[2] - found.away[2] : c[2] + kRests};
+        const Point3 q{c[0] - found.away[0], c[1] - found.away[1],
+                       ball ? c[2] - found.away[2] : c[2] + kRests};
         remember(q);
         add(q);
         return q;
@@ -130,22 +142,29 @@ bool Reach::by(std::size_t index, const Point3& point) {
         return true;
     };
     auto at = [&](double u, double v) {
-        if (ball) return Point3{point[0] + R * std::sin(u) * std::cos(v), point[1] + R * std::sin(u) * std::sin(v), point[2] + R * std::cos(u)};
+        if (ball)
+            return Point3{point[0] + R * std::sin(u) * std::cos(v), point[1] + R * std::sin(u) * std::sin(v),
+                          point[2] + R * std::cos(u)};
         return Point3{point[0] + u * std::cos(v), point[1] + u * std::sin(v), point[2]};
     };
     std::vector<Patch> heap;  // the farthest from what is known to be in the way first
-    const double scale = ball ? R : 1, u_end = ball ? std::acos(std::clamp((floor - point[2]) / R, 0.0, 1.0)) : R;
+    const double scale = ball ? R : 1,
+                 u_end = ball ? std::acos(std::clamp((floor - point[2]) / R, 0.0, 1.0)) : R;
     // Puts a patch among those to look at unless one obstacle blocks all of it.
     auto consider = [&](Patch p) {
-        const double u_most = std::min(p.u + p.du, ball ? std::numbers::pi / 2 : R), width = ball ? std::sin(u_most) * std::sin(p.u) : u_most * p.u;
+        const double u_most = std::min(p.u + p.du, ball ? std::numbers::pi / 2 : R),
+                     width = ball ? std::sin(u_most) * std::sin(p.u) : u_most * p.u;
         p.centre = at(p.u, p.v);
-        p.spread = scale * std::sqrt(p.du * p.du + width * p.dv * p.dv);  // of two places: 4 sin²(Δu/2) + 4 sin u₁ sin u₂ sin²(Δv/2)
+        p.spread = scale * std::sqrt(p.du * p.du +
+                                     width * p.dv *
+                                         p.dv);  // of two places: 4 sin²(Δu/2) + 4 sin u₁ sin u₂ sin²(Δv/2)
         p.nearest = std::sqrt(near.distance2(p.centre, ball));
         if (p.nearest + p.spread < R - kTouch) return;
         heap.push_back(p);
         std::push_heap(heap.begin(), heap.end(), worse);
     };
-    // From a place that lacks little: off the nearest of the part, and back to where the point is covered, in turn.
+    // From a place that lacks little: off the nearest of the part, and back to where the point is covered, in
+    // turn.
     auto settles = [&](Point3 c) {
         double lacking = std::numeric_limits<double>::infinity();
         for (int round = 0; round < kRounds; ++round) {
@@ -166,7 +185,8 @@ bool Reach::by(std::size_t index, const Point3& point) {
         return false;
     };
 
-    for (int k = 0; k < 3; ++k) consider({u_end / 2, (2 * k + 1) * std::numbers::pi / 3, u_end / 2, std::numbers::pi / 3, {}, 0, 0});
+    for (int k = 0; k < 3; ++k)
+        consider({u_end / 2, (2 * k + 1) * std::numbers::pi / 3, u_end / 2, std::numbers::pi / 3, {}, 0, 0});
     int settlings = 0;
     for (std::size_t patches = 0; !heap.empty() && patches < kMostPatches; ++patches) {
         std::pop_heap(heap.begin(), heap.end(), worse);
@@ -178,13 +198,18 @@ bool Reach::by(std::size_t index, const Point3& point) {
             const auto found = clearance(p.centre);
             if (found.distance >= R - kTouch) {
                 if (takes(p.centre)) return true;
-                // Shank or holder is in the way. Where it is even with the tip as high as the patch goes, less the patch's size, the patch is gone.
+                // Shank or holder is in the way. Where it is even with the tip as high as the patch goes,
+                // less the patch's size, the patch is gone.
                 const double tip = ball ? point[2] + R * std::cos(p.u - p.du) - R : point[2];
                 bool gone = false;
-                for (const auto& [radius, above] :
-                     {std::pair{tool.shank_diameter / 2, tool.flute_length}, std::pair{tool.holder_diameter / 2, tool.stickout}})
+                for (const auto& [radius, above] : {std::pair{tool.shank_diameter / 2, tool.flute_length},
+                                                    std::pair{tool.holder_diameter / 2, tool.stickout}})
                     if (radius > R && above > 0)
-                        gone = gone || part_.beside({p.centre[0], p.centre[1], tip + above}, z_top_, radius).distance + p.spread < radius - kTouch;
+                        gone =
+                            gone ||
+                            part_.beside({p.centre[0], p.centre[1], tip + above}, z_top_, radius).distance +
+                                    p.spread <
+                                radius - kTouch;
                 if (gone) continue;
             } else {
                 met(p.centre, found);

@@ -9,21 +9,26 @@
 
 namespace slabwright {
 
-/// Decides, for points of air over a layer's finished surface, whether some flat or ball end mill of the library can cover
-/// them without touching the part (below z_top), the holder included. Borrows the part. It remembers places and obstacles that it has met,
-/// which makes neighbouring points cheap: one object serves one thread.
+/// Decides, for points of air over a layer's finished surface, whether some flat or ball end mill of the
+/// library can cover them without touching the part (below z_top), the holder included. Borrows the part. It
+/// remembers places and obstacles that it has met, which makes neighbouring points cheap: one object serves
+/// one thread.
 class Reach {
 public:
     /// mm: a point that a tool this much thicker could cover is always called reachable.
     static constexpr double kResolution = 0.005;
-    /// mm: a tool may touch the part, and this much is touching; no point out of reach by more than twice this is called reachable.
+    /// mm: a tool may touch the part, and this much is touching; no point out of reach by more than twice
+    /// this is called reachable.
     static constexpr double kTouch = 1e-4;
 
-    /// @param z_bottom the layer's bottom; flat end mills stop there, ball end mills may pass it by their radius, but no tip
+    /// @param z_bottom the layer's bottom; flat end mills stop there, ball end mills may pass it by their
+    /// radius, but no tip
     ///        goes below `lowest` (the base board's limit)
-    Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_bottom, double z_top, double lowest);
+    Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_bottom, double z_top,
+          double lowest);
 
-    /// Whether a tool covers the point. Exact but for kResolution and kTouch: a branch and bound over all of the tool's places.
+    /// Whether a tool covers the point. Exact but for kResolution and kTouch: a branch and bound over all of
+    /// the tool's places.
     [[nodiscard]] bool reachable(const Point3& point);
 
 private:

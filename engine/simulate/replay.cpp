@@ -19,12 +19,14 @@ namespace {
 
 constexpr int kBandRows = 24;          // of the stock: bands are cut in parallel, and joined in their order
 constexpr double kLeastVolume = 1e-6;  // mm³ that a piece must take to count as cutting
-constexpr double kForceShare = 1e-4;   // of a piece's force that it may be wrong by: it is drawn, and read to a hundredth of a newton
+constexpr double kForceShare =
+    1e-4;  // of a piece's force that it may be wrong by: it is drawn, and read to a hundredth of a newton
 
 CutterEnd cutter_end(const Tool& tool) {
     const double radius = tool.diameter / 2;
     if (tool.kind == ToolKind::ball) return {CutterEnd::Form::ball, radius, 0};
-    if (tool.kind == ToolKind::drill) return {CutterEnd::Form::cone, radius, std::tan(31 * std::numbers::pi / 180)};  // a point of 118°
+    if (tool.kind == ToolKind::drill)
+        return {CutterEnd::Form::cone, radius, std::tan(31 * std::numbers::pi / 180)};  // a point of 118°
     return {CutterEnd::Form::flat, radius, 0};
 }
 
@@ -48,7 +50,8 @@ void rate(ReplayPiece& piece, const Tool& tool, const Material& m, double feed, 
     s.high_mm = std::min(piece.depth_mm, 64 * radius);
     // A ball that cuts less deep than its radius is as wide as its circle at that depth.
     const bool cap = s.profile == CutterProfile::ball && s.high_mm < radius;
-    s.arc = engagement_arc(cap ? std::sqrt(s.high_mm * (2 * radius - s.high_mm)) : radius, piece.width_mm, MillingSense::up);
+    s.arc = engagement_arc(cap ? std::sqrt(s.high_mm * (2 * radius - s.high_mm)) : radius, piece.width_mm,
+                           MillingSense::up);
     const CutForce force = peak_force(s, kForceShare);
     piece.force_n = force.peak_resultant_n;
     piece.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, tool.diameter);
@@ -69,7 +72,8 @@ struct Replay::Impl {
 
     void add_slabs(std::size_t upto) {
         for (; slabs <= upto; ++slabs)
-            for (Stock& band : bands) band.add_slab(input.layers[slabs].z_bottom, input.layers[slabs].slab_thickness);
+            for (Stock& band : bands)
+                band.add_slab(input.layers[slabs].z_bottom, input.layers[slabs].slab_thickness);
     }
 };
 
@@ -78,13 +82,15 @@ Replay::Replay(Context& context, const SimulationInput& input, const ReplayOptio
         throw Error(ErrorKind::usage, "replay.options", "no cells, no pieces or no layers", "", "give some");
     impl_ = std::make_unique<Impl>(context, input, options);
     CellGrid& g = impl_->grid;
-    const double width = input.stock_max[0] - input.stock_min[0], depth = input.stock_max[1] - input.stock_min[1];
+    const double width = input.stock_max[0] - input.stock_min[0],
+                 depth = input.stock_max[1] - input.stock_min[1];
     g.cell = options.cell;
     g.nx = std::max(1, static_cast<int>(std::ceil(width / g.cell - 1e-9)));
     g.ny = std::max(1, static_cast<int>(std::ceil(depth / g.cell - 1e-9)));
     g.x0 = input.stock_min[0] + g.cell / 2;
     g.y0 = input.stock_min[1] + g.cell / 2;
-    impl_->charge = std::make_unique<MemoryCharge>(context, g.count() * 4 * (input.layers.size() + 2), "the replayed stock");
+    impl_->charge = std::make_unique<MemoryCharge>(context, g.count() * 4 * (input.layers.size() + 2),
+                                                   "the replayed stock");
     for (int j = 0; j < g.ny; j += kBandRows) {
         CellGrid band = g;
         band.y0 = g.y(j);
@@ -102,10 +108,12 @@ std::array<double, 2> Replay::first() const { return {impl_->grid.x0, impl_->gri
 ReplayedProgram Replay::run(const Program& program) {
     Impl& r = *impl_;
     const auto layer = static_cast<std::size_t>(program.layer);
-    if (layer >= r.input.layers.size()) throw Error(ErrorKind::usage, "replay.layer", "a program of no layer", program.file, "plan again");
+    if (layer >= r.input.layers.size())
+        throw Error(ErrorKind::usage, "replay.layer", "a program of no layer", program.file, "plan again");
     r.add_slabs(layer);
     ReplayedProgram result;
-    const auto tool = std::find_if(r.input.tools.begin(), r.input.tools.end(), [&](const Tool& t) { return t.number == program.tool; });
+    const auto tool = std::find_if(r.input.tools.begin(), r.input.tools.end(),
+                                   [&](const Tool& t) { return t.number == program.tool; });
     const auto& steps = program.steps;
     // When every motion ends, by way over feed.
     std::vector<double> ends(steps.size(), 0);
@@ -113,7 +121,9 @@ ReplayedProgram Replay::run(const Program& program) {
     for (std::size_t k = 1; k < steps.size(); ++k) {
         if (steps[k - 1].known() && steps[k].known()) {
             const double feed = steps[k].rapid() ? r.input.machine.rapid_feed : steps[k].feed;
-            now += std::hypot(steps[k].x - steps[k - 1].x, steps[k].y - steps[k - 1].y, steps[k].z - steps[k - 1].z) / feed * 60;
+            now += std::hypot(steps[k].x - steps[k - 1].x, steps[k].y - steps[k - 1].y,
+                              steps[k].z - steps[k - 1].z) /
+                   feed * 60;
         }
         ends[k] = now;
     }
@@ -143,10 +153,13 @@ ReplayedProgram Replay::run(const Program& program) {
             // What a flat cutter covers where it starts the motion before has taken, whatever that was.
             ChainedSweep chain;
             const auto disc = [&](std::size_t m) {  // whether motion m keeps its disc at one height
-                return steps[m - 1].known() && (steps[m - 1].z == steps[m].z || (steps[m - 1].x == steps[m].x && steps[m - 1].y == steps[m].y));
+                return steps[m - 1].known() &&
+                       (steps[m - 1].z == steps[m].z ||
+                        (steps[m - 1].x == steps[m].x && steps[m - 1].y == steps[m].y));
             };
             chain.been = end.form == CutterEnd::Form::flat && from.z == to.z && k > 1 && disc(k - 1);
-            const CutEffect effect = stock.cut(end, {from.x, from.y, from.z}, {to.x, to.y, to.z}, 1e300, chain);
+            const CutEffect effect =
+                stock.cut(end, {from.x, from.y, from.z}, {to.x, to.y, to.z}, 1e300, chain);
             if (!(effect.removed > 0)) continue;
             Taken& piece = taken[b][piece_of(k)];
             piece.volume += effect.removed * g.cell * g.cell;
@@ -157,7 +170,8 @@ ReplayedProgram Replay::run(const Program& program) {
     // The way cut and the fastest feed in the plane, of motions that took something.
     std::vector<double> way(pieces, 0), feed(pieces, 0);
     for (std::size_t k = 1; k < steps.size(); ++k) {
-        const bool any = std::any_of(cuts.begin(), cuts.end(), [&](const std::vector<char>& c) { return c[k] != 0; });
+        const bool any =
+            std::any_of(cuts.begin(), cuts.end(), [&](const std::vector<char>& c) { return c[k] != 0; });
         if (!any) continue;
         const double dx = steps[k].x - steps[k - 1].x, dy = steps[k].y - steps[k - 1].y;
         const std::size_t p = piece_of(k);
@@ -166,7 +180,8 @@ ReplayedProgram Replay::run(const Program& program) {
     }
     std::vector<Taken> sums(pieces);
     for (std::size_t p = 0; p < pieces; ++p) {
-        for (const auto& band : taken) sums[p].volume += band[p].volume, sums[p].deepest = std::max(sums[p].deepest, band[p].deepest);
+        for (const auto& band : taken)
+            sums[p].volume += band[p].volume, sums[p].deepest = std::max(sums[p].deepest, band[p].deepest);
         result.removed_mm3 += sums[p].volume;
     }
     parallel_each(r.context, pieces, [&](std::size_t p) {
@@ -180,7 +195,8 @@ ReplayedProgram Replay::run(const Program& program) {
     return result;
 }
 
-void Replay::left_over(const StandingPart& part, const std::function<void(std::size_t, const std::vector<float>&)>& fn) const {
+void Replay::left_over(const StandingPart& part,
+                       const std::function<void(std::size_t, const std::vector<float>&)>& fn) const {
     Impl& r = *impl_;
     r.add_slabs(r.input.layers.size() - 1);
     std::vector<std::unique_ptr<RisingEnvelope>> envelopes(r.bands.size());
@@ -196,7 +212,8 @@ void Replay::left_over(const StandingPart& part, const std::function<void(std::s
             const CellGrid& g = stock.grid();
             std::vector<float> envelope(g.count());
             envelopes[b]->at(l.z_top, std::numeric_limits<float>::lowest(), envelope.data());
-            float* out = left.data() + b * static_cast<std::size_t>(kBandRows) * static_cast<std::size_t>(g.nx);
+            float* out =
+                left.data() + b * static_cast<std::size_t>(kBandRows) * static_cast<std::size_t>(g.nx);
             for (int j = 0; j < g.ny; ++j)
                 for (int i = 0; i < g.nx; ++i) {
                     const std::size_t c = g.index(i, j);
@@ -207,7 +224,8 @@ void Replay::left_over(const StandingPart& part, const std::function<void(std::s
                     }
                     const double keep = std::max(l.z_bottom, static_cast<double>(envelope[c]));
                     double over = z - keep;
-                    if (over > r.options.cusp) over = std::min(over, part.from_shadow({x, y, z}, l.z_top, over).distance);
+                    if (over > r.options.cusp)
+                        over = std::min(over, part.from_shadow({x, y, z}, l.z_top, over).distance);
                     else if (over < 0) over = -part.from_facets({x, y, z}, -over);
                     out[c] = static_cast<float>(over);
                 }

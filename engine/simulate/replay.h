@@ -1,4 +1,5 @@
-// The programs run once more over a coarse stock, for a picture of the build: what each cuts as it goes, and what is left.
+// The programs run once more over a coarse stock, for a picture of the build: what each cuts as it goes, and
+// what is left.
 #pragma once
 
 #include <functional>
@@ -16,9 +17,10 @@ struct ReplayOptions {
     Material material;         ///< whose force coefficients are used
 };
 
-/// One piece of a program. Depth is the most that any point of the stock lost in one motion, width the volume taken over the
-/// way cut times that depth, both as the points of the stock show them; forces are the model's for that cut at the piece's
-/// fastest feed in the plane (method.md sections 8 and 9). All 0 where the piece cuts nothing.
+/// One piece of a program. Depth is the most that any point of the stock lost in one motion, width the volume
+/// taken over the way cut times that depth, both as the points of the stock show them; forces are the model's
+/// for that cut at the piece's fastest feed in the plane (method.md sections 8 and 9). All 0 where the piece
+/// cuts nothing.
 struct ReplayPiece {
     double depth_mm = 0, width_mm = 0;
     double force_n = 0;        ///< peak resultant
@@ -31,10 +33,12 @@ struct ReplayedProgram {
     std::vector<ReplayPiece> pieces;
 };
 
-/// Programs are given in the order of execution, layers ascending; memory grows with the stock, not with the programs.
+/// Programs are given in the order of execution, layers ascending; memory grows with the stock, not with the
+/// programs.
 class Replay {
 public:
-    /// @param input its programs are not used; the mesh must outlive this. @throws Error(usage) on options out of range
+    /// @param input its programs are not used; the mesh must outlive this. @throws Error(usage) on options
+    /// out of range
     Replay(Context& context, const SimulationInput& input, const ReplayOptions& options);
     ~Replay();
     Replay(const Replay&) = delete;
@@ -43,9 +47,11 @@ public:
     /// Cuts. A program whose tool the input does not hold cuts nothing.
     ReplayedProgram run(const Program& program);
 
-    /// Calls fn(layer, left) for every layer, from the lowest: what stands over its finished surface, row after row from the least y, mm
-    /// along the normal (negative: cut into the part); NaN where the flask stays. @param part of the input's mesh
-    void left_over(const StandingPart& part, const std::function<void(std::size_t, const std::vector<float>&)>& fn) const;
+    /// Calls fn(layer, left) for every layer, from the lowest: what stands over its finished surface, row
+    /// after row from the least y, mm along the normal (negative: cut into the part); NaN where the flask
+    /// stays. @param part of the input's mesh
+    void left_over(const StandingPart& part,
+                   const std::function<void(std::size_t, const std::vector<float>&)>& fn) const;
 
     [[nodiscard]] int nx() const;
     [[nodiscard]] int ny() const;

@@ -39,9 +39,11 @@ struct StepBox {
     /// A level arc goes farthest where it crosses the axes through its centre.
     void add(const ProgramArc& a) {
         constexpr double quarter = std::numbers::pi / 2;
-        const double low = std::min(a.arc.start, a.arc.start + a.arc.turn), high = std::max(a.arc.start, a.arc.start + a.arc.turn);
+        const double low = std::min(a.arc.start, a.arc.start + a.arc.turn),
+                     high = std::max(a.arc.start, a.arc.start + a.arc.turn);
         for (double k = std::ceil(low / quarter); k * quarter <= high; ++k) {
-            const double x = a.arc.x + a.arc.radius * std::cos(k * quarter), y = a.arc.y + a.arc.radius * std::sin(k * quarter);
+            const double x = a.arc.x + a.arc.radius * std::cos(k * quarter),
+                         y = a.arc.y + a.arc.radius * std::sin(k * quarter);
             x0 = std::min(x0, x), x1 = std::max(x1, x);
             y0 = std::min(y0, y), y1 = std::max(y1, y);
         }
@@ -52,7 +54,8 @@ struct StepBox {
         z0 = std::min(z0, b.z0), z1 = std::max(z1, b.z1);
     }
     [[nodiscard]] bool meets(const CellGrid& g, double margin, double top) const {
-        return z0 < top && x0 - margin <= g.x(g.nx - 1) && g.x0 <= x1 + margin && y0 - margin <= g.y(g.ny - 1) && g.y0 <= y1 + margin;
+        return z0 < top && x0 - margin <= g.x(g.nx - 1) && g.x0 <= x1 + margin &&
+               y0 - margin <= g.y(g.ny - 1) && g.y0 <= y1 + margin;
     }
 };
 
@@ -77,7 +80,8 @@ CutterEnd cutter_end(const Tool& tool) {
         case ToolKind::ball:
             return {CutterEnd::Form::ball, tool.diameter / 2, 0};
         case ToolKind::drill:
-            return {CutterEnd::Form::cone, tool.diameter / 2, std::tan(31 * std::numbers::pi / 180)};  // a point of 118°
+            return {CutterEnd::Form::cone, tool.diameter / 2,
+                    std::tan(31 * std::numbers::pi / 180)};  // a point of 118°
         default:
             return {CutterEnd::Form::flat, tool.diameter / 2, 0};
     }
@@ -102,8 +106,8 @@ struct TileResult {
     Extreme flask;
 };
 
-/// The walls of a layer's flask and of the one below it, into which a cutter dips at a joint. Walls alone: what is cut far inside
-/// the flask shows in the stock.
+/// The walls of a layer's flask and of the one below it, into which a cutter dips at a joint. Walls alone:
+/// what is cut far inside the flask shows in the stock.
 Mesh flask_walls(const std::vector<SimulatedLayer>& layers, std::size_t layer) {
     Mesh walls;
     for (std::size_t l = layer > 0 ? layer - 1 : 0; l <= layer; ++l) {
@@ -113,7 +117,9 @@ Mesh flask_walls(const std::vector<SimulatedLayer>& layers, std::size_t layer) {
             for (std::size_t i = 0; i < loop.size(); ++i) {
                 const auto first = static_cast<std::uint32_t>(walls.vertices.size());
                 for (const Point2 p : {loop[i], loop[(i + 1) % loop.size()]})
-                    for (const float z : {low, high}) walls.vertices.push_back({static_cast<float>(to_mm(p.x)), static_cast<float>(to_mm(p.y)), z});
+                    for (const float z : {low, high})
+                        walls.vertices.push_back(
+                            {static_cast<float>(to_mm(p.x)), static_cast<float>(to_mm(p.y)), z});
                 walls.facets.push_back({first, first + 2, first + 3});
                 walls.facets.push_back({first, first + 3, first + 1});
             }
@@ -132,7 +138,8 @@ void raise(Extreme& a, std::uint32_t& line, const Extreme& b, std::uint32_t b_li
 
 class Simulation {
 public:
-    Simulation(Context& context, const SimulationInput& input, const StandingPart& part, const SimulationOptions& options)
+    Simulation(Context& context, const SimulationInput& input, const StandingPart& part,
+               const SimulationOptions& options)
         : context_(context), input_(input), options_(options), part_(part) {}
 
     SimulationReport run() {
@@ -140,13 +147,15 @@ public:
         SimulationReport report;
         report.cell = options_.cell > 0 ? options_.cell : simulation_cell(input_.tools, options_.cusp);
         cell_ = report.cell;
-        const double width = input_.stock_max[0] - input_.stock_min[0], depth = input_.stock_max[1] - input_.stock_min[1];
+        const double width = input_.stock_max[0] - input_.stock_min[0],
+                     depth = input_.stock_max[1] - input_.stock_min[1];
         report.nx = nx_ = std::max(1, static_cast<int>(std::ceil(width / cell_ - 1e-9)));
         report.ny = ny_ = std::max(1, static_cast<int>(std::ceil(depth / cell_ - 1e-9)));
         place_flasks();
         check_stack(report);
         prepare(report);
-        constexpr double kReading = 0.02;  // of the whole verification: plan.json and the programs, before this
+        constexpr double kReading =
+            0.02;  // of the whole verification: plan.json and the programs, before this
         const SimulationWork work = simulation_work(size());
         checked_ = kReading + (1 - kReading) * work.checking / (work.checking + work.cutting);
         std::uint64_t steps = 0;
@@ -160,14 +169,18 @@ public:
 
 private:
     void check() const {
-        auto bad = [](const std::string& what) { throw Error(ErrorKind::usage, "simulate.input", what, {}, "plan again"); };
+        auto bad = [](const std::string& what) {
+            throw Error(ErrorKind::usage, "simulate.input", what, {}, "plan again");
+        };
         if (input_.layers.empty()) bad("no layers");
         for (int k = 0; k < 2; ++k)
-            if (!(input_.stock_max[k] > input_.stock_min[k]) || !std::isfinite(input_.stock_min[k]) || !std::isfinite(input_.stock_max[k]))
+            if (!(input_.stock_max[k] > input_.stock_min[k]) || !std::isfinite(input_.stock_min[k]) ||
+                !std::isfinite(input_.stock_max[k]))
                 bad("the stock has no extent");
         double below = -1e-6;
         for (const SimulatedLayer& layer : input_.layers) {
-            if (!(layer.z_top > layer.z_bottom) || !(layer.slab_thickness > 0) || !(layer.z_bottom >= below) || !std::isfinite(layer.z_top))
+            if (!(layer.z_top > layer.z_bottom) || !(layer.slab_thickness > 0) ||
+                !(layer.z_bottom >= below) || !std::isfinite(layer.z_top))
                 bad("a layer that lies not on the one before, or has no height");
             below = layer.z_top - 1e-6;
         }
@@ -179,8 +192,8 @@ private:
         }
     }
 
-    /// The flasks of the layers with the tolerances of their walls. The grid's last cells may lie past the stock's edge, where no
-    /// cutter has to go because of them: they count as border too.
+    /// The flasks of the layers with the tolerances of their walls. The grid's last cells may lie past the
+    /// stock's edge, where no cutter has to go because of them: they count as border too.
     void place_flasks() {
         Loops slab;
         const Point2 low{to_units(input_.stock_min[0]), to_units(input_.stock_min[1])},
@@ -191,7 +204,8 @@ private:
             flasks_.emplace_back();
             if (layer.flask.empty()) continue;
             flasks_.back().core = offset(layer.flask, -options_.gouge, 1e-3);
-            flasks_.back().border = unite(offset(layer.flask, options_.cusp + options_.slack, 1e-2), subtract(offset(slab, 2 * cell_, 1e-2), slab));
+            flasks_.back().border = unite(offset(layer.flask, options_.cusp + options_.slack, 1e-2),
+                                          subtract(offset(slab, 2 * cell_, 1e-2), slab));
         }
     }
 
@@ -201,22 +215,28 @@ private:
         const double tolerance = 10 * StandingPart::kSheet;
         const double over = box.max.z - input_.layers.back().z_top;
         if (over > tolerance)
-            violate(report, "stack.short", fmt::format("the layers end {:.3f} mm below the pattern's top", over), nullptr, 0,
+            violate(report, "stack.short",
+                    fmt::format("the layers end {:.3f} mm below the pattern's top", over), nullptr, 0,
                     Point3{box.max.x, box.max.y, box.max.z}, over);
-        const double beyond = std::max(
-            {input_.stock_min[0] - box.min.x, input_.stock_min[1] - box.min.y, box.max.x - input_.stock_max[0], box.max.y - input_.stock_max[1]});
+        const double beyond = std::max({input_.stock_min[0] - box.min.x, input_.stock_min[1] - box.min.y,
+                                        box.max.x - input_.stock_max[0], box.max.y - input_.stock_max[1]});
         if (beyond > tolerance)
-            violate(report, "stack.narrow", fmt::format("the pattern reaches {:.3f} mm past the slabs", beyond), nullptr, 0, {}, beyond);
+            violate(report, "stack.narrow",
+                    fmt::format("the pattern reaches {:.3f} mm past the slabs", beyond), nullptr, 0, {},
+                    beyond);
         double below = 0;
         for (std::size_t l = 0; l < input_.layers.size(); ++l) {
             const SimulatedLayer& layer = input_.layers[l];
             if (std::abs(layer.z_bottom - below) > 1e-3)
                 violate(report, "stack.gap",
-                        fmt::format("layer {} begins at z {:.4f}, where the one below ends at {:.4f}", l + 1, layer.z_bottom, below), nullptr, 0, {},
-                        layer.z_bottom - below);
+                        fmt::format("layer {} begins at z {:.4f}, where the one below ends at {:.4f}", l + 1,
+                                    layer.z_bottom, below),
+                        nullptr, 0, {}, layer.z_bottom - below);
             const double lacking = layer.z_top - layer.z_bottom - layer.slab_thickness;
             if (lacking > 1e-6)
-                violate(report, "stack.thin", fmt::format("layer {} is {:.4f} mm taller than its slab", l + 1, lacking), nullptr, 0, {}, lacking);
+                violate(report, "stack.thin",
+                        fmt::format("layer {} is {:.4f} mm taller than its slab", l + 1, lacking), nullptr, 0,
+                        {}, lacking);
             below = layer.z_top;
         }
     }
@@ -241,8 +261,8 @@ private:
         return nullptr;
     }
 
-    void violate(SimulationReport& report, const std::string& code, const std::string& message, const Program* program, std::uint32_t line,
-                 std::optional<Point3> where, double size) const {
+    void violate(SimulationReport& report, const std::string& code, const std::string& message,
+                 const Program* program, std::uint32_t line, std::optional<Point3> where, double size) const {
         report.violations.push_back({code, message, program ? program->file : "", line, where, size});
     }
 
@@ -252,11 +272,14 @@ private:
             p.program = &program;
             p.tool = tool(program.tool);
             if (!p.tool)
-                violate(report, "tool.unknown", fmt::format("loads tool {}, which the plan's library does not hold", program.tool), &program, 0, {},
-                        0);
+                violate(report, "tool.unknown",
+                        fmt::format("loads tool {}, which the plan's library does not hold", program.tool),
+                        &program, 0, {}, 0);
             else if (program.tool != program.planned_tool)
-                violate(report, "tool.wrong", fmt::format("loads tool {} where the plan names tool {}", program.tool, program.planned_tool), &program,
-                        0, {}, 0);
+                violate(report, "tool.wrong",
+                        fmt::format("loads tool {} where the plan names tool {}", program.tool,
+                                    program.planned_tool),
+                        &program, 0, {}, 0);
             if (p.tool) p.end = cutter_end(*p.tool);
             prepared_.push_back(std::move(p));
         }
@@ -280,27 +303,34 @@ private:
         });
     }
 
-    /// All that needs no stock: the exact check, the spindle, the machine's travel, the time. Programs are independent.
+    /// All that needs no stock: the exact check, the spindle, the machine's travel, the time. Programs are
+    /// independent.
     void check_motions(SimulationReport& report) {
         report.programs.resize(input_.programs.size());
         std::vector<std::optional<StandingPart>> walls(input_.layers.size());  // of the flasks
         for (const Program& program : input_.programs) {
             const auto l = static_cast<std::size_t>(program.layer);
-            if (!walls[l] && !input_.layers[l].flask.empty()) walls[l].emplace(context_, flask_walls(input_.layers, l).view());
+            if (!walls[l] && !input_.layers[l].flask.empty())
+                walls[l].emplace(context_, flask_walls(input_.layers, l).view());
         }
         std::vector<StepBox> boxes(input_.programs.size());
         parallel_each(context_, input_.programs.size(), [&](std::size_t i) {
-            boxes[i] = check_program(i, walls[static_cast<std::size_t>(input_.programs[i].layer)], report.programs[i]);
+            boxes[i] = check_program(i, walls[static_cast<std::size_t>(input_.programs[i].layer)],
+                                     report.programs[i]);
             context_.advance(input_.programs[i].steps.size());
         });
         for (std::size_t i = 0; i < input_.programs.size(); ++i) {
             const Program& program = input_.programs[i];
             const ProgramFindings& f = report.programs[i];
-            if (f.spindle_off_line != 0) violate(report, "spindle.off", "feeds while the spindle does not turn", &program, f.spindle_off_line, {}, 0);
+            if (f.spindle_off_line != 0)
+                violate(report, "spindle.off", "feeds while the spindle does not turn", &program,
+                        f.spindle_off_line, {}, 0);
             const Machine& m = input_.machine;
             auto travel = [&](const char* axis, double span, double limit) {
                 if (span > limit + 1e-6)
-                    violate(report, "travel.exceeded", fmt::format("moves over {:.3f} mm in {}; the machine travels {:.3f} mm", span, axis, limit),
+                    violate(report, "travel.exceeded",
+                            fmt::format("moves over {:.3f} mm in {}; the machine travels {:.3f} mm", span,
+                                        axis, limit),
                             &program, 0, {}, span - limit);
             };
             const StepBox& box = boxes[i];
@@ -338,30 +368,39 @@ private:
             while (arc != program.arcs.end() && arc->end <= k) ++arc;
             if (arc != program.arcs.end() && arc->begin <= k) continue;
             const ProgramStep& b = program.steps[k - 1];
-            (s.rapid() ? f.rapid_mm : f.cutting_mm) += std::sqrt((s.x - b.x) * (s.x - b.x) + (s.y - b.y) * (s.y - b.y) + (s.z - b.z) * (s.z - b.z));
+            (s.rapid() ? f.rapid_mm : f.cutting_mm) +=
+                std::sqrt((s.x - b.x) * (s.x - b.x) + (s.y - b.y) * (s.y - b.y) + (s.z - b.z) * (s.z - b.z));
         }
         if (const Tool* const tool = prepared_[i].tool) {
-            // A path whose corners the machine may round farther than a finish pass's is safe as far as it may leave it.
+            // A path whose corners the machine may round farther than a finish pass's is safe as far as it
+            // may leave it.
             Tool wide = *tool;
             if (program.strays > kJunction)
                 for (double* const diameter : {&wide.diameter, &wide.shank_diameter, &wide.holder_diameter})
                     if (*diameter > 0) *diameter += 2 * program.strays;
             f.gouge = check_gouge(context_, part_, layer.z_top, wide, program, {options_.gouge, 1e-5});
-            if (walls) f.flask = check_gouge(context_, *walls, layer.z_top, *tool, program, {options_.gouge, 1e-5}).cutter;
+            if (walls)
+                f.flask =
+                    check_gouge(context_, *walls, layer.z_top, *tool, program, {options_.gouge, 1e-5}).cutter;
         }
         return box;
     }
 
-    /// Tiles are independent: each builds its own stock from the first slab to the last and runs every program over it.
+    /// Tiles are independent: each builds its own stock from the first slab to the last and runs every
+    /// program over it.
     void cut(SimulationReport& report) {
         const int tx = (nx_ + kTileCells - 1) / kTileCells, ty = (ny_ + kTileCells - 1) / kTileCells;
         const std::size_t tiles = static_cast<std::size_t>(tx) * static_cast<std::size_t>(ty);
-        const std::uint64_t tile_bytes = static_cast<std::uint64_t>(kTileCells) * kTileCells * 4 * (input_.layers.size() + 4);
+        const std::uint64_t tile_bytes =
+            static_cast<std::uint64_t>(kTileCells) * kTileCells * 4 * (input_.layers.size() + 4);
         const std::uint64_t map_bytes =
-            options_.maps ? static_cast<std::uint64_t>(nx_) * static_cast<std::uint64_t>(ny_) * 5 * input_.layers.size() : 0;
+            options_.maps
+                ? static_cast<std::uint64_t>(nx_) * static_cast<std::uint64_t>(ny_) * 5 * input_.layers.size()
+                : 0;
         const MemoryCharge charge(context_,
                                   tile_bytes * static_cast<std::uint64_t>(context_.threads()) + map_bytes +
-                                      tiles * (input_.programs.size() * sizeof(TileProgram) + input_.layers.size() * sizeof(TileLayer)),
+                                      tiles * (input_.programs.size() * sizeof(TileProgram) +
+                                               input_.layers.size() * sizeof(TileLayer)),
                                   "the simulated stock");
         report.layers.resize(input_.layers.size());
         if (options_.maps)
@@ -374,7 +413,8 @@ private:
         parallel_each(context_, tiles, [&](std::size_t t) {
             const int i0 = static_cast<int>(t % static_cast<std::size_t>(tx)) * kTileCells,
                       j0 = static_cast<int>(t / static_cast<std::size_t>(tx)) * kTileCells;
-            results[t] = run_tile(i0, j0, std::min(kTileCells, nx_ - i0), std::min(kTileCells, ny_ - j0), report);
+            results[t] =
+                run_tile(i0, j0, std::min(kTileCells, nx_ - i0), std::min(kTileCells, ny_ - j0), report);
             context_.advance();
         });
         taken_.assign(prepared_.size(), 0);
@@ -396,8 +436,8 @@ private:
             for (std::size_t i = 0; i < r.layers.size(); ++i) {
                 const LayerFindings& l = r.layers[i].findings;
                 LayerFindings& f = report.layers[i];
-                f.cells += l.cells, f.gouge_cells += l.gouge_cells, f.over += l.over, f.unreachable += l.unreachable, f.missed += l.missed,
-                    f.waste += l.waste;
+                f.cells += l.cells, f.gouge_cells += l.gouge_cells, f.over += l.over,
+                    f.unreachable += l.unreachable, f.missed += l.missed, f.waste += l.waste;
                 f.waste_mm3 += l.waste_mm3;
                 raise(f.gouge, l.gouge.size, l.gouge.where);
                 raise(f.left, l.left.size, l.left.where);
@@ -412,7 +452,8 @@ private:
             LayerFindings& f = report.layers[i];
             f.left_rms = f.cells > 0 ? std::sqrt(squares[i] / static_cast<double>(f.cells)) : 0;
             const std::uint64_t reachable = f.cells - f.unreachable;
-            f.within_share = reachable > 0 ? 1 - static_cast<double>(f.missed) / static_cast<double>(reachable) : 1;
+            f.within_share =
+                reachable > 0 ? 1 - static_cast<double>(f.missed) / static_cast<double>(reachable) : 1;
         }
         for (const ProgramFindings& f : report.programs) report.removed_mm3 += f.removed_mm3;
     }
@@ -421,7 +462,8 @@ private:
         TileResult result;
         result.programs.resize(prepared_.size());
         result.layers.resize(input_.layers.size());
-        const CellGrid grid{input_.stock_min[0] + (i0 + 0.5) * cell_, input_.stock_min[1] + (j0 + 0.5) * cell_, cell_, nx, ny};
+        const CellGrid grid{input_.stock_min[0] + (i0 + 0.5) * cell_,
+                            input_.stock_min[1] + (j0 + 0.5) * cell_, cell_, nx, ny};
         Stock stock(grid);
         LevelMotions level(grid);
         std::size_t next = 0;
@@ -429,12 +471,16 @@ private:
             const SimulatedLayer& layer = input_.layers[l];
             stock.add_slab(layer.z_bottom, layer.slab_thickness);
             double top = layer.z_bottom + layer.slab_thickness;
-            for (; next < prepared_.size() && static_cast<std::size_t>(prepared_[next].program->layer) == l; ++next) {
+            for (; next < prepared_.size() && static_cast<std::size_t>(prepared_[next].program->layer) == l;
+                 ++next) {
                 result.programs[next].stock_top = top;
-                if (prepared_[next].tool && run_program(prepared_[next], stock, top, level, result.programs[next])) top = stock.highest();
+                if (prepared_[next].tool &&
+                    run_program(prepared_[next], stock, top, level, result.programs[next]))
+                    top = stock.highest();
             }
         }
-        for (std::size_t c = 0; c < grid.count(); ++c) result.board_cut = std::max(result.board_cut, stock.board_cut(c));
+        for (std::size_t c = 0; c < grid.count(); ++c)
+            result.board_cut = std::max(result.board_cut, stock.board_cut(c));
         std::vector<float> heights(grid.count());
         RisingEnvelope envelope(part_, grid.x0, grid.y0, grid.cell, grid.nx, grid.ny);
         for (std::size_t l = 0; l < input_.layers.size(); ++l) {
@@ -445,8 +491,9 @@ private:
         return result;
     }
 
-    /// Straight level motions of a flat cutter at one height that follow one another in a tile. What they take together does not depend on their
-    /// order, so it is taken once for all, unless it is so deep that it must be told of which motion.
+    /// Straight level motions of a flat cutter at one height that follow one another in a tile. What they
+    /// take together does not depend on their order, so it is taken once for all, unless it is so deep that
+    /// it must be told of which motion.
     struct LevelMotions {
         explicit LevelMotions(const CellGrid& grid) : region(grid) {}
         struct Motion {
@@ -459,19 +506,25 @@ private:
     };
 
     /// Runs a program over a tile whose highest stock stands at `top`; whether it took anything.
-    bool run_program(const PreparedProgram& p, Stock& stock, double top, LevelMotions& level, TileProgram& out) const {
+    bool run_program(const PreparedProgram& p, Stock& stock, double top, LevelMotions& level,
+                     TileProgram& out) const {
         const auto& steps = p.program->steps;
         const CellGrid& grid = stock.grid();
         const Tool& tool = *p.tool;
-        const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2, nose = tool.holder_diameter / 2;
-        // A sliver that stood between passes overloads nobody; a tenth of the cutter's disc does. Where cells lie one or two abreast, along a
-        // wall, they do not tell how wide what stood there was: a micrometre at the cutter's rim may hold the centres of a whole row.
+        const double radius = tool.diameter / 2, shank = tool.shank_diameter / 2,
+                     nose = tool.holder_diameter / 2;
+        // A sliver that stood between passes overloads nobody; a tenth of the cutter's disc does. Where cells
+        // lie one or two abreast, along a wall, they do not tell how wide what stood there was: a micrometre
+        // at the cutter's rim may hold the centres of a whole row.
         const double deep = p.program->planned_stepdown > 0 ? p.program->planned_stepdown + kDeeper : 1e300;
         const double wide = 0.1 * std::numbers::pi * radius * radius;
-        const double shallow = std::min(deep, tool.flute_length > 0 ? tool.flute_length + kStanding : 1e300) - kTaken;
-        const bool thick_shank = shank > radius && tool.flute_length > 0, thick_nose = nose > radius && tool.stickout > 0;
+        const double shallow =
+            std::min(deep, tool.flute_length > 0 ? tool.flute_length + kStanding : 1e300) - kTaken;
+        const bool thick_shank = shank > radius && tool.flute_length > 0,
+                   thick_nose = nose > radius && tool.stickout > 0;
         // Shank and holder are wider, but mostly stay above all that stands.
-        const double aside = radius + p.program->chord_error + kArcError;  // what an arc covers goes no farther beyond its chords
+        const double aside = radius + p.program->chord_error +
+                             kArcError;  // what an arc covers goes no farther beyond its chords
         const auto meets = [&](const StepBox& box) {
             double margin = aside;
             if (thick_shank && box.z0 + tool.flute_length < top) margin = std::max(margin, shank);
@@ -490,11 +543,14 @@ private:
             out.lowest = std::min(out.lowest, e.lowest);
             out.most = std::max(out.most, e.deepest);
             const Point3 where{e.where[0], e.where[1], low};
-            if (b.rapid() && e.deepest > kTaken && e.deepest > out.rapid.size) out.rapid = {e.deepest, where}, out.rapid_line = b.line;
-            if (e.deepest > out.deepest.size && static_cast<double>(e.deep_cells) * cell_ * cell_ > wide && e.deep_across >= kAbreast)
+            if (b.rapid() && e.deepest > kTaken && e.deepest > out.rapid.size)
+                out.rapid = {e.deepest, where}, out.rapid_line = b.line;
+            if (e.deepest > out.deepest.size && static_cast<double>(e.deep_cells) * cell_ * cell_ > wide &&
+                e.deep_across >= kAbreast)
                 out.deepest = {e.deepest, where}, out.deepest_line = b.line;
             const double over = e.highest - low - tool.flute_length;
-            if (tool.flute_length > 0 && over > kStanding && over > out.over_flute.size) out.over_flute = {over, where}, out.over_flute_line = b.line;
+            if (tool.flute_length > 0 && over > kStanding && over > out.over_flute.size)
+                out.over_flute = {over, where}, out.over_flute_line = b.line;
         };
         const auto cut_level = [&] {
             if (level.motions.empty()) return;
@@ -520,22 +576,32 @@ private:
             if (!meets(box)) return;
             const Point3 from{a.x, a.y, a.z}, to{b.x, b.y, b.z};
             const double low = std::min(a.z, b.z);
-            // An arc is cut whole at the first of its chords that comes near; the others then have nothing to do.
+            // An arc is cut whole at the first of its chords that comes near; the others then have nothing to
+            // do.
             if (arc < arcs.size() && arcs[arc].end <= i)
-                arc = static_cast<std::size_t>(std::partition_point(arcs.begin() + static_cast<std::ptrdiff_t>(arc), arcs.end(),
-                                                                    [&](const ProgramArc& each) { return each.end <= i; }) -
-                                               arcs.begin());
-            const bool in_arc = arc < arcs.size() && arcs[arc].begin <= i, cut_before = in_arc && arc < cut_arcs;
-            const bool follows = (thick_shank && low + tool.flute_length < top) || (thick_nose && low + tool.stickout < top);
+                arc = static_cast<std::size_t>(
+                    std::partition_point(arcs.begin() + static_cast<std::ptrdiff_t>(arc), arcs.end(),
+                                         [&](const ProgramArc& each) { return each.end <= i; }) -
+                    arcs.begin());
+            const bool in_arc = arc < arcs.size() && arcs[arc].begin <= i,
+                       cut_before = in_arc && arc < cut_arcs;
+            const bool follows =
+                (thick_shank && low + tool.flute_length < top) || (thick_nose && low + tool.stickout < top);
             const bool near = box.meets(grid, aside, top) && !cut_before;
             if (!near && !follows) return;
-            // A straight feed motion shares its ends with those beside it; what a rapid takes is all told of the rapid.
-            const auto chained = [&](std::size_t k) {  // whether motion k, next to this one, is a straight feed motion too
-                if (b.rapid() || k == 0 || k >= steps.size() || !steps[k - 1].known() || !steps[k].known() || steps[k].rapid()) return false;
-                const bool last_arc = arc > 0 && arcs[arc - 1].end > k, next_arc = arc < arcs.size() && arcs[arc].begin <= k;
-                return !last_arc && !next_arc;
-            };
-            const bool disc = p.end.form == CutterEnd::Form::flat && !b.rapid() && !in_arc && (a.z == b.z || (a.x == b.x && a.y == b.y));
+            // A straight feed motion shares its ends with those beside it; what a rapid takes is all told of
+            // the rapid.
+            const auto chained =
+                [&](std::size_t k) {  // whether motion k, next to this one, is a straight feed motion too
+                    if (b.rapid() || k == 0 || k >= steps.size() || !steps[k - 1].known() ||
+                        !steps[k].known() || steps[k].rapid())
+                        return false;
+                    const bool last_arc = arc > 0 && arcs[arc - 1].end > k,
+                               next_arc = arc < arcs.size() && arcs[arc].begin <= k;
+                    return !last_arc && !next_arc;
+                };
+            const bool disc = p.end.form == CutterEnd::Form::flat && !b.rapid() && !in_arc &&
+                              (a.z == b.z || (a.x == b.x && a.y == b.y));
             if (disc && !follows) {
                 if (low != level.z) cut_level();
                 level.z = low;
@@ -544,21 +610,28 @@ private:
                 return;
             }
             // Nothing to take, as most of the ways between cuts; what is still to be cut only adds to that.
-            if (!in_arc && !follows && stock.clear(box.x0 - aside, box.x1 + aside, box.y0 - aside, box.y1 + aside, low)) return;
+            if (!in_arc && !follows &&
+                stock.clear(box.x0 - aside, box.x1 + aside, box.y0 - aside, box.y1 + aside, low))
+                return;
             cut_level();
             if (near) {
                 Point3 before{}, after{};
                 ChainedSweep chain;
-                if (!in_arc && chained(i - 1)) before = {steps[i - 2].x, steps[i - 2].y, steps[i - 2].z}, chain.before = &before;
-                if (!in_arc && chained(i + 1)) after = {steps[i + 1].x, steps[i + 1].y, steps[i + 1].z}, chain.after = &after;
-                tell(i, in_arc ? stock.cut(p.end, arcs[arc].arc, deep) : stock.cut(p.end, from, to, deep, chain));
+                if (!in_arc && chained(i - 1))
+                    before = {steps[i - 2].x, steps[i - 2].y, steps[i - 2].z}, chain.before = &before;
+                if (!in_arc && chained(i + 1))
+                    after = {steps[i + 1].x, steps[i + 1].y, steps[i + 1].z}, chain.after = &after;
+                tell(i, in_arc ? stock.cut(p.end, arcs[arc].arc, deep)
+                               : stock.cut(p.end, from, to, deep, chain));
                 if (in_arc) cut_arcs = arc + 1;
             }
             auto follow = [&](double thick, double above, Extreme& extreme, std::uint32_t& line) {
                 if (low + above >= top) return;
                 std::array<double, 2> where{};
-                const double reach = stock.reach(thick, {a.x, a.y, a.z + above}, {b.x, b.y, b.z + above}, where);
-                if (reach > kStanding && reach > extreme.size) extreme = {reach, {where[0], where[1], low + above}}, line = b.line;
+                const double reach =
+                    stock.reach(thick, {a.x, a.y, a.z + above}, {b.x, b.y, b.z + above}, where);
+                if (reach > kStanding && reach > extreme.size)
+                    extreme = {reach, {where[0], where[1], low + above}}, line = b.line;
             };
             if (thick_shank) follow(shank, tool.flute_length, out.shank, out.shank_line);
             if (thick_nose) follow(nose, tool.stickout, out.holder, out.holder_line);
@@ -566,7 +639,8 @@ private:
         for (std::size_t block = 0; block < p.blocks.size(); ++block) {
             if (!meets(p.blocks[block])) continue;
             constexpr std::size_t parts = kBlockSteps / kPartSteps;
-            for (std::size_t part = block * parts; part < std::min(p.parts.size(), (block + 1) * parts); ++part) {
+            for (std::size_t part = block * parts; part < std::min(p.parts.size(), (block + 1) * parts);
+                 ++part) {
                 if (!meets(p.parts[part])) continue;
                 const std::size_t begin = 1 + part * kPartSteps;
                 for (std::size_t i = begin; i < std::min(steps.size(), begin + kPartSteps); ++i) run_step(i);
@@ -576,7 +650,8 @@ private:
         return any;
     }
 
-    /// A layer's flask with the tolerances of its walls: nothing of the core may be lost, nothing need be gone within the border.
+    /// A layer's flask with the tolerances of its walls: nothing of the core may be lost, nothing need be
+    /// gone within the border.
     struct Kept {
         Loops core, border;
     };
@@ -588,12 +663,14 @@ private:
         if (cells.empty()) return cells;
         std::vector<double> rows;
         for (int j = 0; j < grid.ny; ++j) rows.push_back(grid.y(j) * kUnitsPerMm);
-        for (const auto& [region, what] : {std::pair{&kept.border, FlaskCell::border}, {&kept.core, FlaskCell::core}}) {
+        for (const auto& [region, what] :
+             {std::pair{&kept.border, FlaskCell::border}, {&kept.core, FlaskCell::core}}) {
             const std::vector<std::vector<Span>> spans = line_spans(*region, rows);
             for (int j = 0; j < grid.ny; ++j)
                 for (const Span& span : spans[static_cast<std::size_t>(j)])
                     for (int i = 0; i < grid.nx; ++i)
-                        if (const double x = grid.x(i) * kUnitsPerMm; x >= span.low && x < span.high) cells[grid.index(i, j)] = what;
+                        if (const double x = grid.x(i) * kUnitsPerMm; x >= span.low && x < span.high)
+                            cells[grid.index(i, j)] = what;
         }
         return cells;
     }
@@ -603,18 +680,20 @@ private:
     }
 
     /// Compares one layer's stock with the part's envelope, when all programs of all layers have run.
-    void measure_layer(std::size_t l, const Stock& stock, const std::vector<float>& envelope, TileResult& result, int i0, int j0,
-                       SimulationReport& report) const {
+    void measure_layer(std::size_t l, const Stock& stock, const std::vector<float>& envelope,
+                       TileResult& result, int i0, int j0, SimulationReport& report) const {
         const SimulatedLayer& layer = input_.layers[l];
         const CellGrid& grid = stock.grid();
         const std::vector<FlaskCell> flask = flask_cells(flasks_[l], grid);
         TileLayer& out = result.layers[l];
         LayerFindings& f = out.findings;
         const double limit = options_.cusp + options_.slack;
-        const double lowest = l == 0 && options_.board_cut >= 0 ? layer.z_bottom - options_.board_cut : -std::numeric_limits<double>::infinity();
+        const double lowest = l == 0 && options_.board_cut >= 0 ? layer.z_bottom - options_.board_cut
+                                                                : -std::numeric_limits<double>::infinity();
         Reach reach(part_, input_.tools, layer.z_bottom, layer.z_top, lowest);
         const StandingHeights surface = stock.standing(l);
-        const auto covered = static_cast<float>(layer.z_top);  // what the envelope is where the part goes on above
+        const auto covered =
+            static_cast<float>(layer.z_top);  // what the envelope is where the part goes on above
         const double part_from = layer.z_bottom + StandingPart::kSheet;
         std::size_t c = 0;
         const auto measure = [&](int i, int j) {
@@ -630,19 +709,21 @@ private:
             double over = z - keep;
             CellKind kind = beside ? CellKind::beside : CellKind::pattern;
             if (over < 0) {
-                const double depth = depth_of_lost({x, y, z}, keep, options_.maps ? 0 : std::min(options_.gouge, f.gouge.size));
+                const double depth = depth_of_lost(
+                    {x, y, z}, keep, options_.maps ? 0 : std::min(options_.gouge, f.gouge.size));
                 raise(f.gouge, depth, {x, y, z});
                 f.gouge_cells += depth > options_.gouge;
                 if (depth > options_.gouge) kind = CellKind::gouge;
                 over = -depth;
             } else if (over > 0) {
-                // Vertical height overstates what is left on a slope. Along the normal it is the distance from the finished surface,
-                // which beside the pattern is the layer's bottom.
+                // Vertical height overstates what is left on a slope. Along the normal it is the distance
+                // from the finished surface, which beside the pattern is the layer's bottom.
                 if (over > options_.cusp) {
                     const auto near = part_.from_shadow({x, y, z}, layer.z_top, over, envelope[c] == covered);
                     over = std::min(over, near.distance);
                     if (over > options_.cusp) kind = CellKind::left;
-                    if (over > limit) kind = judge_leftover(layer, reach, {x, y, z}, over, near, beside, z - keep, f);
+                    if (over > limit)
+                        kind = judge_leftover(layer, reach, {x, y, z}, over, near, beside, z - keep, f);
                 }
                 raise(f.left, over, {x, y, z});
                 out.squares += over * over;
@@ -652,7 +733,8 @@ private:
                 report.layers[l].kinds[map_cell(i0 + i, j0 + j)] = kind;
             }
         };
-        // Most cells have nothing to tell but the square of what little is left: eight are asked at once whether it is so.
+        // Most cells have nothing to tell but the square of what little is left: eight are asked at once
+        // whether it is so.
         using Floats [[gnu::vector_size(8 * sizeof(float))]] = float;
         using Doubles [[gnu::vector_size(8 * sizeof(double))]] = double;
         Doubles squares{};
@@ -660,7 +742,8 @@ private:
             Floats height, upper;
             std::memcpy(&height, surface.height + c, sizeof height);
             std::memcpy(&upper, envelope.data() + c, sizeof upper);
-            const Doubles z = surface.bottom + __builtin_convertvector(height, Doubles), part = __builtin_convertvector(upper, Doubles);
+            const Doubles z = surface.bottom + __builtin_convertvector(height, Doubles),
+                          part = __builtin_convertvector(upper, Doubles);
             const Doubles over = z - (part < part_from ? Doubles{} + layer.z_bottom : part);
             const auto more = (over < 0.0) | (over > std::min(options_.cusp, f.left.size));
             std::int64_t any = 0;
@@ -682,31 +765,37 @@ private:
         for (int k = 0; k < 8; ++k) out.squares += squares[k];
     }
 
-    /// How deep in the part the material was that a column has lost between the stock's surface and the part's: the greatest
-    /// distance from the part's surface of those of its points that are within the part. (The lowest point alone will not do: it may lie
-    /// on the part's own bottom. Points under an overhang are in the part's shadow, but no part was lost there.)
+    /// How deep in the part the material was that a column has lost between the stock's surface and the
+    /// part's: the greatest distance from the part's surface of those of its points that are within the part.
+    /// (The lowest point alone will not do: it may lie on the part's own bottom. Points under an overhang are
+    /// in the part's shadow, but no part was lost there.)
     /// @param enough what is no deeper need not be told from 0, mm
     double depth_of_lost(const Point3& surface, double keep, double enough) const {
         const double height = keep - surface[2];
         if (height <= options_.gouge / 5) return height;
         constexpr int kPoints = 8;
-        double depth = 0, from = surface[2], distance = height;  // that a point below is from a facet at most, and it
+        double depth = 0, from = surface[2],
+               distance = height;  // that a point below is from a facet at most, and it
         for (int k = 0; k < kPoints; ++k) {
-            const double z = surface[2] + height * k / kPoints, cap = std::min(height, keep - z), known = std::max(depth, enough);
+            const double z = surface[2] + height * k / kPoints, cap = std::min(height, keep - z),
+                         known = std::max(depth, enough);
             if (cap <= known) break;
             if (k > 0 && distance + (z - from) <= known) continue;
             const Point3 lost{surface[0], surface[1], z};
             from = z, distance = part_.from_facets(lost, cap, known);
-            if (distance > known && part_.covered(lost[0], lost[1], lost[2])) depth = distance;  // else it is outside of the part
+            if (distance > known && part_.covered(lost[0], lost[1], lost[2]))
+                depth = distance;  // else it is outside of the part
         }
         return depth;
     }
 
-    /// Stock that stands `over` above the finished surface is excused as far as no tool reaches into it. What could have been taken
-    /// at a point of its surface is the greatest d for which tools reach the points d away from it towards the part, straight down and
-    /// down at 45° to four sides: a lump of that size, not the sliver beside what is out of reach. Found by halving.
-    CellKind judge_leftover(const SimulatedLayer& layer, Reach& reach, const Point3& s, double over, const StandingPart::Clearance& near, bool beside,
-                            double height, LayerFindings& f) const {
+    /// Stock that stands `over` above the finished surface is excused as far as no tool reaches into it. What
+    /// could have been taken at a point of its surface is the greatest d for which tools reach the points d
+    /// away from it towards the part, straight down and down at 45° to four sides: a lump of that size, not
+    /// the sliver beside what is out of reach. Found by halving.
+    CellKind judge_leftover(const SimulatedLayer& layer, Reach& reach, const Point3& s, double over,
+                            const StandingPart::Clearance& near, bool beside, double height,
+                            LayerFindings& f) const {
         const double limit = options_.cusp + options_.slack;
         Point3 n{0, 0, 1};
         if (near.distance < height && near.distance > 0)
@@ -715,7 +804,9 @@ private:
         const std::array<Point3, 6> ways{Point3{0, 0, 1}, n, {h, 0, h}, {-h, 0, h}, {0, h, h}, {0, -h, h}};
         auto could_take = [&](double d) {
             for (const Point3& w : ways)
-                if (!reach.reachable({s[0] - w[0] * d, s[1] - w[1] * d, std::max(layer.z_bottom, s[2] - w[2] * d)})) return false;
+                if (!reach.reachable(
+                        {s[0] - w[0] * d, s[1] - w[1] * d, std::max(layer.z_bottom, s[2] - w[2] * d)}))
+                    return false;
             return true;
         };
         ++f.over;
@@ -744,82 +835,100 @@ private:
     /// Turns findings into violations, kind by kind.
     void judge(SimulationReport& report) const {
         auto each = [&](auto&& fn) {
-            for (std::size_t i = 0; i < report.programs.size(); ++i) fn(input_.programs[i], report.programs[i], i);
+            for (std::size_t i = 0; i < report.programs.size(); ++i)
+                fn(input_.programs[i], report.programs[i], i);
         };
         each([&](const Program& p, const ProgramFindings& f, std::size_t) {
             if (f.gouge.cutter.depth > options_.gouge)
                 violate(report, "gouge.cutter",
-                        fmt::format("the cutter goes {:.4f} mm into the part ({} motions over {:.4f} mm)", f.gouge.cutter.depth, f.gouge.gouges,
-                                    options_.gouge),
+                        fmt::format("the cutter goes {:.4f} mm into the part ({} motions over {:.4f} mm)",
+                                    f.gouge.cutter.depth, f.gouge.gouges, options_.gouge),
                         &p, f.gouge.cutter.line, f.gouge.cutter.tip, f.gouge.cutter.depth);
         });
         each([&](const Program& p, const ProgramFindings& f, std::size_t) {
             if (f.flask.depth > options_.gouge)
-                violate(report, "gouge.flask", fmt::format("the cutter goes {:.4f} mm into the flask", f.flask.depth), &p, f.flask.line, f.flask.tip,
-                        f.flask.depth);
+                violate(report, "gouge.flask",
+                        fmt::format("the cutter goes {:.4f} mm into the flask", f.flask.depth), &p,
+                        f.flask.line, f.flask.tip, f.flask.depth);
         });
         each([&](const Program& p, const ProgramFindings& f, std::size_t) {
             if (f.gouge.shank.depth > options_.gouge)
-                violate(report, "contact.shank", fmt::format("the shank goes {:.4f} mm into the part", f.gouge.shank.depth), &p, f.gouge.shank.line,
-                        f.gouge.shank.tip, f.gouge.shank.depth);
+                violate(report, "contact.shank",
+                        fmt::format("the shank goes {:.4f} mm into the part", f.gouge.shank.depth), &p,
+                        f.gouge.shank.line, f.gouge.shank.tip, f.gouge.shank.depth);
             if (f.gouge.holder.depth > options_.gouge)
-                violate(report, "contact.holder", fmt::format("the holder goes {:.4f} mm into the part", f.gouge.holder.depth), &p,
+                violate(report, "contact.holder",
+                        fmt::format("the holder goes {:.4f} mm into the part", f.gouge.holder.depth), &p,
                         f.gouge.holder.line, f.gouge.holder.tip, f.gouge.holder.depth);
             if (f.shank.size > 0)
-                violate(report, "contact.shank", fmt::format("the shank runs into stock, {:.3f} mm deep", f.shank.size), &p, f.shank_line,
-                        f.shank.where, f.shank.size);
+                violate(report, "contact.shank",
+                        fmt::format("the shank runs into stock, {:.3f} mm deep", f.shank.size), &p,
+                        f.shank_line, f.shank.where, f.shank.size);
             if (f.holder.size > 0)
-                violate(report, "contact.holder", fmt::format("the holder runs into stock, {:.3f} mm deep", f.holder.size), &p, f.holder_line,
-                        f.holder.where, f.holder.size);
+                violate(report, "contact.holder",
+                        fmt::format("the holder runs into stock, {:.3f} mm deep", f.holder.size), &p,
+                        f.holder_line, f.holder.where, f.holder.size);
         });
         each([&](const Program& p, const ProgramFindings& f, std::size_t) {
             if (f.rapid.size > 0)
-                violate(report, "rapid.through_stock", fmt::format("a rapid takes {:.3f} mm of stock", f.rapid.size), &p, f.rapid_line, f.rapid.where,
-                        f.rapid.size);
+                violate(report, "rapid.through_stock",
+                        fmt::format("a rapid takes {:.3f} mm of stock", f.rapid.size), &p, f.rapid_line,
+                        f.rapid.where, f.rapid.size);
         });
         each([&](const Program& p, const ProgramFindings& f, std::size_t) { unknown_start(report, p, f); });
         each([&](const Program& p, const ProgramFindings& f, std::size_t) {
             if (f.over_flute.size > 0)
-                violate(report, "flute.too_deep", fmt::format("cuts {:.3f} mm deeper than the flutes are long", f.over_flute.size), &p,
+                violate(report, "flute.too_deep",
+                        fmt::format("cuts {:.3f} mm deeper than the flutes are long", f.over_flute.size), &p,
                         f.over_flute_line, f.over_flute.where, f.over_flute.size);
         });
         each([&](const Program& p, const ProgramFindings& f, std::size_t) {
-            if (p.kind == OperationKind::rough && p.planned_stepdown > 0 && f.deepest.size > p.planned_stepdown + kDeeper)
-                violate(report, "cut.too_deep", fmt::format("cuts {:.3f} mm at once, {:.3f} mm are planned", f.deepest.size, p.planned_stepdown), &p,
-                        f.deepest_line, f.deepest.where, f.deepest.size - p.planned_stepdown);
+            if (p.kind == OperationKind::rough && p.planned_stepdown > 0 &&
+                f.deepest.size > p.planned_stepdown + kDeeper)
+                violate(report, "cut.too_deep",
+                        fmt::format("cuts {:.3f} mm at once, {:.3f} mm are planned", f.deepest.size,
+                                    p.planned_stepdown),
+                        &p, f.deepest_line, f.deepest.where, f.deepest.size - p.planned_stepdown);
         });
         each([&](const Program& p, const ProgramFindings&, std::size_t i) {
             // Coarser points than the tolerance asks for may miss all that an operation takes.
             const bool seen = cell_ <= 1.25 * simulation_cell(input_.tools, options_.cusp) ||
-                              std::none_of(p.steps.begin(), p.steps.end(), [](const ProgramStep& step) { return !step.rapid(); });
-            if (prepared_[i].tool && taken_[i] <= 1e-3 && seen) violate(report, "operation.empty", "removes nothing", &p, 0, {}, 0);
+                              std::none_of(p.steps.begin(), p.steps.end(),
+                                           [](const ProgramStep& step) { return !step.rapid(); });
+            if (prepared_[i].tool && taken_[i] <= 1e-3 && seen)
+                violate(report, "operation.empty", "removes nothing", &p, 0, {}, 0);
         });
         if (options_.board_cut >= 0 && report.board_cut > options_.board_cut + kStanding)
             violate(report, "board.too_deep",
-                    fmt::format("the base board is cut {:.3f} mm deep, {:.3f} mm are allowed", report.board_cut, options_.board_cut), nullptr, 0, {},
-                    report.board_cut);
+                    fmt::format("the base board is cut {:.3f} mm deep, {:.3f} mm are allowed",
+                                report.board_cut, options_.board_cut),
+                    nullptr, 0, {}, report.board_cut);
         if (flask_cut_.size > options_.gouge)
-            violate(report, "gouge.flask", fmt::format("the flask is cut {:.3f} mm deep", flask_cut_.size), nullptr, 0, flask_cut_.where,
-                    flask_cut_.size);
+            violate(report, "gouge.flask", fmt::format("the flask is cut {:.3f} mm deep", flask_cut_.size),
+                    nullptr, 0, flask_cut_.where, flask_cut_.size);
         for (std::size_t l = 0; l < report.layers.size(); ++l) {
             const LayerFindings& f = report.layers[l];
             if (f.gouge_cells > 0)
                 violate(report, "gouge.stock",
-                        fmt::format("layer {}: the stock is cut {:.4f} mm into the part, {:.2f} mm2 are deeper than {:.4f} mm", l + 1, f.gouge.size,
-                                    static_cast<double>(f.gouge_cells) * cell_ * cell_, options_.gouge),
+                        fmt::format("layer {}: the stock is cut {:.4f} mm into the part, {:.2f} mm2 are "
+                                    "deeper than {:.4f} mm",
+                                    l + 1, f.gouge.size, static_cast<double>(f.gouge_cells) * cell_ * cell_,
+                                    options_.gouge),
                         nullptr, 0, f.gouge.where, f.gouge.size);
         }
         for (std::size_t l = 0; l < report.layers.size(); ++l) {
             const LayerFindings& f = report.layers[l];
             if (f.missed_left.size > options_.leftover_limit)
                 violate(report, "left.too_much",
-                        fmt::format("layer {}: {:.3f} mm are left that a tool could take ({:.1f} mm2, {:.0f} mm3 of it waste beside the pattern)",
-                                    l + 1, f.missed_left.size, static_cast<double>(f.missed) * cell_ * cell_, f.waste_mm3),
+                        fmt::format("layer {}: {:.3f} mm are left that a tool could take ({:.1f} mm2, {:.0f} "
+                                    "mm3 of it waste beside the pattern)",
+                                    l + 1, f.missed_left.size, static_cast<double>(f.missed) * cell_ * cell_,
+                                    f.waste_mm3),
                         nullptr, 0, f.missed_left.where, f.missed_left.size);
             if (f.within_share < options_.leftover_share)
                 violate(report, "left.missed",
-                        fmt::format("layer {}: only {:.3f} % of what tools reach is within {:.3f} mm", l + 1, 100 * f.within_share,
-                                    options_.cusp + options_.slack),
+                        fmt::format("layer {}: only {:.3f} % of what tools reach is within {:.3f} mm", l + 1,
+                                    100 * f.within_share, options_.cusp + options_.slack),
                         nullptr, 0, f.missed_left.where, f.missed_left.size);
         }
     }
@@ -830,12 +939,14 @@ private:
             const ProgramStep& s = p.steps[i];
             if (i > 0 && p.steps[i - 1].known()) return;
             // The very first rise in z passes over heights that nobody knows; after it the height counts.
-            const double low = i > 0 && std::isfinite(p.steps[i - 1].z) ? std::min(p.steps[i - 1].z, s.z) : s.z;
+            const double low =
+                i > 0 && std::isfinite(p.steps[i - 1].z) ? std::min(p.steps[i - 1].z, s.z) : s.z;
             if (std::isfinite(low) && low >= f.stock_top) continue;
             violate(report, "rapid.unknown_start",
-                    std::isfinite(low)
-                        ? fmt::format("moves from a place that no line has set at z {:.3f}, while stock stands up to {:.3f}", low, f.stock_top)
-                        : std::string("moves in x or y from a height that no line has set"),
+                    std::isfinite(low) ? fmt::format("moves from a place that no line has set at z {:.3f}, "
+                                                     "while stock stands up to {:.3f}",
+                                                     low, f.stock_top)
+                                       : std::string("moves in x or y from a height that no line has set"),
                     &p, s.line, {}, std::isfinite(low) ? f.stock_top - low : 0);
             return;
         }
@@ -866,7 +977,8 @@ double simulation_cell(const std::vector<Tool>& tools, double cusp) {
     return std::clamp(std::sqrt(2 * radius * std::max(cusp, 1e-4)) / 2, 0.05, 1.0);
 }
 
-SimulationReport simulate(Context& context, const SimulationInput& input, const StandingPart& part, const SimulationOptions& options) {
+SimulationReport simulate(Context& context, const SimulationInput& input, const StandingPart& part,
+                          const SimulationOptions& options) {
     return Simulation(context, input, part, options).run();
 }
 

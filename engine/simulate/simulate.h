@@ -1,5 +1,6 @@
-// What part would result if the machine ran these programs? Programs, tools, layers and the pattern go in as values,
-// a report comes out. All but the pattern was read from OUT; the pattern may be the one that was planned, as its file was read.
+// What part would result if the machine ran these programs? Programs, tools, layers and the pattern go in as
+// values, a report comes out. All but the pattern was read from OUT; the pattern may be the one that was
+// planned, as its file was read.
 #pragma once
 
 #include <array>
@@ -21,7 +22,8 @@ namespace slabwright {
 /// A layer as plan.json states it, mm.
 struct SimulatedLayer {
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
-    Loops flask{};  ///< what of the slab is to stay around the pattern, over the layer's whole height; empty: no flask
+    Loops flask{};  ///< what of the slab is to stay around the pattern, over the layer's whole height; empty:
+                    ///< no flask
 };
 
 /// All that the simulation starts from. The programs stand in the order of execution, layers ascending.
@@ -42,7 +44,7 @@ struct SimulationOptions {
     double leftover_limit = 0.5;    ///< mm that nothing reachable may exceed
     double leftover_share = 0.999;  ///< of the surface must be within cusp + slack, of what is reachable
     double board_cut = -1;          ///< mm allowed into the base board; negative: not limited
-    bool maps = false;              ///< keep left-over, gouge and kind of every point, LayerFindings::map and kinds
+    bool maps = false;  ///< keep left-over, gouge and kind of every point, LayerFindings::map and kinds
 };
 
 /// A size with the place where it is greatest, mm.
@@ -52,9 +54,10 @@ struct Extreme {
 };
 
 /// Something that must not be. The code's family names the kind of fault:
-/// stack.short, stack.narrow, stack.gap, stack.thin, gouge.cutter, gouge.stock, gouge.flask, contact.shank, contact.holder, rapid.through_stock, rapid.unknown_start,
-/// flute.too_deep, cut.too_deep, spindle.off, travel.exceeded, board.too_deep, operation.empty, tool.wrong, tool.unknown, left.missed,
-/// left.too_much; and by io/verify program.order, program.unplanned, program.missing, tool.table.
+/// stack.short, stack.narrow, stack.gap, stack.thin, gouge.cutter, gouge.stock, gouge.flask, contact.shank,
+/// contact.holder, rapid.through_stock, rapid.unknown_start, flute.too_deep, cut.too_deep, spindle.off,
+/// travel.exceeded, board.too_deep, operation.empty, tool.wrong, tool.unknown, left.missed, left.too_much;
+/// and by io/verify program.order, program.unplanned, program.missing, tool.table.
 struct Violation {
     std::string code;
     std::string message;  ///< one line, sizes with units
@@ -82,15 +85,17 @@ struct LayerFindings {
     std::uint64_t gouge_cells = 0;  ///< deeper than the tolerance
     Extreme left;                   ///< left over, along the normal, whether or not a tool could reach it
     double left_rms = 0;
-    std::uint64_t over = 0;         ///< cells with more than cusp + slack left
-    std::uint64_t unreachable = 0;  ///< of those: no flat or ball end mill of the library gets cusp + slack deeper
+    std::uint64_t over = 0;  ///< cells with more than cusp + slack left
+    std::uint64_t unreachable =
+        0;  ///< of those: no flat or ball end mill of the library gets cusp + slack deeper
     Extreme unreachable_left;
     std::uint64_t missed = 0;  ///< of those: a tool could
     Extreme missed_left;       ///< how much of it a tool could have taken
     double within_share = 1;   ///< reachable cells with at most cusp + slack
     std::uint64_t waste = 0;   ///< cells beside the pattern (no part of it in the layer) that were missed
     double waste_mm3 = 0;
-    /// With SimulationOptions::maps, row after row: left-over (positive) or gouge (negative) along the normal.
+    /// With SimulationOptions::maps, row after row: left-over (positive) or gouge (negative) along the
+    /// normal.
     std::vector<float> map;
     std::vector<CellKind> kinds;  ///< the same points
 };
@@ -105,7 +110,8 @@ struct ProgramFindings {
     std::uint32_t rapid_line = 0;
     Extreme over_flute;  ///< stock taken above the flutes' upper end
     std::uint32_t over_flute_line = 0;
-    Extreme deepest;  ///< most height that one motion took, where over a tenth of the cutter's disc, three cells abreast, it took more than planned
+    Extreme deepest;  ///< most height that one motion took, where over a tenth of the cutter's disc, three
+                      ///< cells abreast, it took more than planned
     std::uint32_t deepest_line = 0;
     Extreme shank, holder;  ///< standing stock that they run into
     GougePlace flask;       ///< how deep it goes into the flask's walls, by the exact check
@@ -128,19 +134,20 @@ struct SimulationReport {
     [[nodiscard]] bool passed() const { return violations.empty(); }
 };
 
-/// The cell size that the tolerance asks for: a quarter of the distance of passes that leave the cusp, 2√(2Rc), under the smallest ball
-/// of the library (or its smallest cutter), within 0.05 and 1 mm.
+/// The cell size that the tolerance asks for: a quarter of the distance of passes that leave the cusp,
+/// 2√(2Rc), under the smallest ball of the library (or its smallest cutter), within 0.05 and 1 mm.
 [[nodiscard]] double simulation_cell(const std::vector<Tool>& tools, double cusp);
 
-/// Runs everything. Stock at the cells' centres is exact, not sampled, so a gouge or left-over is what stands there; between
-/// the centres the exact check of every motion decides about gouges.
+/// Runs everything. Stock at the cells' centres is exact, not sampled, so a gouge or left-over is what stands
+/// there; between the centres the exact check of every motion decides about gouges.
 /// @param part of the input's mesh
-/// @throws Error(usage) on layers or stock that make no sense, Error(no_plan, "memory.limit"), Error(cancelled)
-[[nodiscard]] SimulationReport simulate(Context& context, const SimulationInput& input, const StandingPart& part,
-                                        const SimulationOptions& options = {});
+/// @throws Error(usage) on layers or stock that make no sense, Error(no_plan, "memory.limit"),
+/// Error(cancelled)
+[[nodiscard]] SimulationReport simulate(Context& context, const SimulationInput& input,
+                                        const StandingPart& part, const SimulationOptions& options = {});
 
-/// Time of a program in seconds: trapezoids of speed under one acceleration, slowed at corners so that a path rounded by
-/// Program::blend at most would need no more than that acceleration across (junction deviation).
+/// Time of a program in seconds: trapezoids of speed under one acceleration, slowed at corners so that a path
+/// rounded by Program::blend at most would need no more than that acceleration across (junction deviation).
 [[nodiscard]] double program_seconds(const Program& program, const Machine& machine);
 
 }  // namespace slabwright

@@ -1,4 +1,5 @@
-// How long a simulation takes, foretold from what is known before it: by this progress is divided, and nothing else.
+// How long a simulation takes, foretold from what is known before it: by this progress is divided, and
+// nothing else.
 #pragma once
 
 #include <cstddef>

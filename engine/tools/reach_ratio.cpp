@@ -30,7 +30,9 @@ ReachRatio reach_ratio(Context& context, const LayerJob& layer, const AccessScen
     return [&context, &layer, scene](const Tool& tool) {
         const Job& job = *layer.job;
         if (job.selection.accessibility == AccessRule::printed)
-            return printed_accessibility(context, layer.mesh, layer.z_bottom, layer.z_top, tool.diameter / 2, job.selection.overlap_weight).ratio();
+            return printed_accessibility(context, layer.mesh, layer.z_bottom, layer.z_top, tool.diameter / 2,
+                                         job.selection.overlap_weight)
+                .ratio();
         auto ratio = [&](const Tool& t) {
             AccessOptions options = access_options(job, layer.floor_below);
             options.limit = job.selection.threshold;
@@ -39,7 +41,8 @@ ReachRatio reach_ratio(Context& context, const LayerJob& layer, const AccessScen
         double share = ratio(tool);
         if (tool.kind == ToolKind::ball && share < job.selection.threshold)
             for (const Tool& twin : job.tools)
-                if (twin.kind == ToolKind::flat && std::abs(twin.diameter - tool.diameter) < 1e-3) share = std::max(share, ratio(twin));
+                if (twin.kind == ToolKind::flat && std::abs(twin.diameter - tool.diameter) < 1e-3)
+                    share = std::max(share, ratio(twin));
         return share;
     };
 }

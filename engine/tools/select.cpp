@@ -24,7 +24,8 @@ std::vector<Tool> falling(const Job& job, ToolKind kind) {
     std::vector<Tool> tools;
     for (const Tool& tool : job.tools)
         if (tool.kind == kind) tools.push_back(tool);
-    std::stable_sort(tools.begin(), tools.end(), [](const Tool& a, const Tool& b) { return a.diameter > b.diameter; });
+    std::stable_sort(tools.begin(), tools.end(),
+                     [](const Tool& a, const Tool& b) { return a.diameter > b.diameter; });
     return tools;
 }
 
@@ -59,7 +60,8 @@ double perimeter(const Loops& loops) {
 
 class Chooser {
 public:
-    Chooser(Context& context, const LayerJob& layer, const ReachRatio& ratio, const std::optional<Tool>& finish)
+    Chooser(Context& context, const LayerJob& layer, const ReachRatio& ratio,
+            const std::optional<Tool>& finish)
         : context_(context),
           layer_(layer),
           job_(*layer.job),
@@ -92,12 +94,16 @@ public:
         std::vector<LayerTools> sets;
         measure();
         const double height = layer_.z_top - layer_.z_bottom, swath = base.finish.diameter;
-        const double allowed = std::min(flat_level_stepdown(slopes_of(context_, layer_).least, base.finish.diameter / 2), height);
+        const double allowed = std::min(
+            flat_level_stepdown(slopes_of(context_, layer_).least, base.finish.diameter / 2), height);
         for (Tool rough : flats_) {
             if (rough.diameter < base.rough.diameter - 1e-9) break;
-            rough.stepdown_min = rough.stepdown_max = std::clamp(allowed, std::min(rough.stepdown_min, height), rough.stepdown_max);
+            rough.stepdown_min = rough.stepdown_max =
+                std::clamp(allowed, std::min(rough.stepdown_min, height), rough.stepdown_max);
             constexpr double kDeeper = 1.2;  // times as deep: less hardly makes a level fewer
-            if (rough.diameter <= base.rough.diameter + 1e-9 && rough.stepdown_max < kDeeper * base.rough.stepdown_max) break;
+            if (rough.diameter <= base.rough.diameter + 1e-9 &&
+                rough.stepdown_max < kDeeper * base.rough.stepdown_max)
+                break;
             LayerTools& tools = sets.emplace_back();
             tools.finish = base.finish;
             tools.rough = rough;
@@ -106,7 +112,8 @@ public:
             for (Tool semi : flats_) {
                 if (semi.diameter >= rough.diameter - 1e-9) continue;
                 if (semi.diameter < base.finish.diameter / 2 - 1e-9) break;
-                semi.stepdown_max = std::clamp(allowed, std::min(semi.stepdown_min, height), semi.stepdown_max);
+                semi.stepdown_max =
+                    std::clamp(allowed, std::min(semi.stepdown_min, height), semi.stepdown_max);
                 semi.stepdown_min = std::min(semi.stepdown_min, semi.stepdown_max);
                 tools.semi_rough = {semi};
                 if (left(semi, semi.stepdown_max, swath).nothing(job_.selection.voxel)) break;
@@ -122,20 +129,27 @@ private:
     }
 
     // Asks for AR from the largest tool down until one has enough.
-    const Tool& first_that_reaches(const std::vector<Tool>& tools, const char* purpose, const std::function<double(const Tool&)>& stepdown) {
+    const Tool& first_that_reaches(const std::vector<Tool>& tools, const char* purpose,
+                                   const std::function<double(const Tool&)>& stepdown) {
         const double threshold = job_.selection.threshold;
         for (const Tool& tool : tools) {
-            const double ar =
-                ratio_ ? ratio_(tool)
-                       : voxels_->reached_share(context_, tool.diameter / 2, std::max(1, static_cast<int>(kSectionStep / job_.selection.voxel)));
+            const double ar = ratio_
+                                  ? ratio_(tool)
+                                  : voxels_->reached_share(
+                                        context_, tool.diameter / 2,
+                                        std::max(1, static_cast<int>(kSectionStep / job_.selection.voxel)));
             ToolCandidate& candidate = note(purpose, tool);
             candidate.accessibility = ar;
             candidate.stepdown = stepdown(tool);
             const bool last = &tool == &tools.back();
             candidate.chosen = ar >= threshold || last;
             if (ar >= threshold) candidate.reason = "the largest that reaches enough";
-            else if (last) candidate.reason = fmt::format("none reaches the share of {:.4f}; this is the smallest", threshold);
-            else candidate.reason = fmt::format("reaches {:.4f} of the surface, less than {:.4f}", ar, threshold);
+            else if (last)
+                candidate.reason =
+                    fmt::format("none reaches the share of {:.4f}; this is the smallest", threshold);
+            else
+                candidate.reason =
+                    fmt::format("reaches {:.4f} of the surface, less than {:.4f}", ar, threshold);
             if (candidate.chosen) return tool;
         }
         return tools.back();
@@ -144,7 +158,8 @@ private:
     void choose_one_flat() {
         Tool flat = first_that_reaches(flats_, "rough", [](const Tool& t) { return t.stepdown_max; });
         flat.stepdown_min = flat.stepdown_max;
-        choice_.record.candidates.back().reason += "; every wall is upright, so it cuts all, at its largest stepdown";
+        choice_.record.candidates.back().reason +=
+            "; every wall is upright, so it cuts all, at its largest stepdown";
         choice_.tools.rough = flat;
         // What little a flat leaves anywhere is for a ball that goes where the flat goes.
         choice_.tools.finish = balls_.back();
@@ -157,7 +172,8 @@ private:
 
     void choose_finish(double least) {
         auto stepdown = [&](const Tool& ball) {
-            return std::min(ball_level_stepdown(ball.diameter / 2, least, job_.tolerances.cusp), ball.stepdown_max);
+            return std::min(ball_level_stepdown(ball.diameter / 2, least, job_.tolerances.cusp),
+                            ball.stepdown_max);
         };
         choice_.tools.finish = finish_ ? *finish_ : first_that_reaches(balls_, "finish", stepdown);
         const double r = choice_.tools.finish.diameter / 2;
@@ -167,8 +183,9 @@ private:
 
     // The voxels of the layer, and the length of its sections by height.
     void measure() {
-        const VoxelBox box = voxel_box({layer_.stock_min[0], layer_.stock_min[1], layer_.z_bottom},
-                                       {layer_.stock_max[0], layer_.stock_max[1], layer_.z_top}, job_.selection.voxel);
+        const VoxelBox box =
+            voxel_box({layer_.stock_min[0], layer_.stock_min[1], layer_.z_bottom},
+                      {layer_.stock_max[0], layer_.stock_max[1], layer_.z_top}, job_.selection.voxel);
         std::vector<Plane> planes;
         for (int k = 0; k < box.nz; ++k) planes.push_back({std::min(box.z(k), layer_.z_top), Side::below});
         std::vector<Section> sections = slice(context_, layer_.mesh, planes, {job_.tolerances.gap});
@@ -188,14 +205,17 @@ private:
     }
 
     [[nodiscard]] RoughLeft left(const Tool& flat, double stepdown, double swath) {
-        LayerVoxels::Roughing roughing{
-            flat.diameter / 2, job_.cutting.wall_allowance, even_levels(layer_.z_top, layer_.z_bottom, floors_, stepdown), {}};
+        LayerVoxels::Roughing roughing{flat.diameter / 2,
+                                       job_.cutting.wall_allowance,
+                                       even_levels(layer_.z_top, layer_.z_bottom, floors_, stepdown),
+                                       {}};
         for (const Tool& wider : flats_)
             if (wider.diameter > flat.diameter + 1e-9) roughing.wider.push_back(wider.diameter / 2);
         return voxels_->left(context_, roughing, swath);
     }
 
-    // The largest stepdown of [low, high] at which nothing is left, when nothing is at `low` and something at `high`.
+    // The largest stepdown of [low, high] at which nothing is left, when nothing is at `low` and something at
+    // `high`.
     [[nodiscard]] double halve(const Tool& flat, double low, double high, double swath) {
         while (high - low > kFinestStep) {
             const double middle = (low + high) / 2;
@@ -207,26 +227,29 @@ private:
     // t_r = Σ A_i / (2R·f) (LUO eq. 3), in minutes.
     [[nodiscard]] double rough_minutes(const Tool& flat, double stepdown) const {
         double area = 0;
-        for (const double tip : even_levels(layer_.z_top, layer_.z_bottom, floors_, stepdown)) area += voxels_->area_to_clear(tip);
+        for (const double tip : even_levels(layer_.z_top, layer_.z_bottom, floors_, stepdown))
+            area += voxels_->area_to_clear(tip);
         return area / (flat.diameter * std::min(flat.max_feed, job_.machine.max_feed));
     }
     // t_f = L_c / f (LUO eq. 4) of a contour along every section, and the change of tool, in minutes.
     [[nodiscard]] double semi_minutes(const Tool& flat, double stepdown) const {
         double contours = 0;
         for (const double tip : even_levels(layer_.z_top, layer_.z_bottom, floors_, stepdown)) {
-            const auto k =
-                static_cast<std::size_t>(std::clamp((tip - layer_.z_bottom) / job_.selection.voxel, 0.0, static_cast<double>(length_.size() - 1)));
+            const auto k = static_cast<std::size_t>(std::clamp((tip - layer_.z_bottom) / job_.selection.voxel,
+                                                               0.0, static_cast<double>(length_.size() - 1)));
             contours += length_[k];
         }
-        return contours / std::min(flat.max_feed, job_.machine.max_feed) + (job_.machine.tool_change_s + job_.machine.spindle_dwell_s) / 60;
+        return contours / std::min(flat.max_feed, job_.machine.max_feed) +
+               (job_.machine.tool_change_s + job_.machine.spindle_dwell_s) / 60;
     }
 
-    // LUO 5.5.3.3: whether a flat leaves nothing outside the swath at some stepdown of its range; sets it. Print also looks past what the
-    // slopes allow; its example does not, nor does this.
+    // LUO 5.5.3.3: whether a flat leaves nothing outside the swath at some stepdown of its range; sets it.
+    // Print also looks past what the slopes allow; its example does not, nor does this.
     bool fits(Tool& flat, double allowed, double swath, ToolCandidate& candidate) {
         if (flat.stepdown_min > allowed + 1e-9) {
             candidate.reason =
-                fmt::format("its least stepdown is {:.3f} mm, more than the {:.3f} mm that the slopes allow", flat.stepdown_min, allowed);
+                fmt::format("its least stepdown is {:.3f} mm, more than the {:.3f} mm that the slopes allow",
+                            flat.stepdown_min, allowed);
             return false;
         }
         const double first = std::min(allowed, flat.stepdown_max);
@@ -240,9 +263,10 @@ private:
             if (!at_least.nothing(job_.selection.voxel)) {
                 candidate.semi_rough_mm2 = at_least.area;
                 candidate.stepdown = least;
-                candidate.reason =
-                    fmt::format("leaves {:.1f} mm² that the next cutter's swath of {:.2f} mm does not take, as at x {:.1f} y {:.1f} z {:.1f}",
-                                at_least.area, swath, at_least.where[0], at_least.where[1], at_least.where[2]);
+                candidate.reason = fmt::format(
+                    "leaves {:.1f} mm² that the next cutter's swath of {:.2f} mm does not take, as at x "
+                    "{:.1f} y {:.1f} z {:.1f}",
+                    at_least.area, swath, at_least.where[0], at_least.where[1], at_least.where[2]);
                 return false;
             }
             stepdown = halve(flat, least, first, swath);
@@ -262,8 +286,9 @@ private:
         const double unlimited = flat_level_stepdown(least, cusp), height = layer_.z_top - layer_.z_bottom;
         choice_.record.rough_stepdown = std::isfinite(unlimited) ? unlimited : 0;
 
-        // Where the slopes allow no wider flat its least stepdown, that of L = R_f does, and last the least stepdowns themselves: steps under
-        // what a tool is made for only waste time, and the swath tells what may be left.
+        // Where the slopes allow no wider flat its least stepdown, that of L = R_f does, and last the least
+        // stepdowns themselves: steps under what a tool is made for only waste time, and the swath tells what
+        // may be left.
         std::optional<Tool> rough;
         double allowed = 0;
         std::vector<std::pair<Tool, std::size_t>> waiting;  // with the place of its note
@@ -272,13 +297,15 @@ private:
                 waiting.emplace_back(flat, choice_.record.candidates.size());
                 note("rough", flat).reason = "a larger one was chosen";
             }
-        for (const double limit : {unlimited, std::max(unlimited, flat_level_stepdown(least, finish_r)), height}) {
+        for (const double limit :
+             {unlimited, std::max(unlimited, flat_level_stepdown(least, finish_r)), height}) {
             allowed = std::min(limit, height);
             for (std::size_t w = 0; w < waiting.size() && !rough;) {
                 Tool flat = waiting[w].first;
                 ToolCandidate& candidate = choice_.record.candidates[waiting[w].second];
                 if (!fits(flat, allowed, tools.finish.diameter, candidate)) {
-                    if (candidate.semi_rough_mm2) waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(w));
+                    if (candidate.semi_rough_mm2)
+                        waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(w));
                     else ++w;
                     continue;
                 }
@@ -291,7 +318,9 @@ private:
         }
         if (!rough) {
             // The twin of the finish tool, or the next smaller flat.
-            const auto twin = std::find_if(flats_.begin(), flats_.end(), [&](const Tool& t) { return t.diameter <= tools.finish.diameter + 1e-9; });
+            const auto twin = std::find_if(flats_.begin(), flats_.end(), [&](const Tool& t) {
+                return t.diameter <= tools.finish.diameter + 1e-9;
+            });
             rough = twin != flats_.end() ? *twin : flats_.back();
             rough->stepdown_min = rough->stepdown_max = std::min(allowed, rough->stepdown_max);
             ToolCandidate& candidate = note("rough", *rough);
@@ -299,18 +328,21 @@ private:
             candidate.stepdown = rough->stepdown_max;
             candidate.semi_rough_mm2 = left(*rough, rough->stepdown_max, tools.finish.diameter).area;
             candidate.minutes = rough_minutes(*rough, rough->stepdown_max);
-            candidate.reason = "no larger flat leaves so little that the finish tool's swath takes it; as wide as the finish tool";
+            candidate.reason =
+                "no larger flat leaves so little that the finish tool's swath takes it; as wide as the "
+                "finish tool";
         }
         tools.rough = *rough;
         if (job_.selection.semi_rough) choose_semi_rough(allowed);
     }
 
-    // LUO 5.5.3.4, with the roughing tool as the one that follows. It keeps the wall allowance as roughing does, so its swath reaches
-    // that much farther than its diameter.
+    // LUO 5.5.3.4, with the roughing tool as the one that follows. It keeps the wall allowance as roughing
+    // does, so its swath reaches that much farther than its diameter.
     void choose_semi_rough(double allowed) {
         LayerTools& tools = choice_.tools;
         const Tool semi = tools.rough;
-        const double before = rough_minutes(semi, semi.stepdown_max), after = semi_minutes(semi, semi.stepdown_max);
+        const double before = rough_minutes(semi, semi.stepdown_max),
+                     after = semi_minutes(semi, semi.stepdown_max);
         for (Tool flat : flats_) {
             if (flat.diameter <= semi.diameter + 1e-9) break;
             ToolCandidate& candidate = note("semi_rough", flat);
@@ -318,13 +350,16 @@ private:
             const double minutes = rough_minutes(flat, flat.stepdown_max) + after;
             candidate.minutes = minutes;
             if (minutes >= before) {
-                candidate.reason = fmt::format("with tool {} after it, it takes {:.2f} min, no less than the {:.2f} min of that tool alone",
-                                               semi.number, minutes, before);
+                candidate.reason = fmt::format(
+                    "with tool {} after it, it takes {:.2f} min, no less than the {:.2f} min of that tool "
+                    "alone",
+                    semi.number, minutes, before);
                 continue;
             }
             candidate.chosen = true;
             candidate.reason =
-                fmt::format("roughs, and tool {} follows where it did not fit: {:.2f} min in place of {:.2f}", semi.number, minutes, before);
+                fmt::format("roughs, and tool {} follows where it did not fit: {:.2f} min in place of {:.2f}",
+                            semi.number, minutes, before);
             tools.rough = flat;
             tools.semi_rough = {semi};
             return;
@@ -346,7 +381,8 @@ private:
 }  // namespace
 
 bool selects_tools(const Job& job) {
-    return job.selection.mode == SelectionMode::select && (falling(job, ToolKind::flat).size() > 1 || falling(job, ToolKind::ball).size() > 1);
+    return job.selection.mode == SelectionMode::select &&
+           (falling(job, ToolKind::flat).size() > 1 || falling(job, ToolKind::ball).size() > 1);
 }
 
 std::optional<Tool> next_wider_ball(const Job& job, const Tool& finish) {
@@ -356,7 +392,8 @@ std::optional<Tool> next_wider_ball(const Job& job, const Tool& finish) {
     return wider;
 }
 
-ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio, const std::optional<Tool>& finish) {
+ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio,
+                        const std::optional<Tool>& finish) {
     return Chooser(context, layer, ratio, finish).run();
 }
 
@@ -364,7 +401,8 @@ std::vector<LayerTools> with_wider_rough(Context& context, const LayerJob& layer
     return Chooser(context, layer, {}, {}).wider_rough(tools);
 }
 
-std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors, double stepdown) {
+std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors,
+                                double stepdown) {
     std::vector<double> fixed(floors.begin(), floors.end());
     fixed.push_back(z_bottom);
     std::sort(fixed.begin(), fixed.end(), std::greater<>());

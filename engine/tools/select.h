@@ -19,27 +19,37 @@ struct ToolChoice {
 /// The next larger ball of the library than a finish tool; none for the largest.
 [[nodiscard]] std::optional<Tool> next_wider_ball(const Job& job, const Tool& finish);
 
-/// Whether the job's library leaves anything to choose: two flats or two balls, and not the fixed set by order.
+/// Whether the job's library leaves anything to choose: two flats or two balls, and not the fixed set by
+/// order.
 [[nodiscard]] bool selects_tools(const Job& job);
 
-/// LUO's four steps: the largest ball whose AR is at least the threshold, else the smallest; one flat where every wall is upright;
-/// the largest flat that leaves no semi-rough area at some stepdown of its range, and the largest such stepdown; a semi-roughing tool
-/// where a still larger flat then saves time, its change of tool counted. Then the smaller tools for what all these leave.
-/// Where print only looks at one semi-roughing tool after another, one is all that is chosen here.
+/// LUO's four steps: the largest ball whose AR is at least the threshold, else the smallest; one flat where
+/// every wall is upright; the largest flat that leaves no semi-rough area at some stepdown of its range, and
+/// the largest such stepdown; a semi-roughing tool where a still larger flat then saves time, its change of
+/// tool counted. Then the smaller tools for what all these leave. Where print only looks at one semi-roughing
+/// tool after another, one is all that is chosen here.
 /// @param layer all but its tools and floor_below
-/// @param ratio asked for balls, from the largest down, and in an upright layer for flats; none: the share of the sections' length that a
+/// @param ratio asked for balls, from the largest down, and in an upright layer for flats; none: the share of
+/// the sections' length that a
 ///        disc of the tool's radius touches (LayerVoxels::reached_share)
-/// @param finish taken as finish tool whatever it reaches: what it leaves is for the smaller ones where it lies
-/// @throws Error(usage, "job.tool") when the library lacks a flat or a ball; Error(no_plan, "memory.limit"), Error(cancelled)
-[[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio = {}, const std::optional<Tool>& finish = {});
+/// @param finish taken as finish tool whatever it reaches: what it leaves is for the smaller ones where it
+/// lies
+/// @throws Error(usage, "job.tool") when the library lacks a flat or a ball; Error(no_plan, "memory.limit"),
+/// Error(cancelled)
+[[nodiscard]] ToolChoice select_tools(Context& context, const LayerJob& layer, const ReachRatio& ratio = {},
+                                      const std::optional<Tool>& finish = {});
 
-/// Past print: sets with the same finish tool whose roughing cutter is wider, or as wide and goes deeper, the widest first; each as deep at once as the finish tool's
-/// radius allows at the least slope. What these leave outside the finish tool's swath is for the largest smaller flat that leaves nothing
-/// there; where none does, for the smallest one wider than the finish tool's half.
+/// Past print: sets with the same finish tool whose roughing cutter is wider, or as wide and goes deeper, the
+/// widest first; each as deep at once as the finish tool's radius allows at the least slope. What these leave
+/// outside the finish tool's swath is for the largest smaller flat that leaves nothing there; where none
+/// does, for the smallest one wider than the finish tool's half.
 /// @param layer as above
-[[nodiscard]] std::vector<LayerTools> with_wider_rough(Context& context, const LayerJob& layer, const LayerTools& tools);
+[[nodiscard]] std::vector<LayerTools> with_wider_rough(Context& context, const LayerJob& layer,
+                                                       const LayerTools& tools);
 
-/// Heights of the roughing levels, descending: even steps of at most `stepdown` down to every floor and to the layer's bottom.
-[[nodiscard]] std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors, double stepdown);
+/// Heights of the roughing levels, descending: even steps of at most `stepdown` down to every floor and to
+/// the layer's bottom.
+[[nodiscard]] std::vector<double> even_levels(double z_top, double z_bottom, std::span<const double> floors,
+                                              double stepdown);
 
 }  // namespace slabwright

@@ -17,25 +17,30 @@ const Tool& fixed_tool(const Job& job, ToolKind kind, double diameter) {
 }  // namespace
 
 bool clears_on_contours(const Job& job) {
-    if (job.cutting.rest_pattern != RestPattern::by_library) return job.cutting.rest_pattern == RestPattern::contour;
+    if (job.cutting.rest_pattern != RestPattern::by_library)
+        return job.cutting.rest_pattern == RestPattern::contour;
     auto several = [&](ToolKind kind) {
-        return std::count_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.kind == kind; }) > 1;
+        return std::count_if(job.tools.begin(), job.tools.end(),
+                             [&](const Tool& t) { return t.kind == kind; }) > 1;
     };
     return several(ToolKind::flat) || several(ToolKind::ball);
 }
 
-double least_slab(const Tool& tool) { return tool.stepdown_min > 0 ? tool.stepdown_min : tool.stepdown_max / 2; }
+double least_slab(const Tool& tool) {
+    return tool.stepdown_min > 0 ? tool.stepdown_min : tool.stepdown_max / 2;
+}
 
 std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter) {
-    // What a flat reaches at a corner a smaller one reaches too, and so it is with balls: the smallest of either kind leave no more
-    // than all together.
+    // What a flat reaches at a corner a smaller one reaches too, and so it is with balls: the smallest of
+    // either kind leave no more than all together.
     std::vector<Tool> rest;
     for (const Tool& tool : job.tools)
         if ((tool.kind == ToolKind::flat && tool.diameter < rough_diameter - 1e-9) ||
             (tool.kind == ToolKind::ball && tool.diameter < finish_diameter - 1e-9))
             rest.push_back(tool);
-    std::stable_sort(rest.begin(), rest.end(),
-                     [](const Tool& a, const Tool& b) { return a.diameter != b.diameter ? a.diameter > b.diameter : a.kind < b.kind; });
+    std::stable_sort(rest.begin(), rest.end(), [](const Tool& a, const Tool& b) {
+        return a.diameter != b.diameter ? a.diameter > b.diameter : a.kind < b.kind;
+    });
     return rest;
 }
 

@@ -7,33 +7,38 @@
 
 namespace slabwright {
 
-/// The tools of one layer. Each is a copy of the library's, with the stepdown that this layer allows it as stepdown_max.
+/// The tools of one layer. Each is a copy of the library's, with the stepdown that this layer allows it as
+/// stepdown_max.
 struct LayerTools {
-    Tool rough;                    ///< flat: roughing, then floors, walls and the corners that the finish tool leaves
-    std::vector<Tool> semi_rough;  ///< flat, none or one: level by level where the roughing cutter did not fit
-    Tool finish;                   ///< ball: slopes, and waste between walls before them
-    std::vector<Tool> rest;        ///< flats and balls in falling size: only where something is left that they reach
+    Tool rough;  ///< flat: roughing, then floors, walls and the corners that the finish tool leaves
+    std::vector<Tool>
+        semi_rough;  ///< flat, none or one: level by level where the roughing cutter did not fit
+    Tool finish;     ///< ball: slopes, and waste between walls before them
+    std::vector<Tool>
+        rest;  ///< flats and balls in falling size: only where something is left that they reach
 };
 
-/// The fixed set: the first flat and the first ball end mill of the job, LUO's 1/2 and 1/4 in where the library has them; for what
-/// these leave, the smaller tools of the library.
+/// The fixed set: the first flat and the first ball end mill of the job, LUO's 1/2 and 1/4 in where the
+/// library has them; for what these leave, the smaller tools of the library.
 /// @throws Error(usage, "job.tool") when the library has no flat or no ball
 [[nodiscard]] LayerTools fixed_tools(const Job& job);
 
 /// Whether what cutters leave is cleared on contours (Cutting::rest_pattern).
 [[nodiscard]] bool clears_on_contours(const Job& job);
 
-/// The thinnest wood that is called a slab under this tool, mm: its least step; where its range begins at nothing, half of the largest, with which
-/// the ranges of Luo's other tools begin. Thinner wood that hangs over is a sliver that tears off when it is cut.
+/// The thinnest wood that is called a slab under this tool, mm: its least step; where its range begins at
+/// nothing, half of the largest, with which the ranges of Luo's other tools begin. Thinner wood that hangs
+/// over is a sliver that tears off when it is cut.
 [[nodiscard]] double least_slab(const Tool& tool);
 
-/// The library of LUO table 5.4: flat and ball end mills of 1/8, 1/4, 1/2, 3/4 and 1 in with their stepdowns, numbers 2 … 6 and 12 … 16,
-/// and the default face mill. Their flutes reach through a 19 mm slab; what LUO does not give is ours.
+/// The library of LUO table 5.4: flat and ball end mills of 1/8, 1/4, 1/2, 3/4 and 1 in with their stepdowns,
+/// numbers 2 … 6 and 12 … 16, and the default face mill. Their flutes reach through a 19 mm slab; what LUO
+/// does not give is ours.
 [[nodiscard]] std::vector<Tool> luo_library();
 
-/// What follows a finish tool and a roughing tool (mm across) so that nothing is left which a tool of the library reaches: the smaller
-/// flats and balls of the library, in falling size. Only the smallest of either kind is sure to be used: those before it are where much is
-/// left.
+/// What follows a finish tool and a roughing tool (mm across) so that nothing is left which a tool of the
+/// library reaches: the smaller flats and balls of the library, in falling size. Only the smallest of either
+/// kind is sure to be used: those before it are where much is left.
 [[nodiscard]] std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finish_diameter);
 
 }  // namespace slabwright

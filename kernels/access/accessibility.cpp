@@ -29,18 +29,22 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kFloatMargin = 4e-7;  // of the coordinates' size: Embree works in float32 and only finds candidates
-constexpr double kUpright = 1e-4;      // rad: what faces down by less counts as upright
-constexpr double kResolution = 0.5;    // of the tolerance: places nearer than this to each other are not told apart
+constexpr double kFloatMargin =
+    4e-7;  // of the coordinates' size: Embree works in float32 and only finds candidates
+constexpr double kUpright = 1e-4;  // rad: what faces down by less counts as upright
+constexpr double kResolution =
+    0.5;  // of the tolerance: places nearer than this to each other are not told apart
 constexpr int kMostPlaces = 20000;     // of one point; some tens are usual
 constexpr std::size_t kMostCaps = 48;  // of a proof about one point; some are usual
-constexpr double kMostAround = 0.5;    // of a ball's radius: points farther from each other are proven to be missed one by one
-constexpr double kInset = 0.02;        // of a piece: its corners are tested so far within it
-constexpr double kShared = 1.5;        // of a point's distance from the corner: within it other pieces' points are hoped to be
-constexpr int kMostLevels = 40;        // of halving
-constexpr std::size_t kMissed = 64;    // balls without a reached point remembered
-constexpr int kHope = 8;               // pieces in a row that may fail to be proven at once, until only
-constexpr unsigned kTryAgain = 16;     // every so many is tried
+constexpr double kMostAround =
+    0.5;  // of a ball's radius: points farther from each other are proven to be missed one by one
+constexpr double kInset = 0.02;  // of a piece: its corners are tested so far within it
+constexpr double kShared =
+    1.5;  // of a point's distance from the corner: within it other pieces' points are hoped to be
+constexpr int kMostLevels = 40;      // of halving
+constexpr std::size_t kMissed = 64;  // balls without a reached point remembered
+constexpr int kHope = 8;             // pieces in a row that may fail to be proven at once, until only
+constexpr unsigned kTryAgain = 16;   // every so many is tried
 constexpr std::size_t kPiecesAtOnce = 128;
 
 float up(double v) { return std::nextafter(static_cast<float>(v), std::numeric_limits<float>::infinity()); }
@@ -52,12 +56,14 @@ double squared_distance(const Point3& a, const Point3& b) {
     return x * x + y * y + z * z;
 }
 
-/// Square of the distance to a triangle, and its nearest point q, by the regions of its corners, edges and face.
+/// Square of the distance to a triangle, and its nearest point q, by the regions of its corners, edges and
+/// face.
 double squared_distance(const Point3& p, const Triangle& t, Point3& q) {
     auto sub = [](const Point3& a, const Point3& b) { return Point3{a[0] - b[0], a[1] - b[1], a[2] - b[2]}; };
     const Point3 ab = sub(t[1], t[0]), ac = sub(t[2], t[0]), ap = sub(p, t[0]);
     auto from = [&](double v, double w) {
-        q = {t[0][0] + v * ab[0] + w * ac[0], t[0][1] + v * ab[1] + w * ac[1], t[0][2] + v * ab[2] + w * ac[2]};
+        q = {t[0][0] + v * ab[0] + w * ac[0], t[0][1] + v * ab[1] + w * ac[1],
+             t[0][2] + v * ab[2] + w * ac[2]};
         return squared_distance(p, q);
     };
     const double d1 = dot(ab, ap), d2 = dot(ac, ap);
@@ -115,19 +121,24 @@ Below below(const Triangle& t, double top) {
 
 struct Counts {
     std::uint64_t points = 0, queries = 0, rays = 0, undecided = 0;
-    void add(const Counts& c) { points += c.points, queries += c.queries, rays += c.rays, undecided += c.undecided; }
+    void add(const Counts& c) {
+        points += c.points, queries += c.queries, rays += c.rays, undecided += c.undecided;
+    }
 };
 
 using Four [[gnu::vector_size(16)]] = float;
 
-/// Four planes of a facet, n·p + d: its own, and those upright on it through its edges, which face outward. A line of the cache says how
-/// far a place is from most facets, in single precision.
+/// Four planes of a facet, n·p + d: its own, and those upright on it through its edges, which face outward. A
+/// line of the cache says how far a place is from most facets, in single precision.
 struct Planes {
     Four x, y, z, d;
-    /// Whether the square of the distance is more, as far as the planes tell: they do not where a corner is nearest, and on slivers.
+    /// Whether the square of the distance is more, as far as the planes tell: they do not where a corner is
+    /// nearest, and on slivers.
     [[nodiscard]] bool farther(const Vec3f& p, float squared) const {
-        const Four at = x * p.x + y * p.y + z * p.z + d, none{}, beside = at > none ? at : none, over{at[0], at[0], at[0], at[0]};
-        const auto lanes = std::bit_cast<std::array<std::uint64_t, 2>>(over * over + beside * beside > squared);
+        const Four at = x * p.x + y * p.y + z * p.z + d, none{}, beside = at > none ? at : none,
+                   over{at[0], at[0], at[0], at[0]};
+        const auto lanes =
+            std::bit_cast<std::array<std::uint64_t, 2>>(over * over + beside * beside > squared);
         return ((lanes[0] >> 32U) | lanes[1]) != 0;  // of the edges' planes
     }
 };
@@ -139,13 +150,17 @@ Planes planes_of(const Triangle& t) {
     };
     Planes planes{};
     const Point3 n = cross(sub(t[1], t[0]), sub(t[2], t[0]));
-    const double longest2 = std::max({squared_distance(t[0], t[1]), squared_distance(t[1], t[2]), squared_distance(t[2], t[0])});
-    constexpr double sliver = 1e-16;  // of twice the area and the longest edge, squared: rounding makes up the plane of a facet that is thinner
+    const double longest2 =
+        std::max({squared_distance(t[0], t[1]), squared_distance(t[1], t[2]), squared_distance(t[2], t[0])});
+    constexpr double sliver = 1e-16;  // of twice the area and the longest edge, squared: rounding makes up
+                                      // the plane of a facet that is thinner
     if (!(dot(n, n) > sliver * longest2 * longest2)) return planes;
     auto set = [&](int i, const Point3& normal, const Point3& on) {
         const double l = std::sqrt(dot(normal, normal));
-        const Point3 unit{static_cast<float>(normal[0] / l), static_cast<float>(normal[1] / l), static_cast<float>(normal[2] / l)};
-        planes.x[i] = static_cast<float>(unit[0]), planes.y[i] = static_cast<float>(unit[1]), planes.z[i] = static_cast<float>(unit[2]);
+        const Point3 unit{static_cast<float>(normal[0] / l), static_cast<float>(normal[1] / l),
+                          static_cast<float>(normal[2] / l)};
+        planes.x[i] = static_cast<float>(unit[0]), planes.y[i] = static_cast<float>(unit[1]),
+        planes.z[i] = static_cast<float>(unit[2]);
         planes.d[i] = static_cast<float>(-dot(unit, on));
     };
     set(0, n, t[0]);
@@ -156,7 +171,10 @@ Planes planes_of(const Triangle& t) {
 }  // namespace
 
 struct AccessScene::Impl {
-    Impl(Context& context, MeshView of) : planes_memory(context, of.size() * sizeof(Planes), "the planes of the facets"), memory(context), mesh(of) {}
+    Impl(Context& context, MeshView of)
+        : planes_memory(context, of.size() * sizeof(Planes), "the planes of the facets"),
+          memory(context),
+          mesh(of) {}
 
     MemoryCharge planes_memory;
     TreeMemory memory;
@@ -186,10 +204,10 @@ struct AccessScene::Impl {
         rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
         RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
         // Embree reads 16 bytes at a vertex of 12: it gets a copy of its own, which it pads.
-        auto* vertices =
-            static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh.vertices.size()));
-        auto* corners =
-            static_cast<Index3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Index3), facets.size()));
+        auto* vertices = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(
+            geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh.vertices.size()));
+        auto* corners = static_cast<Index3*>(rtcSetNewGeometryBuffer(
+            geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Index3), facets.size()));
         if (vertices && corners) {
             std::copy(mesh.vertices.begin(), mesh.vertices.end(), vertices);
             std::copy(facets.begin(), facets.end(), corners);
@@ -201,14 +219,16 @@ struct AccessScene::Impl {
         if (rtcGetDeviceError(device) != RTC_ERROR_NONE) {
             rtcReleaseScene(scene);
             memory.charge();
-            throw Error(ErrorKind::no_plan, "embree.build", "Embree could not build its tree", {}, "free memory, or plan with fewer facets");
+            throw Error(ErrorKind::no_plan, "embree.build", "Embree could not build its tree", {},
+                        "free memory, or plan with fewer facets");
         }
         return scene;
     }
     /// The first facet that a vertical ray meets, from z towards `limit`; its height, or `none`.
     [[nodiscard]] double first_below(double x, double y, double z, bool& leaves_solid, double none) const {
         RTCRayHit ray{};
-        ray.ray.org_x = static_cast<float>(x), ray.ray.org_y = static_cast<float>(y), ray.ray.org_z = static_cast<float>(z);
+        ray.ray.org_x = static_cast<float>(x), ray.ray.org_y = static_cast<float>(y),
+        ray.ray.org_z = static_cast<float>(z);
         ray.ray.dir_z = -1;
         ray.ray.tfar = std::numeric_limits<float>::infinity();
         ray.ray.mask = 0xFFFFFFFFu;
@@ -227,7 +247,8 @@ struct AccessScene::Impl {
     [[nodiscard]] bool overhung(const Point3& from, double top) const {
         if (!hanging || from[2] >= top) return false;
         RTCRay ray{};
-        ray.org_x = static_cast<float>(from[0]), ray.org_y = static_cast<float>(from[1]), ray.org_z = static_cast<float>(from[2]);
+        ray.org_x = static_cast<float>(from[0]), ray.org_y = static_cast<float>(from[1]),
+        ray.org_z = static_cast<float>(from[2]);
         ray.dir_z = 1;
         ray.tfar = static_cast<float>(top - from[2]);
         ray.mask = 0xFFFFFFFFu;
@@ -246,8 +267,8 @@ namespace {
 
 using Scene = AccessScene::Impl;
 
-/// A patch of places: its middle, and how the tool moves from there to the others: by up to `dl` along one direction and `ds` along
-/// another, and by `second` in any direction besides.
+/// A patch of places: its middle, and how the tool moves from there to the others: by up to `dl` along one
+/// direction and `ds` along another, and by `second` in any direction besides.
 struct Places {
     double x = 0, y = 0, tip = 0;
     Point3 along{}, around{};
@@ -257,36 +278,46 @@ struct Places {
     double tolerance = 0;
 };
 
-/// How deep a point of the part is in a part of the tool, and how that changes as the tool moves: by the motion's component along
-/// `gradient` at least, less its square over 2·`bend`. No bend: only that depth changes by no more than the tool moves.
+/// How deep a point of the part is in a part of the tool, and how that changes as the tool moves: by the
+/// motion's component along `gradient` at least, less its square over 2·`bend`. No bend: only that depth
+/// changes by no more than the tool moves.
 struct Depth {
     double mm;
     Point3 gradient;
     double bend;
 };
 
-// The tool part is a core, which is a cone on a disc, grown by the rounding. A ball of that radius about the core's point nearest to q
-// belongs to the tool wherever the tool goes, so the depth in that ball is a lower bound.
+// The tool part is a core, which is a cone on a disc, grown by the rounding. A ball of that radius about the
+// core's point nearest to q belongs to the tool wherever the tool goes, so the depth in that ball is a lower
+// bound.
 Depth depth_of(const Point3& q, const Places& at, const Envelope& e) {
-    const double dx = q[0] - at.x, dy = q[1] - at.y, d = std::sqrt(dx * dx + dy * dy), z = q[2] - at.tip - e.low - e.rounding;
-    if (e.core == 0 && e.sin_taper == 0) {  // a ball under its own cylinder: no more than the distance from its axis or centre
+    const double dx = q[0] - at.x, dy = q[1] - at.y, d = std::sqrt(dx * dx + dy * dy),
+                 z = q[2] - at.tip - e.low - e.rounding;
+    if (e.core == 0 &&
+        e.sin_taper ==
+            0) {  // a ball under its own cylinder: no more than the distance from its axis or centre
         const double fall = std::min(0.0, z), far = std::sqrt(d * d + fall * fall);
-        return far > 0 ? Depth{e.rounding - far, {dx / far, dy / far, fall / far}, far} : Depth{e.rounding, {}, 0};
+        return far > 0 ? Depth{e.rounding - far, {dx / far, dy / far, fall / far}, far}
+                       : Depth{e.rounding, {}, 0};
     }
     const double ex = d > 0 ? dx / d : 1, ey = d > 0 ? dy / d : 0;
-    auto depth = [&](double mm, double out, double rise, double bend) { return Depth{mm, {out * ex, out * ey, rise}, bend}; };
-    const double beyond = d - e.core, off = beyond * e.cos_taper - z * e.sin_taper, up_flank = beyond * e.sin_taper + z * e.cos_taper;
+    auto depth = [&](double mm, double out, double rise, double bend) {
+        return Depth{mm, {out * ex, out * ey, rise}, bend};
+    };
+    const double beyond = d - e.core, off = beyond * e.cos_taper - z * e.sin_taper,
+                 up_flank = beyond * e.sin_taper + z * e.cos_taper;
     if (d > e.radius) return depth(e.radius - d, 1, 0, 0);
     if (z <= 0 && beyond <= 0) return depth(e.rounding + z, 0, -1, -z);
     if (beyond > 0 && up_flank <= 0) {  // below the flank's foot: the disc's border is nearest
         const double far = std::sqrt(beyond * beyond + z * z);
         return far > 0 ? depth(e.rounding - far, beyond / far, z / far, far) : depth(e.rounding, 1, 0, 0);
     }
-    Depth side = off > 0 ? depth(e.rounding - off, e.cos_taper, -e.sin_taper, off) : depth(e.rounding - off, e.cos_taper, -e.sin_taper, d);
+    Depth side = off > 0 ? depth(e.rounding - off, e.cos_taper, -e.sin_taper, off)
+                         : depth(e.rounding - off, e.cos_taper, -e.sin_taper, d);
     if (e.radius - d < side.mm) side = depth(e.radius - d, 1, 0, d);
     if (off > 0) return side;
-    // Within the core the depth is the lesser of those from the side and from below. Where one of them is ample all over the patch, the
-    // other decides.
+    // Within the core the depth is the lesser of those from the side and from below. Where one of them is
+    // ample all over the patch, the other decides.
     const double rise = e.rounding + z;
     if (rise - at.lift > at.tolerance && side.mm <= rise) return side;
     if (side.mm - at.spread > at.tolerance) return depth(rise, 0, -1, std::numeric_limits<double>::max());
@@ -300,8 +331,8 @@ struct Proof {
 };
 Proof proof_of(const Depth& depth, const Places& at) {
     if (depth.bend <= 0) return {depth.mm - at.spread, 0, 0};
-    return {depth.mm - at.second - at.spread * at.spread / (2 * depth.bend), dot(depth.gradient, at.along) * at.dl,
-            dot(depth.gradient, at.around) * at.ds};
+    return {depth.mm - at.second - at.spread * at.spread / (2 * depth.bend),
+            dot(depth.gradient, at.along) * at.dl, dot(depth.gradient, at.around) * at.ds};
 }
 bool rules_out(const Depth& depth, const Places& at) {
     const double tolerance = at.tolerance;
@@ -309,18 +340,21 @@ bool rules_out(const Depth& depth, const Places& at) {
     const Proof p = proof_of(depth, at);
     return p.floor - std::abs(p.by_l) - std::abs(p.by_s) > tolerance;
 }
-/// Whether two obstacles on different sides of the tool leave no room between them: the deeper of two depths is at least any
-/// weighted mean of them, and the weights may let their changes cancel.
+/// Whether two obstacles on different sides of the tool leave no room between them: the deeper of two depths
+/// is at least any weighted mean of them, and the weights may let their changes cancel.
 bool rule_out(const Proof& a, const Proof& b, double tolerance) {
     if (std::max(a.floor, b.floor) <= tolerance) return false;
     auto mean = [&](double w) {
-        return w * a.floor + (1 - w) * b.floor - std::abs(w * a.by_l + (1 - w) * b.by_l) - std::abs(w * a.by_s + (1 - w) * b.by_s) > tolerance;
+        return w * a.floor + (1 - w) * b.floor - std::abs(w * a.by_l + (1 - w) * b.by_l) -
+                   std::abs(w * a.by_s + (1 - w) * b.by_s) >
+               tolerance;
     };
     auto cancelling = [&](double p, double q) { return (p > 0) != (q > 0) && p != q && mean(q / (q - p)); };
     return cancelling(a.by_l, b.by_l) || cancelling(a.by_s, b.by_s);
 }
 
-/// Looks in the facets around a part of the tool for what is deeper in it than the tolerance, at one place, and as deep as can be.
+/// Looks in the facets around a part of the tool for what is deeper in it than the tolerance, at one place,
+/// and as deep as can be.
 struct Probe {
     const Scene* scene = nullptr;
     const Places* at = nullptr;
@@ -333,7 +367,8 @@ struct Probe {
     Point3 centre{};
     double nearest2 = 0;   ///< of a ball: what is farther is of no interest
     bool hanging = false;  ///< the facets are numbered within the overhangs
-    Vec3f middle{};        ///< of a ball, and the square of what is of no interest even if distances are wrong by rounding
+    Vec3f middle{};  ///< of a ball, and the square of what is of no interest even if distances are wrong by
+                     ///< rounding
     float beyond2 = 0;
     bool found = false, ruled_out = false;
     struct Obstacle {
@@ -371,8 +406,10 @@ struct Probe {
     [[nodiscard]] bool beside(const Triangle& t) const {
         constexpr double rounding = 1 + 1e-9;
         const double r = fine.radius * rounding;
-        return std::min({t[0][0], t[1][0], t[2][0]}) - at->x > r || at->x - std::max({t[0][0], t[1][0], t[2][0]}) > r ||
-               std::min({t[0][1], t[1][1], t[2][1]}) - at->y > r || at->y - std::max({t[0][1], t[1][1], t[2][1]}) > r;
+        return std::min({t[0][0], t[1][0], t[2][0]}) - at->x > r ||
+               at->x - std::max({t[0][0], t[1][0], t[2][0]}) > r ||
+               std::min({t[0][1], t[1][1], t[2][1]}) - at->y > r ||
+               at->y - std::max({t[0][1], t[1][1], t[2][1]}) > r;
     }
     bool look(const Triangle& t) {
         Point3 q;
@@ -420,15 +457,17 @@ bool look(RTCPointQueryFunctionArguments* args) {
 struct Question {
     const Scene* scene = nullptr;
     double top = 0;
-    double margin = 0;                     ///< mm that places and distances in single precision may be wrong by
-    bool overhangs = false;                ///< some may hang over a place of the tool
+    double margin = 0;       ///< mm that places and distances in single precision may be wrong by
+    bool overhangs = false;  ///< some may hang over a place of the tool
     std::vector<Envelope> tool, shrunken;  ///< its parts, and what of them is deeper than the tolerance
     AccessOptions options;
-    // The under side of the cutter grown by the tolerance, along its profile from the tip outwards: the disc, the arc, the flank.
+    // The under side of the cutter grown by the tolerance, along its profile from the tip outwards: the disc,
+    // the arc, the flank.
     double disc = 0, arc = 0, flank = 0, rounding = 0, angle = 0;
 
     [[nodiscard]] double length() const { return disc + arc + flank; }
-    /// The profile at a length along it: distance from the axis, height over the tip, and the direction, outwards and upwards.
+    /// The profile at a length along it: distance from the axis, height over the tip, and the direction,
+    /// outwards and upwards.
     struct Spot {
         double distance, height, outwards, upwards;
     };
@@ -437,14 +476,17 @@ struct Question {
         if (l <= disc) return {l, centre - rounding, 1, 0};
         const double u = std::min(l - disc, arc) / rounding, more = std::max(0.0, l - disc - arc);
         const double sine = std::sin(u), cosine = std::cos(u);
-        return {disc + rounding * sine + more * cosine, centre - rounding * cosine + more * sine, cosine, sine};
+        return {disc + rounding * sine + more * cosine, centre - rounding * cosine + more * sine, cosine,
+                sine};
     }
 };
 
-Question ask(const Scene& scene, double z_low, double z_high, const ToolShape& tool, const AccessOptions& options) {
-    if (!(options.tolerance > 0) || !(options.spacing >= 0) || !(options.accuracy > 0) || !std::isfinite(options.tolerance) ||
-        !std::isfinite(options.spacing))
-        throw Error(ErrorKind::usage, "access.options", "tolerance and accuracy of accessibility must be over 0, its spacing not under");
+Question ask(const Scene& scene, double z_low, double z_high, const ToolShape& tool,
+             const AccessOptions& options) {
+    if (!(options.tolerance > 0) || !(options.spacing >= 0) || !(options.accuracy > 0) ||
+        !std::isfinite(options.tolerance) || !std::isfinite(options.spacing))
+        throw Error(ErrorKind::usage, "access.options",
+                    "tolerance and accuracy of accessibility must be over 0, its spacing not under");
     Question q;
     q.scene = &scene;
     q.top = z_high - kTopSheet;
@@ -453,12 +495,15 @@ Question ask(const Scene& scene, double z_low, double z_high, const ToolShape& t
     for (const Envelope& part : q.tool) q.shrunken.push_back(part.eroded(options.tolerance));
     const Envelope& cutter = q.tool[0];
     if (options.tolerance >= cutter.radius)
-        throw Error(ErrorKind::usage, "access.options", "the tolerance of accessibility is not less than the cutter's radius");
+        throw Error(ErrorKind::usage, "access.options",
+                    "the tolerance of accessibility is not less than the cutter's radius");
     q.rounding = cutter.rounding + options.tolerance;
     q.disc = cutter.core;
     q.angle = std::numbers::pi / 2 - std::asin(cutter.sin_taper);
     q.arc = q.rounding * q.angle;
-    if (cutter.sin_taper > 0) q.flank = std::max(0.0, (cutter.radius - cutter.core - cutter.rounding * cutter.cos_taper) / cutter.sin_taper);
+    if (cutter.sin_taper > 0)
+        q.flank = std::max(
+            0.0, (cutter.radius - cutter.core - cutter.rounding * cutter.cos_taper) / cutter.sin_taper);
     double reach = 0;
     for (const Envelope& e : q.tool) reach = std::max(reach, e.radius);
     q.margin = scene.margin + 3 * kFloatMargin * reach;
@@ -477,7 +522,8 @@ Question ask(const Scene& scene, double z_low, double z_high, const ToolShape& t
 class MissedBalls {
 public:
     void add(const Point3& middle, double radius) {
-        x_[next_] = middle[0], y_[next_] = middle[1], z_[next_] = middle[2], radius2_[next_] = radius * radius;
+        x_[next_] = middle[0], y_[next_] = middle[1], z_[next_] = middle[2],
+        radius2_[next_] = radius * radius;
         next_ = (next_ + 1) % kMissed;
         used_ = std::max(used_, next_);
         if (next_ == 0) used_ = kMissed;
@@ -502,10 +548,13 @@ public:
         : q_(question),
           ball_(question.tool[0].core == 0 && question.tool[0].sin_taper == 0),
           covers_(ball_ || (question.tool[0].rounding == 0 && question.tool[0].sin_taper == 0)),
-          known_(ball_ ? Obstacles::Tool::ball : Obstacles::Tool::flat, question.tool[0].radius, question.options.tolerance) {}
+          known_(ball_ ? Obstacles::Tool::ball : Obstacles::Tool::flat, question.tool[0].radius,
+                 question.options.tolerance) {}
 
-    /// @param corner of the piece, from which the point is no farther than `around`: others are tested near it, and may be missed for the same reason
-    [[nodiscard]] bool reaches(const Point3& p, const Point3& n, const Point3& corner = {}, double around = 0) {
+    /// @param corner of the piece, from which the point is no farther than `around`: others are tested near
+    /// it, and may be missed for the same reason
+    [[nodiscard]] bool reaches(const Point3& p, const Point3& n, const Point3& corner = {},
+                               double around = 0) {
         ++counts.points;
         if (missed_.hold(p)) return false;
         // Where the normal says, then where the last point was reached from.
@@ -530,7 +579,8 @@ public:
         constexpr double half = std::numbers::pi / sectors;
         auto begin = [&](double from, double length, bool bent) {
             if (length > 0)
-                for (int i = 0; i < sectors; ++i) stack_.push_back({from + length / 2, phi + (2 * i + 1) * half, length / 2, half, bent});
+                for (int i = 0; i < sectors; ++i)
+                    stack_.push_back({from + length / 2, phi + (2 * i + 1) * half, length / 2, half, bent});
         };
         begin(q_.disc + q_.arc, q_.flank, false);
         begin(0, q_.disc, false);
@@ -594,21 +644,25 @@ private:
     Places toward(const Point3& p, const Point3& u) const {
         const double across = u[2] < 0 ? q_.rounding / std::hypot(u[0], u[1]) : q_.rounding;
         Places at;
-        at.x = p[0] + across * u[0], at.y = p[1] + across * u[1], at.tip = p[2] - q_.tool[0].rounding + std::max(0.0, across * u[2]);
+        at.x = p[0] + across * u[0], at.y = p[1] + across * u[1],
+        at.tip = p[2] - q_.tool[0].rounding + std::max(0.0, across * u[2]);
         at.tolerance = q_.options.tolerance;
         return at;
     }
     /// The place of a flat for a direction.
     Patch place_at(const Point3& u) const {
         const double phi = std::atan2(u[1], u[0]);
-        // Farther out than its radius the flat's edge touches, and is lower there: at the last by half of the tolerance.
+        // Farther out than its radius the flat's edge touches, and is lower there: at the last by half of the
+        // tolerance.
         const double tolerance = q_.options.tolerance, r = q_.tool[0].radius;
         const double distance = (r + tolerance) * std::hypot(u[0], u[1]) / (1 + std::max(0.0, u[2]));
         if (distance <= r) return {distance, phi, 0, 0, false};
-        return {q_.disc + q_.rounding * std::asin(std::min(0.86, (distance - r) / tolerance)), phi, 0, 0, false};
+        return {q_.disc + q_.rounding * std::asin(std::min(0.86, (distance - r) / tolerance)), phi, 0, 0,
+                false};
     }
 
-    /// Whether what is remembered proves that a ball reaches nothing within `around` of a point; points there are missed from then on.
+    /// Whether what is remembered proves that a ball reaches nothing within `around` of a point; points there
+    /// are missed from then on.
     bool prove_missed(const Point3& p, const Point3& n, double around) {
         if (!ball_ || around > kMostAround * (q_.tool[0].radius + q_.options.tolerance)) return false;
         begin_cover(p, around);
@@ -620,7 +674,8 @@ private:
         return false;
     }
 
-    /// Tries a corner of what no obstacle known so far forbids; what is met there forbids it, until a place is free or nothing is left.
+    /// Tries a corner of what no obstacle known so far forbids; what is met there forbids it, until a place
+    /// is free or nothing is left.
     Answer all_around(const Point3& p, const Point3& n) {
         const double tolerance = q_.options.tolerance, lowest = q_.options.lowest_tip;
         if (ball_ ? lowest - p[2] >= tolerance : p[2] + tolerance < lowest) return Answer::missed;
@@ -630,7 +685,8 @@ private:
             if (!u) return Answer::missed;
             if (add_known(p, *u)) continue;
             met_.clear();
-            if (test(ball_ ? toward(p, *u) : places_of(p, place_at(*u))) == Verdict::free) return Answer::reached;
+            if (test(ball_ ? toward(p, *u) : places_of(p, place_at(*u))) == Verdict::free)
+                return Answer::reached;
             bool covered = false;
             for (const Point3& obstacle : met_)
                 if (const Cap cap = known_.cap(obstacle, p, *u, 0); cap.margin(*u) > CapCover::kInside) {
@@ -642,9 +698,11 @@ private:
         return Answer::unknown;
     }
 
-    /// No ball's centre is below a point, and no tip lower than it may be; no flat's axis passes farther away than its radius.
+    /// No ball's centre is below a point, and no tip lower than it may be; no flat's axis passes farther away
+    /// than its radius.
     void begin_cover(const Point3& p, double around) {
-        const double reach = q_.tool[0].radius + q_.options.tolerance, lowest = q_.options.lowest_tip - p[2] + q_.tool[0].radius;
+        const double reach = q_.tool[0].radius + q_.options.tolerance,
+                     lowest = q_.options.lowest_tip - p[2] + q_.tool[0].radius;
         double least = 0;
         if (ball_) least = lowest > 0 ? std::min(lowest / (reach + around), 1.0) : -around / (reach - around);
         cover_.begin({{0, 0, -1}, -least});
@@ -664,8 +722,8 @@ private:
         at.lift = patch.bent ? patch.dl : std::abs(at.along[2]) * patch.dl;
         at.tolerance = q_.options.tolerance;
         // From the curvature of the profile, that of the circle about the point, and of both together.
-        at.second = (patch.bent ? patch.dl * patch.dl / (2 * q_.rounding) : 0) + (spot.distance + patch.dl) * patch.dphi * patch.dphi / 2 +
-                    patch.dl * patch.dphi;
+        at.second = (patch.bent ? patch.dl * patch.dl / (2 * q_.rounding) : 0) +
+                    (spot.distance + patch.dl) * patch.dphi * patch.dphi / 2 + patch.dl * patch.dphi;
         return at;
     }
 
@@ -696,7 +754,8 @@ private:
                 radius = e.radius - tolerance;
                 probe.centre = {at.x, at.y, at.tip + middle};
                 probe.nearest2 = radius * radius;
-                probe.middle = {static_cast<float>(probe.centre[0]), static_cast<float>(probe.centre[1]), static_cast<float>(probe.centre[2])};
+                probe.middle = {static_cast<float>(probe.centre[0]), static_cast<float>(probe.centre[1]),
+                                static_cast<float>(probe.centre[2])};
                 probe.beyond2 = up(radius + q_.margin) * up(radius + q_.margin);
             } else {
                 const double rise = std::min(e.height(e.radius), q_.top - at.tip) - middle;
@@ -710,11 +769,13 @@ private:
             if (!probe.ruled_out && q_.overhangs && q_.scene->hanging) {
                 // What hangs over the part, in spheres up the axis that together cover the upright cylinder.
                 const double from = at.tip + probe.fine.low;
-                const int spheres = std::max(1, static_cast<int>(std::ceil((q_.top - from) / (2 * e.radius))));
+                const int spheres =
+                    std::max(1, static_cast<int>(std::ceil((q_.top - from) / (2 * e.radius))));
                 const double half = (q_.top - from) / spheres / 2;
                 probe.hanging = true;
                 for (int i = 0; i < spheres && !probe.ruled_out; ++i)
-                    search(probe, q_.scene->hanging, probe.fine.low + (2 * i + 1) * half, std::hypot(e.radius, half), part == 0);
+                    search(probe, q_.scene->hanging, probe.fine.low + (2 * i + 1) * half,
+                           std::hypot(e.radius, half), part == 0);
             }
             if (probe.ruled_out) return Verdict::ruled_out;
             if (probe.found) {
@@ -736,7 +797,8 @@ private:
             const Point3 over{at.x, at.y, highest};
             const Depth buried = depth_of(over, at, e);
             if (part == 0 && (covers_ || at.spread > 0)) remember(over);
-            if (rules_out(buried, at) || (part == 0 && paired_rule_out(buried, at))) return Verdict::ruled_out;
+            if (rules_out(buried, at) || (part == 0 && paired_rule_out(buried, at)))
+                return Verdict::ruled_out;
             free = false;
         }
         return free ? Verdict::free : Verdict::too_deep;
@@ -745,7 +807,8 @@ private:
     void search(Probe& probe, RTCScene scene, double middle, double radius, bool keep) {
         ++counts.queries;
         RTCPointQuery query{};
-        query.x = static_cast<float>(probe.at->x), query.y = static_cast<float>(probe.at->y), query.z = static_cast<float>(probe.at->tip + middle);
+        query.x = static_cast<float>(probe.at->x), query.y = static_cast<float>(probe.at->y),
+        query.z = static_cast<float>(probe.at->tip + middle);
         query.radius = up(radius + q_.margin);
         RTCPointQueryContext stack;
         rtcInitPointQueryContext(&stack);
@@ -770,7 +833,8 @@ private:
         known_.remember(obstacle);
     }
 
-    /// By obstacles met before, alone or in pairs. Keeps what they prove for the ones that are yet to be met here.
+    /// By obstacles met before, alone or in pairs. Keeps what they prove for the ones that are yet to be met
+    /// here.
     bool remembered_rule_out(const Places& at) {
         proven_ = 0;
         for (std::size_t i = 0; i < known_.size(); ++i) {
@@ -841,7 +905,8 @@ double halve(const Triangle& t, Triangle& a, Triangle& b) {
 }
 
 double longest_edge(const Triangle& t) {
-    return std::sqrt(std::max({squared_distance(t[0], t[1]), squared_distance(t[1], t[2]), squared_distance(t[2], t[0])}));
+    return std::sqrt(
+        std::max({squared_distance(t[0], t[1]), squared_distance(t[1], t[2]), squared_distance(t[2], t[0])}));
 }
 
 template <class F>
@@ -942,7 +1007,8 @@ Work collect(Context& context, const Scene& scene, double low, double high) {
             Piece& piece = part.pieces[i];
             piece.item += first;
             auto middle = [&](int k) { return (piece.t[0][k] + piece.t[1][k] + piece.t[2][k]) / 3; };
-            keys.push_back({grid.code(middle(0), middle(1), middle(2)), static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(i)});
+            keys.push_back({grid.code(middle(0), middle(1), middle(2)), static_cast<std::uint32_t>(p),
+                            static_cast<std::uint32_t>(i)});
         }
         work.items.insert(work.items.end(), part.items.begin(), part.items.end());
         work.undercut += part.undercut;
@@ -958,14 +1024,17 @@ Work collect(Context& context, const Scene& scene, double low, double high) {
 /// Of points that are tested together.
 struct Tally {
     int points = 0, reached = 0, undercut = 0;
-    [[nodiscard]] bool agree() const { return reached == points || undercut == points || (reached == 0 && undercut == 0); }
+    [[nodiscard]] bool agree() const {
+        return reached == points || undercut == points || (reached == 0 && undercut == 0);
+    }
     [[nodiscard]] Areas share(double area) const {
         const double each = area / points;
         return {each * (points - undercut), each * reached, each * undercut};
     }
 };
 
-void add_point(Tally& tally, Searcher& searcher, const Question& q, const Point3& p, const Point3& n, const Point3& corner = {}, double around = 0) {
+void add_point(Tally& tally, Searcher& searcher, const Question& q, const Point3& p, const Point3& n,
+               const Point3& corner = {}, double around = 0) {
     ++tally.points;
     if (q.overhangs) {
         ++searcher.counts.rays;
@@ -1013,8 +1082,10 @@ AccessScene::AccessScene(Context& context, MeshView mesh) : impl_(std::make_uniq
     for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
         const Vec3f& v = mesh.vertices[i];
         if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
-            throw Error(ErrorKind::input, "mesh.not_finite", "a vertex is not finite", "vertex " + std::to_string(i), "repair the mesh");
-        size = std::max({size, std::abs(static_cast<double>(v.x)), std::abs(static_cast<double>(v.y)), std::abs(static_cast<double>(v.z))});
+            throw Error(ErrorKind::input, "mesh.not_finite", "a vertex is not finite",
+                        "vertex " + std::to_string(i), "repair the mesh");
+        size = std::max({size, std::abs(static_cast<double>(v.x)), std::abs(static_cast<double>(v.y)),
+                         std::abs(static_cast<double>(v.z))});
     }
     impl_->margin = 3 * size * kFloatMargin;
     std::vector<Index3> hanging;
@@ -1022,7 +1093,8 @@ AccessScene::AccessScene(Context& context, MeshView mesh) : impl_(std::make_uniq
     for (std::size_t f = 0; f < mesh.size(); ++f) {
         const Triangle t = impl_->triangle(static_cast<std::uint32_t>(f));
         impl_->planes[f] = planes_of(t);
-        const double nz = (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]);
+        const double nz =
+            (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]);
         // The part's own bottom hangs over nothing that a tool could be in.
         const double lowest = impl_->box.min.z;
         if (!(nz < 0) || (t[0][2] <= lowest && t[1][2] <= lowest && t[2][2] <= lowest)) continue;
@@ -1031,7 +1103,9 @@ AccessScene::AccessScene(Context& context, MeshView mesh) : impl_(std::make_uniq
     }
     context.throw_if_cancelled();
     impl_->device = rtcNewDevice(nullptr);  // "threads=…" here would clamp TBB for the whole process
-    if (!impl_->device) throw Error(ErrorKind::no_plan, "embree.device", "Embree offers no device", {}, "check the installation of libembree");
+    if (!impl_->device)
+        throw Error(ErrorKind::no_plan, "embree.device", "Embree offers no device", {},
+                    "check the installation of libembree");
     rtcSetDeviceMemoryMonitorFunction(impl_->device, &TreeMemory::monitor, &impl_->memory);
     impl_->all = impl_->build(mesh.facets);
     if (!hanging.empty()) impl_->hanging = impl_->build(hanging);
@@ -1040,12 +1114,14 @@ AccessScene::AccessScene(Context& context, MeshView mesh) : impl_(std::make_uniq
 
 AccessScene::~AccessScene() = default;
 
-bool AccessScene::reaches(double z_high, const Point3& point, const Point3& normal, const ToolShape& tool, const AccessOptions& options) const {
+bool AccessScene::reaches(double z_high, const Point3& point, const Point3& normal, const ToolShape& tool,
+                          const AccessOptions& options) const {
     const Question question = ask(*impl_, point[2], z_high, tool, options);
     return Searcher(question).reaches(point, normal);
 }
 
-Accessibility AccessScene::accessible(Context& context, double z_low, double z_high, const ToolShape& tool, const AccessOptions& options) const {
+Accessibility AccessScene::accessible(Context& context, double z_low, double z_high, const ToolShape& tool,
+                                      const AccessOptions& options) const {
     const Question question = ask(*impl_, z_low, z_high, tool, options);
     constexpr double tasks_per_edge = 16;  // pieces of a large facet that are handed out as one, by length
     Work work = collect(context, *impl_, z_low + kTopSheet, z_high - kTopSheet);
@@ -1056,9 +1132,11 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
         spacing = std::max(1.0, std::sqrt(surface) / 50);
     }
     const double longest = spacing * tasks_per_edge;
-    if (std::any_of(work.pieces.begin(), work.pieces.end(), [&](const Piece& piece) { return longest_edge(piece.t) > longest; })) {
+    if (std::any_of(work.pieces.begin(), work.pieces.end(),
+                    [&](const Piece& piece) { return longest_edge(piece.t) > longest; })) {
         std::vector<Piece> tasks;
-        for (const Piece& piece : work.pieces) split_to(piece.t, longest, [&](const Triangle& t) { tasks.push_back({t, piece.item}); });
+        for (const Piece& piece : work.pieces)
+            split_to(piece.t, longest, [&](const Triangle& t) { tasks.push_back({t, piece.item}); });
         work.pieces.swap(tasks);
     }
     std::vector<Areas> of_item(work.items.size());
@@ -1068,8 +1146,9 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
     struct Outcome {
         std::vector<std::pair<std::uint32_t, Areas>> decided;  // by item
         std::vector<Piece> border;
-        std::vector<Areas> shares;     // of the border's pieces
-        double mixed = 0, mixed2 = 0;  // areas of small pieces that were tested together and disagree, and their squares
+        std::vector<Areas> shares;  // of the border's pieces
+        double mixed = 0,
+               mixed2 = 0;  // areas of small pieces that were tested together and disagree, and their squares
         Counts counts;
     };
     const double small = options.shares ? 0 : spacing * spacing / 2;
@@ -1079,7 +1158,8 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
             Outcome& outcome = outcomes[begin / kPiecesAtOnce];
             Searcher searcher(question);
             auto decide = [&](std::uint32_t item, const Areas& areas) {
-                if (!outcome.decided.empty() && outcome.decided.back().first == item) outcome.decided.back().second.add(areas);
+                if (!outcome.decided.empty() && outcome.decided.back().first == item)
+                    outcome.decided.back().second.add(areas);
                 else outcome.decided.emplace_back(item, areas);
             };
             auto one = [&](const Piece& piece) {
@@ -1102,7 +1182,8 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
                     const std::size_t count = last - first, points = std::min<std::size_t>(4, count);
                     for (std::size_t k = 0; k < points; ++k) {
                         const Piece& piece = pieces[first + (2 * k + 1) * count / (2 * points)];
-                        add_point(tally, searcher, question, middle_of(piece.t), work.items[piece.item].normal);
+                        add_point(tally, searcher, question, middle_of(piece.t),
+                                  work.items[piece.item].normal);
                     }
                     decide(pieces[first].item, tally.share(gathered));
                     if (!tally.agree()) outcome.mixed += gathered, outcome.mixed2 += gathered * gathered;
@@ -1186,7 +1267,8 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
         result.area += a.all;
         result.reached += a.reached;
         result.undercut += a.undercut;
-        if (options.shares && a.all > 0) result.share[work.items[i].facet] = static_cast<float>(std::min(1.0, a.reached / a.all));
+        if (options.shares && a.all > 0)
+            result.share[work.items[i].facet] = static_cast<float>(std::min(1.0, a.reached / a.all));
     }
     result.points = counts.points;
     result.queries = counts.queries;
@@ -1195,7 +1277,8 @@ Accessibility AccessScene::accessible(Context& context, double z_low, double z_h
     return result;
 }
 
-Accessibility accessible(Context& context, MeshView mesh, double z_low, double z_high, const ToolShape& tool, const AccessOptions& options) {
+Accessibility accessible(Context& context, MeshView mesh, double z_low, double z_high, const ToolShape& tool,
+                         const AccessOptions& options) {
     return AccessScene(context, mesh).accessible(context, z_low, z_high, tool, options);
 }
 

@@ -11,19 +11,23 @@ namespace slabwright {
 namespace {
 
 constexpr double kParallel = 1e-12;  // of a sine, squared: circles about one axis do not cross
-constexpr double kClose = 1e-5;      // the same, where rounding may put a crossing into the caps whose circles it lies on
-constexpr std::size_t kAtOnce = 8;   // rows are filled up to a multiple of this, with caps of no direction
-constexpr double kNowhere = 2;       // a cosine
-constexpr double kNeither = 3;       // how deep what is no crossing counts to be
+constexpr double kClose =
+    1e-5;  // the same, where rounding may put a crossing into the caps whose circles it lies on
+constexpr std::size_t kAtOnce = 8;  // rows are filled up to a multiple of this, with caps of no direction
+constexpr double kNowhere = 2;      // a cosine
+constexpr double kNeither = 3;      // how deep what is no crossing counts to be
 
 double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 }  // namespace
 
-// Where the circle of `own` crosses those of n others: u = a·own + b·other ± c·(own × other) lies on both and on the sphere. Twice n directions,
-// which are so far in no cap. Says whether there are two circles about nearly the same axis.
-SLABWRIGHT_WIDE static bool cross_circles(const Cap& own, const double* __restrict x, const double* __restrict y, const double* __restrict z,
-                                          const double* __restrict cosine, int n, double* __restrict ux, double* __restrict uy, double* __restrict uz,
+// Where the circle of `own` crosses those of n others: u = a·own + b·other ± c·(own × other) lies on both and
+// on the sphere. Twice n directions, which are so far in no cap. Says whether there are two circles about
+// nearly the same axis.
+SLABWRIGHT_WIDE static bool cross_circles(const Cap& own, const double* __restrict x,
+                                          const double* __restrict y, const double* __restrict z,
+                                          const double* __restrict cosine, int n, double* __restrict ux,
+                                          double* __restrict uy, double* __restrict uz,
                                           double* __restrict depth) {
     const double ox = own.axis[0], oy = own.axis[1], oz = own.axis[2], oc = own.cosine;
     long close = 0;
@@ -33,7 +37,8 @@ SLABWRIGHT_WIDE static bool cross_circles(const Cap& own, const double* __restri
         const double rest = (1 - a * a - b * b - 2 * a * b * g) * per;
         const double c = std::sqrt(rest > 0 ? rest : 0.0);
         const double along_x = a * ox + b * x[i], along_y = a * oy + b * y[i], along_z = a * oz + b * z[i];
-        const double aside_x = c * (oy * z[i] - oz * y[i]), aside_y = c * (oz * x[i] - ox * z[i]), aside_z = c * (ox * y[i] - oy * x[i]);
+        const double aside_x = c * (oy * z[i] - oz * y[i]), aside_y = c * (oz * x[i] - ox * z[i]),
+                     aside_z = c * (ox * y[i] - oy * x[i]);
         const double none = rest >= 0 ? -kNeither : kNeither, state = square >= kParallel ? none : kNeither;
         ux[i] = along_x + aside_x, uy[i] = along_y + aside_y, uz[i] = along_z + aside_z;
         ux[n + i] = along_x - aside_x, uy[n + i] = along_y - aside_y, uz[n + i] = along_z - aside_z;
@@ -46,9 +51,11 @@ SLABWRIGHT_WIDE static bool cross_circles(const Cap& own, const double* __restri
 using Eight [[gnu::vector_size(64)]] = double;
 static_assert(sizeof(Eight) == kAtOnce * sizeof(double));
 
-// How deep n directions are in caps. In its own two a crossing is by rounding at most, which is less than what counts, unless their axes are close.
-SLABWRIGHT_WIDE static void deepen(const double* __restrict x, const double* __restrict y, const double* __restrict z,
-                                   const double* __restrict cosine, int caps, int n, const double* __restrict ux, const double* __restrict uy,
+// How deep n directions are in caps. In its own two a crossing is by rounding at most, which is less than
+// what counts, unless their axes are close.
+SLABWRIGHT_WIDE static void deepen(const double* __restrict x, const double* __restrict y,
+                                   const double* __restrict z, const double* __restrict cosine, int caps,
+                                   int n, const double* __restrict ux, const double* __restrict uy,
                                    const double* __restrict uz, double* __restrict depth) {
     for (int i = 0; i < n; i += static_cast<int>(kAtOnce)) {
         Eight vx, vy, vz, most;
@@ -76,7 +83,8 @@ void CapCover::keep_own(const Cap& cap) {
     Point3 aside{};
     const Point3 length{std::abs(cap.axis[0]), std::abs(cap.axis[1]), std::abs(cap.axis[2])};
     aside[length[0] <= length[1] && length[0] <= length[2] ? 0 : length[1] <= length[2] ? 1 : 2] = 1;
-    const double along = dot(aside, cap.axis), sine = std::sqrt(1 - cap.cosine * cap.cosine), scale = sine / std::sqrt(1 - along * along);
+    const double along = dot(aside, cap.axis), sine = std::sqrt(1 - cap.cosine * cap.cosine),
+                 scale = sine / std::sqrt(1 - along * along);
     Point3 u;
     for (int k = 0; k < 3; ++k) u[k] = cap.cosine * cap.axis[k] + scale * (aside[k] - along * cap.axis[k]);
     for (std::size_t i = 0; i < size_; ++i)
@@ -113,8 +121,10 @@ void CapCover::add(const Cap& cap) {
     if (n > 0) {
         if (crossings_[0].size() < 2 * n)
             for (std::vector<double>& row : crossings_) row.resize(2 * n);
-        const double *x = caps_[0].data(), *y = caps_[1].data(), *z = caps_[2].data(), *cosine = caps_[3].data();
-        double *ux = crossings_[0].data(), *uy = crossings_[1].data(), *uz = crossings_[2].data(), *depth = crossings_[3].data();
+        const double *x = caps_[0].data(), *y = caps_[1].data(), *z = caps_[2].data(),
+                     *cosine = caps_[3].data();
+        double *ux = crossings_[0].data(), *uy = crossings_[1].data(), *uz = crossings_[2].data(),
+               *depth = crossings_[3].data();
         const bool close = cross_circles(cap, x, y, z, cosine, static_cast<int>(n), ux, uy, uz, depth);
         deepen(x, y, z, cosine, static_cast<int>(size_), static_cast<int>(2 * n), ux, uy, uz, depth);
         if (close) leave_out_own(cap, n);

@@ -21,12 +21,14 @@ namespace slabwright {
 
 namespace {
 
-/// Embree works in float32: every box, query point and radius is widened by this share of the coordinates' size, so that
-/// rounding never hides a candidate. What is nearest is decided in double afterwards.
+/// Embree works in float32: every box, query point and radius is widened by this share of the coordinates'
+/// size, so that rounding never hides a candidate. What is nearest is decided in double afterwards.
 constexpr double kFloatMargin = 4e-7;
 
 float up(double v) { return std::nextafter(static_cast<float>(v), std::numeric_limits<float>::infinity()); }
-float down(double v) { return std::nextafter(static_cast<float>(v), -std::numeric_limits<float>::infinity()); }
+float down(double v) {
+    return std::nextafter(static_cast<float>(v), -std::numeric_limits<float>::infinity());
+}
 
 }  // namespace
 
@@ -54,9 +56,12 @@ struct ClosestPoint::Impl {
         const auto& self = *static_cast<const Impl*>(args->geometryUserPtr);
         const auto v = self.facet(args->primID);
         RTCBounds& b = *args->bounds_o;
-        b.lower_x = down(std::min({v[0].x, v[1].x, v[2].x}) - self.margin), b.upper_x = up(std::max({v[0].x, v[1].x, v[2].x}) + self.margin);
-        b.lower_y = down(std::min({v[0].y, v[1].y, v[2].y}) - self.margin), b.upper_y = up(std::max({v[0].y, v[1].y, v[2].y}) + self.margin);
-        b.lower_z = down(std::min({v[0].z, v[1].z, v[2].z}) - self.margin), b.upper_z = up(std::max({v[0].z, v[1].z, v[2].z}) + self.margin);
+        b.lower_x = down(std::min({v[0].x, v[1].x, v[2].x}) - self.margin),
+        b.upper_x = up(std::max({v[0].x, v[1].x, v[2].x}) + self.margin);
+        b.lower_y = down(std::min({v[0].y, v[1].y, v[2].y}) - self.margin),
+        b.upper_y = up(std::max({v[0].y, v[1].y, v[2].y}) + self.margin);
+        b.lower_z = down(std::min({v[0].z, v[1].z, v[2].z}) - self.margin),
+        b.upper_z = up(std::max({v[0].z, v[1].z, v[2].z}) + self.margin);
     }
 };
 
@@ -121,16 +126,21 @@ ClosestPoint::ClosestPoint(Context& context, MeshView mesh) : impl_(std::make_un
         for (const std::uint32_t i : f) {
             const Vec3f& v = mesh.vertices[i];
             if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
-                throw Error(ErrorKind::input, "mesh.not_finite", "a vertex is not finite", "vertex " + std::to_string(i), "repair the mesh");
-            size = std::max({size, std::abs(static_cast<double>(v.x)), std::abs(static_cast<double>(v.y)), std::abs(static_cast<double>(v.z))});
+                throw Error(ErrorKind::input, "mesh.not_finite", "a vertex is not finite",
+                            "vertex " + std::to_string(i), "repair the mesh");
+            size = std::max({size, std::abs(static_cast<double>(v.x)), std::abs(static_cast<double>(v.y)),
+                             std::abs(static_cast<double>(v.z))});
         }
     impl_->margin = size * kFloatMargin;
     context.throw_if_cancelled();
     impl_->device = rtcNewDevice(nullptr);  // "threads=…" here would clamp TBB for the whole process
-    if (!impl_->device) throw Error(ErrorKind::no_plan, "embree.device", "Embree offers no device", {}, "check the installation of libembree");
+    if (!impl_->device)
+        throw Error(ErrorKind::no_plan, "embree.device", "Embree offers no device", {},
+                    "check the installation of libembree");
     rtcSetDeviceMemoryMonitorFunction(impl_->device, &TreeMemory::monitor, &impl_->memory);
     impl_->scene = rtcNewScene(impl_->device);
-    rtcSetSceneFlags(impl_->scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
+    rtcSetSceneFlags(impl_->scene,
+                     static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT));
     RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(mesh.size()));
     rtcSetGeometryUserData(geometry, impl_.get());
@@ -143,7 +153,8 @@ ClosestPoint::ClosestPoint(Context& context, MeshView mesh) : impl_(std::make_un
     rtcCommitScene(impl_->scene);
     impl_->memory.charge();
     if (rtcGetDeviceError(impl_->device) != RTC_ERROR_NONE)
-        throw Error(ErrorKind::no_plan, "embree.build", "Embree could not build its tree", {}, "free memory, or plan with fewer facets");
+        throw Error(ErrorKind::no_plan, "embree.build", "Embree could not build its tree", {},
+                    "free memory, or plan with fewer facets");
 }
 
 ClosestPoint::~ClosestPoint() = default;
@@ -164,7 +175,8 @@ ClosestHit ClosestPoint::query_unsigned(const Point3& point, double max_radius) 
     n.margin = impl_->margin + 2 * size * kFloatMargin;
     n.hit.distance = max_radius;
     RTCPointQuery query{};
-    query.x = static_cast<float>(point[0]), query.y = static_cast<float>(point[1]), query.z = static_cast<float>(point[2]);
+    query.x = static_cast<float>(point[0]), query.y = static_cast<float>(point[1]),
+    query.z = static_cast<float>(point[2]);
     query.time = 0;
     query.radius = up(max_radius + n.margin);
     RTCPointQueryContext stack;
@@ -179,7 +191,8 @@ ClosestHit ClosestPoint::query(const Point3& point, double max_radius) const {
     return hit;
 }
 
-std::vector<ClosestHit> ClosestPoint::query(Context& context, std::span<const Point3> points, double max_radius) const {
+std::vector<ClosestHit> ClosestPoint::query(Context& context, std::span<const Point3> points,
+                                            double max_radius) const {
     std::vector<ClosestHit> hits(points.size());
     struct Key {
         std::uint64_t code;
@@ -187,18 +200,23 @@ std::vector<ClosestHit> ClosestPoint::query(Context& context, std::span<const Po
     };
     std::vector<Key> order(points.size());
     const MortonGrid grid(impl_->box);
-    for (std::size_t i = 0; i < points.size(); ++i) order[i] = {grid.code(points[i][0], points[i][1], points[i][2]), i};
-    parallel_sort(context, order.begin(), order.end(),
-                  [](const Key& a, const Key& b) { return a.code != b.code ? a.code < b.code : a.index < b.index; });
+    for (std::size_t i = 0; i < points.size(); ++i)
+        order[i] = {grid.code(points[i][0], points[i][1], points[i][2]), i};
+    parallel_sort(context, order.begin(), order.end(), [](const Key& a, const Key& b) {
+        return a.code != b.code ? a.code < b.code : a.index < b.index;
+    });
     parallel_for(context, points.size(), 256, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) hits[order[i].index] = query(points[order[i].index], max_radius);
+        for (std::size_t i = begin; i < end; ++i)
+            hits[order[i].index] = query(points[order[i].index], max_radius);
     });
     return hits;
 }
 
 int ClosestPoint::winding(const Point3& point) const {
     const Box3& b = impl_->box;
-    if (point[0] < b.min.x || point[0] > b.max.x || point[1] < b.min.y || point[1] > b.max.y || point[2] > b.max.z) return 0;
+    if (point[0] < b.min.x || point[0] > b.max.x || point[1] < b.min.y || point[1] > b.max.y ||
+        point[2] > b.max.z)
+        return 0;
     Column column;
 #if defined(RTC_VERSION_MAJOR) && RTC_VERSION_MAJOR >= 4
     rtcInitRayQueryContext(&column);

@@ -31,7 +31,7 @@ struct Rows {
           highest(row(15)),
           wrong(row(14)) {}
     const float *nx, *ny, *nz, *offset;  // signed distance from the facet's plane
-    const float* needs;                  // a place so far above the plane, or farther, does not meet the facet
+    const float* needs;  // a place so far above the plane, or farther, does not meet the facet
     const float *x0, *y0, *z0, *x1, *y1, *z1, *x2, *y2, *z2, *highest;
     const float* wrong;  // what distances from the facet may be wrong by
 };
@@ -63,11 +63,13 @@ struct Corners {
 struct Box {
     double mx, my, mz, hx, hy, hz;  // its middle and half its extent
     double top, lowest;             // of the facets and of the ways, above the middle
-    double upwards, up;             // 1 where heights count as distance, 0 where they do not; mm that the ways are above the box
-    double round, flat;             // what is so far away is out of reach, and what is so far horizontally: one of them is 0
-    double reach2;                  // square of the other
-    double under;                   // what is so far under the ways is out of reach
-    double wrong;                   // what distances may be wrong by beside what the facet's own place makes
+    double upwards,
+        up;  // 1 where heights count as distance, 0 where they do not; mm that the ways are above the box
+    double round,
+        flat;       // what is so far away is out of reach, and what is so far horizontally: one of them is 0
+    double reach2;  // square of the other
+    double under;   // what is so far under the ways is out of reach
+    double wrong;   // what distances may be wrong by beside what the facet's own place makes
 };
 
 constexpr double kHair = 1e-9;  // mm: rounding of a bound
@@ -87,12 +89,14 @@ Number max3(Number a, Number b, Number c) {
 
 }  // namespace
 
-// No branch differs from facet to facet, so that a compiler can do several in one step. Two planes are tried between facet and way: the facet's own,
-// and one across the line from the facet's middle to where the way comes nearest to it. What is above such a plane stays so upwards.
+// No branch differs from facet to facet, so that a compiler can do several in one step. Two planes are tried
+// between facet and way: the facet's own, and one across the line from the facet's middle to where the way
+// comes nearest to it. What is above such a plane stays so upwards.
 SLABWRIGHT_WIDE static void near_rows(const Rows& r, const Way& w, int n, unsigned char* __restrict keep) {
     for (int i = 0; i < n; ++i) {
         const float nx = r.nx[i], ny = r.ny[i], nz = r.nz[i];
-        const float begin = nx * w.ax + ny * w.ay + nz * w.az + r.offset[i], end = begin + (nx * w.dx + ny * w.dy + nz * w.dz);
+        const float begin = nx * w.ax + ny * w.ay + nz * w.az + r.offset[i],
+                    end = begin + (nx * w.dx + ny * w.dy + nz * w.dz);
         const float above = (begin < end ? begin : end) + w.nearer;
         const float x0 = r.x0[i] - w.ax, y0 = r.y0[i] - w.ay, z0 = r.z0[i] - w.az;
         const float x1 = r.x1[i] - w.ax, y1 = r.y1[i] - w.ay, z1 = r.z1[i] - w.az;
@@ -104,26 +108,33 @@ SLABWRIGHT_WIDE static void near_rows(const Rows& r, const Way& w, int n, unsign
         const float ux = t * w.dx - mx, uy = t * w.dy - my;
         float uz = (t * w.dz - mz) * w.upwards;
         uz = (uz + std::abs(uz)) / 2;  // 0 where negative
-        const float d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1, d2 = ux * x2 + uy * y2 + uz * z2;
+        const float d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1,
+                    d2 = ux * x2 + uy * y2 + uz * z2;
         float most = d0 > d1 ? d0 : d1;
         most = most > d2 ? most : d2;
-        const float forward = ux * w.dx + uy * w.dy + uz * w.dz, first = -most, last = forward - most, reach = w.reach + w.slack + r.wrong[i];
+        const float forward = ux * w.dx + uy * w.dy + uz * w.dz, first = -most, last = forward - most,
+                    reach = w.reach + w.slack + r.wrong[i];
         const float gap = first < last ? first : last;
-        keep[i] &=
-            (above - w.slack < r.needs[i]) & ((gap <= 0.0F) | (gap * gap < reach * reach * (ux * ux + uy * uy + uz * uz))) & (r.highest[i] > w.above);
+        keep[i] &= (above - w.slack < r.needs[i]) &
+                   ((gap <= 0.0F) | (gap * gap < reach * reach * (ux * ux + uy * uy + uz * uz))) &
+                   (r.highest[i] > w.above);
     }
 }
 
-// The same with a plane across the line from the way to the nearest point of the facet's edges, which parts the two wherever anything but the facet's
-// own plane does. Of the way the place nearest to the facet's middle is taken, and then the one nearest to what was the nearest point for that. Where
-// such a point is higher, what counts is what is above the way at its height, and the line is level.
-SLABWRIGHT_WIDE static void chosen_near(const Corners& r, const float* wrong, const Way& w, int n, unsigned char* __restrict keep) {
+// The same with a plane across the line from the way to the nearest point of the facet's edges, which parts
+// the two wherever anything but the facet's own plane does. Of the way the place nearest to the facet's
+// middle is taken, and then the one nearest to what was the nearest point for that. Where such a point is
+// higher, what counts is what is above the way at its height, and the line is level.
+SLABWRIGHT_WIDE static void chosen_near(const Corners& r, const float* wrong, const Way& w, int n,
+                                        unsigned char* __restrict keep) {
     for (int i = 0; i < n; ++i) {
         const float x0 = r.x0[i] - w.ax, y0 = r.y0[i] - w.ay, z0 = (r.z0[i] - w.az) * w.upwards;
         const float x1 = r.x1[i] - w.ax, y1 = r.y1[i] - w.ay, z1 = (r.z1[i] - w.az) * w.upwards;
         const float x2 = r.x2[i] - w.ax, y2 = r.y2[i] - w.ay, z2 = (r.z2[i] - w.az) * w.upwards;
-        const float ax = x1 - x0, ay = y1 - y0, az = z1 - z0, bx = x2 - x1, by = y2 - y1, bz = z2 - z1, cx = x0 - x2, cy = y0 - y2, cz = z0 - z2;
-        const float per_a = 1 / (ax * ax + ay * ay + az * az + tiny), per_b = 1 / (bx * bx + by * by + bz * bz + tiny),
+        const float ax = x1 - x0, ay = y1 - y0, az = z1 - z0, bx = x2 - x1, by = y2 - y1, bz = z2 - z1,
+                    cx = x0 - x2, cy = y0 - y2, cz = z0 - z2;
+        const float per_a = 1 / (ax * ax + ay * ay + az * az + tiny),
+                    per_b = 1 / (bx * bx + by * by + bz * bz + tiny),
                     per_c = 1 / (cx * cx + cy * cy + cz * cz + tiny);
         float lowest = z0 < z1 ? z0 : z1;
         lowest = lowest < z2 ? lowest : z2;
@@ -131,19 +142,27 @@ SLABWRIGHT_WIDE static void chosen_near(const Corners& r, const float* wrong, co
         t = t < 0.0F ? 0.0F : t;
         t = t > w.end ? w.end : t;
         float px = t * w.dx, py = t * w.dy, low = t * w.dz * w.upwards, pz = low > lowest ? low : lowest;
-        // From each corner to the place, how far along the edge that begins there its nearest point lies, and the square of what is left across.
-        const float fx = px - x0, fy = py - y0, fz = pz - z0, gx = px - x1, gy = py - y1, gz = pz - z1, hx = px - x2, hy = py - y2, hz = pz - z2;
-        float s0 = (fx * ax + fy * ay + fz * az) * per_a, s1 = (gx * bx + gy * by + gz * bz) * per_b, s2 = (hx * cx + hy * cy + hz * cz) * per_c;
+        // From each corner to the place, how far along the edge that begins there its nearest point lies, and
+        // the square of what is left across.
+        const float fx = px - x0, fy = py - y0, fz = pz - z0, gx = px - x1, gy = py - y1, gz = pz - z1,
+                    hx = px - x2, hy = py - y2, hz = pz - z2;
+        float s0 = (fx * ax + fy * ay + fz * az) * per_a, s1 = (gx * bx + gy * by + gz * bz) * per_b,
+              s2 = (hx * cx + hy * cy + hz * cz) * per_c;
         s0 = s0 < 0.0F ? 0.0F : s0, s1 = s1 < 0.0F ? 0.0F : s1, s2 = s2 < 0.0F ? 0.0F : s2;
         s0 = s0 > 1.0F ? 1.0F : s0, s1 = s1 > 1.0F ? 1.0F : s1, s2 = s2 > 1.0F ? 1.0F : s2;
-        const float ux0 = fx - s0 * ax, uy0 = fy - s0 * ay, uz0 = fz - s0 * az, e0 = ux0 * ux0 + uy0 * uy0 + uz0 * uz0;
-        const float ux1 = gx - s1 * bx, uy1 = gy - s1 * by, uz1 = gz - s1 * bz, e1 = ux1 * ux1 + uy1 * uy1 + uz1 * uz1;
-        const float ux2 = hx - s2 * cx, uy2 = hy - s2 * cy, uz2 = hz - s2 * cz, e2 = ux2 * ux2 + uy2 * uy2 + uz2 * uz2;
+        const float ux0 = fx - s0 * ax, uy0 = fy - s0 * ay, uz0 = fz - s0 * az,
+                    e0 = ux0 * ux0 + uy0 * uy0 + uz0 * uz0;
+        const float ux1 = gx - s1 * bx, uy1 = gy - s1 * by, uz1 = gz - s1 * bz,
+                    e1 = ux1 * ux1 + uy1 * uy1 + uz1 * uz1;
+        const float ux2 = hx - s2 * cx, uy2 = hy - s2 * cy, uz2 = hz - s2 * cz,
+                    e2 = ux2 * ux2 + uy2 * uy2 + uz2 * uz2;
         // The nearest edge: its begin, its direction and how far along it the nearest point lies.
         const float e01 = e1 < e0 ? e1 : e0;
-        float kx = e1 < e0 ? x1 : x0, ky = e1 < e0 ? y1 : y0, kz = e1 < e0 ? z1 : z0, lx = e1 < e0 ? bx : ax, ly = e1 < e0 ? by : ay,
-              lz = e1 < e0 ? bz : az, per = e1 < e0 ? per_b : per_a, s = e1 < e0 ? s1 : s0;
-        kx = e2 < e01 ? x2 : kx, ky = e2 < e01 ? y2 : ky, kz = e2 < e01 ? z2 : kz, lx = e2 < e01 ? cx : lx, ly = e2 < e01 ? cy : ly;
+        float kx = e1 < e0 ? x1 : x0, ky = e1 < e0 ? y1 : y0, kz = e1 < e0 ? z1 : z0, lx = e1 < e0 ? bx : ax,
+              ly = e1 < e0 ? by : ay, lz = e1 < e0 ? bz : az, per = e1 < e0 ? per_b : per_a,
+              s = e1 < e0 ? s1 : s0;
+        kx = e2 < e01 ? x2 : kx, ky = e2 < e01 ? y2 : ky, kz = e2 < e01 ? z2 : kz, lx = e2 < e01 ? cx : lx,
+        ly = e2 < e01 ? cy : ly;
         lz = e2 < e01 ? cz : lz, per = e2 < e01 ? per_c : per, s = e2 < e01 ? s2 : s;
         const float qx = kx + s * lx, qy = ky + s * ly, qz = kz + s * lz;
         t = (qx * w.dx + qy * w.dy) * w.per_length2;
@@ -153,29 +172,37 @@ SLABWRIGHT_WIDE static void chosen_near(const Corners& r, const float* wrong, co
         s = ((px - kx) * lx + (py - ky) * ly + (pz - kz) * lz) * per;
         s = s < 0.0F ? 0.0F : s;
         s = s > 1.0F ? 1.0F : s;
-        const float ux = px - kx - s * lx, uy = py - ky - s * ly, away = pz - kz - s * lz, uz = pz > low ? 0.0F : (away + std::abs(away)) / 2;
-        const float d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1, d2 = ux * x2 + uy * y2 + uz * z2;
+        const float ux = px - kx - s * lx, uy = py - ky - s * ly, away = pz - kz - s * lz,
+                    uz = pz > low ? 0.0F : (away + std::abs(away)) / 2;
+        const float d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1,
+                    d2 = ux * x2 + uy * y2 + uz * z2;
         float most = d0 > d1 ? d0 : d1;
         most = most > d2 ? most : d2;
-        const float forward = ux * w.dx + uy * w.dy + uz * w.dz, begins = -most, ends = forward - most, reach = w.reach + w.slack + wrong[i];
+        const float forward = ux * w.dx + uy * w.dy + uz * w.dz, begins = -most, ends = forward - most,
+                    reach = w.reach + w.slack + wrong[i];
         const float gap = begins < ends ? begins : ends;
-        keep[i] = static_cast<unsigned char>((gap <= 0.0F) | (gap * gap < reach * reach * (ux * ux + uy * uy + uz * uz)));
+        keep[i] = static_cast<unsigned char>((gap <= 0.0F) |
+                                             (gap * gap < reach * reach * (ux * ux + uy * uy + uz * uz)));
     }
 }
 
-// Which facets a way within the box may meet, by their boxes and planes, and the rows of all: each row is FacetRows::kMost long.
-SLABWRIGHT_WIDE static void box_rows(const Corners& r, const Box& box, int n, float* __restrict to, unsigned char* __restrict keep) {
+// Which facets a way within the box may meet, by their boxes and planes, and the rows of all: each row is
+// FacetRows::kMost long.
+SLABWRIGHT_WIDE static void box_rows(const Corners& r, const Box& box, int n, float* __restrict to,
+                                     unsigned char* __restrict keep) {
     const Box b = box;
     constexpr int most = FacetRows::kMost;
     for (int i = 0; i < n; ++i) {
         const double x0 = r.x0[i] - b.mx, y0 = r.y0[i] - b.my, z0 = r.z0[i] - b.mz;
         const double x1 = r.x1[i] - b.mx, y1 = r.y1[i] - b.my, z1 = r.z1[i] - b.mz;
         const double x2 = r.x2[i] - b.mx, y2 = r.y2[i] - b.my, z2 = r.z2[i] - b.mz;
-        const double left = min3(x0, x1, x2), right = max3(x0, x1, x2), front = min3(y0, y1, y2), back = max3(y0, y1, y2);
+        const double left = min3(x0, x1, x2), right = max3(x0, x1, x2), front = min3(y0, y1, y2),
+                     back = max3(y0, y1, y2);
         const double lowest = min3(z0, z1, z2), highest = max3(z0, z1, z2);
         // Horizontally from the box of the ways to the facet's, and upwards to the ways.
         const double dx = max3(0.0, left - b.hx, -b.hx - right), dy = max3(0.0, front - b.hy, -b.hy - back);
-        const double under = b.lowest - (highest < b.top ? highest : b.top), dz = b.upwards * (under > 0 ? under : 0.0);
+        const double under = b.lowest - (highest < b.top ? highest : b.top),
+                     dz = b.upwards * (under > 0 ? under : 0.0);
         // The facet's plane.
         const double ex = x1 - x0, ey = y1 - y0, ez = z1 - z0, gx = x2 - x0, gy = y2 - y0, gz = z2 - z0;
         double nx = ey * gz - ez * gy, ny = ez * gx - ex * gz, nz = ex * gy - ey * gx;
@@ -184,15 +211,22 @@ SLABWRIGHT_WIDE static void box_rows(const Corners& r, const Box& box, int n, fl
         nx *= scale, ny *= scale, nz *= scale;
         const double offset = -(nx * x0 + ny * y0 + nz * z0), across = std::sqrt(nx * nx + ny * ny);
         const double reach = scale == 0 ? 1e30 : b.round + b.flat * across;  // of none that has no plane
-        const double nearest = offset + nz * b.up - std::abs(nx) * b.hx - std::abs(ny) * b.hy - std::abs(nz) * b.hz;
-        const double far_x = -left > right ? -left : right, far_y = -front > back ? -front : back, far_z = -lowest > highest ? -lowest : highest;
+        const double nearest =
+            offset + nz * b.up - std::abs(nx) * b.hx - std::abs(ny) * b.hy - std::abs(nz) * b.hz;
+        const double far_x = -left > right ? -left : right, far_y = -front > back ? -front : back,
+                     far_z = -lowest > highest ? -lowest : highest;
         const double wrong = 1.5e-6 * (max3(far_x, far_y, far_z) + b.wrong);
-        keep[i] = static_cast<unsigned char>((lowest < b.top) & (dx * dx + dy * dy + dz * dz < b.reach2) & (under < b.under) & (nearest < reach));
-        to[0 * most + i] = static_cast<float>(nx), to[1 * most + i] = static_cast<float>(ny), to[2 * most + i] = static_cast<float>(nz);
+        keep[i] = static_cast<unsigned char>((lowest < b.top) & (dx * dx + dy * dy + dz * dz < b.reach2) &
+                                             (under < b.under) & (nearest < reach));
+        to[0 * most + i] = static_cast<float>(nx), to[1 * most + i] = static_cast<float>(ny),
+                      to[2 * most + i] = static_cast<float>(nz);
         to[3 * most + i] = static_cast<float>(offset), to[4 * most + i] = static_cast<float>(reach + wrong);
-        to[5 * most + i] = static_cast<float>(x0), to[6 * most + i] = static_cast<float>(y0), to[7 * most + i] = static_cast<float>(z0);
-        to[8 * most + i] = static_cast<float>(x1), to[9 * most + i] = static_cast<float>(y1), to[10 * most + i] = static_cast<float>(z1);
-        to[11 * most + i] = static_cast<float>(x2), to[12 * most + i] = static_cast<float>(y2), to[13 * most + i] = static_cast<float>(z2);
+        to[5 * most + i] = static_cast<float>(x0), to[6 * most + i] = static_cast<float>(y0),
+                      to[7 * most + i] = static_cast<float>(z0);
+        to[8 * most + i] = static_cast<float>(x1), to[9 * most + i] = static_cast<float>(y1),
+                      to[10 * most + i] = static_cast<float>(z1);
+        to[11 * most + i] = static_cast<float>(x2), to[12 * most + i] = static_cast<float>(y2),
+                       to[13 * most + i] = static_cast<float>(z2);
         to[14 * most + i] = static_cast<float>(wrong);
         to[15 * most + i] = static_cast<float>(highest + 1e-6 * std::abs(highest));
     }
@@ -215,13 +249,15 @@ WayAround::WayAround(const NearWay& way, bool ball, double lowest_z, double top_
       above(std::nextafter(static_cast<float>(way.above), -std::numeric_limits<float>::infinity())),
       top(std::nextafter(static_cast<float>(top_z), std::numeric_limits<float>::infinity())),
       reach2(static_cast<float>(reach * reach)) {
-    const double x = way.b[0] - way.a[0], y = way.b[1] - way.a[1], length2 = x * x + y * y, l = std::sqrt(length2);
+    const double x = way.b[0] - way.a[0], y = way.b[1] - way.a[1], length2 = x * x + y * y,
+                 l = std::sqrt(length2);
     if (l > 0) ux = static_cast<float>(x / l), uy = static_cast<float>(y / l), length = static_cast<float>(l);
     if (length2 > 1e-12) per_length2 = static_cast<float>(1 / length2), end = 1;
 }
 
 // Written with vectors of eight, since compilers take such a short loop apart into smaller ones.
-SLABWRIGHT_WIDE static void around_eights(const ManyEights& many, const WayAround& way, unsigned* __restrict keep) {
+SLABWRIGHT_WIDE static void around_eights(const ManyEights& many, const WayAround& way,
+                                          unsigned* __restrict keep) {
     using Eight [[gnu::vector_size(32)]] = float;
     using Signs [[gnu::vector_size(32)]] = std::int32_t;
     const WayAround w = way;
@@ -237,42 +273,58 @@ SLABWRIGHT_WIDE static void around_eights(const ManyEights& many, const WayAroun
     for (std::size_t i = 0; i < many.count; ++i) {
         const EightFacets& f = *many.eights[i];
         Eight x0, y0, z0, x1, y1, z1, x2, y2, z2;
-        std::memcpy(&x0, f.x0.data(), sizeof(Eight)), std::memcpy(&y0, f.y0.data(), sizeof(Eight)), std::memcpy(&z0, f.z0.data(), sizeof(Eight));
-        std::memcpy(&x1, f.x1.data(), sizeof(Eight)), std::memcpy(&y1, f.y1.data(), sizeof(Eight)), std::memcpy(&z1, f.z1.data(), sizeof(Eight));
-        std::memcpy(&x2, f.x2.data(), sizeof(Eight)), std::memcpy(&y2, f.y2.data(), sizeof(Eight)), std::memcpy(&z2, f.z2.data(), sizeof(Eight));
+        std::memcpy(&x0, f.x0.data(), sizeof(Eight)), std::memcpy(&y0, f.y0.data(), sizeof(Eight)),
+            std::memcpy(&z0, f.z0.data(), sizeof(Eight));
+        std::memcpy(&x1, f.x1.data(), sizeof(Eight)), std::memcpy(&y1, f.y1.data(), sizeof(Eight)),
+            std::memcpy(&z1, f.z1.data(), sizeof(Eight));
+        std::memcpy(&x2, f.x2.data(), sizeof(Eight)), std::memcpy(&y2, f.y2.data(), sizeof(Eight)),
+            std::memcpy(&z2, f.z2.data(), sizeof(Eight));
         Eight lowest = z0 < z1 ? z0 : z1, highest = z0 > z1 ? z0 : z1;
         lowest = lowest < z2 ? lowest : z2, highest = highest > z2 ? highest : z2;
         x0 -= w.ax, y0 -= w.ay, x1 -= w.ax, y1 -= w.ay, x2 -= w.ax, y2 -= w.ay;
         const Eight l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
         const Eight c0 = y0 * w.ux - x0 * w.uy, c1 = y1 * w.ux - x1 * w.uy, c2 = y2 * w.ux - x2 * w.uy;
-        Eight l_low = l0 < l1 ? l0 : l1, l_high = l0 > l1 ? l0 : l1, c_low = c0 < c1 ? c0 : c1, c_high = c0 > c1 ? c0 : c1;
-        l_low = l_low < l2 ? l_low : l2, l_high = l_high > l2 ? l_high : l2, c_low = c_low < c2 ? c_low : c2, c_high = c_high > c2 ? c_high : c2;
-        Eight l = l_low - w.length, c = c_low > -c_high ? c_low : -c_high, under = w.lowest - (highest < w.top ? highest : none + w.top);
-        l = l > -l_high ? l : -l_high, l = l > none ? l : none, c = c > none ? c : none, under = (under > none ? under : none) * w.upwards;
-        const Signs kept = (lowest < w.top) & (highest > w.above) & (l * l + c * c + under * under < w.reach2);
+        Eight l_low = l0 < l1 ? l0 : l1, l_high = l0 > l1 ? l0 : l1, c_low = c0 < c1 ? c0 : c1,
+              c_high = c0 > c1 ? c0 : c1;
+        l_low = l_low < l2 ? l_low : l2, l_high = l_high > l2 ? l_high : l2, c_low = c_low < c2 ? c_low : c2,
+        c_high = c_high > c2 ? c_high : c2;
+        Eight l = l_low - w.length, c = c_low > -c_high ? c_low : -c_high,
+              under = w.lowest - (highest < w.top ? highest : none + w.top);
+        l = l > -l_high ? l : -l_high, l = l > none ? l : none, c = c > none ? c : none,
+        under = (under > none ? under : none) * w.upwards;
+        const Signs kept =
+            (lowest < w.top) & (highest > w.above) & (l * l + c * c + under * under < w.reach2);
         if (keep[i] = bits_of(kept); keep[i] != 0) {
             z0 -= w.az, z1 -= w.az, z2 -= w.az;
             const Eight mx = (x0 + x1 + x2) * third, my = (y0 + y1 + y2) * third, mz = (z0 + z1 + z2) * third;
             Eight t = (mx * w.dx + my * w.dy) * w.per_length2;
             t = t > none ? t : none, t = t < w.end ? t : none + w.end;
-            const Eight ux = t * w.dx - mx, uy = t * w.dy - my, over = (t * w.dz - mz) * w.upwards, uz = over > none ? over : none;
-            const Eight d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1, d2 = ux * x2 + uy * y2 + uz * z2;
+            const Eight ux = t * w.dx - mx, uy = t * w.dy - my, over = (t * w.dz - mz) * w.upwards,
+                        uz = over > none ? over : none;
+            const Eight d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1,
+                        d2 = ux * x2 + uy * y2 + uz * z2;
             Eight most = d0 > d1 ? d0 : d1;
             most = most > d2 ? most : d2;
-            const Eight forward = ux * forward_x + uy * forward_y + uz * forward_z, gap = (forward < none ? forward : none) - most;
-            keep[i] = bits_of(kept & ((gap <= none) | (gap * gap < w.reach2 * (ux * ux + uy * uy + uz * uz))));
+            const Eight forward = ux * forward_x + uy * forward_y + uz * forward_z,
+                        gap = (forward < none ? forward : none) - most;
+            keep[i] =
+                bits_of(kept & ((gap <= none) | (gap * gap < w.reach2 * (ux * ux + uy * uy + uz * uz))));
         }
     }
 }
 
-void facets_around(const ManyEights& eights, const WayAround& way, std::array<unsigned, ManyEights::kMost>& keep) {
+void facets_around(const ManyEights& eights, const WayAround& way,
+                   std::array<unsigned, ManyEights::kMost>& keep) {
     around_eights(eights, way, keep.data());
 }
 
 namespace {
-float upwards_of(double v) { return std::nextafter(static_cast<float>(v), std::numeric_limits<float>::infinity()); }
+float upwards_of(double v) {
+    return std::nextafter(static_cast<float>(v), std::numeric_limits<float>::infinity());
+}
 
-/// A number in single precision and what is left of it. Not inline: of three in a row g++ 12 takes what is left to be zero (-O2, -ftree-slp-vectorize).
+/// A number in single precision and what is left of it. Not inline: of three in a row g++ 12 takes what is
+/// left to be zero (-O2, -ftree-slp-vectorize).
 struct Split {
     float near, rest;
 };
@@ -282,22 +334,34 @@ struct Split {
 }
 }  // namespace
 
-LevelWay::LevelWay(const std::array<double, 3>& a, const std::array<double, 3>& b, double top_z, double within)
-    : ux(1), uy(0), before(0), after(0), bow(0), curvature(0), top(upwards_of(top_z)), reach(upwards_of(within)) {
-    const double x = (a[0] + b[0]) / 2, y = (a[1] + b[1]) / 2, dx = b[0] - a[0], dy = b[1] - a[1], length = std::sqrt(dx * dx + dy * dy);
-    if (length > 0) ux = static_cast<float>(dx / length), uy = static_cast<float>(dy / length), before = after = upwards_of(length / 2);
+LevelWay::LevelWay(const std::array<double, 3>& a, const std::array<double, 3>& b, double top_z,
+                   double within)
+    : ux(1),
+      uy(0),
+      before(0),
+      after(0),
+      bow(0),
+      curvature(0),
+      top(upwards_of(top_z)),
+      reach(upwards_of(within)) {
+    const double x = (a[0] + b[0]) / 2, y = (a[1] + b[1]) / 2, dx = b[0] - a[0], dy = b[1] - a[1],
+                 length = std::sqrt(dx * dx + dy * dy);
+    if (length > 0)
+        ux = static_cast<float>(dx / length), uy = static_cast<float>(dy / length),
+        before = after = upwards_of(length / 2);
     begin_at(x, y, a[2]);
 }
 
-LevelWay::LevelWay(double x, double y, double radius, const std::array<double, 3>& about, double length_before, double length_after, double aside,
-                   double top_z, double within)
+LevelWay::LevelWay(double x, double y, double radius, const std::array<double, 3>& about,
+                   double length_before, double length_after, double aside, double top_z, double within)
     : before(upwards_of(length_before)),
       after(upwards_of(length_after)),
       bow(upwards_of(aside)),
       curvature(static_cast<float>(1 / radius)),
       top(upwards_of(top_z)),
       reach(upwards_of(within)) {
-    const double px = about[0] - x, py = about[1] - y, per = 1 / std::max(std::sqrt(px * px + py * py), 1e-12);
+    const double px = about[0] - x, py = about[1] - y,
+                 per = 1 / std::max(std::sqrt(px * px + py * py), 1e-12);
     ux = static_cast<float>(-py * per), uy = static_cast<float>(px * per);
     begin_at(x + radius * px * per, y + radius * py * per, about[2]);
 }
@@ -307,10 +371,13 @@ void LevelWay::begin_at(double x, double y, double z) {
     ox = sx.near, oy = sy.near, oz = sz.near, rest_x = sx.rest, rest_y = sy.rest, rest_z = sz.rest;
 }
 
-// In the plane across the way an upward ray begins at the way, and each facet becomes a triangle between its corners. Around a circle what is between
-// them is truly nearer to the axis, by no more than the distance from the axis bends over the facet. Ray and triangle are parted by a line across the way
-// to a corner, or along an edge, if at all; what is below such a line stays so upwards. No branch differs from facet to facet.
-SLABWRIGHT_WIDE static void along_eights(const ManyEights& many, const LevelWay& way, unsigned* __restrict keep) {
+// In the plane across the way an upward ray begins at the way, and each facet becomes a triangle between its
+// corners. Around a circle what is between them is truly nearer to the axis, by no more than the distance
+// from the axis bends over the facet. Ray and triangle are parted by a line across the way to a corner, or
+// along an edge, if at all; what is below such a line stays so upwards. No branch differs from facet to
+// facet.
+SLABWRIGHT_WIDE static void along_eights(const ManyEights& many, const LevelWay& way,
+                                         unsigned* __restrict keep) {
     using Eight [[gnu::vector_size(32)]] = float;
     using Signs [[gnu::vector_size(32)]] = std::int32_t;
     const LevelWay w = way;
@@ -326,16 +393,23 @@ SLABWRIGHT_WIDE static void along_eights(const ManyEights& many, const LevelWay&
     const auto root = [](Eight& v) {
         for (std::size_t k = 0; k < 8; ++k) v[k] = std::sqrt(v[k]);
     };
-    const auto least_of = [](const Eight& a, const Eight& b, const Eight& c, Eight& least) { least = a < b ? a : b, least = least < c ? least : c; };
-    const auto most_of = [](const Eight& a, const Eight& b, const Eight& c, Eight& most) { most = a > b ? a : b, most = most > c ? most : c; };
+    const auto least_of = [](const Eight& a, const Eight& b, const Eight& c, Eight& least) {
+        least = a < b ? a : b, least = least < c ? least : c;
+    };
+    const auto most_of = [](const Eight& a, const Eight& b, const Eight& c, Eight& most) {
+        most = a > b ? a : b, most = most > c ? most : c;
+    };
     const float straight = w.curvature == 0 ? 1.0F : 0.0F;
     constexpr float rounding = 2e-6F;  // of a length
     for (std::size_t i = 0; i < many.count; ++i) {
         const EightFacets& f = *many.eights[i];
         Eight x0, y0, z0, x1, y1, z1, x2, y2, z2;
-        std::memcpy(&x0, f.x0.data(), sizeof(Eight)), std::memcpy(&y0, f.y0.data(), sizeof(Eight)), std::memcpy(&z0, f.z0.data(), sizeof(Eight));
-        std::memcpy(&x1, f.x1.data(), sizeof(Eight)), std::memcpy(&y1, f.y1.data(), sizeof(Eight)), std::memcpy(&z1, f.z1.data(), sizeof(Eight));
-        std::memcpy(&x2, f.x2.data(), sizeof(Eight)), std::memcpy(&y2, f.y2.data(), sizeof(Eight)), std::memcpy(&z2, f.z2.data(), sizeof(Eight));
+        std::memcpy(&x0, f.x0.data(), sizeof(Eight)), std::memcpy(&y0, f.y0.data(), sizeof(Eight)),
+            std::memcpy(&z0, f.z0.data(), sizeof(Eight));
+        std::memcpy(&x1, f.x1.data(), sizeof(Eight)), std::memcpy(&y1, f.y1.data(), sizeof(Eight)),
+            std::memcpy(&z1, f.z1.data(), sizeof(Eight));
+        std::memcpy(&x2, f.x2.data(), sizeof(Eight)), std::memcpy(&y2, f.y2.data(), sizeof(Eight)),
+            std::memcpy(&z2, f.z2.data(), sizeof(Eight));
         Eight lowest, l_low, l_high, c_low, c_high, h_low, h_high;
         least_of(z0, z1, z2, lowest);
         x0 = x0 - w.ox - w.rest_x, y0 = y0 - w.oy - w.rest_y, z0 = z0 - w.oz - w.rest_z;
@@ -343,13 +417,16 @@ SLABWRIGHT_WIDE static void along_eights(const ManyEights& many, const LevelWay&
         x2 = x2 - w.ox - w.rest_x, y2 = y2 - w.oy - w.rest_y, z2 = z2 - w.oz - w.rest_z;
         const Eight l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
         const Eight c0 = x0 * w.uy - y0 * w.ux, c1 = x1 * w.uy - y1 * w.ux, c2 = x2 * w.uy - y2 * w.ux;
-        least_of(l0, l1, l2, l_low), most_of(l0, l1, l2, l_high), least_of(c0, c1, c2, c_low), most_of(c0, c1, c2, c_high);
+        least_of(l0, l1, l2, l_low), most_of(l0, l1, l2, l_high), least_of(c0, c1, c2, c_low),
+            most_of(c0, c1, c2, c_high);
         least_of(z0, z1, z2, h_low), most_of(z0, z1, z2, h_high);
-        const Eight far_l = l_high > -l_low ? l_high : -l_low, far_c = c_high > -c_low ? c_high : -c_low, far_h = h_high > -h_low ? h_high : -h_low;
+        const Eight far_l = l_high > -l_low ? l_high : -l_low, far_c = c_high > -c_low ? c_high : -c_low,
+                    far_h = h_high > -h_low ? h_high : -h_low;
         const Eight far = far_l + far_c + far_h, reach = w.reach + rounding * (far + w.curvature * far * far);
         Eight l = l_low - w.after > -l_high - w.before ? l_low - w.after : -l_high - w.before;
         l = l > none ? l : none;
-        Eight c = c_low > -c_high - w.bow ? c_low : -c_high - w.bow, under = -h_high > none ? -h_high : none, reach2 = reach * reach;
+        Eight c = c_low > -c_high - w.bow ? c_low : -c_high - w.bow, under = -h_high > none ? -h_high : none,
+              reach2 = reach * reach;
         c = c > none ? c : none;
         const Signs within = (lowest < w.top) & (l * l + c * c + under * under < reach2);
         keep[i] = bits_of(within);
@@ -366,13 +443,15 @@ SLABWRIGHT_WIDE static void along_eights(const ManyEights& many, const LevelWay&
                 across = twice / (from_axis + one);
             };
             outwards(l0, a0), outwards(l1, a1), outwards(l2, a2);
-            const Eight e0 = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0), e1 = (x2 - x1) * (x2 - x1) + (y2 - y1) * (y2 - y1),
+            const Eight e0 = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0),
+                        e1 = (x2 - x1) * (x2 - x1) + (y2 - y1) * (y2 - y1),
                         e2 = (x0 - x2) * (x0 - x2) + (y0 - y2) * (y0 - y2), least = none + 1e-3F;
             Eight edge2, edge, outmost;
             most_of(e0, e1, e2, edge2), most_of(a0, a1, a2, outmost);
             edge = edge2, root(edge);
             const Eight inmost = one + w.curvature * (outmost - edge);
-            // A second derivative of 1 / radius at most, over a circle of the longest edge / √3 that holds the facet; near the axis, no more than an edge.
+            // A second derivative of 1 / radius at most, over a circle of the longest edge / √3 that holds
+            // the facet; near the axis, no more than an edge.
             bend = inmost > least ? w.curvature * edge2 / (6.0F * inmost) : edge;
         }
         Signs parted{};
@@ -383,14 +462,17 @@ SLABWRIGHT_WIDE static void along_eights(const ManyEights& many, const LevelWay&
             parted |= (gap > none) & (gap * gap >= reach2 * (ua * ua + uh * uh));
         };
         const auto to_corner = [&](const Eight& a, const Eight& h) { part(a, h < none ? h : none); };
-        const auto by_edge = [&](const Eight& a, const Eight& h) { part(a > none ? h : -h, a > none ? -a : a); };
+        const auto by_edge = [&](const Eight& a, const Eight& h) {
+            part(a > none ? h : -h, a > none ? -a : a);
+        };
         to_corner(a0, z0), to_corner(a1, z1), to_corner(a2, z2);
         by_edge(a1 - a0, z1 - z0), by_edge(a2 - a1, z2 - z1), by_edge(a0 - a2, z0 - z2);
         keep[i] = bits_of(within & ~parted);
     }
 }
 
-void facets_along(const ManyEights& eights, const LevelWay& way, std::array<unsigned, ManyEights::kMost>& keep) {
+void facets_along(const ManyEights& eights, const LevelWay& way,
+                  std::array<unsigned, ManyEights::kMost>& keep) {
     along_eights(eights, way, keep.data());
 }
 
@@ -413,7 +495,8 @@ static Way way_from(const NearWay& way, const std::array<double, 3>& middle, boo
 }
 
 /// Keeps of what is kept what the way may meet.
-static void keep_near(const Rows& rows, const Way& w, std::size_t size, bool closely, std::vector<unsigned char>& keep) {
+static void keep_near(const Rows& rows, const Way& w, std::size_t size, bool closely,
+                      std::vector<unsigned char>& keep) {
     near_rows(rows, w, static_cast<int>(size), keep.data());
     if (!closely) return;
     FacetRows chosen;
@@ -437,14 +520,17 @@ static void keep_near(const Rows& rows, const Way& w, std::size_t size, bool clo
     if (count > 0) look();
 }
 
-void NearFacets::place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach, bool ball, double top, double up) {
-    for (std::size_t k = 0; k < 3; ++k) middle_[k] = (low[k] + high[k]) / 2, half_[k] = (high[k] - low[k]) / 2;
+void NearFacets::place(const std::array<double, 3>& low, const std::array<double, 3>& high, double reach,
+                       bool ball, double top, double up) {
+    for (std::size_t k = 0; k < 3; ++k)
+        middle_[k] = (low[k] + high[k]) / 2, half_[k] = (high[k] - low[k]) / 2;
     reach_ = reach, top_ = top, up_ = up;
     ball_ = ball;
     size_ = 0;
 }
 
-void NearFacets::add(const FacetRows& facets, std::size_t count, const NearWay* way, bool closely, std::vector<unsigned char>& keep) {
+void NearFacets::add(const FacetRows& facets, std::size_t count, const NearWay* way, bool closely,
+                     std::vector<unsigned char>& keep) {
     keep.assign((count + 7) / 8 * 8, 0);
     std::array<std::array<float, FacetRows::kMost>, kRows> values;
     const Box box{middle_[0],
@@ -463,7 +549,9 @@ void NearFacets::add(const FacetRows& facets, std::size_t count, const NearWay* 
                   ball_ ? 1e30 : kHair,
                   half_[0] + half_[1] + half_[2] + reach_ + up_};
     box_rows(Corners(facets), box, static_cast<int>(count), values[0].data(), keep.data());
-    if (way) keep_near(Rows([&](std::size_t k) { return values[k].data(); }), way_from(*way, middle_, ball_, reach_), count, closely, keep);
+    if (way)
+        keep_near(Rows([&](std::size_t k) { return values[k].data(); }),
+                  way_from(*way, middle_, ball_, reach_), count, closely, keep);
     if (size_ + count > rows_[0].size())
         for (auto& row : rows_) row.resize(std::max<std::size_t>(256, 2 * (size_ + count)));
     for_each_kept(keep, [&](std::size_t i) {
@@ -475,7 +563,8 @@ void NearFacets::add(const FacetRows& facets, std::size_t count, const NearWay* 
 void NearFacets::near(const NearWay& way, bool closely, std::vector<unsigned char>& keep) const {
     keep.assign((size_ + 7) / 8 * 8, 0);
     std::fill_n(keep.begin(), size_, static_cast<unsigned char>(1));
-    keep_near(Rows([&](std::size_t k) { return rows_[k].data(); }), way_from(way, middle_, ball_, reach_), size_, closely, keep);
+    keep_near(Rows([&](std::size_t k) { return rows_[k].data(); }), way_from(way, middle_, ball_, reach_),
+              size_, closely, keep);
 }
 
 }  // namespace slabwright

@@ -15,7 +15,8 @@ constexpr int kHalvings = 60;
 // Along the edge from p to q, relative to the axis; `z` is over the tip.
 bool edge_pokes(const Point3& p, const Point3& q, const Envelope& e, Point3& at) {
     const double dx = q[0] - p[0], dy = q[1] - p[1], dz = q[2] - p[2];
-    const double a = dx * dx + dy * dy, b = p[0] * dx + p[1] * dy, c = p[0] * p[0] + p[1] * p[1] - e.radius * e.radius;
+    const double a = dx * dx + dy * dy, b = p[0] * dx + p[1] * dy,
+                 c = p[0] * p[0] + p[1] * p[1] - e.radius * e.radius;
     double from = 0, to = 1;
     if (a > 0) {
         const double root = b * b - a * c;
@@ -62,8 +63,8 @@ bool pokes(const Triangle& triangle, double x, double y, double tip_z, const Env
     for (Point3& p : t) p[0] -= x, p[1] -= y, p[2] -= tip_z;
     if (std::max({t[0][2], t[1][2], t[2][2]}) <= e.low) return false;
     const double r = e.radius;
-    if (std::min({t[0][0], t[1][0], t[2][0]}) > r || std::max({t[0][0], t[1][0], t[2][0]}) < -r || std::min({t[0][1], t[1][1], t[2][1]}) > r ||
-        std::max({t[0][1], t[1][1], t[2][1]}) < -r)
+    if (std::min({t[0][0], t[1][0], t[2][0]}) > r || std::max({t[0][0], t[1][0], t[2][0]}) < -r ||
+        std::min({t[0][1], t[1][1], t[2][1]}) > r || std::max({t[0][1], t[1][1], t[2][1]}) < -r)
         return false;
     auto here = [&](const Point3& p) {
         at = {p[0] + x, p[1] + y, p[2] + tip_z};
@@ -77,12 +78,14 @@ bool pokes(const Triangle& triangle, double x, double y, double tip_z, const Env
         const double over = p[2] - e.height(std::sqrt(d2));
         if (over > highest) highest = over, corner = &p;
     }
-    // Over the facet's plane the height is greatest uphill of the axis, where the under side is as steep as the plane.
+    // Over the facet's plane the height is greatest uphill of the axis, where the under side is as steep as
+    // the plane.
     const double ux = t[1][0] - t[0][0], uy = t[1][1] - t[0][1], uz = t[1][2] - t[0][2];
     const double vx = t[2][0] - t[0][0], vy = t[2][1] - t[0][1], vz = t[2][2] - t[0][2];
     const double nz = ux * vy - uy * vx;
     if (nz != 0) {
-        const double gx = -(uy * vz - uz * vy) / nz, gy = -(uz * vx - ux * vz) / nz, steep = std::sqrt(gx * gx + gy * gy);
+        const double gx = -(uy * vz - uz * vy) / nz, gy = -(uz * vx - ux * vz) / nz,
+                     steep = std::sqrt(gx * gx + gy * gy);
         double px = 0, py = 0, d = 0;
         if (steep > 0) {
             const double sine = steep / std::sqrt(1 + steep * steep);
@@ -95,9 +98,11 @@ bool pokes(const Triangle& triangle, double x, double y, double tip_z, const Env
             inside = ((b[0] - a[0]) * (py - a[1]) - (b[1] - a[1]) * (px - a[0])) * nz >= 0;
         }
         if (inside) {
-            // A facet seen nearly edge-on has a slope of rounding only: no height outside its own range counts.
-            const double z = std::clamp(t[0][2] + gx * (px - t[0][0]) + gy * (py - t[0][1]), std::min({t[0][2], t[1][2], t[2][2]}),
-                                        std::max({t[0][2], t[1][2], t[2][2]}));
+            // A facet seen nearly edge-on has a slope of rounding only: no height outside its own range
+            // counts.
+            const double z =
+                std::clamp(t[0][2] + gx * (px - t[0][0]) + gy * (py - t[0][1]),
+                           std::min({t[0][2], t[1][2], t[2][2]}), std::max({t[0][2], t[1][2], t[2][2]}));
             if (z > e.height(d)) return here({px, py, z});
         }
     }
@@ -138,7 +143,9 @@ double nearest_over(const Point3& point, const Triangle& t, Point3& at) {
         const double vx = t[2][0] - t[0][0], vy = t[2][1] - t[0][1], vz = t[2][2] - t[0][2];
         const double nz = ux * vy - uy * vx;
         if (nz != 0) {
-            const double z = t[0][2] + ((uy * vz - uz * vy) * (t[0][0] - point[0]) + (uz * vx - ux * vz) * (t[0][1] - point[1])) / nz;
+            const double z = t[0][2] + ((uy * vz - uz * vy) * (t[0][0] - point[0]) +
+                                        (uz * vx - ux * vz) * (t[0][1] - point[1])) /
+                                           nz;
             at = {point[0], point[1], std::clamp(z, point[2], std::max({t[0][2], t[1][2], t[2][2]}))};
             return 0;
         }

@@ -68,13 +68,16 @@ public:
         if (members_.empty()) return;
         for (std::size_t r = row(ay); r <= row(by); ++r)
             for (std::size_t c = column(ax); c <= column(bx); ++c)
-                for (std::uint32_t m = starts_[r * columns_ + c]; m < starts_[r * columns_ + c + 1]; ++m) f(members_[m]);
+                for (std::uint32_t m = starts_[r * columns_ + c]; m < starts_[r * columns_ + c + 1]; ++m)
+                    f(members_[m]);
     }
 
 private:
     [[nodiscard]] std::size_t column(double x) const { return place(x - x0_, columns_); }
     [[nodiscard]] std::size_t row(double y) const { return place(y - y0_, rows_); }
-    [[nodiscard]] std::size_t place(double d, std::size_t n) const { return d <= 0 ? 0 : std::min(n - 1, static_cast<std::size_t>(d / cell_)); }
+    [[nodiscard]] std::size_t place(double d, std::size_t n) const {
+        return d <= 0 ? 0 : std::min(n - 1, static_cast<std::size_t>(d / cell_));
+    }
     double x0_ = 0, y0_ = 0, cell_ = 1;
     std::size_t columns_ = 0, rows_ = 0;
     std::vector<std::uint32_t> starts_, members_;
@@ -82,8 +85,9 @@ private:
 
 using Interval = std::pair<double, double>;
 
-/// Where a point that runs from `from` along the unit vector `along` is nearer than `radius` to a segment: it is in the convex hull of two
-/// discs, so this is one interval, the hull of what the discs and the rectangle between them give.
+/// Where a point that runs from `from` along the unit vector `along` is nearer than `radius` to a segment: it
+/// is in the convex hull of two discs, so this is one interval, the hull of what the discs and the rectangle
+/// between them give.
 Interval near(P from, P along, const Segment& s, double radius) {
     Interval in{HUGE_VAL, -HUGE_VAL};
     auto take = [&](double low, double high) {
@@ -117,16 +121,20 @@ Interval near(P from, P along, const Segment& s, double radius) {
 
 }  // namespace
 
-PrintedAccessibility printed_accessibility(const Loops& section, double radius, double weight, std::span<const std::uint8_t> left_out, double touch) {
-    if (!(radius > 0) || !std::isfinite(radius)) throw Error(ErrorKind::usage, "access.printed", "the tool's radius is not over 0");
+PrintedAccessibility printed_accessibility(const Loops& section, double radius, double weight,
+                                           std::span<const std::uint8_t> left_out, double touch) {
+    if (!(radius > 0) || !std::isfinite(radius))
+        throw Error(ErrorKind::usage, "access.printed", "the tool's radius is not over 0");
     if (!left_out.empty() && left_out.size() != section.points.size())
-        throw Error(ErrorKind::usage, "access.printed", "left_out has another length than the section's points");
+        throw Error(ErrorKind::usage, "access.printed",
+                    "left_out has another length than the section's points");
     PrintedAccessibility result;
     result.weight = weight;
     std::vector<Segment> edges;
     for (std::size_t l = 0; l < section.size(); ++l) {
         const auto loop = section.loop(l);
-        for (std::size_t i = 0; i < loop.size(); ++i) edges.push_back({to_p(loop[i]), to_p(loop[(i + 1) % loop.size()])});
+        for (std::size_t i = 0; i < loop.size(); ++i)
+            edges.push_back({to_p(loop[i]), to_p(loop[(i + 1) % loop.size()])});
     }
     const Cells cells(edges, radius);
     std::vector<Interval> lost;
@@ -139,22 +147,25 @@ PrintedAccessibility printed_accessibility(const Loops& section, double radius, 
             const double whole = length(d);
             if (!(whole > 0)) continue;
             result.all += whole;
-            // Solid is on the left, so a corner that turns right is concave; it takes R/tan(θ/2) of both its edges, θ = π − turn.
+            // Solid is on the left, so a corner that turns right is concave; it takes R/tan(θ/2) of both its
+            // edges, θ = π − turn.
             auto corner = [&](P in, P out) {
                 const double turn = -std::atan2(cross(in, out), dot(in, out));
                 return turn > 0 ? radius * std::tan(turn / 2) : 0;
             };
             const Segment &before = edges[first + (i + n - 1) % n], &after = edges[first + (i + 1) % n];
-            const double from = std::min(whole, corner(before.b - before.a, d)), to = std::max(from, whole - corner(d, after.b - after.a));
+            const double from = std::min(whole, corner(before.b - before.a, d)),
+                         to = std::max(from, whole - corner(d, after.b - after.a));
             result.corners += whole - (to - from);
             if (!(to > from)) continue;
             // The tool's centre runs beside the edge.
             const P along{d.x / whole, d.y / whole}, out{along.y, -along.x};
             const P centre{e.a.x + radius * out.x, e.a.y + radius * out.y};
-            const P p{centre.x + from * along.x, centre.y + from * along.y}, q{centre.x + to * along.x, centre.y + to * along.y};
+            const P p{centre.x + from * along.x, centre.y + from * along.y},
+                q{centre.x + to * along.x, centre.y + to * along.y};
             lost.clear();
-            cells.visit(std::min(p.x, q.x) - radius, std::min(p.y, q.y) - radius, std::max(p.x, q.x) + radius, std::max(p.y, q.y) + radius,
-                        [&](std::uint32_t k) {
+            cells.visit(std::min(p.x, q.x) - radius, std::min(p.y, q.y) - radius, std::max(p.x, q.x) + radius,
+                        std::max(p.y, q.y) + radius, [&](std::uint32_t k) {
                             if (k == first + i) return;
                             Interval in = near(centre, along, edges[k], radius - touch);
                             in = {std::max(in.first, from), std::min(in.second, to)};
@@ -187,7 +198,8 @@ std::vector<std::uint8_t> undercut_edges(MeshView mesh, double z, const Loops& s
     std::vector<Segment> cuts;
     for (const Index3& f : mesh.facets) {
         std::array<std::array<double, 3>, 3> p;
-        for (int k = 0; k < 3; ++k) p[k] = {mesh.vertices[f[k]].x, mesh.vertices[f[k]].y, mesh.vertices[f[k]].z};
+        for (int k = 0; k < 3; ++k)
+            p[k] = {mesh.vertices[f[k]].x, mesh.vertices[f[k]].y, mesh.vertices[f[k]].z};
         const auto [low, high] = std::minmax({p[0][2], p[1][2], p[2][2]});
         if (low > z || high < z || low == high) continue;
         const double ux = p[1][0] - p[0][0], uy = p[1][1] - p[0][1], uz = p[1][2] - p[0][2];
@@ -210,7 +222,8 @@ std::vector<std::uint8_t> undercut_edges(MeshView mesh, double z, const Loops& s
     for (std::size_t l = 0; l < section.size(); ++l) {
         const auto loop = section.loop(l);
         for (std::size_t i = 0; i < loop.size(); ++i) {
-            const P a = to_p(loop[i]), b = to_p(loop[(i + 1) % loop.size()]), m{(a.x + b.x) / 2, (a.y + b.y) / 2};
+            const P a = to_p(loop[i]), b = to_p(loop[(i + 1) % loop.size()]),
+                    m{(a.x + b.x) / 2, (a.y + b.y) / 2};
             cells.visit(m.x - kSame, m.y - kSame, m.x + kSame, m.y + kSame, [&](std::uint32_t c) {
                 const P d = cuts[c].b - cuts[c].a, w = m - cuts[c].a;
                 const double dd = dot(d, d), t = dd > 0 ? std::clamp(dot(w, d) / dd, 0.0, 1.0) : 0;
@@ -223,10 +236,12 @@ std::vector<std::uint8_t> undercut_edges(MeshView mesh, double z, const Loops& s
 
 }  // namespace
 
-PrintedAccessibility printed_accessibility(Context& context, MeshView mesh, double z_low, double z_high, double radius, double weight, int sections) {
+PrintedAccessibility printed_accessibility(Context& context, MeshView mesh, double z_low, double z_high,
+                                           double radius, double weight, int sections) {
     sections = std::max(1, sections);
     std::vector<Plane> planes;
-    for (int i = 0; i < sections; ++i) planes.push_back({z_low + (z_high - z_low) * (i + 0.5) / sections, Side::above});
+    for (int i = 0; i < sections; ++i)
+        planes.push_back({z_low + (z_high - z_low) * (i + 0.5) / sections, Side::above});
     const std::vector<Section> cut = slice(context, mesh, planes);
     std::vector<PrintedAccessibility> parts(cut.size());
     parallel_each(context, cut.size(), [&](std::size_t i) {
@@ -235,7 +250,8 @@ PrintedAccessibility printed_accessibility(Context& context, MeshView mesh, doub
     });
     PrintedAccessibility sum;
     sum.weight = weight;
-    for (const PrintedAccessibility& part : parts) sum.all += part.all, sum.intersecting += part.intersecting, sum.corners += part.corners;
+    for (const PrintedAccessibility& part : parts)
+        sum.all += part.all, sum.intersecting += part.intersecting, sum.corners += part.corners;
     return sum;
 }
 

@@ -31,7 +31,9 @@ struct P2 {
 Point3 to_point(const Vec3f& v) { return {v.x, v.y, v.z}; }
 Point3 sub(const Point3& a, const Point3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Point3 between(const Point3& a, const Point3& b, double t) { return {a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t}; }
+Point3 between(const Point3& a, const Point3& b, double t) {
+    return {a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t};
+}
 
 /// A convex polygon of at most five corners: a triangle cut by two horizontal planes.
 struct Polygon {
@@ -64,12 +66,14 @@ double distance_2d(P2 p, P2 a, P2 b) {
 double cross_2d(P2 a, P2 b, P2 c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
 
 bool segments_cross(P2 a, P2 b, P2 c, P2 d) {
-    const double s1 = cross_2d(a, b, c), s2 = cross_2d(a, b, d), s3 = cross_2d(c, d, a), s4 = cross_2d(c, d, b);
+    const double s1 = cross_2d(a, b, c), s2 = cross_2d(a, b, d), s3 = cross_2d(c, d, a),
+                 s4 = cross_2d(c, d, b);
     return ((s1 > 0) != (s2 > 0)) && ((s3 > 0) != (s4 > 0));
 }
 
 bool contains_2d(const Polygon& poly, P2 q) {
-    // The box first: on a polygon seen edge-on all signs below are rounding, and could agree far along its line.
+    // The box first: on a polygon seen edge-on all signs below are rounding, and could agree far along its
+    // line.
     double x0 = kInfinity, x1 = -kInfinity, y0 = kInfinity, y1 = -kInfinity;
     for (int i = 0; i < poly.n; ++i) {
         x0 = std::min(x0, poly.p[i][0]), x1 = std::max(x1, poly.p[i][0]);
@@ -90,12 +94,13 @@ bool contains_2d(const Polygon& poly, P2 q) {
 /// Horizontal distance between a segment (or a point) and a convex polygon; infinite for an empty one.
 double distance_2d(const Polygon& poly, P2 a, P2 b) {
     if (poly.n == 0) return kInfinity;
-    // Points exactly on an edge line give s == 0 for one edge only, which contains_2d tolerates: their distance is 0 or
-    // is measured against the edges anyway.
+    // Points exactly on an edge line give s == 0 for one edge only, which contains_2d tolerates: their
+    // distance is 0 or is measured against the edges anyway.
     if (poly.n >= 3 && contains_2d(poly, a)) {
         double area = 0;
         for (int i = 1; i + 1 < poly.n; ++i)
-            area += cross_2d({poly.p[0][0], poly.p[0][1]}, {poly.p[i][0], poly.p[i][1]}, {poly.p[i + 1][0], poly.p[i + 1][1]});
+            area += cross_2d({poly.p[0][0], poly.p[0][1]}, {poly.p[i][0], poly.p[i][1]},
+                             {poly.p[i + 1][0], poly.p[i + 1][1]});
         if (area != 0) return 0;
     }
     const bool moving = a.x != b.x || a.y != b.y;
@@ -111,10 +116,11 @@ double distance_2d(const Polygon& poly, P2 a, P2 b) {
     return best;
 }
 
-/// Distance between a point's upward ray and a triangle, and its vector (from triangle to ray), whose z is never negative.
-/// Over the triangle both the distance from the point and that from the ray are convex, and they have one gradient where the
-/// triangle is not above the point: if the nearest point to the point lies there, it is the nearest to the ray too.
-/// Otherwise the nearest to the ray is as high as the point or higher, and is measured horizontally.
+/// Distance between a point's upward ray and a triangle, and its vector (from triangle to ray), whose z is
+/// never negative. Over the triangle both the distance from the point and that from the ray are convex, and
+/// they have one gradient where the triangle is not above the point: if the nearest point to the point lies
+/// there, it is the nearest to the ray too. Otherwise the nearest to the ray is as high as the point or
+/// higher, and is measured horizontally.
 struct RayDistance {
     double d;
     Point3 vector;
@@ -147,7 +153,8 @@ RayDistance ray_distance(const Point3& c, const Triangle& t) {
     return {std::sqrt(best), v};
 }
 
-/// Calls fn(triangle) for the parts of a facet below z (one or two triangles), none when no corner lies below.
+/// Calls fn(triangle) for the parts of a facet below z (one or two triangles), none when no corner lies
+/// below.
 template <class Fn>
 void below(const std::array<Vec3f, 3>& facet, double z, Fn&& fn) {
     int under = 0;
@@ -164,9 +171,9 @@ void below(const std::array<Vec3f, 3>& facet, double z, Fn&& fn) {
     for (int i = 1; i + 1 < poly.n; ++i) fn(Triangle{poly.p[0], poly.p[i], poly.p[i + 1]});
 }
 
-/// Least distance over the piece from a to b (ray starts) to a triangle, and where; looks only for less than `limit`.
-/// The distance to a convex set is convex along a line: tangents at both ends of a bracket bound it from below, their
-/// crossing is the next place to try (Kelley's cutting planes in one dimension).
+/// Least distance over the piece from a to b (ray starts) to a triangle, and where; looks only for less than
+/// `limit`. The distance to a convex set is convex along a line: tangents at both ends of a bracket bound it
+/// from below, their crossing is the next place to try (Kelley's cutting planes in one dimension).
 struct Closest {
     double d;
     double t;
@@ -235,13 +242,16 @@ Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& tri, double
     if (a[2] == b[2]) {
         const double depth = deepest_at(a, b, lowest, best);
         if (depth <= best) return {best, 0};
-        // The place along the piece: the axis there is nearest to what stands above the cylinder's shrunken floor.
+        // The place along the piece: the axis there is nearest to what stands above the cylinder's shrunken
+        // floor.
         const Polygon above = clip_z(tri, lowest + depth, true);
         double low = 0, high = 1;
         for (int i = 0; i < 40; ++i) {
             const double m1 = low + (high - low) / 3, m2 = high - (high - low) / 3;
             const Point3 p = between(a, b, m1), q = between(a, b, m2);
-            if (distance_2d(above, {p[0], p[1]}, {p[0], p[1]}) <= distance_2d(above, {q[0], q[1]}, {q[0], q[1]})) high = m2;
+            if (distance_2d(above, {p[0], p[1]}, {p[0], p[1]}) <=
+                distance_2d(above, {q[0], q[1]}, {q[0], q[1]}))
+                high = m2;
             else low = m1;
         }
         return {depth, (low + high) / 2};
@@ -265,7 +275,8 @@ Deepest piece_depth(const Point3& a, const Point3& b, const Polygon& tri, double
     return result;
 }
 
-/// Whether the mesh is known to close: every edge is gone along as often one way as the other, so that the facets together wind around nothing.
+/// Whether the mesh is known to close: every edge is gone along as often one way as the other, so that the
+/// facets together wind around nothing.
 bool closes(Context& context, MeshView mesh) {
     if (mesh.neighbours.size() != mesh.size()) return false;
     return parallel_reduce(
@@ -273,7 +284,8 @@ bool closes(Context& context, MeshView mesh) {
         [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
                 for (std::size_t k = 0; k < 3; ++k)
-                    if (mesh.neighbours[i][k] == kNoFacet && mesh.facets[i][k] != mesh.facets[i][(k + 1) % 3]) return false;
+                    if (mesh.neighbours[i][k] == kNoFacet && mesh.facets[i][k] != mesh.facets[i][(k + 1) % 3])
+                        return false;
             return true;
         },
         [](bool a, bool b) { return a && b; });
@@ -285,12 +297,14 @@ void StandingPart::Facets::set(std::size_t i, const Facet& facet) {
     EightFacets& e = eights_[i / 8];
     const std::size_t k = i % 8;
     const auto& [a, b, c] = facet.v;
-    e.x0[k] = a.x, e.y0[k] = a.y, e.z0[k] = a.z, e.x1[k] = b.x, e.y1[k] = b.y, e.z1[k] = b.z, e.x2[k] = c.x, e.y2[k] = c.y, e.z2[k] = c.z;
+    e.x0[k] = a.x, e.y0[k] = a.y, e.z0[k] = a.z, e.x1[k] = b.x, e.y1[k] = b.y, e.z1[k] = b.z, e.x2[k] = c.x,
+    e.y2[k] = c.y, e.z2[k] = c.z;
 }
 
 void StandingPart::Facets::end() {
     constexpr float none = std::numeric_limits<float>::quiet_NaN();
-    for (std::size_t i = size_; i < 8 * eights_.size(); ++i) set(i, {{Vec3f{none, none, none}, {none, none, none}, {none, none, none}}});
+    for (std::size_t i = size_; i < 8 * eights_.size(); ++i)
+        set(i, {{Vec3f{none, none, none}, {none, none, none}, {none, none, none}}});
 }
 
 StandingPart::StandingPart(Context& context, MeshView mesh) {
@@ -299,13 +313,16 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
     closed_ = closes(context, mesh);
     const MortonGrid grid(box_);
     // A key is as much of the Morton number as fits beside the facet's own.
-    const unsigned facet_bits = static_cast<unsigned>(std::bit_width(std::max<std::size_t>(n, 1))), drop = facet_bits - 1;  // of the number's 63 bits
+    const unsigned facet_bits = static_cast<unsigned>(std::bit_width(std::max<std::size_t>(n, 1))),
+                   drop = facet_bits - 1;  // of the number's 63 bits
     constexpr unsigned part_bits = 12;
     auto key_of = [&](std::size_t i) {
         const Index3& f = mesh.facets[i];
         const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
         auto middle = [](float u, float v, float w) { return (double{u} + v + w) / 3; };
-        return grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)) >> drop << facet_bits | i;
+        return grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)) >>
+                   drop << facet_bits |
+               i;
     };
     auto part_of = [](std::uint64_t key) { return static_cast<std::size_t>(key >> (64 - part_bits)); };
     RawArray<std::uint64_t> keys(n), in_order(n);  // sorted, and as the facets come
@@ -320,7 +337,8 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
         [&](std::uint64_t, std::uint64_t) { return std::pair(keys.data(), std::uint64_t{n}); },
         [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
             parallel_for(context, last - first, 8, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t i = begin; i < end; ++i) std::sort(keys.data() + starts[i], keys.data() + starts[i + 1]);
+                for (std::size_t i = begin; i < end; ++i)
+                    std::sort(keys.data() + starts[i], keys.data() + starts[i + 1]);
             });
         });
     in_order = {};
@@ -370,7 +388,8 @@ StandingPart::Within::Within(const Point3& from, const Point3& to) {
 }
 
 // Written with vectors of eight, since compilers take such a short loop apart into smaller ones.
-SLABWRIGHT_WIDE void StandingPart::overlapping(const ManyNodes& many, const Within& box, unsigned* __restrict kept) {
+SLABWRIGHT_WIDE void StandingPart::overlapping(const ManyNodes& many, const Within& box,
+                                               unsigned* __restrict kept) {
     using Eight [[gnu::vector_size(32)]] = float;
     using Signs [[gnu::vector_size(32)]] = std::int32_t;
     const Eight none{}, low_x = none + box.low[0], low_y = none + box.low[1], low_z = none + box.low[2];
@@ -379,9 +398,12 @@ SLABWRIGHT_WIDE void StandingPart::overlapping(const ManyNodes& many, const With
         const Nodes& n = *many.eights[i];
         static_assert(sizeof(n.x0) == sizeof(Eight));
         Eight x0, y0, z0, x1, y1, z1;
-        std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
-        std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
-        const Signs signs = (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
+        std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)),
+            std::memcpy(&z0, n.z0.data(), sizeof(Eight));
+        std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)),
+            std::memcpy(&z1, n.z1.data(), sizeof(Eight));
+        const Signs signs =
+            (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
         const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
         std::array<std::uint64_t, 4> pairs;
         std::memcpy(pairs.data(), &bits, sizeof(pairs));
@@ -394,12 +416,14 @@ namespace {
 /// Asks for what is looked at soon.
 template <class T>
 void expect(const T& what) {
-    for (std::size_t byte = 0; byte < sizeof(T); byte += 64) __builtin_prefetch(static_cast<const char*>(static_cast<const void*>(&what)) + byte);
+    for (std::size_t byte = 0; byte < sizeof(T); byte += 64)
+        __builtin_prefetch(static_cast<const char*>(static_cast<const void*>(&what)) + byte);
 }
 }  // namespace
 
-/// Visits, in the order of the tree, the facets [first, last) of every node whose bit is 1 in what choose(eights, kept) says of up to eight times
-/// eight nodes of one level at a time: looking at them costs little more than calling for it.
+/// Visits, in the order of the tree, the facets [first, last) of every node whose bit is 1 in what
+/// choose(eights, kept) says of up to eight times eight nodes of one level at a time: looking at them costs
+/// little more than calling for it.
 template <class Choose, class Visit>
 void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
     if (facets_.empty()) return;
@@ -451,7 +475,8 @@ void StandingPart::walk(Enter&& enter, Visit&& visit) const {
             for (std::size_t i = 0; i < many.count; ++i) {
                 const Nodes& nodes = *many.eights[i];
                 kept[i] = 0;
-                for (unsigned k = 0; k < kFan; ++k) kept[i] |= static_cast<unsigned>(nodes.x0[k] <= nodes.x1[k] && enter(nodes[k])) << k;
+                for (unsigned k = 0; k < kFan; ++k)
+                    kept[i] |= static_cast<unsigned>(nodes.x0[k] <= nodes.x1[k] && enter(nodes[k])) << k;
             }
         },
         [&](std::size_t first, std::size_t last) {
@@ -469,7 +494,8 @@ void StandingPart::walk_within(const Within& box, Visit&& visit) const {
 }
 
 namespace {
-/// A straight motion seen from above. Boxes and facets are measured in the frame of its direction, where their extents bound their distance.
+/// A straight motion seen from above. Boxes and facets are measured in the frame of its direction, where
+/// their extents bound their distance.
 class WayInPlan {
 public:
     WayInPlan(const Point3& a, const Point3& b) : ax_(a[0]), ay_(a[1]) {
@@ -480,10 +506,13 @@ public:
     /// Square of a lower bound of the distance to a box, and never more than a hair above it by rounding.
     template <class NodeT>
     [[nodiscard]] double distance2(const NodeT& n) const {
-        const double hx = 0.5 * (static_cast<double>(n.x1) - n.x0), hy = 0.5 * (static_cast<double>(n.y1) - n.y0);
-        const double cx = 0.5 * (static_cast<double>(n.x1) + n.x0) - ax_, cy = 0.5 * (static_cast<double>(n.y1) + n.y0) - ay_;
+        const double hx = 0.5 * (static_cast<double>(n.x1) - n.x0),
+                     hy = 0.5 * (static_cast<double>(n.y1) - n.y0);
+        const double cx = 0.5 * (static_cast<double>(n.x1) + n.x0) - ax_,
+                     cy = 0.5 * (static_cast<double>(n.y1) + n.y0) - ay_;
         const double along = cx * ux_ + cy * uy_, across = cy * ux_ - cx * uy_;
-        const double h_along = std::abs(ux_) * hx + std::abs(uy_) * hy, h_across = std::abs(uy_) * hx + std::abs(ux_) * hy;
+        const double h_along = std::abs(ux_) * hx + std::abs(uy_) * hy,
+                     h_across = std::abs(uy_) * hx + std::abs(ux_) * hy;
         return gaps2(along - h_along, along + h_along, across - h_across, across + h_across);
     }
     [[nodiscard]] double distance2(const std::array<Vec3f, 3>& v) const {
@@ -514,13 +543,14 @@ struct Cutter {
     [[nodiscard]] int pieces(const Point3& from, const Point3& to) const {
         const Point3 span = sub(to, from);
         const double length = std::sqrt(dot(span, span));
-        const double count = ball() ? std::max(length / StandingPart::kSpan, std::abs(span[2]) / StandingPart::kRise)
-                                    : length / (from[2] == to[2] ? StandingPart::kSpan : StandingPart::kPiece);
+        const double count =
+            ball() ? std::max(length / StandingPart::kSpan, std::abs(span[2]) / StandingPart::kRise)
+                   : length / (from[2] == to[2] ? StandingPart::kSpan : StandingPart::kPiece);
         return std::max(1, static_cast<int>(std::ceil(count)));
     }
-    /// Depth with the tip under the cap, the section of the part by the layer's top: that of the ball's centre below it, or of the cylinder's
-    /// floor. On a piece it is greatest at an end or where the axis crosses the cap's outline, and the outline is an edge of facets cut
-    /// at the top.
+    /// Depth with the tip under the cap, the section of the part by the layer's top: that of the ball's
+    /// centre below it, or of the cylinder's floor. On a piece it is greatest at an end or where the axis
+    /// crosses the cap's outline, and the outline is an edge of facets cut at the top.
     [[nodiscard]] double under_cap(const Point3& tip) const {
         return ball() ? radius - std::max(0.0, tip[2] + radius - top) : std::min(radius, top - tip[2]);
     }
@@ -528,7 +558,8 @@ struct Cutter {
 
 /// A piece of a motion.
 struct Piece {
-    Piece(const Point3& from, const Point3& to) : a(from), b(to), lowest(std::min(from[2], to[2])), way(from, to) {}
+    Piece(const Point3& from, const Point3& to)
+        : a(from), b(to), lowest(std::min(from[2], to[2])), way(from, to) {}
     Point3 a, b;
     double lowest;
     WayInPlan way;
@@ -551,7 +582,8 @@ void meet(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& 
         a[2] += cutter.radius, b[2] += cutter.radius;
         below(facet, cutter.top, [&](const Triangle& t) {
             const Closest c = piece_distance(a, b, t, cutter.radius - result.depth);
-            if (cutter.radius - c.d > result.depth) result = {cutter.radius - c.d, between(piece.a, piece.b, c.t), true};
+            if (cutter.radius - c.d > result.depth)
+                result = {cutter.radius - c.d, between(piece.a, piece.b, c.t), true};
         });
         return;
     }
@@ -568,10 +600,13 @@ void meet(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& 
     if (d.depth > result.depth) result = {d.depth, between(piece.a, piece.b, d.t), true};
 }
 
-/// One motion. @param covered whether there is part just under the layer's top at a place @param look raises the result by what is near a piece
+/// One motion. @param covered whether there is part just under the layer's top at a place @param look raises
+/// the result by what is near a piece
 template <class Covered, class Look>
-Penetration motion_depth(const Cutter& cutter, const Point3& from, const Point3& to, double at_least, Covered&& covered, Look&& look) {
-    if (cutter.radius <= at_least || std::min(from[2], to[2]) >= cutter.top - at_least) return {0, from, false};
+Penetration motion_depth(const Cutter& cutter, const Point3& from, const Point3& to, double at_least,
+                         Covered&& covered, Look&& look) {
+    if (cutter.radius <= at_least || std::min(from[2], to[2]) >= cutter.top - at_least)
+        return {0, from, false};
     Penetration result{at_least, from, false};
     const int pieces = cutter.pieces(from, to);
     auto under_cap = [&](const Point3& tip) {
@@ -627,19 +662,22 @@ SLABWRIGHT_WIDE void StandingPart::squares(const Nodes& n, const Away& from, std
 
 SLABWRIGHT_WIDE void StandingPart::boxes(const EightFacets& f, Nodes& boxes) {
     using Floats [[gnu::vector_size(32)]] = float;
-    const auto extent = [](const std::array<float, 8>& a, const std::array<float, 8>& b, const std::array<float, 8>& c, std::array<float, 8>& low,
+    const auto extent = [](const std::array<float, 8>& a, const std::array<float, 8>& b,
+                           const std::array<float, 8>& c, std::array<float, 8>& low,
                            std::array<float, 8>& high) {
         Floats u, v, w;
-        std::memcpy(&u, a.data(), sizeof(u)), std::memcpy(&v, b.data(), sizeof(v)), std::memcpy(&w, c.data(), sizeof(w));
+        std::memcpy(&u, a.data(), sizeof(u)), std::memcpy(&v, b.data(), sizeof(v)),
+            std::memcpy(&w, c.data(), sizeof(w));
         Floats least = u < v ? u : v, most = u > v ? u : v;
         least = least < w ? least : w, most = most > w ? most : w;
         std::memcpy(low.data(), &least, sizeof(least)), std::memcpy(high.data(), &most, sizeof(most));
     };
-    extent(f.x0, f.x1, f.x2, boxes.x0, boxes.x1), extent(f.y0, f.y1, f.y2, boxes.y0, boxes.y1), extent(f.z0, f.z1, f.z2, boxes.z0, boxes.z1);
+    extent(f.x0, f.x1, f.x2, boxes.x0, boxes.x1), extent(f.y0, f.y1, f.y2, boxes.y0, boxes.y1),
+        extent(f.z0, f.z1, f.z2, boxes.z0, boxes.z1);
 }
 
-/// Visits the facets, and which they are, whose box is nearer than limit(), a square, the nearer of sibling nodes first, so that the limit falls
-/// early. Ties keep the order of the tree.
+/// Visits the facets, and which they are, whose box is nearer than limit(), a square, the nearer of sibling
+/// nodes first, so that the limit falls early. Ties keep the order of the tree.
 template <class Limit, class Visit>
 void StandingPart::walk_nearest(const Away& from, Limit&& limit, Visit&& visit) const {
     struct Item {
@@ -673,35 +711,43 @@ void StandingPart::walk_nearest(const Away& from, Limit&& limit, Visit&& visit) 
         Nodes around;
         boxes(facets_.eight(item.index), around);
         squares(around, from, d);
-        for (std::size_t first = item.index * kFan, k = 0; first + k < std::min(facets_.size(), first + kFan); ++k)
+        for (std::size_t first = item.index * kFan, k = 0; first + k < std::min(facets_.size(), first + kFan);
+             ++k)
             if (d[k] < limit()) visit(facets_[first + k], static_cast<std::uint32_t>(first + k));
     }
 }
 
-Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+Penetration StandingPart::ball(double z_top, const Point3& from, const Point3& to, double radius,
+                               double at_least) const {
     return depth_of(Form::ball, z_top, from, to, radius, at_least);
 }
 
-Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+Penetration StandingPart::cylinder(double z_top, const Point3& from, const Point3& to, double radius,
+                                   double at_least) const {
     return depth_of(Form::cylinder, z_top, from, to, radius, at_least);
 }
 
-Penetration StandingPart::depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const {
+Penetration StandingPart::depth_of(Form form, double z_top, const Point3& from, const Point3& to,
+                                   double radius, double at_least) const {
     const Cutter cutter{form, radius, z_top - kSheet};
     return motion_depth(
         cutter, from, to, at_least, [&](const Point3& tip) { return covered(tip[0], tip[1], cutter.top); },
         [&](const Piece& piece, Penetration& result) {
-            walk([&](const Node& n) { return n.z0 < cutter.top && near(cutter, piece, n, n.z1, result.depth); },
-                 [&](const Facet& f) { meet(cutter, piece, f.v, result); });
+            walk(
+                [&](const Node& n) {
+                    return n.z0 < cutter.top && near(cutter, piece, n, n.z1, result.depth);
+                },
+                [&](const Facet& f) { meet(cutter, piece, f.v, result); });
         });
 }
 
-/// A stretch of a row of motions, or one piece, taken as one straight way that nothing of it is far from, and the facets it may meet.
+/// A stretch of a row of motions, or one piece, taken as one straight way that nothing of it is far from, and
+/// the facets it may meet.
 struct StandingPart::Stretch {
     static constexpr std::size_t kLong = 512, kShort = 12, kCalm = 8;  // motions; stretches
     static constexpr double kLength = 2.5, kSlack = 0.2;               // mm: of short ones
     static constexpr double kBow = 0.5;                                // mm: of what runs along a circle
-    static constexpr std::size_t kFew = 32;                            // facets: a long one that meets more is taken in parts
+    static constexpr std::size_t kFew = 32;  // facets: a long one that meets more is taken in parts
 
     std::size_t first = 0, last = 0;
     Point3 from{}, to{};   // the way
@@ -717,7 +763,8 @@ struct StandingPart::Stretch {
         slack = 0;
         for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(a[k], b[k]), high[k] = std::max(a[k], b[k]);
     }
-    /// Motions [begin, end), each of which begins where the one before ends. @param flat the way is level, so that what is over it is no slack
+    /// Motions [begin, end), each of which begins where the one before ends. @param flat the way is level, so
+    /// that what is over it is no slack
     void take(std::span<const Motion> motions, std::size_t begin, std::size_t end, bool flat) {
         first = begin, last = end;
         take(motions[begin].from, motions[end - 1].to);
@@ -725,12 +772,14 @@ struct StandingPart::Stretch {
         if (flat) a[2] = b[2] = 0;
         for (std::size_t m = begin; m + 1 < end; ++m) {
             Point3 p = motions[m].to;
-            for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
+            for (std::size_t k = 0; k < 3; ++k)
+                low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
             if (flat) p[2] = 0;
             const Point3 off = sub(p, closest_on_segment(p, a, b));
             slack = std::max(slack, dot(off, off));
         }
-        // The distance from the way is convex, so that a motion is nowhere farther from it than where it begins or ends.
+        // The distance from the way is convex, so that a motion is nowhere farther from it than where it
+        // begins or ends.
         if (slack > 0) slack = std::sqrt(slack) + kHair;
         if (flat && end - begin > 1) sink();
     }
@@ -739,7 +788,8 @@ struct StandingPart::Stretch {
 };
 
 // Written with vectors of eight, as overlapping() is.
-SLABWRIGHT_WIDE void StandingPart::around(const ManyNodes& many, const WayAround& way, const Within& box, unsigned* __restrict kept) {
+SLABWRIGHT_WIDE void StandingPart::around(const ManyNodes& many, const WayAround& way, const Within& box,
+                                          unsigned* __restrict kept) {
     using Eight [[gnu::vector_size(32)]] = float;
     using Signs [[gnu::vector_size(32)]] = std::int32_t;
     const WayAround w = way;
@@ -750,16 +800,23 @@ SLABWRIGHT_WIDE void StandingPart::around(const ManyNodes& many, const WayAround
     for (std::size_t i = 0; i < many.count; ++i) {
         const Nodes& n = *many.eights[i];
         Eight x0, y0, z0, x1, y1, z1;
-        std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)), std::memcpy(&z0, n.z0.data(), sizeof(Eight));
-        std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)), std::memcpy(&z1, n.z1.data(), sizeof(Eight));
-        const Signs within = (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
-        const Eight hx = (x1 - x0) * 0.5F, hy = (y1 - y0) * 0.5F, cx = (x1 + x0) * 0.5F - w.ax, cy = (y1 + y0) * 0.5F - w.ay;
-        const Eight along = cx * w.ux + cy * w.uy, aside = cy * w.ux - cx * w.uy, across = aside > none ? aside : -aside;
-        const Eight before = -along - (hx * sx + hy * sy), behind = along - w.length - (hx * sx + hy * sy), beside = across - (hx * sy + hy * sx);
+        std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)),
+            std::memcpy(&z0, n.z0.data(), sizeof(Eight));
+        std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)),
+            std::memcpy(&z1, n.z1.data(), sizeof(Eight));
+        const Signs within =
+            (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
+        const Eight hx = (x1 - x0) * 0.5F, hy = (y1 - y0) * 0.5F, cx = (x1 + x0) * 0.5F - w.ax,
+                    cy = (y1 + y0) * 0.5F - w.ay;
+        const Eight along = cx * w.ux + cy * w.uy, aside = cy * w.ux - cx * w.uy,
+                    across = aside > none ? aside : -aside;
+        const Eight before = -along - (hx * sx + hy * sy), behind = along - w.length - (hx * sx + hy * sy),
+                    beside = across - (hx * sy + hy * sx);
         Eight l = before > behind ? before : behind, high = z1 < top ? z1 : top, under = w.lowest - high;
         l = l > none ? l : none, under = under > none ? under : none;
         const Eight c = beside > none ? beside : none, u = under * w.upwards;
-        const Signs signs = within & (z0 < top) & (z1 > none + w.above) & (l * l + c * c + u * u < none + w.reach2);
+        const Signs signs =
+            within & (z0 < top) & (z1 > none + w.above) & (l * l + c * c + u * u < none + w.reach2);
         const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
         std::array<std::uint64_t, 4> pairs;
         std::memcpy(pairs.data(), &bits, sizeof(pairs));
@@ -770,9 +827,14 @@ SLABWRIGHT_WIDE void StandingPart::around(const ManyNodes& many, const WayAround
 
 namespace {
 /// The way of a cutter that is asked for depths above `depth`. @param lowest of the tip
-NearWay asking(const Cutter& cutter, const Point3& from, const Point3& to, double lowest, double depth, double slack) {
+NearWay asking(const Cutter& cutter, const Point3& from, const Point3& to, double lowest, double depth,
+               double slack) {
     const double reach = cutter.radius - depth + kHair, up = cutter.ball() ? cutter.radius : depth;
-    return {{from[0], from[1], from[2] + up}, {to[0], to[1], to[2] + up}, reach, lowest + (cutter.ball() ? cutter.radius - reach : depth), slack};
+    return {{from[0], from[1], from[2] + up},
+            {to[0], to[1], to[2] + up},
+            reach,
+            lowest + (cutter.ball() ? cutter.radius - reach : depth),
+            slack};
 }
 }  // namespace
 
@@ -780,27 +842,36 @@ NearWay asking(const Cutter& cutter, const Point3& from, const Point3& to, doubl
 struct StandingPart::Search {
     Cutter cutter{};
     std::vector<unsigned char> keep;
-    std::size_t many = Stretch::kShort, calm = 0;  // motions that the next stretch takes if they are free; free stretches before it takes more
-    std::span<const Chords> arcs;                  // that have not ended
+    std::size_t
+        many = Stretch::kShort,
+        calm =
+            0;  // motions that the next stretch takes if they are free; free stretches before it takes more
+    std::span<const Chords> arcs;  // that have not ended
 };
 
-/// Finds the facets that a stretch may be deeper than `depth` in. @return false when they would be more than `most`: they are not all found then
+/// Finds the facets that a stretch may be deeper than `depth` in. @return false when they would be more than
+/// `most`: they are not all found then
 bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t most) const {
     const Cutter& cutter = search.cutter;
-    // What begins or ends above the layer's top: what is far from it when sunk has no outline of the cap anywhere above or below it.
+    // What begins or ends above the layer's top: what is far from it when sunk has no outline of the cap
+    // anywhere above or below it.
     if (s.high[2] >= cutter.top - depth) s.sink();
     const Point3 &from = s.from, &to = s.to;
     const NearWay way = asking(cutter, from, to, s.low[2], depth, s.slack);
     const double length = std::hypot(to[0] - from[0], to[1] - from[1]);
     double largest = length + std::max({std::abs(from[0]), std::abs(from[1]), std::abs(s.low[2])});
-    for (const float v : {box_.min.x, box_.min.y, box_.min.z, box_.max.x, box_.max.y, box_.max.z}) largest = std::max<double>(largest, std::abs(v));
+    for (const float v : {box_.min.x, box_.min.y, box_.min.z, box_.max.x, box_.max.y, box_.max.z})
+        largest = std::max<double>(largest, std::abs(v));
     const double reach = way.reach + s.slack + 1e-5 * (largest + cutter.radius);
-    const WayAround place(way, cutter.ball(), s.low[2] + (cutter.ball() ? cutter.radius : 0), cutter.top, reach);
+    const WayAround place(way, cutter.ball(), s.low[2] + (cutter.ball() ? cutter.radius : 0), cutter.top,
+                          reach);
     std::optional<LevelWay> level = s.arc;
-    if (!level && cutter.ball() && way.a[2] == way.b[2]) level.emplace(way.a, way.b, cutter.top, way.reach + s.slack);
+    if (!level && cutter.ball() && way.a[2] == way.b[2])
+        level.emplace(way.a, way.b, cutter.top, way.reach + s.slack);
     const double lowest = s.low[2] + (cutter.ball() ? cutter.radius : depth);
-    const Within box({s.low[0] - way.reach, s.low[1] - way.reach, cutter.ball() ? lowest - way.reach : lowest},
-                     {s.high[0] + way.reach, s.high[1] + way.reach, cutter.top});
+    const Within box(
+        {s.low[0] - way.reach, s.low[1] - way.reach, cutter.ball() ? lowest - way.reach : lowest},
+        {s.high[0] + way.reach, s.high[1] + way.reach, cutter.top});
     s.terms.place(s.low, s.high, way.reach, cutter.ball(), cutter.top, cutter.ball() ? cutter.radius : depth);
     s.facets.clear();
     ManyEights many;
@@ -850,8 +921,10 @@ bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t 
     return all;
 }
 
-/// Finds a stretch of chords of one circle that begins with a motion, and its facets. @return false when there is none
-bool StandingPart::arc_from(Search& search, Stretch& s, std::span<const Motion> motions, std::size_t m, double depth) const {
+/// Finds a stretch of chords of one circle that begins with a motion, and its facets. @return false when
+/// there is none
+bool StandingPart::arc_from(Search& search, Stretch& s, std::span<const Motion> motions, std::size_t m,
+                            double depth) const {
     while (!search.arcs.empty() && search.arcs.front().last <= m) search.arcs = search.arcs.subspan(1);
     if (search.arcs.empty() || search.arcs.front().first > m) return false;
     const Chords& arc = search.arcs.front();
@@ -859,38 +932,46 @@ bool StandingPart::arc_from(Search& search, Stretch& s, std::span<const Motion> 
     const double z = from[2], chord = std::hypot(motions[m].to[0] - from[0], motions[m].to[1] - from[1]);
     // Parts of about one length that are not too far from straight.
     const double most = std::sqrt(8 * Stretch::kBow * arc.radius) / std::max(chord, kHair);
-    const std::size_t left = arc.last - m, parts = static_cast<std::size_t>(std::ceil(static_cast<double>(left) / std::clamp(most, 2.0, 1e6)));
+    const std::size_t left = arc.last - m, parts = static_cast<std::size_t>(std::ceil(
+                                               static_cast<double>(left) / std::clamp(most, 2.0, 1e6)));
     const std::size_t last = m + (left + parts - 1) / parts;
-    // Where the ends of a chord are from the centre, all of it is no farther than the one and no nearer than the other, less what the chord bows.
+    // Where the ends of a chord are from the centre, all of it is no farther than the one and no nearer than
+    // the other, less what the chord bows.
     double nearest = std::hypot(from[0] - arc.x, from[1] - arc.y), farthest = nearest, longest2 = 0;
     for (std::size_t k = m; k < last; ++k) {
         const Point3 &a = motions[k].from, &b = motions[k].to;
         if (b[2] != z || (k > m && a != motions[k - 1].to)) return false;
-        const double dx = b[0] - a[0], dy = b[1] - a[1], x = b[0] - arc.x, y = b[1] - arc.y, r = std::sqrt(x * x + y * y);
-        nearest = std::min(nearest, r), farthest = std::max(farthest, r), longest2 = std::max(longest2, dx * dx + dy * dy);
+        const double dx = b[0] - a[0], dy = b[1] - a[1], x = b[0] - arc.x, y = b[1] - arc.y,
+                     r = std::sqrt(x * x + y * y);
+        nearest = std::min(nearest, r), farthest = std::max(farthest, r),
+        longest2 = std::max(longest2, dx * dx + dy * dy);
     }
     nearest = std::sqrt(std::max(0.0, nearest * nearest - longest2 / 4));
     const double off = std::max(farthest - arc.radius, arc.radius - nearest);
     if (!(off < Stretch::kBow && nearest > 0)) return false;
     s.take(motions, m, last, false);
     Point3 about = motions[(m + last) / 2].from;
-    const double r = std::hypot(about[0] - arc.x, about[1] - arc.y), tx = (arc.y - about[1]) / r, ty = (about[0] - arc.x) / r;
+    const double r = std::hypot(about[0] - arc.x, about[1] - arc.y), tx = (arc.y - about[1]) / r,
+                 ty = (about[0] - arc.x) / r;
     double before = 0, after = 0, bow = off;
     const auto extend = [&](const Point3& p) {
         const double x = p[0] - about[0], y = p[1] - about[1], along = x * tx + y * ty;
-        before = std::max(before, -along), after = std::max(after, along), bow = std::max(bow, y * tx - x * ty + off);
+        before = std::max(before, -along), after = std::max(after, along),
+        bow = std::max(bow, y * tx - x * ty + off);
     };
     for (std::size_t k = m; k < last; ++k) extend(motions[k].to);
     extend(from);
     about[2] += search.cutter.radius;
-    s.arc.emplace(arc.x, arc.y, arc.radius, about, before, after, bow, search.cutter.top, search.cutter.radius - depth + off + kHair);
+    s.arc.emplace(arc.x, arc.y, arc.radius, about, before, after, bow, search.cutter.top,
+                  search.cutter.radius - depth + off + kHair);
     gather(search, s, depth, std::numeric_limits<std::size_t>::max());
     return true;
 }
 
-/// Finds a stretch that begins with a motion: as many as are free of the part, or a short one and its facets; or one motion whose pieces are to be
-/// looked at one by one, and returns false.
-bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Motion> motions, std::size_t m, double depth) const {
+/// Finds a stretch that begins with a motion: as many as are free of the part, or a short one and its facets;
+/// or one motion whose pieces are to be looked at one by one, and returns false.
+bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Motion> motions, std::size_t m,
+                                double depth) const {
     if (arc_from(search, s, motions, m, depth)) return true;
     const double top = search.cutter.top - depth;
     const bool flat = !search.cutter.ball();
@@ -899,7 +980,8 @@ bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Moti
     double length = 0;
     for (; last < end && last - m < std::max(search.many, Stretch::kShort); ++last) {
         const Motion& next = motions[last];
-        if (std::min(next.from[2], next.to[2]) >= top || (last > m && next.from != motions[last - 1].to)) break;
+        if (std::min(next.from[2], next.to[2]) >= top || (last > m && next.from != motions[last - 1].to))
+            break;
         const Point3 way = sub(next.to, next.from);
         length += std::sqrt(dot(way, way));
         if (length <= Stretch::kLength && last - m < Stretch::kShort) short_last = last + 1;
@@ -933,7 +1015,8 @@ bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Moti
     return true;
 }
 
-StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore, double tolerance,
+StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<const Motion> motions,
+                                          double radius, double ignore, double tolerance,
                                           std::atomic<double>* known, std::span<const Chords> chords) const {
     Found found;
     Search search;
@@ -949,7 +1032,8 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
         last = tip, last_known = true;
         return last_covered = covered(tip[0], tip[1], cutter.top);
     };
-    auto meet_near = [&](const NearFacets& terms, const std::vector<std::uint32_t>& facets, const Piece& piece, Penetration& result) {
+    auto meet_near = [&](const NearFacets& terms, const std::vector<std::uint32_t>& facets,
+                         const Piece& piece, Penetration& result) {
         if (facets.size() <= 4) {
             for (const std::uint32_t f : facets) meet(cutter, piece, facets_[f].v, result);
             return;
@@ -958,9 +1042,10 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
         for_each_kept(keep, [&](std::size_t k) { meet(cutter, piece, facets_[facets[k]].v, result); });
     };
     for (std::size_t m = 0; m < motions.size();) {
-        // Only what is deeper than all before can change the maximum; but every motion beyond the tolerance is to be found.
-        // Of equal ones in other rows this may be the first.
-        const double deep = std::max(found.most.depth, known ? known->load(std::memory_order_relaxed) - kEqual : 0.0);
+        // Only what is deeper than all before can change the maximum; but every motion beyond the tolerance
+        // is to be found. Of equal ones in other rows this may be the first.
+        const double deep =
+            std::max(found.most.depth, known ? known->load(std::memory_order_relaxed) - kEqual : 0.0);
         const double floor = std::max(ignore, std::min(deep, tolerance));
         const auto& [from, to] = motions[m];
         if (radius <= floor || std::min(from[2], to[2]) >= cutter.top - floor) {
@@ -1029,19 +1114,25 @@ double StandingPart::envelope(double x, double y, double z_top, double none) con
     return height > -kInfinity ? height : none;
 }
 
-// fn(point, winding, height) for all points that facets come over which may be as high as z_low and lower than z_high.
+// fn(point, winding, height) for all points that facets come over which may be as high as z_low and lower
+// than z_high.
 template <class Fn>
 void RisingEnvelope::for_each_point(double z_low, double z_high, Fn&& fn) const {
     const double x1 = x0_ + cell_ * (nx_ - 1), y1 = y0_ + cell_ * (ny_ - 1), per_cell = 1 / cell_;
-    // Points from `low` to `high`, and one beside them where rounding does not tell: facet_winding() decides, this only saves asking it.
+    // Points from `low` to `high`, and one beside them where rounding does not tell: facet_winding() decides,
+    // this only saves asking it.
     constexpr double hair = 1e-6;
     const auto first_of = [](double low) { return low > 0 ? static_cast<int>(low + (1 - hair)) : 0; };
-    const auto last_of = [](double high, int n) { return high < -hair ? -1 : high < n - 1 ? static_cast<int>(high + hair) : n - 1; };
+    const auto last_of = [](double high, int n) {
+        return high < -hair ? -1 : high < n - 1 ? static_cast<int>(high + hair) : n - 1;
+    };
     part_->walk_within(StandingPart::Within({x0_, y0_, z_low}, {x1, y1, z_high}), [&](const auto& facet) {
         const auto& [a, b, c] = facet.v;
         if (std::max({a.z, b.z, c.z}) < z_low || std::min({a.z, b.z, c.z}) >= z_high) return;
-        const double fx0 = (std::min({a.x, b.x, c.x}) - x0_) * per_cell, fx1 = (std::max({a.x, b.x, c.x}) - x0_) * per_cell;
-        const double fy0 = (std::min({a.y, b.y, c.y}) - y0_) * per_cell, fy1 = (std::max({a.y, b.y, c.y}) - y0_) * per_cell;
+        const double fx0 = (std::min({a.x, b.x, c.x}) - x0_) * per_cell,
+                     fx1 = (std::max({a.x, b.x, c.x}) - x0_) * per_cell;
+        const double fy0 = (std::min({a.y, b.y, c.y}) - y0_) * per_cell,
+                     fy1 = (std::max({a.y, b.y, c.y}) - y0_) * per_cell;
         if (fx0 > nx_ || fy0 > ny_) return;
         const int i0 = first_of(fx0), i1 = last_of(fx1, nx_), j0 = first_of(fy0), j1 = last_of(fy1, ny_);
         for (int j = j0; j <= j1; ++j) {
@@ -1050,9 +1141,11 @@ void RisingEnvelope::for_each_point(double z_low, double z_high, Fn&& fn) const 
             if (constexpr int few = 3; last - begin >= few) {  // where the row crosses the outline
                 double low = fx1, high = fx0;
                 for (int k = 0; k < 3; ++k) {
-                    const Vec3f &p = facet.v[static_cast<std::size_t>(k)], &q = facet.v[static_cast<std::size_t>((k + 1) % 3)];
+                    const Vec3f &p = facet.v[static_cast<std::size_t>(k)],
+                                &q = facet.v[static_cast<std::size_t>((k + 1) % 3)];
                     if ((p.y <= y) == (q.y <= y)) continue;
-                    const double x = p.x + (y - p.y) / (static_cast<double>(q.y) - p.y) * (static_cast<double>(q.x) - p.x);
+                    const double x =
+                        p.x + (y - p.y) / (static_cast<double>(q.y) - p.y) * (static_cast<double>(q.x) - p.x);
                     low = std::min(low, (x - x0_) * per_cell), high = std::max(high, (x - x0_) * per_cell);
                 }
                 begin = first_of(low), last = last_of(high, nx_);
@@ -1060,7 +1153,9 @@ void RisingEnvelope::for_each_point(double z_low, double z_high, Fn&& fn) const 
             for (int i = begin; i <= last; ++i) {
                 const double x = x0_ + i * cell_;
                 if (const int w = facet_winding(facet.v, x, y); w != 0)
-                    fn(static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i), w, facet_height(facet.v, x, y));
+                    fn(static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) +
+                           static_cast<std::size_t>(i),
+                       w, facet_height(facet.v, x, y));
             }
         }
     });
@@ -1077,7 +1172,8 @@ RisingEnvelope::RisingEnvelope(const StandingPart& part, double x0, double y0, d
       above_(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny), 0),
       below_(above_.size(), -std::numeric_limits<float>::infinity()) {
     // Over a closed mesh what is at all heights together winds around nothing.
-    if (!part.closed_) for_each_point(-kInfinity, kInfinity, [&](std::size_t k, int w, double) { above_[k] += w; });
+    if (!part.closed_)
+        for_each_point(-kInfinity, kInfinity, [&](std::size_t k, int w, double) { above_[k] += w; });
 }
 
 void RisingEnvelope::at(double z_top, float none, float* out) {
@@ -1089,10 +1185,13 @@ void RisingEnvelope::at(double z_top, float none, float* out) {
     });
     passed_ = std::max(passed_, top);
     for (std::size_t k = 0; k < above_.size(); ++k)
-        out[k] = above_[k] > 0 ? static_cast<float>(z_top) : below_[k] == -std::numeric_limits<float>::infinity() ? none : below_[k];
+        out[k] = above_[k] > 0                                          ? static_cast<float>(z_top)
+                 : below_[k] == -std::numeric_limits<float>::infinity() ? none
+                                                                        : below_[k];
 }
 
-StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_top, double limit, bool under) const {
+StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_top, double limit,
+                                                  bool under) const {
     const double top = z_top - kSheet;
     Clearance best{limit, {0, 0, 0}};
     if (under && point[2] - top < best.distance) {
@@ -1141,14 +1240,16 @@ StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, 
 
 double StandingPart::distance(const Point3& point, std::uint32_t facet) const {
     const std::array<Vec3f, 3>& v = facets_[facet].v;
-    const Point3 away = sub(point, closest_on_triangle(point, {to_point(v[0]), to_point(v[1]), to_point(v[2])}));
+    const Point3 away =
+        sub(point, closest_on_triangle(point, {to_point(v[0]), to_point(v[1]), to_point(v[2])}));
     return std::sqrt(dot(away, away));
 }
 
 StandingPart::Near StandingPart::nearest(const Point3& point, const Near& known, double enough) const {
     Near best = known;
     walk_nearest(
-        {Away::Kind::facets, point, 0}, [&] { return best.distance <= enough ? 0.0 : best.distance * best.distance; },
+        {Away::Kind::facets, point, 0},
+        [&] { return best.distance <= enough ? 0.0 : best.distance * best.distance; },
         [&](const Facet&, std::uint32_t facet) {
             const double d = distance(point, facet);
             if (d < best.distance) best = {d, facet};
@@ -1161,7 +1262,8 @@ double StandingPart::from_facets(const Point3& point, double limit, double enoug
     walk_nearest(
         {Away::Kind::facets, point, 0}, [&] { return best2 <= enough * enough ? 0.0 : best2; },
         [&](const Facet& f, std::uint32_t) {
-            const Point3 away = sub(point, closest_on_triangle(point, {to_point(f.v[0]), to_point(f.v[1]), to_point(f.v[2])}));
+            const Point3 away = sub(
+                point, closest_on_triangle(point, {to_point(f.v[0]), to_point(f.v[1]), to_point(f.v[2])}));
             best2 = std::min(best2, dot(away, away));
         });
     return std::sqrt(best2);

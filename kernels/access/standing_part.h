@@ -1,7 +1,8 @@
-// The part as a cutter meets it in one layer: solid ∩ {z ≤ z_top}, all that stands below the layer's top (higher layers
-// are not there yet, lower ones are). Every cutter here reaches from its lower end upwards without end, so what matters of
-// the part is its shadow, the set of points that have part at or above them: a cutter touches the one exactly if it
-// touches the other, and just as deep. Nothing here is sampled: a straight motion is one convex problem per facet.
+// The part as a cutter meets it in one layer: solid ∩ {z ≤ z_top}, all that stands below the layer's top
+// (higher layers are not there yet, lower ones are). Every cutter here reaches from its lower end upwards
+// without end, so what matters of the part is its shadow, the set of points that have part at or above them:
+// a cutter touches the one exactly if it touches the other, and just as deep. Nothing here is sampled: a
+// straight motion is one convex problem per facet.
 #pragma once
 
 #include <array>
@@ -26,30 +27,35 @@ struct Penetration {
     bool found = false;
 };
 
-/// A tree over the facets of a mesh, built once and used for every layer. Borrows nothing: it copies the facets.
-/// Const functions may be called from many threads at once. Deterministic.
+/// A tree over the facets of a mesh, built once and used for every layer. Borrows nothing: it copies the
+/// facets. Const functions may be called from many threads at once. Deterministic.
 class StandingPart {
 public:
     StandingPart(Context& context, MeshView mesh);
 
-    /// Material thinner than this under a layer's top is not counted: a facet that lies in the top plane to within
-    /// rounding of float32 and of the plan's text belongs to the next layer. All depths may be short by this, mm.
+    /// Material thinner than this under a layer's top is not counted: a facet that lies in the top plane to
+    /// within rounding of float32 and of the plan's text belongs to the next layer. All depths may be short
+    /// by this, mm.
     static constexpr double kSheet = 0.001;
-    /// A motion is treated in pieces, mm: their length, what they may rise, and the length of a cylinder's that goes up or down. The result
-    /// depends on none of them.
+    /// A motion is treated in pieces, mm: their length, what they may rise, and the length of a cylinder's
+    /// that goes up or down. The result depends on none of them.
     static constexpr double kSpan = 8, kRise = 1, kPiece = 0.5;
     /// Error of a depth by numerical minimisation, mm.
     static constexpr double kNumericalError = 1e-7;
 
-    /// Largest depth, over a straight motion of the tip, of part in a ball end mill: a ball of `radius` whose lowest point
-    /// is the tip, and the shank of the same radius above its centre. Depth of a point in the cutter is its distance
-    /// from the cutter's surface, so a wall that is cut too deep by d counts d, whatever its slope.
+    /// Largest depth, over a straight motion of the tip, of part in a ball end mill: a ball of `radius` whose
+    /// lowest point is the tip, and the shank of the same radius above its centre. Depth of a point in the
+    /// cutter is its distance from the cutter's surface, so a wall that is cut too deep by d counts d,
+    /// whatever its slope.
     /// @param at_least only depths above this are looked for (0 or more), mm
-    [[nodiscard]] Penetration ball(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
+    [[nodiscard]] Penetration ball(double z_top, const Point3& from, const Point3& to, double radius,
+                                   double at_least) const;
 
-    /// The same for an upright cylinder that begins at the tip and has no upper end (flat end mill, face mill, shank,
-    /// holder): depth of a point is the lesser of its distances from the wall and from the floor of the cylinder.
-    [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
+    /// The same for an upright cylinder that begins at the tip and has no upper end (flat end mill, face
+    /// mill, shank, holder): depth of a point is the lesser of its distances from the wall and from the floor
+    /// of the cylinder.
+    [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius,
+                                       double at_least) const;
 
     enum class Form : char { ball, cylinder };
     struct Motion {
@@ -66,14 +72,20 @@ public:
         std::size_t motion = 0;             ///< that has it
         std::vector<std::uint32_t> beyond;  ///< motions deeper than the tolerance, ascending
     };
-    /// The same for a row of motions, best for such as follow one another closely: what of the part is near is looked for once for many.
+    /// The same for a row of motions, best for such as follow one another closely: what of the part is near
+    /// is looked for once for many.
     /// @param ignore depths up to this are not looked for (0 or more), mm
-    /// @param tolerance every motion deeper than this is found, of the others only those that are deeper than all before, mm
-    /// @param known of a ball: the greatest depth of rows that are checked together, each with this. Only what may be the greatest of all is found
-    ///        then, and is the same in whichever order they are. (A cylinder's depth differs in its last digits with what is known.)
-    /// @param chords of the motions that run along circles, in their order: what is found is the same, but sooner
-    [[nodiscard]] Found deepest(Form form, double z_top, std::span<const Motion> motions, double radius, double ignore, double tolerance,
-                                std::atomic<double>* known = nullptr, std::span<const Chords> chords = {}) const;
+    /// @param tolerance every motion deeper than this is found, of the others only those that are deeper than
+    /// all before, mm
+    /// @param known of a ball: the greatest depth of rows that are checked together, each with this. Only
+    /// what may be the greatest of all is found
+    ///        then, and is the same in whichever order they are. (A cylinder's depth differs in its last
+    ///        digits with what is known.)
+    /// @param chords of the motions that run along circles, in their order: what is found is the same, but
+    /// sooner
+    [[nodiscard]] Found deepest(Form form, double z_top, std::span<const Motion> motions, double radius,
+                                double ignore, double tolerance, std::atomic<double>* known = nullptr,
+                                std::span<const Chords> chords = {}) const;
 
     /// Whether there is part just under the plane z at (x, y).
     [[nodiscard]] bool covered(double x, double y, double z) const;
@@ -81,7 +93,8 @@ public:
     /// The largest z ≤ z_top of the part over (x, y); `none` where there is no part.
     [[nodiscard]] double envelope(double x, double y, double z_top, double none) const;
 
-    /// How far something stands away, and which way: `away` leads from its nearest point to the point asked for.
+    /// How far something stands away, and which way: `away` leads from its nearest point to the point asked
+    /// for.
     struct Clearance {
         double distance = 0;  ///< mm; the limit when nothing is nearer
         Point3 away{};
@@ -93,14 +106,16 @@ public:
     }
     /// The same where it is known whether there is part just under the top at (x, y).
     [[nodiscard]] Clearance from_shadow(const Point3& point, double z_top, double limit, bool covered) const;
-    /// Horizontally from an upright line through (x, y) to what of the part stands higher than z (and below z_top); 0 within it.
+    /// Horizontally from an upright line through (x, y) to what of the part stands higher than z (and below
+    /// z_top); 0 within it.
     [[nodiscard]] Clearance beside(const Point3& point, double z_top, double limit) const;
 
-    /// From a point to the nearest facet, whatever its height; the limit when none is nearer. Of what is no farther than `enough` the first found.
+    /// From a point to the nearest facet, whatever its height; the limit when none is nearer. Of what is no
+    /// farther than `enough` the first found.
     [[nodiscard]] double from_facets(const Point3& point, double limit, double enough = 0) const;
 
-    /// The greatest distance from a corner or middle of its facets to the nearest facet of another part, mm; `known` when none is greater or
-    /// either has none.
+    /// The greatest distance from a corner or middle of its facets to the nearest facet of another part, mm;
+    /// `known` when none is greater or either has none.
     [[nodiscard]] double farthest_from(Context& context, const StandingPart& other, double known) const;
     [[nodiscard]] std::size_t facet_count() const { return facets_.size(); }
 
@@ -124,7 +139,8 @@ private:
         [[nodiscard]] Facet operator[](std::size_t i) const {
             const EightFacets& e = eights_[i / 8];
             const std::size_t k = i % 8;
-            return {{{{e.x0[k], e.y0[k], e.z0[k]}, {e.x1[k], e.y1[k], e.z1[k]}, {e.x2[k], e.y2[k], e.z2[k]}}}};
+            return {
+                {{{e.x0[k], e.y0[k], e.z0[k]}, {e.x1[k], e.y1[k], e.z1[k]}, {e.x2[k], e.y2[k], e.z2[k]}}}};
         }
         [[nodiscard]] const EightFacets& eight(std::size_t i) const { return eights_[i]; }
 
@@ -135,10 +151,13 @@ private:
     struct Node {
         float x0, y0, z0, x1, y1, z1;
     };
-    /// Boxes of eight nodes that follow one another, as rows of numbers; those that there are none of are empty.
+    /// Boxes of eight nodes that follow one another, as rows of numbers; those that there are none of are
+    /// empty.
     struct Nodes {
         std::array<float, 8> x0, y0, z0, x1, y1, z1;
-        [[nodiscard]] Node operator[](std::size_t k) const { return {x0[k], y0[k], z0[k], x1[k], y1[k], z1[k]}; }
+        [[nodiscard]] Node operator[](std::size_t k) const {
+            return {x0[k], y0[k], z0[k], x1[k], y1[k], z1[k]};
+        }
     };
     /// A box in single precision; it holds what it was made of.
     struct Within {
@@ -159,14 +178,15 @@ private:
     void walk(Enter&& enter, Visit&& visit) const;
     template <class Visit>
     void walk_within(const Within& box, Visit&& visit) const;
-    /// What is asked of boxes: how far a point is from the facets in them, or from the shadow of these below the top; or how far, horizontally,
-    /// from what is higher than it.
+    /// What is asked of boxes: how far a point is from the facets in them, or from the shadow of these below
+    /// the top; or how far, horizontally, from what is higher than it.
     struct Away {
         enum class Kind : char { facets, shadow, beside } kind;
         Point3 point;
         double top;
     };
-    /// Squares of the distances from a point to eight boxes, mm²; infinite where a box holds nothing that is asked for.
+    /// Squares of the distances from a point to eight boxes, mm²; infinite where a box holds nothing that is
+    /// asked for.
     static void squares(const Nodes& nodes, const Away& from, std::array<double, 8>& squares);
     static void boxes(const EightFacets& facets, Nodes& boxes);
     template <class Limit, class Visit>
@@ -183,23 +203,29 @@ private:
     struct Search;
     static void around(const ManyNodes& many, const WayAround& way, const Within& box, unsigned* kept);
     bool gather(Search& search, Stretch& stretch, double depth, std::size_t most) const;
-    bool arc_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m, double depth) const;
-    bool stretch_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m, double depth) const;
-    [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to, double radius, double at_least) const;
+    bool arc_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m,
+                  double depth) const;
+    bool stretch_from(Search& search, Stretch& stretch, std::span<const Motion> motions, std::size_t m,
+                      double depth) const;
+    [[nodiscard]] Penetration depth_of(Form form, double z_top, const Point3& from, const Point3& to,
+                                       double radius, double at_least) const;
     friend class RisingEnvelope;
-    Facets facets_;                          ///< in Morton order
-    std::vector<BulkVector<Nodes>> levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
+    Facets facets_;  ///< in Morton order
+    std::vector<BulkVector<Nodes>>
+        levels_;  ///< levels_[0] covers kFan facets a node, levels_[k] kFan nodes of level k − 1
     Box3 box_{};
     bool closed_ = false;  ///< by its neighbours: every edge is gone along as often one way as the other
 };
 
-/// The envelope (StandingPart::envelope) over a grid of nx × ny points (x0 + i·cell, y0 + j·cell), row j after row j − 1, for planes that
-/// rise, by scan conversion: a facet is looked at once at first and then as its heights are passed.
+/// The envelope (StandingPart::envelope) over a grid of nx × ny points (x0 + i·cell, y0 + j·cell), row j
+/// after row j − 1, for planes that rise, by scan conversion: a facet is looked at once at first and then as
+/// its heights are passed.
 class RisingEnvelope {
 public:
     /// The part must outlive it.
     RisingEnvelope(const StandingPart& part, double x0, double y0, double cell, int nx, int ny);
-    /// @pre z_top is no lower than when asked before  @param out gets nx × ny heights; `none` where there is no part
+    /// @pre z_top is no lower than when asked before  @param out gets nx × ny heights; `none` where there is
+    /// no part
     void at(double z_top, float none, float* out);
 
 private:

@@ -13,11 +13,12 @@ constexpr std::string_view kWhat = "Embree's tree of the facets";
 
 TreeMemory::TreeMemory(Context& context)
     : context_(context),
-      room_(static_cast<std::int64_t>(std::min<std::uint64_t>(context.memory_limit() - std::min(context.memory_charged(), context.memory_limit()),
-                                                              std::numeric_limits<std::int64_t>::max()))) {}
+      room_(static_cast<std::int64_t>(std::min<std::uint64_t>(
+          context.memory_limit() - std::min(context.memory_charged(), context.memory_limit()),
+          std::numeric_limits<std::int64_t>::max()))) {}
 
-// Embree says what it is about to take or, if `post`, has just taken (bytes over 0), and what it has given back. What is refused beforehand is not taken;
-// what is refused afterwards is given back, which is said too.
+// Embree says what it is about to take or, if `post`, has just taken (bytes over 0), and what it has given
+// back. What is refused beforehand is not taken; what is refused afterwards is given back, which is said too.
 bool TreeMemory::monitor(void* memory, ssize_t bytes, bool post) {
     auto& self = *static_cast<TreeMemory*>(memory);
     const std::int64_t taken = self.taken_.fetch_add(bytes) + bytes;

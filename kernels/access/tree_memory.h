@@ -11,8 +11,9 @@
 
 namespace slabwright {
 
-/// Hears of every allocation of a device of Embree, and refuses those that the context's limit has no room for; what is left after building
-/// is charged until the end. Must outlive the device, and the context must outlive this.
+/// Hears of every allocation of a device of Embree, and refuses those that the context's limit has no room
+/// for; what is left after building is charged until the end. Must outlive the device, and the context must
+/// outlive this.
 class TreeMemory {
 public:
     explicit TreeMemory(Context& context);
@@ -21,7 +22,8 @@ public:
     static bool monitor(void* memory, ssize_t bytes, bool post);
 
     /// To be called when a tree has been built, or could not be.
-    /// @throws Error(no_plan, "memory.limit") if something was refused, or other charges leave no room any more
+    /// @throws Error(no_plan, "memory.limit") if something was refused, or other charges leave no room any
+    /// more
     void charge();
 
 private:

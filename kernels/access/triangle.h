@@ -1,4 +1,5 @@
-// The two questions about a facet that the trees of this folder ask: its nearest point, and its crossing with a vertical line.
+// The two questions about a facet that the trees of this folder ask: its nearest point, and its crossing with
+// a vertical line.
 #pragma once
 
 #include <array>
@@ -16,8 +17,8 @@ using Triangle = std::array<Point3, 3>;
 /// The nearest point of a triangle; of a degenerate one, the nearest of its edges.
 [[nodiscard]] Point3 closest_on_triangle(const Point3& point, const Triangle& triangle);
 
-/// Winding number of a facet's outline around (x, y), seen from above: +1 facing up, −1 facing down, 0 beside it. Half-open,
-/// so over a closed mesh the sum is 0 everywhere, on edges and vertices too.
+/// Winding number of a facet's outline around (x, y), seen from above: +1 facing up, −1 facing down, 0 beside
+/// it. Half-open, so over a closed mesh the sum is 0 everywhere, on edges and vertices too.
 [[nodiscard]] int facet_winding(const std::array<Vec3f, 3>& facet, double x, double y);
 
 /// Height of a facet's plane over (x, y), kept within the facet's own range; its top when it is vertical.

@@ -12,7 +12,9 @@ constexpr double kFinest = 0.2 * kUnitsPerMm;
 constexpr double kMostCells = 1 << 19, kMostInARow = 1 << 12;
 constexpr double kAll = -std::numeric_limits<double>::infinity();
 
-std::size_t place(double v, std::size_t n) { return std::min(n - 1, static_cast<std::size_t>(std::max(0.0, v))); }
+std::size_t place(double v, std::size_t n) {
+    return std::min(n - 1, static_cast<std::size_t>(std::max(0.0, v)));
+}
 
 }  // namespace
 
@@ -34,12 +36,14 @@ CapCells::CapCells(const Loops& loops) {
     // Calls fn(cell) for the cells that a segment meets, and for some that it misses by a hair.
     auto cells = [&](const Segment& s, auto&& fn) {
         const Point2 a = s.a.y <= s.b.y ? s.a : s.b, b = s.a.y <= s.b.y ? s.b : s.a;
-        const double slope = a.y == b.y ? 0 : (static_cast<double>(b.x) - a.x) / (static_cast<double>(b.y) - a.y);
+        const double slope =
+            a.y == b.y ? 0 : (static_cast<double>(b.x) - a.x) / (static_cast<double>(b.y) - a.y);
         const double left = std::min(a.x, b.x), right = std::max(a.x, b.x);
         for (std::size_t r = row(a.y - 1.0), last = row(b.y + 1.0); r <= last; ++r) {
             double from = left, to = right;
             if (a.y != b.y) {
-                const double y0 = y0_ + static_cast<double>(r) * cell_ - 1, at0 = a.x + slope * (y0 - a.y), at1 = at0 + slope * (cell_ + 2);
+                const double y0 = y0_ + static_cast<double>(r) * cell_ - 1, at0 = a.x + slope * (y0 - a.y),
+                             at1 = at0 + slope * (cell_ + 2);
                 from = std::max(from, std::min(at0, at1)), to = std::min(to, std::max(at0, at1));
             }
             for (std::size_t c = column(from - 1), end = column(to + 1); c <= end; ++c) fn(r * columns_ + c);
@@ -48,7 +52,8 @@ CapCells::CapCells(const Loops& loops) {
     auto each = [&](auto&& fn) {
         for (std::size_t l = 0; l < loops.size(); ++l) {
             const auto loop = loops.loop(l);
-            for (std::size_t i = 0; i < loop.size(); ++i) fn(Segment{loop[i], loop[i + 1 == loop.size() ? 0 : i + 1]});
+            for (std::size_t i = 0; i < loop.size(); ++i)
+                fn(Segment{loop[i], loop[i + 1 == loop.size() ? 0 : i + 1]});
         }
     };
     starts_.assign(columns_ * rows_ + 1, 0);
@@ -80,7 +85,8 @@ int CapCells::turns(std::size_t c, std::size_t r, double x, double y) const {
     for (std::uint32_t k = starts_[cell]; k < starts_[cell + 1]; ++k) {
         const Segment& s = segments_[k];
         if ((s.a.y <= y) == (s.b.y <= y)) continue;
-        const double at = s.a.x + (y - s.a.y) / (static_cast<double>(s.b.y) - s.a.y) * (static_cast<double>(s.b.x) - s.a.x);
+        const double at =
+            s.a.x + (y - s.a.y) / (static_cast<double>(s.b.y) - s.a.y) * (static_cast<double>(s.b.x) - s.a.x);
         // Listed in several cells it counts in the one where it crosses the line.
         if (at > x && column(at) == c) sum += s.b.y > s.a.y ? 1 : -1;
     }
@@ -90,7 +96,9 @@ int CapCells::turns(std::size_t c, std::size_t r, double x, double y) const {
 bool CapCells::inside(double x_mm, double y_mm) const {
     if (columns_ == 0) return false;
     const double x = x_mm * kUnitsPerMm, y = y_mm * kUnitsPerMm;
-    if (x < x0_ || y < y0_ || x > x0_ + static_cast<double>(columns_) * cell_ || y > y0_ + static_cast<double>(rows_) * cell_) return false;
+    if (x < x0_ || y < y0_ || x > x0_ + static_cast<double>(columns_) * cell_ ||
+        y > y0_ + static_cast<double>(rows_) * cell_)
+        return false;
     const std::size_t r = row(y), first = column(x);
     int winding = 0;
     for (std::size_t c = first; c < columns_; ++c) {

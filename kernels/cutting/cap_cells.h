@@ -1,4 +1,5 @@
-// Whether a place lies in a region, for very many places: cells know whether they are inside, but for those that the border crosses.
+// Whether a place lies in a region, for very many places: cells know whether they are inside, but for those
+// that the border crosses.
 #pragma once
 
 #include <cstdint>

@@ -7,11 +7,13 @@
 namespace slabwright {
 
 double ball_level_cusp(double r, double alpha, double stepdown) {
-    const double s = std::sin(alpha), c = std::cos(alpha), step_along = stepdown / s;  // along the slope between contacts
+    const double s = std::sin(alpha), c = std::cos(alpha),
+                 step_along = stepdown / s;  // along the slope between contacts
     const double u = c > 0 ? stepdown * c / s : 0;
     if (u >= 2 * r) return std::numeric_limits<double>::infinity();
-    // Where the two circles meet. They meet above the lower ball's equator as long as SD ≤ 2(R − L)·cos α, which at the
-    // meeting point is step_along/2·s ≤ (R − L)·c; past that the lower cutter's vertical side meets the upper circle.
+    // Where the two circles meet. They meet above the lower ball's equator as long as SD ≤ 2(R − L)·cos α,
+    // which at the meeting point is step_along/2·s ≤ (R − L)·c; past that the lower cutter's vertical side
+    // meets the upper circle.
     if (step_along < 2 * r) {
         const double cusp = r - std::sqrt(r * r - step_along * step_along / 4);
         if (stepdown <= 2 * (r - cusp) * c) return cusp;
@@ -22,7 +24,8 @@ double ball_level_cusp(double r, double alpha, double stepdown) {
 double ball_level_stepdown(double r, double alpha, double cusp) {
     const double printed = ball_level_stepdown_printed(r, alpha, cusp);
     if (printed <= 2 * (r - cusp) * std::cos(alpha)) return printed;
-    if (std::cos(alpha) < 1e-12) return std::numeric_limits<double>::infinity();  // a vertical wall keeps no cusp
+    if (std::cos(alpha) < 1e-12)
+        return std::numeric_limits<double>::infinity();  // a vertical wall keeps no cusp
     // The cusp grows with the stepdown, from print's value at the border of the two cases: halve.
     double low = printed, high = 2 * r * std::tan(alpha);
     for (int i = 0; i < 200 && high - low > 1e-12 * high; ++i) {
@@ -32,7 +35,9 @@ double ball_level_stepdown(double r, double alpha, double cusp) {
     return low;
 }
 
-double ball_level_stepdown_printed(double r, double alpha, double cusp) { return 2 * std::sqrt(2 * r * cusp - cusp * cusp) * std::sin(alpha); }
+double ball_level_stepdown_printed(double r, double alpha, double cusp) {
+    return 2 * std::sqrt(2 * r * cusp - cusp * cusp) * std::sin(alpha);
+}
 
 double flat_level_cusp(double alpha, double stepdown) { return stepdown * std::cos(alpha); }
 

@@ -5,7 +5,8 @@
 
 namespace slabwright {
 
-/// A ball of radius r under a shank of the same radius, or a flat-ended cylinder of radius r; positions are its tip's.
+/// A ball of radius r under a shank of the same radius, or a flat-ended cylinder of radius r; positions are
+/// its tip's.
 struct Cutter {
     enum class Profile : std::uint8_t { flat, ball } profile = Profile::flat;
     double radius = 0;  ///< mm

@@ -28,22 +28,26 @@ struct Best {
     }
 };
 
-// A ball's tip over one facet: the plane where the contact falls inside, then the edges it owns and their ends.
+// A ball's tip over one facet: the plane where the contact falls inside, then the edges it owns and their
+// ends.
 void drop_ball(const SolidFacet& f, double r, double x, double y, Best& best) {
     const Vec3d& n = f.normal;
     if (n[2] > 1e-9) {
         // Centre above the plane by r: contact p = c − r·n, p inside the triangle.
         const double px = x - r * n[0], py = y - r * n[1];
-        const double pz = f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2], tip = pz + r * n[2] - r;
-        if (tip + kRounding <= best.tip_z) return;  // nor does anything of the facet lift the ball more than its plane
-        double outside2 = 0;                        // how far p lies beyond one of the edges, squared
+        const double pz = f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2],
+                     tip = pz + r * n[2] - r;
+        if (tip + kRounding <= best.tip_z)
+            return;           // nor does anything of the facet lift the ball more than its plane
+        double outside2 = 0;  // how far p lies beyond one of the edges, squared
         bool inside = true;
         for (int k = 0; k < 3; ++k) {
             const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
             const double dx = b[0] - a[0], dy = b[1] - a[1], across = dx * (py - a[1]) - dy * (px - a[0]);
             if (across >= 0) continue;
             inside = false;
-            if (across * across > outside2 * (dx * dx + dy * dy)) outside2 = across * across / (dx * dx + dy * dy);
+            if (across * across > outside2 * (dx * dx + dy * dy))
+                outside2 = across * across / (dx * dx + dy * dy);
         }
         if (inside) {
             best.offer(tip, n[2], n[0], n[1]);
@@ -90,9 +94,11 @@ void drop_flat(const SolidFacet& f, double r, double x, double y, Best& best) {
         return !(positive && negative);
     };
     if (std::abs(n[2]) > 1e-9) {
-        // On the plane the disc touches at its uphill rim (anywhere, where the plane is level: at its middle).
+        // On the plane the disc touches at its uphill rim (anywhere, where the plane is level: at its
+        // middle).
         const double slope = std::sqrt(n[0] * n[0] + n[1] * n[1]), up = n[2] > 0 ? -1.0 : 1.0;
-        const double px = slope > 1e-12 ? x + up * r * n[0] / slope : x, py = slope > 1e-12 ? y + up * r * n[1] / slope : y;
+        const double px = slope > 1e-12 ? x + up * r * n[0] / slope : x,
+                     py = slope > 1e-12 ? y + up * r * n[1] / slope : y;
         const double z = f.p[0][2] - (n[0] * (px - f.p[0][0]) + n[1] * (py - f.p[0][1])) / n[2];
         if (z > best.tip_z && in_triangle(px, py)) best.offer(z, f.nz, px, py);
     }
@@ -117,9 +123,11 @@ float rounded_down(double v) {
     return static_cast<double>(f) > v ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
 }
 
-// The contact that lifts the cutter most, if that is above what it begins with. @param enough mm: the first one above that will do
+// The contact that lifts the cutter most, if that is above what it begins with. @param enough mm: the first
+// one above that will do
 template <bool ball>
-void search(const LayerSolid& solid, const DropProbe& probe, double r, double x, double y, double enough, Best& best) {
+void search(const LayerSolid& solid, const DropProbe& probe, double r, double x, double y, double enough,
+            Best& best) {
     struct Waiting {
         float bound;
         std::uint32_t level, node;
@@ -129,11 +137,13 @@ void search(const LayerSolid& solid, const DropProbe& probe, double r, double x,
     float least = rounded_down(best.tip_z);
     for (const FacetTree::Tier& tier : solid.tree.tiers) {
         std::size_t count = 0;
-        Waiting now{std::numeric_limits<float>::infinity(), static_cast<std::uint32_t>(tier.starts.size() - 2), 0};
+        Waiting now{std::numeric_limits<float>::infinity(),
+                    static_cast<std::uint32_t>(tier.starts.size() - 2), 0};
         while (true) {
             alignas(64) std::array<float, k_all> bounds;
             const FacetTree::Node& node = tier.nodes[tier.starts[now.level] + now.node];
-            std::uint32_t over = ball ? ball_bounds(node, probe, least, bounds.data()) : flat_bounds(node, probe, least, bounds.data());
+            std::uint32_t over = ball ? ball_bounds(node, probe, least, bounds.data())
+                                      : flat_bounds(node, probe, least, bounds.data());
             // The children worth a look, ascending.
             std::array<std::uint32_t, k_all> order;
             std::size_t n = 0;
@@ -144,7 +154,8 @@ void search(const LayerSolid& solid, const DropProbe& probe, double r, double x,
                 order[at] = k;
             }
             if (now.level > 0 && n > 0) {
-                for (std::size_t i = 0; i + 1 < n; ++i) waiting[count++] = {bounds[order[i]], now.level - 1, k_all * now.node + order[i]};
+                for (std::size_t i = 0; i + 1 < n; ++i)
+                    waiting[count++] = {bounds[order[i]], now.level - 1, k_all * now.node + order[i]};
                 now = {bounds[order[n - 1]], now.level - 1, k_all * now.node + order[n - 1]};
                 continue;
             }
@@ -171,8 +182,8 @@ void search(const LayerSolid& solid, const DropProbe& probe, double r, double x,
 }
 
 // The same, and what was met there before spares most of it; `best` begins with what need not be found.
-void search(const LayerSolid& solid, const DropProbe& probe, const Cutter& cutter, double x, double y, double enough, double kept_up, Best& best,
-            MetPoints* met) {
+void search(const LayerSolid& solid, const DropProbe& probe, const Cutter& cutter, double x, double y,
+            double enough, double kept_up, Best& best, MetPoints* met) {
     const double above = best.tip_z, r = cutter.radius;
     const bool ball = cutter.profile == Cutter::Profile::ball;
     auto found_over = [&](double from) {
@@ -194,25 +205,31 @@ double MetPoints::keep_up(const Cutter& cutter, double x, double y) const {
     double most = -kNoEnd;
     for (const Vec3d& p : points_) {
         const double dx = x - p[0], dy = y - p[1], room2 = reach * reach - dx * dx - dy * dy;
-        if (room2 > 0) most = std::max(most, p[2] + (cutter.profile == Cutter::Profile::ball ? std::sqrt(room2) - cutter.radius : 0));
+        if (room2 > 0)
+            most = std::max(
+                most,
+                p[2] + (cutter.profile == Cutter::Profile::ball ? std::sqrt(room2) - cutter.radius : 0));
     }
     return most - kSurely;
 }
 
 DropIndex::DropIndex(const LayerSolid& solid, const Cutter& cutter) : solid_(solid), cutter_(cutter) {
     if (!(cutter.radius > 0 && cutter.radius <= FacetTree::kWidestCutter))
-        throw Error(ErrorKind::usage, "drop.radius", "a cutter's radius is not between 0 and 1 m", "cutter", "correct the tool's diameter");
+        throw Error(ErrorKind::usage, "drop.radius", "a cutter's radius is not between 0 and 1 m", "cutter",
+                    "correct the tool's diameter");
     const double unit = solid.tree.unit, r = cutter.radius;
     probe_.radius = static_cast<float>(r / unit);
     probe_.unit = static_cast<float>(unit);
     probe_.inverse = static_cast<float>(1 / (2 * r));
     // Float has 24 bits, and no term of a bound is much larger than these.
-    probe_.spare = static_cast<float>(5e-7 * (std::abs(solid.z_low) + std::abs(solid.z_top) + 4 * r) + 8 * unit);
+    probe_.spare =
+        static_cast<float>(5e-7 * (std::abs(solid.z_low) + std::abs(solid.z_top) + 4 * r) + 8 * unit);
 }
 
 bool DropIndex::nothing_near(double x, double y) const {
     const double r = cutter_.radius;
-    return solid_.tree.tiers.empty() || !(x >= solid_.min[0] - r && x <= solid_.max[0] + r && y >= solid_.min[1] - r && y <= solid_.max[1] + r);
+    return solid_.tree.tiers.empty() || !(x >= solid_.min[0] - r && x <= solid_.max[0] + r &&
+                                          y >= solid_.min[1] - r && y <= solid_.max[1] + r);
 }
 
 DropProbe DropIndex::probe_at(double x, double y) const {
@@ -221,9 +238,12 @@ DropProbe DropIndex::probe_at(double x, double y) const {
     return probe;
 }
 
-Rest DropIndex::drop(double x, double y, double above, MetPoints* met) const { return *drop_within(x, y, above, kNoEnd, met); }
+Rest DropIndex::drop(double x, double y, double above, MetPoints* met) const {
+    return *drop_within(x, y, above, kNoEnd, met);
+}
 
-std::optional<Rest> DropIndex::drop_within(double x, double y, double above, double most, MetPoints* met) const {
+std::optional<Rest> DropIndex::drop_within(double x, double y, double above, double most,
+                                           MetPoints* met) const {
     Rest rest;
     rest.tip_z = -kNoEnd;
     if (nothing_near(x, y)) return rest;
@@ -236,8 +256,8 @@ std::optional<Rest> DropIndex::drop_within(double x, double y, double above, dou
         search(solid_, probe_at(x, y), cutter_, x, y, most, kept_up, best, met);
         if (best.tip_z > above) {
             const bool ball = cutter_.profile == Cutter::Profile::ball;
-            rest = {best.tip_z, ball ? static_cast<float>(best.x) : 0.0F, ball ? static_cast<float>(best.y) : 0.0F, static_cast<float>(best.nz),
-                    false};
+            rest = {best.tip_z, ball ? static_cast<float>(best.x) : 0.0F,
+                    ball ? static_cast<float>(best.y) : 0.0F, static_cast<float>(best.nz), false};
         }
     }
     if (rest.tip_z > most) return std::nullopt;

@@ -21,16 +21,16 @@ struct Rest {
     [[nodiscard]] double contact_z(double radius) const { return tip_z + radius * (1 - nz); }
 };
 
-/// The last few points of a solid that cutters met. What they keep up nearby need not be searched for again: for drops along a line, or around a
-/// place, of one thread.
+/// The last few points of a solid that cutters met. What they keep up nearby need not be searched for again:
+/// for drops along a line, or around a place, of one thread.
 class MetPoints {
 public:
     void add(const Vec3d& point) {
         points_[next_] = point;
         next_ = (next_ + 1) % points_.size();
     }
-    /// Less than the tip of this cutter over a place: what the points keep it up to, less what rounding may take from that; −infinity where none is
-    /// in reach.
+    /// Less than the tip of this cutter over a place: what the points keep it up to, less what rounding may
+    /// take from that; −infinity where none is in reach.
     [[nodiscard]] double keep_up(const Cutter& cutter, double x, double y) const;
 
 private:
@@ -43,22 +43,27 @@ private:
     std::size_t next_ = 0;
 };
 
-/// A cutter to be dropped onto a layer's solid. A view: the solid must outlive it. What a drop is given met points for, and adds to them, makes it
-/// sooner done and changes nothing else.
+/// A cutter to be dropped onto a layer's solid. A view: the solid must outlive it. What a drop is given met
+/// points for, and adds to them, makes it sooner done and changes nothing else.
 class DropIndex {
 public:
     /// @throws Error(usage, "drop.radius") for a radius that is not positive or over FacetTree::kWidestCutter
     DropIndex(const LayerSolid& solid, const Cutter& cutter);
-    /// Exact over facets, edges and vertices (for a flat cutter over their shadow, tip on the highest of them). Of contacts that are equally
-    /// high the one is given that the solid's tree leads to first.
+    /// Exact over facets, edges and vertices (for a flat cutter over their shadow, tip on the highest of
+    /// them). Of contacts that are equally high the one is given that the solid's tree leads to first.
     /// @param above mm: a tip that is no higher need not be told, but may be given as −infinity
-    [[nodiscard]] Rest drop(double x, double y, double above = -std::numeric_limits<double>::infinity(), MetPoints* met = nullptr) const;
-    /// The same where the tip is no higher than `most`, nothing elsewhere; the latter as soon as that is known.
-    [[nodiscard]] std::optional<Rest> drop_within(double x, double y, double above, double most, MetPoints* met = nullptr) const;
+    [[nodiscard]] Rest drop(double x, double y, double above = -std::numeric_limits<double>::infinity(),
+                            MetPoints* met = nullptr) const;
+    /// The same where the tip is no higher than `most`, nothing elsewhere; the latter as soon as that is
+    /// known.
+    [[nodiscard]] std::optional<Rest> drop_within(double x, double y, double above, double most,
+                                                  MetPoints* met = nullptr) const;
     /// Whether drop(x, y).tip_z > z, in a fraction of its time.
     [[nodiscard]] bool stands_over(double x, double y, double z, MetPoints* met = nullptr) const;
-    /// drop(x, y).tip_z where that is no more than `most`, nothing elsewhere; the latter as soon as that is known.
-    [[nodiscard]] std::optional<double> tip_within(double x, double y, double most, MetPoints* met = nullptr) const;
+    /// drop(x, y).tip_z where that is no more than `most`, nothing elsewhere; the latter as soon as that is
+    /// known.
+    [[nodiscard]] std::optional<double> tip_within(double x, double y, double most,
+                                                   MetPoints* met = nullptr) const;
     [[nodiscard]] const Cutter& cutter() const { return cutter_; }
 
 private:

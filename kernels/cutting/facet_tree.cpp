@@ -52,7 +52,8 @@ std::array<double, 2> extent(const SolidFacet& f, std::size_t axis) {
 }
 
 // The tree of the facets that keys name in their lower halves, in that order.
-FacetTree::Tier tier(Context& context, std::span<const SolidFacet> facets, const FacetTree& tree, std::span<const std::uint64_t> keys) {
+FacetTree::Tier tier(Context& context, std::span<const SolidFacet> facets, const FacetTree& tree,
+                     std::span<const std::uint64_t> keys) {
     FacetTree::Tier tier;
     const std::size_t n = keys.size();
     tier.facets.resize(n);
@@ -66,8 +67,12 @@ FacetTree::Tier tier(Context& context, std::span<const SolidFacet> facets, const
     }
     tier.nodes.resize(tier.starts.back());
 
-    auto low_units = [&](double v, double from) { return static_cast<std::int32_t>(std::floor((v - from) / tree.unit)); };
-    auto high_units = [&](double v, double from) { return static_cast<std::int32_t>(std::ceil((v - from) / tree.unit)); };
+    auto low_units = [&](double v, double from) {
+        return static_cast<std::int32_t>(std::floor((v - from) / tree.unit));
+    };
+    auto high_units = [&](double v, double from) {
+        return static_cast<std::int32_t>(std::ceil((v - from) / tree.unit));
+    };
     parallel_for(context, tier.starts[1], kGrain / kLeaf, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             FacetTree::Node node = empty_node();
@@ -84,55 +89,68 @@ FacetTree::Tier tier(Context& context, std::span<const SolidFacet> facets, const
                 const double cx = tree.x0 + tree.unit * middle(node.x_low[k], node.x_high[k]),
                              cy = tree.y0 + tree.unit * middle(node.y_low[k], node.y_high[k]);
                 double z = -1e300;
-                for (const Vec3d& p : f.p) z = std::max(z, p[2] - node.gx[k] * (p[0] - cx) - node.gy[k] * (p[1] - cy));
+                for (const Vec3d& p : f.p)
+                    z = std::max(z, p[2] - node.gx[k] * (p[0] - cx) - node.gy[k] * (p[1] - cy));
                 node.z_mid[k] = rounded_up(z);
             }
             tier.nodes[i] = node;
         }
     });
     for (std::size_t level = 1; level + 1 < tier.starts.size(); ++level) {
-        const std::size_t below = tier.starts[level - 1], first = tier.starts[level], children = first - below;
-        parallel_for(context, tier.starts[level + 1] - first, kGrain / kLeaf, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                FacetTree::Node node = empty_node();
-                for (std::size_t k = 0; k < kLeaf && kLeaf * i + k < children; ++k) {
-                    const FacetTree::Node& child = tier.nodes[below + kLeaf * i + k];
-                    std::int32_t xl = INT32_MAX, xh = INT32_MIN, yl = INT32_MAX, yh = INT32_MIN;
-                    double z_max = kNowhere, weight = 0, gx = 0, gy = 0;
-                    for (std::size_t c = 0; c < kLeaf && child.z_max[c] > kNowhere; ++c) {
-                        xl = std::min(xl, child.x_low[c]), xh = std::max(xh, child.x_high[c]);
-                        yl = std::min(yl, child.y_low[c]), yh = std::max(yh, child.y_high[c]);
-                        z_max = std::max<double>(z_max, child.z_max[c]);
-                        // Each as much as its box is large, for what is wide is seldom missed by a cutter.
-                        const double area = (1.0 + child.x_high[c] - child.x_low[c]) * (1.0 + child.y_high[c] - child.y_low[c]);
-                        weight += area, gx += area * child.gx[c], gy += area * child.gy[c];
+        const std::size_t below = tier.starts[level - 1], first = tier.starts[level],
+                          children = first - below;
+        parallel_for(
+            context, tier.starts[level + 1] - first, kGrain / kLeaf, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t i = begin; i < end; ++i) {
+                    FacetTree::Node node = empty_node();
+                    for (std::size_t k = 0; k < kLeaf && kLeaf * i + k < children; ++k) {
+                        const FacetTree::Node& child = tier.nodes[below + kLeaf * i + k];
+                        std::int32_t xl = INT32_MAX, xh = INT32_MIN, yl = INT32_MAX, yh = INT32_MIN;
+                        double z_max = kNowhere, weight = 0, gx = 0, gy = 0;
+                        for (std::size_t c = 0; c < kLeaf && child.z_max[c] > kNowhere; ++c) {
+                            xl = std::min(xl, child.x_low[c]), xh = std::max(xh, child.x_high[c]);
+                            yl = std::min(yl, child.y_low[c]), yh = std::max(yh, child.y_high[c]);
+                            z_max = std::max<double>(z_max, child.z_max[c]);
+                            // Each as much as its box is large, for what is wide is seldom missed by a
+                            // cutter.
+                            const double area = (1.0 + child.x_high[c] - child.x_low[c]) *
+                                                (1.0 + child.y_high[c] - child.y_low[c]);
+                            weight += area, gx += area * child.gx[c], gy += area * child.gy[c];
+                        }
+                        node.x_low[k] = xl, node.x_high[k] = xh, node.y_low[k] = yl, node.y_high[k] = yh;
+                        node.z_max[k] = static_cast<float>(z_max);
+                        node.gx[k] = static_cast<float>(gx / weight),
+                        node.gy[k] = static_cast<float>(gy / weight);
+                        // Over each child's box both its plane and its z_max bound it; over this plane they
+                        // are highest at a corner.
+                        double z = -1e300;
+                        for (std::size_t c = 0; c < kLeaf && child.z_max[c] > kNowhere; ++c) {
+                            const std::int32_t mx = middle(child.x_low[c], child.x_high[c]),
+                                               my = middle(child.y_low[c], child.y_high[c]);
+                            const double hx = tree.unit * (1.0 + child.x_high[c] - mx),
+                                         hy = tree.unit * (1.0 + child.y_high[c] - my);
+                            const double at = node.gx[k] * tree.unit * (mx - middle(xl, xh)) +
+                                              node.gy[k] * tree.unit * (my - middle(yl, yh));
+                            const double ax = node.gx[k], ay = node.gy[k];
+                            const double level_most =
+                                child.z_max[c] - at + std::abs(ax) * hx + std::abs(ay) * hy;
+                            const double plane_most = child.z_mid[c] - at + std::abs(child.gx[c] - ax) * hx +
+                                                      std::abs(child.gy[c] - ay) * hy;
+                            z = std::max(z, std::min(level_most, plane_most));
+                        }
+                        node.z_mid[k] = rounded_up(z);
                     }
-                    node.x_low[k] = xl, node.x_high[k] = xh, node.y_low[k] = yl, node.y_high[k] = yh;
-                    node.z_max[k] = static_cast<float>(z_max);
-                    node.gx[k] = static_cast<float>(gx / weight), node.gy[k] = static_cast<float>(gy / weight);
-                    // Over each child's box both its plane and its z_max bound it; over this plane they are highest at a corner.
-                    double z = -1e300;
-                    for (std::size_t c = 0; c < kLeaf && child.z_max[c] > kNowhere; ++c) {
-                        const std::int32_t mx = middle(child.x_low[c], child.x_high[c]), my = middle(child.y_low[c], child.y_high[c]);
-                        const double hx = tree.unit * (1.0 + child.x_high[c] - mx), hy = tree.unit * (1.0 + child.y_high[c] - my);
-                        const double at = node.gx[k] * tree.unit * (mx - middle(xl, xh)) + node.gy[k] * tree.unit * (my - middle(yl, yh));
-                        const double ax = node.gx[k], ay = node.gy[k];
-                        const double level_most = child.z_max[c] - at + std::abs(ax) * hx + std::abs(ay) * hy;
-                        const double plane_most = child.z_mid[c] - at + std::abs(child.gx[c] - ax) * hx + std::abs(child.gy[c] - ay) * hy;
-                        z = std::max(z, std::min(level_most, plane_most));
-                    }
-                    node.z_mid[k] = rounded_up(z);
+                    tier.nodes[first + i] = node;
                 }
-                tier.nodes[first + i] = node;
-            }
-        });
+            });
     }
     return tier;
 }
 
 }  // namespace
 
-FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const std::array<double, 2>& min, const std::array<double, 2>& max) {
+FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const std::array<double, 2>& min,
+                     const std::array<double, 2>& max) {
     FacetTree tree;
     const std::size_t n = facets.size();
     if (n == 0) return tree;
@@ -140,7 +158,8 @@ FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const
     tree.x0 = min[0], tree.y0 = min[1];
     tree.unit = (std::max(width, depth) + 2 * FacetTree::kWidestCutter) / (1 << 29);
 
-    // The facets along the curve; those that are larger than a mesh as fine as the mean has them apart, so that they do not widen the others' nodes.
+    // The facets along the curve; those that are larger than a mesh as fine as the mean has them apart, so
+    // that they do not widen the others' nodes.
     const double mean = std::sqrt(std::max(width * depth, 1e-12) / static_cast<double>(n));
     const double to_curve = ((1 << 15) - 1) / std::max({width, depth, 1e-9});
     BulkVector<std::uint64_t> keys(n);
@@ -150,41 +169,48 @@ FacetTree facet_tree(Context& context, std::span<const SolidFacet> facets, const
             const auto [yl, yh] = extent(facets[i], 1);
             const double widest = std::max(xh - xl, yh - yl);
             const std::uint64_t size = widest <= 8 * mean ? 0 : widest <= 64 * mean ? 1 : 2;
-            const std::uint32_t along = hilbert(static_cast<std::uint32_t>((0.5 * (xl + xh) - min[0]) * to_curve),
-                                                static_cast<std::uint32_t>((0.5 * (yl + yh) - min[1]) * to_curve));
+            const std::uint32_t along =
+                hilbert(static_cast<std::uint32_t>((0.5 * (xl + xh) - min[0]) * to_curve),
+                        static_cast<std::uint32_t>((0.5 * (yl + yh) - min[1]) * to_curve));
             keys[i] = size << 62 | static_cast<std::uint64_t>(along) << 32 | i;
         }
     });
     parallel_sort(context, keys.begin(), keys.end(), std::less<>());
     for (std::uint64_t size = 0; size < kSizes; ++size) {
-        const auto begin = std::lower_bound(keys.begin(), keys.end(), size << 62), end = std::lower_bound(begin, keys.end(), (size + 1) << 62);
+        const auto begin = std::lower_bound(keys.begin(), keys.end(), size << 62),
+                   end = std::lower_bound(begin, keys.end(), (size + 1) << 62);
         if (begin != end) tree.tiers.push_back(tier(context, facets, tree, std::span(begin, end)));
     }
     return tree;
 }
 
-// Every step is the same for all eight, so that a compiler does them at once. Distances are shortened and heights raised by more than
-// float takes from them.
-SLABWRIGHT_WIDE std::uint32_t ball_bounds(const FacetTree::Node& node, const DropProbe& probe, float least, float* __restrict bounds) {
+// Every step is the same for all eight, so that a compiler does them at once. Distances are shortened and
+// heights raised by more than float takes from them.
+SLABWRIGHT_WIDE std::uint32_t ball_bounds(const FacetTree::Node& node, const DropProbe& probe, float least,
+                                          float* __restrict bounds) {
     std::uint32_t over = 0;
     const float r = probe.radius, r2 = r * r, unit = probe.unit, bend = probe.inverse * unit * unit;
     for (int k = 0; k < FacetTree::kTogether; ++k) {
         const auto i = static_cast<std::size_t>(k);
         const std::int32_t xl = node.x_low[i], xh = node.x_high[i], yl = node.y_low[i], yh = node.y_high[i];
-        const auto left = static_cast<float>(xl - probe.x), right = static_cast<float>(probe.x - xh), below = static_cast<float>(yl - probe.y),
-                   above = static_cast<float>(probe.y - yh);
-        const auto mx = static_cast<float>(probe.x - middle(xl, xh)), my = static_cast<float>(probe.y - middle(yl, yh));
+        const auto left = static_cast<float>(xl - probe.x), right = static_cast<float>(probe.x - xh),
+                   below = static_cast<float>(yl - probe.y), above = static_cast<float>(probe.y - yh);
+        const auto mx = static_cast<float>(probe.x - middle(xl, xh)),
+                   my = static_cast<float>(probe.y - middle(yl, yh));
         float dx = left > right ? left : right, dy = below > above ? below : above;
         dx = (dx > kOutside ? dx : kOutside) - kOutside;
         dy = (dy > kOutside ? dy : kOutside) - kOutside;
         const float room2 = r2 - (dx * dx + dy * dy);
         const float over_box = node.z_max[i] + (std::sqrt(room2 > 0 ? room2 : 0.0F) - r) * unit;
-        const float gx = node.gx[i], gy = node.gy[i], w = std::sqrt(1 + gx * gx + gy * gy), px = r * gx / w, py = r * gy / w;
-        float ex = left - px > right + px ? left - px : right + px, ey = below - py > above + py ? below - py : above + py;
+        const float gx = node.gx[i], gy = node.gy[i], w = std::sqrt(1 + gx * gx + gy * gy), px = r * gx / w,
+                    py = r * gy / w;
+        float ex = left - px > right + px ? left - px : right + px,
+              ey = below - py > above + py ? below - py : above + py;
         ex = (ex > kOutside ? ex : kOutside) - kOutside;
         ey = (ey > kOutside ? ey : kOutside) - kOutside;
         const float far = (mx < 0 ? -mx : mx) + (my < 0 ? -my : my);
-        const float over_plane = node.z_mid[i] + (gx * mx + gy * my + r * (w - 1) + 1e-6F * far) * unit - (ex * ex + ey * ey) * bend;
+        const float over_plane = node.z_mid[i] + (gx * mx + gy * my + r * (w - 1) + 1e-6F * far) * unit -
+                                 (ex * ex + ey * ey) * bend;
         const float bound = (over_box < over_plane ? over_box : over_plane) + probe.spare;
         bounds[i] = room2 > 0 ? bound : kNowhere;
         over |= bounds[i] > least ? std::uint32_t{1} << k : 0;
@@ -192,20 +218,24 @@ SLABWRIGHT_WIDE std::uint32_t ball_bounds(const FacetTree::Node& node, const Dro
     return over;
 }
 
-SLABWRIGHT_WIDE std::uint32_t flat_bounds(const FacetTree::Node& node, const DropProbe& probe, float least, float* __restrict bounds) {
+SLABWRIGHT_WIDE std::uint32_t flat_bounds(const FacetTree::Node& node, const DropProbe& probe, float least,
+                                          float* __restrict bounds) {
     std::uint32_t over = 0;
     const float r = probe.radius, r2 = r * r, unit = probe.unit;
     for (int k = 0; k < FacetTree::kTogether; ++k) {
         const auto i = static_cast<std::size_t>(k);
         const std::int32_t xl = node.x_low[i], xh = node.x_high[i], yl = node.y_low[i], yh = node.y_high[i];
-        const auto left = static_cast<float>(xl - probe.x), right = static_cast<float>(probe.x - xh), below = static_cast<float>(yl - probe.y),
-                   above = static_cast<float>(probe.y - yh);
-        const auto mx = static_cast<float>(probe.x - middle(xl, xh)), my = static_cast<float>(probe.y - middle(yl, yh));
+        const auto left = static_cast<float>(xl - probe.x), right = static_cast<float>(probe.x - xh),
+                   below = static_cast<float>(yl - probe.y), above = static_cast<float>(probe.y - yh);
+        const auto mx = static_cast<float>(probe.x - middle(xl, xh)),
+                   my = static_cast<float>(probe.y - middle(yl, yh));
         float dx = left > right ? left : right, dy = below > above ? below : above;
         dx = (dx > kOutside ? dx : kOutside) - kOutside;
         dy = (dy > kOutside ? dy : kOutside) - kOutside;
         const float gx = node.gx[i], gy = node.gy[i], far = (mx < 0 ? -mx : mx) + (my < 0 ? -my : my);
-        const float rim = node.z_mid[i] + (gx * mx + gy * my + r * std::sqrt(gx * gx + gy * gy) + 1e-6F * far) * unit + probe.spare;
+        const float rim = node.z_mid[i] +
+                          (gx * mx + gy * my + r * std::sqrt(gx * gx + gy * gy) + 1e-6F * far) * unit +
+                          probe.spare;
         const float bound = node.z_max[i] < rim ? node.z_max[i] : rim;
         bounds[i] = dx * dx + dy * dy < r2 * 1.000001F ? bound : kNowhere;
         over |= bounds[i] > least ? std::uint32_t{1} << k : 0;

@@ -12,25 +12,31 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// How far along n lines at v what lies in a box may forbid: low and high, or low > high where it is out of reach.
-[[gnu::always_inline]] inline void reach(const BoxTerms& b, const double* __restrict v, int n, double* __restrict low, double* __restrict high) {
+// How far along n lines at v what lies in a box may forbid: low and high, or low > high where it is out of
+// reach.
+[[gnu::always_inline]] inline void reach(const BoxTerms& b, const double* __restrict v, int n,
+                                         double* __restrict low, double* __restrict high) {
     const double u_low = b.u_low, u_high = b.u_high;
     for (int i = 0; i < n; ++i) {
-        const double under = b.v_low - v[i], over = v[i] - b.v_high, beside = under > over ? under : over, d = beside > 0 ? beside : 0;
+        const double under = b.v_low - v[i], over = v[i] - b.v_high, beside = under > over ? under : over,
+                     d = beside > 0 ? beside : 0;
         const double q = b.r2 - d * d,
-                     h = std::sqrt(std::abs(q));  // a choice under the root would keep the compiler from doing several lines at once
+                     h = std::sqrt(std::abs(q));  // a choice under the root would keep the compiler from
+                                                  // doing several lines at once
         low[i] = q > 0 ? u_low - h : kInfinity;
         high[i] = q > 0 ? u_high + h : -kInfinity;
     }
 }
 
-[[gnu::always_inline]] inline std::int64_t out(const CoverRows& cover, const double* __restrict low, const double* __restrict high, int first, int n,
+[[gnu::always_inline]] inline std::int64_t out(const CoverRows& cover, const double* __restrict low,
+                                               const double* __restrict high, int first, int n,
                                                std::int64_t* __restrict state) {
     const double *__restrict const from = cover.low.data() + first, *__restrict const to = cover.high.data() + first,
                  *__restrict const next = cover.next.data() + first;
     std::int64_t any = 0;
     for (int i = 0; i < n; ++i) {
-        const bool within = (from[i] <= low[i]) & (high[i] <= to[i]), nothing = low[i] >= high[i], here = (from[i] <= low[i]) & (low[i] < next[i]);
+        const bool within = (from[i] <= low[i]) & (high[i] <= to[i]), nothing = low[i] >= high[i],
+                   here = (from[i] <= low[i]) & (low[i] < next[i]);
         const std::int64_t beyond = here ? kReachesOut : kLooksElsewhere, s = within | nothing ? 0 : beyond;
         state[i] = s;
         any |= s;
@@ -38,7 +44,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
     return any;
 }
 
-// Near the rim of its reach the tangent is steep, and says nothing: what is left of r² there at least, as a share.
+// Near the rim of its reach the tangent is steep, and says nothing: what is left of r² there at least, as a
+// share.
 constexpr double kTangentLeast = 0.01;
 
 constexpr float kTouchMargin = 1e-4F;  // mm
@@ -46,14 +53,15 @@ constexpr double kOnPlane = 1 - 1e-6;  // of r: nearer to a plane is not at r
 
 }  // namespace
 
-// The loops hold no branch that differs from line to line, so that a compiler can do several lines in one step; what does not depend on
-// the line is decided outside of them.
+// The loops hold no branch that differs from line to line, so that a compiler can do several lines in one
+// step; what does not depend on the line is decided outside of them.
 
 namespace {
 
 template <bool marked>
-[[gnu::always_inline]] inline void prism_on(const PrismTerms& p, const double* __restrict v, int lines, double* __restrict low,
-                                            double* __restrict high, double* __restrict nz_low, double* __restrict nz_high) {
+[[gnu::always_inline]] inline void prism_on(const PrismTerms& p, const double* __restrict v, int lines,
+                                            double* __restrict low, double* __restrict high,
+                                            double* __restrict nz_low, double* __restrict nz_high) {
     alignas(64) double l[kLinesTogether], h[kLinesTogether], k[kLinesTogether];
     const int n = lines / kLinesStep * kLinesStep;
     const double r = p.r, nu = p.nu;
@@ -102,22 +110,26 @@ template <bool marked>
 
 }  // namespace
 
-SLABWRIGHT_WIDE void prism_rows(const PrismTerms& p, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+SLABWRIGHT_WIDE void prism_rows(const PrismTerms& p, const double* v, int lines, double* low, double* high,
+                                double* nz_low, double* nz_high) {
     prism_on<false>(p, v, lines, low, high, nz_low, nz_high);
 }
-SLABWRIGHT_WIDE void marked_prism_rows(const PrismTerms& p, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+SLABWRIGHT_WIDE void marked_prism_rows(const PrismTerms& p, const double* v, int lines, double* low,
+                                       double* high, double* nz_low, double* nz_high) {
     prism_on<true>(p, v, lines, low, high, nz_low, nz_high);
 }
 
 namespace {
 
 // The balls around the first ends.
-[[gnu::always_inline]] inline void ends_on(const CapsuleTerms& t, int ends, const double* __restrict v, int lines, double* __restrict low,
-                                           double* __restrict high, double* __restrict nz_low, double* __restrict nz_high) {
+[[gnu::always_inline]] inline void ends_on(const CapsuleTerms& t, int ends, const double* __restrict v,
+                                           int lines, double* __restrict low, double* __restrict high,
+                                           double* __restrict nz_low, double* __restrict nz_high) {
     const double r2 = t.r * t.r;
     const int n = lines / kLinesStep * kLinesStep;
     for (int end = 0; end < ends; ++end) {
-        const double centre = end == 0 ? t.au : t.bu, cv = end == 0 ? t.av : t.bv, wz = end == 0 ? t.za : t.zb, over = r2 - wz * wz;
+        const double centre = end == 0 ? t.au : t.bu, cv = end == 0 ? t.av : t.bv,
+                     wz = end == 0 ? t.za : t.zb, over = r2 - wz * wz;
         if (over <= 0) continue;
         const double nz = t.nz > -1.5 ? t.nz : wz / t.r;
         for (int i = 0; i < n; ++i) {
@@ -134,8 +146,9 @@ namespace {
 }
 
 // What is between them.
-[[gnu::always_inline]] inline void cylinder_on(const CapsuleTerms& t, const double* __restrict v, int lines, double* __restrict low,
-                                               double* __restrict high, double* __restrict nz_low, double* __restrict nz_high) {
+[[gnu::always_inline]] inline void cylinder_on(const CapsuleTerms& t, const double* __restrict v, int lines,
+                                               double* __restrict low, double* __restrict high,
+                                               double* __restrict nz_low, double* __restrict nz_high) {
     const double r2 = t.r * t.r;
     const int n = lines / kLinesStep * kLinesStep;
     const double du = t.bu - t.au, dv = t.bv - t.av, dz = t.za - t.zb, length2 = du * du + dv * dv + dz * dz;
@@ -153,7 +166,8 @@ namespace {
         }
     } else {
         for (int i = 0; i < n; ++i) {
-            const double wv = v[i] - t.av, qb = du * s[i] / length2, qc = wv * wv + t.za * t.za - s[i] * s[i] / length2 - r2;
+            const double wv = v[i] - t.av, qb = du * s[i] / length2,
+                         qc = wv * wv + t.za * t.za - s[i] * s[i] / length2 - r2;
             const double discriminant = qb * qb - qa * qc;
             const double root = std::sqrt(discriminant > 0 ? discriminant : 0.0);
             l[i] = discriminant > 0 ? (qb - root) / qa : kInfinity;
@@ -191,29 +205,36 @@ namespace {
 
 }  // namespace
 
-SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+SLABWRIGHT_WIDE void capsule_rows(const CapsuleTerms& t, const double* v, int lines, double* low,
+                                  double* high, double* nz_low, double* nz_high) {
     ends_on(t, 2, v, lines, low, high, nz_low, nz_high);
     cylinder_on(t, v, lines, low, high, nz_low, nz_high);
 }
-SLABWRIGHT_WIDE void cylinder_rows(const CapsuleTerms& t, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+SLABWRIGHT_WIDE void cylinder_rows(const CapsuleTerms& t, const double* v, int lines, double* low,
+                                   double* high, double* nz_low, double* nz_high) {
     cylinder_on(t, v, lines, low, high, nz_low, nz_high);
 }
-SLABWRIGHT_WIDE void end_rows(const CapsuleTerms& t, const double* v, int lines, double* low, double* high, double* nz_low, double* nz_high) {
+SLABWRIGHT_WIDE void end_rows(const CapsuleTerms& t, const double* v, int lines, double* low, double* high,
+                              double* nz_low, double* nz_high) {
     ends_on(t, 1, v, lines, low, high, nz_low, nz_high);
 }
 
-SLABWRIGHT_WIDE std::int64_t cover_rows(const CoverRows& cover, const double* low, const double* high, int first, int last, std::int64_t* state) {
-    return out(cover, low + first, high + first, first, (last - first) / kLinesStep * kLinesStep, state + first);
+SLABWRIGHT_WIDE std::int64_t cover_rows(const CoverRows& cover, const double* low, const double* high,
+                                        int first, int last, std::int64_t* state) {
+    return out(cover, low + first, high + first, first, (last - first) / kLinesStep * kLinesStep,
+               state + first);
 }
 
-SLABWRIGHT_WIDE std::int64_t box_out_rows(const BoxTerms& b, const CoverRows& cover, const double* v, int first, int last, double* low, double* high,
+SLABWRIGHT_WIDE std::int64_t box_out_rows(const BoxTerms& b, const CoverRows& cover, const double* v,
+                                          int first, int last, double* low, double* high,
                                           std::int64_t* state) {
     const int n = (last - first) / kLinesStep * kLinesStep;
     reach(b, v + first, n, low + first, high + first);
     return out(cover, low + first, high + first, first, n, state + first);
 }
 
-// Nothing farther than r over or under the lines keeps a ball away, and a tall wall's other parts would make it seem to reach farther.
+// Nothing farther than r over or under the lines keeps a ball away, and a tall wall's other parts would make
+// it seem to reach farther.
 void facet_terms(const SolidFacet& f, std::size_t u, double r, double zc, BoxTerms& box, TangentTerms& t) {
     const std::size_t v = 1 - u;
     const double bottom = zc - r, top = zc + r, dz = std::max({0.0, f.z_min - zc, zc - f.z_max}),
@@ -250,10 +271,12 @@ void facet_terms(const SolidFacet& f, std::size_t u, double r, double zc, BoxTer
 namespace {
 
 template <std::size_t corners>
-[[gnu::always_inline]] inline void narrow(const TangentTerms& t, const double* __restrict v, int n, double* __restrict low, double* __restrict high) {
+[[gnu::always_inline]] inline void narrow(const TangentTerms& t, const double* __restrict v, int n,
+                                          double* __restrict low, double* __restrict high) {
     const double least = kTangentLeast * t.r2, z2 = t.r2 - t.z * t.z;
     for (int i = 0; i < n; ++i) {
-        const double touched = v[i] - t.across, at_least = touched < t.v_low ? t.v_low : touched, from_v = at_least < t.v_high ? at_least : t.v_high;
+        const double touched = v[i] - t.across, at_least = touched < t.v_low ? t.v_low : touched,
+                     from_v = at_least < t.v_high ? at_least : t.v_high;
         const double w = v[i] - from_v, q = z2 - w * w;
         const bool near = q > least;
         const double h = std::sqrt(near ? q : 1.0), inverse = 1 / h, sv = w * inverse, sz = t.z * inverse;
@@ -271,10 +294,12 @@ template <std::size_t corners>
 
 }  // namespace
 
-// From a point p the ball's centre is kept away up to p_u + √(r² − (v − p_v)² − (zc − p_z)²) on the line at v, a concave function of p, so no
-// more than what its tangent at any point gives at one of the corners.
-SLABWRIGHT_WIDE std::int64_t facet_out_rows(const BoxTerms& b, const TangentTerms& t, const CoverRows& cover, const double* __restrict v, int first,
-                                            int last, double* __restrict low, double* __restrict high, std::int64_t* __restrict state) {
+// From a point p the ball's centre is kept away up to p_u + √(r² − (v − p_v)² − (zc − p_z)²) on the line at
+// v, a concave function of p, so no more than what its tangent at any point gives at one of the corners.
+SLABWRIGHT_WIDE std::int64_t facet_out_rows(const BoxTerms& b, const TangentTerms& t, const CoverRows& cover,
+                                            const double* __restrict v, int first, int last,
+                                            double* __restrict low, double* __restrict high,
+                                            std::int64_t* __restrict state) {
     const int n = (last - first) / kLinesStep * kLinesStep;
     v += first, low += first, high += first;
     reach(b, v, n, low, high);
@@ -283,9 +308,12 @@ SLABWRIGHT_WIDE std::int64_t facet_out_rows(const BoxTerms& b, const TangentTerm
     return out(cover, low, high, first, n, state + first);
 }
 
-// The tangent's slope is (w, z) / h, and (h, w, z) is as long as r; what the disc reaches along that goes by its part along the axis.
-SLABWRIGHT_WIDE std::int64_t disc_out_rows(const BoxTerms& b, const DiscTerms& t, const CoverRows& cover, const double* __restrict v, int first,
-                                           int last, double* __restrict low, double* __restrict high, std::int64_t* __restrict state) {
+// The tangent's slope is (w, z) / h, and (h, w, z) is as long as r; what the disc reaches along that goes by
+// its part along the axis.
+SLABWRIGHT_WIDE std::int64_t disc_out_rows(const BoxTerms& b, const DiscTerms& t, const CoverRows& cover,
+                                           const double* __restrict v, int first, int last,
+                                           double* __restrict low, double* __restrict high,
+                                           std::int64_t* __restrict state) {
     const double least = kTangentLeast * t.r2, z2 = t.r2 - t.z * t.z, az = t.axis_z * t.z;
     const int n = (last - first) / kLinesStep * kLinesStep;
     v += first, low += first, high += first;
@@ -293,10 +321,13 @@ SLABWRIGHT_WIDE std::int64_t disc_out_rows(const BoxTerms& b, const DiscTerms& t
     for (int i = 0; i < n; ++i) {
         const double w = v[i] - t.v, q = z2 - w * w;
         const bool near = q > least;
-        const double h = std::sqrt(near ? q : 1.0), across = t.axis_v * w + az, on_high = across + t.axis_u * h, on_low = across - t.axis_u * h;
+        const double h = std::sqrt(near ? q : 1.0), across = t.axis_v * w + az,
+                     on_high = across + t.axis_u * h, on_low = across - t.axis_u * h;
         const double high2 = t.r2 - on_high * on_high, low2 = t.r2 - on_low * on_low, inverse = 1 / h;
-        const double up = (std::abs(on_high) * t.thickness + std::sqrt(high2 > 0 ? high2 : 0.0) * t.radius) * inverse,
-                     down = (std::abs(on_low) * t.thickness + std::sqrt(low2 > 0 ? low2 : 0.0) * t.radius) * inverse;
+        const double up = (std::abs(on_high) * t.thickness + std::sqrt(high2 > 0 ? high2 : 0.0) * t.radius) *
+                          inverse,
+                     down = (std::abs(on_low) * t.thickness + std::sqrt(low2 > 0 ? low2 : 0.0) * t.radius) *
+                            inverse;
         const double to = t.u + h + up, from = t.u - h - down;
         high[i] = near & (to < high[i]) ? to : high[i];
         low[i] = near & (from > low[i]) ? from : low[i];
@@ -304,26 +335,32 @@ SLABWRIGHT_WIDE std::int64_t disc_out_rows(const BoxTerms& b, const DiscTerms& t
     return out(cover, low, high, first, n, state + first);
 }
 
-// In floats, about the group's middle. What they round is less than a few of their last digits of r and of the facets' sizes, times ten where a
-// tangent is steep; a distance across is taken as so much less, and what is said as so much wider.
-SLABWRIGHT_WIDE void group_out_rows(const GroupCorners& g, const FacetGroup& group, std::size_t u_axis, double radius, double zc,
-                                    const CoverRows& cover, const double* v, int first, int last, const std::int64_t* state, GroupRows& rows) {
+// In floats, about the group's middle. What they round is less than a few of their last digits of r and of
+// the facets' sizes, times ten where a tangent is steep; a distance across is taken as so much less, and what
+// is said as so much wider.
+SLABWRIGHT_WIDE void group_out_rows(const GroupCorners& g, const FacetGroup& group, std::size_t u_axis,
+                                    double radius, double zc, const CoverRows& cover, const double* v,
+                                    int first, int last, const std::int64_t* state, GroupRows& rows) {
     constexpr std::size_t n = GroupRows::kFacets;
     constexpr auto inf = std::numeric_limits<float>::infinity();
     using Each = std::array<float, n>;
     const std::size_t v_axis = 1 - u_axis;
     const double mu = group.middle[u_axis], mv = group.middle[v_axis];
     const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]), r2 = r * r;
-    const float wider = 3e-5F * (r + group.radius + group.thickness), least = static_cast<float>(kTangentLeast) * r2, more = r2 * 1e-5F;
+    const float wider = 3e-5F * (r + group.radius + group.thickness),
+                least = static_cast<float>(kTangentLeast) * r2, more = r2 * 1e-5F;
     const auto &ua = g.p[0][u_axis], &ub = g.p[1][u_axis], &uc = g.p[2][u_axis];
     const auto &va = g.p[0][v_axis], &vb = g.p[1][v_axis], &vc = g.p[2][v_axis];
     alignas(32) Each u_low, u_high, v_low, v_high, box2, t_low, t_high, across, tz, tz2, da, db, dc;
     for (std::size_t i = 0; i < n; ++i) {
         const auto min = [](float a, float b) { return a < b ? a : b; };
         const auto max = [](float a, float b) { return a > b ? a : b; };
-        const float za = g.p[0][2][i], zb = g.p[1][2][i], zd = g.p[2][2][i], low = min(za, min(zb, zd)), high = max(za, max(zb, zd));
-        const float at = z - r * g.normal[2][i], at_least = at > low ? at : low, touched = at_least < high ? at_least : high;
-        const bool level = (g.nz[i] < 0) & (high + wider > z), active = level | ((high + wider > z - r) & (low - wider <= z));
+        const float za = g.p[0][2][i], zb = g.p[1][2][i], zd = g.p[2][2][i], low = min(za, min(zb, zd)),
+                    high = max(za, max(zb, zd));
+        const float at = z - r * g.normal[2][i], at_least = at > low ? at : low,
+                    touched = at_least < high ? at_least : high;
+        const bool level = (g.nz[i] < 0) & (high + wider > z),
+                   active = level | ((high + wider > z - r) & (low - wider <= z));
         u_low[i] = min(ua[i], min(ub[i], uc[i])), u_high[i] = max(ua[i], max(ub[i], uc[i]));
         v_low[i] = min(va[i], min(vb[i], vc[i])), v_high[i] = max(va[i], max(vb[i], vc[i]));
         const float dz = max(0.0F, max(low - z, z - high)), over2 = level ? 0.0F : dz * dz;
@@ -349,22 +386,28 @@ SLABWRIGHT_WIDE void group_out_rows(const GroupCorners& g, const FacetGroup& gro
     from_line.fill(last), to_line.fill(first);
     for (int l = first; l < last; ++l) {
         if (state[l] == 0) {
-            rows.low[static_cast<std::size_t>(l)].fill(inf), rows.high[static_cast<std::size_t>(l)].fill(-inf);
+            rows.low[static_cast<std::size_t>(l)].fill(inf),
+                rows.high[static_cast<std::size_t>(l)].fill(-inf);
             continue;
         }
         const auto at = static_cast<float>(v[l] - mv), covered_from = static_cast<float>(cover.low[l] - mu),
                    covered_to = static_cast<float>(cover.high[l] - mu);
-        float *const row_low = rows.low[static_cast<std::size_t>(l)].data(), *const row_high = rows.high[static_cast<std::size_t>(l)].data();
+        float *const row_low = rows.low[static_cast<std::size_t>(l)].data(),
+                     *const row_high = rows.high[static_cast<std::size_t>(l)].data();
         for (std::size_t i = 0; i < n; ++i) {
-            const float under = v_low[i] - at, over = at - v_high[i], off = under > over ? under : over, d = off > 0 ? off : 0;
+            const float under = v_low[i] - at, over = at - v_high[i], off = under > over ? under : over,
+                        d = off > 0 ? off : 0;
             const float reach2 = box2[i] - d * d, reach = std::sqrt(std::abs(reach2));
-            const float box_low = reach2 > 0 ? u_low[i] - reach : inf, box_high = reach2 > 0 ? u_high[i] + reach : -inf;
+            const float box_low = reach2 > 0 ? u_low[i] - reach : inf,
+                        box_high = reach2 > 0 ? u_high[i] + reach : -inf;
             const float touched = at - across[i], at_least = touched < t_low[i] ? t_low[i] : touched,
                         from = at_least < t_high[i] ? at_least : t_high[i];
             const float w = at - from, q = tz2[i] - w * w;
             const bool near = q > least;
-            const float h = std::sqrt(near ? q : 1.0F), inverse = 1 / h, sv = w * inverse, sz = tz[i] * inverse;
-            const float a = sv * (va[i] - from) + sz * da[i], b = sv * (vb[i] - from) + sz * db[i], c = sv * (vc[i] - from) + sz * dc[i];
+            const float h = std::sqrt(near ? q : 1.0F), inverse = 1 / h, sv = w * inverse,
+                        sz = tz[i] * inverse;
+            const float a = sv * (va[i] - from) + sz * da[i], b = sv * (vb[i] - from) + sz * db[i],
+                        c = sv * (vc[i] - from) + sz * dc[i];
             float up = ua[i] + a, down = ua[i] - a;
             up = ub[i] + b > up ? ub[i] + b : up, down = ub[i] - b < down ? ub[i] - b : down;
             up = uc[i] + c > up ? uc[i] + c : up, down = uc[i] - c < down ? uc[i] - c : down;
@@ -405,12 +448,14 @@ template <class T, class Vector>
 
 }  // namespace
 
-// A ball touches with the normal d at its centre less r·d: a facet with its own, an edge with one between those beside it, a corner with one between
-// those around it, and each on the part that is as high as that. `wider` is more than what floats round, of the heights and of where an edge crosses
-// one of them.
-SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& group, std::size_t v, double radius, double zc, GroupTouched& touched) {
+// A ball touches with the normal d at its centre less r·d: a facet with its own, an edge with one between
+// those beside it, a corner with one between those around it, and each on the part that is as high as that.
+// `wider` is more than what floats round, of the heights and of where an edge crosses one of them.
+SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& group, std::size_t v,
+                                   double radius, double zc, GroupTouched& touched) {
     const Floats none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
-    const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]), step = r * static_cast<float>(SolidFacet::kTurn);
+    const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]),
+               step = r * static_cast<float>(SolidFacet::kTurn);
     const float wider = kTouchMargin + 1e-6F * (r + std::abs(z) + group.radius + group.thickness);
     Floats nz, nv;
     Bits edges;
@@ -419,15 +464,18 @@ SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& grou
         std::memcpy(range.low.data(), &low, sizeof low), std::memcpy(range.high.data(), &high, sizeof high);
     };
     Floats all_low = inf, all_high = -inf;
-    // Of each corner the normals, and where a ball touches it; of each edge what it is wide for each mm that it is high.
+    // Of each corner the normals, and where a ball touches it; of each edge what it is wide for each mm that
+    // it is high.
     std::array<Floats, 3> pz, pv, wide, least, most;
     for (std::size_t c = 0; c < 3; ++c) {
         load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]);
         Floats down, up, left, right;
         load_small(g.corner.low[c][2], down), load_small(g.corner.high[c][2], up);
         load_small(g.corner.low[c][v], left), load_small(g.corner.high[c][v], right);
-        const Bits meets = ((edges & (8 << c)) != 0) & (pz[c] >= z - step * up - wider) & (pz[c] <= z - step * down + wider);
-        const Floats low = meets ? pv[c] + step * left - wider : inf, high = meets ? pv[c] + step * right + wider : -inf;
+        const Bits meets =
+            ((edges & (8 << c)) != 0) & (pz[c] >= z - step * up - wider) & (pz[c] <= z - step * down + wider);
+        const Floats low = meets ? pv[c] + step * left - wider : inf,
+                     high = meets ? pv[c] + step * right + wider : -inf;
         store(low, high, touched.end[c]);
         lower(all_low, low), raise(all_high, high);
     }
@@ -470,19 +518,22 @@ SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& grou
     store(all_low, all_high, touched.all);
 }
 
-// Seen from above, a disc touches a facet's section in the direction in which that faces, and where it ends in one that is near enough.
-SLABWRIGHT_WIDE void group_touched_by_disc(const GroupCorners& g, const FacetGroup& group, std::size_t v, double radius, double zc,
-                                           GroupTouched::Range& touched) {
+// Seen from above, a disc touches a facet's section in the direction in which that faces, and where it ends
+// in one that is near enough.
+SLABWRIGHT_WIDE void group_touched_by_disc(const GroupCorners& g, const FacetGroup& group, std::size_t v,
+                                           double radius, double zc, GroupTouched::Range& touched) {
     const Floats none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
     const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]);
-    const float wider = kTouchMargin + 1e-6F * (r + std::abs(z) + group.radius + group.thickness), under = z - wider, over = z + wider;
+    const float wider = kTouchMargin + 1e-6F * (r + std::abs(z) + group.radius + group.thickness),
+                under = z - wider, over = z + wider;
     Floats nu, nv, across;
     load(g.normal[1 - v], nu), load(g.normal[v], nv);
     across = nu * nu + nv * nv;
     for (int i = 0; i < kLanes; ++i) across[i] = std::sqrt(across[i]);
     nv /= (across > 0) ? across : one;
     std::array<Floats, 3> pz, pv, aside;
-    for (std::size_t c = 0; c < 3; ++c) load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]), load(g.aside[c], aside[c]);
+    for (std::size_t c = 0; c < 3; ++c)
+        load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]), load(g.aside[c], aside[c]);
     Floats low = inf, high = -inf;
     const auto add = [&](const Bits& meets, const Floats& at, const Floats& turn) {
         Floats least = nv - turn, most = nv + turn;

@@ -14,15 +14,17 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kLeastAlong =
-    0.17;                        // of normals along one that is amid them: short of a right angle from it, within which they hold all between them
-constexpr int kMostAside = 240;  // the same in a plane: short of straight back
-constexpr double kMostTiles = 1024;  // along x and along y, of solid_near
+constexpr double kLeastAlong = 0.17;  // of normals along one that is amid them: short of a right angle from
+                                      // it, within which they hold all between them
+constexpr int kMostAside = 240;       // the same in a plane: short of straight back
+constexpr double kMostTiles = 1024;   // along x and along y, of solid_near
 
 Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
 Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+Vec3d cross(const Vec3d& a, const Vec3d& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
 
 Vec3d unit_normal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
     const Vec3d u = minus(b, a), v = minus(c, a), n = cross(u, v);
@@ -33,10 +35,12 @@ Vec3d unit_normal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
 
 Vec3d normal_of(MeshView mesh, std::uint32_t f) {
     const Index3& v = mesh.facets[f];
-    return unit_normal(to_double(mesh.vertices[v[0]]), to_double(mesh.vertices[v[1]]), to_double(mesh.vertices[v[2]]));
+    return unit_normal(to_double(mesh.vertices[v[0]]), to_double(mesh.vertices[v[1]]),
+                       to_double(mesh.vertices[v[2]]));
 }
 
-// The crossing is computed from the lower end to the upper one, so that both facets of an edge get the same point.
+// The crossing is computed from the lower end to the upper one, so that both facets of an edge get the same
+// point.
 Vec3d cross_plane(const Vec3d& a, const Vec3d& b, double z) {
     const Vec3d& low = a[2] <= b[2] ? a : b;
     const Vec3d& high = a[2] <= b[2] ? b : a;
@@ -44,7 +48,8 @@ Vec3d cross_plane(const Vec3d& a, const Vec3d& b, double z) {
     return {low[0] + t * (high[0] - low[0]), low[1] + t * (high[1] - low[1]), z};
 }
 
-// An edge is tested by its lower facet unless it is concave: there the facets' own prisms overlap and hide it.
+// An edge is tested by its lower facet unless it is concave: there the facets' own prisms overlap and hide
+// it.
 bool edge_matters(MeshView mesh, std::uint32_t f, int k, const Vec3d& a, const Vec3d& n) {
     const std::uint32_t g = mesh.neighbours[f][k];
     if (g == kNoFacet) return true;
@@ -67,10 +72,15 @@ struct Turns {
 };
 
 constexpr double kNormalRounding = 1e-6;
-std::int8_t rounded_down(double v) { return static_cast<std::int8_t>(std::max(-127.0, std::floor((v - kNormalRounding) / SolidFacet::kTurn))); }
-std::int8_t rounded_up(double v) { return static_cast<std::int8_t>(std::min(127.0, std::ceil((v + kNormalRounding) / SolidFacet::kTurn))); }
+std::int8_t rounded_down(double v) {
+    return static_cast<std::int8_t>(std::max(-127.0, std::floor((v - kNormalRounding) / SolidFacet::kTurn)));
+}
+std::int8_t rounded_up(double v) {
+    return static_cast<std::int8_t>(std::min(127.0, std::ceil((v + kNormalRounding) / SolidFacet::kTurn)));
+}
 
-// What lies between the normals beside an edge, along the way from one to the other, which is less than half a turn.
+// What lies between the normals beside an edge, along the way from one to the other, which is less than half
+// a turn.
 NormalBox between(const Vec3d& m, const Vec3d& n) {
     constexpr double most_turn = -0.99, no_turn = 1 - 1e-12;
     NormalBox box;
@@ -82,7 +92,8 @@ NormalBox between(const Vec3d& m, const Vec3d& n) {
         double low = std::min(m[k], n[k]), high = std::max(m[k], n[k]);
         if (along < no_turn) {
             // Where both ends lead on, the way turns back between them.
-            const double from_m = n[k] - along * m[k], from_n = m[k] - along * n[k], turn = std::sqrt(std::max(0.0, 1 - axis[k] * axis[k] / across2));
+            const double from_m = n[k] - along * m[k], from_n = m[k] - along * n[k],
+                         turn = std::sqrt(std::max(0.0, 1 - axis[k] * axis[k] / across2));
             if (from_m > 0 && from_n > 0) high = turn;
             if (from_m < 0 && from_n < 0) low = -turn;
         }
@@ -91,8 +102,8 @@ NormalBox between(const Vec3d& m, const Vec3d& n) {
     return box;
 }
 
-// What lies between all the unit normals of a box: sums of them, with weights that make one, lie in it too, and are no shorter than they reach along
-// the middle of the box.
+// What lies between all the unit normals of a box: sums of them, with weights that make one, lie in it too,
+// and are no shorter than they reach along the middle of the box.
 NormalBox between_all(const NormalBox& box) {
     double middle2 = 0, half2 = 0;
     std::array<double, 3> low, high;
@@ -113,18 +124,21 @@ NormalBox between_all(const NormalBox& box) {
 }
 
 void widen(NormalBox& box, const NormalBox& other) {
-    for (std::size_t k = 0; k < 3; ++k) box.low[k] = std::min(box.low[k], other.low[k]), box.high[k] = std::max(box.high[k], other.high[k]);
+    for (std::size_t k = 0; k < 3; ++k)
+        box.low[k] = std::min(box.low[k], other.low[k]), box.high[k] = std::max(box.high[k], other.high[k]);
 }
 
 // Writes the facets that it makes to `out` and `normals`, as many as pieces() says, and moves these on.
-void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_top, SolidFacet*& out, FacetNormals*& normals) {
+void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_top, SolidFacet*& out,
+                  FacetNormals*& normals) {
     std::array<Vec3d, 3> p;
     for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     const Vec3d n = unit_normal(p[0], p[1], p[2]);
     std::array<bool, 3> matters;
     for (int k = 0; k < 3; ++k) matters[k] = turn.edges >> k & 1;
 
-    // Clip at z_top; corner[i] is followed by an edge that matters[i] (the new edge along the top always does).
+    // Clip at z_top; corner[i] is followed by an edge that matters[i] (the new edge along the top always
+    // does).
     constexpr int along_top = 3;
     std::array<Vec3d, 4> corner;
     std::array<bool, 4> edge{}, end{};
@@ -155,7 +169,8 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         }
     }
     if (corners < 3) return;
-    // Where the solid is cut off, a ball may also touch it with all between a facet's normals and the upright one.
+    // Where the solid is cut off, a ball may also touch it with all between a facet's normals and the upright
+    // one.
     NormalBox along_cut, at_cut;
     const std::uint8_t most_aside = *std::max_element(turn.aside.begin(), turn.aside.end());
     if (std::find(cut.begin(), cut.begin() + corners, true) != cut.begin() + corners) {
@@ -176,12 +191,15 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         std::size_t at = 0;
         for (const int c : {i, j, k}) s.aside[at++] = cut[c] ? most_aside : turn.aside[which[c]];
         const auto ends_here = [&](int c) { return end[c] && (first || c == k); };
-        s.ends = static_cast<std::uint8_t>((ends_here(i) ? 1 : 0) | (ends_here(j) ? 2 : 0) | (ends_here(k) ? 4 : 0)) & 7;
+        s.ends = static_cast<std::uint8_t>((ends_here(i) ? 1 : 0) | (ends_here(j) ? 2 : 0) |
+                                           (ends_here(k) ? 4 : 0)) &
+                 7;
         *out++ = s;
         FacetNormals around;
         at = 0;
         for (const int c : {i, j, k}) {
-            around.edge[at] = of[c] == along_top ? along_cut : turn.normals.edge[static_cast<std::size_t>(of[c])];
+            around.edge[at] =
+                of[c] == along_top ? along_cut : turn.normals.edge[static_cast<std::size_t>(of[c])];
             around.corner[at++] = cut[c] ? at_cut : turn.normals.corner[static_cast<std::size_t>(which[c])];
         }
         *normals++ = around;
@@ -200,13 +218,16 @@ struct Directions {
     Directions() { low.fill(127), high.fill(-127); }
     void add(const std::array<double, n>& d) {
         for (std::size_t k = 0; k < n; ++k) {
-            low[k] = std::min(low[k], static_cast<std::int8_t>(std::max(-127.0, std::floor(d[k] / SolidFacet::kTurn))));
-            high[k] = std::max(high[k], static_cast<std::int8_t>(std::min(127.0, std::ceil(d[k] / SolidFacet::kTurn))));
+            low[k] = std::min(
+                low[k], static_cast<std::int8_t>(std::max(-127.0, std::floor(d[k] / SolidFacet::kTurn))));
+            high[k] = std::max(
+                high[k], static_cast<std::int8_t>(std::min(127.0, std::ceil(d[k] / SolidFacet::kTurn))));
         }
     }
     void add_all() { low.fill(-127), high.fill(127); }
     void add(const Directions& other) {
-        for (std::size_t k = 0; k < n; ++k) low[k] = std::min(low[k], other.low[k]), high[k] = std::max(high[k], other.high[k]);
+        for (std::size_t k = 0; k < n; ++k)
+            low[k] = std::min(low[k], other.low[k]), high[k] = std::max(high[k], other.high[k]);
     }
     // How far from d they end at most.
     [[nodiscard]] std::uint8_t turn_from(const std::array<double, n>& d, double most) const {
@@ -215,7 +236,8 @@ struct Directions {
             const double at = d[k] / SolidFacet::kTurn, off = std::max(high[k] - at, at - low[k]);
             turn2 += off * off;
         }
-        return turn2 <= most * most ? static_cast<std::uint8_t>(std::ceil(std::sqrt(turn2))) : SolidFacet::kAnyTurn;
+        return turn2 <= most * most ? static_cast<std::uint8_t>(std::ceil(std::sqrt(turn2)))
+                                    : SolidFacet::kAnyTurn;
     }
 };
 
@@ -231,7 +253,8 @@ Seen seen_from_above(const Vec3d& n, std::array<double, 2>& direction) {
 }
 
 // For the facets. What the solid has no part of is left out: it is far below, or cut off.
-BulkVector<Turns> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets, double cut_off) {
+BulkVector<Turns> turns(Context& context, MeshView mesh, std::span<const std::uint32_t> facets,
+                        double cut_off) {
     constexpr std::size_t grain = 4096;
     BulkVector<Vec3d> normals(facets.size());
     BulkVector<Turns> turns(facets.size());
@@ -244,9 +267,12 @@ BulkVector<Turns> turns(Context& context, MeshView mesh, std::span<const std::ui
             for (int k = 0; k < 3; ++k) {
                 if (!edge_matters(mesh, facets[i], k, to_double(mesh.vertices[v[k]]), normals[i])) continue;
                 turns[i].edges |= static_cast<std::uint8_t>(1 << k);
-                if (across[k] != kNoFacet) turns[i].normals.edge[static_cast<std::size_t>(k)] = between(normals[i], normal_of(mesh, across[k]));
+                if (across[k] != kNoFacet)
+                    turns[i].normals.edge[static_cast<std::size_t>(k)] =
+                        between(normals[i], normal_of(mesh, across[k]));
             }
-            if (across[0] == kNoFacet || across[1] == kNoFacet || across[2] == kNoFacet) normals[i] = {0, 0, 0};
+            if (across[0] == kNoFacet || across[1] == kNoFacet || across[2] == kNoFacet)
+                normals[i] = {0, 0, 0};
         }
     });
     struct Around {
@@ -280,10 +306,12 @@ BulkVector<Turns> turns(Context& context, MeshView mesh, std::span<const std::ui
             std::array<double, 2> aside{};
             const Index3& v = mesh.facets[facets[i]];
             const bool faces = seen_from_above(normals[i], aside) == Seen::direction,
-                       at_top = std::max({mesh.vertices[v[0]].z, mesh.vertices[v[1]].z, mesh.vertices[v[2]].z}) >= cut_off;
+                       at_top = std::max({mesh.vertices[v[0]].z, mesh.vertices[v[1]].z,
+                                          mesh.vertices[v[2]].z}) >= cut_off;
             for (std::size_t c = 0; c < 3; ++c) {
                 const Around& at = around[mesh.facets[facets[i]][c]];
-                if (at_top || (turns[i].ends >> c & 1) != 0) turns[i].normals.corner[c] = between_all({at.normals.low, at.normals.high});
+                if (at_top || (turns[i].ends >> c & 1) != 0)
+                    turns[i].normals.corner[c] = between_all({at.normals.low, at.normals.high});
                 if (faces) turns[i].aside[c] = at.aside.turn_from(aside, kMostAside);
             }
         }
@@ -293,7 +321,8 @@ BulkVector<Turns> turns(Context& context, MeshView mesh, std::span<const std::ui
 
 // How many facets append_facet makes of one.
 std::size_t pieces(MeshView mesh, std::uint32_t f, double z_top) {
-    const std::array<double, 3> z{mesh.vertices[mesh.facets[f][0]].z, mesh.vertices[mesh.facets[f][1]].z, mesh.vertices[mesh.facets[f][2]].z};
+    const std::array<double, 3> z{mesh.vertices[mesh.facets[f][0]].z, mesh.vertices[mesh.facets[f][1]].z,
+                                  mesh.vertices[mesh.facets[f][2]].z};
     std::size_t corners = 0;
     for (std::size_t k = 0; k < 3; ++k) {
         const double a = z[k], b = z[(k + 1) % 3];
@@ -315,10 +344,14 @@ BulkVector<std::uint32_t> facets_between(Context& context, MeshView mesh, double
         std::vector<std::uint32_t>& part = parts[begin / grain];
         Box3 box{mesh.vertices[mesh.facets[begin][0]], mesh.vertices[mesh.facets[begin][0]]};
         for (std::size_t f = begin; f < end; ++f) {
-            const Vec3f a = mesh.vertices[mesh.facets[f][0]], b = mesh.vertices[mesh.facets[f][1]], c = mesh.vertices[mesh.facets[f][2]];
-            box.min = {std::min({box.min.x, a.x, b.x, c.x}), std::min({box.min.y, a.y, b.y, c.y}), std::min({box.min.z, a.z, b.z, c.z})};
-            box.max = {std::max({box.max.x, a.x, b.x, c.x}), std::max({box.max.y, a.y, b.y, c.y}), std::max({box.max.z, a.z, b.z, c.z})};
-            if (std::min({a.z, b.z, c.z}) >= cut_off || std::max({a.z, b.z, c.z}) < z_low) continue;  // a flat at the top itself belongs to the cap
+            const Vec3f a = mesh.vertices[mesh.facets[f][0]], b = mesh.vertices[mesh.facets[f][1]],
+                        c = mesh.vertices[mesh.facets[f][2]];
+            box.min = {std::min({box.min.x, a.x, b.x, c.x}), std::min({box.min.y, a.y, b.y, c.y}),
+                       std::min({box.min.z, a.z, b.z, c.z})};
+            box.max = {std::max({box.max.x, a.x, b.x, c.x}), std::max({box.max.y, a.y, b.y, c.y}),
+                       std::max({box.max.z, a.z, b.z, c.z})};
+            if (std::min({a.z, b.z, c.z}) >= cut_off || std::max({a.z, b.z, c.z}) < z_low)
+                continue;  // a flat at the top itself belongs to the cap
             part.push_back(static_cast<std::uint32_t>(f));
         }
         boxes[begin / grain] = box;
@@ -340,13 +373,15 @@ BulkVector<std::uint32_t> facets_between(Context& context, MeshView mesh, double
         auto middle = [](float u, float v, float w) { return (double{u} + v + w) / 3; };
         std::size_t at = starts[p];
         for (const std::uint32_t f : parts[p]) {
-            const Vec3f &a = mesh.vertices[mesh.facets[f][0]], &b = mesh.vertices[mesh.facets[f][1]], &c = mesh.vertices[mesh.facets[f][2]];
+            const Vec3f &a = mesh.vertices[mesh.facets[f][0]], &b = mesh.vertices[mesh.facets[f][1]],
+                        &c = mesh.vertices[mesh.facets[f][2]];
             keys[at++] = {grid.code(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)), f};
         }
         std::vector<std::uint32_t>().swap(parts[p]);
     });
-    parallel_sort(context, keys.begin(), keys.end(),
-                  [](const Key& a, const Key& b) { return a.code != b.code ? a.code < b.code : a.facet < b.facet; });
+    parallel_sort(context, keys.begin(), keys.end(), [](const Key& a, const Key& b) {
+        return a.code != b.code ? a.code < b.code : a.facet < b.facet;
+    });
     BulkVector<std::uint32_t> facets(keys.size());
     parallel_for(context, keys.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) facets[i] = keys[i].facet;
@@ -370,7 +405,8 @@ void lay_disc(std::span<const SolidFacet> facets, FacetGroup& group) {
         group.middle[k] = static_cast<float>((low[k] + high[k]) / 2);
         group.axis[k] = length > 0 ? static_cast<float>(area[k] / length) : (k == 2 ? 1.0F : 0.0F);
     }
-    const Vec3d middle{group.middle[0], group.middle[1], group.middle[2]}, axis{group.axis[0], group.axis[1], group.axis[2]};
+    const Vec3d middle{group.middle[0], group.middle[1], group.middle[2]},
+        axis{group.axis[0], group.axis[1], group.axis[2]};
     double radius2 = 0, thickness = 0, far2 = 0;
     for (const SolidFacet& f : facets)
         for (const Vec3d& p : f.p) {
@@ -394,7 +430,8 @@ Facing facing_of(const SolidFacet& facet, const FacetNormals& normals) {
     std::array<double, 3> low = facet.normal, high = low;
     const auto add = [&](const NormalBox& box) {
         for (std::size_t k = 0; k < 3; ++k)
-            low[k] = std::min(low[k], box.low[k] * SolidFacet::kTurn), high[k] = std::max(high[k], box.high[k] * SolidFacet::kTurn);
+            low[k] = std::min(low[k], box.low[k] * SolidFacet::kTurn),
+            high[k] = std::max(high[k], box.high[k] * SolidFacet::kTurn);
     };
     for (std::size_t k = 0; k < 3; ++k) {
         if ((facet.edges >> k & 1) != 0) add(normals.edge[k]);
@@ -402,13 +439,15 @@ Facing facing_of(const SolidFacet& facet, const FacetNormals& normals) {
     }
     Facing facing{};
     for (std::size_t k = 0; k < 3; ++k)
-        facing.low[k] = static_cast<float>(low[k] - kNormalRounding), facing.high[k] = static_cast<float>(high[k] + kNormalRounding);
+        facing.low[k] = static_cast<float>(low[k] - kNormalRounding),
+        facing.high[k] = static_cast<float>(high[k] + kNormalRounding);
     return facing;
 }
 
 }  // namespace
 
-std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets, std::span<const FacetNormals> normals) {
+std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFacet> facets,
+                                     std::span<const FacetNormals> normals) {
     constexpr float inf = std::numeric_limits<float>::infinity();
     auto down = [](double v) { return std::nextafter(static_cast<float>(v), -inf); };
     auto up = [](double v) { return std::nextafter(static_cast<float>(v), inf); };
@@ -417,7 +456,8 @@ std::vector<FacetGroup> facet_groups(Context& context, std::span<const SolidFace
         for (std::size_t g = begin; g < end; ++g) {
             FacetGroup group{{inf, inf}, {-inf, -inf}, inf, -inf, -inf, {}, {}, 0, 0, {}};
             const std::span<const SolidFacet> own =
-                facets.subspan(g * FacetGroup::kFacets, std::min(FacetGroup::kFacets, facets.size() - g * FacetGroup::kFacets));
+                facets.subspan(g * FacetGroup::kFacets,
+                               std::min(FacetGroup::kFacets, facets.size() - g * FacetGroup::kFacets));
             for (const SolidFacet& f : own) {
                 for (const Vec3d& p : f.p)
                     for (std::size_t k = 0; k < 2; ++k) {
@@ -449,12 +489,15 @@ namespace {
 // GroupCorners::aside.
 float aside_at(const SolidFacet& facet, std::size_t corner) {
     constexpr double rounding = 2e-6;
-    return facet.aside[corner] == SolidFacet::kAnyTurn ? GroupCorners::kAny : static_cast<float>(facet.aside[corner] * SolidFacet::kTurn + rounding);
+    return facet.aside[corner] == SolidFacet::kAnyTurn
+               ? GroupCorners::kAny
+               : static_cast<float>(facet.aside[corner] * SolidFacet::kTurn + rounding);
 }
 
 }  // namespace
 
-BulkVector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets, std::span<const FacetGroup> groups,
+BulkVector<GroupCorners> group_corners(Context& context, std::span<const SolidFacet> facets,
+                                       std::span<const FacetGroup> groups,
                                        std::span<const FacetNormals> normals) {
     constexpr float far_below = -1e15F;
     BulkVector<GroupCorners> corners(groups.size());
@@ -465,16 +508,22 @@ BulkVector<GroupCorners> group_corners(Context& context, std::span<const SolidFa
                 const std::size_t f = g * FacetGroup::kFacets + i;
                 for (std::size_t k = 0; k < 3; ++k)
                     for (std::size_t c = 0; c < 3; ++c)
-                        to.p[c][k][i] = f < facets.size() ? static_cast<float>(facets[f].p[c][k] - groups[g].middle[k]) : (k == 2 ? far_below : 0.0F);
-                for (std::size_t k = 0; k < 3; ++k) to.normal[k][i] = f < facets.size() ? static_cast<float>(facets[f].normal[k]) : 0.0F;
+                        to.p[c][k][i] = f < facets.size()
+                                            ? static_cast<float>(facets[f].p[c][k] - groups[g].middle[k])
+                                            : (k == 2 ? far_below : 0.0F);
+                for (std::size_t k = 0; k < 3; ++k)
+                    to.normal[k][i] = f < facets.size() ? static_cast<float>(facets[f].normal[k]) : 0.0F;
                 to.nz[i] = f < facets.size() ? facets[f].nz : 0.0F;
-                for (std::size_t c = 0; c < 3; ++c) to.aside[c][i] = f < facets.size() ? aside_at(facets[f], c) : 0.0F;
+                for (std::size_t c = 0; c < 3; ++c)
+                    to.aside[c][i] = f < facets.size() ? aside_at(facets[f], c) : 0.0F;
                 to.edges[i] = f < facets.size() ? facets[f].edges | facets[f].ends << 3 : 0;
                 const FacetNormals& own = f < normals.size() ? normals[f] : kAnyNormals;
                 for (std::size_t e = 0; e < 3; ++e)
                     for (std::size_t k = 0; k < 3; ++k) {
-                        to.edge.low[e][k][i] = own.edge[e].low[k], to.edge.high[e][k][i] = own.edge[e].high[k];
-                        to.corner.low[e][k][i] = own.corner[e].low[k], to.corner.high[e][k][i] = own.corner[e].high[k];
+                        to.edge.low[e][k][i] = own.edge[e].low[k],
+                        to.edge.high[e][k][i] = own.edge[e].high[k];
+                        to.corner.low[e][k][i] = own.corner[e].low[k],
+                        to.corner.high[e][k][i] = own.corner[e].high[k];
                     }
             }
         }
@@ -504,7 +553,8 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         SolidFacet* to = solid.facets.data() + starts[begin / kGrain];
         FacetNormals* to_normals = normals.data() + starts[begin / kGrain];
-        for (std::size_t i = begin; i < end; ++i) append_facet(mesh, facets[i], turn[i], cut_off, to, to_normals);
+        for (std::size_t i = begin; i < end; ++i)
+            append_facet(mesh, facets[i], turn[i], cut_off, to, to_normals);
     });
     using Extent = std::array<double, 4>;  // least x, y; greatest x, y
     const Extent extent = parallel_reduce(
@@ -512,11 +562,14 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
         [&](std::size_t begin, std::size_t end) {
             Extent e{1e300, 1e300, -1e300, -1e300};
             for (std::size_t i = begin; i < end; ++i)
-                for (const Vec3d& p : solid.facets[i].p) e = {std::min(e[0], p[0]), std::min(e[1], p[1]), std::max(e[2], p[0]), std::max(e[3], p[1])};
+                for (const Vec3d& p : solid.facets[i].p)
+                    e = {std::min(e[0], p[0]), std::min(e[1], p[1]), std::max(e[2], p[0]),
+                         std::max(e[3], p[1])};
             return e;
         },
         [](const Extent& a, const Extent& b) {
-            return Extent{std::min(a[0], b[0]), std::min(a[1], b[1]), std::max(a[2], b[2]), std::max(a[3], b[3])};
+            return Extent{std::min(a[0], b[0]), std::min(a[1], b[1]), std::max(a[2], b[2]),
+                          std::max(a[3], b[3])};
         });
     solid.min = {extent[0], extent[1]};
     solid.max = {extent[2], extent[3]};
@@ -526,20 +579,26 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     return solid;
 }
 
-LayerSolid solid_near(Context& context, const LayerSolid& solid, std::span<const SolidFacet> facets, double reach) {
+LayerSolid solid_near(Context& context, const LayerSolid& solid, std::span<const SolidFacet> facets,
+                      double reach) {
     LayerSolid near;
     near.part = true;
     near.z_low = solid.z_low, near.z_top = solid.z_top, near.min = solid.min, near.max = solid.max;
     if (facets.empty() || solid.facets.empty()) return near;
     // Square tiles over the solid; those that come near are marked, by their middles.
-    const double tile = std::max({reach, (solid.max[0] - solid.min[0]) / kMostTiles, (solid.max[1] - solid.min[1]) / kMostTiles});
-    const auto tiles = [&](int axis) { return static_cast<std::size_t>((solid.max[axis] - solid.min[axis]) / tile) + 1; };
+    const double tile = std::max(
+        {reach, (solid.max[0] - solid.min[0]) / kMostTiles, (solid.max[1] - solid.min[1]) / kMostTiles});
+    const auto tiles = [&](int axis) {
+        return static_cast<std::size_t>((solid.max[axis] - solid.min[axis]) / tile) + 1;
+    };
     const std::size_t nx = tiles(0), ny = tiles(1);
     const auto of = [&](double v, int axis) {
-        return static_cast<std::size_t>(std::clamp((v - solid.min[axis]) / tile, 0.0, static_cast<double>((axis == 0 ? nx : ny) - 1)));
+        return static_cast<std::size_t>(
+            std::clamp((v - solid.min[axis]) / tile, 0.0, static_cast<double>((axis == 0 ? nx : ny) - 1)));
     };
     std::vector<std::int32_t> rows;
-    for (std::size_t j = 0; j < ny; ++j) rows.push_back(to_units(solid.min[1] + (static_cast<double>(j) + 0.5) * tile));
+    for (std::size_t j = 0; j < ny; ++j)
+        rows.push_back(to_units(solid.min[1] + (static_cast<double>(j) + 0.5) * tile));
     const double half = tile * std::numbers::sqrt2 / 2 + 0.001;
     const Fibres marked = covering(context, facets, reach + half, Axis::x, rows);
     std::vector<std::uint32_t> before(nx * ny + ny, 0);  // by row: how many marked tiles precede a tile
@@ -562,7 +621,8 @@ LayerSolid solid_near(Context& context, const LayerSolid& solid, std::span<const
         if (meets(solid.groups[g])) met.push_back(static_cast<std::uint32_t>(g));
     near.facets.reserve(met.size() * FacetGroup::kFacets);
     for (const std::size_t g : met) {
-        const std::size_t first = g * FacetGroup::kFacets, last = std::min(solid.facets.size(), first + FacetGroup::kFacets);
+        const std::size_t first = g * FacetGroup::kFacets,
+                          last = std::min(solid.facets.size(), first + FacetGroup::kFacets);
         near.facets.insert(near.facets.end(), solid.facets.begin() + static_cast<std::ptrdiff_t>(first),
                            solid.facets.begin() + static_cast<std::ptrdiff_t>(last));
     }

@@ -12,8 +12,8 @@ namespace slabwright {
 
 namespace {
 
-// Crossings of the border with grid edges. On row j (a fibre along x) the crossing with cell column i lies between the
-// nodes (i, j) and (i + 1, j); on column i it lies between (i, j) and (i, j + 1).
+// Crossings of the border with grid edges. On row j (a fibre along x) the crossing with cell column i lies
+// between the nodes (i, j) and (i + 1, j); on column i it lies between (i, j) and (i, j + 1).
 struct EdgeCrossing {
     std::uint32_t cell = 0;  // i on a row, j on a column
     std::int32_t at = 0;     // along the fibre, 0.1 µm
@@ -28,7 +28,8 @@ struct Lines {
 
     EdgeCrossing* find(std::size_t line, std::uint32_t cell) {
         auto first = crossings.begin() + starts[line], last = crossings.begin() + starts[line + 1];
-        auto it = std::lower_bound(first, last, cell, [](const EdgeCrossing& c, std::uint32_t v) { return c.cell < v; });
+        auto it = std::lower_bound(first, last, cell,
+                                   [](const EdgeCrossing& c, std::uint32_t v) { return c.cell < v; });
         return it != last && it->cell == cell ? &*it : nullptr;
     }
 };
@@ -39,41 +40,51 @@ struct NodeRange {
 };
 
 // The node test is done on the fibres along x alone, so that both families agree on it.
-std::vector<NodeRange> forbidden_nodes(std::span<const Forbidden> intervals, std::span<const std::int32_t> nodes) {
+std::vector<NodeRange> forbidden_nodes(std::span<const Forbidden> intervals,
+                                       std::span<const std::int32_t> nodes) {
     std::vector<NodeRange> ranges;
     for (const Forbidden& f : intervals) {
-        const auto first = std::upper_bound(nodes.begin(), nodes.end(), f.low * kUnitsPerMm, [](double v, std::int32_t n) { return v < n; });
-        const auto last = std::lower_bound(first, nodes.end(), f.high * kUnitsPerMm, [](std::int32_t n, double v) { return n < v; });
+        const auto first = std::upper_bound(nodes.begin(), nodes.end(), f.low * kUnitsPerMm,
+                                            [](double v, std::int32_t n) { return v < n; });
+        const auto last = std::lower_bound(first, nodes.end(), f.high * kUnitsPerMm,
+                                           [](std::int32_t n, double v) { return n < v; });
         if (first == last) continue;
-        const NodeRange r{static_cast<std::uint32_t>(first - nodes.begin()), static_cast<std::uint32_t>(last - nodes.begin())};
-        if (!ranges.empty() && ranges.back().last >= r.first) ranges.back().last = std::max(ranges.back().last, r.last);
+        const NodeRange r{static_cast<std::uint32_t>(first - nodes.begin()),
+                          static_cast<std::uint32_t>(last - nodes.begin())};
+        if (!ranges.empty() && ranges.back().last >= r.first)
+            ranges.back().last = std::max(ranges.back().last, r.last);
         else ranges.push_back(r);
     }
     return ranges;
 }
 
 bool contains(const std::vector<NodeRange>& ranges, std::uint32_t node) {
-    auto it = std::upper_bound(ranges.begin(), ranges.end(), node, [](std::uint32_t v, const NodeRange& r) { return v < r.first; });
+    auto it = std::upper_bound(ranges.begin(), ranges.end(), node,
+                               [](std::uint32_t v, const NodeRange& r) { return v < r.first; });
     return it != ranges.begin() && node < std::prev(it)->last;
 }
 
-// The end of the forbidden stretch between a free and a forbidden node, as seen from the free one. Where a wall touches
-// a grid line exactly, the two families may differ by rounding about the node on it: the end then lies on the node.
-EdgeCrossing crossing_between(std::span<const Forbidden> intervals, std::int32_t low, std::int32_t high, bool low_is_solid) {
+// The end of the forbidden stretch between a free and a forbidden node, as seen from the free one. Where a
+// wall touches a grid line exactly, the two families may differ by rounding about the node on it: the end
+// then lies on the node.
+EdgeCrossing crossing_between(std::span<const Forbidden> intervals, std::int32_t low, std::int32_t high,
+                              bool low_is_solid) {
     constexpr double rounding = 1e-5;  // mm
     EdgeCrossing c;
     c.low_is_solid = low_is_solid;
     const double a = low / kUnitsPerMm, b = high / kUnitsPerMm;
     if (low_is_solid) {  // free end above: the highest interval end in [a, b]
         c.at = high;
-        auto it = std::upper_bound(intervals.begin(), intervals.end(), b, [](double v, const Forbidden& f) { return v < f.high; });
+        auto it = std::upper_bound(intervals.begin(), intervals.end(), b,
+                                   [](double v, const Forbidden& f) { return v < f.high; });
         if (it != intervals.begin() && std::prev(it)->high > a - rounding) {
             c.at = std::max(low, to_units(std::prev(it)->high));
             c.nz = std::prev(it)->nz_high;
         }
     } else {  // free end below: the lowest interval start in [a, b]
         c.at = low;
-        auto it = std::lower_bound(intervals.begin(), intervals.end(), a, [](const Forbidden& f, double v) { return f.low < v; });
+        auto it = std::lower_bound(intervals.begin(), intervals.end(), a,
+                                   [](const Forbidden& f, double v) { return f.low < v; });
         if (it != intervals.end() && it->low < b + rounding) {
             c.at = std::min(high, to_units(it->low));
             c.nz = it->nz_low;
@@ -91,8 +102,10 @@ FibreGrid fibre_grid(const LayerSolid& solid, const Cutter& cutter, std::int32_t
         std::vector<std::int32_t> v;
         if (solid.min[k] > solid.max[k]) return v;
         const double reach = cutter.radius * kUnitsPerMm;
-        const auto first = static_cast<std::int64_t>(std::floor((solid.min[k] * kUnitsPerMm - reach) / pitch)) - 1;
-        const auto last = static_cast<std::int64_t>(std::ceil((solid.max[k] * kUnitsPerMm + reach) / pitch)) + 1;
+        const auto first =
+            static_cast<std::int64_t>(std::floor((solid.min[k] * kUnitsPerMm - reach) / pitch)) - 1;
+        const auto last =
+            static_cast<std::int64_t>(std::ceil((solid.max[k] * kUnitsPerMm + reach) / pitch)) + 1;
         for (std::int64_t i = first; i <= last; ++i) v.push_back(static_cast<std::int32_t>(i * pitch));
         return v;
     };
@@ -114,8 +127,10 @@ Contours linked(const Fibres& along_x, const Fibres& along_y, const FibreGrid& g
     for (std::size_t j = 0; j < rows; ++j) {
         const std::vector<NodeRange>& r = node_rows[j];
         if (!r.empty() && (j == 0 || j + 1 == rows || r.front().first == 0 || r.back().last == columns))
-            throw Error(ErrorKind::no_plan, "contours.open", "what a cutter must keep out of reaches past the layer's facets",
-                        "y " + std::to_string(grid.y[j] / 10000) + " mm, tip " + std::to_string(static_cast<long>(tip_z)) + " mm",
+            throw Error(ErrorKind::no_plan, "contours.open",
+                        "what a cutter must keep out of reaches past the layer's facets",
+                        "y " + std::to_string(grid.y[j] / 10000) + " mm, tip " +
+                            std::to_string(static_cast<long>(tip_z)) + " mm",
                         "check the mesh with slabwright inspect, and report this");
     }
 
@@ -123,7 +138,8 @@ Contours linked(const Fibres& along_x, const Fibres& along_y, const FibreGrid& g
     for (std::size_t j = 0; j < rows; ++j) {
         for (const NodeRange& r : node_rows[j]) {
             auto add = [&](std::uint32_t cell, bool low_is_solid) {
-                EdgeCrossing c = crossing_between(along_x.line(j), grid.x[cell], grid.x[cell + 1], low_is_solid);
+                EdgeCrossing c =
+                    crossing_between(along_x.line(j), grid.x[cell], grid.x[cell + 1], low_is_solid);
                 c.cell = cell;
                 on_rows.crossings.push_back(c);
             };
@@ -132,7 +148,8 @@ Contours linked(const Fibres& along_x, const Fibres& along_y, const FibreGrid& g
         }
         on_rows.starts.push_back(static_cast<std::uint32_t>(on_rows.crossings.size()));
     }
-    // Between two rows the border crosses every column whose node is in one row's ranges but not in the other's.
+    // Between two rows the border crosses every column whose node is in one row's ranges but not in the
+    // other's.
     std::vector<std::vector<std::uint32_t>> cells_of_column(columns);
     for (std::size_t j = 0; j + 1 < rows; ++j) {
         const auto &a = node_rows[j], &b = node_rows[j + 1];
@@ -142,7 +159,8 @@ Contours linked(const Fibres& along_x, const Fibres& along_y, const FibreGrid& g
         std::sort(cuts.begin(), cuts.end());
         for (std::size_t k = 0; k + 1 < cuts.size(); ++k)
             if (cuts[k] != cuts[k + 1] && contains(a, cuts[k]) != contains(b, cuts[k]))
-                for (std::uint32_t i = cuts[k]; i < cuts[k + 1]; ++i) cells_of_column[i].push_back(static_cast<std::uint32_t>(j));
+                for (std::uint32_t i = cuts[k]; i < cuts[k + 1]; ++i)
+                    cells_of_column[i].push_back(static_cast<std::uint32_t>(j));
     }
     for (std::size_t i = 0; i < columns; ++i) {
         for (const std::uint32_t j : cells_of_column[i]) {
@@ -154,8 +172,9 @@ Contours linked(const Fibres& along_x, const Fibres& along_y, const FibreGrid& g
         on_columns.starts.push_back(static_cast<std::uint32_t>(on_columns.crossings.size()));
     }
 
-    // Follow the border with the solid on the right. In a cell, the exit is the edge next to the entry around the free
-    // corner that both share, so that in a doubtful cell (solid corners on one diagonal) the solid stays connected.
+    // Follow the border with the solid on the right. In a cell, the exit is the edge next to the entry around
+    // the free corner that both share, so that in a doubtful cell (solid corners on one diagonal) the solid
+    // stays connected.
     auto trace = [&](bool start_on_row, std::size_t line, EdgeCrossing* start) {
         bool on_row = start_on_row;
         EdgeCrossing* c = start;
@@ -180,7 +199,8 @@ Contours linked(const Fibres& along_x, const Fibres& along_y, const FibreGrid& g
                 free_is_east = !c->low_is_solid;  // heading east, the column is the next cell's western edge
                 if (!c->low_is_solid) --i;
             }
-            // Turning around the free corner first (a left turn), then straight on, then around the solid corner.
+            // Turning around the free corner first (a left turn), then straight on, then around the solid
+            // corner.
             const std::uint32_t near_row = free_is_north ? j + 1 : j, far_row = free_is_north ? j : j + 1;
             const std::uint32_t near_column = free_is_east ? i + 1 : i, far_column = free_is_east ? i : i + 1;
             EdgeCrossing* next = nullptr;
@@ -209,7 +229,8 @@ Contours linked(const Fibres& along_x, const Fibres& along_y, const FibreGrid& g
 
 }  // namespace
 
-std::vector<Contours> level_contours(Context& context, const LayerSolid& solid, std::span<const FibreLevel> levels, const Cutter& cutter,
+std::vector<Contours> level_contours(Context& context, const LayerSolid& solid,
+                                     std::span<const FibreLevel> levels, const Cutter& cutter,
                                      const FibreGrid& grid) {
     std::vector<Contours> contours(levels.size());
     if (grid.x.size() < 2 || grid.y.size() < 2) return contours;
@@ -222,7 +243,8 @@ std::vector<Contours> level_contours(Context& context, const LayerSolid& solid, 
     return contours;
 }
 
-Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z, const FibreGrid& grid) {
+Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter,
+                        double tip_z, const FibreGrid& grid) {
     const FibreLevel level{tip_z, &inside};
     return std::move(level_contours(context, solid, {&level, 1}, cutter, grid).front());
 }

@@ -9,8 +9,9 @@
 
 namespace slabwright {
 
-/// Closed polylines of cutter locations at one height, travelled with the solid on the right (climb milling with a
-/// spindle that turns clockwise). Contour i has the points starts[i] … starts[i + 1] − 1; the last is joined to the first.
+/// Closed polylines of cutter locations at one height, travelled with the solid on the right (climb milling
+/// with a spindle that turns clockwise). Contour i has the points starts[i] … starts[i + 1] − 1; the last is
+/// joined to the first.
 struct Contours {
     std::vector<Point2> points;  ///< 0.1 µm
     std::vector<float> nz;       ///< at each point, as Forbidden::nz
@@ -24,19 +25,21 @@ struct FibreGrid {
     std::vector<std::int32_t> x, y;  ///< coordinates of the fibres along y (at x[i]) and along x (at y[j])
 };
 
-/// A grid of `pitch` (units), aligned to the origin, that encloses every contour of this cutter around this solid.
+/// A grid of `pitch` (units), aligned to the origin, that encloses every contour of this cutter around this
+/// solid.
 [[nodiscard]] FibreGrid fibre_grid(const LayerSolid& solid, const Cutter& cutter, std::int32_t pitch);
 
-/// The contours at tip height `tip_z`. Every point is the exact end of a fibre's interval, neighbours are at most
-/// √2·pitch apart. A chord of that length between two free positions enters the forbidden region of a cutter of
-/// radius r by at most pitch²/(4r), measured normal to the part: whatever the region does between the fibres, each
-/// point of it lies in a ball (for a flat cutter a disc) of radius r around a point of the solid, and that ball contains
-/// neither end of the chord.
-[[nodiscard]] Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside, const Cutter& cutter, double tip_z,
-                                      const FibreGrid& grid);
+/// The contours at tip height `tip_z`. Every point is the exact end of a fibre's interval, neighbours are at
+/// most √2·pitch apart. A chord of that length between two free positions enters the forbidden region of a
+/// cutter of radius r by at most pitch²/(4r), measured normal to the part: whatever the region does between
+/// the fibres, each point of it lies in a ball (for a flat cutter a disc) of radius r around a point of the
+/// solid, and that ball contains neither end of the chord.
+[[nodiscard]] Contours level_contours(Context& context, const LayerSolid& solid, const Loops& inside,
+                                      const Cutter& cutter, double tip_z, const FibreGrid& grid);
 
 /// The same at several heights, in any order; a result for each.
-[[nodiscard]] std::vector<Contours> level_contours(Context& context, const LayerSolid& solid, std::span<const FibreLevel> levels,
-                                                   const Cutter& cutter, const FibreGrid& grid);
+[[nodiscard]] std::vector<Contours> level_contours(Context& context, const LayerSolid& solid,
+                                                   std::span<const FibreLevel> levels, const Cutter& cutter,
+                                                   const FibreGrid& grid);
 
 }  // namespace slabwright

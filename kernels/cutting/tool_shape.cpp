@@ -12,10 +12,11 @@ namespace slabwright {
 
 void check_tool_shape(const ToolShape& tool) {
     auto require = [](bool good, const char* what) {
-        if (!good) throw Error(ErrorKind::usage, "tool.shape", what, "tool shape", "correct the tool's measures");
+        if (!good)
+            throw Error(ErrorKind::usage, "tool.shape", what, "tool shape", "correct the tool's measures");
     };
-    for (const double length :
-         {tool.radius, tool.corner_radius, tool.taper_rad, tool.flute_length, tool.shank_radius, tool.stickout, tool.holder_radius})
+    for (const double length : {tool.radius, tool.corner_radius, tool.taper_rad, tool.flute_length,
+                                tool.shank_radius, tool.stickout, tool.holder_radius})
         require(std::isfinite(length) && length >= 0, "a measure of the tool is negative or not finite");
     require(tool.radius > 0, "the tool has no radius");
     double top_of_rounding = 0;
@@ -30,19 +31,23 @@ void check_tool_shape(const ToolShape& tool) {
             top_of_rounding = tool.corner_radius;
             break;
         case ToolShape::Profile::tapered_ball:
-            require(tool.corner_radius > 0 && tool.corner_radius <= tool.radius, "the ball at the tip is not smaller than the cutter");
-            require(tool.taper_rad > 0 && tool.taper_rad < std::numbers::pi / 2, "the taper is not between 0 and 90 degrees");
+            require(tool.corner_radius > 0 && tool.corner_radius <= tool.radius,
+                    "the ball at the tip is not smaller than the cutter");
+            require(tool.taper_rad > 0 && tool.taper_rad < std::numbers::pi / 2,
+                    "the taper is not between 0 and 90 degrees");
             top_of_rounding = tool.corner_radius * (1 - std::sin(tool.taper_rad));
             break;
     }
-    require(tool.flute_length == 0 || tool.flute_length >= top_of_rounding, "the flutes end below the top of the tip's rounding");
+    require(tool.flute_length == 0 || tool.flute_length >= top_of_rounding,
+            "the flutes end below the top of the tip's rounding");
 }
 
 double Envelope::height(double distance) const {
     if (distance > radius) return std::numeric_limits<double>::infinity();
     const double x = distance - core;
     if (x <= 0) return low;
-    if (x <= rounding * cos_taper) return low + rounding - std::sqrt(std::max(0.0, rounding * rounding - x * x));
+    if (x <= rounding * cos_taper)
+        return low + rounding - std::sqrt(std::max(0.0, rounding * rounding - x * x));
     if (sin_taper <= 0) return low + rounding;
     return low + rounding * (1 - sin_taper) + (x - rounding * cos_taper) * cos_taper / sin_taper;
 }
@@ -54,8 +59,8 @@ double Envelope::slope(double distance) const {
     return sin_taper > 0 ? cos_taper / sin_taper : std::numeric_limits<double>::infinity();
 }
 
-// Depth is the distance from the surface: the rounding shrinks, and once it is used up the disc does. Where a flank stands on a disc,
-// its offset meets the raised floor nearer to the axis.
+// Depth is the distance from the surface: the rounding shrinks, and once it is used up the disc does. Where a
+// flank stands on a disc, its offset meets the raised floor nearer to the axis.
 Envelope Envelope::eroded(double depth) const {
     Envelope e = *this;
     e.low += depth;
@@ -97,7 +102,8 @@ std::vector<Envelope> envelopes(const ToolShape& tool) {
             if (tool.flute_length > 0) {
                 // The flank ends with the flutes, if it is not as wide as the cutter before.
                 const double above = tool.flute_length - cutter.rounding * (1 - cutter.sin_taper);
-                cutter.radius = std::min(cutter.radius, cutter.rounding * cutter.cos_taper + above * cutter.sin_taper / cutter.cos_taper);
+                cutter.radius = std::min(cutter.radius, cutter.rounding * cutter.cos_taper +
+                                                            above * cutter.sin_taper / cutter.cos_taper);
             }
             break;
         }

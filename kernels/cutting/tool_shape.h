@@ -23,12 +23,14 @@ struct ToolShape {
     double holder_radius = 0;  ///< mm
 };
 
-/// @throws Error(usage, "tool.shape") for a length that is negative or not finite, a radius of 0, a corner larger than the cutter, a
+/// @throws Error(usage, "tool.shape") for a length that is negative or not finite, a radius of 0, a corner
+/// larger than the cutter, a
 ///         taper outside (0°, 90°), or flutes that end below the top of the tip's rounding
 void check_tool_shape(const ToolShape& tool);
 
-/// The under side of a part of a tool: a level disc of radius `core`, a rounding of radius `rounding`, then the flank, at a slope or
-/// upright, out to `radius`. What lies above it belongs to the tool. Convex: height() is, as a function of the distance.
+/// The under side of a part of a tool: a level disc of radius `core`, a rounding of radius `rounding`, then
+/// the flank, at a slope or upright, out to `radius`. What lies above it belongs to the tool. Convex:
+/// height() is, as a function of the distance.
 struct Envelope {
     double low = 0;  ///< mm, the disc's height over the tip
     double core = 0, rounding = 0;
@@ -39,11 +41,13 @@ struct Envelope {
     [[nodiscard]] double height(double distance) const;
     /// Its derivative by the distance.
     [[nodiscard]] double slope(double distance) const;
-    /// What is deeper in the tool than `depth`, mm: that part's under side. Its radius is negative when nothing is.
+    /// What is deeper in the tool than `depth`, mm: that part's under side. Its radius is negative when
+    /// nothing is.
     [[nodiscard]] Envelope eroded(double depth) const;
 };
 
-/// The cutter's under side first, then those of shank and holder where they stand out over what is below them.
+/// The cutter's under side first, then those of shank and holder where they stand out over what is below
+/// them.
 [[nodiscard]] std::vector<Envelope> envelopes(const ToolShape& tool);
 
 }  // namespace slabwright

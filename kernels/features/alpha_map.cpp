@@ -47,7 +47,10 @@ double area_between(const std::array<P3, 3>& t, double area, double low, double 
 double AlphaMap::least(double z0, double z1, double at_least) const {
     double least = std::numbers::pi / 2;
     if (slopes.empty()) return least;
-    auto bin = [&](double z) { return std::clamp<long>(static_cast<long>((z - z_low) / step), 0, static_cast<long>(slopes.size()) - 1); };
+    auto bin = [&](double z) {
+        return std::clamp<long>(static_cast<long>((z - z_low) / step), 0,
+                                static_cast<long>(slopes.size()) - 1);
+    };
     for (long b = bin(z0); b <= bin(z1); ++b) {
         const auto& s = slopes[static_cast<std::size_t>(b)];
         const auto it = std::lower_bound(s.begin(), s.end(), at_least);
@@ -90,15 +93,18 @@ std::vector<AlphaMap::Band> AlphaMap::bands(double at_least, double same_rad, do
     return found;
 }
 
-AlphaMap alpha_map(Context& context, MeshView mesh, double z_low, double z_high, const AlphaOptions& options) {
+AlphaMap alpha_map(Context& context, MeshView mesh, double z_low, double z_high,
+                   const AlphaOptions& options) {
     if (!(z_low < z_high) || !std::isfinite(z_low) || !std::isfinite(z_high) || !(options.step > 0))
-        throw Error(ErrorKind::usage, "alpha_map.range", "the heights of an alpha map do not ascend, or its step is not over 0");
+        throw Error(ErrorKind::usage, "alpha_map.range",
+                    "the heights of an alpha map do not ascend, or its step is not over 0");
     AlphaMap map;
     map.z_low = z_low, map.z_high = z_high, map.step = options.step;
     const std::size_t bins = static_cast<std::size_t>((z_high - z_low) / options.step) + 1;
     const double top = z_high - options.cut_off;
     auto bin = [&](double z) {
-        return static_cast<std::size_t>(std::clamp<long>(static_cast<long>((z - z_low) / options.step), 0, static_cast<long>(bins) - 1));
+        return static_cast<std::size_t>(
+            std::clamp<long>(static_cast<long>((z - z_low) / options.step), 0, static_cast<long>(bins) - 1));
     };
     Part sum = parallel_reduce(
         context, mesh.size(), kGrain, Part{},
@@ -122,8 +128,10 @@ AlphaMap alpha_map(Context& context, MeshView mesh, double z_low, double z_high,
                 const double up = nz / length;
                 if (up < 0 || up > kLevel || (nx == 0 && ny == 0)) continue;
                 const double alpha = std::acos(std::min(1.0, up));
-                const std::size_t slope = std::min(kSlopes - 1, static_cast<std::size_t>(alpha / AlphaMap::kTenth));
-                for (std::size_t b = bin(low); b <= bin(std::min(high, top)); ++b) part.seen[b][slope / 64] |= std::uint64_t{1} << slope % 64;
+                const std::size_t slope =
+                    std::min(kSlopes - 1, static_cast<std::size_t>(alpha / AlphaMap::kTenth));
+                for (std::size_t b = bin(low); b <= bin(std::min(high, top)); ++b)
+                    part.seen[b][slope / 64] |= std::uint64_t{1} << slope % 64;
                 const double area = area_between(t, length / 2, z_low, top);
                 if (!(area > 0)) continue;
                 part.area += area;
@@ -142,11 +150,13 @@ AlphaMap alpha_map(Context& context, MeshView mesh, double z_low, double z_high,
             a.least_steep = std::min(a.least_steep, b.least_steep);
             return a;
         });
-    map.area = sum.area, map.vertical_area = sum.vertical_area, map.least_slope = sum.least, map.least_steep = sum.least_steep;
+    map.area = sum.area, map.vertical_area = sum.vertical_area, map.least_slope = sum.least,
+    map.least_steep = sum.least_steep;
     map.slopes.resize(bins);
     for (std::size_t b = 0; b < sum.seen.size(); ++b)
         for (std::size_t s = 0; s < kSlopes; ++s)
-            if ((sum.seen[b][s / 64] >> s % 64 & 1) != 0) map.slopes[b].push_back(static_cast<double>(s) * AlphaMap::kTenth);
+            if ((sum.seen[b][s / 64] >> s % 64 & 1) != 0)
+                map.slopes[b].push_back(static_cast<double>(s) * AlphaMap::kTenth);
     return map;
 }
 

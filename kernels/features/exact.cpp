@@ -1,12 +1,12 @@
-// Peaks, valleys and saddles to float precision: the height's critical points on the surface, by the signs around every
-// vertex. Vertices of one height that edges join are one plateau and are judged together.
+// Peaks, valleys and saddles to float precision: the height's critical points on the surface, by the signs
+// around every vertex. Vertices of one height that edges join are one plateau and are judged together.
 //
-// Around a plateau lie its star facets, each of which crosses from one plateau edge to the next. Where all of the star is
-// lower, the section just below the plateau is a set of closed rings in the star; with the solid on their left their
-// area is positive when the solid lies within (a peak) and negative when it lies around (the ceiling of a hollow, an
-// undercut's matter). Just above a minimum it is the other way about: negative in a depression (a valley), positive
-// under a bulge. The sign is exact wherever the surface does not cross itself, overhangs included, which a sum of
-// normals is not.
+// Around a plateau lie its star facets, each of which crosses from one plateau edge to the next. Where all of
+// the star is lower, the section just below the plateau is a set of closed rings in the star; with the solid
+// on their left their area is positive when the solid lies within (a peak) and negative when it lies around
+// (the ceiling of a hollow, an undercut's matter). Just above a minimum it is the other way about: negative
+// in a depression (a valley), positive under a bulge. The sign is exact wherever the surface does not cross
+// itself, overhangs included, which a sum of normals is not.
 #include <algorithm>
 #include <atomic>
 #include <bit>
@@ -22,7 +22,8 @@ namespace slabwright {
 namespace {
 
 constexpr std::size_t kGrain = 4096;
-constexpr std::size_t kCheckedAfter = std::size_t{1} << 18;  // facets on one thread: whether the work is still wanted
+constexpr std::size_t kCheckedAfter = std::size_t{1}
+                                      << 18;  // facets on one thread: whether the work is still wanted
 
 bool collapsed(const Index3& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
@@ -47,13 +48,15 @@ void add_facet(MeshView mesh, std::uint32_t facet, float z, Star& star) {
     star.changes += above && below;
 }
 
-// Twice the area, as seen from above, of the ring that the facet's part in the section at distance `eps` from the
-// plateau's height contributes to. Falling edges start the part and rising ones end it, on either side of the plateau.
+// Twice the area, as seen from above, of the ring that the facet's part in the section at distance `eps` from
+// the plateau's height contributes to. Falling edges start the part and rising ones end it, on either side of
+// the plateau.
 double ring_area(MeshView mesh, std::uint32_t facet, float z, double eps, const Vec3d& origin) {
     std::array<double, 2> start{}, end{};
     const Index3 t = mesh.facets[facet];
     for (int k = 0; k < 3; ++k) {
-        Vec3d a = minus(to_double(mesh.vertices[t[k]]), origin), b = minus(to_double(mesh.vertices[t[(k + 1) % 3]]), origin);
+        Vec3d a = minus(to_double(mesh.vertices[t[k]]), origin),
+              b = minus(to_double(mesh.vertices[t[(k + 1) % 3]]), origin);
         const bool a_on = mesh.vertices[t[k]].z == z, b_on = mesh.vertices[t[(k + 1) % 3]].z == z;
         if (a_on == b_on) continue;
         const bool falls = a[2] > b[2];
@@ -65,18 +68,21 @@ double ring_area(MeshView mesh, std::uint32_t facet, float z, double eps, const 
 }
 
 // The type of a plateau whose star is all on one side; nothing for ceilings and for the undersides of bulges.
-bool extremum(MeshView mesh, std::span<const std::uint32_t> star_facets, std::uint32_t vertex, const Star& star, FeatureType& type) {
+bool extremum(MeshView mesh, std::span<const std::uint32_t> star_facets, std::uint32_t vertex,
+              const Star& star, FeatureType& type) {
     const Vec3d origin = to_double(mesh.vertices[vertex]);
     double area = 0;
-    for (const std::uint32_t f : star_facets) area += ring_area(mesh, f, mesh.vertices[vertex].z, star.nearest, origin);
+    for (const std::uint32_t f : star_facets)
+        area += ring_area(mesh, f, mesh.vertices[vertex].z, star.nearest, origin);
     if (star.below && area > 0) type = FeatureType::peak;
     else if (star.above && area < 0) type = FeatureType::valley;
     else return false;
     return true;
 }
 
-// A plateau's star facets, each to be met once on a walk from neighbour to neighbour. Facets of a plateau mostly follow one another in
-// the mesh: then a bit for each from the first to the last sorts them and finds them again.
+// A plateau's star facets, each to be met once on a walk from neighbour to neighbour. Facets of a plateau
+// mostly follow one another in the mesh: then a bit for each from the first to the last sorts them and finds
+// them again.
 class StarFacets {
 public:
     /// Sorts `facets` and leaves out what comes again.
@@ -95,11 +101,13 @@ public:
             return;
         }
         bits_.assign(words, 0);
-        for (const std::uint32_t f : facets) bits_[(f - first_) / 64] |= std::uint64_t{1} << (f - first_) % 64;
+        for (const std::uint32_t f : facets)
+            bits_[(f - first_) / 64] |= std::uint64_t{1} << (f - first_) % 64;
         facets.clear();
         for (std::size_t w = 0; w < words; ++w)
             for (std::uint64_t rest = bits_[w]; rest != 0; rest &= rest - 1)
-                facets.push_back(first_ + static_cast<std::uint32_t>(64 * w) + static_cast<std::uint32_t>(std::countr_zero(rest)));
+                facets.push_back(first_ + static_cast<std::uint32_t>(64 * w) +
+                                 static_cast<std::uint32_t>(std::countr_zero(rest)));
     }
     /// Whether the facet is one of the star that nobody has taken yet.
     bool take(std::uint32_t facet) {
@@ -120,14 +128,17 @@ public:
 private:
     std::uint32_t first_ = 0;
     std::vector<std::uint32_t> in_order_;  // of facets that lie far apart; else empty
-    std::vector<std::uint64_t> bits_;      // a bit for each facet from first_, or for each of in_order_: not yet taken
+    std::vector<std::uint64_t>
+        bits_;  // a bit for each facet from first_, or for each of in_order_: not yet taken
 };
 
-// Whether the rings of a star have more than one run of higher or of lower neighbours. Rings are walked until that is known; `left`
-// holds the star's facets. A plateau facet (all of one height) is no part of a ring. An open mesh ends a ring, which is then walked from
-// its other end too.
-bool saddle(MeshView mesh, std::span<const std::uint32_t> star_facets, float z, const Star& star, StarFacets& left) {
-    // A ring with n changes has at least n / 2 runs of either kind, so three changes are two runs wherever they lie.
+// Whether the rings of a star have more than one run of higher or of lower neighbours. Rings are walked until
+// that is known; `left` holds the star's facets. A plateau facet (all of one height) is no part of a ring. An
+// open mesh ends a ring, which is then walked from its other end too.
+bool saddle(MeshView mesh, std::span<const std::uint32_t> star_facets, float z, const Star& star,
+            StarFacets& left) {
+    // A ring with n changes has at least n / 2 runs of either kind, so three changes are two runs wherever
+    // they lie.
     if (star.changes > 2) return true;
     int runs_above = 0, runs_below = 0;
     std::vector<std::uint32_t> stack;
@@ -140,7 +151,8 @@ bool saddle(MeshView mesh, std::span<const std::uint32_t> star_facets, float z, 
             const std::uint32_t f = stack.back();
             stack.pop_back();
             const Index3 t = mesh.facets[f];
-            const std::array<float, 3> height{mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z};
+            const std::array<float, 3> height{mesh.vertices[t[0]].z, mesh.vertices[t[1]].z,
+                                              mesh.vertices[t[2]].z};
             bool higher = false, lower = false;
             for (std::size_t k = 0; k < 3; ++k) {
                 higher = higher || height[k] > z;
@@ -170,14 +182,17 @@ Feature point_feature(MeshView mesh, FeatureType type, std::uint32_t vertex) {
     return feature;
 }
 
-// Vertices of up-facing flats. What touches a flat and differs from it by less than the merging distance is the flat's.
+// Vertices of up-facing flats. What touches a flat and differs from it by less than the merging distance is
+// the flat's.
 struct Flats {
     std::vector<std::uint8_t> on;
     double reach = 0;
     [[nodiscard]] bool touched(MeshView mesh, std::span<const std::uint32_t> star_facets, float z) const {
         for (const std::uint32_t f : star_facets)
             for (const std::uint32_t v : mesh.facets[f])
-                if (on[v] && std::abs(static_cast<double>(mesh.vertices[v].z) - static_cast<double>(z)) <= reach) return true;
+                if (on[v] &&
+                    std::abs(static_cast<double>(mesh.vertices[v].z) - static_cast<double>(z)) <= reach)
+                    return true;
         return false;
     }
 };
@@ -189,7 +204,8 @@ std::vector<Feature> append(std::vector<Feature> a, std::vector<Feature> b) {
 }
 
 // A vertex without neighbours of its own height.
-void judge_vertex(MeshView mesh, const VertexStars& stars, const Flats& flats, std::uint32_t v, std::vector<Feature>& found) {
+void judge_vertex(MeshView mesh, const VertexStars& stars, const Flats& flats, std::uint32_t v,
+                  std::vector<Feature>& found) {
     const auto facets = stars.around(v);
     const float z = mesh.vertices[v].z;
     Star star;
@@ -213,7 +229,8 @@ struct PlateauScratch {
     StarFacets left;
 };
 
-void judge_plateau(MeshView mesh, const VertexStars& stars, const Flats& flats, std::span<const std::uint32_t> plateau, PlateauScratch& scratch,
+void judge_plateau(MeshView mesh, const VertexStars& stars, const Flats& flats,
+                   std::span<const std::uint32_t> plateau, PlateauScratch& scratch,
                    std::vector<Feature>& found) {
     const float z = mesh.vertices[plateau.front()].z;
     std::vector<std::uint32_t>& facets = scratch.facets;
@@ -222,7 +239,8 @@ void judge_plateau(MeshView mesh, const VertexStars& stars, const Flats& flats, 
     for (const std::uint32_t v : plateau)
         for (const std::uint32_t f : stars.around(v)) {
             const Index3 t = mesh.facets[f];
-            if (mesh.vertices[t[0]].z != z || mesh.vertices[t[1]].z != z || mesh.vertices[t[2]].z != z) facets.push_back(f);
+            if (mesh.vertices[t[0]].z != z || mesh.vertices[t[1]].z != z || mesh.vertices[t[2]].z != z)
+                facets.push_back(f);
         }
     scratch.left.set(facets);
     for (const std::uint32_t f : facets) add_facet(mesh, f, z, star);
@@ -271,7 +289,8 @@ VertexStars vertex_stars(Context& context, MeshView mesh) {
     for (std::size_t f = mesh.size(); f-- > 0;) {  // backwards, so that each list ascends
         if (f % kCheckedAfter == 0) context.throw_if_cancelled();
         if (!collapsed(mesh.facets[f]))
-            for (const std::uint32_t v : mesh.facets[f]) stars.facets[--stars.starts[v]] = static_cast<std::uint32_t>(f);
+            for (const std::uint32_t v : mesh.facets[f])
+                stars.facets[--stars.starts[v]] = static_cast<std::uint32_t>(f);
     }
     context.throw_if_cancelled();
 
@@ -295,10 +314,12 @@ VertexStars vertex_stars(Context& context, MeshView mesh) {
     return stars;
 }
 
-std::vector<Feature> find_exact(Context& context, MeshView mesh, VertexStars stars, std::span<const Feature> flats, double flat_reach) {
+std::vector<Feature> find_exact(Context& context, MeshView mesh, VertexStars stars,
+                                std::span<const Feature> flats, double flat_reach) {
     const std::size_t n = mesh.vertices.size();
     if (mesh.size() == 0) return {};
-    std::vector<std::uint8_t>& kind = stars.level;  // 0: alone at its height, 1: of a plateau, 2: the lowest of a plateau in which a flat lies
+    std::vector<std::uint8_t>& kind = stars.level;  // 0: alone at its height, 1: of a plateau, 2: the lowest
+                                                    // of a plateau in which a flat lies
     auto lowest = [&](std::uint32_t v) { return cluster_root(stars.lowest, v); };
     Flats touching{std::vector<std::uint8_t>(n, 0), flat_reach};
     for (const Feature& flat : flats)
@@ -307,13 +328,15 @@ std::vector<Feature> find_exact(Context& context, MeshView mesh, VertexStars sta
                 if (kind[v] != 0) kind[lowest(v)] = 2;
                 if (flat.type == FeatureType::up_flat) touching.on[v] = 1;
             }
-    // The vertices of plateaus without flats, one plateau after the other by their lowest vertices, each ascending: counted, then placed.
+    // The vertices of plateaus without flats, one plateau after the other by their lowest vertices, each
+    // ascending: counted, then placed.
     BulkVector<std::uint32_t> next(n);
     std::vector<std::uint32_t> plateau_starts{0};
     parallel_for(context, n, 4 * kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
             next[v] = 0;
-            if (kind[v] != 0) lowest(static_cast<std::uint32_t>(v));  // shortens its way to one step, or nearly
+            if (kind[v] != 0)
+                lowest(static_cast<std::uint32_t>(v));  // shortens its way to one step, or nearly
         }
     });
     context.throw_if_cancelled();
@@ -321,7 +344,8 @@ std::vector<Feature> find_exact(Context& context, MeshView mesh, VertexStars sta
         if (kind[v] != 0) ++next[lowest(v)];
     context.throw_if_cancelled();
     for (std::uint32_t v = 0; v < n; ++v)
-        if (kind[v] == 1 && next[v] != 0) plateau_starts.push_back(plateau_starts.back() + std::exchange(next[v], plateau_starts.back()));
+        if (kind[v] == 1 && next[v] != 0)
+            plateau_starts.push_back(plateau_starts.back() + std::exchange(next[v], plateau_starts.back()));
     context.throw_if_cancelled();
     std::vector<std::uint32_t> sorted(plateau_starts.back());
     for (std::uint32_t v = 0; v < n; ++v) {
@@ -339,18 +363,20 @@ std::vector<Feature> find_exact(Context& context, MeshView mesh, VertexStars sta
             return part;
         },
         append);
-    return append(std::move(found), parallel_reduce(
-                                        context, plateau_starts.size() - 1, 64, std::vector<Feature>{},
-                                        [&](std::size_t begin, std::size_t end) {
-                                            std::vector<Feature> part;
-                                            PlateauScratch scratch;
-                                            for (std::size_t p = begin; p < end; ++p)
-                                                judge_plateau(mesh, stars, touching,
-                                                              std::span(sorted).subspan(plateau_starts[p], plateau_starts[p + 1] - plateau_starts[p]),
-                                                              scratch, part);
-                                            return part;
-                                        },
-                                        append));
+    return append(std::move(found),
+                  parallel_reduce(
+                      context, plateau_starts.size() - 1, 64, std::vector<Feature>{},
+                      [&](std::size_t begin, std::size_t end) {
+                          std::vector<Feature> part;
+                          PlateauScratch scratch;
+                          for (std::size_t p = begin; p < end; ++p)
+                              judge_plateau(mesh, stars, touching,
+                                            std::span(sorted).subspan(
+                                                plateau_starts[p], plateau_starts[p + 1] - plateau_starts[p]),
+                                            scratch, part);
+                          return part;
+                      },
+                      append));
 }
 
 }  // namespace slabwright

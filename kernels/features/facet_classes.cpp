@@ -43,8 +43,8 @@ double longest_edge2(const Vec3d& p, const Vec3d& q, const Vec3d& r) {
 // Twice the area times the outward unit normal.
 Vec3d normal_of(const Vec3d& p, const Vec3d& q, const Vec3d& r) { return cross(minus(q, p), minus(r, p)); }
 
-// Whether a ≤ b, told from their squares, which need no roots; exact() decides where the two are so near, or so small, that
-// rounding could.
+// Whether a ≤ b, told from their squares, which need no roots; exact() decides where the two are so near, or
+// so small, that rounding could.
 template <class Exact>
 bool at_most(double a2, double b2, Exact&& exact) {
     constexpr double near = 1e-6, smallest = 1e-280;
@@ -66,12 +66,14 @@ Vec3d centroid_of(MeshView mesh, std::uint32_t facet) {
 
 Vec3d area_normal(MeshView mesh, std::uint32_t facet) {
     const Index3 t = mesh.facets[facet];
-    return normal_of(to_double(mesh.vertices[t[0]]), to_double(mesh.vertices[t[1]]), to_double(mesh.vertices[t[2]]));
+    return normal_of(to_double(mesh.vertices[t[0]]), to_double(mesh.vertices[t[1]]),
+                     to_double(mesh.vertices[t[2]]));
 }
 
 double smallest_height(MeshView mesh, std::uint32_t facet) {
     const Index3 t = mesh.facets[facet];
-    const Vec3d p = to_double(mesh.vertices[t[0]]), q = to_double(mesh.vertices[t[1]]), r = to_double(mesh.vertices[t[2]]);
+    const Vec3d p = to_double(mesh.vertices[t[0]]), q = to_double(mesh.vertices[t[1]]),
+                r = to_double(mesh.vertices[t[2]]);
     const double longest = std::sqrt(longest_edge2(p, q, r));
     const Vec3d n = normal_of(p, q, r);
     return longest > 0 ? std::sqrt(dot(n, n)) / longest : 0;
@@ -83,8 +85,8 @@ FacetClasses classify_facets(Context& context, MeshView mesh, const FeatureOptio
     if (mesh.size() == 0) return classes;
     const Extent extent = extent_of(context, mesh);
     classes.z_base = extent.lowest;
-    // Corners are rounded to float, so lengths under two units in the last place of the largest coordinate say nothing:
-    // a facet thinner than that has no normal, and a wall that overhangs by less is vertical.
+    // Corners are rounded to float, so lengths under two units in the last place of the largest coordinate
+    // say nothing: a facet thinner than that has no normal, and a wall that overhangs by less is vertical.
     const double noise = extent.largest * std::ldexp(1.0, -22);
     const double horizontal = std::tan(options.horizontal_rad), shallow = std::tan(options.shallow_limit_rad);
     const double noise2 = noise * noise;
@@ -92,23 +94,32 @@ FacetClasses classify_facets(Context& context, MeshView mesh, const FeatureOptio
         for (std::size_t i = begin; i < end; ++i) {
             const auto f = static_cast<std::uint32_t>(i);
             const Index3 t = mesh.facets[f];
-            const Vec3d p = to_double(mesh.vertices[t[0]]), q = to_double(mesh.vertices[t[1]]), r = to_double(mesh.vertices[t[2]]);
+            const Vec3d p = to_double(mesh.vertices[t[0]]), q = to_double(mesh.vertices[t[1]]),
+                        r = to_double(mesh.vertices[t[2]]);
             const Vec3d n = normal_of(p, q, r);
-            const double across2 = n[0] * n[0] + n[1] * n[1], low = std::min({p[2], q[2], r[2]}), high = std::max({p[2], q[2], r[2]});
+            const double across2 = n[0] * n[0] + n[1] * n[1], low = std::min({p[2], q[2], r[2]}),
+                         high = std::max({p[2], q[2], r[2]});
             auto across = [&] { return std::hypot(n[0], n[1]); };
             FacetClass& facet = classes.of[f];
-            if (at_most(dot(n, n), noise2 * longest_edge2(p, q, r), [&] { return smallest_height(mesh, f) <= noise; })) {
+            if (at_most(dot(n, n), noise2 * longest_edge2(p, q, r),
+                        [&] { return smallest_height(mesh, f) <= noise; })) {
                 facet = FacetClass::sliver;
                 continue;
             }
-            const double lying = horizontal * std::abs(n[2]), sloping = shallow * n[2], overhang = (high - low) * -n[2];
+            const double lying = horizontal * std::abs(n[2]), sloping = shallow * n[2],
+                         overhang = (high - low) * -n[2];
             if (at_most(across2, lying * lying, [&] { return across() <= lying; })) {
                 if (n[2] > 0) facet = FacetClass::up_flat;
-                else facet = high - classes.z_base <= kBaseTolerance ? FacetClass::base : FacetClass::down_flat;
+                else
+                    facet =
+                        high - classes.z_base <= kBaseTolerance ? FacetClass::base : FacetClass::down_flat;
             } else if (n[2] > 0) {
-                if (!at_most(sloping * sloping, across2, [&] { return sloping <= across(); })) facet = FacetClass::shallow;
+                if (!at_most(sloping * sloping, across2, [&] { return sloping <= across(); }))
+                    facet = FacetClass::shallow;
             } else if (n[2] < 0) {
-                if (!at_most(overhang * overhang, noise2 * across2, [&] { return overhang <= noise * across(); })) facet = FacetClass::undercut;
+                if (!at_most(overhang * overhang, noise2 * across2,
+                             [&] { return overhang <= noise * across(); }))
+                    facet = FacetClass::undercut;
             }
         }
     });
@@ -117,7 +128,8 @@ FacetClasses classify_facets(Context& context, MeshView mesh, const FeatureOptio
 
 std::vector<Patch> connected_patches(Context& context, MeshView mesh, const FacetClasses& classes) {
     auto forms_patches = [](FacetClass c) { return c >= FacetClass::up_flat; };
-    std::vector<std::uint8_t> done(mesh.size(), 0);  // facets of patches: 1; slivers: a bit for each class that crossed them
+    std::vector<std::uint8_t> done(
+        mesh.size(), 0);  // facets of patches: 1; slivers: a bit for each class that crossed them
     std::vector<Patch> patches;
     std::vector<std::uint32_t> stack;
     for (std::uint32_t seed = 0; seed < mesh.size(); ++seed) {
@@ -135,8 +147,8 @@ std::vector<Patch> connected_patches(Context& context, MeshView mesh, const Face
             if (classes.of[f] == c) patch.facets.push_back(f);
             for (const std::uint32_t g : mesh.neighbours[f]) {
                 if (g == kNoFacet) continue;
-                // A sliver may join patches of several classes; each class crosses it once, because whatever that
-                // class reaches through it belongs to the one patch anyway.
+                // A sliver may join patches of several classes; each class crosses it once, because whatever
+                // that class reaches through it belongs to the one patch anyway.
                 if (classes.of[g] == c) {
                     if (done[g]) continue;
                     done[g] = 1;
@@ -190,7 +202,8 @@ Feature feature_of_patch(Context& context, MeshView mesh, FeatureType type, Patc
         feature.y = c[1];
     }
     // A flat has one height; facets that tilt within the limit share the area's mean.
-    if (flat && feature.z_low < feature.z_high) feature.z_low = feature.z_high = std::clamp(middle[2], feature.z_low, feature.z_high);
+    if (flat && feature.z_low < feature.z_high)
+        feature.z_low = feature.z_high = std::clamp(middle[2], feature.z_low, feature.z_high);
     feature.facets = std::move(patch.facets);
     return feature;
 }

@@ -9,8 +9,8 @@
 
 namespace slabwright {
 
-/// What a facet is to the features. `base` faces down in the lowest plane; `sliver` is so thin that its normal is
-/// rounding noise: it belongs to no feature, but patches connect across it.
+/// What a facet is to the features. `base` faces down in the lowest plane; `sliver` is so thin that its
+/// normal is rounding noise: it belongs to no feature, but patches connect across it.
 enum class FacetClass : std::uint8_t { other, base, sliver, up_flat, down_flat, shallow, undercut };
 
 /// Heights nearer than this (mm) to the lowest z are the base.
@@ -24,11 +24,15 @@ struct FacetClasses {
 using Vec3d = std::array<double, 3>;
 
 [[nodiscard]] inline Vec3d to_double(const Vec3f& v) { return {v.x, v.y, v.z}; }
-[[nodiscard]] inline Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+[[nodiscard]] inline Vec3d minus(const Vec3d& a, const Vec3d& b) {
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
 [[nodiscard]] inline Vec3d cross(const Vec3d& a, const Vec3d& b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-[[nodiscard]] inline double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+[[nodiscard]] inline double dot(const Vec3d& a, const Vec3d& b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 /// Twice the area times the outward unit normal, in double from the float corners.
 [[nodiscard]] Vec3d area_normal(MeshView mesh, std::uint32_t facet);
@@ -38,16 +42,17 @@ using Vec3d = std::array<double, 3>;
 
 [[nodiscard]] FacetClasses classify_facets(Context& context, MeshView mesh, const FeatureOptions& options);
 
-/// Connected facets of one class, ascending, patches in the order of their lowest facet. A feature of the given type
-/// still needs its facets judged: a patch is only what hangs together.
+/// Connected facets of one class, ascending, patches in the order of their lowest facet. A feature of the
+/// given type still needs its facets judged: a patch is only what hangs together.
 struct Patch {
     FacetClass facet_class{};
     std::vector<std::uint32_t> facets;
 };
-[[nodiscard]] std::vector<Patch> connected_patches(Context& context, MeshView mesh, const FacetClasses& classes);
+[[nodiscard]] std::vector<Patch> connected_patches(Context& context, MeshView mesh,
+                                                   const FacetClasses& classes);
 
-/// The patch as a feature: z range of its corners, its area (projected for flats), and the facet centroid nearest to
-/// its centroid of area.
+/// The patch as a feature: z range of its corners, its area (projected for flats), and the facet centroid
+/// nearest to its centroid of area.
 /// @throws Error(cancelled)
 [[nodiscard]] Feature feature_of_patch(Context& context, MeshView mesh, FeatureType type, Patch patch);
 

@@ -16,15 +16,19 @@ enum class FeatureType : std::uint8_t { peak, valley, up_flat, down_flat, shallo
 enum class FoundBy : std::uint8_t { exact, halving, facets };
 enum class Finder : std::uint8_t { halving, exact, both };
 
-[[nodiscard]] SLABWRIGHT_API std::string_view name(FeatureType type);  ///< "peak", "valley", "up_flat", … as plan.json spells them
+[[nodiscard]] SLABWRIGHT_API std::string_view name(
+    FeatureType type);  ///< "peak", "valley", "up_flat", … as plan.json spells them
 [[nodiscard]] SLABWRIGHT_API std::string_view name(FoundBy found_by);
 
-/// One feature, millimetres. For `shallow` and `undercut` [z_low, z_high] is the patch's range; else both are its height.
+/// One feature, millimetres. For `shallow` and `undercut` [z_low, z_high] is the patch's range; else both are
+/// its height.
 struct Feature {
     FeatureType type{};
     FoundBy found_by{};
     double z_low = 0, z_high = 0;
-    double x = 0, y = 0;                ///< a point of the feature: the vertex, or the area's centroid moved to its nearest facet centroid
+    double x = 0,
+           y = 0;  ///< a point of the feature: the vertex, or the area's centroid moved to its nearest facet
+                   ///< centroid
     double area = 0;                    ///< mm² of its facets (projected for flats); 0 for a single vertex
     std::vector<std::uint32_t> facets;  ///< its facets, ascending; empty for peaks, valleys and saddles
 };
@@ -38,8 +42,10 @@ struct FinderDisagreement {
 
 struct FeatureOptions {
     Finder finder = Finder::exact;
-    double chordal_deviation_mm = 0.0254;           ///< of the STL; a lone horizontal facet narrower than this is no flat
-    double flat_merge_mm = 1.0;                     ///< a peak or valley this near (in z, and touching or as near in xy) an up-facing flat is dropped
+    double chordal_deviation_mm =
+        0.0254;                  ///< of the STL; a lone horizontal facet narrower than this is no flat
+    double flat_merge_mm = 1.0;  ///< a peak or valley this near (in z, and touching or as near in xy) an
+                                 ///< up-facing flat is dropped
     double shallow_limit_rad = 0.2617993877991494;  ///< 15° for MDF
     double halving_coarse_mm = 2.54;
     double halving_resolution_mm = 0.254;
@@ -56,10 +62,12 @@ struct FeatureSet {
 /// @throws Error(usage, "features.options") for lengths or angles out of range
 [[nodiscard]] FeatureSet find_features(Context& context, MeshView mesh, const FeatureOptions& options = {});
 
-/// Material that stays under down-facing facets when the layers are milled from above: within a layer (zb, zt] the milled
-/// shape at z is the union of the sections in [z, zt], so what lies under a facet of the same layer stays.
+/// Material that stays under down-facing facets when the layers are milled from above: within a layer (zb,
+/// zt] the milled shape at z is the union of the sections in [z, zt], so what lies under a facet of the same
+/// layer stays.
 struct UnmadeUndercut {
-    FeatureType type{};                 ///< down_flat when all its facets are horizontal (a flat that no boundary meets), else undercut
+    FeatureType type{};  ///< down_flat when all its facets are horizontal (a flat that no boundary meets),
+                         ///< else undercut
     double z_low = 0, z_high = 0;       ///< mm, range of what stays unmade's facets
     double area_mm2 = 0;                ///< of the facets, cut to the layers, under which something stays
     double depth_mm = 0;                ///< the thickest that stays, along the facet's outward normal
@@ -67,14 +75,15 @@ struct UnmadeUndercut {
     std::vector<std::uint32_t> facets;  ///< connected, ascending
 };
 
-/// Measures what given boundaries leave unmade, in connected patches, the deepest first (ties: lowest facet first).
-/// The depth is found in closed form at corners, edge middles and centroid of every facet as the layers cut it: how far
-/// its outward normal runs before no down-facing facet of the layer lies straight above, or solid or the layer's bottom
-/// is met. A wall that leans out by rounding is as deep as it leans, however tall. Depths under 1 µm are left out, and
-/// so are facets inside the solid (of another shell).
+/// Measures what given boundaries leave unmade, in connected patches, the deepest first (ties: lowest facet
+/// first). The depth is found in closed form at corners, edge middles and centroid of every facet as the
+/// layers cut it: how far its outward normal runs before no down-facing facet of the layer lies straight
+/// above, or solid or the layer's bottom is met. A wall that leans out by rounding is as deep as it leans,
+/// however tall. Depths under 1 µm are left out, and so are facets inside the solid (of another shell).
 /// @param layer_tops mm, ascending, in the mesh's own z; the first layer begins at the mesh's lowest z
 /// @throws Error(usage, "features.layer_tops") when the tops do not ascend or are not finite
-[[nodiscard]] std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh, std::span<const double> layer_tops,
+[[nodiscard]] std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh,
+                                                            std::span<const double> layer_tops,
                                                             const FeatureOptions& options = {});
 
 }  // namespace slabwright

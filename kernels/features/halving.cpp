@@ -1,14 +1,17 @@
-// Peaks and valleys by LUO's halving search (LUO 4.2.3): sections at a coarse spacing are compared with their neighbours,
-// and every bracket in which something differs is halved until it is narrower than the resolution.
+// Peaks and valleys by LUO's halving search (LUO 4.2.3): sections at a coarse spacing are compared with their
+// neighbours, and every bracket in which something differs is halved until it is narrower than the
+// resolution.
 //
-// Two sections agree when they have equally many loops and every body of one shares some (x, y) with a body of the
-// other. A body is a component of the section's material, a hollow one of its complement; hollows are compared as well,
-// for the bottom of a depression closes a hole. What is found is named by what has no partner across the last bracket:
-// a body that ends going up is a peak, a hollow that ends going down is a valley. Bodies that begin going up and hollows that
-// end going up face down, which is no Type I. A count that changes although all have partners is a saddle.
+// Two sections agree when they have equally many loops and every body of one shares some (x, y) with a body
+// of the other. A body is a component of the section's material, a hollow one of its complement; hollows are
+// compared as well, for the bottom of a depression closes a hole. What is found is named by what has no
+// partner across the last bracket: a body that ends going up is a peak, a hollow that ends going down is a
+// valley. Bodies that begin going up and hollows that end going up face down, which is no Type I. A count
+// that changes although all have partners is a saddle.
 //
-// Both halves of a bracket are searched, so that two features of one coarse step are both found when the middle section
-// parts them. What appears and vanishes between two coarse sections stays unseen: that is the method's own limit.
+// Both halves of a bracket are searched, so that two features of one coarse step are both found when the
+// middle section parts them. What appears and vanishes between two coarse sections stays unseen: that is the
+// method's own limit.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -38,7 +41,8 @@ public:
             }
         }
         if (loops.points.empty()) return;
-        rows_ = std::clamp<std::int64_t>(static_cast<std::int64_t>(loops.points.size() / 4), 1, high_ - low_ + 1);
+        rows_ =
+            std::clamp<std::int64_t>(static_cast<std::int64_t>(loops.points.size() / 4), 1, high_ - low_ + 1);
         starts_.assign(static_cast<std::size_t>(rows_) + 1, 0);
         auto for_edges = [&](auto&& f) {
             for (std::size_t l = 0; l < loops.size(); ++l) {
@@ -64,14 +68,19 @@ public:
     [[nodiscard]] const Loops& loops() const { return loops_; }
     [[nodiscard]] bool hole(std::size_t loop) const { return hole_[loop]; }
     /// The body (outer loop) that the loop bounds, and the hollow (hole, or kOutside).
-    [[nodiscard]] std::int32_t body(std::size_t loop) const { return hole_[loop] ? loops_.parents[loop] : static_cast<std::int32_t>(loop); }
-    [[nodiscard]] std::int32_t hollow(std::size_t loop) const { return hole_[loop] ? static_cast<std::int32_t>(loop) : loops_.parents[loop]; }
+    [[nodiscard]] std::int32_t body(std::size_t loop) const {
+        return hole_[loop] ? loops_.parents[loop] : static_cast<std::int32_t>(loop);
+    }
+    [[nodiscard]] std::int32_t hollow(std::size_t loop) const {
+        return hole_[loop] ? static_cast<std::int32_t>(loop) : loops_.parents[loop];
+    }
 
     struct Place {
         bool material = false;
         std::int32_t part = kOutside;  // body or hollow
     };
-    /// Where p lies; nothing when it lies on an edge. The nearest edge to its right tells: it runs up past material.
+    /// Where p lies; nothing when it lies on an edge. The nearest edge to its right tells: it runs up past
+    /// material.
     [[nodiscard]] std::optional<Place> locate(Point2 p) const {
         Place place;
         if (p.y < low_ || p.y > high_) return place;
@@ -80,13 +89,14 @@ public:
         for (std::uint32_t i = starts_[r]; i < starts_[r + 1]; ++i) {
             const Edge& e = edges_[i];
             const std::int64_t side = side_of(e, p);
-            if (side == 0 && std::min(e.a.y, e.b.y) <= p.y && p.y <= std::max(e.a.y, e.b.y) && std::min(e.a.x, e.b.x) <= p.x &&
-                p.x <= std::max(e.a.x, e.b.x))
+            if (side == 0 && std::min(e.a.y, e.b.y) <= p.y && p.y <= std::max(e.a.y, e.b.y) &&
+                std::min(e.a.x, e.b.x) <= p.x && p.x <= std::max(e.a.x, e.b.x))
                 return std::nullopt;
             const bool up = e.a.y <= p.y && e.b.y > p.y, down = e.b.y <= p.y && e.a.y > p.y;
             if (!(up && side > 0) && !(down && side < 0)) continue;
             const double x =
-                e.a.x + (static_cast<double>(e.b.x) - e.a.x) * ((static_cast<double>(p.y) - e.a.y) / (static_cast<double>(e.b.y) - e.a.y));
+                e.a.x + (static_cast<double>(e.b.x) - e.a.x) *
+                            ((static_cast<double>(p.y) - e.a.y) / (static_cast<double>(e.b.y) - e.a.y));
             if (x >= nearest) continue;
             nearest = x;
             const auto l = static_cast<std::size_t>(e.loop);
@@ -95,35 +105,43 @@ public:
         return place;
     }
 
-    /// True when the segment meets an edge so that material meets material there: they cross, or run on one another one way.
+    /// True when the segment meets an edge so that material meets material there: they cross, or run on one
+    /// another one way.
     template <class F>
     void for_meeting(Point2 a, Point2 b, F&& f) const {
         if (loops_.points.empty() || std::max(a.y, b.y) < low_ || std::min(a.y, b.y) > high_) return;
         const Edge own{a, b, 0};
         for (std::int64_t r = row(std::min(a.y, b.y)); r <= row(std::max(a.y, b.y)); ++r)
-            for (std::uint32_t i = starts_[static_cast<std::size_t>(r)]; i < starts_[static_cast<std::size_t>(r) + 1]; ++i) {
+            for (std::uint32_t i = starts_[static_cast<std::size_t>(r)];
+                 i < starts_[static_cast<std::size_t>(r) + 1]; ++i) {
                 const Edge& e = edges_[i];
                 const std::int64_t ea = side_of(own, e.a), eb = side_of(own, e.b);
                 if (ea == 0 && eb == 0) {
-                    const double along = (static_cast<double>(b.x) - a.x) * (static_cast<double>(e.b.x) - e.a.x) +
-                                         (static_cast<double>(b.y) - a.y) * (static_cast<double>(e.b.y) - e.a.y);
-                    const bool overlap =
-                        std::max(std::min(a.x, b.x), std::min(e.a.x, e.b.x)) <= std::min(std::max(a.x, b.x), std::max(e.a.x, e.b.x)) &&
-                        std::max(std::min(a.y, b.y), std::min(e.a.y, e.b.y)) <= std::min(std::max(a.y, b.y), std::max(e.a.y, e.b.y));
+                    const double along =
+                        (static_cast<double>(b.x) - a.x) * (static_cast<double>(e.b.x) - e.a.x) +
+                        (static_cast<double>(b.y) - a.y) * (static_cast<double>(e.b.y) - e.a.y);
+                    const bool overlap = std::max(std::min(a.x, b.x), std::min(e.a.x, e.b.x)) <=
+                                             std::min(std::max(a.x, b.x), std::max(e.a.x, e.b.x)) &&
+                                         std::max(std::min(a.y, b.y), std::min(e.a.y, e.b.y)) <=
+                                             std::min(std::max(a.y, b.y), std::max(e.a.y, e.b.y));
                     if (along > 0 && overlap) f(static_cast<std::size_t>(e.loop));
-                } else if ((ea > 0) != (eb > 0) && (side_of(e, a) > 0) != (side_of(e, b) > 0)) f(static_cast<std::size_t>(e.loop));
+                } else if ((ea > 0) != (eb > 0) && (side_of(e, a) > 0) != (side_of(e, b) > 0))
+                    f(static_cast<std::size_t>(e.loop));
             }
     }
 
 private:
-    // Positive when p lies left of the edge. Differences of int32 need 33 bits, so their products are formed in 128.
+    // Positive when p lies left of the edge. Differences of int32 need 33 bits, so their products are formed
+    // in 128.
     static std::int64_t side_of(const Edge& e, Point2 p) {
         __extension__ using Wide = __int128;
         const Wide s = static_cast<Wide>(std::int64_t{e.b.x} - e.a.x) * (std::int64_t{p.y} - e.a.y) -
                        static_cast<Wide>(std::int64_t{e.b.y} - e.a.y) * (std::int64_t{p.x} - e.a.x);
         return s > 0 ? 1 : s < 0 ? -1 : 0;
     }
-    [[nodiscard]] std::int64_t row(std::int64_t y) const { return std::clamp<std::int64_t>((y - low_) * rows_ / (high_ - low_ + 1), 0, rows_ - 1); }
+    [[nodiscard]] std::int64_t row(std::int64_t y) const {
+        return std::clamp<std::int64_t>((y - low_) * rows_ / (high_ - low_ + 1), 0, rows_ - 1);
+    }
 
     const Loops& loops_;
     std::vector<std::uint8_t> hole_;
@@ -132,9 +150,10 @@ private:
     std::vector<Edge> edges_;
 };
 
-// Marks what of `own` shares a point with `other`: bodies with bodies, hollows with hollows. Entry l stands for the body
-// of outer loop l or the hollow of hole l.
-void mark_partners(const Bodies& own, const Bodies& other, std::vector<std::uint8_t>& own_marks, std::vector<std::uint8_t>& other_marks) {
+// Marks what of `own` shares a point with `other`: bodies with bodies, hollows with hollows. Entry l stands
+// for the body of outer loop l or the hollow of hole l.
+void mark_partners(const Bodies& own, const Bodies& other, std::vector<std::uint8_t>& own_marks,
+                   std::vector<std::uint8_t>& other_marks) {
     auto mark = [](std::vector<std::uint8_t>& marks, std::int32_t part) {
         if (part != kOutside) marks[static_cast<std::size_t>(part)] = 1;
     };
@@ -149,13 +168,16 @@ void mark_partners(const Bodies& own, const Bodies& other, std::vector<std::uint
 }
 
 // Where no corner of one lies within the other, boundaries may still cross or coincide.
-void mark_meetings(const Bodies& own, const Bodies& other, std::vector<std::uint8_t>& own_marks, std::vector<std::uint8_t>& other_marks) {
+void mark_meetings(const Bodies& own, const Bodies& other, std::vector<std::uint8_t>& own_marks,
+                   std::vector<std::uint8_t>& other_marks) {
     auto mark = [](std::vector<std::uint8_t>& marks, std::int32_t part) {
         if (part != kOutside) marks[static_cast<std::size_t>(part)] = 1;
     };
     const Loops& loops = own.loops();
     for (std::size_t l = 0; l < loops.size(); ++l) {
-        auto open = [&](std::int32_t part) { return part != kOutside && !own_marks[static_cast<std::size_t>(part)]; };
+        auto open = [&](std::int32_t part) {
+            return part != kOutside && !own_marks[static_cast<std::size_t>(part)];
+        };
         if (!open(own.body(l)) && !open(own.hollow(l))) continue;
         const auto loop = loops.loop(l);
         for (std::size_t i = 0; i < loop.size(); ++i)
@@ -184,7 +206,9 @@ Comparison compare_sections(const Section& lower, const Section& upper, bool cla
     mark_partners(b, a, c.upper_marks, c.lower_marks);
     mark_meetings(a, b, c.lower_marks, c.upper_marks);
     mark_meetings(b, a, c.upper_marks, c.lower_marks);
-    auto all = [](const std::vector<std::uint8_t>& marks) { return std::find(marks.begin(), marks.end(), 0) == marks.end(); };
+    auto all = [](const std::vector<std::uint8_t>& marks) {
+        return std::find(marks.begin(), marks.end(), 0) == marks.end();
+    };
     c.differ = c.differ || !all(c.lower_marks) || !all(c.upper_marks);
     return c;
 }
@@ -219,15 +243,18 @@ std::vector<Feature> name_difference(const Section& lower, const Section& upper)
     for (std::size_t l = 0; l < lower.loops.size(); ++l) {
         if (c.lower_marks[l]) continue;
         partnerless = true;
-        if (signed_area(lower.loops.loop(l)) > 0) found.push_back(feature_at(FeatureType::peak, z, lower.loops.loop(l)));
+        if (signed_area(lower.loops.loop(l)) > 0)
+            found.push_back(feature_at(FeatureType::peak, z, lower.loops.loop(l)));
     }
     for (std::size_t l = 0; l < upper.loops.size(); ++l) {
         if (c.upper_marks[l]) continue;
         partnerless = true;
-        if (signed_area(upper.loops.loop(l)) < 0) found.push_back(feature_at(FeatureType::valley, z, upper.loops.loop(l)));
+        if (signed_area(upper.loops.loop(l)) < 0)
+            found.push_back(feature_at(FeatureType::valley, z, upper.loops.loop(l)));
     }
     if (c.differ && !partnerless && !upper.loops.empty() && !lower.loops.empty()) {
-        // Placed at a loop that only one of the two sections has, as far as counting tells: the last of the larger set.
+        // Placed at a loop that only one of the two sections has, as far as counting tells: the last of the
+        // larger set.
         const Loops& more = lower.loops.size() > upper.loops.size() ? lower.loops : upper.loops;
         found.push_back(feature_at(FeatureType::saddle, z, more.loop(more.size() - 1)));
     }
@@ -253,7 +280,9 @@ std::vector<Feature> find_halving(Context& context, MeshView mesh, const Feature
 
     std::vector<Bracket> open;
     std::vector<std::uint8_t> differ(coarse.size(), 0);
-    parallel_each(context, coarse.size() - 1, [&](std::size_t i) { differ[i] = compare_sections(coarse[i], coarse[i + 1], false).differ; });
+    parallel_each(context, coarse.size() - 1, [&](std::size_t i) {
+        differ[i] = compare_sections(coarse[i], coarse[i + 1], false).differ;
+    });
     for (std::size_t i = 0; i + 1 < coarse.size(); ++i)
         if (differ[i]) open.push_back({coarse[i], coarse[i + 1]});
     coarse.clear();
@@ -261,19 +290,24 @@ std::vector<Feature> find_halving(Context& context, MeshView mesh, const Feature
     std::vector<Feature> found;
     while (!open.empty()) {
         std::vector<Bracket> wide, narrow;
-        for (Bracket& b : open) (b.upper.plane.z - b.lower.plane.z < options.halving_resolution_mm ? narrow : wide).push_back(std::move(b));
+        for (Bracket& b : open)
+            (b.upper.plane.z - b.lower.plane.z < options.halving_resolution_mm ? narrow : wide)
+                .push_back(std::move(b));
         std::vector<std::vector<Feature>> named(narrow.size());
-        parallel_each(context, narrow.size(), [&](std::size_t i) { named[i] = name_difference(narrow[i].lower, narrow[i].upper); });
+        parallel_each(context, narrow.size(),
+                      [&](std::size_t i) { named[i] = name_difference(narrow[i].lower, narrow[i].upper); });
         for (std::vector<Feature>& n : named) found.insert(found.end(), n.begin(), n.end());
         planes.clear();
-        for (const Bracket& b : wide) planes.push_back({(b.lower.plane.z + b.upper.plane.z) / 2, Side::above});
+        for (const Bracket& b : wide)
+            planes.push_back({(b.lower.plane.z + b.upper.plane.z) / 2, Side::above});
         std::vector<Section> middles = slice(context, mesh, planes);
         struct Halves {
             bool lower, upper;
         };
         std::vector<Halves> halves(wide.size());
         parallel_each(context, wide.size(), [&](std::size_t i) {
-            halves[i] = {compare_sections(wide[i].lower, middles[i], false).differ, compare_sections(middles[i], wide[i].upper, false).differ};
+            halves[i] = {compare_sections(wide[i].lower, middles[i], false).differ,
+                         compare_sections(middles[i], wide[i].upper, false).differ};
         });
         open.clear();
         for (std::size_t i = 0; i < wide.size(); ++i) {

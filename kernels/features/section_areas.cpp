@@ -12,12 +12,14 @@ namespace slabwright {
 
 namespace {
 
-// Signed area in plan of the part of a facet above z. Facets at z belong below (the section is taken just above).
+// Signed area in plan of the part of a facet above z. Facets at z belong below (the section is taken just
+// above).
 double plan_area_above(MeshView mesh, std::uint32_t f, double z) {
     std::array<Vec3d, 3> p;
     for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     double twice = 0;
-    // The clipped polygon's area about p[0], edge by edge; where the facet dips below z two crossings join each other.
+    // The clipped polygon's area about p[0], edge by edge; where the facet dips below z two crossings join
+    // each other.
     std::array<std::array<double, 2>, 4> q;
     std::size_t n = 0;
     for (int k = 0; k < 3; ++k) {
@@ -71,8 +73,10 @@ SectionAreas::SectionAreas(Context& context, MeshView mesh) : mesh_(mesh) {
                     const double area = area_normal(mesh, static_cast<std::uint32_t>(f))[2] / 2;
                     if (area == 0) continue;
                     const Index3& t = mesh.facets[f];
-                    const auto [low, high] = std::minmax({mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z});
-                    const Reach reach{static_cast<std::uint16_t>(slab(low)), static_cast<std::uint16_t>(slab(high))};
+                    const auto [low, high] =
+                        std::minmax({mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z});
+                    const Reach reach{static_cast<std::uint16_t>(slab(low)),
+                                      static_cast<std::uint16_t>(slab(high))};
                     reaches[f] = reach;
                     part.entries += reach.last - reach.first + 1u;
                     part.begins[reach.first] += area;
@@ -88,18 +92,25 @@ SectionAreas::SectionAreas(Context& context, MeshView mesh) : mesh_(mesh) {
     }
     const auto each_slab = [&](std::size_t begin, std::size_t end, auto&& take) {
         for (std::size_t f = begin; f < end; ++f)
-            for (std::size_t k = reaches[f].first; k <= reaches[f].last; ++k) take(k, static_cast<std::uint32_t>(f));
+            for (std::size_t k = reaches[f].first; k <= reaches[f].last; ++k)
+                take(k, static_cast<std::uint32_t>(f));
     };
     starts_.assign(whole_.size() + 1, 0);
     deal(
         context, mesh.size(), grain, whole_.size(),
-        [&](std::size_t begin, std::size_t end, auto&& take) { each_slab(begin, end, [&](std::size_t k, std::uint32_t) { take(k); }); }, each_slab,
+        [&](std::size_t begin, std::size_t end, auto&& take) {
+            each_slab(begin, end, [&](std::size_t k, std::uint32_t) { take(k); });
+        },
+        each_slab,
         [&](std::uint64_t total, std::uint64_t) {
-            charge_ = std::make_shared<MemoryCharge>(context, total * sizeof(std::uint32_t), "the areas of sections");
+            charge_ = std::make_shared<MemoryCharge>(context, total * sizeof(std::uint32_t),
+                                                     "the areas of sections");
             facets_.resize(total);
             return std::pair(facets_.data(), total);
         },
-        [&](std::size_t, std::size_t, std::span<const std::uint32_t> starts) { starts_.assign(starts.begin(), starts.end()); });
+        [&](std::size_t, std::size_t, std::span<const std::uint32_t> starts) {
+            starts_.assign(starts.begin(), starts.end());
+        });
     for (std::size_t k = whole_.size() - 1; k-- > 0;) whole_[k] = whole_[k + 1] + sums.begins[k + 1];
 }
 

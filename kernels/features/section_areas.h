@@ -10,11 +10,12 @@
 
 namespace slabwright {
 
-/// Answers "how large is the section at z" in microseconds once it is made, from any thread. The part of a closed surface
-/// above a plane and the section close one another, so the section's area is the sum of what the facets above cover in
-/// plan, signed: Σ N_z·A over the parts of facets above z. Exact up to rounding where the mesh is closed above z; facets that
-/// overlap count twice. Keeps a view of the mesh, and charges 4 bytes for each slab of 1/1024 of the height that a facet reaches into; while it
-/// is made, 4 bytes more for each facet.
+/// Answers "how large is the section at z" in microseconds once it is made, from any thread. The part of a
+/// closed surface above a plane and the section close one another, so the section's area is the sum of what
+/// the facets above cover in plan, signed: Σ N_z·A over the parts of facets above z. Exact up to rounding
+/// where the mesh is closed above z; facets that overlap count twice. Keeps a view of the mesh, and charges 4
+/// bytes for each slab of 1/1024 of the height that a facet reaches into; while it is made, 4 bytes more for
+/// each facet.
 class SectionAreas {
 public:
     /// @throws Error(no_plan, "memory.limit"), Error(cancelled)

@@ -1,11 +1,12 @@
-// What cannot be milled from above: the patches that face down, and how much of it given layer boundaries leave unmade.
+// What cannot be milled from above: the patches that face down, and how much of it given layer boundaries
+// leave unmade.
 //
-// Measuring: within a layer (bottom, top) a point outside the solid keeps its material exactly when some down-facing
-// facet of the layer lies straight above it. From a point s of such a facet we follow the facet's outward unit normal n.
-// Over each facet g that the path passes beneath, "g is above q(t) = s + t·n" is a set of linear inequalities in t: three
-// for the edges of g in plan, one for the height of g above q, one for g being under the layer's top. Each facet thus
-// covers one interval of t; the leftover reaches as far as intervals join on to t = 0. Facets are found through plan bins, a
-// cell's width of the path at a time.
+// Measuring: within a layer (bottom, top) a point outside the solid keeps its material exactly when some
+// down-facing facet of the layer lies straight above it. From a point s of such a facet we follow the facet's
+// outward unit normal n. Over each facet g that the path passes beneath, "g is above q(t) = s + t·n" is a set
+// of linear inequalities in t: three for the edges of g in plan, one for the height of g above q, one for g
+// being under the layer's top. Each facet thus covers one interval of t; the leftover reaches as far as
+// intervals join on to t = 0. Facets are found through plan bins, a cell's width of the path at a time.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -20,7 +21,8 @@ namespace slabwright {
 std::vector<Feature> find_undercuts(Context& context, MeshView mesh, std::vector<Patch>& patches) {
     std::vector<Feature> found;
     for (Patch& patch : patches)
-        if (patch.facet_class == FacetClass::undercut) found.push_back(feature_of_patch(context, mesh, FeatureType::undercut, std::move(patch)));
+        if (patch.facet_class == FacetClass::undercut)
+            found.push_back(feature_of_patch(context, mesh, FeatureType::undercut, std::move(patch)));
     return found;
 }
 
@@ -28,8 +30,9 @@ namespace {
 
 constexpr double kAtBoundary = 1e-3;  // mm: a flat this near a boundary is made by it
 constexpr double kLeastDepth = 1e-3;  // mm: less than this left standing is rounding
-constexpr double kJoin = 1e-3;        // mm: intervals this near are one; edges of neighbours agree to float rounding only
-constexpr double kInside = 1e-5;      // mm: a point this near a facet's edge in plan is under the facet
+constexpr double kJoin =
+    1e-3;  // mm: intervals this near are one; edges of neighbours agree to float rounding only
+constexpr double kInside = 1e-5;  // mm: a point this near a facet's edge in plan is under the facet
 
 struct Interval {
     double from, to;
@@ -54,11 +57,13 @@ struct Depth {
 
 class Measure {
 public:
-    Measure(Context& context, MeshView mesh, std::span<const std::uint32_t> all) : mesh_(mesh), bins_(context, mesh, all), spans_(mesh.size()) {
+    Measure(Context& context, MeshView mesh, std::span<const std::uint32_t> all)
+        : mesh_(mesh), bins_(context, mesh, all), spans_(mesh.size()) {
         parallel_for(context, mesh.size(), 4096, [&](std::size_t begin, std::size_t end) {
             for (std::size_t f = begin; f < end; ++f) {
                 const Index3 t = mesh.facets[f];
-                const auto [low, high] = std::minmax({mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z});
+                const auto [low, high] =
+                    std::minmax({mesh.vertices[t[0]].z, mesh.vertices[t[1]].z, mesh.vertices[t[2]].z});
                 spans_[f] = {low, high};
             }
         });
@@ -66,13 +71,16 @@ public:
 
     // How far the path stays under down-facing facets that lie under `top`, before it meets solid.
     [[nodiscard]] double covered(const Path& path, double top, std::vector<Interval>& intervals) const {
-        const double across = std::sqrt(path.direction[0] * path.direction[0] + path.direction[1] * path.direction[1]);
+        const double across =
+            std::sqrt(path.direction[0] * path.direction[0] + path.direction[1] * path.direction[1]);
         const double step = across > 0 ? std::max(bins_.cell() / across, kJoin) : path.length;
         double reached = 0;
         for (double from = 0; from < path.length; from += step) {
             const double to = std::min(path.length, from + step);
-            const double xa = path.start[0] + from * path.direction[0], xb = path.start[0] + to * path.direction[0];
-            const double ya = path.start[1] + from * path.direction[1], yb = path.start[1] + to * path.direction[1];
+            const double xa = path.start[0] + from * path.direction[0],
+                         xb = path.start[0] + to * path.direction[0];
+            const double ya = path.start[1] + from * path.direction[1],
+                         yb = path.start[1] + to * path.direction[1];
             const double lowest = path.start[2] + to * path.direction[2] - kInside;
             double hit = path.length;
             intervals.clear();
@@ -83,14 +91,15 @@ public:
                 if (spans_[f].high < lowest || spans_[f].low > top) return;
                 const Index3 t = mesh_.facets[f];
                 const Vec3f &a = mesh_.vertices[t[0]], &b = mesh_.vertices[t[1]], &c = mesh_.vertices[t[2]];
-                if (std::max({a.x, b.x, c.x}) < x0 || std::min({a.x, b.x, c.x}) > x1 || std::max({a.y, b.y, c.y}) < y0 ||
-                    std::min({a.y, b.y, c.y}) > y1)
+                if (std::max({a.x, b.x, c.x}) < x0 || std::min({a.x, b.x, c.x}) > x1 ||
+                    std::max({a.y, b.y, c.y}) < y0 || std::min({a.y, b.y, c.y}) > y1)
                     return;
                 const Vec3d n = area_normal(mesh_, f);
                 if (n[2] < 0) cover(f, n, path, top, reached, intervals);
                 if (dot(n, path.direction) < 0) hit = std::min(hit, meet(f, n, path));
             });
-            std::sort(intervals.begin(), intervals.end(), [](const Interval& a, const Interval& b) { return a.from < b.from; });
+            std::sort(intervals.begin(), intervals.end(),
+                      [](const Interval& a, const Interval& b) { return a.from < b.from; });
             for (const Interval& i : intervals) {
                 if (i.from > reached + kJoin) break;
                 reached = std::max(reached, i.to);
@@ -102,8 +111,9 @@ public:
         return std::min(reached, path.length);
     }
 
-    // True when q lies in the solid: facets above it, each counted by the winding of its projection around q. Corners
-    // decide by y alone and both facets of an edge compute one crossing, so no point is counted twice or missed.
+    // True when q lies in the solid: facets above it, each counted by the winding of its projection around q.
+    // Corners decide by y alone and both facets of an edge compute one crossing, so no point is counted twice
+    // or missed.
     [[nodiscard]] bool inside_solid(const Vec3d& q) const {
         int winding = 0;
         std::vector<std::uint32_t> near;
@@ -113,25 +123,30 @@ public:
         for (const std::uint32_t f : near) {
             int turns = 0;
             for (int k = 0; k < 3; ++k) {
-                const Vec3d a = to_double(mesh_.vertices[mesh_.facets[f][k]]), b = to_double(mesh_.vertices[mesh_.facets[f][(k + 1) % 3]]);
+                const Vec3d a = to_double(mesh_.vertices[mesh_.facets[f][k]]),
+                            b = to_double(mesh_.vertices[mesh_.facets[f][(k + 1) % 3]]);
                 if ((a[1] <= q[1]) == (b[1] <= q[1])) continue;
                 const Vec3d &low = a[1] < b[1] ? a : b, &high = a[1] < b[1] ? b : a;
-                if (low[0] + (high[0] - low[0]) * ((q[1] - low[1]) / (high[1] - low[1])) > q[0]) turns += a[1] < b[1] ? 1 : -1;
+                if (low[0] + (high[0] - low[0]) * ((q[1] - low[1]) / (high[1] - low[1])) > q[0])
+                    turns += a[1] < b[1] ? 1 : -1;
             }
             if (turns == 0) continue;
             const Vec3d n = area_normal(mesh_, f), a = to_double(mesh_.vertices[mesh_.facets[f][0]]);
-            if (n[2] != 0 && a[2] - (n[0] * (q[0] - a[0]) + n[1] * (q[1] - a[1])) / n[2] > q[2]) winding += turns;
+            if (n[2] != 0 && a[2] - (n[0] * (q[0] - a[0]) + n[1] * (q[1] - a[1])) / n[2] > q[2])
+                winding += turns;
         }
         return winding > 0;
     }
 
 private:
-    void cover(std::uint32_t f, const Vec3d& n, const Path& path, double top, double reached, std::vector<Interval>& intervals) const {
+    void cover(std::uint32_t f, const Vec3d& n, const Path& path, double top, double reached,
+               std::vector<Interval>& intervals) const {
         Interval i{0, path.length};
         const Vec3d &s = path.start, &d = path.direction;
         const Index3 t = mesh_.facets[f];
         const Vec3d origin = to_double(mesh_.vertices[t[0]]), from = minus(s, origin);
-        // Signed height of q over the facet's plane, as a + b·t; the facet faces down, so dividing by n_z turns it over.
+        // Signed height of q over the facet's plane, as a + b·t; the facet faces down, so dividing by n_z
+        // turns it over.
         const double above = dot(n, from) / n[2], above_per_t = dot(n, d) / n[2];
         i.keep(-above + kInside, -above_per_t);
         // Height of the plane over q's place in plan must stay under the layer's top.
@@ -142,7 +157,8 @@ private:
             const double ex = b[0] - a[0], ey = b[1] - a[1], length = std::sqrt(ex * ex + ey * ey);
             if (length == 0) return;
             // Down-facing facets run clockwise in plan: their inside is on the right.
-            i.keep((ey * (s[0] - a[0]) - ex * (s[1] - a[1])) / length + kInside, (ey * d[0] - ex * d[1]) / length);
+            i.keep((ey * (s[0] - a[0]) - ex * (s[1] - a[1])) / length + kInside,
+                   (ey * d[0] - ex * d[1]) / length);
         }
         if (i.to >= i.from) intervals.push_back(i);
     }
@@ -153,7 +169,8 @@ private:
         const Vec3d a = to_double(mesh_.vertices[t[0]]);
         const double at = dot(n, minus(a, path.start)) / dot(n, path.direction);
         if (!(at > kInside) || at >= path.length) return path.length;
-        const Vec3d q{path.start[0] + at * path.direction[0], path.start[1] + at * path.direction[1], path.start[2] + at * path.direction[2]};
+        const Vec3d q{path.start[0] + at * path.direction[0], path.start[1] + at * path.direction[1],
+                      path.start[2] + at * path.direction[2]};
         for (int k = 0; k < 3; ++k) {
             const Vec3d u = to_double(mesh_.vertices[t[k]]), v = to_double(mesh_.vertices[t[(k + 1) % 3]]);
             if (dot(cross(minus(v, u), minus(q, u)), n) < 0) return path.length;
@@ -191,9 +208,11 @@ struct FacetUnmade {
     Depth deepest;
 };
 
-// The facet, cut to each layer it reaches into, measured at its corners, edge middles and centroid. Corners and middles are drawn
-// in by a fiftieth: on an outline the path leaves the shadow at once, a little within it does not.
-FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f, std::span<const double> borders, bool horizontal) {
+// The facet, cut to each layer it reaches into, measured at its corners, edge middles and centroid. Corners
+// and middles are drawn in by a fiftieth: on an outline the path leaves the shadow at once, a little within
+// it does not.
+FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f,
+                          std::span<const double> borders, bool horizontal) {
     FacetUnmade unmade;
     Vec3d n = area_normal(mesh, f);
     const double length = std::sqrt(dot(n, n));
@@ -202,7 +221,8 @@ FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f
     for (const std::uint32_t v : mesh.facets[f]) facet.push_back(to_double(mesh.vertices[v]));
     const auto [low, high] = std::minmax({facet[0][2], facet[1][2], facet[2][2]});
     std::vector<Interval> intervals;
-    auto layer = static_cast<std::size_t>(std::upper_bound(borders.begin(), borders.end(), low) - borders.begin());
+    auto layer =
+        static_cast<std::size_t>(std::upper_bound(borders.begin(), borders.end(), low) - borders.begin());
     for (layer = layer == 0 ? 0 : layer - 1; layer + 1 < borders.size() && borders[layer] <= high; ++layer) {
         const double bottom = borders[layer], top = borders[layer + 1] - kAtBoundary;
         Polygon piece;
@@ -251,19 +271,24 @@ FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f
 
 }  // namespace
 
-std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh, std::span<const double> layer_tops, const FeatureOptions& options) {
+std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh,
+                                              std::span<const double> layer_tops,
+                                              const FeatureOptions& options) {
     if (mesh.size() == 0) return {};
     const FacetClasses classes = classify_facets(context, mesh, options);
     std::vector<double> borders{classes.z_base};
     for (const double top : layer_tops) {
         if (!std::isfinite(top) || top <= borders.back())
-            throw Error(ErrorKind::usage, "features.layer_tops", "layer tops do not ascend from the mesh's bottom", std::to_string(top) + " mm");
+            throw Error(ErrorKind::usage, "features.layer_tops",
+                        "layer tops do not ascend from the mesh's bottom", std::to_string(top) + " mm");
         borders.push_back(top);
     }
     if (borders.size() == 1) borders.push_back(HUGE_VAL);
     borders.back() = HUGE_VAL;  // nothing is placed on the last layer: whatever lies above is its own
 
-    auto faces_down = [&](std::uint32_t f) { return classes.of[f] == FacetClass::undercut || classes.of[f] == FacetClass::down_flat; };
+    auto faces_down = [&](std::uint32_t f) {
+        return classes.of[f] == FacetClass::undercut || classes.of[f] == FacetClass::down_flat;
+    };
     std::vector<std::uint32_t> down;
     for (std::uint32_t f = 0; f < mesh.size(); ++f)
         if (faces_down(f)) down.push_back(f);
@@ -275,7 +300,8 @@ std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh, s
     std::vector<FacetUnmade> unmade(down.size());
     parallel_for(context, down.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
-            unmade[i] = measure_facet(measure, mesh, down[i], borders, classes.of[down[i]] == FacetClass::down_flat);
+            unmade[i] =
+                measure_facet(measure, mesh, down[i], borders, classes.of[down[i]] == FacetClass::down_flat);
     });
 
     // Facets that leave something, joined across their edges, each patch from its lowest facet.

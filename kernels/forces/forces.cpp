@@ -7,7 +7,8 @@
 
 namespace slabwright {
 
-ForceCoefficients resolve_coefficients(const OrthogonalForces& k, double helix, CoefficientTransform transform) {
+ForceCoefficients resolve_coefficients(const OrthogonalForces& k, double helix,
+                                       CoefficientTransform transform) {
     const double c = std::cos(helix), s = std::sin(helix);
     if (transform == CoefficientTransform::printed) {
         const double tc = k.kfc + k.ktc * c, te = k.kfe + k.kte * c;
@@ -17,14 +18,17 @@ ForceCoefficients resolve_coefficients(const OrthogonalForces& k, double helix, 
 }
 
 EngagementArc engagement_arc(double radius, double width, MillingSense sense) {
-    if (!(radius > 0 && width >= 0)) throw Error(ErrorKind::usage, "forces.segment", "a cut needs a positive radius and a width of at least 0");
+    if (!(radius > 0 && width >= 0))
+        throw Error(ErrorKind::usage, "forces.segment",
+                    "a cut needs a positive radius and a width of at least 0");
     const double arc = std::acos(std::max(-1.0, 1 - width / radius));
     if (sense == MillingSense::up) return {0, arc};
     return {std::numbers::pi - arc, std::numbers::pi};
 }
 
 CutForce peak_force(const CutSegment& segment, double accuracy) {
-    const SegmentForces f = segment.profile == CutterProfile::flat ? closed_form_forces(segment, accuracy) : reference_forces(segment, accuracy);
+    const SegmentForces f = segment.profile == CutterProfile::flat ? closed_form_forces(segment, accuracy)
+                                                                   : reference_forces(segment, accuracy);
     return {f.peak_resultant_n, f.peak_z_n, f.peak_torque_nmm, f.mean_power_w, f.peak_in_plane_n};
 }
 

@@ -1,19 +1,22 @@
-// What a milling cut does to cutter and wood (LUO 6.2, 6.5.1; method.md section 8): the edge-force model of Altintas for
-// flat and ball end mills, for one cut in double precision and for any number of cuts on an OpenCL device.
+// What a milling cut does to cutter and wood (LUO 6.2, 6.5.1; method.md section 8): the edge-force model of
+// Altintas for flat and ball end mills, for one cut in double precision and for any number of cuts on an
+// OpenCL device.
 //
-// Angles are those of the tooth: 0 where up milling enters, π/2 in the direction of feed, π where down milling leaves. At
-// the height z above the tip a tooth lags by z·tan(helix)/R. On the disc dz at the edge's slope κ (90° on a flat end mill
-// and on a ball's shank; sin κ = r(z)/R on the ball), db = dz/sin κ of edge cuts a chip h = c·sin φ·sin κ thick, with
+// Angles are those of the tooth: 0 where up milling enters, π/2 in the direction of feed, π where down
+// milling leaves. At the height z above the tip a tooth lags by z·tan(helix)/R. On the disc dz at the edge's
+// slope κ (90° on a flat end mill and on a ball's shank; sin κ = r(z)/R on the ball), db = dz/sin κ of edge
+// cuts a chip h = c·sin φ·sin κ thick, with
 //     dFt = (Ktc·h + Kte)·db,  dFr = (Krc·h + Kre)·db,  dFa = (Kac·h + Kae)·db,
 //     dFx = −dFt·cos φ − (dFr·sin κ + dFa·cos κ)·sin φ,
 //     dFy = +dFt·sin φ − (dFr·sin κ + dFa·cos κ)·cos φ,
 //     dFz = dFa·sin κ − dFr·cos κ,
-// which for κ = 90° are LUO's eq. 1 and 2: x is the direction of feed, y normal to it in the plane, and z is positive
-// where the helix pulls the cutter down (and lifts the wood). Lengths mm, forces N, angles rad.
+// which for κ = 90° are LUO's eq. 1 and 2: x is the direction of feed, y normal to it in the plane, and z is
+// positive where the helix pulls the cutter down (and lifts the wood). Lengths mm, forces N, angles rad.
 //
-// The teeth are equal, so one pitch (2π/N of a turn) tells all. It is cut at every angle at which some tooth begins or
-// ceases to enter or to leave; between two such angles the same teeth are engaged and the forces are smooth, so samples are
-// taken there, both ends included. No sample ever has to guess on which side of an engagement limit it lies.
+// The teeth are equal, so one pitch (2π/N of a turn) tells all. It is cut at every angle at which some tooth
+// begins or ceases to enter or to leave; between two such angles the same teeth are engaged and the forces
+// are smooth, so samples are taken there, both ends included. No sample ever has to guess on which side of an
+// engagement limit it lies.
 #pragma once
 
 #include <cstddef>
@@ -47,7 +50,8 @@ enum class CoefficientTransform : std::uint8_t {
     oblique,  ///< the orthogonal force resolved on the edge: Kt·cos β, Kr = Kf, Ka = Kt·sin β
 };
 
-[[nodiscard]] ForceCoefficients resolve_coefficients(const OrthogonalForces& orthogonal, double helix_rad, CoefficientTransform transform);
+[[nodiscard]] ForceCoefficients resolve_coefficients(const OrthogonalForces& orthogonal, double helix_rad,
+                                                     CoefficientTransform transform);
 
 /// The teeth that are in the wood: from `entry` to `exit`, 0 … π.
 struct EngagementArc {
@@ -63,18 +67,20 @@ enum class MillingSense : std::uint8_t { up, down };
 /// A piece of a path with one engagement.
 struct CutSegment {
     CutterProfile profile = CutterProfile::flat;
-    int flutes = 2;                  ///< 1 … 32
-    double radius_mm = 0;            ///< of the cutter
-    double helix_rad = 0;            ///< 0 … 60°
-    double low_mm = 0, high_mm = 0;  ///< the engaged heights above the tip; high − low is the axial depth, at most 64 radii
+    int flutes = 2;        ///< 1 … 32
+    double radius_mm = 0;  ///< of the cutter
+    double helix_rad = 0;  ///< 0 … 60°
+    double low_mm = 0,
+           high_mm =
+               0;  ///< the engaged heights above the tip; high − low is the axial depth, at most 64 radii
     EngagementArc arc;
     double chip_load_mm = 0;  ///< feed per tooth
     double spindle_rpm = 0;   ///< for power; 0: power is 0
     ForceCoefficients coefficients;
 };
 
-/// Over one turn. Peaks are of the magnitude, means are signed and exact; the resultant's mean is of its magnitude, by
-/// the samples that the peaks are taken from.
+/// Over one turn. Peaks are of the magnitude, means are signed and exact; the resultant's mean is of its
+/// magnitude, by the samples that the peaks are taken from.
 struct SegmentForces {
     double peak_x_n = 0, peak_y_n = 0, peak_z_n = 0;
     double peak_in_plane_n = 0;   ///< √(Fx² + Fy²): bends the tool
@@ -84,11 +90,13 @@ struct SegmentForces {
     double peak_power_w = 0, mean_power_w = 0;  ///< torque times speed
 };
 
-/// Peaks are found to about this share of themselves: the tooth turns by at most √(2·accuracy) between samples, which
-/// a harmonic of twice the turn (the fastest in the model) cannot use to rise more than that above them.
+/// Peaks are found to about this share of themselves: the tooth turns by at most √(2·accuracy) between
+/// samples, which a harmonic of twice the turn (the fastest in the model) cannot use to rise more than that
+/// above them.
 inline constexpr double kForceAccuracy = 1e-3;
 
-/// One cut in double precision, by Gauss's rule along the engaged edge: any profile. The measure for everything else.
+/// One cut in double precision, by Gauss's rule along the engaged edge: any profile. The measure for
+/// everything else.
 /// @throws Error(usage, "forces.segment") for a segment outside the ranges above
 [[nodiscard]] SegmentForces reference_forces(const CutSegment& segment, double accuracy = kForceAccuracy);
 
@@ -109,14 +117,16 @@ struct CutForce {
 /// @param accuracy share of themselves to which peaks are found; time grows as one over its root
 [[nodiscard]] CutForce peak_force(const CutSegment& segment, double accuracy = 1e-5);
 
-/// Forces of many cuts, on an OpenCL device where there is one that passes a self-test, else by reference and closed form
-/// on the context's threads. The device's single precision differs from the reference by less than 1e-4 of a segment's
-/// peak resultant; what must not depend on the machine is decided by peak_force.
+/// Forces of many cuts, on an OpenCL device where there is one that passes a self-test, else by reference and
+/// closed form on the context's threads. The device's single precision differs from the reference by less
+/// than 1e-4 of a segment's peak resultant; what must not depend on the machine is decided by peak_force.
 class ForceSolver {
 public:
-    /// @param device "" or "auto": the fastest device that passes the self-test; "reference": none; else the first
+    /// @param device "" or "auto": the fastest device that passes the self-test; "reference": none; else the
+    /// first
     ///               device whose name holds this text
-    /// @throws Error(usage, "forces.device") when a device is asked for by name and none fits or it fails the self-test
+    /// @throws Error(usage, "forces.device") when a device is asked for by name and none fits or it fails the
+    /// self-test
     explicit ForceSolver(Context& context, const std::string& device = {});
     ~ForceSolver();
     ForceSolver(const ForceSolver&) = delete;
@@ -125,12 +135,14 @@ public:
     /// False: the double reference runs instead, and `note` says why.
     [[nodiscard]] bool on_device() const noexcept;
     [[nodiscard]] const std::string& device() const noexcept;  ///< its name, "reference" without one
-    [[nodiscard]] const std::string& note() const noexcept;    ///< one line; "" when a device runs as it should
+    [[nodiscard]] const std::string& note() const noexcept;  ///< one line; "" when a device runs as it should
 
     /// forces[i] is what segments[i] does. Streams: memory does not grow with their number.
-    /// @throws Error(usage, "forces.segment") naming the first bad segment; Error(usage, "forces.device") if the device
+    /// @throws Error(usage, "forces.segment") naming the first bad segment; Error(usage, "forces.device") if
+    /// the device
     ///         fails; Error(cancelled)
-    void solve(Context& context, std::span<const CutSegment> segments, std::span<SegmentForces> forces, double accuracy = kForceAccuracy);
+    void solve(Context& context, std::span<const CutSegment> segments, std::span<SegmentForces> forces,
+               double accuracy = kForceAccuracy);
 
 private:
     struct Impl;

@@ -11,34 +11,41 @@ namespace slabwright {
 
 namespace {
 
-// Of the double model, measured on one thread at 2.6 GHz (bench/RESULTS.md); only the decision whether to start a device hangs on them.
+// Of the double model, measured on one thread at 2.6 GHz (bench/RESULTS.md); only the decision whether to
+// start a device hangs on them.
 constexpr double kSecondsFlat = 8e-6, kSecondsBall = 55e-6;
 // Twice what the self-test allows a device, as a share of the cut's own peak resultant.
 constexpr double kScreen = 2e-4;
 
 SegmentForces in_double(const CutSegment& cut) {
-    return cut.profile == CutterProfile::flat ? closed_form_forces(cut, kForceAccuracy) : reference_forces(cut, kForceAccuracy);
+    return cut.profile == CutterProfile::flat ? closed_form_forces(cut, kForceAccuracy)
+                                              : reference_forces(cut, kForceAccuracy);
 }
 
-constexpr double SegmentForces::*kAsked[] = {&SegmentForces::peak_resultant_n, &SegmentForces::peak_in_plane_n, &SegmentForces::peak_y_n};
+constexpr double SegmentForces::*kAsked[] = {&SegmentForces::peak_resultant_n,
+                                             &SegmentForces::peak_in_plane_n, &SegmentForces::peak_y_n};
 
 }  // namespace
 
-SolverAhead::SolverAhead(Context& context, double worth_seconds) : context_(context), worth_seconds_(worth_seconds) {}
+SolverAhead::SolverAhead(Context& context, double worth_seconds)
+    : context_(context), worth_seconds_(worth_seconds) {}
 
 SolverAhead::~SolverAhead() {
     if (opening_.valid()) opening_.wait();
 }
 
 void SolverAhead::expect(std::span<const CutSegment> cuts) {
-    const auto balls =
-        static_cast<std::uint64_t>(std::count_if(cuts.begin(), cuts.end(), [](const CutSegment& cut) { return cut.profile == CutterProfile::ball; }));
+    const auto balls = static_cast<std::uint64_t>(std::count_if(
+        cuts.begin(), cuts.end(), [](const CutSegment& cut) { return cut.profile == CutterProfile::ball; }));
     const std::lock_guard lock(mutex_);
     balls_ += balls;
     flats_ += cuts.size() - balls;
     if (opening_.valid() || solver_ || context_.device() == "reference") return;
-    if (static_cast<double>(flats_) * kSecondsFlat + static_cast<double>(balls_) * kSecondsBall < worth_seconds_) return;
-    opening_ = std::async(std::launch::async, [this] { return std::make_unique<ForceSolver>(context_, context_.device()); });
+    if (static_cast<double>(flats_) * kSecondsFlat + static_cast<double>(balls_) * kSecondsBall <
+        worth_seconds_)
+        return;
+    opening_ = std::async(std::launch::async,
+                          [this] { return std::make_unique<ForceSolver>(context_, context_.device()); });
 }
 
 ForceSolver* SolverAhead::solver() {
@@ -47,7 +54,8 @@ ForceSolver* SolverAhead::solver() {
     return solver_.get();
 }
 
-HardestSearch hardest_cuts(Context& context, std::span<const CutSegment> cuts, std::span<const std::size_t> starts, ForceSolver* solver) {
+HardestSearch hardest_cuts(Context& context, std::span<const CutSegment> cuts,
+                           std::span<const std::size_t> starts, ForceSolver* solver) {
     HardestSearch search;
     for (std::size_t i = 0; i < cuts.size(); ++i) forces::check_segment(cuts[i], i);
     RawArray<SegmentForces> found(cuts.size());
@@ -65,10 +73,13 @@ HardestSearch hardest_cuts(Context& context, std::span<const CutSegment> cuts, s
         for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
             double surely[3] = {0, 0, 0};
             for (std::size_t i = starts[g]; i < starts[g + 1]; ++i)
-                for (int q = 0; q < 3; ++q) surely[q] = std::max(surely[q], found[i].*kAsked[q] - kScreen * found[i].peak_resultant_n);
+                for (int q = 0; q < 3; ++q)
+                    surely[q] =
+                        std::max(surely[q], found[i].*kAsked[q] - kScreen * found[i].peak_resultant_n);
             for (std::size_t i = starts[g]; i < starts[g + 1]; ++i) {
                 bool may = false;
-                for (int q = 0; q < 3; ++q) may |= found[i].*kAsked[q] + kScreen * found[i].peak_resultant_n >= surely[q];
+                for (int q = 0; q < 3; ++q)
+                    may |= found[i].*kAsked[q] + kScreen * found[i].peak_resultant_n >= surely[q];
                 if (may) doubtful.push_back(static_cast<std::uint32_t>(i));
             }
         }
@@ -81,7 +92,8 @@ HardestSearch hardest_cuts(Context& context, std::span<const CutSegment> cuts, s
         std::size_t best[3] = {kNoCut, kNoCut, kNoCut};
         for (; next < doubtful.size() && doubtful[next] < starts[g + 1]; ++next)
             for (int q = 0; q < 3; ++q)
-                if (best[q] == kNoCut || found[doubtful[next]].*kAsked[q] > found[best[q]].*kAsked[q]) best[q] = doubtful[next];
+                if (best[q] == kNoCut || found[doubtful[next]].*kAsked[q] > found[best[q]].*kAsked[q])
+                    best[q] = doubtful[next];
         search.groups.push_back({best[0], best[1], best[2]});
     }
     return search;

@@ -1,6 +1,7 @@
-// The batch solver. Segments are packed into single precision on the context's threads (their pieces in double, so that
-// which teeth cut is decided once and well), streamed through two pairs of buffers, and one is packed while the device
-// works on the other. The driver keeps the compiled program; PoCL does so in POCL_CACHE_DIR or under HOME.
+// The batch solver. Segments are packed into single precision on the context's threads (their pieces in
+// double, so that which teeth cut is decided once and well), streamed through two pairs of buffers, and one
+// is packed while the device works on the other. The driver keeps the compiled program; PoCL does so in
+// POCL_CACHE_DIR or under HOME.
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 
@@ -47,8 +48,8 @@ template <class T>
 using Owned = std::unique_ptr<std::remove_pointer_t<T>, Release>;
 
 Error device_error(const std::string& what, cl_int code, const std::string& device) {
-    return Error(ErrorKind::usage, "forces.device", what + " (OpenCL error " + std::to_string(code) + ")", device,
-                 "choose another device, or \"reference\"");
+    return Error(ErrorKind::usage, "forces.device", what + " (OpenCL error " + std::to_string(code) + ")",
+                 device, "choose another device, or \"reference\"");
 }
 
 std::string text_of(cl_device_id device, cl_device_info what) {
@@ -72,7 +73,8 @@ std::vector<cl_device_id> all_devices() {
         if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, nullptr, &n) != CL_SUCCESS || n == 0) continue;
         const std::size_t at = devices.size();
         devices.resize(at + n);
-        if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, n, devices.data() + at, nullptr) != CL_SUCCESS) devices.resize(at);
+        if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, n, devices.data() + at, nullptr) != CL_SUCCESS)
+            devices.resize(at);
     }
     return devices;
 }
@@ -81,7 +83,8 @@ SegmentForces double_forces(const CutSegment& s, double accuracy) {
     return s.profile == CutterProfile::flat ? closed_form_forces(s, accuracy) : reference_forces(s, accuracy);
 }
 
-/// A segment as the device takes it; the means, which need no device, go to `means`, so that the turn is cut into pieces once.
+/// A segment as the device takes it; the means, which need no device, go to `means`, so that the turn is cut
+/// into pieces once.
 void pack(const CutSegment& s, std::size_t index, double angle, Packed& out, SegmentForces& means) {
     forces::check_segment(s, index);
     const forces::Turn t = forces::make_turn(s);
@@ -91,8 +94,10 @@ void pack(const CutSegment& s, std::size_t index, double angle, Packed& out, Seg
     const double c = s.chip_load_mm;
     const ForceCoefficients& k = s.coefficients;
     out.radius = f(s.radius_mm), out.lag = f(t.lag_per_mm), out.entry = f(t.entry), out.exit = f(t.exit);
-    out.low = f(t.low), out.high = f(t.high), out.pitch = f(t.pitch), out.ball = s.profile == CutterProfile::ball ? 1.0f : 0.0f;
-    out.tc = f(k.ktc * c), out.rc = f(k.krc * c), out.ac = f(k.kac * c), out.te = f(k.kte), out.re = f(k.kre), out.ae = f(k.kae);
+    out.low = f(t.low), out.high = f(t.high), out.pitch = f(t.pitch),
+    out.ball = s.profile == CutterProfile::ball ? 1.0f : 0.0f;
+    out.tc = f(k.ktc * c), out.rc = f(k.krc * c), out.ac = f(k.kac * c), out.te = f(k.kte), out.re = f(k.kre),
+    out.ae = f(k.kae);
     out.pieces = t.count, out.padding = 0;
     for (int p = 0; p < t.count; ++p) {
         const forces::Turn::Piece& piece = t.pieces[static_cast<std::size_t>(p)];
@@ -106,7 +111,8 @@ void pack(const CutSegment& s, std::size_t index, double angle, Packed& out, Seg
 }
 
 void set_peaks(const float* o, const CutSegment& s, SegmentForces& f) {
-    f.peak_x_n = o[0], f.peak_y_n = o[1], f.peak_z_n = o[2], f.peak_in_plane_n = o[3], f.peak_resultant_n = o[4], f.peak_torque_nmm = o[5];
+    f.peak_x_n = o[0], f.peak_y_n = o[1], f.peak_z_n = o[2], f.peak_in_plane_n = o[3],
+    f.peak_resultant_n = o[4], f.peak_torque_nmm = o[5];
     f.mean_in_plane_n = o[6];
     f.peak_power_w = f.peak_torque_nmm * forces::watts_per_nmm(s.spindle_rpm);
 }
@@ -126,7 +132,8 @@ std::vector<CutSegment> test_cuts(std::size_t n) {
         s.radius_mm = random(1.5, 12.7);
         s.helix_rad = i % 8 < 2 ? 0 : random(0, 0.8);
         s.high_mm = random(0.05, 2) * s.radius_mm;
-        s.arc = engagement_arc(s.radius_mm, random(0.05, 2.2) * s.radius_mm, i % 3 ? MillingSense::up : MillingSense::down);
+        s.arc = engagement_arc(s.radius_mm, random(0.05, 2.2) * s.radius_mm,
+                               i % 3 ? MillingSense::up : MillingSense::down);
         s.chip_load_mm = random(0, 0.7);
         s.coefficients = {8, 0.6, 4, 1, 2.5, 0.6};
     }
@@ -135,9 +142,10 @@ std::vector<CutSegment> test_cuts(std::size_t n) {
 
 double worst_difference(const SegmentForces& a, const SegmentForces& b) {
     double worst = 0;
-    for (const auto member : {&SegmentForces::peak_x_n, &SegmentForces::peak_y_n, &SegmentForces::peak_z_n, &SegmentForces::peak_in_plane_n,
-                              &SegmentForces::peak_resultant_n, &SegmentForces::mean_x_n, &SegmentForces::mean_y_n, &SegmentForces::mean_z_n,
-                              &SegmentForces::mean_in_plane_n}) {
+    for (const auto member :
+         {&SegmentForces::peak_x_n, &SegmentForces::peak_y_n, &SegmentForces::peak_z_n,
+          &SegmentForces::peak_in_plane_n, &SegmentForces::peak_resultant_n, &SegmentForces::mean_x_n,
+          &SegmentForces::mean_y_n, &SegmentForces::mean_z_n, &SegmentForces::mean_in_plane_n}) {
         const double d = std::abs(a.*member - b.*member);
         if (!(d <= worst)) worst = d;  // keeps NaN
     }
@@ -147,16 +155,20 @@ double worst_difference(const SegmentForces& a, const SegmentForces& b) {
 /// One device with its program and buffers.
 class DeviceRunner {
 public:
-    DeviceRunner(Context& context, cl_device_id device) : name_(text_of(device, CL_DEVICE_NAME)), device_(device) {
-        // A CPU device ignores the context's arena; a part of it of as many units as the context has threads does not.
+    DeviceRunner(Context& context, cl_device_id device)
+        : name_(text_of(device, CL_DEVICE_NAME)), device_(device) {
+        // A CPU device ignores the context's arena; a part of it of as many units as the context has threads
+        // does not.
         cl_device_type type = 0;
         cl_uint units = 0;
         clGetDeviceInfo(device, CL_DEVICE_TYPE, sizeof type, &type, nullptr);
         clGetDeviceInfo(device, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof units, &units, nullptr);
         if (type & CL_DEVICE_TYPE_CPU && static_cast<cl_uint>(context.threads()) < units) {
-            const cl_device_partition_property by[] = {CL_DEVICE_PARTITION_BY_COUNTS, context.threads(), CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};
+            const cl_device_partition_property by[] = {CL_DEVICE_PARTITION_BY_COUNTS, context.threads(),
+                                                       CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};
             cl_device_id part = nullptr;
-            if (clCreateSubDevices(device, by, 1, &part, nullptr) == CL_SUCCESS) part_.reset(part), device_ = part;
+            if (clCreateSubDevices(device, by, 1, &part, nullptr) == CL_SUCCESS)
+                part_.reset(part), device_ = part;
         }
         cl_int rc = CL_SUCCESS;
         context_.reset(clCreateContext(nullptr, 1, &device_, nullptr, nullptr, &rc));
@@ -167,13 +179,16 @@ public:
         program_.reset(clCreateProgramWithSource(context_.get(), 1, &source, nullptr, &rc));
         if (rc != CL_SUCCESS) throw device_error("no program", rc, name_);
         rc = clBuildProgram(program_.get(), 1, &device_, "", nullptr, nullptr);
-        if (rc != CL_SUCCESS) throw device_error("the force kernel does not build: " + build_log(), rc, name_);
+        if (rc != CL_SUCCESS)
+            throw device_error("the force kernel does not build: " + build_log(), rc, name_);
         kernel_.reset(clCreateKernel(program_.get(), "forces", &rc));
         if (rc != CL_SUCCESS) throw device_error("no kernel", rc, name_);
         for (Slot& slot : slots_) {
-            slot.in.reset(clCreateBuffer(context_.get(), CL_MEM_READ_ONLY, kBatch * sizeof(Packed), nullptr, &rc));
+            slot.in.reset(
+                clCreateBuffer(context_.get(), CL_MEM_READ_ONLY, kBatch * sizeof(Packed), nullptr, &rc));
             if (rc != CL_SUCCESS) throw device_error("no memory for segments", rc, name_);
-            slot.out.reset(clCreateBuffer(context_.get(), CL_MEM_WRITE_ONLY, kBatch * kOut * sizeof(float), nullptr, &rc));
+            slot.out.reset(clCreateBuffer(context_.get(), CL_MEM_WRITE_ONLY, kBatch * kOut * sizeof(float),
+                                          nullptr, &rc));
             if (rc != CL_SUCCESS) throw device_error("no memory for forces", rc, name_);
         }
     }
@@ -182,10 +197,14 @@ public:
 
     [[nodiscard]] const std::string& name() const { return name_; }
 
-    void solve(Context& context, std::span<const CutSegment> segments, std::span<SegmentForces> out, double accuracy) {
-        const MemoryCharge charge(context, 2 * 2 * std::min(kBatch, segments.size()) * (sizeof(Packed) + kOut * sizeof(float)), "cutting forces");
+    void solve(Context& context, std::span<const CutSegment> segments, std::span<SegmentForces> out,
+               double accuracy) {
+        const MemoryCharge charge(
+            context, 2 * 2 * std::min(kBatch, segments.size()) * (sizeof(Packed) + kOut * sizeof(float)),
+            "cutting forces");
         const double angle = forces::sample_angle(accuracy);
-        struct Drain {  // the device reads and writes the slots until it has finished, also when something throws
+        struct Drain {  // the device reads and writes the slots until it has finished, also when something
+                        // throws
             cl_command_queue queue;
             std::array<Slot, 2>& slots;
             ~Drain() {
@@ -203,7 +222,8 @@ public:
             slot.packed.resize(slot.count);
             slot.results.resize(slot.count * kOut);
             parallel_for(context, slot.count, 1024, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t i = begin; i < end; ++i) pack(segments[at + i], at + i, angle, slot.packed[i], out[at + i]);
+                for (std::size_t i = begin; i < end; ++i)
+                    pack(segments[at + i], at + i, angle, slot.packed[i], out[at + i]);
             });
             enqueue(slot);
         }
@@ -223,27 +243,33 @@ private:
         const cl_uint count = static_cast<cl_uint>(slot.count);
         const std::size_t items = (slot.count + kGroup - 1) / kGroup * kGroup;
         const cl_mem in = slot.in.get(), out = slot.out.get();
-        cl_int rc = clEnqueueWriteBuffer(queue_.get(), in, CL_FALSE, 0, slot.count * sizeof(Packed), slot.packed.data(), 0, nullptr, nullptr);
+        cl_int rc = clEnqueueWriteBuffer(queue_.get(), in, CL_FALSE, 0, slot.count * sizeof(Packed),
+                                         slot.packed.data(), 0, nullptr, nullptr);
         if (rc == CL_SUCCESS) rc = clSetKernelArg(kernel_.get(), 0, sizeof in, &in);
         if (rc == CL_SUCCESS) rc = clSetKernelArg(kernel_.get(), 1, sizeof out, &out);
         if (rc == CL_SUCCESS) rc = clSetKernelArg(kernel_.get(), 2, sizeof count, &count);
-        if (rc == CL_SUCCESS) rc = clEnqueueNDRangeKernel(queue_.get(), kernel_.get(), 1, nullptr, &items, &kGroup, 0, nullptr, nullptr);
+        if (rc == CL_SUCCESS)
+            rc = clEnqueueNDRangeKernel(queue_.get(), kernel_.get(), 1, nullptr, &items, &kGroup, 0, nullptr,
+                                        nullptr);
         cl_event event = nullptr;
         if (rc == CL_SUCCESS)
-            rc = clEnqueueReadBuffer(queue_.get(), out, CL_FALSE, 0, slot.results.size() * sizeof(float), slot.results.data(), 0, nullptr, &event);
+            rc = clEnqueueReadBuffer(queue_.get(), out, CL_FALSE, 0, slot.results.size() * sizeof(float),
+                                     slot.results.data(), 0, nullptr, &event);
         if (rc != CL_SUCCESS) throw device_error("the force kernel does not start", rc, name_);
         slot.done.reset(event);
         clFlush(queue_.get());
     }
 
-    void collect(Context& context, Slot& slot, std::span<const CutSegment> segments, std::span<SegmentForces> out) {
+    void collect(Context& context, Slot& slot, std::span<const CutSegment> segments,
+                 std::span<SegmentForces> out) {
         if (!slot.done) return;
         const cl_event event = slot.done.get();
         const cl_int rc = clWaitForEvents(1, &event);
         slot.done.reset();
         if (rc != CL_SUCCESS) throw device_error("the force kernel fails", rc, name_);
         parallel_for(context, slot.count, 4096, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) set_peaks(slot.results.data() + i * kOut, segments[slot.at + i], out[slot.at + i]);
+            for (std::size_t i = begin; i < end; ++i)
+                set_peaks(slot.results.data() + i * kOut, segments[slot.at + i], out[slot.at + i]);
         });
     }
 
@@ -277,7 +303,8 @@ double self_test(Context& context, DeviceRunner& runner) {
         const SegmentForces expected = double_forces(cuts[i], kForceAccuracy);
         const double worst = worst_difference(found[i], expected);
         if (!(worst <= 1e-4 * expected.peak_resultant_n))
-            throw Error(ErrorKind::usage, "forces.device", "the force kernel fails its self-test on cut " + std::to_string(i), runner.name(),
+            throw Error(ErrorKind::usage, "forces.device",
+                        "the force kernel fails its self-test on cut " + std::to_string(i), runner.name(),
                         "choose another device, or \"reference\"");
     }
     std::vector<CutSegment> many;
@@ -321,8 +348,10 @@ ForceSolver::ForceSolver(Context& context, const std::string& wanted) : impl_(st
         return;
     }
     if (!any)
-        throw Error(ErrorKind::usage, "forces.device", "no OpenCL device has \"" + wanted + "\" in its name", {}, "use \"auto\" or \"reference\"");
-    impl_->note = refused.empty() ? "no OpenCL device (PoCL shows one only if HOME is writable or POCL_CACHE_DIR names a folder); forces by reference"
+        throw Error(ErrorKind::usage, "forces.device", "no OpenCL device has \"" + wanted + "\" in its name",
+                    {}, "use \"auto\" or \"reference\"");
+    impl_->note = refused.empty() ? "no OpenCL device (PoCL shows one only if HOME is writable or "
+                                    "POCL_CACHE_DIR names a folder); forces by reference"
                                   : "no OpenCL device can be used, forces by reference: " + refused;
 }
 
@@ -332,9 +361,11 @@ bool ForceSolver::on_device() const noexcept { return impl_->runner != nullptr; 
 const std::string& ForceSolver::device() const noexcept { return impl_->device; }
 const std::string& ForceSolver::note() const noexcept { return impl_->note; }
 
-void ForceSolver::solve(Context& context, std::span<const CutSegment> segments, std::span<SegmentForces> out, double accuracy) {
+void ForceSolver::solve(Context& context, std::span<const CutSegment> segments, std::span<SegmentForces> out,
+                        double accuracy) {
     if (out.size() != segments.size())
-        throw Error(ErrorKind::usage, "forces.segment", "there must be as many forces as segments", std::to_string(out.size()));
+        throw Error(ErrorKind::usage, "forces.segment", "there must be as many forces as segments",
+                    std::to_string(out.size()));
     if (impl_->runner) return impl_->runner->solve(context, segments, out, accuracy);
     parallel_for(context, segments.size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {

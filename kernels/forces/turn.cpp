@@ -14,8 +14,8 @@ namespace {
 }
 
 bool finite(const ForceCoefficients& k) {
-    return std::isfinite(k.ktc) && std::isfinite(k.krc) && std::isfinite(k.kac) && std::isfinite(k.kte) && std::isfinite(k.kre) &&
-           std::isfinite(k.kae);
+    return std::isfinite(k.ktc) && std::isfinite(k.krc) && std::isfinite(k.kac) && std::isfinite(k.kte) &&
+           std::isfinite(k.kre) && std::isfinite(k.kae);
 }
 
 }  // namespace
@@ -24,10 +24,12 @@ void check_segment(const CutSegment& s, std::size_t index) {
     // Written so that NaN fails every test.
     if (s.flutes < 1 || s.flutes > 32) refuse("the number of flutes is not in 1 … 32", index);
     if (!(s.radius_mm > 0 && s.radius_mm <= 1e4)) refuse("the cutter's radius is not positive", index);
-    if (!(s.helix_rad >= 0 && s.helix_rad <= std::numbers::pi / 3 + 1e-12)) refuse("the helix angle is not in 0 … 60°", index);
+    if (!(s.helix_rad >= 0 && s.helix_rad <= std::numbers::pi / 3 + 1e-12))
+        refuse("the helix angle is not in 0 … 60°", index);
     if (!(s.low_mm >= 0 && s.high_mm >= s.low_mm && s.high_mm <= 64 * s.radius_mm))
         refuse("the engaged heights are not ordered, negative, or above 64 radii", index);
-    if (!(s.arc.entry_rad >= 0 && s.arc.exit_rad >= s.arc.entry_rad && s.arc.exit_rad <= std::numbers::pi + 1e-12))
+    if (!(s.arc.entry_rad >= 0 && s.arc.exit_rad >= s.arc.entry_rad &&
+          s.arc.exit_rad <= std::numbers::pi + 1e-12))
         refuse("the engagement arc is not within 0 … π", index);
     if (!(s.chip_load_mm >= 0 && std::isfinite(s.chip_load_mm))) refuse("the chip load is negative", index);
     if (!(s.spindle_rpm >= 0 && std::isfinite(s.spindle_rpm))) refuse("the spindle speed is negative", index);
@@ -46,7 +48,8 @@ Turn make_turn(const CutSegment& s) {
     t.first = t.entry + t.lag_per_mm * t.low;
     t.last = t.exit + t.lag_per_mm * t.high;
     if (t.high <= t.low || t.exit - t.entry < kShortest) return t;
-    std::array<double, 4> cuts{t.first, t.entry + t.lag_per_mm * t.high, t.exit + t.lag_per_mm * t.low, t.last};
+    std::array<double, 4> cuts{t.first, t.entry + t.lag_per_mm * t.high, t.exit + t.lag_per_mm * t.low,
+                               t.last};
     for (double& cut : cuts) cut -= t.pitch * std::floor(cut / t.pitch);
     std::sort(cuts.begin(), cuts.end());
     for (std::size_t i = 0; i < 4; ++i) {
@@ -59,12 +62,14 @@ Turn make_turn(const CutSegment& s) {
 
 void set_means(const CutSegment& s, const Turn& t, SegmentForces& out) {
     const ForceCoefficients& k = s.coefficients;
-    const double r = s.radius_mm, tc = k.ktc * s.chip_load_mm, rc = k.krc * s.chip_load_mm, ac = k.kac * s.chip_load_mm;
+    const double r = s.radius_mm, tc = k.ktc * s.chip_load_mm, rc = k.krc * s.chip_load_mm,
+                 ac = k.kac * s.chip_load_mm;
     // Over the edge: of 1, sin κ, sin²κ, cos κ and sin κ·cos κ.
     double e0 = 0, e1 = 0, e2 = 0, g0 = 0, g1 = 0, shank = t.low;
     if (s.profile == CutterProfile::ball && t.low < r) {
         shank = std::min(r, t.high);
-        const double c0 = 1 - t.low / r, c1 = 1 - shank / r, s0 = std::sqrt(1 - c0 * c0), s1 = std::sqrt(1 - c1 * c1);
+        const double c0 = 1 - t.low / r, c1 = 1 - shank / r, s0 = std::sqrt(1 - c0 * c0),
+                     s1 = std::sqrt(1 - c1 * c1);
         e0 = r * (std::acos(c1) - std::acos(c0));
         e1 = r * (c0 - c1);
         e2 = (e0 - r * (s1 * c1 - s0 * c0)) / 2;
@@ -76,8 +81,10 @@ void set_means(const CutSegment& s, const Turn& t, SegmentForces& out) {
     const double sa = std::sin(t.entry), ca = std::cos(t.entry), sb = std::sin(t.exit), cb = std::cos(t.exit);
     const double a0 = (t.exit - t.entry) / t.pitch, a1 = (ca - cb) / t.pitch, b1 = (sb - sa) / t.pitch;
     const double a2 = (a0 - (sb * cb - sa * ca) / t.pitch) / 2, ab = (sb * sb - sa * sa) / 2 / t.pitch;
-    out.mean_x_n = -(tc * e1 * ab + k.kte * e0 * b1) - (rc * e2 + ac * g1) * a2 - (k.kre * e1 + k.kae * g0) * a1;
-    out.mean_y_n = (tc * e1 * a2 + k.kte * e0 * a1) - (rc * e2 + ac * g1) * ab - (k.kre * e1 + k.kae * g0) * b1;
+    out.mean_x_n =
+        -(tc * e1 * ab + k.kte * e0 * b1) - (rc * e2 + ac * g1) * a2 - (k.kre * e1 + k.kae * g0) * a1;
+    out.mean_y_n =
+        (tc * e1 * a2 + k.kte * e0 * a1) - (rc * e2 + ac * g1) * ab - (k.kre * e1 + k.kae * g0) * b1;
     out.mean_z_n = (ac * e2 - rc * g1) * a1 + (k.kae * e1 - k.kre * g0) * a0;
     out.mean_torque_nmm = r * (tc * e2 * a1 + k.kte * e1 * a0);
     out.mean_power_w = out.mean_torque_nmm * watts_per_nmm(s.spindle_rpm);

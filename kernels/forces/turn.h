@@ -1,5 +1,5 @@
-// One pitch of a turning cutter, cut where a tooth begins or ceases to enter or leave; shared by closed form, reference
-// and OpenCL, so that all three look at the same instants. Internal to forces.
+// One pitch of a turning cutter, cut where a tooth begins or ceases to enter or leave; shared by closed form,
+// reference and OpenCL, so that all three look at the same instants. Internal to forces.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace slabwright::forces {
 
-/// Lags and pieces shorter than this are taken as none: at the seam of two teeth (a slot cut by two flutes) rounding would
-/// else make both seem engaged. It turns no force by more than itself.
+/// Lags and pieces shorter than this are taken as none: at the seam of two teeth (a slot cut by two flutes)
+/// rounding would else make both seem engaged. It turns no force by more than itself.
 inline constexpr double kShortest = 1e-5;
 
 /// Fx, Fy, Fz and torque.
@@ -20,8 +20,8 @@ struct Instant {
     double x = 0, y = 0, z = 0, torque = 0;
 };
 
-/// What stays the same over the turn. A tooth's turn u is its angle at the tip, not wrapped: tooth m has u = θ + m·pitch,
-/// and at height z it stands at u − lag_per_mm·z.
+/// What stays the same over the turn. A tooth's turn u is its angle at the tip, not wrapped: tooth m has u =
+/// θ + m·pitch, and at height z it stands at u − lag_per_mm·z.
 struct Turn {
     double pitch = 0;
     double entry = 0, exit = 0;
@@ -42,7 +42,9 @@ void check_segment(const CutSegment& segment, std::size_t index);
 [[nodiscard]] Turn make_turn(const CutSegment& segment);
 
 /// The largest angle between samples for an accuracy, clamped to what is sensible (1e-8 … 0.1).
-[[nodiscard]] inline double sample_angle(double accuracy) { return std::sqrt(2 * std::clamp(accuracy, 1e-8, 0.1)); }
+[[nodiscard]] inline double sample_angle(double accuracy) {
+    return std::sqrt(2 * std::clamp(accuracy, 1e-8, 0.1));
+}
 
 /// Samples come in blocks of as many as a vector of the OpenCL kernel holds.
 inline constexpr int kSampleBlock = 8;
@@ -59,19 +61,23 @@ struct Teeth {
 };
 [[nodiscard]] inline Teeth teeth_in(const Turn& turn, const Turn::Piece& piece) {
     const double middle = piece.begin + piece.length / 2;
-    return {static_cast<int>(std::ceil((turn.first - middle) / turn.pitch)), static_cast<int>(std::floor((turn.last - middle) / turn.pitch))};
+    return {static_cast<int>(std::ceil((turn.first - middle) / turn.pitch)),
+            static_cast<int>(std::floor((turn.last - middle) / turn.pitch))};
 }
 
-/// The heights at which a tooth is engaged at turn u, when the piece's middle lies at `middle` of the same tooth. Which
-/// limit bounds them is decided in the middle, once for the piece; rounding at its ends cannot change it.
+/// The heights at which a tooth is engaged at turn u, when the piece's middle lies at `middle` of the same
+/// tooth. Which limit bounds them is decided in the middle, once for the piece; rounding at its ends cannot
+/// change it.
 struct Heights {
     double low = 0, high = 0;
 };
 [[nodiscard]] inline Heights engaged_heights(const Turn& t, double middle, double u) {
     Heights h{t.low, t.high};
     if (t.lag_per_mm > 0) {
-        if (middle - t.lag_per_mm * t.high < t.entry) h.high = std::clamp((u - t.entry) / t.lag_per_mm, t.low, t.high);
-        if (middle - t.lag_per_mm * t.low > t.exit) h.low = std::clamp((u - t.exit) / t.lag_per_mm, t.low, t.high);
+        if (middle - t.lag_per_mm * t.high < t.entry)
+            h.high = std::clamp((u - t.entry) / t.lag_per_mm, t.low, t.high);
+        if (middle - t.lag_per_mm * t.low > t.exit)
+            h.low = std::clamp((u - t.exit) / t.lag_per_mm, t.low, t.high);
     }
     h.high = std::max(h.high, h.low);
     return h;
@@ -79,12 +85,12 @@ struct Heights {
 
 [[nodiscard]] inline double watts_per_nmm(double rpm) { return rpm * 2 * std::numbers::pi / 60 / 1000; }
 
-/// Fills the means of x, y, z, torque and power from the integrals over arc and edge, which every profile has in closed
-/// form: each height sees the whole arc once a tooth, so the order of integration may be swapped.
+/// Fills the means of x, y, z, torque and power from the integrals over arc and edge, which every profile has
+/// in closed form: each height sees the whole arc once a tooth, so the order of integration may be swapped.
 void set_means(const CutSegment& segment, const Turn& turn, SegmentForces& out);
 
-/// Gathers peaks, and the mean of the resultant by the trapezoidal rule over the pieces, of what `tooth(heights, u)`
-/// returns as an Instant.
+/// Gathers peaks, and the mean of the resultant by the trapezoidal rule over the pieces, of what
+/// `tooth(heights, u)` returns as an Instant.
 template <class Tooth>
 SegmentForces sweep_turn(const CutSegment& segment, const Turn& turn, double accuracy, Tooth&& tooth) {
     SegmentForces out;
@@ -102,12 +108,14 @@ SegmentForces sweep_turn(const CutSegment& segment, const Turn& turn, double acc
                 const Instant f = tooth(engaged_heights(turn, middle + m * turn.pitch, u), u);
                 sum.x += f.x, sum.y += f.y, sum.z += f.z, sum.torque += f.torque;
             }
-            const double in_plane = std::sqrt(sum.x * sum.x + sum.y * sum.y), weight = (i == 0 || i + 1 == n ? 0.5 : 1) * step / turn.pitch;
+            const double in_plane = std::sqrt(sum.x * sum.x + sum.y * sum.y),
+                         weight = (i == 0 || i + 1 == n ? 0.5 : 1) * step / turn.pitch;
             out.peak_x_n = std::max(out.peak_x_n, std::abs(sum.x));
             out.peak_y_n = std::max(out.peak_y_n, std::abs(sum.y));
             out.peak_z_n = std::max(out.peak_z_n, std::abs(sum.z));
             out.peak_in_plane_n = std::max(out.peak_in_plane_n, in_plane);
-            out.peak_resultant_n = std::max(out.peak_resultant_n, std::sqrt(in_plane * in_plane + sum.z * sum.z));
+            out.peak_resultant_n =
+                std::max(out.peak_resultant_n, std::sqrt(in_plane * in_plane + sum.z * sum.z));
             out.peak_torque_nmm = std::max(out.peak_torque_nmm, std::abs(sum.torque));
             out.mean_in_plane_n += weight * in_plane;
         }

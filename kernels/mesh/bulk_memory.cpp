@@ -12,8 +12,9 @@ namespace slabwright {
 
 namespace {
 
-constexpr std::size_t kPage = std::size_t{1} << 21;   ///< bytes of a huge page
-constexpr std::size_t kLarge = std::size_t{1} << 22;  ///< bytes from which on memory may be kept, and has a head
+constexpr std::size_t kPage = std::size_t{1} << 21;  ///< bytes of a huge page
+constexpr std::size_t kLarge = std::size_t{1}
+                               << 22;  ///< bytes from which on memory may be kept, and has a head
 
 /// Before the data of large pieces, which begin with a page.
 struct alignas(64) Head {
@@ -26,14 +27,18 @@ struct Pages {
     std::size_t bytes;
 };
 
-// A page of 2 MB is cleared in one go and found in one step, where its 512 small ones are a fault each, of 2 to 10 µs on a virtual machine: a plan of 10 M facets
-// takes a tenth less time. Where the system has none to give, or is set not to, it gives small ones. To have small ones made many at a time
-// (MADV_POPULATE_WRITE) gains nothing.
-void ask_for_huge_pages(char* data, std::size_t bytes) { ::madvise(data, bytes / kPage * kPage, MADV_HUGEPAGE); }
+// A page of 2 MB is cleared in one go and found in one step, where its 512 small ones are a fault each, of 2
+// to 10 µs on a virtual machine: a plan of 10 M facets takes a tenth less time. Where the system has none to
+// give, or is set not to, it gives small ones. To have small ones made many at a time (MADV_POPULATE_WRITE)
+// gains nothing.
+void ask_for_huge_pages(char* data, std::size_t bytes) {
+    ::madvise(data, bytes / kPage * kPage, MADV_HUGEPAGE);
+}
 
 char* map_pages(std::size_t bytes) {
     // The system maps where it likes: what lies before the first whole page and after the last goes back.
-    void* const mapped = ::mmap(nullptr, bytes + kPage, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    void* const mapped =
+        ::mmap(nullptr, bytes + kPage, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (mapped == MAP_FAILED) throw std::bad_alloc();
     char* const begin = static_cast<char*>(mapped);
     const std::size_t before = (kPage - reinterpret_cast<std::uintptr_t>(begin) % kPage) % kPage;
@@ -76,7 +81,9 @@ KeptMemory::~KeptMemory() {
 void* take_bulk(std::size_t bytes) {
     if (bytes < kLarge) return ::operator new(bytes);
     const bool mapped = kept_pages.has_value();
-    char* const all = mapped ? take_pages(whole_pages(bytes)) : static_cast<char*>(::operator new (bytes + sizeof(Head), std::align_val_t{kPage}));
+    char* const all =
+        mapped ? take_pages(whole_pages(bytes))
+               : static_cast<char*>(::operator new (bytes + sizeof(Head), std::align_val_t{kPage}));
     if (!mapped) ask_for_huge_pages(all, bytes + sizeof(Head));
     return ::new (all) Head{mapped ? whole_pages(bytes) : 0} + 1;
 }

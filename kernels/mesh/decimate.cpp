@@ -21,17 +21,18 @@ namespace {
 
 using Vector = Eigen::Vector3d;
 
-constexpr double kMostCells = (1 << 21) - 1;     // of the grid along one axis
-constexpr unsigned kPartBits = 9;                // of a cell's hash: what each part has of the vertices fits a cache
+constexpr double kMostCells = (1 << 21) - 1;  // of the grid along one axis
+constexpr unsigned kPartBits = 9;  // of a cell's hash: what each part has of the vertices fits a cache
 constexpr std::uint64_t kDealtAtOnce = 1 << 23;  // vertices, unless one part has more
 constexpr std::size_t kGrain = 1 << 16;          // of what is done for one vertex or facet after the other
 constexpr double kFlat = 0.02;                   // of a cell: a vertex as near to the planes around it stays
 constexpr std::size_t kLeastTable = 1 << 10;     // of a part's cells
 constexpr const char* kWhat = "fewer facets for the report";
-constexpr double kRoundShare = 0.3;       // of the edges, the cheapest, are tried in one round; the others wait for better figures
+constexpr double kRoundShare =
+    0.3;  // of the edges, the cheapest, are tried in one round; the others wait for better figures
 constexpr double kTurn = 0.2;             // cosine: a facet may turn by no more in one collapse
 constexpr double kLeastProgress = 0.002;  // of the facets; a round that removes fewer is the last
-constexpr double kEdgeWeight = 1e-3;      // pulls a flat neighbourhood's free optimum towards the edge's middle
+constexpr double kEdgeWeight = 1e-3;  // pulls a flat neighbourhood's free optimum towards the edge's middle
 
 /// Sum of squared distances from weighted planes: xᵀAx + 2bᵀx + c.
 struct Quadric {
@@ -54,7 +55,9 @@ struct Edge {
     double cost = 0;
     std::uint32_t a = 0, b = 0;
     Vector place = Vector::Zero();
-    bool operator<(const Edge& e) const { return cost != e.cost ? cost < e.cost : a != e.a ? a < e.a : b < e.b; }
+    bool operator<(const Edge& e) const {
+        return cost != e.cost ? cost < e.cost : a != e.a ? a < e.a : b < e.b;
+    }
 };
 
 bool degenerate(const Index3& f) { return f[0] == f[1] || f[1] == f[2] || f[2] == f[0]; }
@@ -84,7 +87,8 @@ public:
         while (facets_.size() > wished) {
             const std::size_t before = facets_.size();
             round(wished);
-            if (static_cast<double>(before - facets_.size()) < kLeastProgress * static_cast<double>(before)) break;
+            if (static_cast<double>(before - facets_.size()) < kLeastProgress * static_cast<double>(before))
+                break;
         }
     }
 
@@ -98,7 +102,8 @@ public:
                 if (to[f[k]] == unused) {
                     to[f[k]] = static_cast<std::uint32_t>(mesh.vertices.size());
                     const Vector& v = vertices_[f[k]];
-                    mesh.vertices.push_back({static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())});
+                    mesh.vertices.push_back(
+                        {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())});
                 }
                 g[k] = to[f[k]];
             }
@@ -108,14 +113,15 @@ public:
     }
 
 private:
-    /// Vertices in one cell of a grid become one, where the planes of the facets that stay want it. Those are the facets whose corners lie in
-    /// three cells.
+    /// Vertices in one cell of a grid become one, where the planes of the facets that stay want it. Those are
+    /// the facets whose corners lie in three cells.
     /// @param aim facets that the grid aims at
     void cluster(MeshView mesh, std::size_t aim) {
         charge_.emplace(context_, 12 * mesh.vertices.size() + 100 * aim, kWhat);
         const auto corners = [&](std::size_t f) {
             const Index3& v = mesh.facets[f];
-            return std::array<Vector, 3>{vector_of(mesh.vertices[v[0]]), vector_of(mesh.vertices[v[1]]), vector_of(mesh.vertices[v[2]])};
+            return std::array<Vector, 3>{vector_of(mesh.vertices[v[0]]), vector_of(mesh.vertices[v[1]]),
+                                         vector_of(mesh.vertices[v[2]])};
         };
         constexpr std::size_t sampled = 16;
         const double area = sampled * parallel_reduce(
@@ -131,15 +137,20 @@ private:
                                           [](double x, double y) { return x + y; });
         const Box3 box = bounds(context_, mesh);
         const Vector low = vector_of(box.min);
-        const double cell = std::max({1e-6, std::sqrt(2 * area / static_cast<double>(aim)), (vector_of(box.max) - low).maxCoeff() / kMostCells});
+        const double cell = std::max({1e-6, std::sqrt(2 * area / static_cast<double>(aim)),
+                                      (vector_of(box.max) - low).maxCoeff() / kMostCells});
         const double per_cell = 1 / cell;
         const auto cell_of = [&](const Vec3f& v) {
             const Vector at = (vector_of(v) - low) * per_cell;
-            const auto share = [&](int k) { return static_cast<std::uint64_t>(std::clamp(at[k], 0.0, kMostCells)); };
+            const auto share = [&](int k) {
+                return static_cast<std::uint64_t>(std::clamp(at[k], 0.0, kMostCells));
+            };
             return share(0) << 42 | share(1) << 21 | share(2);
         };
         const auto hash_of = [](std::uint64_t key) { return key * 0x9E3779B97F4A7C15u; };
-        const auto part_of = [&](std::uint64_t key) { return static_cast<std::size_t>(hash_of(key) >> (64 - kPartBits)); };
+        const auto part_of = [&](std::uint64_t key) {
+            return static_cast<std::size_t>(hash_of(key) >> (64 - kPartBits));
+        };
 
         // Vertices are dealt by their cell's hash into parts, of which each numbers its cells as they come.
         struct Item {
@@ -156,7 +167,8 @@ private:
             deal(
                 context_, n, std::max(kGrain, n / 64 + 1), parts,
                 [&](std::size_t begin, std::size_t end, auto&& take) {
-                    for (std::size_t i = begin; i < end; ++i) take(part_of(cells[i] = cell_of(mesh.vertices[i])));
+                    for (std::size_t i = begin; i < end; ++i)
+                        take(part_of(cells[i] = cell_of(mesh.vertices[i])));
                 },
                 [&](std::size_t begin, std::size_t end, auto&& take) {
                     for (std::size_t i = begin; i < end; ++i) {
@@ -181,12 +193,14 @@ private:
                         std::vector<Vector>& sums = means[first + p];
                         const auto slot_of = [&](std::uint64_t key) {
                             std::size_t slot = (hash_of(key) >> 16) & (table.size() - 1);
-                            while (table[slot] != empty && keys[table[slot]] != key) slot = (slot + 1) & (table.size() - 1);
+                            while (table[slot] != empty && keys[table[slot]] != key)
+                                slot = (slot + 1) & (table.size() - 1);
                             return slot;
                         };
                         for (const Item& item : mine) {
                             const std::size_t slot = slot_of(item.key);
-                            const std::uint32_t id = table[slot] != empty ? table[slot] : static_cast<std::uint32_t>(keys.size());
+                            const std::uint32_t id =
+                                table[slot] != empty ? table[slot] : static_cast<std::uint32_t>(keys.size());
                             if (table[slot] == empty) {
                                 table[slot] = id;
                                 keys.push_back(item.key);
@@ -194,7 +208,8 @@ private:
                                 counts.push_back(0);
                                 if (2 * keys.size() > table.size()) {
                                     table.assign(2 * table.size(), empty);
-                                    for (std::uint32_t k = 0; k < keys.size(); ++k) table[slot_of(keys[k])] = k;
+                                    for (std::uint32_t k = 0; k < keys.size(); ++k)
+                                        table[slot_of(keys[k])] = k;
                                 }
                             }
                             sums[id] += vector_of(mesh.vertices[item.vertex]);
@@ -225,7 +240,8 @@ private:
                 if (!degenerate(merged(f))) staying[begin / kGrain].push_back(static_cast<std::uint32_t>(f));
         });
         std::vector<std::uint32_t> source;
-        for (const std::vector<std::uint32_t>& some : staying) source.insert(source.end(), some.begin(), some.end());
+        for (const std::vector<std::uint32_t>& some : staying)
+            source.insert(source.end(), some.begin(), some.end());
         facets_.resize(source.size());
         struct Oriented {
             Vector normal, place;
@@ -247,11 +263,13 @@ private:
                 Quadric sum;  // about the mean
                 for (std::uint32_t k = starts_[v]; k < starts_[v + 1]; ++k) {
                     const Oriented& plane = planes[around_[k]];
-                    sum.add_plane(plane.normal, plane.normal.dot(vertices_[v] - plane.place), plane.twice_area);
+                    sum.add_plane(plane.normal, plane.normal.dot(vertices_[v] - plane.place),
+                                  plane.twice_area);
                 }
                 const double weight = sum.a.trace();
                 if (sum.c <= kFlat * kFlat * cell * cell * weight) continue;
-                const Eigen::Matrix3d a = sum.a + (kEdgeWeight * weight + 1e-12) * Eigen::Matrix3d::Identity();
+                const Eigen::Matrix3d a =
+                    sum.a + (kEdgeWeight * weight + 1e-12) * Eigen::Matrix3d::Identity();
                 const Vector way = a.ldlt().solve(-sum.b);
                 if (way.allFinite() && way.norm() < cell) vertices_[v] += way;
             }
@@ -270,7 +288,8 @@ private:
             for (const std::uint32_t v : facets_[f]) around_[next[v]++] = static_cast<std::uint32_t>(f);
     }
 
-    /// The quadric of a vertex: the planes of its facets, weighted by area; an open edge adds a plane upright on its facet.
+    /// The quadric of a vertex: the planes of its facets, weighted by area; an open edge adds a plane upright
+    /// on its facet.
     void measure() {
         find_facets_around();
         quadrics_.assign(vertices_.size(), {});
@@ -288,7 +307,8 @@ private:
                         if ((p != v && q != v) || shared(p, q) > 1) continue;
                         const Vector along = vertices_[q] - vertices_[p];
                         const Vector upright = along.cross(n).normalized();
-                        if (upright.allFinite()) quadrics_[v].add_plane(upright, -upright.dot(vertices_[p]), along.squaredNorm());
+                        if (upright.allFinite())
+                            quadrics_[v].add_plane(upright, -upright.dot(vertices_[p]), along.squaredNorm());
                     }
                 }
         });
@@ -309,15 +329,19 @@ private:
         const Vector &p = vertices_[edge.a], &q = vertices_[edge.b], middle = (p + q) / 2;
         Quadric sum = quadrics_[edge.a];
         sum += quadrics_[edge.b];
-        // In a flat or a straight neighbourhood the optimum is a plane or a line; a weak pull to the middle makes it one point.
+        // In a flat or a straight neighbourhood the optimum is a plane or a line; a weak pull to the middle
+        // makes it one point.
         const double pull = kEdgeWeight * sum.a.trace() + 1e-12;
         const Eigen::Matrix3d a = sum.a + pull * Eigen::Matrix3d::Identity();
         Vector best = a.ldlt().solve(pull * middle - sum.b);
-        double cost = best.allFinite() && (best - middle).norm() < 2 * (p - q).norm() ? sum.at(best) : std::numeric_limits<double>::infinity();
+        double cost = best.allFinite() && (best - middle).norm() < 2 * (p - q).norm()
+                          ? sum.at(best)
+                          : std::numeric_limits<double>::infinity();
         for (const Vector& other : {middle, p, q})
             if (const double c = sum.at(other); c < cost) cost = c, best = other;
         edge.place = best;
-        edge.cost = std::max(0.0, cost) + 1e-9 * (p - q).squaredNorm();  // of equally flat ones the shortest first
+        edge.cost =
+            std::max(0.0, cost) + 1e-9 * (p - q).squaredNorm();  // of equally flat ones the shortest first
     }
 
     /// Whether merging keeps every facet around upright and joins no sheets.
@@ -328,7 +352,8 @@ private:
             for (std::uint32_t k = starts_[v]; k < starts_[v + 1]; ++k) {
                 const Index3& f = facets_[around_[k]];
                 if (degenerate(f)) continue;
-                const bool has_a = f[0] == edge.a || f[1] == edge.a || f[2] == edge.a, has_b = f[0] == edge.b || f[1] == edge.b || f[2] == edge.b;
+                const bool has_a = f[0] == edge.a || f[1] == edge.a || f[2] == edge.a,
+                           has_b = f[0] == edge.b || f[1] == edge.b || f[2] == edge.b;
                 for (const std::uint32_t w : f)
                     if (w != edge.a && w != edge.b) (v == edge.a ? ring_a_ : ring_b_).push_back(w);
                 if (has_a && has_b) {
@@ -349,7 +374,8 @@ private:
         }
         int common = 0;
         for (const std::uint32_t w : ring_a_) common += std::binary_search(ring_b_.begin(), ring_b_.end(), w);
-        return common == common_facets;  // more: the edge is one side of a hole of three, and the surface would be pinched
+        return common == common_facets;  // more: the edge is one side of a hole of three, and the surface
+                                         // would be pinched
     }
 
     void round(std::size_t wished) {
@@ -360,13 +386,15 @@ private:
         for (const Index3& f : facets_)
             for (std::size_t k = 0; k < 3; ++k) {
                 const std::uint32_t a = f[k], b = f[(k + 1) % 3];
-                if (a < b || shared(a, b) == 1) edges.push_back({0, std::min(a, b), std::max(a, b), Vector::Zero()});
+                if (a < b || shared(a, b) == 1)
+                    edges.push_back({0, std::min(a, b), std::max(a, b), Vector::Zero()});
             }
         parallel_for(context_, edges.size(), 2048, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) rate(edges[i]);
         });
-        const std::size_t tried =
-            std::min(edges.size(), std::max<std::size_t>(64, static_cast<std::size_t>(kRoundShare * static_cast<double>(edges.size()))));
+        const std::size_t tried = std::min(
+            edges.size(), std::max<std::size_t>(
+                              64, static_cast<std::size_t>(kRoundShare * static_cast<double>(edges.size()))));
         std::nth_element(edges.begin(), edges.begin() + static_cast<std::ptrdiff_t>(tried) - 1, edges.end());
         edges.resize(tried);
         std::sort(edges.begin(), edges.end());

@@ -22,11 +22,14 @@ Box3 bounds(MeshView mesh) {
 
 Box3 bounds(Context& context, MeshView mesh) {
     if (mesh.facets.empty()) return {};
-    auto part = [&](std::size_t begin, std::size_t end) { return bounds(MeshView{mesh.vertices, mesh.facets.subspan(begin, end - begin), {}}); };
-    return parallel_reduce(context, mesh.size(), std::size_t{1} << 16, part(0, 1), part, [](const Box3& a, const Box3& b) {
-        return Box3{{std::min(a.min.x, b.min.x), std::min(a.min.y, b.min.y), std::min(a.min.z, b.min.z)},
-                    {std::max(a.max.x, b.max.x), std::max(a.max.y, b.max.y), std::max(a.max.z, b.max.z)}};
-    });
+    auto part = [&](std::size_t begin, std::size_t end) {
+        return bounds(MeshView{mesh.vertices, mesh.facets.subspan(begin, end - begin), {}});
+    };
+    return parallel_reduce(
+        context, mesh.size(), std::size_t{1} << 16, part(0, 1), part, [](const Box3& a, const Box3& b) {
+            return Box3{{std::min(a.min.x, b.min.x), std::min(a.min.y, b.min.y), std::min(a.min.z, b.min.z)},
+                        {std::max(a.max.x, b.max.x), std::max(a.max.y, b.max.y), std::max(a.max.z, b.max.z)}};
+        });
 }
 
 }  // namespace slabwright

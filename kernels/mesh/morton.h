@@ -15,15 +15,19 @@ public:
     static constexpr int kBits = 21;  ///< along each axis
     explicit MortonGrid(const Box3& box);
     /// The number of the cell that holds a point; that of the nearest one for a point outside.
-    [[nodiscard]] std::uint64_t code(double x, double y, double z) const { return spread(x, x0_) | spread(y, y0_) << 1 | spread(z, z0_) << 2; }
+    [[nodiscard]] std::uint64_t code(double x, double y, double z) const {
+        return spread(x, x0_) | spread(y, y0_) << 1 | spread(z, z0_) << 2;
+    }
     /// The first 24 bits of that number, sooner.
     [[nodiscard]] std::uint32_t coarse_code(double x, double y, double z) const {
-        return kSpread[cell(x, x0_) >> 13] | kSpread[cell(y, y0_) >> 13] << 1 | kSpread[cell(z, z0_) >> 13] << 2;
+        return kSpread[cell(x, x0_) >> 13] | kSpread[cell(y, y0_) >> 13] << 1 |
+               kSpread[cell(z, z0_) >> 13] << 2;
     }
 
 private:
     [[nodiscard]] std::uint64_t cell(double at, double from) const {
-        return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::clamp((at - from) * per_mm_, 0.0, kLast)));
+        return static_cast<std::uint64_t>(
+            static_cast<std::int64_t>(std::clamp((at - from) * per_mm_, 0.0, kLast)));
     }
     // 21 bits, two zeros after each.
     [[nodiscard]] std::uint64_t spread(double at, double from) const {
@@ -45,7 +49,8 @@ private:
 };
 
 inline MortonGrid::MortonGrid(const Box3& box) : x0_(box.min.x), y0_(box.min.y), z0_(box.min.z) {
-    per_mm_ = kLast / std::max({1e-6, double{box.max.x} - x0_, double{box.max.y} - y0_, double{box.max.z} - z0_});
+    per_mm_ =
+        kLast / std::max({1e-6, double{box.max.x} - x0_, double{box.max.y} - y0_, double{box.max.z} - z0_});
 }
 
 }  // namespace slabwright

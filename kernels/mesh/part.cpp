@@ -22,11 +22,13 @@ struct Chosen {
     std::size_t count() {
         before.resize(words.size());
         std::uint32_t sum = 0;
-        for (std::size_t w = 0; w < words.size(); ++w) before[w] = sum, sum += static_cast<std::uint32_t>(std::popcount(words[w]));
+        for (std::size_t w = 0; w < words.size(); ++w)
+            before[w] = sum, sum += static_cast<std::uint32_t>(std::popcount(words[w]));
         return sum;
     }
     [[nodiscard]] std::uint32_t rank(std::uint32_t i) const {
-        return before[i >> 6] + static_cast<std::uint32_t>(std::popcount(words[i >> 6] & ((std::uint64_t{1} << (i & 63)) - 1)));
+        return before[i >> 6] + static_cast<std::uint32_t>(
+                                    std::popcount(words[i >> 6] & ((std::uint64_t{1} << (i & 63)) - 1)));
     }
     /// Calls fn(i) for those in words [begin, end), ascending.
     template <class Fn>
@@ -51,13 +53,15 @@ Mesh part_between(Context& context, MeshView mesh, double low, double high) {
         });
     };
     choose(within, [&](std::size_t f) {
-        const float a = mesh.vertices[mesh.facets[f][0]].z, b = mesh.vertices[mesh.facets[f][1]].z, c = mesh.vertices[mesh.facets[f][2]].z;
+        const float a = mesh.vertices[mesh.facets[f][0]].z, b = mesh.vertices[mesh.facets[f][1]].z,
+                    c = mesh.vertices[mesh.facets[f][2]].z;
         return std::max({a, b, c}) >= low && std::min({a, b, c}) <= high;
     });
     choose(facets, [&](std::size_t f) {
         const Index3& beside = mesh.neighbours[f];
         return within.has(static_cast<std::uint32_t>(f)) ||
-               std::any_of(beside.begin(), beside.end(), [&](std::uint32_t g) { return g != kNoFacet && within.has(g); });
+               std::any_of(beside.begin(), beside.end(),
+                           [&](std::uint32_t g) { return g != kNoFacet && within.has(g); });
     });
     Mesh part;
     part.facets.resize(facets.count());
@@ -67,7 +71,8 @@ Mesh part_between(Context& context, MeshView mesh, double low, double high) {
     });
     part.vertices.resize(vertices.count());
     parallel_for(context, vertices.words.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-        vertices.each(begin, end, [&](std::uint32_t v) { part.vertices[vertices.rank(v)] = mesh.vertices[v]; });
+        vertices.each(begin, end,
+                      [&](std::uint32_t v) { part.vertices[vertices.rank(v)] = mesh.vertices[v]; });
     });
     parallel_for(context, facets.words.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         facets.each(begin, end, [&](std::uint32_t f) {

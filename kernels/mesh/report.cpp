@@ -20,7 +20,9 @@ struct Point {
 };
 
 Point operator-(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Point cross(const Point& a, const Point& b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+Point cross(const Point& a, const Point& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 double dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Point point(const Vec3f& v) { return {v.x, v.y, v.z}; }
 
@@ -32,10 +34,12 @@ void note(Finding& finding, std::uint32_t facet, std::uint64_t count = 1) {
 
 void add(Finding& finding, const Finding& more) { note(finding, more.first_facet, more.count); }
 
-bool collapsed(const Index3& facet) { return facet[0] == facet[1] || facet[1] == facet[2] || facet[2] == facet[0]; }
+bool collapsed(const Index3& facet) {
+    return facet[0] == facet[1] || facet[1] == facet[2] || facet[2] == facet[0];
+}
 
-/// Twice the vector area. Differences and products of float32 coordinates of like size are exact in double, so three
-/// points on a line give exactly zero.
+/// Twice the vector area. Differences and products of float32 coordinates of like size are exact in double,
+/// so three points on a line give exactly zero.
 Point twice_area(MeshView mesh, const Index3& facet) {
     const Point a = point(mesh.vertices[facet[0]]);
     return cross(point(mesh.vertices[facet[1]]) - a, point(mesh.vertices[facet[2]]) - a);
@@ -67,8 +71,10 @@ void find_duplicates(MeshView mesh, std::span<const EdgeUse> uses, Finding& dupl
     }
 }
 
-/// Counts what is wrong at one edge, and joins the facets that meet there without a partner into one component.
-void inspect_edge(MeshView mesh, float base, std::span<const EdgeUse> uses, std::span<std::uint32_t> component, EdgeFindings& found) {
+/// Counts what is wrong at one edge, and joins the facets that meet there without a partner into one
+/// component.
+void inspect_edge(MeshView mesh, float base, std::span<const EdgeUse> uses,
+                  std::span<std::uint32_t> component, EdgeFindings& found) {
     // A facet with two equal corners runs along the edge in both directions and cancels itself.
     std::size_t facets = 0, forward = 0;
     std::uint32_t first = kNoFacet;
@@ -79,7 +85,8 @@ void inspect_edge(MeshView mesh, float base, std::span<const EdgeUse> uses, std:
     }
     if (facets == 1) {
         note(found.open, first);
-        if (mesh.vertices[uses[0].low].z != base || mesh.vertices[uses[0].high].z != base) note(found.open_off_base, first);
+        if (mesh.vertices[uses[0].low].z != base || mesh.vertices[uses[0].high].z != base)
+            note(found.open_off_base, first);
     }
     if (facets > 2) note(found.non_manifold, first);
     if (facets >= 2 && 2 * forward != facets) {
@@ -109,8 +116,8 @@ struct Query {
     std::uint32_t component;
 };
 
-/// Whether the step from a to b crosses the ray from q towards +x in the plane, and in which direction. The side is
-/// computed from the lower end, so that two facets that share the edge agree to the last bit.
+/// Whether the step from a to b crosses the ray from q towards +x in the plane, and in which direction. The
+/// side is computed from the lower end, so that two facets that share the edge agree to the last bit.
 int crossing(const Point& a, const Point& b, const Point& q) {
     if ((a.y <= q.y) == (b.y <= q.y)) return 0;
     const bool up = a.y <= q.y;
@@ -121,22 +128,26 @@ int crossing(const Point& a, const Point& b, const Point& q) {
     return up ? 1 : -1;
 }
 
-/// Winding number of all other components around each query, counted along a ray to +z: material that lies above ends
-/// with a facet facing up. An opening in the base plane does not matter to that ray.
-std::vector<int> material_around(Context& context, MeshView mesh, std::span<const std::uint32_t> component_of, const std::vector<Query>& queries) {
+/// Winding number of all other components around each query, counted along a ray to +z: material that lies
+/// above ends with a facet facing up. An opening in the base plane does not matter to that ray.
+std::vector<int> material_around(Context& context, MeshView mesh, std::span<const std::uint32_t> component_of,
+                                 const std::vector<Query>& queries) {
     if (queries.empty()) return {};
     std::vector<std::size_t> by_x(queries.size());
     for (std::size_t i = 0; i < by_x.size(); ++i) by_x[i] = i;
-    std::sort(by_x.begin(), by_x.end(),
-              [&](std::size_t a, std::size_t b) { return queries[a].p.x != queries[b].p.x ? queries[a].p.x < queries[b].p.x : a < b; });
+    std::sort(by_x.begin(), by_x.end(), [&](std::size_t a, std::size_t b) {
+        return queries[a].p.x != queries[b].p.x ? queries[a].p.x < queries[b].p.x : a < b;
+    });
     std::vector<std::atomic<int>> winding(queries.size());
     parallel_for(context, mesh.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end; ++f) {
             const Index3& facet = mesh.facets[f];
-            const Point a = point(mesh.vertices[facet[0]]), b = point(mesh.vertices[facet[1]]), c = point(mesh.vertices[facet[2]]);
+            const Point a = point(mesh.vertices[facet[0]]), b = point(mesh.vertices[facet[1]]),
+                        c = point(mesh.vertices[facet[2]]);
             const auto [x0, x1] = std::minmax({a.x, b.x, c.x});
             const auto [y0, y1] = std::minmax({a.y, b.y, c.y});
-            auto at = std::lower_bound(by_x.begin(), by_x.end(), x0, [&](std::size_t i, double x) { return queries[i].p.x < x; });
+            auto at = std::lower_bound(by_x.begin(), by_x.end(), x0,
+                                       [&](std::size_t i, double x) { return queries[i].p.x < x; });
             for (; at != by_x.end() && queries[*at].p.x <= x1; ++at) {
                 const Query& query = queries[*at];
                 const Point& q = query.p;
@@ -146,7 +157,9 @@ std::vector<int> material_around(Context& context, MeshView mesh, std::span<cons
                 const Point normal = cross(b - a, c - a);
                 const auto [z0, z1] = std::minmax({a.z, b.z, c.z});
                 double z = z1;
-                if (normal.z != 0) z = std::clamp(a.z - ((q.x - a.x) * normal.x + (q.y - a.y) * normal.y) / normal.z, z0, z1);
+                if (normal.z != 0)
+                    z = std::clamp(a.z - ((q.x - a.x) * normal.x + (q.y - a.y) * normal.y) / normal.z, z0,
+                                   z1);
                 if (z > q.z) winding[*at].fetch_add(turns, std::memory_order_relaxed);
             }
         }
@@ -183,9 +196,12 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
             for (const std::uint32_t v : *odd) asked[v] = true;
         EdgeScratch scratch;
         edges = reduce_fans(
-            context, mesh.facets, mesh.vertices.size(), scratch, EdgeFindings{}, [&](std::uint32_t v) { return asked.empty() || asked[v]; },
+            context, mesh.facets, mesh.vertices.size(), scratch, EdgeFindings{},
+            [&](std::uint32_t v) { return asked.empty() || asked[v]; },
             [&](EdgeFindings& found, std::span<const EdgeUse> fan) {
-                each_edge(fan, [&](std::span<const EdgeUse> uses) { inspect_edge(mesh, base, uses, component, found); });
+                each_edge(fan, [&](std::span<const EdgeUse> uses) {
+                    inspect_edge(mesh, base, uses, component, found);
+                });
             },
             join);
     }
@@ -195,20 +211,23 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
     report.misoriented_edges = edges.misoriented;
     report.duplicate_facets = edges.duplicate;
 
-    // Paths are flattened into a second array: reading and writing one array would let threads see each other's work.
+    // Paths are flattened into a second array: reading and writing one array would let threads see each
+    // other's work.
     {
         BulkVector<std::uint32_t> roots(n);
         parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t f = begin; f < end; ++f) roots[f] = cluster_root(component, static_cast<std::uint32_t>(f));
+            for (std::size_t f = begin; f < end; ++f)
+                roots[f] = cluster_root(component, static_cast<std::uint32_t>(f));
         });
         report.component_of = std::move(roots);
     }
     report.components = number_by_first(
         context, report.component_of, [](std::uint32_t) {}, [](std::size_t, std::uint32_t) {});
 
-    // Volume is summed from tetrahedra to the middle of the base: exact for a mesh that is open in its base plane only,
-    // and without loss of digits for a mesh far from the origin.
-    const Point origin{(double(report.box.min.x) + report.box.max.x) / 2, (double(report.box.min.y) + report.box.max.y) / 2, base};
+    // Volume is summed from tetrahedra to the middle of the base: exact for a mesh that is open in its base
+    // plane only, and without loss of digits for a mesh far from the origin.
+    const Point origin{(double(report.box.min.x) + report.box.max.x) / 2,
+                       (double(report.box.min.y) + report.box.max.y) / 2, base};
     const Sums sums = parallel_reduce(
         context, n, kGrain, Sums{},
         [&](std::size_t begin, std::size_t end) {

@@ -18,26 +18,30 @@ struct Finding {
 
 struct MeshReport {
     std::uint64_t facets = 0, vertices = 0, components = 0;
-    Finding open_edges;           ///< edges with one facet (here and below, a facet with two equal corners does not count)
+    Finding
+        open_edges;  ///< edges with one facet (here and below, a facet with two equal corners does not count)
     Finding open_edges_off_base;  ///< those of them that do not lie wholly in the lowest plane
     Finding non_manifold_edges;   ///< edges with more than two facets
-    Finding misoriented_edges;    ///< edges whose facets do not run along them in opposite directions, one for one
-    Finding degenerate_facets;    ///< two equal corners, or no area
-    Finding duplicate_facets;     ///< same three (different) vertices as an earlier facet, whichever way round
-    /// Components of negative volume, closed but for edges in the lowest plane, around which the other components make no
-    /// material (winding number at most 0); a cavity, which lies in material, is none.
+    Finding
+        misoriented_edges;  ///< edges whose facets do not run along them in opposite directions, one for one
+    Finding degenerate_facets;  ///< two equal corners, or no area
+    Finding duplicate_facets;   ///< same three (different) vertices as an earlier facet, whichever way round
+    /// Components of negative volume, closed but for edges in the lowest plane, around which the other
+    /// components make no material (winding number at most 0); a cavity, which lies in material, is none.
     Finding inverted_components;
     double volume_mm3 = 0;  ///< signed, of the whole; an opening in the lowest plane counts as filled
     double area_mm2 = 0;
     Box3 box;
-    /// Component of every facet, numbered by lowest facet. Facets that are paired across an edge belong together, and so
-    /// do all facets of a misoriented edge; bodies that touch along an edge stay two.
+    /// Component of every facet, numbered by lowest facet. Facets that are paired across an edge belong
+    /// together, and so do all facets of a misoriented edge; bodies that touch along an edge stay two.
     BulkVector<std::uint32_t> component_of;
 };
 
 /// Reports on a mesh whose adjacency is filled. Deterministic.
-/// @param odd vertices that weld() or pair_edges() named on this very mesh: only edges with their lower end there are searched for
+/// @param odd vertices that weld() or pair_edges() named on this very mesh: only edges with their lower end
+/// there are searched for
 ///        faults; without it all are
-[[nodiscard]] MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::uint32_t>* odd = nullptr);
+[[nodiscard]] MeshReport report_mesh(Context& context, MeshView mesh,
+                                     const std::vector<std::uint32_t>* odd = nullptr);
 
 }  // namespace slabwright

@@ -24,7 +24,8 @@ namespace slabwright {
 
 namespace {
 
-// What is asked of all around a vertex is asked of four at once. The functions that return such vectors are called in this file alone.
+// What is asked of all around a vertex is asked of four at once. The functions that return such vectors are
+// called in this file alone.
 #pragma GCC diagnostic ignored "-Wpsabi"
 constexpr std::size_t kLanes = 4;
 using Four [[gnu::vector_size(kLanes * sizeof(double))]] = double;
@@ -38,17 +39,19 @@ struct Space {
 using Place = Space<double>;
 using Places = Space<Four>;
 
-constexpr std::size_t kBlockFacets = 1 << 15;    // that a block has on the average
-constexpr int kMostAround = 16;                  // a vertex with more facets around it stays
-constexpr double kLeastFacing = 0.2;             // cosine between the mean normal and any facet's: below, the gap along it says too much
+constexpr std::size_t kBlockFacets = 1 << 15;  // that a block has on the average
+constexpr int kMostAround = 16;                // a vertex with more facets around it stays
+constexpr double kLeastFacing =
+    0.2;  // cosine between the mean normal and any facet's: below, the gap along it says too much
 constexpr double kSameFacing = 0.99985;          // cosine of one degree
 constexpr double kLeastHeight = 0.05;            // mm: of a new facet, unless one was flatter before
 constexpr double kNearlyLevel = 0.866;           // cosine of 30°
 constexpr double kBesidePlane = 5;               // tolerances
 constexpr double kRounding = 1e-9;               // mm
 constexpr std::uint64_t kDealtAtOnce = 1 << 24;  // facets, unless one block has more
-constexpr std::size_t kSparse = 8;               // of a block's facets: words of 64 vertices from which on sorting numbers them sooner
-constexpr double kLeastRound = 0.002;            // of a block's facets; a round in which fewer vertices go is the last
+constexpr std::size_t kSparse =
+    8;  // of a block's facets: words of 64 vertices from which on sorting numbers them sooner
+constexpr double kLeastRound = 0.002;  // of a block's facets; a round in which fewer vertices go is the last
 
 template <class A, class B>
 auto dot(const Space<A>& a, const Space<B>& b) {
@@ -107,11 +110,13 @@ struct Task {
     MeshView mesh;
     double tolerance;
     std::span<const double> planes;  ///< ascending
-    const VertexBits* settled;       ///< the vertices that are not set here stay unless something around them changes; none: nothing is known
+    const VertexBits* settled;       ///< the vertices that are not set here stay unless something around them
+                                     ///< changes; none: nothing is known
     VertexBits* unsettled;           ///< where those are set that a block has not settled; none: nobody asks
 };
 
-/// The facets of one block, with vertices of its own numbering. Used for one block after another, its memory stays.
+/// The facets of one block, with vertices of its own numbering. Used for one block after another, its memory
+/// stays.
 class Block {
 public:
     /// @param face_of(i) the face number i of the block's n
@@ -133,7 +138,8 @@ public:
                 if (!task.settled->has(ids_[v])) need_[v] = kNever;
     }
 
-    /// Takes away what the tolerance allows. @return the faces that stay, with the mesh's vertices, until the next block is loaded
+    /// Takes away what the tolerance allows. @return the faces that stay, with the mesh's vertices, until the
+    /// next block is loaded
     std::span<const Face> simplified(const Task& task) {
         find_around();
         // Whether all facets around a vertex are in this block, as far as an open fan tells.
@@ -144,7 +150,8 @@ public:
         for (const double share : {0.5, 1.0}) {
             allowed_ = share * tolerance_;
             for (std::size_t v = 0; v < ids_.size(); ++v) awake_[v] = inner_[v] && need_[v] <= allowed_;
-            for (std::size_t gone = faces_.size(); static_cast<double>(gone) > kLeastRound * static_cast<double>(faces_.size());) {
+            for (std::size_t gone = faces_.size();
+                 static_cast<double>(gone) > kLeastRound * static_cast<double>(faces_.size());) {
                 gone = 0;
                 touched_.assign(ids_.size(), 0);
                 for (std::uint32_t v = 0; v < ids_.size(); ++v) {
@@ -158,15 +165,17 @@ public:
         }
         if (task.unsettled != nullptr)
             for (std::size_t v = 0; v < ids_.size(); ++v)
-                if (starts_[v] < starts_[v + 1] && !(inner_[v] && need_[v] > tolerance_)) task.unsettled->set(ids_[v]);
+                if (starts_[v] < starts_[v + 1] && !(inner_[v] && need_[v] > tolerance_))
+                    task.unsettled->set(ids_[v]);
         for (Face& f : faces_)
             for (std::uint32_t& v : f.v) v = ids_[v];
         return faces_;
     }
 
 private:
-    // Ascending by the mesh's numbers. A bit for each number between the lowest and the highest, and how many are before each 64 of them, tell
-    // quickly which one a vertex is; where the block's vertices are few among many they are sorted.
+    // Ascending by the mesh's numbers. A bit for each number between the lowest and the highest, and how many
+    // are before each 64 of them, tell quickly which one a vertex is; where the block's vertices are few
+    // among many they are sorted.
     void number_vertices() {
         ids_.clear();
         if (faces_.empty()) return;
@@ -179,22 +188,27 @@ private:
             std::sort(ids_.begin(), ids_.end());
             ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
             for (Face& f : faces_)
-                for (std::uint32_t& v : f.v) v = static_cast<std::uint32_t>(std::lower_bound(ids_.begin(), ids_.end(), v) - ids_.begin());
+                for (std::uint32_t& v : f.v)
+                    v = static_cast<std::uint32_t>(std::lower_bound(ids_.begin(), ids_.end(), v) -
+                                                   ids_.begin());
             return;
         }
         used_.assign(words, 0);
         before_.resize(words);
         for (const Face& f : faces_)
-            for (const std::uint32_t v : f.v) used_[(v - lowest) / 64] |= std::uint64_t{1} << (v - lowest) % 64;
+            for (const std::uint32_t v : f.v)
+                used_[(v - lowest) / 64] |= std::uint64_t{1} << (v - lowest) % 64;
         for (std::size_t w = 0; w < words; ++w) {
             before_[w] = static_cast<std::uint32_t>(ids_.size());
             for (std::uint64_t bits = used_[w]; bits != 0; bits &= bits - 1)
-                ids_.push_back(lowest + static_cast<std::uint32_t>(64 * w) + static_cast<std::uint32_t>(std::countr_zero(bits)));
+                ids_.push_back(lowest + static_cast<std::uint32_t>(64 * w) +
+                               static_cast<std::uint32_t>(std::countr_zero(bits)));
         }
         for (Face& f : faces_)
             for (std::uint32_t& v : f.v) {
                 const std::uint32_t i = v - lowest;
-                v = before_[i / 64] + static_cast<std::uint32_t>(std::popcount(used_[i / 64] & ((std::uint64_t{1} << i % 64) - 1)));
+                v = before_[i / 64] + static_cast<std::uint32_t>(
+                                          std::popcount(used_[i / 64] & ((std::uint64_t{1} << i % 64) - 1)));
             }
     }
 
@@ -206,11 +220,13 @@ private:
         for (std::size_t i = 2; i < starts_.size(); ++i) starts_[i] += starts_[i - 1];
         around_.resize(3 * faces_.size());
         for (std::size_t f = 0; f < faces_.size(); ++f)
-            for (std::size_t k = 0; k < 3; ++k) around_[starts_[faces_[f].v[k] + 1]++] = static_cast<std::uint32_t>(4 * f + k);
+            for (std::size_t k = 0; k < 3; ++k)
+                around_[starts_[faces_[f].v[k] + 1]++] = static_cast<std::uint32_t>(4 * f + k);
     }
 
     static constexpr std::array<std::uint8_t, 4> kNext{1, 2, 0, 1};  // corners of a facet
-    // The facets around v and the vertices around it, counter-clockwise: facet i is (v, ring_[i], ring_[i + 1]). False where they are not one closed fan.
+    // The facets around v and the vertices around it, counter-clockwise: facet i is (v, ring_[i], ring_[i +
+    // 1]). False where they are not one closed fan.
     bool gather(std::uint32_t v) {
         const auto n = static_cast<int>(starts_[v + 1] - starts_[v]);
         if (n < 3 || n > kMostAround) return false;
@@ -222,14 +238,15 @@ private:
             to[static_cast<std::size_t>(i)] = f[kNext[corner % 4 + 1]];
             facet[static_cast<std::size_t>(i)] = corner / 4;
         }
-        // A bit for each facet that begins where this one ends. Two in a fan that visits all are at the same vertex where a facet is degenerate: then
-        // there is no such fan.
+        // A bit for each facet that begins where this one ends. Two in a fan that visits all are at the same
+        // vertex where a facet is degenerate: then there is no such fan.
         using Eight [[gnu::vector_size(32)]] = std::uint32_t;
         std::array<std::uint32_t, kMostAround> follow;
         for (std::size_t half = 0; half < static_cast<std::size_t>(n); half += 8) {
             Eight ends, bits{};
             std::memcpy(&ends, &to[half], sizeof(ends));
-            for (int j = 0; j < n; ++j) bits |= static_cast<Eight>(ends == from[static_cast<std::size_t>(j)]) & (1u << j);
+            for (int j = 0; j < n; ++j)
+                bits |= static_cast<Eight>(ends == from[static_cast<std::size_t>(j)]) & (1u << j);
             std::memcpy(&follow[half], &bits, sizeof(bits));
         }
         n_ = n;
@@ -260,11 +277,13 @@ private:
         return true;
     }
 
-    // Whether the fan has a facet of less than 30° from level, and reaches as near to one of the planes as it may move.
+    // Whether the fan has a facet of less than 30° from level, and reaches as near to one of the planes as it
+    // may move.
     [[nodiscard]] bool crosses_nearly_level(std::uint32_t v) const {
         if (planes_.empty()) return false;
         double low = place_[v].z, high = low;
-        for (std::size_t a = 0; a < count(); ++a) low = std::min(low, place_[ring_[a]].z), high = std::max(high, place_[ring_[a]].z);
+        for (std::size_t a = 0; a < count(); ++a)
+            low = std::min(low, place_[ring_[a]].z), high = std::max(high, place_[ring_[a]].z);
         const double beside = kBesidePlane * tolerance_;
         const auto plane = std::lower_bound(planes_.begin(), planes_.end(), low - beside);
         if (plane == planes_.end() || *plane > high + beside) return false;
@@ -273,7 +292,8 @@ private:
         return false;
     }
 
-    // The vertices around v as (u, v, w) from v, w along the facets' mean normal. False where nothing lets v go.
+    // The vertices around v as (u, v, w) from v, w along the facets' mean normal. False where nothing lets v
+    // go.
     bool look(std::uint32_t v) {
         low_ = high_ = 0;
         for (std::size_t a = 0; a < count(); ++a) {
@@ -292,7 +312,8 @@ private:
         }
         if (joined_bits(no_area) != 0) return false;
         Place sum;
-        for (std::size_t a = 0; a < count(); ++a) sum = {sum.x + normal_.x[a], sum.y + normal_.y[a], sum.z + normal_.z[a]};
+        for (std::size_t a = 0; a < count(); ++a)
+            sum = {sum.x + normal_.x[a], sum.y + normal_.y[a], sum.z + normal_.z[a]};
         const double length = std::sqrt(dot(sum, sum));
         if (length == 0) return false;
         const Place w{sum.x / length, sum.y / length, sum.z / length};
@@ -336,7 +357,8 @@ private:
     // Whether all facets around a vertex are known: in this block, and as they were when the round began.
     [[nodiscard]] bool known(std::uint32_t v) const { return inner_[v] && !touched_[v]; }
 
-    // Whether the edge (a, b) exists, as a facet of the one of them that is known tells; true where neither is.
+    // Whether the edge (a, b) exists, as a facet of the one of them that is known tells; true where neither
+    // is.
     [[nodiscard]] bool joined(std::uint32_t a, std::uint32_t b) const {
         if (!known(a)) std::swap(a, b);
         if (!known(a)) return true;
@@ -347,8 +369,8 @@ private:
         return false;
     }
 
-    // Whether v may be drawn into the vertex k of its ring, and leaves less flat facets than going to the best one so far. need_[v] becomes no more
-    // than what a tolerance must allow so that this may change.
+    // Whether v may be drawn into the vertex k of its ring, and leaves less flat facets than going to the
+    // best one so far. need_[v] becomes no more than what a tolerance must allow so that this may change.
     bool may_go_to(std::uint32_t v, int k) {
         const std::size_t n = count(), start = static_cast<std::size_t>(k);
         const Place a = flat_.get(start);
@@ -365,7 +387,8 @@ private:
             need_[v] = std::min(need_[v], asks);
             return false;
         };
-        // On which side of the way to a each vertex lies (bits from 0 on, from 16 on the other), and which new facets are upright (from 32 on).
+        // On which side of the way to a each vertex lies (bits from 0 on, from 16 on the other), and which
+        // new facets are upright (from 32 on).
         Signs found{}, own = kOwn;
         for (std::size_t i = 0; i < n; i += kLanes, own <<= kLanes) {
             const Places p = from_a(i), q = from_a(i + 1);
@@ -375,26 +398,29 @@ private:
             found |= ((side >= 0) & own) | ((side <= 0) & own << 16) | ((area2 > 0) & own << 32);
         }
         const std::uint64_t all = joined_bits(found);
-        const unsigned new_facets = (1u << (n - 1)) - 2, holders = static_cast<unsigned>(all & all >> 17) & new_facets;
-        // The gap at v itself, which is a + s·p + t·q with s = of_q / area2, t = of_p / area2 in the new facet that it lies in: what
-        // most often forbids to go.
+        const unsigned new_facets = (1u << (n - 1)) - 2,
+                       holders = static_cast<unsigned>(all & all >> 17) & new_facets;
+        // The gap at v itself, which is a + s·p + t·q with s = of_q / area2, t = of_p / area2 in the new
+        // facet that it lies in: what most often forbids to go.
         for (unsigned left = holders; left != 0; left &= left - 1) {
             const auto i = static_cast<std::size_t>(std::countr_zero(left));
             const double area2 = area2_[i];
             if (!(area2 > 0)) return false;
             const double s = -side_[i + 1] / area2, t = side_[i] / area2;
-            if (!fits(-(a.z + s * (flat_.z[start + i] - a.z) + t * (flat_.z[start + i + 1] - a.z)))) return false;
+            if (!fits(-(a.z + s * (flat_.z[start + i] - a.z) + t * (flat_.z[start + i + 1] - a.z))))
+                return false;
         }
         // The new facets are upright.
         if ((~(all >> 32) & new_facets) != 0) return false;
-        // Where the new edges cross those that meet in v. A new edge parts the ring: where v lies in one new facet only, just the vertices that are not
-        // on its side have edges to it that cross.
+        // Where the new edges cross those that meet in v. A new edge parts the ring: where v lies in one new
+        // facet only, just the vertices that are not on its side have edges to it that cross.
         const bool in_one = std::has_single_bit(holders);
         const auto holds_v = static_cast<std::size_t>(std::countr_zero(holders));
         for (std::size_t i = 2; i + 1 < n; ++i) {
             const Place d = flat_.get(start + i) - a;
             const double of_t = side_[i];
-            const std::size_t first = in_one && i > holds_v ? i + 1 : 1, last = in_one && i <= holds_v ? i : n;
+            const std::size_t first = in_one && i > holds_v ? i + 1 : 1,
+                              last = in_one && i <= holds_v ? i : n;
             for (std::size_t j = first; j < last; j += kLanes) {
                 const Places r = flat_.at(start + j);
                 // a + s·d = t·r with s and t between 0 and 1
@@ -444,9 +470,12 @@ private:
         return true;
     }
 
-    [[nodiscard]] std::size_t at(int k, int i) const { return static_cast<std::size_t>(k + i < n_ ? k + i : k + i - n_); }
+    [[nodiscard]] std::size_t at(int k, int i) const {
+        return static_cast<std::size_t>(k + i < n_ ? k + i : k + i - n_);
+    }
 
-    // With three facets around, the one that follows may be there already, turned over: a tetrahedron must stay one.
+    // With three facets around, the one that follows may be there already, turned over: a tetrahedron must
+    // stay one.
     [[nodiscard]] bool joined_across(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
         for (const std::uint32_t v : {a, b, c})
             if (known(v)) {
@@ -494,7 +523,8 @@ private:
     std::vector<Face> faces_;
     std::vector<std::uint32_t> starts_, around_;
     std::vector<char> inner_, awake_, touched_;
-    std::vector<double> need_;  // what the tolerance must be, at least, so that a vertex that is asleep may go
+    std::vector<double>
+        need_;  // what the tolerance must be, at least, so that a vertex that is asleep may go
     // Around the vertex in work.
     template <class T, std::size_t times = 1>
     using Around = std::array<T, times * kMostAround + 2 * kLanes>;
@@ -503,24 +533,29 @@ private:
         std::memcpy(&values, &from[i], sizeof(values));
         return values;
     }
-    static void put(auto& to, std::size_t i, const Four& values) { std::memcpy(&to[i], &values, sizeof(values)); }
+    static void put(auto& to, std::size_t i, const Four& values) {
+        std::memcpy(&to[i], &values, sizeof(values));
+    }
     // Once and again from the start, so that four in a row may be asked anywhere.
     struct PlacesAround {
         Around<double, 2> x, y, z;
         [[nodiscard]] Place get(std::size_t i) const { return {x[i], y[i], z[i]}; }
         [[nodiscard]] Places at(std::size_t i) const { return {four(x, i), four(y, i), four(z, i)}; }
         void set(std::size_t i, const Place& p) { x[i] = p.x, y[i] = p.y, z[i] = p.z; }
-        void put(std::size_t i, const Places& p) { Block::put(x, i, p.x), Block::put(y, i, p.y), Block::put(z, i, p.z); }
+        void put(std::size_t i, const Places& p) {
+            Block::put(x, i, p.x), Block::put(y, i, p.y), Block::put(z, i, p.z);
+        }
         void repeat(std::size_t n, std::size_t last) {
             for (std::size_t i = n; i < last; ++i) set(i, get(i - n));
         }
     };
     int n_ = 0;
     Around<std::uint32_t> ring_, fan_;
-    PlacesAround arm_, normal_;  // as the pattern stands: to the vertices around, and of the facets, twice their area long
-    PlacesAround flat_;          // the vertices around
-    PlacesAround flat_normal_;   // as flat_
-    Around<double> square_;      // of the lengths of normal_
+    PlacesAround arm_,
+        normal_;  // as the pattern stands: to the vertices around, and of the facets, twice their area long
+    PlacesAround flat_;         // the vertices around
+    PlacesAround flat_normal_;  // as flat_
+    Around<double> square_;     // of the lengths of normal_
     Around<double> side_, area2_;
     Around<double> same_facing2_;  // what a normal along flat_normal_ makes with it at least
     bool exactly_ = false;         // nothing may move
@@ -534,12 +569,15 @@ private:
 class Cells {
 public:
     /// @param shift of a cell by which the grid's origin lies lower, so that other places lie at its borders
-    Cells(const Box3& box, std::size_t facets, double shift) : low_{box.min.x, box.min.y, box.min.z}, shift_(shift) {
-        const std::array<double, 3> size{double{box.max.x} - low_[0], double{box.max.y} - low_[1], double{box.max.z} - low_[2]};
+    Cells(const Box3& box, std::size_t facets, double shift)
+        : low_{box.min.x, box.min.y, box.min.z}, shift_(shift) {
+        const std::array<double, 3> size{double{box.max.x} - low_[0], double{box.max.y} - low_[1],
+                                         double{box.max.z} - low_[2]};
         // A surface meets about the square of cells to a side.
         const double cells = std::max(1.0, std::sqrt(static_cast<double>(facets) / kBlockFacets));
         cell_ = std::max({size[0], size[1], size[2], 1e-6}) / cells;
-        for (std::size_t k = 0; k < 3; ++k) count_[k] = static_cast<std::uint32_t>(size[k] / cell_ + shift) + 1;
+        for (std::size_t k = 0; k < 3; ++k)
+            count_[k] = static_cast<std::uint32_t>(size[k] / cell_ + shift) + 1;
     }
     [[nodiscard]] std::size_t count() const { return std::size_t{count_[0]} * count_[1] * count_[2]; }
     /// Of the cell that holds a facet's lowest vertex.
@@ -548,7 +586,8 @@ public:
         const std::array<double, 3> at{p.x, p.y, p.z};
         std::size_t cell = 0;
         for (std::size_t k = 3; k-- > 0;)
-            cell = cell * count_[k] + std::min(count_[k] - 1, static_cast<std::uint32_t>(std::max(0.0, (at[k] - low_[k]) / cell_ + shift_)));
+            cell = cell * count_[k] + std::min(count_[k] - 1, static_cast<std::uint32_t>(std::max(
+                                                                  0.0, (at[k] - low_[k]) / cell_ + shift_)));
         return cell;
     }
 
@@ -558,7 +597,8 @@ private:
     std::array<std::uint32_t, 3> count_{};
 };
 
-/// Memory for so many elements, of which each block writes only the first of those that are its own: what is not written takes no memory.
+/// Memory for so many elements, of which each block writes only the first of those that are its own: what is
+/// not written takes no memory.
 template <class T>
 struct Sparse {
     struct Part {
@@ -568,7 +608,8 @@ struct Sparse {
     std::vector<Part> parts;
     std::unique_ptr<std::optional<MemoryCharge>[]> charges;  ///< one for each part
 
-    Sparse(std::size_t size, std::size_t blocks) : all(size), parts(blocks), charges(new std::optional<MemoryCharge>[blocks]) {}
+    Sparse(std::size_t size, std::size_t blocks)
+        : all(size), parts(blocks), charges(new std::optional<MemoryCharge>[blocks]) {}
     [[nodiscard]] std::size_t size() const {
         std::size_t sum = 0;
         for (const Part& part : parts) sum += part.end - part.begin;
@@ -577,11 +618,13 @@ struct Sparse {
     void release() { all = {}, charges.reset(); }
 };
 
-// The numbers of the n sources' faces are dealt by cells and each cell made simpler, its faces written as keep(face) says.
-// @param each_face(begin, end, take) calls take(number, facet) for the faces of these sources @param face_of(number) a face
+// The numbers of the n sources' faces are dealt by cells and each cell made simpler, its faces written as
+// keep(face) says.
+// @param each_face(begin, end, take) calls take(number, facet) for the faces of these sources @param
+// face_of(number) a face
 template <class T, class EachFace, class FaceOf, class Keep>
-Sparse<T> pass(const Task& task, const Cells& cells, std::size_t faces, std::size_t n, std::size_t grain, EachFace&& each_face, FaceOf&& face_of,
-               Keep&& keep) {
+Sparse<T> pass(const Task& task, const Cells& cells, std::size_t faces, std::size_t n, std::size_t grain,
+               EachFace&& each_face, FaceOf&& face_of, Keep&& keep) {
     Sparse<T> out(faces, cells.count());
     Spares<Block> blocks;
     RawArray<std::uint32_t> numbers;
@@ -590,10 +633,13 @@ Sparse<T> pass(const Task& task, const Cells& cells, std::size_t faces, std::siz
     deal(
         task.context, n, grain, cells.count(),
         [&](std::size_t begin, std::size_t end, auto&& take) {
-            each_face(begin, end, [&](std::uint32_t, const Index3& facet) { take(cells.of(task.mesh, facet)); });
+            each_face(begin, end,
+                      [&](std::uint32_t, const Index3& facet) { take(cells.of(task.mesh, facet)); });
         },
         [&](std::size_t begin, std::size_t end, auto&& take) {
-            each_face(begin, end, [&](std::uint32_t number, const Index3& facet) { take(cells.of(task.mesh, facet), number); });
+            each_face(begin, end, [&](std::uint32_t number, const Index3& facet) {
+                take(cells.of(task.mesh, facet), number);
+            });
         },
         [&](std::uint64_t total, std::uint64_t largest) {
             const std::uint64_t most = std::min(total, std::max(kDealtAtOnce, 2 * largest));
@@ -603,12 +649,14 @@ Sparse<T> pass(const Task& task, const Cells& cells, std::size_t faces, std::siz
         },
         [&](std::size_t first, std::size_t last, std::span<const std::uint32_t> starts) {
             parallel_each(task.context, last - first, [&](std::size_t b) {
-                const std::span<const std::uint32_t> mine(numbers.data() + starts[b], starts[b + 1] - starts[b]);
+                const std::span<const std::uint32_t> mine(numbers.data() + starts[b],
+                                                          starts[b + 1] - starts[b]);
                 if (mine.empty()) return;
                 auto block = blocks.take([] { return std::make_unique<Block>(); });
                 block->load(task, mine.size(), [&](std::size_t i) { return face_of(mine[i]); });
                 const std::span<const Face> few = block->simplified(task);
-                out.charges[first + b].emplace(task.context, few.size() * sizeof(T), "the facets that a tolerance needs");
+                out.charges[first + b].emplace(task.context, few.size() * sizeof(T),
+                                               "the facets that a tolerance needs");
                 const std::size_t begin = before + starts[b];
                 out.parts[first + b] = {begin, begin + few.size()};
                 std::transform(few.begin(), few.end(), out.all.data() + begin, keep);
@@ -627,23 +675,27 @@ Sparse<Index3> few_facets(Context& context, MeshView mesh, double tolerance, std
         for (std::size_t f = begin; f < end; ++f) take(static_cast<std::uint32_t>(f), mesh.facets[f]);
     };
     const Sparse<Face> some = pass<Face>(
-        Task{context, mesh, tolerance, planes, nullptr, &unsettled}, Cells(box, mesh.size(), 0), mesh.size(), mesh.size(), std::size_t{1} << 16,
-        of_mesh, [&](std::uint32_t f) { return Face{mesh.facets[f]}; }, [](const Face& face) { return face; });
+        Task{context, mesh, tolerance, planes, nullptr, &unsettled}, Cells(box, mesh.size(), 0), mesh.size(),
+        mesh.size(), std::size_t{1} << 16, of_mesh, [&](std::uint32_t f) { return Face{mesh.facets[f]}; },
+        [](const Face& face) { return face; });
     auto of_some = [&](std::size_t begin, std::size_t end, auto&& take) {
         for (std::size_t part = begin; part < end; ++part)
-            for (std::size_t f = some.parts[part].begin; f < some.parts[part].end; ++f) take(static_cast<std::uint32_t>(f), some.all[f].v);
+            for (std::size_t f = some.parts[part].begin; f < some.parts[part].end; ++f)
+                take(static_cast<std::uint32_t>(f), some.all[f].v);
     };
     const std::size_t left = some.size();
     return pass<Index3>(
-        Task{context, mesh, tolerance, planes, &unsettled, nullptr}, Cells(box, left, 0.5), left, some.parts.size(), 1, of_some,
-        [&](std::uint32_t f) { return some.all[f]; }, [](const Face& face) { return face.v; });
+        Task{context, mesh, tolerance, planes, &unsettled, nullptr}, Cells(box, left, 0.5), left,
+        some.parts.size(), 1, of_some, [&](std::uint32_t f) { return some.all[f]; },
+        [](const Face& face) { return face.v; });
 }
 
 }  // namespace
 
 Mesh simplify(Context& context, MeshView mesh, double tolerance_mm, std::span<const double> planes) {
     if (!(tolerance_mm > 0) || !std::isfinite(tolerance_mm))
-        throw Error(ErrorKind::usage, "simplify.tolerance", "the tolerance of simplifying must be positive", {}, "give a length in mm");
+        throw Error(ErrorKind::usage, "simplify.tolerance", "the tolerance of simplifying must be positive",
+                    {}, "give a length in mm");
     std::vector<double> ascending(planes.begin(), planes.end());
     std::sort(ascending.begin(), ascending.end());
     Mesh result;
@@ -651,7 +703,9 @@ Mesh simplify(Context& context, MeshView mesh, double tolerance_mm, std::span<co
     {
         Sparse<Index3> few = few_facets(context, mesh, tolerance_mm, ascending);
         const std::size_t left = few.size();
-        const MemoryCharge charge(context, left * sizeof(Index3) + mesh.vertices.size() * sizeof(std::uint32_t), "the facets that a tolerance needs");
+        const MemoryCharge charge(context,
+                                  left * sizeof(Index3) + mesh.vertices.size() * sizeof(std::uint32_t),
+                                  "the facets that a tolerance needs");
         // Vertices are numbered as the facets name them.
         constexpr std::uint32_t unused = 0xFFFFFFFFu;
         std::vector<std::uint32_t> to(mesh.vertices.size(), unused);

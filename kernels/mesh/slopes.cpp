@@ -8,7 +8,8 @@
 
 namespace slabwright {
 
-SlopeProfile slope_profile(Context& context, MeshView mesh, int steps, double horizontal_rad, double least_flat_mm2) {
+SlopeProfile slope_profile(Context& context, MeshView mesh, int steps, double horizontal_rad,
+                           double least_flat_mm2) {
     SlopeProfile empty;
     const Box3 box = bounds(context, mesh);
     empty.z_low = box.min.z;
@@ -24,7 +25,8 @@ SlopeProfile slope_profile(Context& context, MeshView mesh, int steps, double ho
             const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z;
             const double vx = double{c.x} - a.x, vy = double{c.y} - a.y, vz = double{c.z} - a.z;
             const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
-            const double across = std::sqrt(nx * nx + ny * ny), area = std::sqrt(across * across + nz * nz) / 2;
+            const double across = std::sqrt(nx * nx + ny * ny),
+                         area = std::sqrt(across * across + nz * nz) / 2;
             if (!(area > 0)) continue;
             const double slope = std::atan2(across, nz);  // 0 … π: past a right angle it faces down
             if (slope >= std::numbers::pi - horizontal_rad) {
@@ -38,9 +40,11 @@ SlopeProfile slope_profile(Context& context, MeshView mesh, int steps, double ho
             const double degrees = std::min(90.0, slope * 180 / std::numbers::pi);
             profile.area_mm2[std::min<std::size_t>(89, static_cast<std::size_t>(degrees))] += area;
             if (!(step > 0) || (slope < horizontal_rad && area < least_flat_mm2)) continue;
-            const double low = std::min({a.z, b.z, c.z}) - profile.z_low, high = std::max({a.z, b.z, c.z}) - profile.z_low;
+            const double low = std::min({a.z, b.z, c.z}) - profile.z_low,
+                         high = std::max({a.z, b.z, c.z}) - profile.z_low;
             const int first = std::clamp(static_cast<int>(std::floor(low / step + 1e-9)), 0, steps - 1);
-            const int last = std::clamp(static_cast<int>(std::ceil(high / step - 1e-9)) - 1, first, steps - 1);
+            const int last =
+                std::clamp(static_cast<int>(std::ceil(high / step - 1e-9)) - 1, first, steps - 1);
             for (int i = first; i <= last; ++i) {
                 double& least = profile.least_deg[static_cast<std::size_t>(i)];
                 least = std::min(least, degrees);
@@ -48,13 +52,16 @@ SlopeProfile slope_profile(Context& context, MeshView mesh, int steps, double ho
         }
         return profile;
     };
-    return parallel_reduce(context, mesh.facets.size(), std::size_t{1} << 16, empty, of_some, [](SlopeProfile all, const SlopeProfile& some) {
-        for (std::size_t i = 0; i < all.least_deg.size(); ++i) all.least_deg[i] = std::min(all.least_deg[i], some.least_deg[i]);
-        for (std::size_t i = 0; i < all.area_mm2.size(); ++i) all.area_mm2[i] += some.area_mm2[i];
-        all.down_flat_mm2 += some.down_flat_mm2;
-        all.undercut_mm2 += some.undercut_mm2;
-        return all;
-    });
+    return parallel_reduce(context, mesh.facets.size(), std::size_t{1} << 16, empty, of_some,
+                           [](SlopeProfile all, const SlopeProfile& some) {
+                               for (std::size_t i = 0; i < all.least_deg.size(); ++i)
+                                   all.least_deg[i] = std::min(all.least_deg[i], some.least_deg[i]);
+                               for (std::size_t i = 0; i < all.area_mm2.size(); ++i)
+                                   all.area_mm2[i] += some.area_mm2[i];
+                               all.down_flat_mm2 += some.down_flat_mm2;
+                               all.undercut_mm2 += some.undercut_mm2;
+                               return all;
+                           });
 }
 
 }  // namespace slabwright

@@ -25,13 +25,14 @@ struct Key {
 };
 
 Key key_of(const Vec3f& p, std::size_t corner) {
-    return {std::bit_cast<std::uint32_t>(p.x + 0.0f), std::bit_cast<std::uint32_t>(p.y + 0.0f), std::bit_cast<std::uint32_t>(p.z + 0.0f),
-            static_cast<std::uint32_t>(corner)};
+    return {std::bit_cast<std::uint32_t>(p.x + 0.0f), std::bit_cast<std::uint32_t>(p.y + 0.0f),
+            std::bit_cast<std::uint32_t>(p.z + 0.0f), static_cast<std::uint32_t>(corner)};
 }
 
 bool same_point(const Key& a, const Key& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
-/// Grids put all their points on a few bits, so every bit must reach every other: two rounds of multiply and fold.
+/// Grids put all their points on a few bits, so every bit must reach every other: two rounds of multiply and
+/// fold.
 std::uint64_t hash_of(const Key& key) {
     std::uint64_t h = (key.x | std::uint64_t{key.y} << 32) * 0x9E3779B97F4A7C15u;
     h = ((h ^ h >> 32) + key.z) * 0xD6E8FEB86659FD93u;
@@ -49,15 +50,18 @@ constexpr std::uint16_t kFree = 0xFFFF;
 class BlockTable {
 public:
     BlockTable() : table_(kSlots), keys_(3 * kBlockFacets + 1) {}
-    /// slots[c] becomes the first corner of the block that has the same point as c. @return how many points are different
-    std::size_t find_firsts(const FacetRecords& facets, std::size_t begin, std::size_t end, std::span<std::uint32_t> slots) {
+    /// slots[c] becomes the first corner of the block that has the same point as c. @return how many points
+    /// are different
+    std::size_t find_firsts(const FacetRecords& facets, std::size_t begin, std::size_t end,
+                            std::span<std::uint32_t> slots) {
         std::fill(table_.begin(), table_.end(), kFree);
         std::size_t different = 0;
         for (std::size_t f = begin; f < end; ++f) {
             for (std::size_t k = 0; k < 3; ++k) {
                 const Key key = key_of(facets.corner(f, k), 3 * f + k);
                 std::size_t slot = hash_of(key) % kSlots;
-                // As if the point was a new one, so that a free slot leads to an equal key too: whether it is new takes no branch.
+                // As if the point was a new one, so that a free slot leads to an equal key too: whether it is
+                // new takes no branch.
                 keys_[different] = key;
                 std::size_t at = table_[slot] == kFree ? different : table_[slot];
                 while (!same_point(keys_[at], key)) {
@@ -101,7 +105,8 @@ bool neighbours_follow(const FacetRecords& facets) {
 BulkVector<std::array<Vec3f, 3>> in_space(Context& context, const FacetRecords& facets, const Box3& box) {
     if (facets.count > kMaxFacets) throw too_many_facets(facets.count);
     using Corners = std::array<Vec3f, 3>;
-    // First into no more parts than the memory's pages can be kept at hand, most of which fit a cache then, and within each into its cells.
+    // First into no more parts than the memory's pages can be kept at hand, most of which fit a cache then,
+    // and within each into its cells.
     constexpr int coarse = 4, finer = 4, subcells = 1 << (3 * finer);
     const MortonGrid grid(box);
     auto cell_of = [&](const Corners& c) { return grid.coarse_code(c[0].x, c[0].y, c[0].z); };
@@ -149,24 +154,28 @@ namespace {
 
 // @param let_go called when the records are not needed any more
 template <class LetGo>
-Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<std::uint32_t>* odd, LetGo&& let_go) {
+Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<std::uint32_t>* odd,
+                     LetGo&& let_go) {
     if (odd != nullptr) odd->clear();
     if (facets.count > kMaxFacets) throw too_many_facets(facets.count);
     Mesh mesh;
     if (facets.count == 0) return mesh;
     const std::size_t n = 3 * facets.count;
     mesh.facets.resize(facets.count);
-    // One flat view of all corner slots; while welding, slot c holds the first corner that has the same point, or one before c in
-    // its block that leads there.
+    // One flat view of all corner slots; while welding, slot c holds the first corner that has the same
+    // point, or one before c in its block that leads there.
     const std::span<std::uint32_t> slots(mesh.facets.front().data(), n);
 
-    // Corners are dealt by hash into parts small enough for a hash table in the cache; shuffled facets cost little more than ordered
-    // ones. Dealing keeps the order of corners, so the first of a part is the first in the file. Where facets that follow each other
-    // share corners, only the first of its block is dealt for each point, which leaves a fifth of them.
+    // Corners are dealt by hash into parts small enough for a hash table in the cache; shuffled facets cost
+    // little more than ordered ones. Dealing keeps the order of corners, so the first of a part is the first
+    // in the file. Where facets that follow each other share corners, only the first of its block is dealt
+    // for each point, which leaves a fifth of them.
     const std::size_t corners_a_part = std::size_t{1} << 14, most_parts = 2048;
     const std::size_t parts = std::min(std::bit_ceil((n + corners_a_part - 1) / corners_a_part), most_parts);
     const unsigned part_bits = static_cast<unsigned>(std::countr_zero(parts));
-    auto part_of = [&](const Key& key) { return part_bits == 0 ? std::size_t{0} : static_cast<std::size_t>(hash_of(key) >> (64 - part_bits)); };
+    auto part_of = [&](const Key& key) {
+        return part_bits == 0 ? std::size_t{0} : static_cast<std::size_t>(hash_of(key) >> (64 - part_bits));
+    };
     const bool blockwise = neighbours_follow(facets);
 
     const std::size_t blocks = (facets.count + kBlockFacets - 1) / kBlockFacets;
@@ -174,7 +183,8 @@ Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<s
     {
         std::optional<MemoryCharge> charge;
         EdgeScratch scratch;
-        std::vector<BulkVector<Key>> firsts(blockwise ? (facets.count + grain - 1) / grain : 0);  // of each chunk: the keys that it deals
+        std::vector<BulkVector<Key>> firsts(blockwise ? (facets.count + grain - 1) / grain
+                                                      : 0);  // of each chunk: the keys that it deals
         std::vector<const Key*> first_of_block(blockwise ? blocks : 0);
         auto counted = [&](std::size_t begin, std::size_t end, auto&& take) {
             if (blockwise) {
@@ -223,7 +233,8 @@ Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<s
                     table.assign(mask + 1, empty);
                     for (std::uint32_t j = 0; j < mine.size(); ++j) {
                         std::size_t slot = hash_of(mine[j]) & mask;
-                        while (table[slot] != empty && !same_point(mine[table[slot]], mine[j])) slot = (slot + 1) & mask;
+                        while (table[slot] != empty && !same_point(mine[table[slot]], mine[j]))
+                            slot = (slot + 1) & mask;
                         if (table[slot] == empty) table[slot] = j;
                         slots[mine[j].corner] = mine[table[slot]].corner;
                     }
@@ -238,7 +249,8 @@ Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<s
                     // Asked for by ascending corner, chunk by chunk of whole blocks.
                     const Key*& at = first_of_block[c / (3 * kBlockFacets)];
                     while (at->corner != c) ++at;
-                    mesh.vertices[number] = {std::bit_cast<float>(at->x), std::bit_cast<float>(at->y), std::bit_cast<float>(at->z)};
+                    mesh.vertices[number] = {std::bit_cast<float>(at->x), std::bit_cast<float>(at->y),
+                                             std::bit_cast<float>(at->z)};
                     return;
                 }
                 const Vec3f p = facets.corner(c / 3, c % 3);
@@ -251,7 +263,9 @@ Mesh weld_letting_go(Context& context, const FacetRecords& facets, std::vector<s
     return mesh;
 }
 
-FacetRecords records_of(std::span<const std::array<Vec3f, 3>> corners) { return {reinterpret_cast<const char*>(corners.data()), corners.size()}; }
+FacetRecords records_of(std::span<const std::array<Vec3f, 3>> corners) {
+    return {reinterpret_cast<const char*>(corners.data()), corners.size()};
+}
 
 }  // namespace
 
@@ -263,8 +277,10 @@ Mesh weld(Context& context, std::span<const std::array<Vec3f, 3>> corners, std::
     return weld_records(context, records_of(corners), odd);
 }
 
-Mesh weld_and_let_go(Context& context, BulkVector<std::array<Vec3f, 3>>&& corners, std::vector<std::uint32_t>* odd) {
-    return weld_letting_go(context, records_of(corners), odd, [&] { BulkVector<std::array<Vec3f, 3>>().swap(corners); });
+Mesh weld_and_let_go(Context& context, BulkVector<std::array<Vec3f, 3>>&& corners,
+                     std::vector<std::uint32_t>* odd) {
+    return weld_letting_go(context, records_of(corners), odd,
+                           [&] { BulkVector<std::array<Vec3f, 3>>().swap(corners); });
 }
 
 }  // namespace slabwright

@@ -19,7 +19,9 @@ struct Cell {
     std::uint32_t vertex;
 };
 
-bool before(const Cell& a, const Cell& b) { return std::tie(a.x, a.y, a.z, a.vertex) < std::tie(b.x, b.y, b.z, b.vertex); }
+bool before(const Cell& a, const Cell& b) {
+    return std::tie(a.x, a.y, a.z, a.vertex) < std::tie(b.x, b.y, b.z, b.vertex);
+}
 
 double distance_squared(const Vec3f& a, const Vec3f& b) {
     const double x = double(a.x) - b.x, y = double(a.y) - b.y, z = double(a.z) - b.z;
@@ -30,17 +32,21 @@ double distance_squared(const Vec3f& a, const Vec3f& b) {
 
 ToleranceWeld weld_within(Context& context, MeshView mesh, double tolerance_mm) {
     if (!(tolerance_mm > 0) || !std::isfinite(tolerance_mm))
-        throw Error(ErrorKind::usage, "weld.tolerance", "the weld tolerance must be a positive length", "--weld",
-                    "give millimetres, e.g. --weld 0.001");
+        throw Error(ErrorKind::usage, "weld.tolerance", "the weld tolerance must be a positive length",
+                    "--weld", "give millimetres, e.g. --weld 0.001");
     const std::size_t n = mesh.vertices.size();
-    const MemoryCharge charge(context, std::uint64_t{n} * (2 * sizeof(Cell) + 8) + mesh.size() * sizeof(Index3), "welding within a tolerance");
+    const MemoryCharge charge(context,
+                              std::uint64_t{n} * (2 * sizeof(Cell) + 8) + mesh.size() * sizeof(Index3),
+                              "welding within a tolerance");
 
     // Cells are a little wider than the tolerance, so that rounding cannot put near vertices two cells apart.
     constexpr std::size_t grain = std::size_t{1} << 14;
     const double width = tolerance_mm * 1.000001;
-    auto cell_of = [&](float coordinate) {  // the clamp only matters where float32 is coarser than the tolerance anyway
-        return static_cast<std::int64_t>(std::clamp(std::floor(static_cast<double>(coordinate) / width), -4e18, 4e18));
-    };
+    auto cell_of =
+        [&](float coordinate) {  // the clamp only matters where float32 is coarser than the tolerance anyway
+            return static_cast<std::int64_t>(
+                std::clamp(std::floor(static_cast<double>(coordinate) / width), -4e18, 4e18));
+        };
     RawArray<Cell> cells(n);
     std::vector<std::uint32_t> lowest(n);
     parallel_for(context, n, grain, [&](std::size_t begin, std::size_t end) {
@@ -52,15 +58,17 @@ ToleranceWeld weld_within(Context& context, MeshView mesh, double tolerance_mm) 
     });
     parallel_sort(context, cells.data(), cells.data() + n, before);
 
-    // Each vertex meets those of its own cell and of the cells after it; in sorted order these are five runs, (x, y)
-    // and (x, y + 1), (x + 1, y − 1 … y + 1), each over z − 1 … z + 1, and each run's start only moves forward.
+    // Each vertex meets those of its own cell and of the cells after it; in sorted order these are five runs,
+    // (x, y) and (x, y + 1), (x + 1, y − 1 … y + 1), each over z − 1 … z + 1, and each run's start only moves
+    // forward.
     constexpr std::array<std::array<int, 2>, 5> rows{{{0, 0}, {0, 1}, {1, -1}, {1, 0}, {1, 1}}};
     parallel_for(context, n, grain, [&](std::size_t begin, std::size_t end) {
         std::array<std::size_t, 5> starts;
         for (std::size_t r = 0; r < rows.size(); ++r) {
             const Cell& c = cells[begin];
             const Cell target{c.x + rows[r][0], c.y + rows[r][1], c.z - 1, 0};
-            starts[r] = static_cast<std::size_t>(std::lower_bound(cells.data(), cells.data() + n, target, before) - cells.data());
+            starts[r] = static_cast<std::size_t>(
+                std::lower_bound(cells.data(), cells.data() + n, target, before) - cells.data());
         }
         for (std::size_t i = begin; i < end; ++i) {
             const Cell& c = cells[i];
@@ -71,7 +79,8 @@ ToleranceWeld weld_within(Context& context, MeshView mesh, double tolerance_mm) 
                 for (std::size_t j = r == 0 ? i + 1 : start; j < n; ++j) {
                     const Cell& d = cells[j];
                     if (d.x != target.x || d.y != target.y || d.z > c.z + 1) break;
-                    if (distance_squared(mesh.vertices[c.vertex], mesh.vertices[d.vertex]) < tolerance_mm * tolerance_mm)
+                    if (distance_squared(mesh.vertices[c.vertex], mesh.vertices[d.vertex]) <
+                        tolerance_mm * tolerance_mm)
                         join_clusters(lowest, c.vertex, d.vertex);
                 }
             }
@@ -84,7 +93,8 @@ ToleranceWeld weld_within(Context& context, MeshView mesh, double tolerance_mm) 
         context, n, grain, std::uint64_t{0},
         [&](std::size_t begin, std::size_t end) {
             std::uint64_t count = 0;
-            for (std::size_t v = begin; v < end; ++v) count += cluster_root(lowest, static_cast<std::uint32_t>(v)) != v;
+            for (std::size_t v = begin; v < end; ++v)
+                count += cluster_root(lowest, static_cast<std::uint32_t>(v)) != v;
             return count;
         },
         [](std::uint64_t a, std::uint64_t b) { return a + b; });
@@ -95,7 +105,8 @@ ToleranceWeld weld_within(Context& context, MeshView mesh, double tolerance_mm) 
     for (std::size_t f = 0; f < mesh.size(); ++f) {
         if (f % grain == 0) context.throw_if_cancelled();
         const Index3& old = mesh.facets[f];
-        const Index3 now{cluster_root(lowest, old[0]), cluster_root(lowest, old[1]), cluster_root(lowest, old[2])};
+        const Index3 now{cluster_root(lowest, old[0]), cluster_root(lowest, old[1]),
+                         cluster_root(lowest, old[2])};
         if (now[0] == now[1] || now[1] == now[2] || now[2] == now[0]) ++result.removed_facets;
         else facets.push_back(now);
     }

@@ -26,7 +26,8 @@ struct Context::Impl {
         : threads(n)
 #if !defined(SLABWRIGHT_STD_THREADS)
           ,
-          arena(std::min(n, machine_threads()))  // oneTBB warns on stderr about more, and would not run them anyway
+          arena(std::min(
+              n, machine_threads()))  // oneTBB warns on stderr about more, and would not run them anyway
 #endif
     {
     }
@@ -47,12 +48,15 @@ struct Context::Impl {
 Context::Context() : Context(Options{}) {}
 
 Context::Context(Options options)
-    : impl_(std::make_unique<Impl>(options.threads > 0 ? options.threads : machine_threads())), memory_limit_(options.memory_bytes) {
+    : impl_(std::make_unique<Impl>(options.threads > 0 ? options.threads : machine_threads())),
+      memory_limit_(options.memory_bytes) {
     impl_->sink = std::move(options.progress);
     impl_->device = std::move(options.device);
     if (memory_limit_ == 0) {
         struct sysinfo info {};
-        if (sysinfo(&info) == 0) memory_limit_ = static_cast<std::uint64_t>(0.6 * static_cast<double>(info.totalram) * info.mem_unit);
+        if (sysinfo(&info) == 0)
+            memory_limit_ =
+                static_cast<std::uint64_t>(0.6 * static_cast<double>(info.totalram) * info.mem_unit);
         else memory_limit_ = std::uint64_t{4} << 30;
     }
 }
@@ -63,7 +67,8 @@ int Context::threads() const noexcept { return impl_->threads; }
 const std::string& Context::device() const noexcept { return impl_->device; }
 
 void Context::throw_if_cancelled() const {
-    if (cancelled()) throw Error(ErrorKind::cancelled, "cancelled", "cancelled on request; nothing was written");
+    if (cancelled())
+        throw Error(ErrorKind::cancelled, "cancelled", "cancelled on request; nothing was written");
 }
 
 void Context::begin_phase(std::string_view name, double from, double to, std::uint64_t steps) {
@@ -88,22 +93,25 @@ void Context::advance(std::uint64_t steps) {
     impl_->done.fetch_add(steps, std::memory_order_relaxed);
     if (!impl_->sink) return;
     const std::lock_guard lock(impl_->mutex);
-    const double done = static_cast<double>(std::min(impl_->done.load(std::memory_order_relaxed), impl_->steps));
-    const double fraction = impl_->from + (impl_->to - impl_->from) * done / static_cast<double>(impl_->steps);
+    const double done =
+        static_cast<double>(std::min(impl_->done.load(std::memory_order_relaxed), impl_->steps));
+    const double fraction =
+        impl_->from + (impl_->to - impl_->from) * done / static_cast<double>(impl_->steps);
     if (fraction <= impl_->reported) return;
     impl_->reported = fraction;
     impl_->sink({impl_->phase, fraction});
 }
 
-MemoryCharge::MemoryCharge(Context& context, std::uint64_t bytes, std::string_view what) : context_(context), bytes_(bytes) {
+MemoryCharge::MemoryCharge(Context& context, std::uint64_t bytes, std::string_view what)
+    : context_(context), bytes_(bytes) {
     const std::uint64_t before = context_.charged_.fetch_add(bytes);
     if (before + bytes > context_.memory_limit_) {
         context_.charged_.fetch_sub(bytes);
         auto mib = [](std::uint64_t b) { return std::to_string((b + (1u << 20) - 1) >> 20) + " MiB"; };
-        throw Error(
-            ErrorKind::no_plan, "memory.limit",
-            std::string(what) + " needs " + mib(bytes) + " beside " + mib(before) + " in use, over the limit of " + mib(context_.memory_limit_), {},
-            "raise --memory or plan with fewer facets");
+        throw Error(ErrorKind::no_plan, "memory.limit",
+                    std::string(what) + " needs " + mib(bytes) + " beside " + mib(before) +
+                        " in use, over the limit of " + mib(context_.memory_limit_),
+                    {}, "raise --memory or plan with fewer facets");
     }
 }
 
@@ -119,8 +127,9 @@ void run_chunks(Context& context, std::size_t chunks, void (*fn)(void*, std::siz
         }
         return;
     }
-    // Which chunk throws first depends on timing; which of the thrown errors is reported must not, so the lowest wins.
-    // Later chunks are skipped once one has thrown, earlier ones still run: the lowest failing chunk always does.
+    // Which chunk throws first depends on timing; which of the thrown errors is reported must not, so the
+    // lowest wins. Later chunks are skipped once one has thrown, earlier ones still run: the lowest failing
+    // chunk always does.
     std::mutex mutex;
     std::exception_ptr error;
     std::atomic<std::size_t> failed{chunks};
@@ -147,8 +156,10 @@ void run_chunks(Context& context, std::size_t chunks, void (*fn)(void*, std::siz
     worker();
     for (std::thread& thread : threads) thread.join();
 #else
-    // Isolated: a thread that waits for this loop takes no chunk of an outer one, which would hold two layers' memory at once.
-    context.impl_->arena.execute([&] { tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, chunks, body); }); });
+    // Isolated: a thread that waits for this loop takes no chunk of an outer one, which would hold two
+    // layers' memory at once.
+    context.impl_->arena.execute(
+        [&] { tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, chunks, body); }); });
 #endif
     if (error) std::rethrow_exception(error);
 }

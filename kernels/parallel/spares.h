@@ -8,7 +8,8 @@
 
 namespace slabwright {
 
-/// Lends each running task a T: one that was used before, or a new one. Which it gets depends on the threads, so nothing may depend on what is left in it.
+/// Lends each running task a T: one that was used before, or a new one. Which it gets depends on the threads,
+/// so nothing may depend on what is left in it.
 template <class T>
 class Spares {
 public:
@@ -40,7 +41,9 @@ template <class T>
 class Lent {
 public:
     explicit Lent(Spares<T>* spares)
-        : spares_(spares), one_(spares != nullptr ? spares->take([] { return std::make_unique<T>(); }) : std::make_unique<T>()) {}
+        : spares_(spares),
+          one_(spares != nullptr ? spares->take([] { return std::make_unique<T>(); })
+                                 : std::make_unique<T>()) {}
     ~Lent() {
         if (spares_ != nullptr) spares_->give(std::move(one_));
     }

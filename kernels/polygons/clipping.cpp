@@ -1,4 +1,5 @@
-// Booleans and offsets, by polyclipping. Its units are ours (0.1 µm), which keeps it in its fast range up to 107 m.
+// Booleans and offsets, by polyclipping. Its units are ours (0.1 µm), which keeps it in its fast range up to
+// 107 m.
 #include <polyclipping/clipper.hpp>
 
 #include <algorithm>
@@ -35,7 +36,8 @@ Paths to_paths(const Loops& loops) {
 }
 
 std::int32_t checked(cInt value) {
-    if (value < std::numeric_limits<std::int32_t>::min() || value > std::numeric_limits<std::int32_t>::max()) {
+    if (value < std::numeric_limits<std::int32_t>::min() ||
+        value > std::numeric_limits<std::int32_t>::max()) {
         throw Error(ErrorKind::usage, "polygons.range", "a polygon reaches past 214 m from the origin", {},
                     "check the units, or use a smaller offset");
     }
@@ -53,19 +55,23 @@ Loops to_loops(const Paths& paths) {
     return loops;
 }
 
-Paths execute(ClipperLib::ClipType type, const Paths& subject, const Paths& clip, ClipperLib::PolyFillType fill) {
+Paths execute(ClipperLib::ClipType type, const Paths& subject, const Paths& clip,
+              ClipperLib::PolyFillType fill) {
     Paths result;
     try {
         ClipperLib::Clipper clipper;
         // It skips paths that enclose nothing, and takes it for a failure when none is left.
-        const bool subjects = clipper.AddPaths(subject, ClipperLib::ptSubject, true), clips = clipper.AddPaths(clip, ClipperLib::ptClip, true);
+        const bool subjects = clipper.AddPaths(subject, ClipperLib::ptSubject, true),
+                   clips = clipper.AddPaths(clip, ClipperLib::ptClip, true);
         if (!subjects && !clips) return result;
         if (!clipper.Execute(type, result, fill, fill)) {
-            throw Error(ErrorKind::no_plan, "polygons.failed", "polyclipping could not combine these polygons", {},
+            throw Error(ErrorKind::no_plan, "polygons.failed",
+                        "polyclipping could not combine these polygons", {},
                         "report the model; a slightly different height or tolerance avoids it");
         }
     } catch (const ClipperLib::clipperException& error) {
-        throw Error(ErrorKind::no_plan, "polygons.failed", std::string("polyclipping refused these polygons: ") + error.what(), {},
+        throw Error(ErrorKind::no_plan, "polygons.failed",
+                    std::string("polyclipping refused these polygons: ") + error.what(), {},
                     "check the units of the model");
     }
     return result;
@@ -78,7 +84,8 @@ Loops combine(ClipperLib::ClipType type, const Loops& a, const Loops& b) {
 /// Drops points on the straight line between their neighbours, spikes included, until there is none.
 void drop_straight(Path& path) {
     auto straight = [](const IntPoint& a, const IntPoint& b, const IntPoint& c) {
-        return static_cast<__int128>(b.X - a.X) * (c.Y - b.Y) == static_cast<__int128>(b.Y - a.Y) * (c.X - b.X);
+        return static_cast<__int128>(b.X - a.X) * (c.Y - b.Y) ==
+               static_cast<__int128>(b.Y - a.Y) * (c.X - b.X);
     };
     Path kept;
     kept.reserve(path.size());
@@ -102,19 +109,24 @@ void drop_straight(Path& path) {
     if (path.size() < 3) path.clear();
 }
 
-/// The loop moved by `delta` units to its outside, not yet freed of its crossings: an edge keeps its length, and moves
-/// along its normal; where the moved edges part, an arc joins them; where they cross, the path goes through the vertex,
-/// so that all that is swept too far winds the other way and the positive filling drops it.
+/// The loop moved by `delta` units to its outside, not yet freed of its crossings: an edge keeps its length,
+/// and moves along its normal; where the moved edges part, an arc joins them; where they cross, the path goes
+/// through the vertex, so that all that is swept too far winds the other way and the positive filling drops
+/// it.
 ///
-/// polyclipping's own arcs are chords whose number is rounded down, on the inner side. Here the number is rounded up, and
-/// the side chosen: the region must not come out too small. Growing, tangents around the arc stand outside of it;
-/// shrinking, the arcs belong to what is taken away, and chords inside of them take too little.
+/// polyclipping's own arcs are chords whose number is rounded down, on the inner side. Here the number is
+/// rounded up, and the side chosen: the region must not come out too small. Growing, tangents around the arc
+/// stand outside of it; shrinking, the arcs belong to what is taken away, and chords inside of them take too
+/// little.
 Path moved(const Path& loop, double delta, double tolerance) {
     const std::size_t n = loop.size();
     const double radius = std::abs(delta);
-    const double largest = delta > 0 ? 2 * std::acos(radius / (radius + tolerance)) : 2 * std::acos(std::max(0.0, 1 - tolerance / radius));
+    const double largest = delta > 0 ? 2 * std::acos(radius / (radius + tolerance))
+                                     : 2 * std::acos(std::max(0.0, 1 - tolerance / radius));
     const double largest_step = std::min(largest, std::numbers::pi / 2), one_step = std::cos(largest_step);
-    auto rounded = [](double x, double y) { return IntPoint(static_cast<cInt>(std::llround(x)), static_cast<cInt>(std::llround(y))); };
+    auto rounded = [](double x, double y) {
+        return IntPoint(static_cast<cInt>(std::llround(x)), static_cast<cInt>(std::llround(y)));
+    };
 
     Path path;
     path.reserve(2 * n);
@@ -126,12 +138,16 @@ Path moved(const Path& loop, double delta, double tolerance) {
         const double u = std::sqrt(ux * ux + uy * uy), v = std::sqrt(vx * vx + vy * vy);
         ux /= u, uy /= u, vx /= v, vy /= v;
         const double sine = ux * vy - uy * vx, cosine = ux * vx + uy * vy;
-        // Where the moved edges, or the lines that they lie on, meet: 1 + cos is twice the square of the half turn's cosine.
-        const auto meeting = [&] { return rounded(x + delta * (uy + vy) / (1 + cosine), y - delta * (ux + vx) / (1 + cosine)); };
+        // Where the moved edges, or the lines that they lie on, meet: 1 + cos is twice the square of the half
+        // turn's cosine.
+        const auto meeting = [&] {
+            return rounded(x + delta * (uy + vy) / (1 + cosine), y - delta * (ux + vx) / (1 + cosine));
+        };
         // Outward normals are (uy, −ux) and (vy, −vx); delta < 0 turns them inward.
         if (sine * delta <= 0 || cosine == -1) {
-            // Edges that both reach beyond where they cross, and by more than half of their length so that the one at their other end
-            // leaves them something, need not go there: what they would sweep beside it the two of them sweep anyway.
+            // Edges that both reach beyond where they cross, and by more than half of their length so that
+            // the one at their other end leaves them something, need not go there: what they would sweep
+            // beside it the two of them sweep anyway.
             if (2 * radius * std::abs(sine) < (1 + cosine) * std::min(u, v)) {
                 path.push_back(meeting());
                 continue;
@@ -156,13 +172,17 @@ Path moved(const Path& loop, double delta, double tolerance) {
         if (delta > 0) {
             const double reach = delta / std::cos(step / 2);
             for (std::size_t k = 0; k < steps; ++k) {
-                const double angle = (static_cast<double>(k) + 0.5) * step, across = std::cos(angle), along = std::sin(angle);
-                path.push_back(rounded(x + reach * (uy * across + ux * along), y + reach * (uy * along - ux * across)));
+                const double angle = (static_cast<double>(k) + 0.5) * step, across = std::cos(angle),
+                             along = std::sin(angle);
+                path.push_back(
+                    rounded(x + reach * (uy * across + ux * along), y + reach * (uy * along - ux * across)));
             }
         } else {
             for (std::size_t k = 0; k <= steps; ++k) {
-                const double angle = static_cast<double>(k) * step, across = std::cos(angle), along = std::sin(angle);
-                path.push_back(rounded(x + delta * (uy * across + ux * along), y + delta * (uy * along - ux * across)));
+                const double angle = static_cast<double>(k) * step, across = std::cos(angle),
+                             along = std::sin(angle);
+                path.push_back(
+                    rounded(x + delta * (uy * across + ux * along), y + delta * (uy * along - ux * across)));
             }
         }
     }
@@ -170,11 +190,14 @@ Path moved(const Path& loop, double delta, double tolerance) {
 }
 
 void check_offset(double delta_mm, double tolerance_mm) {
-    if (!std::isfinite(delta_mm) || std::abs(delta_mm) * kUnitsPerMm > std::numeric_limits<std::int32_t>::max()) {
-        throw Error(ErrorKind::usage, "polygons.offset", "an offset must be finite and under 214 m", {}, "check the tool's diameter");
+    if (!std::isfinite(delta_mm) ||
+        std::abs(delta_mm) * kUnitsPerMm > std::numeric_limits<std::int32_t>::max()) {
+        throw Error(ErrorKind::usage, "polygons.offset", "an offset must be finite and under 214 m", {},
+                    "check the tool's diameter");
     }
     if (!(tolerance_mm * kUnitsPerMm >= 1) || !std::isfinite(tolerance_mm)) {
-        throw Error(ErrorKind::usage, "polygons.tolerance", "the tolerance of an offset must be 0.0001 mm or more");
+        throw Error(ErrorKind::usage, "polygons.tolerance",
+                    "the tolerance of an offset must be 0.0001 mm or more");
     }
 }
 
@@ -201,7 +224,8 @@ Loops simplify(const Loops& loops) { return combine(ClipperLib::ctUnion, loops, 
 Loops offset(const Loops& region, double delta_mm, double tolerance_mm) {
     check_offset(delta_mm, tolerance_mm);
     // Regions may overlap themselves; only the outline of what they cover may be moved.
-    return moved(execute(ClipperLib::ctUnion, to_paths(region), {}, ClipperLib::pftNonZero), delta_mm, tolerance_mm);
+    return moved(execute(ClipperLib::ctUnion, to_paths(region), {}, ClipperLib::pftNonZero), delta_mm,
+                 tolerance_mm);
 }
 
 Loops offset_outline(const Loops& outline, double delta_mm, double tolerance_mm) {

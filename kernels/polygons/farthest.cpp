@@ -28,7 +28,8 @@ template <class T>
     d2 = ex * ex + ey * ey + ez * ez;
 }
 
-[[gnu::always_inline]] inline void one_by_one(const PointRows& p, const Segment& s, std::size_t first, std::size_t last, Farthest& best) {
+[[gnu::always_inline]] inline void one_by_one(const PointRows& p, const Segment& s, std::size_t first,
+                                              std::size_t last, Farthest& best) {
     for (std::size_t i = first; i < last; ++i) {
         double d2 = 0;
         distance2(s, p.x[i], p.y[i], p.z[i], d2);
@@ -36,14 +37,16 @@ template <class T>
     }
 }
 
-SLABWRIGHT_WIDE Farthest by_eights(const PointRows& p, const Segment& s, std::size_t first, std::size_t last) {
+SLABWRIGHT_WIDE Farthest by_eights(const PointRows& p, const Segment& s, std::size_t first,
+                                   std::size_t last) {
     constexpr WideBits lane{0, 1, 2, 3, 4, 5, 6, 7};
     Doubles most = Doubles{} - 1.0;
     WideBits at{};
     std::size_t i = first;
     for (; i + kLanes <= last; i += kLanes) {
         Doubles x, y, z, d2;
-        std::memcpy(&x, p.x.data() + i, sizeof x), std::memcpy(&y, p.y.data() + i, sizeof y), std::memcpy(&z, p.z.data() + i, sizeof z);
+        std::memcpy(&x, p.x.data() + i, sizeof x), std::memcpy(&y, p.y.data() + i, sizeof y),
+            std::memcpy(&z, p.z.data() + i, sizeof z);
         distance2(s, x, y, z, d2);
         const WideBits farther = d2 > most, here = lane + static_cast<std::int64_t>(i);
         most = farther ? d2 : most;
@@ -51,7 +54,8 @@ SLABWRIGHT_WIDE Farthest by_eights(const PointRows& p, const Segment& s, std::si
     }
     Farthest best{-1, first};
     for (std::size_t k = 0; k < kLanes; ++k)
-        if (const auto of_lane = static_cast<std::size_t>(at[k]); most[k] > best.distance2 || (most[k] == best.distance2 && of_lane < best.at))
+        if (const auto of_lane = static_cast<std::size_t>(at[k]);
+            most[k] > best.distance2 || (most[k] == best.distance2 && of_lane < best.at))
             best = {most[k], of_lane};
     one_by_one(p, s, i, last, best);
     return best;
@@ -60,7 +64,13 @@ SLABWRIGHT_WIDE Farthest by_eights(const PointRows& p, const Segment& s, std::si
 }  // namespace
 
 Farthest farthest_between(const PointRows& p, std::size_t first, std::size_t last) {
-    Segment s{p.x[first], p.y[first], p.z[first], p.x[last] - p.x[first], p.y[last] - p.y[first], p.z[last] - p.z[first], 0};
+    Segment s{p.x[first],
+              p.y[first],
+              p.z[first],
+              p.x[last] - p.x[first],
+              p.y[last] - p.y[first],
+              p.z[last] - p.z[first],
+              0};
     s.l2 = s.dx * s.dx + s.dy * s.dy + s.dz * s.dz;
     if (!(s.l2 > 0)) s.l2 = 1;  // a point: nothing is along it
     if (last - first > kLanes) return by_eights(p, s, first + 1, last);

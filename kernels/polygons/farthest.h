@@ -17,7 +17,8 @@ struct Farthest {
     std::size_t at = 0;     ///< of several the first
 };
 
-/// Of the points first + 1 … last − 1 that farthest from the segment between first and last; {-1, first}: there is none.
+/// Of the points first + 1 … last − 1 that farthest from the segment between first and last; {-1, first}:
+/// there is none.
 [[nodiscard]] Farthest farthest_between(const PointRows& points, std::size_t first, std::size_t last);
 
 }  // namespace slabwright

@@ -18,7 +18,8 @@ std::vector<Point2> convex_hull(std::vector<Point2> points) {
     for (int pass = 0; pass < 2; ++pass) {
         const std::size_t start = hull.size();
         for (const Point2 p : points) {
-            while (hull.size() >= start + 2 && turn(hull[hull.size() - 2], hull.back(), p) <= 0) hull.pop_back();
+            while (hull.size() >= start + 2 && turn(hull[hull.size() - 2], hull.back(), p) <= 0)
+                hull.pop_back();
             hull.push_back(p);
         }
         hull.pop_back();

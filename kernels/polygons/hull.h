@@ -7,7 +7,8 @@
 
 namespace slabwright {
 
-/// Convex hull, counter-clockwise, without points on its edges; of fewer than three distinct points, those points.
+/// Convex hull, counter-clockwise, without points on its edges; of fewer than three distinct points, those
+/// points.
 [[nodiscard]] std::vector<Point2> convex_hull(std::vector<Point2> points);
 
 }  // namespace slabwright

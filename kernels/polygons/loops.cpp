@@ -8,7 +8,8 @@ namespace slabwright {
 
 namespace {
 
-// Coordinates are int32, so differences need 33 bits and their products 66: sums and orientations are exact in 128.
+// Coordinates are int32, so differences need 33 bits and their products 66: sums and orientations are exact
+// in 128.
 using Wide = __int128;
 
 /// Twice the signed area, exact.
@@ -48,7 +49,9 @@ std::int64_t floor_of(const Ratio& r) {
     return static_cast<std::int64_t>(q);
 }
 
-Point2 cyclic(std::span<const Point2> loop, std::size_t i) { return loop[i < loop.size() ? i : i - loop.size()]; }
+Point2 cyclic(std::span<const Point2> loop, std::size_t i) {
+    return loop[i < loop.size() ? i : i - loop.size()];
+}
 
 /// Where the chain crosses the line at y + 1/2. Needs y_low <= y < y_high.
 Ratio crossing(const Chain& chain, std::span<const Point2> loop, std::int32_t y) {
@@ -105,9 +108,10 @@ struct Probe {
     Ratio x;
 };
 
-/// The leftmost crossing at y + 1/2 behind which the loop's own winding is not zero. Whiskers (edges there and back) have
-/// none; then false.
-bool leftmost_inside(std::span<const Chain> chains, std::span<const Point2> loop, std::int32_t y, Ratio& x, bool& any) {
+/// The leftmost crossing at y + 1/2 behind which the loop's own winding is not zero. Whiskers (edges there
+/// and back) have none; then false.
+bool leftmost_inside(std::span<const Chain> chains, std::span<const Point2> loop, std::int32_t y, Ratio& x,
+                     bool& any) {
     struct Crossing {
         Ratio x;
         std::int32_t direction;
@@ -133,7 +137,9 @@ bool leftmost_inside(std::span<const Chain> chains, std::span<const Point2> loop
 
 }  // namespace
 
-double signed_area(std::span<const Point2> loop) { return static_cast<double>(twice_area(loop)) * kHalfSquareUnit; }
+double signed_area(std::span<const Point2> loop) {
+    return static_cast<double>(twice_area(loop)) * kHalfSquareUnit;
+}
 
 double area(const Loops& loops) {
     Wide sum = 0;
@@ -148,7 +154,8 @@ int winding(const Loops& loops, Point2 p) {
         if (loop.empty()) continue;
         Point2 a = loop.back();
         for (const Point2 b : loop) {
-            // An edge counts when it crosses the ray from p to the right; half-open in y, so that a vertex counts once.
+            // An edge counts when it crosses the ray from p to the right; half-open in y, so that a vertex
+            // counts once.
             const bool a_upper = a.y > p.y, b_upper = b.y > p.y;
             if (a_upper != b_upper) {
                 const Wide side = (static_cast<Wide>(b.x) - a.x) * (static_cast<std::int64_t>(p.y) - a.y) -
@@ -162,13 +169,15 @@ int winding(const Loops& loops, Point2 p) {
     return turns;
 }
 
-// Every loop is asked for at one point: on a line half a unit above an integer height, just right of the loop's leftmost
-// crossing. No point of any loop lies on such a line, so loops that touch in points cannot confuse the count, and where
-// they share an edge "just right" decides. All arithmetic is exact. The loops around that point are found by counting
-// signed crossings to its left, over chains of edges that rise or fall: a chain that lies wholly on one side costs one
-// comparison, the others a binary search. The chains that a line meets are kept up by a sweep in y.
+// Every loop is asked for at one point: on a line half a unit above an integer height, just right of the
+// loop's leftmost crossing. No point of any loop lies on such a line, so loops that touch in points cannot
+// confuse the count, and where they share an edge "just right" decides. All arithmetic is exact. The loops
+// around that point are found by counting signed crossings to its left, over chains of edges that rise or
+// fall: a chain that lies wholly on one side costs one comparison, the others a binary search. The chains
+// that a line meets are kept up by a sweep in y.
 //
-// Only a larger loop (of two equal ones the earlier) may be a parent, so that there is no cycle even where loops cross.
+// Only a larger loop (of two equal ones the earlier) may be a parent, so that there is no cycle even where
+// loops cross.
 void nest(Loops& loops) {
     const std::size_t n = loops.size();
     loops.parents.assign(n, -1);
@@ -185,7 +194,8 @@ void nest(Loops& loops) {
         append_chains(loop, static_cast<std::uint32_t>(i), chains);
         const std::span<const Chain> own = std::span(chains).subspan(first);
         if (own.empty()) continue;  // flat: no inside, no place in the order
-        std::int32_t low = std::numeric_limits<std::int32_t>::max(), high = std::numeric_limits<std::int32_t>::min();
+        std::int32_t low = std::numeric_limits<std::int32_t>::max(),
+                     high = std::numeric_limits<std::int32_t>::min();
         for (const Chain& chain : own) {
             low = std::min(low, chain.y_low);
             high = std::max(high, chain.y_high);
@@ -193,8 +203,10 @@ void nest(Loops& loops) {
         Probe probe{static_cast<std::uint32_t>(i), low, {}};
         bool any = false;
         if (!leftmost_inside(own, loop, low, probe.x, any)) {
-            // A whisker hangs from the loop's bottom: the middle is a better place, if it is not one of whiskers too.
-            Probe middle{probe.loop, static_cast<std::int32_t>((static_cast<std::int64_t>(low) + high - 1) / 2), {}};
+            // A whisker hangs from the loop's bottom: the middle is a better place, if it is not one of
+            // whiskers too.
+            Probe middle{
+                probe.loop, static_cast<std::int32_t>((static_cast<std::int64_t>(low) + high - 1) / 2), {}};
             if (leftmost_inside(own, loop, middle.y, middle.x, any)) probe = middle;
         }
         probes.push_back(probe);
@@ -202,7 +214,9 @@ void nest(Loops& loops) {
 
     std::sort(chains.begin(), chains.end(), [](const Chain& a, const Chain& b) { return a.y_low < b.y_low; });
     std::sort(probes.begin(), probes.end(), [](const Probe& a, const Probe& b) { return a.y < b.y; });
-    auto larger = [&](std::size_t a, std::size_t b) { return size[a] != size[b] ? size[a] > size[b] : a < b; };
+    auto larger = [&](std::size_t a, std::size_t b) {
+        return size[a] != size[b] ? size[a] > size[b] : a < b;
+    };
 
     std::vector<Chain> active;
     std::vector<std::int32_t> turns(n, 0);
@@ -219,15 +233,18 @@ void nest(Loops& loops) {
                 continue;
             }
             ++c;
-            if (chain.x_low > x || chain.loop == probe.loop) continue;  // wholly right of the probe, or its own
-            if (chain.x_high <= x || less_or_equal(crossing(chain, loops.loop(chain.loop), probe.y), probe.x)) {
+            if (chain.x_low > x || chain.loop == probe.loop)
+                continue;  // wholly right of the probe, or its own
+            if (chain.x_high <= x ||
+                less_or_equal(crossing(chain, loops.loop(chain.loop), probe.y), probe.x)) {
                 turns[chain.loop] += chain.direction;
                 met.push_back(chain.loop);
             }
         }
         std::int32_t parent = -1;
         for (const std::uint32_t j : met) {
-            if (turns[j] != 0 && larger(j, probe.loop) && (parent < 0 || larger(static_cast<std::size_t>(parent), j))) {
+            if (turns[j] != 0 && larger(j, probe.loop) &&
+                (parent < 0 || larger(static_cast<std::size_t>(parent), j))) {
                 parent = static_cast<std::int32_t>(j);
             }
         }
@@ -247,15 +264,17 @@ std::vector<std::vector<Span>> line_spans(const Loops& region, std::span<const d
             const double low = std::min(a.y, b.y), high = std::max(a.y, b.y);
             for (auto at = std::lower_bound(y.begin(), y.end(), low); at != y.end() && *at < high; ++at) {
                 const double t = (*at - a.y) / (static_cast<double>(b.y) - a.y);
-                crossings[static_cast<std::size_t>(at - y.begin())].emplace_back(a.x + t * (static_cast<double>(b.x) - a.x), a.y > b.y ? 1 : -1);
+                crossings[static_cast<std::size_t>(at - y.begin())].emplace_back(
+                    a.x + t * (static_cast<double>(b.x) - a.x), a.y > b.y ? 1 : -1);
             }
         }
     }
     std::vector<std::vector<Span>> lines(y.size());
     for (std::size_t j = 0; j < y.size(); ++j) {
         // Entering before leaving where two crossings coincide, so that touching loops make one span.
-        std::sort(crossings[j].begin(), crossings[j].end(),
-                  [](const Crossing& a, const Crossing& b) { return a.first != b.first ? a.first < b.first : a.second > b.second; });
+        std::sort(crossings[j].begin(), crossings[j].end(), [](const Crossing& a, const Crossing& b) {
+            return a.first != b.first ? a.first < b.first : a.second > b.second;
+        });
         int depth = 0;
         for (const auto& [x, turn] : crossings[j]) {
             if (depth <= 0 && depth + turn > 0) lines[j].push_back({x, x});

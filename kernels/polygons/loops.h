@@ -13,7 +13,9 @@ namespace slabwright {
 inline constexpr double kUnitsPerMm = 10000.0;
 
 /// Nearest unit of a length in millimetres (halves away from zero, on every machine).
-[[nodiscard]] inline std::int32_t to_units(double mm) { return static_cast<std::int32_t>(std::llround(mm * kUnitsPerMm)); }
+[[nodiscard]] inline std::int32_t to_units(double mm) {
+    return static_cast<std::int32_t>(std::llround(mm * kUnitsPerMm));
+}
 [[nodiscard]] inline double to_mm(std::int64_t units) { return static_cast<double>(units) / kUnitsPerMm; }
 
 struct Point2 {
@@ -27,11 +29,13 @@ struct Point2 {
 struct Loops {
     std::vector<Point2> points;
     std::vector<std::uint32_t> starts{0};  ///< one more than there are loops
-    std::vector<std::int32_t> parents;     ///< the loop directly around loop i, or −1; empty when not nested yet
+    std::vector<std::int32_t> parents;  ///< the loop directly around loop i, or −1; empty when not nested yet
 
     [[nodiscard]] std::size_t size() const noexcept { return starts.size() - 1; }
     [[nodiscard]] bool empty() const noexcept { return size() == 0; }
-    [[nodiscard]] std::span<const Point2> loop(std::size_t i) const { return std::span(points).subspan(starts[i], starts[i + 1] - starts[i]); }
+    [[nodiscard]] std::span<const Point2> loop(std::size_t i) const {
+        return std::span(points).subspan(starts[i], starts[i + 1] - starts[i]);
+    }
     /// Closes the points appended since the last call into a loop.
     void close_loop() { starts.push_back(static_cast<std::uint32_t>(points.size())); }
 };
@@ -50,24 +54,26 @@ struct Span {
 /// Of each of the lines at the heights y, ascending; in one pass over the region.
 [[nodiscard]] std::vector<std::vector<Span>> line_spans(const Loops& region, std::span<const double> y);
 
-/// Fills `parents` by containment: the smallest larger loop around each. Loops may touch in points and along edges; where
-/// they cross (self-intersecting meshes) the answer is by one point inside each loop, and never cyclic. O(n) in points, plus
-/// for every loop the edge chains that one horizontal line meets.
+/// Fills `parents` by containment: the smallest larger loop around each. Loops may touch in points and along
+/// edges; where they cross (self-intersecting meshes) the answer is by one point inside each loop, and never
+/// cyclic. O(n) in points, plus for every loop the edge chains that one horizontal line meets.
 void nest(Loops& loops);
 
-/// Boolean operations and offsets on regions (non-zero winding), by polyclipping. Results are nested, outer loops
-/// counter-clockwise and holes clockwise. @throws Error when a result would pass 214 m, or polyclipping fails
+/// Boolean operations and offsets on regions (non-zero winding), by polyclipping. Results are nested, outer
+/// loops counter-clockwise and holes clockwise. @throws Error when a result would pass 214 m, or polyclipping
+/// fails
 [[nodiscard]] Loops unite(const Loops& a, const Loops& b);
 [[nodiscard]] Loops intersect(const Loops& a, const Loops& b);
 [[nodiscard]] Loops subtract(const Loops& a, const Loops& b);
 /// The outline of what the loops cover: overlaps and crossings are gone.
 [[nodiscard]] Loops simplify(const Loops& loops);
-/// Grows (delta > 0) or shrinks a region by `delta_mm`, round joins; straight edges are exact to 0.1 µm, arcs deviate by at
-/// most `tolerance_mm` (0.0001 or more), always to the side of the *larger* region, so that what is kept clear is never
-/// understated.
+/// Grows (delta > 0) or shrinks a region by `delta_mm`, round joins; straight edges are exact to 0.1 µm, arcs
+/// deviate by at most `tolerance_mm` (0.0001 or more), always to the side of the *larger* region, so that
+/// what is kept clear is never understated.
 [[nodiscard]] Loops offset(const Loops& region, double delta_mm, double tolerance_mm);
-/// The same of a region whose loops neither cross nor overlap and are turned as these functions turn them, which is not looked for. A region that
-/// grows may also be thinned: where its loops then cross by far less than it grows, the result is the same.
+/// The same of a region whose loops neither cross nor overlap and are turned as these functions turn them,
+/// which is not looked for. A region that grows may also be thinned: where its loops then cross by far less
+/// than it grows, the result is the same.
 [[nodiscard]] Loops offset_outline(const Loops& outline, double delta_mm, double tolerance_mm);
 
 }  // namespace slabwright

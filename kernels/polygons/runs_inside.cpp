@@ -17,7 +17,8 @@ struct Edge {
 
 /// Twice the area of a, b, p: positive where p lies on the left of a → b.
 Wide side(const Point2& a, const Point2& b, const Point2& p) {
-    return (static_cast<Wide>(b.x) - a.x) * (static_cast<Wide>(p.y) - a.y) - (static_cast<Wide>(b.y) - a.y) * (static_cast<Wide>(p.x) - a.x);
+    return (static_cast<Wide>(b.x) - a.x) * (static_cast<Wide>(p.y) - a.y) -
+           (static_cast<Wide>(b.y) - a.y) * (static_cast<Wide>(p.x) - a.x);
 }
 
 /// Edges by the cells of a grid that their boxes meet.
@@ -26,14 +27,19 @@ public:
     explicit EdgeGrid(const Loops& region) {
         for (std::size_t l = 0; l < region.size(); ++l) {
             const std::span<const Point2> loop = region.loop(l);
-            for (std::size_t k = 0; k < loop.size(); ++k) edges_.push_back({loop[k], loop[k + 1 < loop.size() ? k + 1 : 0]});
+            for (std::size_t k = 0; k < loop.size(); ++k)
+                edges_.push_back({loop[k], loop[k + 1 < loop.size() ? k + 1 : 0]});
         }
         if (edges_.empty()) return;
         for (const Edge& e : edges_)
-            low_ = {std::min(low_.x, e.a.x), std::min(low_.y, e.a.y)}, high_ = {std::max(high_.x, e.a.x), std::max(high_.y, e.a.y)};
+            low_ = {std::min(low_.x, e.a.x), std::min(low_.y, e.a.y)},
+            high_ = {std::max(high_.x, e.a.x), std::max(high_.y, e.a.y)};
         // About one cell to an edge.
-        const double across = std::max({1.0, static_cast<double>(high_.x) - low_.x, static_cast<double>(high_.y) - low_.y});
-        cell_ = static_cast<std::int64_t>(across / std::clamp(std::sqrt(static_cast<double>(edges_.size())), 1.0, 1024.0)) + 1;
+        const double across =
+            std::max({1.0, static_cast<double>(high_.x) - low_.x, static_cast<double>(high_.y) - low_.y});
+        cell_ = static_cast<std::int64_t>(
+                    across / std::clamp(std::sqrt(static_cast<double>(edges_.size())), 1.0, 1024.0)) +
+                1;
         columns_ = (std::int64_t{high_.x} - low_.x) / cell_ + 1;
         const std::int64_t rows = (std::int64_t{high_.y} - low_.y) / cell_ + 1;
         starts_.assign(static_cast<std::size_t>(columns_ * rows) + 1, 0);
@@ -64,11 +70,14 @@ public:
 private:
     template <class Visit>
     void for_cells(const Point2& p, const Point2& q, Visit&& visit) const {
-        const std::int64_t x0 = std::max(std::min(p.x, q.x), low_.x), x1 = std::min(std::max(p.x, q.x), high_.x);
-        const std::int64_t y0 = std::max(std::min(p.y, q.y), low_.y), y1 = std::min(std::max(p.y, q.y), high_.y);
+        const std::int64_t x0 = std::max(std::min(p.x, q.x), low_.x),
+                           x1 = std::min(std::max(p.x, q.x), high_.x);
+        const std::int64_t y0 = std::max(std::min(p.y, q.y), low_.y),
+                           y1 = std::min(std::max(p.y, q.y), high_.y);
         if (x0 > x1 || y0 > y1) return;
         for (std::int64_t r = (y0 - low_.y) / cell_; r <= (y1 - low_.y) / cell_; ++r)
-            for (std::int64_t c = (x0 - low_.x) / cell_; c <= (x1 - low_.x) / cell_; ++c) visit(static_cast<std::size_t>(r * columns_ + c));
+            for (std::int64_t c = (x0 - low_.x) / cell_; c <= (x1 - low_.x) / cell_; ++c)
+                visit(static_cast<std::size_t>(r * columns_ + c));
     }
 
     std::vector<Edge> edges_;
@@ -83,7 +92,8 @@ void append(std::vector<Point2>& points, Point2 p) {
 }
 
 /// The stretches of one line; none where the crossings contradict each other.
-std::optional<std::vector<RunInside>> stretches(std::span<const Point2> line, std::size_t index, const Loops& region, EdgeGrid& grid) {
+std::optional<std::vector<RunInside>> stretches(std::span<const Point2> line, std::size_t index,
+                                                const Loops& region, EdgeGrid& grid) {
     struct Crossing {
         double at = 0;  // share of the segment
         int change = 0;
@@ -99,17 +109,21 @@ std::optional<std::vector<RunInside>> stretches(std::span<const Point2> line, st
         grid.near(p, q, [&](const Edge& e) {
             const Wide from = side(e.a, e.b, p), to = side(e.a, e.b, q);
             if ((from > 0) == (to > 0) || (side(p, q, e.a) > 0) == (side(p, q, e.b) > 0)) return;
-            crossings.push_back({static_cast<double>(from) / (static_cast<double>(from) - static_cast<double>(to)), to > 0 ? 1 : -1});
+            crossings.push_back(
+                {static_cast<double>(from) / (static_cast<double>(from) - static_cast<double>(to)),
+                 to > 0 ? 1 : -1});
         });
-        std::sort(crossings.begin(), crossings.end(),
-                  [](const Crossing& a, const Crossing& b) { return std::pair(a.at, a.change) < std::pair(b.at, b.change); });
+        std::sort(crossings.begin(), crossings.end(), [](const Crossing& a, const Crossing& b) {
+            return std::pair(a.at, a.change) < std::pair(b.at, b.change);
+        });
         for (const Crossing& c : crossings) {
             const bool was_inside = around > 0;
             around += c.change;
             if ((around > 0) == was_inside) continue;
             if (!was_inside) runs.push_back({{}, index, false});
-            append(runs.back().points, {static_cast<std::int32_t>(std::lround(p.x + c.at * (static_cast<double>(q.x) - p.x))),
-                                        static_cast<std::int32_t>(std::lround(p.y + c.at * (static_cast<double>(q.y) - p.y)))});
+            append(runs.back().points,
+                   {static_cast<std::int32_t>(std::lround(p.x + c.at * (static_cast<double>(q.x) - p.x))),
+                    static_cast<std::int32_t>(std::lround(p.y + c.at * (static_cast<double>(q.y) - p.y)))});
         }
         if (around > 0) append(runs.back().points, q);
     }

@@ -7,8 +7,8 @@
 
 namespace slabwright {
 
-/// What the mesh covers, seen along z: the union of its up-facing facets, projected and rounded to 0.1 µm. Outer loops run
-/// counter-clockwise, holes (through the whole pattern) clockwise; nested.
+/// What the mesh covers, seen along z: the union of its up-facing facets, projected and rounded to 0.1 µm.
+/// Outer loops run counter-clockwise, holes (through the whole pattern) clockwise; nested.
 /// @param mesh adjacency filled
 /// @throws Error(no_plan, "memory.limit"), Error(cancelled), and what simplify() throws
 [[nodiscard]] Loops silhouette(Context& context, MeshView mesh);

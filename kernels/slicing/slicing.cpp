@@ -1,12 +1,14 @@
-// How it works. The two sides of a plane are told apart by one float threshold: a vertex lies above exactly if its z is
-// greater. So a facet in the plane is all below or all above and yields nothing, and every other facet that meets the plane
-// has exactly one edge that goes up through it and one that goes down. The section's segment on a facet, solid on its left,
-// runs from the down edge to the up edge, and the facet across the up edge continues it: no search, no comparing of
-// coordinates. On closed adjacency this is a permutation of the crossed facets, and its cycles are the loops.
+// How it works. The two sides of a plane are told apart by one float threshold: a vertex lies above exactly
+// if its z is greater. So a facet in the plane is all below or all above and yields nothing, and every other
+// facet that meets the plane has exactly one edge that goes up through it and one that goes down. The
+// section's segment on a facet, solid on its left, runs from the down edge to the up edge, and the facet
+// across the up edge continues it: no search, no comparing of coordinates. On closed adjacency this is a
+// permutation of the crossed facets, and its cycles are the loops.
 //
-// Each vertex is ranked among the sorted thresholds, each facet is thereby crossed by one run of planes. Those that any plane crosses
-// are listed with their runs, so that a few planes of a large mesh cost little more than one look at it, and two passes over that list
-// (count, scatter) give every plane the ascending list of its facets. Planes are then walked independently.
+// Each vertex is ranked among the sorted thresholds, each facet is thereby crossed by one run of planes.
+// Those that any plane crosses are listed with their runs, so that a few planes of a large mesh cost little
+// more than one look at it, and two passes over that list (count, scatter) give every plane the ascending
+// list of its facets. Planes are then walked independently.
 #include "kernels/slicing/slicing.h"
 
 #include <algorithm>
@@ -45,15 +47,17 @@ constexpr float kReach = 214000.0f;
 /// The largest float t such that "vertex above the plane on this side" is the same as "vertex z > t".
 float threshold(const Plane& plane) {
     constexpr float lowest = -std::numeric_limits<float>::infinity();
-    if (plane.z > static_cast<double>(std::numeric_limits<float>::max())) return std::numeric_limits<float>::max();
+    if (plane.z > static_cast<double>(std::numeric_limits<float>::max()))
+        return std::numeric_limits<float>::max();
     if (plane.z < -static_cast<double>(std::numeric_limits<float>::max())) return lowest;
     const auto nearest = static_cast<float>(plane.z);
-    const bool too_high = plane.side == Side::above ? static_cast<double>(nearest) > plane.z : static_cast<double>(nearest) >= plane.z;
+    const bool too_high = plane.side == Side::above ? static_cast<double>(nearest) > plane.z
+                                                    : static_cast<double>(nearest) >= plane.z;
     return too_high ? std::nextafterf(nearest, lowest) : nearest;
 }
 
-/// Counts the thresholds under a height. Buckets of equal height narrow the search; as the bucket is a monotonic function of
-/// the height, only the thresholds of the height's own bucket are in doubt.
+/// Counts the thresholds under a height. Buckets of equal height narrow the search; as the bucket is a
+/// monotonic function of the height, only the thresholds of the height's own bucket are in doubt.
 class Ranking {
 public:
     explicit Ranking(const std::vector<float>& thresholds) : thresholds_(thresholds) {
@@ -69,7 +73,8 @@ public:
     [[nodiscard]] std::uint32_t operator()(float z) const {
         const std::size_t b = bucket(z);
         const float* base = thresholds_.data();
-        return static_cast<std::uint32_t>(std::lower_bound(base + starts_[b], base + starts_[b + 1], z) - base);
+        return static_cast<std::uint32_t>(std::lower_bound(base + starts_[b], base + starts_[b + 1], z) -
+                                          base);
     }
 
 private:
@@ -87,31 +92,35 @@ struct Run {
     std::uint32_t facet = 0, first = 0, last = 0;
 };
 
-/// By the corners above the plane (bit i for corner i): the edge along which the facet rises through it, and the edge along
-/// which it falls; edge k goes from corner k to corner k + 1, and 3 is none.
+/// By the corners above the plane (bit i for corner i): the edge along which the facet rises through it, and
+/// the edge along which it falls; edge k goes from corner k to corner k + 1, and 3 is none.
 constexpr std::uint8_t kUpEdge[8] = {3, 2, 0, 2, 1, 1, 0, 3};
 constexpr std::uint8_t kDownEdge[8] = {3, 0, 1, 1, 2, 0, 2, 3};
 constexpr std::uint8_t kNextCorner[3] = {1, 2, 0};
 
 unsigned corners_above(MeshView mesh, const Index3& facet, float limit) {
-    return static_cast<unsigned>(mesh.vertices[facet[0]].z > limit) | static_cast<unsigned>(mesh.vertices[facet[1]].z > limit) << 1 |
+    return static_cast<unsigned>(mesh.vertices[facet[0]].z > limit) |
+           static_cast<unsigned>(mesh.vertices[facet[1]].z > limit) << 1 |
            static_cast<unsigned>(mesh.vertices[facet[2]].z > limit) << 2;
 }
 
-/// Nearest unit, halves away from zero; the same as to_units() on every coordinate a float can hold, and inlined.
+/// Nearest unit, halves away from zero; the same as to_units() on every coordinate a float can hold, and
+/// inlined.
 std::int32_t nearest_unit(double mm) {
     const double units = mm * kUnitsPerMm;
     return static_cast<std::int32_t>(units + (units < 0 ? -0.5 : 0.5));
 }
 
-/// Where an edge meets the plane. Both facets of an edge must find the same point, so it is computed from the end of lower
-/// index. The ends lie on different sides, so the share t is in [0, 1], and a plane exactly at an end gives that end.
+/// Where an edge meets the plane. Both facets of an edge must find the same point, so it is computed from the
+/// end of lower index. The ends lie on different sides, so the share t is in [0, 1], and a plane exactly at
+/// an end gives that end.
 Point2 crossing(MeshView mesh, std::uint32_t a, std::uint32_t b, double z) {
     if (b < a) std::swap(a, b);
     const Vec3f &p = mesh.vertices[a], &q = mesh.vertices[b];
     const double rise = static_cast<double>(q.z) - p.z;
     const double t = (z - p.z) / rise;
-    return {nearest_unit(p.x + t * (static_cast<double>(q.x) - p.x)), nearest_unit(p.y + t * (static_cast<double>(q.y) - p.y))};
+    return {nearest_unit(p.x + t * (static_cast<double>(q.x) - p.x)),
+            nearest_unit(p.y + t * (static_cast<double>(q.y) - p.y))};
 }
 
 /// What walking one plane needs; kept from plane to plane, and clean between them.
@@ -121,11 +130,19 @@ struct Scratch {
     Loops loops, chains;
 };
 
-bool is_pending(const Scratch& scratch, std::uint32_t facet) { return (scratch.pending[facet >> 6] >> (facet & 63) & 1) != 0; }
-void set_pending(Scratch& scratch, std::uint32_t facet) { scratch.pending[facet >> 6] |= std::uint64_t{1} << (facet & 63); }
-void clear_pending(Scratch& scratch, std::uint32_t facet) { scratch.pending[facet >> 6] &= ~(std::uint64_t{1} << (facet & 63)); }
+bool is_pending(const Scratch& scratch, std::uint32_t facet) {
+    return (scratch.pending[facet >> 6] >> (facet & 63) & 1) != 0;
+}
+void set_pending(Scratch& scratch, std::uint32_t facet) {
+    scratch.pending[facet >> 6] |= std::uint64_t{1} << (facet & 63);
+}
+void clear_pending(Scratch& scratch, std::uint32_t facet) {
+    scratch.pending[facet >> 6] &= ~(std::uint64_t{1} << (facet & 63));
+}
 
-void drop_repeats(std::vector<Point2>& points) { points.erase(std::unique(points.begin(), points.end()), points.end()); }
+void drop_repeats(std::vector<Point2>& points) {
+    points.erase(std::unique(points.begin(), points.end()), points.end());
+}
 
 /// Adds a loop unless it encloses nothing. Exact, as twice the area may not fit 64 bits.
 void add_loop(std::vector<Point2>& points, Loops& loops) {
@@ -136,11 +153,12 @@ void add_loop(std::vector<Point2>& points, Loops& loops) {
     loops.close_loop();
 }
 
-/// Follows the section through one facet after the other from `start`, along up edges (`kUpEdge`) or against its direction
+/// Follows the section through one facet after the other from `start`, along up edges (`kUpEdge`) or against
+/// its direction
 /// (`kDownEdge`), and appends the crossing on every edge it goes through.
 /// @return true when it came back to `start`, false when it ended at an open edge
-bool walk(MeshView mesh, double z, float limit, std::uint32_t start, const std::uint8_t (&edge_of)[8], Scratch& scratch,
-          std::vector<Point2>& points) {
+bool walk(MeshView mesh, double z, float limit, std::uint32_t start, const std::uint8_t (&edge_of)[8],
+          Scratch& scratch, std::vector<Point2>& points) {
     const std::size_t facets = mesh.facets.size();
     for (std::uint32_t f = start;;) {
         const Index3& facet = mesh.facets[f];
@@ -155,9 +173,10 @@ bool walk(MeshView mesh, double z, float limit, std::uint32_t start, const std::
     }
 }
 
-/// Joins chains whose ends are within the gap, the nearest pair of ends first, ties to the lower index. Only an end and a
-/// beginning are joined, so that the solid stays on the left.
-std::uint32_t join_chains(const Loops& chains, double gap_mm, Loops& loops, Loops& open, std::vector<Point2>& points) {
+/// Joins chains whose ends are within the gap, the nearest pair of ends first, ties to the lower index. Only
+/// an end and a beginning are joined, so that the solid stays on the left.
+std::uint32_t join_chains(const Loops& chains, double gap_mm, Loops& loops, Loops& open,
+                          std::vector<Point2>& points) {
     const std::size_t n = chains.size();
     const double gap = gap_mm * kUnitsPerMm;
     const double gap2 = gap * gap;
@@ -173,8 +192,9 @@ std::uint32_t join_chains(const Loops& chains, double gap_mm, Loops& loops, Loop
     auto tail_of = [&](std::uint32_t c) { return chains.loop(c).back(); };
     std::vector<std::uint32_t> by_x(n);
     std::iota(by_x.begin(), by_x.end(), 0u);
-    std::sort(by_x.begin(), by_x.end(),
-              [&](std::uint32_t a, std::uint32_t b) { return head_of(a).x != head_of(b).x ? head_of(a).x < head_of(b).x : a < b; });
+    std::sort(by_x.begin(), by_x.end(), [&](std::uint32_t a, std::uint32_t b) {
+        return head_of(a).x != head_of(b).x ? head_of(a).x < head_of(b).x : a < b;
+    });
     std::vector<std::uint32_t> next(n, kNoFacet), previous(n, kNoFacet);
 
     // The nearest free beginning to an end: outwards in x from the end, until x alone is too far.
@@ -182,7 +202,8 @@ std::uint32_t join_chains(const Loops& chains, double gap_mm, Loops& loops, Loop
         const Point2 p = tail_of(tail);
         best = {std::nextafter(gap2, std::numeric_limits<double>::infinity()), tail, kNoFacet};
         auto consider = [&](std::uint32_t head) {
-            const double dx = static_cast<double>(head_of(head).x) - p.x, dy = static_cast<double>(head_of(head).y) - p.y;
+            const double dx = static_cast<double>(head_of(head).x) - p.x,
+                         dy = static_cast<double>(head_of(head).y) - p.y;
             if (dx * dx > best.distance2) return false;
             const bool itself = head == tail && chains.loop(head).size() < 3;
             const double distance2 = dx * dx + dy * dy;
@@ -192,7 +213,8 @@ std::uint32_t join_chains(const Loops& chains, double gap_mm, Loops& loops, Loop
             }
             return true;
         };
-        const auto from = std::lower_bound(by_x.begin(), by_x.end(), p.x, [&](std::uint32_t c, std::int32_t x) { return head_of(c).x < x; });
+        const auto from = std::lower_bound(by_x.begin(), by_x.end(), p.x,
+                                           [&](std::uint32_t c, std::int32_t x) { return head_of(c).x < x; });
         for (auto it = from; it != by_x.end() && consider(*it);) ++it;
         for (auto it = from; it != by_x.begin() && consider(*std::prev(it));) --it;
         return best.head != kNoFacet;
@@ -252,7 +274,8 @@ void clear(Loops& loops) {
     loops.parents.clear();
 }
 
-void cut(MeshView mesh, float limit, std::span<const std::uint32_t> crossed, const SliceOptions& options, Scratch& scratch, Section& section) {
+void cut(MeshView mesh, float limit, std::span<const std::uint32_t> crossed, const SliceOptions& options,
+         Scratch& scratch, Section& section) {
     const double z = section.plane.z;
     for (const std::uint32_t f : crossed) set_pending(scratch, f);
     clear(scratch.loops);
@@ -271,11 +294,13 @@ void cut(MeshView mesh, float limit, std::span<const std::uint32_t> crossed, con
         std::reverse(scratch.backward.begin(), scratch.backward.end());
         scratch.backward.insert(scratch.backward.end(), scratch.points.begin(), scratch.points.end());
         drop_repeats(scratch.backward);
-        scratch.chains.points.insert(scratch.chains.points.end(), scratch.backward.begin(), scratch.backward.end());
+        scratch.chains.points.insert(scratch.chains.points.end(), scratch.backward.begin(),
+                                     scratch.backward.end());
         scratch.chains.close_loop();
     }
     if (options.close_gap_mm > 0 && !scratch.chains.empty()) {
-        section.closed_gaps = join_chains(scratch.chains, options.close_gap_mm, scratch.loops, section.open_chains, scratch.points);
+        section.closed_gaps = join_chains(scratch.chains, options.close_gap_mm, scratch.loops,
+                                          section.open_chains, scratch.points);
     } else {
         for (std::size_t c = 0; c < scratch.chains.size(); ++c) {
             const auto chain = scratch.chains.loop(c);
@@ -291,7 +316,8 @@ void cut(MeshView mesh, float limit, std::span<const std::uint32_t> crossed, con
 void check(MeshView mesh, std::span<const Plane> planes, const SliceOptions& options) {
     for (std::size_t i = 0; i < planes.size(); ++i) {
         if (std::isfinite(planes[i].z)) continue;
-        throw Error(ErrorKind::usage, "slice.plane", "a plane's height is not a finite number", "plane " + std::to_string(i));
+        throw Error(ErrorKind::usage, "slice.plane", "a plane's height is not a finite number",
+                    "plane " + std::to_string(i));
     }
     if (!std::isfinite(options.close_gap_mm) || options.close_gap_mm < 0) {
         throw Error(ErrorKind::usage, "slice.gap", "the gap to close must be 0 mm or more");
@@ -299,12 +325,14 @@ void check(MeshView mesh, std::span<const Plane> planes, const SliceOptions& opt
     if (mesh.neighbours.size() != mesh.facets.size()) {
         throw Error(ErrorKind::input, "slice.adjacency", "the mesh has no adjacency", {}, "weld it first");
     }
-    if (mesh.facets.size() >= kNoFacet) throw Error(ErrorKind::input, "slice.facets", "the mesh has more than 4294967294 facets");
+    if (mesh.facets.size() >= kNoFacet)
+        throw Error(ErrorKind::input, "slice.facets", "the mesh has more than 4294967294 facets");
 }
 
 }  // namespace
 
-std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plane> planes, const SliceOptions& options) {
+std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plane> planes,
+                           const SliceOptions& options) {
     check(mesh, planes, options);
     std::vector<Section> sections(planes.size());
     for (std::size_t i = 0; i < planes.size(); ++i) sections[i].plane = planes[i];
@@ -328,14 +356,17 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
         for (std::size_t v = begin; v < end; ++v) {
             const Vec3f& p = mesh.vertices[v];
             if (!(std::abs(p.x) <= kReach && std::abs(p.y) <= kReach && std::isfinite(p.z))) {
-                throw Error(ErrorKind::input, "slice.range", "a vertex is not finite, or reaches past 214 m from the origin",
+                throw Error(ErrorKind::input, "slice.range",
+                            "a vertex is not finite, or reaches past 214 m from the origin",
                             "vertex " + std::to_string(v), "check the units of the model");
             }
             rank[v] = ranking(p.z);
         }
     });
-    // First which facets are crossed, and by how many planes in all, a bit for each facet; then their runs, in a list just as long.
-    const std::size_t grain = std::max(kFacetGrain, (facets + kMaxChunks - 1) / kMaxChunks / 64 * 64 + 64), chunks = (facets + grain - 1) / grain;
+    // First which facets are crossed, and by how many planes in all, a bit for each facet; then their runs,
+    // in a list just as long.
+    const std::size_t grain = std::max(kFacetGrain, (facets + kMaxChunks - 1) / kMaxChunks / 64 * 64 + 64),
+                      chunks = (facets + grain - 1) / grain;
     std::vector<std::uint64_t> is_crossed((facets + 63) / 64, 0);
     std::vector<std::uint64_t> chunk_crossings(chunks, 0);
     std::vector<std::size_t> chunk_runs(chunks + 1, 0);
@@ -350,7 +381,8 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
         for (std::size_t f = begin; f < end; ++f) {
             const Index3& facet = mesh.facets[f];
             if (facet[0] >= vertices || facet[1] >= vertices || facet[2] >= vertices) {
-                throw Error(ErrorKind::input, "slice.index", "a facet names a vertex that does not exist", "facet " + std::to_string(f));
+                throw Error(ErrorKind::input, "slice.index", "a facet names a vertex that does not exist",
+                            "facet " + std::to_string(f));
             }
             const Run run = run_of(f);
             crossings += run.last - run.first;
@@ -361,13 +393,17 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
         chunk_runs[begin / grain + 1] = count;
     });
     std::partial_sum(chunk_runs.begin(), chunk_runs.end(), chunk_runs.begin());
-    const std::uint64_t crossings = std::accumulate(chunk_crossings.begin(), chunk_crossings.end(), std::uint64_t{0});
-    const std::uint64_t listed = std::min<std::uint64_t>(std::max<std::uint64_t>(kBatchCrossings, chunk_runs.back()), crossings);
-    const MemoryCharge charge(context, chunk_runs.back() * sizeof(Run) + listed * sizeof(std::uint32_t), "slicing");
+    const std::uint64_t crossings =
+        std::accumulate(chunk_crossings.begin(), chunk_crossings.end(), std::uint64_t{0});
+    const std::uint64_t listed =
+        std::min<std::uint64_t>(std::max<std::uint64_t>(kBatchCrossings, chunk_runs.back()), crossings);
+    const MemoryCharge charge(context, chunk_runs.back() * sizeof(Run) + listed * sizeof(std::uint32_t),
+                              "slicing");
     BulkVector<Run> runs(chunk_runs.back());
     parallel_for(context, chunks, 1, [&](std::size_t chunk, std::size_t) {
         std::size_t at = chunk_runs[chunk];
-        for (std::size_t word = chunk * grain / 64; word < std::min(is_crossed.size(), (chunk + 1) * grain / 64); ++word)
+        for (std::size_t word = chunk * grain / 64;
+             word < std::min(is_crossed.size(), (chunk + 1) * grain / 64); ++word)
             for (std::uint64_t bits = is_crossed[word]; bits != 0; bits &= bits - 1)
                 runs[at++] = run_of(64 * word + static_cast<std::size_t>(std::countr_zero(bits)));
     });
@@ -382,7 +418,8 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
     BulkVector<std::uint32_t> crossed;
     for (std::size_t window = 0; window < order.size(); window += kBatchPlanes) {
         const std::size_t window_planes = std::min(kBatchPlanes, order.size() - window);
-        // slots[chunk * stride + p]: first how many facets of the chunk plane window + p crosses, then where they go.
+        // slots[chunk * stride + p]: first how many facets of the chunk plane window + p crosses, then where
+        // they go.
         const std::size_t stride = window_planes + 1;
         std::vector<std::uint64_t> slots(chunks * stride, 0);
         auto clip = [&](const Run& run, std::size_t first, std::size_t last) {
@@ -404,7 +441,8 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
 
         for (std::size_t first = 0, last = 0; first < window_planes; first = last) {
             std::uint64_t room = 0;
-            while (last < window_planes && (last == first || room + totals[last] <= kBatchCrossings)) room += totals[last++];
+            while (last < window_planes && (last == first || room + totals[last] <= kBatchCrossings))
+                room += totals[last++];
             std::vector<std::uint64_t> starts(last - first + 1, 0);
             for (std::size_t p = first; p < last; ++p) {
                 starts[p - first + 1] = starts[p - first] + totals[p];
@@ -424,8 +462,9 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
                 for (std::size_t i = begin; i < end; ++i) {
                     context.throw_if_cancelled();
                     const std::size_t p = window + first + i;
-                    cut(mesh, limits[p], std::span<const std::uint32_t>(crossed).subspan(starts[i], starts[i + 1] - starts[i]), options, *scratch,
-                        sections[order[p]]);
+                    cut(mesh, limits[p],
+                        std::span<const std::uint32_t>(crossed).subspan(starts[i], starts[i + 1] - starts[i]),
+                        options, *scratch, sections[order[p]]);
                 }
                 pool.give(std::move(scratch));
             });

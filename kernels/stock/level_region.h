@@ -1,4 +1,5 @@
-// What a level disc comes over along many ways at one height, as intervals of rows: each cell is touched once, not by every way over it.
+// What a level disc comes over along many ways at one height, as intervals of rows: each cell is touched
+// once, not by every way over it.
 #pragma once
 
 #include <array>
@@ -9,7 +10,8 @@
 
 namespace slabwright {
 
-/// The union of ways of one disc. Intervals of one row that follow one another and meet are joined as they come; those that do not may overlap.
+/// The union of ways of one disc. Intervals of one row that follow one another and meet are joined as they
+/// come; those that do not may overlap.
 class LevelRegion {
 public:
     explicit LevelRegion(const CellGrid& grid);
@@ -19,7 +21,8 @@ public:
     struct Interval {
         std::int32_t row, first, last;
     };
-    /// All that was added since the last call; none is empty. Valid until the next way is added, which begins anew.
+    /// All that was added since the last call; none is empty. Valid until the next way is added, which begins
+    /// anew.
     [[nodiscard]] std::vector<Interval>& intervals();
 
 private:
@@ -30,8 +33,10 @@ private:
     bool begun_ = false;
 };
 
-/// Joins [low, left] of each row of `spans` to the row's interval; rows whose interval does not meet it are left as they are.
+/// Joins [low, left] of each row of `spans` to the row's interval; rows whose interval does not meet it are
+/// left as they are.
 /// @returns a bit for each of those
-[[nodiscard]] std::uint64_t join_spans(const RowSpans& spans, int rows, std::int32_t* low, std::int32_t* high);
+[[nodiscard]] std::uint64_t join_spans(const RowSpans& spans, int rows, std::int32_t* low,
+                                       std::int32_t* high);
 
 }  // namespace slabwright

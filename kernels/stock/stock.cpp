@@ -21,7 +21,8 @@ int blocks_of(int cells) { return (cells + kBlockCells - 1) / kBlockCells; }
 Stock::Stock(const CellGrid& grid)
     : grid_(grid),
       board_(grid.count(), 0.0f),
-      block_tops_(static_cast<std::size_t>(blocks_of(grid.nx)) * static_cast<std::size_t>(blocks_of(grid.ny)), 0.0f) {}
+      block_tops_(static_cast<std::size_t>(blocks_of(grid.nx)) * static_cast<std::size_t>(blocks_of(grid.ny)),
+                  0.0f) {}
 
 void Stock::add_slab(double z_bottom, double thickness) {
     slabs_.push_back({z_bottom, thickness, std::vector<float>(grid_.count(), static_cast<float>(thickness))});
@@ -30,26 +31,31 @@ void Stock::add_slab(double z_bottom, double thickness) {
 
 namespace {
 
-// What cells over a slab's bottom lost, told in eight places, so that a compiler sees that the order of cells does not matter.
+// What cells over a slab's bottom lost, told in eight places, so that a compiler sees that the order of cells
+// does not matter.
 struct Losses {
     std::array<double, kLanes> removed{}, most{}, highest{}, lowest{}, deepest{}, deep{};
     Losses() { highest.fill(-1e300), lowest.fill(1e300); }
 };
 
-// Lowers n cells, whole eights of them, to `left` over a slab's bottom where they stand higher. `first` is the first one's number.
+// Lowers n cells, whole eights of them, to `left` over a slab's bottom where they stand higher. `first` is
+// the first one's number.
 template <class Left>
-[[gnu::always_inline]] inline void lower_lanes(float* __restrict height, int n, Left&& left_at, double bottom, double deep, int first,
-                                               Losses& __restrict losses) {
+[[gnu::always_inline]] inline void lower_lanes(float* __restrict height, int n, Left&& left_at, double bottom,
+                                               double deep, int first, Losses& __restrict losses) {
     constexpr double none = 2e300;
     Losses all = losses;
     for (int c = 0; c < n; c += kLanes)
         for (std::size_t k = 0; k < kLanes; ++k) {
             const std::size_t at = static_cast<std::size_t>(c) + k;
             const float stood = height[at], left = left_at(at), stands = left < stood ? left : stood;
-            const double before = bottom + static_cast<double>(stood), after = bottom + static_cast<double>(stands), lost = before - after;
-            const double top = before - (stands < stood ? 0.0 : none), low = after + (stands < stood ? 0.0 : none);
+            const double before = bottom + static_cast<double>(stood),
+                         after = bottom + static_cast<double>(stands), lost = before - after;
+            const double top = before - (stands < stood ? 0.0 : none),
+                         low = after + (stands < stood ? 0.0 : none);
             all.removed[k] += lost;
-            all.deepest[k] = lost > all.most[k] ? static_cast<double>(first + static_cast<int>(at)) : all.deepest[k];
+            all.deepest[k] =
+                lost > all.most[k] ? static_cast<double>(first + static_cast<int>(at)) : all.deepest[k];
             all.most[k] = lost > all.most[k] ? lost : all.most[k];
             all.highest[k] = top > all.highest[k] ? top : all.highest[k];
             all.lowest[k] = low < all.lowest[k] ? low : all.lowest[k];
@@ -60,8 +66,8 @@ template <class Left>
 }
 
 // To h; no h is under the slab's bottom but by rounding.
-SLABWRIGHT_WIDE void lower_eights(float* __restrict height, int n, const double* __restrict h, double bottom, double deep, int first,
-                                  Losses& __restrict losses) {
+SLABWRIGHT_WIDE void lower_eights(float* __restrict height, int n, const double* __restrict h, double bottom,
+                                  double deep, int first, Losses& __restrict losses) {
     lower_lanes(
         height, n,
         [&](std::size_t at) {
@@ -72,7 +78,8 @@ SLABWRIGHT_WIDE void lower_eights(float* __restrict height, int n, const double*
 }
 
 // Lowers any number of cells to one height over the slab's bottom; whether any stood higher.
-SLABWRIGHT_WIDE bool lower_level(float* __restrict height, int n, float left, double bottom, double deep, Losses& __restrict losses) {
+SLABWRIGHT_WIDE bool lower_level(float* __restrict height, int n, float left, double bottom, double deep,
+                                 Losses& __restrict losses) {
     int higher = 0;
     for (int i = 0; i < n; ++i) higher |= static_cast<int>(height[i] > left);
     if (higher == 0) return false;
@@ -108,12 +115,15 @@ SLABWRIGHT_WIDE bool lower_level(float* __restrict height, int n, float left, do
     return most;
 }
 
-// Keeps those intervals of rows, nx cells long, of which something is over `left`; the greatest of all heights, or `left`.
-SLABWRIGHT_WIDE float keep_over(const float* height, std::size_t nx, float left, std::vector<LevelRegion::Interval>& intervals) {
+// Keeps those intervals of rows, nx cells long, of which something is over `left`; the greatest of all
+// heights, or `left`.
+SLABWRIGHT_WIDE float keep_over(const float* height, std::size_t nx, float left,
+                                std::vector<LevelRegion::Interval>& intervals) {
     float most = left;
     std::size_t kept = 0;
     for (const LevelRegion::Interval& i : intervals) {
-        const float here = greatest(height + static_cast<std::size_t>(i.row) * nx + i.first, i.last - i.first + 1);
+        const float here =
+            greatest(height + static_cast<std::size_t>(i.row) * nx + i.first, i.last - i.first + 1);
         if (!(here > left)) continue;
         most = here > most ? here : most;
         intervals[kept++] = i;
@@ -219,7 +229,8 @@ public:
         if (n > kLanes) {
             for (int i = 0; i < n; i += kSweptTogether) {
                 Losses losses;
-                if (lower_level(slab.height.data() + first + i, std::min(kSweptTogether, n - i), left, slab.bottom, deep_, losses))
+                if (lower_level(slab.height.data() + first + i, std::min(kSweptTogether, n - i), left,
+                                slab.bottom, deep_, losses))
                     take(first + static_cast<std::size_t>(i), losses);
             }
             return;
@@ -229,12 +240,16 @@ public:
     [[nodiscard]] CutEffect effect() const {
         CutEffect effect = effect_;
         const auto nx = static_cast<std::size_t>(stock_.grid_.nx);
-        if (effect.deep_cells > 0) effect.deep_across = static_cast<double>(effect.deep_cells) / static_cast<double>(std::max(deep_rows_, fullest_));
+        if (effect.deep_cells > 0)
+            effect.deep_across =
+                static_cast<double>(effect.deep_cells) / static_cast<double>(std::max(deep_rows_, fullest_));
         if (effect.deepest > 0)
-            effect.where = {stock_.grid_.x(static_cast<int>(deepest_cell_ % nx)), stock_.grid_.y(static_cast<int>(deepest_cell_ / nx))};
+            effect.where = {stock_.grid_.x(static_cast<int>(deepest_cell_ % nx)),
+                            stock_.grid_.y(static_cast<int>(deepest_cell_ / nx))};
         return effect;
     }
-    /// The topmost slab's surface decides: a cutter that stays above it takes nothing there, nor of what lies below.
+    /// The topmost slab's surface decides: a cutter that stays above it takes nothing there, nor of what lies
+    /// below.
     [[nodiscard]] StandingHeights standing() const {
         if (stock_.slabs_.empty()) return {stock_.board_.data(), 1e300};
         return {stock_.slabs_.back().height.data(), stock_.slabs_.back().bottom};
@@ -245,7 +260,8 @@ private:
     void lower(Slab& slab, std::size_t cell, float left) {
         float& height = slab.height[cell];
         if (!(left < height)) return;
-        const double before = slab.bottom + static_cast<double>(height), after = slab.bottom + static_cast<double>(left), lost = before - after;
+        const double before = slab.bottom + static_cast<double>(height),
+                     after = slab.bottom + static_cast<double>(left), lost = before - after;
         effect_.removed += lost;
         effect_.highest = std::max(effect_.highest, before);
         effect_.lowest = std::min(effect_.lowest, after);
@@ -256,9 +272,12 @@ private:
     // Adds what cells from the first one on lost.
     void take(std::size_t first, const Losses& losses) {
         for (const double removed : losses.removed) effect_.removed += removed;
-        effect_.highest = std::max(effect_.highest, joined(losses.highest, [](double a, double b) { return a > b ? a : b; }));
-        effect_.lowest = std::min(effect_.lowest, joined(losses.lowest, [](double a, double b) { return a < b ? a : b; }));
-        const double deep = joined(losses.deep, std::plus<>()), most = joined(losses.most, [](double a, double b) { return a > b ? a : b; });
+        effect_.highest = std::max(effect_.highest,
+                                   joined(losses.highest, [](double a, double b) { return a > b ? a : b; }));
+        effect_.lowest =
+            std::min(effect_.lowest, joined(losses.lowest, [](double a, double b) { return a < b ? a : b; }));
+        const double deep = joined(losses.deep, std::plus<>()),
+                     most = joined(losses.most, [](double a, double b) { return a > b ? a : b; });
         if (deep > 0) count_deep(first, static_cast<std::uint64_t>(deep));
         if (!(most > effect_.deepest)) return;
         // Of cells that lost as much the first.
@@ -283,18 +302,21 @@ private:
         effect_.deep_cells += n;
     }
     // Whether all that is taken is the topmost slab's.
-    [[nodiscard]] bool within_top(double lowest) const { return !stock_.slabs_.empty() && lowest >= std::max(0.0, stock_.slabs_.back().bottom); }
+    [[nodiscard]] bool within_top(double lowest) const {
+        return !stock_.slabs_.empty() && lowest >= std::max(0.0, stock_.slabs_.back().bottom);
+    }
 
     Stock& stock_;
     double deep_;
     CutEffect effect_;
     std::size_t deepest_cell_ = 0;
-    std::size_t deep_row_ = static_cast<std::size_t>(-1);  // the last one with cells that lost more than `deep`
+    std::size_t deep_row_ =
+        static_cast<std::size_t>(-1);  // the last one with cells that lost more than `deep`
     std::uint64_t deep_rows_ = 0, in_row_ = 0, fullest_ = 0;
 };
 
-CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep,
-                     const ChainedSweep& chain) {
+CutEffect Stock::cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to,
+                     double deep, const ChainedSweep& chain) {
     Taking taking(*this, deep);
     sweep_above(grid_, end, from, to, taking.standing(), taking, chain);
     return taking.effect();
@@ -319,7 +341,8 @@ std::optional<LevelEffect> Stock::cut(LevelRegion& region, double z, double most
     effect.deepest = (slab.bottom + static_cast<double>(highest)) - effect.lowest;
     if (effect.deepest > most) return {};
     for (const LevelRegion::Interval& i : intervals)
-        effect.removed += lower_run(slab.height.data() + static_cast<std::size_t>(i.row) * nx + i.first, i.last - i.first + 1, left, slab.bottom);
+        effect.removed += lower_run(slab.height.data() + static_cast<std::size_t>(i.row) * nx + i.first,
+                                    i.last - i.first + 1, left, slab.bottom);
     return effect;
 }
 
@@ -337,8 +360,10 @@ bool Stock::clear(double x0, double x1, double y0, double y1, double z) {
         for (int i = i0 / kBlockCells; i * kBlockCells <= i1; ++i) {
             float& top = block_tops_[static_cast<std::size_t>(j) * row + static_cast<std::size_t>(i)];
             if (!(top > level)) continue;
-            top = highest_of(slab.height.data() + static_cast<std::size_t>(j * kBlockCells) * nx + i * kBlockCells, nx,
-                             std::min(kBlockCells, grid_.nx - i * kBlockCells), std::min(kBlockCells, grid_.ny - j * kBlockCells));
+            top = highest_of(
+                slab.height.data() + static_cast<std::size_t>(j * kBlockCells) * nx + i * kBlockCells, nx,
+                std::min(kBlockCells, grid_.nx - i * kBlockCells),
+                std::min(kBlockCells, grid_.ny - j * kBlockCells));
             if (top > level) return false;
         }
     return true;
@@ -353,8 +378,11 @@ double Stock::highest() const {
             // Only where the topmost slab is cut through does one below it show.
             bool below = false;
             for (std::size_t k = 0; k + 1 < slabs_.size() && !below; ++k)
-                below = slabs_[k].bottom + slabs_[k].thickness > most &&
-                        slabs_[k].bottom + static_cast<double>(highest_of(slabs_[k].height.data(), 0, static_cast<int>(grid_.count()), 1)) > most;
+                below =
+                    slabs_[k].bottom + slabs_[k].thickness > most &&
+                    slabs_[k].bottom + static_cast<double>(highest_of(slabs_[k].height.data(), 0,
+                                                                      static_cast<int>(grid_.count()), 1)) >
+                        most;
             if (!below) return most;
         }
     }
@@ -368,7 +396,8 @@ double Stock::top(std::size_t cell) const {
     return -static_cast<double>(board_[cell]);
 }
 
-double Stock::reach(double radius, const std::array<double, 3>& from, const std::array<double, 3>& to, std::array<double, 2>& where) const {
+double Stock::reach(double radius, const std::array<double, 3>& from, const std::array<double, 3>& to,
+                    std::array<double, 2>& where) const {
     double most = 0;
     const double lowest = std::min(from[2], to[2]);
     if (!slabs_.empty() && lowest >= slabs_.back().bottom + slabs_.back().thickness) return 0;

@@ -19,7 +19,8 @@ struct CutEffect {
     double lowest = 1e300;          ///< z of the lowest point cut
     std::array<double, 2> where{};  ///< the cell that lost most
     std::uint64_t deep_cells = 0;   ///< cells that lost more than `deep`
-    double deep_across = 0;         ///< how many cells wide they lie on average: their number over the longer of their rows and the fullest row
+    double deep_across = 0;  ///< how many cells wide they lie on average: their number over the longer of
+                             ///< their rows and the fullest row
 };
 
 /// What a region cut to one height lost.
@@ -28,8 +29,9 @@ struct LevelEffect {
     double lowest = 1e300;            ///< z of what was cut
 };
 
-/// The stock over a rectangle of cells. Slabs are added from below; a column that is cut through a slab's bottom shows what
-/// stands below it, and is cut there too. Under the first slab lies the base board, whose cuts are kept as well.
+/// The stock over a rectangle of cells. Slabs are added from below; a column that is cut through a slab's
+/// bottom shows what stands below it, and is cut there too. Under the first slab lies the base board, whose
+/// cuts are kept as well.
 class Stock {
 public:
     explicit Stock(const CellGrid& grid);
@@ -37,28 +39,34 @@ public:
     /// Bonds a slab of `thickness` mm with its bottom at z_bottom, at or above what was added before.
     void add_slab(double z_bottom, double thickness);
 
-    /// Takes away what the cutter meets on its way. Cells that lose more than `deep` mm are counted. @param chain as for sweep_above: what
-    /// another motion of the chain gets as low or lower is left to that one
-    CutEffect cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to, double deep = 1e300,
-                  const ChainedSweep& chain = {});
+    /// Takes away what the cutter meets on its way. Cells that lose more than `deep` mm are counted. @param
+    /// chain as for sweep_above: what another motion of the chain gets as low or lower is left to that one
+    CutEffect cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to,
+                  double deep = 1e300, const ChainedSweep& chain = {});
     /// The same along a level arc.
     CutEffect cut(const CutterEnd& end, const LevelArc& arc, double deep = 1e300);
-    /// The same down to z in a whole region of this stock's grid, at once; nothing at all where a cell would lose more than `most` mm, or more than
-    /// the topmost slab.
+    /// The same down to z in a whole region of this stock's grid, at once; nothing at all where a cell would
+    /// lose more than `most` mm, or more than the topmost slab.
     std::optional<LevelEffect> cut(LevelRegion& region, double z, double most);
 
-    /// Whether nothing of the topmost slab stands higher than z over the cells within [x0, x1] × [y0, y1]. Told from blocks of cells whose
-    /// highest is known, or was when they stood higher; one that does not tell is looked at again.
+    /// Whether nothing of the topmost slab stands higher than z over the cells within [x0, x1] × [y0, y1].
+    /// Told from blocks of cells whose highest is known, or was when they stood higher; one that does not
+    /// tell is looked at again.
     [[nodiscard]] bool clear(double x0, double x1, double y0, double y1, double z);
 
-    /// Largest height by which stock stands above the lower face of an upright cylinder (shank or holder) anywhere on its way;
-    /// 0 when it is free. `where` gets the place.
-    [[nodiscard]] double reach(double radius, const std::array<double, 3>& from, const std::array<double, 3>& to, std::array<double, 2>& where) const;
+    /// Largest height by which stock stands above the lower face of an upright cylinder (shank or holder)
+    /// anywhere on its way; 0 when it is free. `where` gets the place.
+    [[nodiscard]] double reach(double radius, const std::array<double, 3>& from,
+                               const std::array<double, 3>& to, std::array<double, 2>& where) const;
 
     /// z of the slab's surface in a cell; its bottom when it is cut through.
-    [[nodiscard]] double surface(std::size_t slab, std::size_t cell) const { return slabs_[slab].bottom + slabs_[slab].height[cell]; }
+    [[nodiscard]] double surface(std::size_t slab, std::size_t cell) const {
+        return slabs_[slab].bottom + slabs_[slab].height[cell];
+    }
     /// The same of all cells.
-    [[nodiscard]] StandingHeights standing(std::size_t slab) const { return {slabs_[slab].height.data(), slabs_[slab].bottom}; }
+    [[nodiscard]] StandingHeights standing(std::size_t slab) const {
+        return {slabs_[slab].height.data(), slabs_[slab].bottom};
+    }
     /// z of the highest stock in a column, 0 or less on the bare board.
     [[nodiscard]] double top(std::size_t cell) const;
     /// The same of all columns.
@@ -78,7 +86,8 @@ private:
     CellGrid grid_;
     std::vector<Slab> slabs_;
     std::vector<float> board_;
-    std::vector<float> block_tops_;  ///< of the topmost slab, no less than the highest of each block of cells, rows of blocks
+    std::vector<float> block_tops_;  ///< of the topmost slab, no less than the highest of each block of
+                                     ///< cells, rows of blocks
 };
 
 }  // namespace slabwright

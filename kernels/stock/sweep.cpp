@@ -34,7 +34,9 @@ template <class Eight>
     }
     if (k == n) return;
     std::array<float, kLanes> rest;
-    for (int i = 0; i < kLanes; ++i) rest[static_cast<std::size_t>(i)] = k + i < n ? stands[k + i] : -std::numeric_limits<float>::infinity();
+    for (int i = 0; i < kLanes; ++i)
+        rest[static_cast<std::size_t>(i)] =
+            k + i < n ? stands[k + i] : -std::numeric_limits<float>::infinity();
     load(rest.data(), f);
     eight(k, __builtin_convertvector(f, Doubles));
 }
@@ -47,7 +49,8 @@ template <class Eight>
 
 }  // namespace
 
-SLABWRIGHT_WIDE void ball_row(double a, double b, double c, double r2, double q, double dq, int n, double* h) {
+SLABWRIGHT_WIDE void ball_row(double a, double b, double c, double r2, double q, double dq, int n,
+                              double* h) {
     for (int k = 0; k < n; ++k) {
         const double across = q + k * dq;
         h[k] = a + b * k - c * std::sqrt(r2 - across * across);
@@ -62,7 +65,8 @@ namespace {
     return any_of(over);
 }
 
-[[gnu::always_inline]] inline bool some_lower(const float* __restrict stands, double bottom, int n, double* __restrict h) {
+[[gnu::always_inline]] inline bool some_lower(const float* __restrict stands, double bottom, int n,
+                                              double* __restrict h) {
     WideBits any{};
     each_eight(stands, n, [&](int k, const Doubles& f) {
         Doubles height;
@@ -77,7 +81,8 @@ namespace {
 
 // Bits of those of n cells that stand at least `least` over max(floor, h).
 template <class Left>
-[[gnu::always_inline]] inline std::uint64_t bits_over(const float* stands, int n, double floor, double least, Left&& left) {
+[[gnu::always_inline]] inline std::uint64_t bits_over(const float* stands, int n, double floor, double least,
+                                                      Left&& left) {
     constexpr WideBits lane{1, 2, 4, 8, 16, 32, 64, 128};
     std::uint64_t over = 0;
     each_eight(stands, n, [&](int k, const Doubles& f) {
@@ -94,23 +99,29 @@ template <class Left>
 
 }  // namespace
 
-SLABWRIGHT_WIDE std::uint64_t cells_over(const float* stands, int n, const double* h, double floor, double least) {
+SLABWRIGHT_WIDE std::uint64_t cells_over(const float* stands, int n, const double* h, double floor,
+                                         double least) {
     return bits_over(stands, n, floor, least, [&](int k, Doubles& left) { load(h + k, left); });
 }
 SLABWRIGHT_WIDE std::uint64_t cells_over(const float* stands, int n, double h, double least) {
     return bits_over(stands, n, h, least, [&](int, Doubles& left) { left = Doubles{} + h; });
 }
 
-SLABWRIGHT_WIDE bool any_over(const float* stands, double bottom, int n, double level) { return some_over(stands, bottom, n, level); }
-SLABWRIGHT_WIDE bool keep_lower(const float* stands, double bottom, int n, double* h) { return some_lower(stands, bottom, n, h); }
+SLABWRIGHT_WIDE bool any_over(const float* stands, double bottom, int n, double level) {
+    return some_over(stands, bottom, n, level);
+}
+SLABWRIGHT_WIDE bool keep_lower(const float* stands, double bottom, int n, double* h) {
+    return some_lower(stands, bottom, n, h);
+}
 
-SLABWRIGHT_WIDE std::uint64_t cells_left(const float* __restrict stands, const float* __restrict surface, const std::uint8_t* __restrict nz, int n,
-                                         float most) {
+SLABWRIGHT_WIDE std::uint64_t cells_left(const float* __restrict stands, const float* __restrict surface,
+                                         const std::uint8_t* __restrict nz, int n, float most) {
     std::int32_t any = 0;
     for (int k = 0; k < n; ++k) any |= stands[k] - surface[k] > most ? 1 : 0;
     if (any == 0) return 0;
     std::uint64_t bits = 0;
-    for (int k = 0; k < n; ++k) bits |= std::uint64_t{(stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F) > most} << k;
+    for (int k = 0; k < n; ++k)
+        bits |= std::uint64_t{(stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F) > most} << k;
     return bits;
 }
 
@@ -125,14 +136,16 @@ SLABWRIGHT_WIDE float most_left(const float* stands, const float* surface, const
         const Floats left = (high - low) * (__builtin_convertvector(share, Floats) / 255.0F);
         most = left > most ? left : most;
     }
-    for (; k < n; ++k) of_rest = std::max(of_rest, (stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F));
+    for (; k < n; ++k)
+        of_rest = std::max(of_rest, (stands[k] - surface[k]) * (static_cast<float>(nz[k]) / 255.0F));
     for (int i = 0; i < kLanes; ++i) of_rest = std::max(of_rest, most[i]);
     return of_rest;
 }
 
-// The loops hold no branch, so that a compiler does several cells in one step; what does not depend on the cell is decided outside. Whole eights
-// of cells: what is past the last is not asked for.
-SLABWRIGHT_WIDE bool row_heights(const RowWay& way, int i0, int n, double py, const float* __restrict stands, double bottom, double* __restrict h) {
+// The loops hold no branch, so that a compiler does several cells in one step; what does not depend on the
+// cell is decided outside. Whole eights of cells: what is past the last is not asked for.
+SLABWRIGHT_WIDE bool row_heights(const RowWay& way, int i0, int n, double py, const float* __restrict stands,
+                                 double bottom, double* __restrict h) {
     if (stands != nullptr && !some_over(stands, bottom, n, way.lowest)) return false;
     const RowWay w = way;
     const int cells = (n + kLanes - 1) / kLanes * kLanes;
@@ -150,9 +163,11 @@ SLABWRIGHT_WIDE bool row_heights(const RowWay& way, int i0, int n, double py, co
     return any != 0;
 }
 
-// The capsule's span on a row is where the row meets either disc, or the strip between them; with a hole, what is left of where the disc
-// starts and what is right of it. No branch, and whole vectors of rows: what is past the last is not asked for.
-SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows, const std::array<double, 2>& from, const std::array<double, 2>& to,
+// The capsule's span on a row is where the row meets either disc, or the strip between them; with a hole,
+// what is left of where the disc starts and what is right of it. No branch, and whole vectors of rows: what
+// is past the last is not asked for.
+SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows,
+                                   const std::array<double, 2>& from, const std::array<double, 2>& to,
                                    double radius, bool been, RowSpans& spans) {
     constexpr int lanes = 8;
     const double inf = 1e300, r2 = radius * radius, nx = grid.nx, per_mm = 1 / grid.cell;
@@ -164,12 +179,14 @@ SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows
     const double inverse = rise == 0 ? 0 : (tx - fx) / rise, x0 = grid.x0, y0 = grid.y0, cell = grid.cell;
     // The sides of the strip; of one that runs along the rows, or nowhere, none is met.
     const double lx = fx - radius * dy, ly = fy + radius * dx, rx = fx + radius * dy, ry = fy - radius * dx;
-    const double l_from = rise == 0 ? inf : std::min(ly, ly + rise), l_to = rise == 0 ? -inf : std::max(ly, ly + rise);
-    const double r_from = rise == 0 ? inf : std::min(ry, ry + rise), r_to = rise == 0 ? -inf : std::max(ry, ry + rise);
+    const double l_from = rise == 0 ? inf : std::min(ly, ly + rise),
+                 l_to = rise == 0 ? -inf : std::max(ly, ly + rise);
+    const double r_from = rise == 0 ? inf : std::min(ry, ry + rise),
+                 r_to = rise == 0 ? -inf : std::max(ry, ry + rise);
     const double hole = been ? 0.0 : inf;
     const int count = (rows + lanes - 1) / lanes * lanes;
-    std::int32_t *const low_out = spans.low.data(), *const left_out = spans.left.data(), *const right_out = spans.right.data(),
-                        *const high_out = spans.high.data();
+    std::int32_t *const low_out = spans.low.data(), *const left_out = spans.left.data(),
+                        *const right_out = spans.right.data(), *const high_out = spans.high.data();
     for (int k = 0; k < count; ++k) {
         const double y = y0 + (first_row + k) * cell;
         const double a2 = r2 - (y - fy) * (y - fy), b2 = r2 - (y - ty) * (y - ty);
@@ -179,7 +196,8 @@ SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows
         const double low_b = tx - b + on_b, high_b = tx + b - on_b;
         low = low_b < low ? low_b : low, high = high_b > high ? high_b : high;
         const double l = lx + (y - ly) * inverse, r = rx + (y - ry) * inverse;
-        const double l_off = (y < l_from) | (y > l_to) ? inf : 0.0, r_off = (y < r_from) | (y > r_to) ? inf : 0.0;
+        const double l_off = (y < l_from) | (y > l_to) ? inf : 0.0,
+                     r_off = (y < r_from) | (y > r_to) ? inf : 0.0;
         low = l + l_off < low ? l + l_off : low, high = l - l_off > high ? l - l_off : high;
         low = r + r_off < low ? r + r_off : low, high = r - r_off > high ? r - r_off : high;
         const double off = on_a + hole;
@@ -196,7 +214,8 @@ SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows
 namespace {
 
 // Narrows [low, high] of eight lines to a strip, as Strip does.
-[[gnu::always_inline]] inline void narrow(const Strip& strip, const Doubles& value, Doubles& low, Doubles& high) {
+[[gnu::always_inline]] inline void narrow(const Strip& strip, const Doubles& value, Doubles& low,
+                                          Doubles& high) {
     if (strip.everywhere_or_nowhere()) {
         high = (value >= strip.least) & (value <= strip.most) ? high : Doubles{} - 1e300;
         return;
@@ -205,7 +224,8 @@ namespace {
     const Doubles from = b < a ? b : a, to = a < b ? b : a;
     low = low < from ? from : low, high = to < high ? to : high;
 }
-[[gnu::always_inline]] inline void narrow(const CrossedStrips& strips, const Doubles& py, Doubles& low, Doubles& high) {
+[[gnu::always_inline]] inline void narrow(const CrossedStrips& strips, const Doubles& py, Doubles& low,
+                                          Doubles& high) {
     narrow(strips.a, py * strips.a_rise, low, high);
     narrow(strips.b, py * strips.b_rise, low, high);
 }
@@ -218,7 +238,8 @@ namespace {
 }
 
 // The cells between low and high of eight rows, mm from fx; none where low > high.
-[[gnu::always_inline]] inline void cells_between(const CellGrid& grid, double fx, const Doubles& low, const Doubles& high, std::int32_t* first,
+[[gnu::always_inline]] inline void cells_between(const CellGrid& grid, double fx, const Doubles& low,
+                                                 const Doubles& high, std::int32_t* first,
                                                  std::int32_t* last) {
     const double per_mm = 1 / grid.cell, beyond = grid.nx + 1.0, most = grid.nx - 1.0;
     Doubles a = (low + fx - grid.x0) * per_mm, b = (high + fx - grid.x0) * per_mm;
@@ -233,8 +254,10 @@ namespace {
 
 }  // namespace
 
-SLABWRIGHT_WIDE void strips_of_rows(const CellGrid& grid, int first_row, int rows, const std::array<double, 2>& from, const CrossedStrips& strips,
-                                    double low, double high, const CrossedStrips* near, double radius, RowSpans& spans) {
+SLABWRIGHT_WIDE void strips_of_rows(const CellGrid& grid, int first_row, int rows,
+                                    const std::array<double, 2>& from, const CrossedStrips& strips,
+                                    double low, double high, const CrossedStrips* near, double radius,
+                                    RowSpans& spans) {
     constexpr Doubles lane{0, 1, 2, 3, 4, 5, 6, 7};
     const double r2 = radius * radius;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rows); k += kLanes) {
@@ -260,11 +283,15 @@ SLABWRIGHT_WIDE void strips_of_rows(const CellGrid& grid, int first_row, int row
 float level_over(double bottom, double level) {
     const auto under = [&](float h) { return bottom + static_cast<double>(h) <= level; };
     constexpr float inf = std::numeric_limits<float>::infinity();
-    const auto near = static_cast<float>(level - bottom), below = std::nextafter(near, -inf), above = std::nextafter(near, inf);
+    const auto near = static_cast<float>(level - bottom), below = std::nextafter(near, -inf),
+               above = std::nextafter(near, inf);
     if (under(near) && !under(above)) return near;
     if (under(below) && !under(near)) return below;
-    // Where many heights near nothing make the same sum: halving among all floats, whose bits are ordered as they are.
-    const auto of = [](std::int32_t order) { return std::bit_cast<float>(order >= 0 ? order : std::numeric_limits<std::int32_t>::min() - order); };
+    // Where many heights near nothing make the same sum: halving among all floats, whose bits are ordered as
+    // they are.
+    const auto of = [](std::int32_t order) {
+        return std::bit_cast<float>(order >= 0 ? order : std::numeric_limits<std::int32_t>::min() - order);
+    };
     std::int64_t low = -std::bit_cast<std::int32_t>(inf), high = -low;
     while (low < high) {
         const std::int64_t middle = low + (high - low + 1) / 2;
@@ -276,10 +303,12 @@ float level_over(double bottom, double level) {
 
 namespace {
 
-// Calls fn(eight, mask) for all of the cells [first, last] of a row, eight at a time; the last eight may hold cells that came before. In a
-// shorter span the mask tells which of the eight that end with it are its own. fn(cell) where a row has too few before them.
+// Calls fn(eight, mask) for all of the cells [first, last] of a row, eight at a time; the last eight may hold
+// cells that came before. In a shorter span the mask tells which of the eight that end with it are its own.
+// fn(cell) where a row has too few before them.
 template <class Eight, class One>
-[[gnu::always_inline]] inline void by_eights(std::int32_t first, std::int32_t last, Eight&& eight, One&& one) {
+[[gnu::always_inline]] inline void by_eights(std::int32_t first, std::int32_t last, Eight&& eight,
+                                             One&& one) {
     constexpr Bits lane{0, 1, 2, 3, 4, 5, 6, 7};
     if (first > last) return;
     const std::int32_t end = last + 1 - kLanes;
@@ -293,7 +322,8 @@ template <class Eight, class One>
     }
 }
 
-[[gnu::always_inline]] inline bool over_in(const float* row, std::int32_t first, std::int32_t last, float level) {
+[[gnu::always_inline]] inline bool over_in(const float* row, std::int32_t first, std::int32_t last,
+                                           float level) {
     Bits over{};
     bool any = false;
     by_eights(
@@ -323,7 +353,8 @@ template <class Eight, class One>
 
 }  // namespace
 
-SLABWRIGHT_WIDE OverSpans spans_over(const float* height, std::size_t nx, int rows, const RowSpans& spans, float level) {
+SLABWRIGHT_WIDE OverSpans spans_over(const float* height, std::size_t nx, int rows, const RowSpans& spans,
+                                     float level) {
     OverSpans over;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k, height += nx) {
         over.left |= std::uint64_t{over_in(height, spans.low[k], spans.left[k], level)} << k;
@@ -358,7 +389,8 @@ void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans,
     lower_spans(height, nx, rows, spans, static_cast<float>(z > 0 ? z : 0.0));
 }
 
-SLABWRIGHT_WIDE void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans, float level) {
+SLABWRIGHT_WIDE void lower_spans(float* height, std::size_t nx, int rows, const RowSpans& spans,
+                                 float level) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k, height += nx) {
         lower_in(height, spans.low[k], spans.left[k], level);
         lower_in(height, spans.right[k], spans.high[k], level);
@@ -394,7 +426,8 @@ SLABWRIGHT_WIDE float highest_of(const float* height, std::size_t nx, int n, int
     return of_rest;
 }
 
-SLABWRIGHT_WIDE void add_lost(const float* before, const float* now, const std::uint8_t* share, int n, float least, Lost& lost) {
+SLABWRIGHT_WIDE void add_lost(const float* before, const float* now, const std::uint8_t* share, int n,
+                              float least, Lost& lost) {
     constexpr float whole = 255;
     Floats most{}, sum{};
     Bits cells{};
@@ -410,19 +443,22 @@ SLABWRIGHT_WIDE void add_lost(const float* before, const float* now, const std::
     }
     for (; k < n; ++k) {
         const float off = before[k] - now[k], along = off * (static_cast<float>(share[k]) / whole);
-        lost.most = std::max(lost.most, along), lost.sum += static_cast<double>(along), lost.cells += off > least;
+        lost.most = std::max(lost.most, along), lost.sum += static_cast<double>(along),
+        lost.cells += off > least;
     }
     for (int i = 0; i < kLanes; ++i)
-        lost.most = std::max(lost.most, most[i]), lost.sum += static_cast<double>(sum[i]), lost.cells += static_cast<std::size_t>(cells[i]);
+        lost.most = std::max(lost.most, most[i]), lost.sum += static_cast<double>(sum[i]),
+        lost.cells += static_cast<std::size_t>(cells[i]);
 }
 
-SLABWRIGHT_WIDE void edge_parts(const PartedWay& way, double px, double cell, double py, int n, std::int32_t* __restrict part,
-                                double* __restrict across) {
+SLABWRIGHT_WIDE void edge_parts(const PartedWay& way, double px, double cell, double py, int n,
+                                std::int32_t* __restrict part, double* __restrict across) {
     const double r2 = way.radius * way.radius, last = way.count - 1;
     const int cells = (n + kLanes - 1) / kLanes * kLanes;
     for (int k = 0; k < cells; ++k) {
         const double x = px + k * cell, aside = way.dx * py - way.dy * x, w2 = r2 - aside * aside;
-        const double met = (x * way.dx + py * way.dy - std::sqrt(w2 > 0 ? w2 : 0.0)) * way.per_mm, from_begin = met > 0 ? met : 0.0;
+        const double met = (x * way.dx + py * way.dy - std::sqrt(w2 > 0 ? w2 : 0.0)) * way.per_mm,
+                     from_begin = met > 0 ? met : 0.0;
         part[k] = static_cast<std::int32_t>(from_begin < last ? from_begin : last);
         across[k] = aside;
     }

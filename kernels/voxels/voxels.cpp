@@ -1,6 +1,7 @@
-// Sections become rows of cells, and where a cutter fits is found in rows: grown by the cutter, what is kept leaves the places of its
-// middle, and these, grown by the cutter again, what it clears. What it leaves is thin and scattered, so that goes into a sparse tree
-// (OpenVDB), whose leaves are then freed of the swath eight cells at a time.
+// Sections become rows of cells, and where a cutter fits is found in rows: grown by the cutter, what is kept
+// leaves the places of its middle, and these, grown by the cutter again, what it clears. What it leaves is
+// thin and scattered, so that goes into a sparse tree (OpenVDB), whose leaves are then freed of the swath
+// eight cells at a time.
 #include "kernels/voxels/voxels.h"
 
 #include <openvdb/Types.h>
@@ -22,7 +23,8 @@ std::size_t slot(int index) { return static_cast<std::size_t>(index); }
 
 using MaskTree = openvdb::tree::Tree4<openvdb::ValueMask, 5, 4, 3>::Type;
 using Leaf = MaskTree::LeafNodeType;
-// Slices run along the tree's x and cells of a row along its z: in a leaf, a slice is one word and a row of it one byte.
+// Slices run along the tree's x and cells of a row along its z: in a leaf, a slice is one word and a row of
+// it one byte.
 constexpr int kLeaf = 8;
 using Spans = std::span<const std::array<std::int32_t, 2>>;
 
@@ -53,7 +55,8 @@ CellRows make_rows(Context& context, std::size_t rows, Fill&& fill) {
     return all;
 }
 
-void append_span(std::vector<std::array<std::int32_t, 2>>& out, std::size_t first, std::int32_t low, std::int32_t high) {
+void append_span(std::vector<std::array<std::int32_t, 2>>& out, std::size_t first, std::int32_t low,
+                 std::int32_t high) {
     if (out.size() > first && low <= out.back()[1] + 1) out.back()[1] = std::max(out.back()[1], high);
     else out.push_back({low, high});
 }
@@ -68,7 +71,8 @@ void append_union(Spans a, Spans b, std::vector<std::array<std::int32_t, 2>>& ou
 }
 
 // What of [low, high] no span covers.
-void append_rest(Spans spans, std::int32_t low, std::int32_t high, std::vector<std::array<std::int32_t, 2>>& out) {
+void append_rest(Spans spans, std::int32_t low, std::int32_t high,
+                 std::vector<std::array<std::int32_t, 2>>& out) {
     for (const auto& s : spans) {
         if (s[1] < low) continue;
         if (s[0] > high) break;
@@ -90,7 +94,8 @@ public:
     void clear(int cells) { words_.assign(slot(cells) / 64 + 1, 0); }
     void set(std::int32_t low, std::int32_t high) {
         const std::size_t first = slot(low) / 64, last = slot(high) / 64;
-        const std::uint64_t from = ~std::uint64_t{0} << (low % 64), to = ~std::uint64_t{0} >> (63 - high % 64);
+        const std::uint64_t from = ~std::uint64_t{0} << (low % 64),
+                            to = ~std::uint64_t{0} >> (63 - high % 64);
         if (first == last) {
             words_[first] |= from & to;
             return;
@@ -124,11 +129,14 @@ private:
 struct FreshRows {
     struct Run {
         std::int32_t low, high;
-        std::int32_t lead;  // no cell is farther from the nearest one of the other row, if that has cells right beside the run
+        std::int32_t lead;  // no cell is farther from the nearest one of the other row, if that has cells
+                            // right beside the run
     };
     std::vector<std::uint32_t> starts{0};
     std::vector<Run> runs;
-    [[nodiscard]] std::span<const Run> row(std::size_t j) const { return std::span(runs).subspan(starts[j], starts[j + 1] - starts[j]); }
+    [[nodiscard]] std::span<const Run> row(std::size_t j) const {
+        return std::span(runs).subspan(starts[j], starts[j + 1] - starts[j]);
+    }
 };
 
 FreshRows fresh_rows(const CellRows& rows, int step) {
@@ -157,30 +165,34 @@ FreshRows fresh_rows(const CellRows& rows, int step) {
     return fresh;
 }
 
-// Every cell whose middle lies within the radius of some cell's middle; rows and cells from 0, as many as before. A cell that the next nearer row
-// holds as well reaches no farther than that one, nor does one that leads it by no more than the disc is narrower here.
+// Every cell whose middle lies within the radius of some cell's middle; rows and cells from 0, as many as
+// before. A cell that the next nearer row holds as well reaches no farther than that one, nor does one that
+// leads it by no more than the disc is narrower here.
 CellRows grown(Context& context, const CellRows& rows, double radius_cells, int nx) {
     const int reach = static_cast<int>(std::floor(radius_cells + 1e-9)), n = static_cast<int>(rows.rows());
     std::vector<int> width;
     for (int dy = 0; dy <= reach; ++dy) width.push_back(half_width(radius_cells, dy));
     const FreshRows upwards = fresh_rows(rows, 1), downwards = fresh_rows(rows, -1);
-    return make_rows(context, rows.rows(), [&](std::size_t row, std::vector<std::array<std::int32_t, 2>>& out) {
-        const int j = static_cast<int>(row);
-        static thread_local RowBits bits;
-        bits.clear(nx);
-        const auto add = [&](std::int32_t low, std::int32_t high, int w) { bits.set(std::max(0, low - w), std::min(nx - 1, high + w)); };
-        for (const auto& s : rows.row(row)) add(s[0], s[1], width[0]);
-        for (int dy = 1; dy <= reach; ++dy) {
-            const int w = width[slot(dy)], narrower = width[slot(dy - 1)] - w;
-            const auto grow = [&](std::span<const FreshRows::Run> runs) {
-                for (const FreshRows::Run& r : runs)
-                    if (r.lead > narrower) add(r.low, r.high, w);
-            };
-            if (j - dy >= 0) grow(upwards.row(slot(j - dy)));
-            if (j + dy < n) grow(downwards.row(slot(j + dy)));
-        }
-        bits.append_spans(out);
-    });
+    return make_rows(context, rows.rows(),
+                     [&](std::size_t row, std::vector<std::array<std::int32_t, 2>>& out) {
+                         const int j = static_cast<int>(row);
+                         static thread_local RowBits bits;
+                         bits.clear(nx);
+                         const auto add = [&](std::int32_t low, std::int32_t high, int w) {
+                             bits.set(std::max(0, low - w), std::min(nx - 1, high + w));
+                         };
+                         for (const auto& s : rows.row(row)) add(s[0], s[1], width[0]);
+                         for (int dy = 1; dy <= reach; ++dy) {
+                             const int w = width[slot(dy)], narrower = width[slot(dy - 1)] - w;
+                             const auto grow = [&](std::span<const FreshRows::Run> runs) {
+                                 for (const FreshRows::Run& r : runs)
+                                     if (r.lead > narrower) add(r.low, r.high, w);
+                             };
+                             if (j - dy >= 0) grow(upwards.row(slot(j - dy)));
+                             if (j + dy < n) grow(downwards.row(slot(j + dy)));
+                         }
+                         bits.append_spans(out);
+                     });
 }
 
 // The cells whose middle lies within the loops. Cell 0 of row 0 has its middle at x, y (mm).
@@ -195,11 +207,14 @@ CellRows cells_within(const Loops& loops, double x, double y, double cell, int n
             for (std::size_t i = 0; i < loop.size(); ++i) {
                 const Point2 a = loop[i], b = loop[(i + 1) % loop.size()];
                 if (a.y == b.y) continue;
-                const double ax = (to_mm(a.x) - x) / cell, ay = (to_mm(a.y) - y) / cell, bx = (to_mm(b.x) - x) / cell, by = (to_mm(b.y) - y) / cell;
+                const double ax = (to_mm(a.x) - x) / cell, ay = (to_mm(a.y) - y) / cell,
+                             bx = (to_mm(b.x) - x) / cell, by = (to_mm(b.y) - y) / cell;
                 const bool up = ay < by;
                 const int first = std::max(0, static_cast<int>(std::ceil(up ? ay : by))),
                           last = std::min(ny - 1, static_cast<int>(std::ceil(up ? by : ay)) - 1);
-                for (int j = first; j <= last; ++j) take(static_cast<std::size_t>(j), Crossing{ax + (j - ay) / (by - ay) * (bx - ax), up ? -1 : 1});
+                for (int j = first; j <= last; ++j)
+                    take(static_cast<std::size_t>(j),
+                         Crossing{ax + (j - ay) / (by - ay) * (bx - ax), up ? -1 : 1});
             }
         }
     };
@@ -211,8 +226,9 @@ CellRows cells_within(const Loops& loops, double x, double y, double cell, int n
     each_crossing([&](std::size_t j, const Crossing& c) { crossings[next[j]++] = c; });
     CellRows rows;
     for (std::size_t j = 0; j < static_cast<std::size_t>(ny); ++j) {
-        std::sort(crossings.begin() + starts[j], crossings.begin() + starts[j + 1],
-                  [](const Crossing& a, const Crossing& b) { return a.x != b.x ? a.x < b.x : a.turn < b.turn; });
+        std::sort(
+            crossings.begin() + starts[j], crossings.begin() + starts[j + 1],
+            [](const Crossing& a, const Crossing& b) { return a.x != b.x ? a.x < b.x : a.turn < b.turn; });
         const std::size_t first = rows.spans.size();
         int winding = 0;
         double begin = 0;
@@ -221,7 +237,8 @@ CellRows cells_within(const Loops& loops, double x, double y, double cell, int n
             winding += crossings[c].turn;
             if (before <= 0 && winding > 0) begin = crossings[c].x;
             if (before <= 0 || winding > 0) continue;
-            const int low = std::max(0, static_cast<int>(std::ceil(begin))), high = std::min(nx - 1, static_cast<int>(std::ceil(crossings[c].x)) - 1);
+            const int low = std::max(0, static_cast<int>(std::ceil(begin))),
+                      high = std::min(nx - 1, static_cast<int>(std::ceil(crossings[c].x)) - 1);
             if (low <= high) append_span(rows.spans, first, low, high);
         }
         rows.starts.push_back(static_cast<std::uint32_t>(rows.spans.size()));
@@ -231,10 +248,12 @@ CellRows cells_within(const Loops& loops, double x, double y, double cell, int n
 
 // Of the eight cells from i on, those that a span covers, as bits.
 std::uint8_t covered(Spans spans, std::int32_t i, std::int32_t widened) {
-    auto it = std::lower_bound(spans.begin(), spans.end(), i - widened, [](const auto& s, std::int32_t v) { return s[1] < v; });
+    auto it = std::lower_bound(spans.begin(), spans.end(), i - widened,
+                               [](const auto& s, std::int32_t v) { return s[1] < v; });
     unsigned bits = 0;
     for (; it != spans.end() && (*it)[0] - widened < i + kLeaf; ++it) {
-        const int low = std::max(0, (*it)[0] - widened - i), high = std::min(kLeaf - 1, (*it)[1] + widened - i);
+        const int low = std::max(0, (*it)[0] - widened - i),
+                  high = std::min(kLeaf - 1, (*it)[1] + widened - i);
         bits |= (0xFFU >> (kLeaf - 1 - high + low)) << low;
     }
     return static_cast<std::uint8_t>(bits);
@@ -245,35 +264,43 @@ std::uint64_t& slice_of(Leaf& leaf, int k) { return leaf.getValueMask().getWord<
 }  // namespace
 
 VoxelBox voxel_box(const std::array<double, 3>& low, const std::array<double, 3>& high, double voxel) {
-    auto cells = [&](int axis) { return std::max(1, static_cast<int>(std::ceil((high[axis] - low[axis]) / voxel - 1e-6))); };
+    auto cells = [&](int axis) {
+        return std::max(1, static_cast<int>(std::ceil((high[axis] - low[axis]) / voxel - 1e-6)));
+    };
     return {low, voxel, cells(0), cells(1), cells(2)};
 }
 
-LayerVoxels::LayerVoxels(Context& context, const VoxelBox& box, std::span<const Loops> sections, double widest)
+LayerVoxels::LayerVoxels(Context& context, const VoxelBox& box, std::span<const Loops> sections,
+                         double widest)
     : box_(box), border_(static_cast<int>(std::ceil(widest / box.voxel)) + 2) {
     const double x = box.min[0] + (0.5 - border_) * box.voxel, y = box.min[1] + (0.5 - border_) * box.voxel;
     kept_.resize(sections.size());
-    parallel_each(context, sections.size(),
-                  [&](std::size_t k) { kept_[k] = cells_within(sections[k], x, y, box_.voxel, box_.nx + 2 * border_, box_.ny + 2 * border_); });
+    parallel_each(context, sections.size(), [&](std::size_t k) {
+        kept_[k] = cells_within(sections[k], x, y, box_.voxel, box_.nx + 2 * border_, box_.ny + 2 * border_);
+    });
     std::uint64_t bytes = 0;
     for (std::size_t k = sections.size(); k-- > 0;) {
         if (k + 1 < sections.size())
-            kept_[k] =
-                make_rows(context, kept_[k].rows(), [&](std::size_t j, auto& out) { append_union(kept_[k].row(j), kept_[k + 1].row(j), out); });
-        bytes += kept_[k].spans.size() * sizeof(kept_[k].spans[0]) + kept_[k].starts.size() * sizeof(std::uint32_t);
+            kept_[k] = make_rows(context, kept_[k].rows(), [&](std::size_t j, auto& out) {
+                append_union(kept_[k].row(j), kept_[k + 1].row(j), out);
+            });
+        bytes += kept_[k].spans.size() * sizeof(kept_[k].spans[0]) +
+                 kept_[k].starts.size() * sizeof(std::uint32_t);
     }
     memory_.emplace(context, bytes, "the voxels of a layer");
 }
 
 int LayerVoxels::slice_at(double tip) const {
-    return std::clamp(static_cast<int>(std::ceil((tip - box_.min[2]) / box_.voxel - 0.5 - 1e-6)), 0, box_.nz - 1);
+    return std::clamp(static_cast<int>(std::ceil((tip - box_.min[2]) / box_.voxel - 0.5 - 1e-6)), 0,
+                      box_.nz - 1);
 }
 
 double LayerVoxels::area_to_clear(double tip) const {
     const CellRows& kept = kept_[static_cast<std::size_t>(slice_at(tip))];
     std::int64_t cells = static_cast<std::int64_t>(box_.nx) * box_.ny;
     for (int j = 0; j < box_.ny; ++j)
-        for (const auto& s : kept.row(slot(j + border_))) cells -= std::max(0, std::min(s[1], border_ + box_.nx - 1) - std::max(s[0], border_) + 1);
+        for (const auto& s : kept.row(slot(j + border_)))
+            cells -= std::max(0, std::min(s[1], border_ + box_.nx - 1) - std::max(s[0], border_) + 1);
     return static_cast<double>(cells) * box_.voxel * box_.voxel;
 }
 
@@ -282,11 +309,13 @@ const CellRows& LayerVoxels::reached(Context& context, int slice, double radius,
     if (const auto it = reached_.find(key); it != reached_.end()) return it->second;
     const CellRows& kept = kept_[static_cast<std::size_t>(slice)];
     const int nx = box_.nx + 2 * border_;
-    // A wall lies half a cell before the middle of the first cell behind it, and half a cell behind that of the last before it. A cutter
-    // that touches is let in.
+    // A wall lies half a cell before the middle of the first cell behind it, and half a cell behind that of
+    // the last before it. A cutter that touches is let in.
     const double off = (radius + allowance) / box_.voxel + 0.5;
     const CellRows barred = grown(context, kept, std::nextafter(off - 1e-6, 0.0), nx);
-    const CellRows places = make_rows(context, barred.rows(), [&](std::size_t j, auto& out) { append_rest(barred.row(j), 0, nx - 1, out); });
+    const CellRows places = make_rows(context, barred.rows(), [&](std::size_t j, auto& out) {
+        append_rest(barred.row(j), 0, nx - 1, out);
+    });
     return reached_.emplace(key, grown(context, places, radius / box_.voxel + 0.5, nx)).first->second;
 }
 
@@ -301,10 +330,12 @@ double LayerVoxels::reached_share(Context& context, double radius, int every) {
         for (std::size_t j = static_cast<std::size_t>(border_); j < slot(border_ + box_.ny); ++j)
             for (const auto& s : with_edge.row(j)) {
                 beside.clear();
-                append_rest(kept.row(j), std::max(s[0], border_), std::min(s[1], border_ + box_.nx - 1), beside);
+                append_rest(kept.row(j), std::max(s[0], border_), std::min(s[1], border_ + box_.nx - 1),
+                            beside);
                 for (const auto& edge : beside) {
                     all += edge[1] - edge[0] + 1;
-                    for (const auto& r : reach.row(j)) touched += std::max(0, std::min(edge[1], r[1]) - std::max(edge[0], r[0]) + 1);
+                    for (const auto& r : reach.row(j))
+                        touched += std::max(0, std::min(edge[1], r[1]) - std::max(edge[0], r[0]) + 1);
                 }
             }
     }
@@ -315,7 +346,8 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
     // Of all levels at or under a slice the highest one clears most of it: what is kept grows downwards.
     std::vector<int> level(static_cast<std::size_t>(box_.nz), -1);  // by slice: the slice of its level's tip
     for (const double tip : roughing.tips)
-        for (int k = slice_at(tip); k < box_.nz && box_.z(k) >= tip - 1e-6 && level[static_cast<std::size_t>(k)] < 0; ++k)
+        for (int k = slice_at(tip);
+             k < box_.nz && box_.z(k) >= tip - 1e-6 && level[static_cast<std::size_t>(k)] < 0; ++k)
             level[static_cast<std::size_t>(k)] = slice_at(tip);
     std::map<int, CellRows> gone;
     for (const int at : level) {
@@ -323,17 +355,20 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
         CellRows rows = reached(context, at, roughing.radius, roughing.allowance);
         for (const double wider : roughing.wider) {
             const CellRows& more = reached(context, at, wider, roughing.allowance);
-            rows = make_rows(context, rows.rows(), [&](std::size_t j, auto& out) { append_union(rows.row(j), more.row(j), out); });
+            rows = make_rows(context, rows.rows(),
+                             [&](std::size_t j, auto& out) { append_union(rows.row(j), more.row(j), out); });
         }
         gone.emplace(at, std::move(rows));
     }
 
-    // Leaves of what is left: strips of eight rows and eight slices in parallel, put into the tree in their order.
+    // Leaves of what is left: strips of eight rows and eight slices in parallel, put into the tree in their
+    // order.
     struct Piece {
         openvdb::Coord at;
         std::unique_ptr<Leaf> leaf;
     };
-    const int strips = (box_.ny + kLeaf - 1) / kLeaf, bands = (box_.nz + kLeaf - 1) / kLeaf, columns = (box_.nx + kLeaf - 1) / kLeaf;
+    const int strips = (box_.ny + kLeaf - 1) / kLeaf, bands = (box_.nz + kLeaf - 1) / kLeaf,
+              columns = (box_.nx + kLeaf - 1) / kLeaf;
     std::vector<std::vector<Piece>> pieces(static_cast<std::size_t>(strips) * bands);
     parallel_for(context, pieces.size(), 16, [&](std::size_t begin, std::size_t end) {
         std::vector<std::unique_ptr<Leaf>> open(static_cast<std::size_t>(columns));
@@ -345,14 +380,16 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
                     const auto row = slot(j + border_);
                     const int at = level[static_cast<std::size_t>(k)];
                     both.clear(), rest.clear();
-                    append_union(kept_[static_cast<std::size_t>(k)].row(row), at < 0 ? Spans{} : gone.at(at).row(row), both);
+                    append_union(kept_[static_cast<std::size_t>(k)].row(row),
+                                 at < 0 ? Spans{} : gone.at(at).row(row), both);
                     append_rest(both, border_, border_ + box_.nx - 1, rest);
                     for (const auto& s : rest)
                         for (int c = (s[0] - border_) / kLeaf; c <= (s[1] - border_) / kLeaf; ++c) {
                             std::unique_ptr<Leaf>& leaf = open[static_cast<std::size_t>(c)];
                             if (!leaf) leaf = std::make_unique<Leaf>(openvdb::Coord(k0, j0, c * kLeaf));
                             const std::array<std::int32_t, 2> run{s[0] - border_, s[1] - border_};
-                            slice_of(*leaf, k - k0) |= std::uint64_t{covered(std::span(&run, 1), c * kLeaf, 0)} << (8 * (j - j0));
+                            slice_of(*leaf, k - k0) |=
+                                std::uint64_t{covered(std::span(&run, 1), c * kLeaf, 0)} << (8 * (j - j0));
                         }
                 }
             for (std::unique_ptr<Leaf>& leaf : open)
@@ -372,7 +409,8 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
     std::vector<std::uint64_t> voxels(static_cast<std::size_t>(box_.nz), 0), outside(voxels);
     for (Leaf* leaf : leaves)
         for (int k = 0; k < kLeaf && leaf->origin().x() + k < box_.nz; ++k)
-            voxels[slot(leaf->origin().x() + k)] += static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
+            voxels[slot(leaf->origin().x() + k)] +=
+                static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
     result.sparse_bytes = tree.memUsage();
 
     const double reach = swath / box_.voxel + 0.5;
@@ -385,26 +423,31 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
                 std::uint64_t& slice = slice_of(*leaves[l], dk);
                 if (slice == 0) continue;
                 const auto [k, j0, i0] =
-                    std::array{leaves[l]->origin().x() + dk, leaves[l]->origin().y() + border_, leaves[l]->origin().z() + border_};
-                const CellRows &kept = kept_[static_cast<std::size_t>(k)], &under = kept_[static_cast<std::size_t>(std::max(0, k - below))];
+                    std::array{leaves[l]->origin().x() + dk, leaves[l]->origin().y() + border_,
+                               leaves[l]->origin().z() + border_};
+                const CellRows &kept = kept_[static_cast<std::size_t>(k)],
+                               &under = kept_[static_cast<std::size_t>(std::max(0, k - below))];
                 for (int dj = 0; dj < kLeaf; ++dj) {
                     auto cells = static_cast<std::uint8_t>(slice >> (8 * dj));
                     if (cells == 0) continue;
                     const std::uint8_t before = cells;
                     const int j = j0 + dj;
-                    cells &= static_cast<std::uint8_t>(~covered(under.row(static_cast<std::size_t>(j)), i0, 0));
+                    cells &=
+                        static_cast<std::uint8_t>(~covered(under.row(static_cast<std::size_t>(j)), i0, 0));
                     for (int dy = 0; dy < static_cast<int>(width.size()) && cells != 0; ++dy)
                         for (const int row : {j - dy, j + dy})
                             if (row >= 0 && row < rows)
                                 cells &= static_cast<std::uint8_t>(
-                                    ~covered(kept.row(static_cast<std::size_t>(row)), i0, width[static_cast<std::size_t>(dy)]));
+                                    ~covered(kept.row(static_cast<std::size_t>(row)), i0,
+                                             width[static_cast<std::size_t>(dy)]));
                     slice ^= std::uint64_t{static_cast<std::uint8_t>(before ^ cells)} << (8 * dj);
                 }
             }
     });
     for (Leaf* leaf : leaves)
         for (int k = 0; k < kLeaf && leaf->origin().x() + k < box_.nz; ++k)
-            outside[slot(leaf->origin().x() + k)] += static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
+            outside[slot(leaf->origin().x() + k)] +=
+                static_cast<std::uint64_t>(std::popcount(slice_of(*leaf, k)));
 
     const double cell = box_.voxel * box_.voxel;
     int worst = 0;
@@ -424,7 +467,8 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
         first = std::min(first, {leaf->origin().y() + bit / 8, leaf->origin().z() + bit % 8});
     }
     if (result.area > 0)
-        result.where = {box_.min[0] + (first.second + 0.5) * box_.voxel, box_.min[1] + (first.first + 0.5) * box_.voxel, box_.z(worst)};
+        result.where = {box_.min[0] + (first.second + 0.5) * box_.voxel,
+                        box_.min[1] + (first.first + 0.5) * box_.voxel, box_.z(worst)};
     return result;
 }
 

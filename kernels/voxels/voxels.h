@@ -1,5 +1,5 @@
-// The stock of one layer as voxels, and what roughing leaves of it outside the swath of the cutter that follows: the semi-rough area AS
-// of LUO 5.5.2 (method.md section 7).
+// The stock of one layer as voxels, and what roughing leaves of it outside the swath of the cutter that
+// follows: the semi-rough area AS of LUO 5.5.2 (method.md section 7).
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@
 
 namespace slabwright {
 
-/// Cells of a plane grid, row by row: those of row j are the spans spans[starts[j]] … spans[starts[j + 1] − 1], first and last cell of
-/// each, ascending, disjoint, and with a cell between two of them.
+/// Cells of a plane grid, row by row: those of row j are the spans spans[starts[j]] … spans[starts[j + 1] −
+/// 1], first and last cell of each, ascending, disjoint, and with a cell between two of them.
 struct CellRows {
     std::vector<std::uint32_t> starts{0};
     std::vector<std::array<std::int32_t, 2>> spans;
@@ -35,7 +35,8 @@ struct VoxelBox {
     [[nodiscard]] double z(int k) const { return min[2] + (k + 0.5) * voxel; }
 };
 /// The fewest voxels that cover the box from `low` to `high`.
-[[nodiscard]] VoxelBox voxel_box(const std::array<double, 3>& low, const std::array<double, 3>& high, double voxel);
+[[nodiscard]] VoxelBox voxel_box(const std::array<double, 3>& low, const std::array<double, 3>& high,
+                                 double voxel);
 
 /// What a roughing leaves. Areas are those of the slice where they are largest, mm².
 struct RoughLeft {
@@ -48,11 +49,12 @@ struct RoughLeft {
     [[nodiscard]] bool nothing(double voxel) const { return area <= 4 * voxel * voxel; }
 };
 
-/// One layer's stock. What must be kept at a height is the pattern's section there and everything that overhangs it within the layer, for
-/// all cutters come from above.
+/// One layer's stock. What must be kept at a height is the pattern's section there and everything that
+/// overhangs it within the layer, for all cutters come from above.
 class LayerVoxels {
 public:
-    /// @param sections one for each slice, ascending, at box.z(k): loops of any nesting (non-zero winding), in 0.1 µm
+    /// @param sections one for each slice, ascending, at box.z(k): loops of any nesting (non-zero winding),
+    /// in 0.1 µm
     /// @param widest   mm: no radius that is asked for later, with what is kept off the walls, is larger
     /// @throws Error(no_plan, "memory.limit"), Error(cancelled)
     LayerVoxels(Context& context, const VoxelBox& box, std::span<const Loops> sections, double widest);
@@ -62,17 +64,18 @@ public:
         double radius = 0;         ///< mm
         double allowance = 0;      ///< mm kept off the walls
         std::vector<double> tips;  ///< mm, descending
-        /// Radii of wider cutters, whose reach belongs to this one's: a disc of cells is not always made of smaller discs of cells, and
-        /// what a tool leaves must not grow as it shrinks.
+        /// Radii of wider cutters, whose reach belongs to this one's: a disc of cells is not always made of
+        /// smaller discs of cells, and what a tool leaves must not grow as it shrinks.
         std::vector<double> wider;
     };
 
-    /// What the roughing leaves, and of that what lies farther than `swath` (mm) from what is kept, sideways at its height and straight
-    /// above it. A gap must be up to half a voxel wider than the cutter to let it in.
+    /// What the roughing leaves, and of that what lies farther than `swath` (mm) from what is kept, sideways
+    /// at its height and straight above it. A gap must be up to half a voxel wider than the cutter to let it
+    /// in.
     [[nodiscard]] RoughLeft left(Context& context, const Roughing& roughing, double swath);
 
-    /// The share of the walls' length, over every `every`-th slice, that a disc of this radius touches without entering what is kept; 1
-    /// where there are none. To within half a voxel.
+    /// The share of the walls' length, over every `every`-th slice, that a disc of this radius touches
+    /// without entering what is kept; 1 where there are none. To within half a voxel.
     [[nodiscard]] double reached_share(Context& context, double radius, int every);
 
     /// mm², of all the stock that is not kept at a tip height (an A_i of t_r = Σ A_i / (2R·f)).

@@ -1,7 +1,7 @@
-// The command on real meshes made by others, one process a file: every part is planned or refused with a true reason and
-// a place, nothing crashes, hangs or stays silent, every program that comes out is read by LinuxCNC's interpreter, and the
-// simulation of the programs makes the part. The same for parts turned about z; with SLABWRIGHT_SOAK set for all of them, scaled so
-// that they fill the slab, which takes hours.
+// The command on real meshes made by others, one process a file: every part is planned or refused with a true
+// reason and a place, nothing crashes, hangs or stays silent, every program that comes out is read by
+// LinuxCNC's interpreter, and the simulation of the programs makes the part. The same for parts turned about
+// z; with SLABWRIGHT_SOAK set for all of them, scaled so that they fill the slab, which takes hours.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -36,8 +36,8 @@ struct Outcome {
 
 Outcome run_command(const std::string& arguments, const fs::path& folder) {
     // timeout's 124 tells a hang from a crash.
-    const std::string command =
-        "timeout 3000 '" SLABWRIGHT_COMMAND "' " + arguments + " >'" + (folder / "stdout").string() + "' 2>'" + (folder / "stderr").string() + "'";
+    const std::string command = "timeout 3000 '" SLABWRIGHT_COMMAND "' " + arguments + " >'" +
+                                (folder / "stdout").string() + "' 2>'" + (folder / "stderr").string() + "'";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), slurp(folder / "stderr")};
 }
@@ -66,11 +66,13 @@ void check_programs(const fs::path& out) {
             for (std::size_t k = 3; k < ours.size(); ++k) {  // from where all axes are known
                 const auto& a = canon.motions[k];
                 const auto& b = ours[k];
-                ASSERT_TRUE(std::abs(a.x - b.x) < 6e-5 && std::abs(a.y - b.y) < 6e-5 && std::abs(a.z - b.z) < 6e-5 && a.rapid == b.rapid())
+                ASSERT_TRUE(std::abs(a.x - b.x) < 6e-5 && std::abs(a.y - b.y) < 6e-5 &&
+                            std::abs(a.z - b.z) < 6e-5 && a.rapid == b.rapid())
                     << file << " motion " << k;
             }
         }
-    EXPECT_EQ(named, static_cast<std::size_t>(std::distance(fs::directory_iterator(out / "nc"), fs::directory_iterator{})));
+    EXPECT_EQ(named, static_cast<std::size_t>(
+                         std::distance(fs::directory_iterator(out / "nc"), fs::directory_iterator{})));
     EXPECT_GT(named, 0U);
 }
 
@@ -87,14 +89,16 @@ void plan_or_refuse(const fs::path& file, bool nasty) {
     SCOPED_TRACE(file.filename().string());
     TemporaryFolder temporary;
     const fs::path out = temporary.path / "out";
-    Outcome outcome = run_command("plan '" + file.string() + "' -o '" + out.string() + "' --json", temporary.path);
+    Outcome outcome =
+        run_command("plan '" + file.string() + "' -o '" + out.string() + "' --json", temporary.path);
     if (outcome.status == 0) {
         std::printf("%-44s planned\n", file.filename().c_str());
         check_programs(out);
         check_verdict(out);
         return;
     }
-    ASSERT_TRUE(outcome.status == 3 || outcome.status == 4) << "exit " << outcome.status << ' ' << outcome.errors << slurp(temporary.path / "stdout");
+    ASSERT_TRUE(outcome.status == 3 || outcome.status == 4)
+        << "exit " << outcome.status << ' ' << outcome.errors << slurp(temporary.path / "stdout");
     EXPECT_FALSE(fs::exists(out)) << "something half-written stays";
     nlohmann::json error;
     ASSERT_NO_THROW(error = nlohmann::json::parse(outcome.errors)) << outcome.errors;
@@ -103,7 +107,8 @@ void plan_or_refuse(const fs::path& file, bool nasty) {
     std::printf("%-44s refused: %s\n", file.filename().c_str(), code.c_str());
     EXPECT_FALSE(place.empty());
     EXPECT_FALSE(remedy.empty());
-    // What can be accepted is planned once it is: an undercut by the flag, hairline cracks by the weld it names.
+    // What can be accepted is planned once it is: an undercut by the flag, hairline cracks by the weld it
+    // names.
     std::string accept;
     if (code == "undercut.unmade" && !nasty) accept = "--allow-undercut";
     if (const std::size_t at = remedy.find("--weld "); at != std::string::npos && !nasty) {
@@ -111,12 +116,14 @@ void plan_or_refuse(const fs::path& file, bool nasty) {
         accept = "--allow-undercut --weld " + number.substr(0, number.find(' '));
     }
     if (accept.empty()) return;
-    outcome = run_command("plan '" + file.string() + "' -o '" + out.string() + "' --json " + accept, temporary.path);
+    outcome = run_command("plan '" + file.string() + "' -o '" + out.string() + "' --json " + accept,
+                          temporary.path);
     ASSERT_EQ(outcome.status, 0) << accept << ": " << outcome.errors << slurp(temporary.path / "stdout");
     const nlohmann::json plan = nlohmann::json::parse(slurp(out / "plan.json"));
     if (code == "undercut.unmade") {
         bool told = false;
-        for (const auto& d : plan["diagnostics"]) told |= d["code"] == "undercut.unmade" && d.contains("where");
+        for (const auto& d : plan["diagnostics"])
+            told |= d["code"] == "undercut.unmade" && d.contains("where");
         EXPECT_TRUE(told) << "the undercut is accepted but not told";
     }
     check_programs(out);
@@ -150,21 +157,24 @@ TEST_P(PlanCorpus, PlannedOrRefused) {
     const Share& share = GetParam();
     const std::vector<fs::path> files = files_of(fs::path(corpus) / share.folder);
     ASSERT_GE(files.size(), share.of);
-    for (std::size_t i = share.which; i < files.size(); i += share.of) plan_or_refuse(files[i], std::string(share.folder) == "nasty");
+    for (std::size_t i = share.which; i < files.size(); i += share.of)
+        plan_or_refuse(files[i], std::string(share.folder) == "nasty");
 }
 
 std::string share_name(const testing::TestParamInfo<Share>& info) {
-    return info.param.of == 1 ? info.param.folder : std::string(info.param.folder) + std::to_string(info.param.which + 1);
+    return info.param.of == 1 ? info.param.folder
+                              : std::string(info.param.folder) + std::to_string(info.param.which + 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Real, PlanCorpus,
-                         testing::Values(Share{"castings", 0, 5}, Share{"castings", 1, 5}, Share{"castings", 2, 5}, Share{"castings", 3, 5},
-                                         Share{"castings", 4, 5}, Share{"relief", 0, 3}, Share{"relief", 1, 3}, Share{"relief", 2, 3},
-                                         Share{"nasty", 0, 1}),
+                         testing::Values(Share{"castings", 0, 5}, Share{"castings", 1, 5},
+                                         Share{"castings", 2, 5}, Share{"castings", 3, 5},
+                                         Share{"castings", 4, 5}, Share{"relief", 0, 3},
+                                         Share{"relief", 1, 3}, Share{"relief", 2, 3}, Share{"nasty", 0, 1}),
                          share_name);
 
-// A part as other people would lay it on the table: turned by 33° about z, so that no wall follows an axis, and scaled so that its longer
-// side is `side` mm (0: as it is).
+// A part as other people would lay it on the table: turned by 33° about z, so that no wall follows an axis,
+// and scaled so that its longer side is `side` mm (0: as it is).
 void write_turned(const fs::path& from, const fs::path& to, double side) {
     Context context;
     const StlMesh stl = read_stl(context, from.string(), {LengthUnit::mm, 0});
@@ -172,17 +182,22 @@ void write_turned(const fs::path& from, const fs::path& to, double side) {
     std::vector<std::array<double, 3>> points;
     double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
     for (const Vec3f& v : stl.mesh.vertices) {
-        points.push_back({std::cos(turn) * v.x - std::sin(turn) * v.y, std::sin(turn) * v.x + std::cos(turn) * v.y, v.z});
-        for (int k = 0; k < 2; ++k) low[k] = std::min(low[k], points.back()[k]), high[k] = std::max(high[k], points.back()[k]);
+        points.push_back(
+            {std::cos(turn) * v.x - std::sin(turn) * v.y, std::sin(turn) * v.x + std::cos(turn) * v.y, v.z});
+        for (int k = 0; k < 2; ++k)
+            low[k] = std::min(low[k], points.back()[k]), high[k] = std::max(high[k], points.back()[k]);
     }
     const double scale = side > 0 ? side / std::max(high[0] - low[0], high[1] - low[1]) : 1;
     std::string bytes(80, ' ');
-    auto append = [&](const auto& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
+    auto append = [&](const auto& value) {
+        bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+    };
     append(static_cast<std::uint32_t>(stl.mesh.facets.size()));
     for (const Index3& f : stl.mesh.facets) {
         for (int k = 0; k < 3; ++k) append(0.0F);
         for (const std::uint32_t v : f)
-            for (int k = 0; k < 3; ++k) append(static_cast<float>((points[v][k] - (k < 2 ? low[k] : 0)) * scale));
+            for (int k = 0; k < 3; ++k)
+                append(static_cast<float>((points[v][k] - (k < 2 ? low[k] : 0)) * scale));
         append(std::uint16_t{0});
     }
     std::ofstream(to, std::ios::binary) << bytes;
@@ -193,7 +208,8 @@ TEST(PlanCorpusTurned, PlannedOrRefused) {
     if (!corpus) return;
     const bool soak = std::getenv("SLABWRIGHT_SOAK") != nullptr;
     TemporaryFolder temporary;
-    std::vector<fs::path> files{fs::path(corpus) / "castings/midget_crankcase_front_pattern.stl", fs::path(corpus) / "castings/mold_cavity_ktool.stl",
+    std::vector<fs::path> files{fs::path(corpus) / "castings/midget_crankcase_front_pattern.stl",
+                                fs::path(corpus) / "castings/mold_cavity_ktool.stl",
                                 fs::path(corpus) / "relief/hmstl_blob.stl"};
     if (soak) {
         files = files_of(fs::path(corpus) / "castings");

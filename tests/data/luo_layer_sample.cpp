@@ -22,7 +22,9 @@ Vec3f place(double x, double y, double z) {
     return {static_cast<float>(x * mm), static_cast<float>(y * mm), static_cast<float>(z * mm)};
 }
 
-double turn(const ProfileCorner& a, const ProfileCorner& b, const ProfileCorner& c) { return (b.x - a.x) * (c.z - a.z) - (b.z - a.z) * (c.x - a.x); }
+double turn(const ProfileCorner& a, const ProfileCorner& b, const ProfileCorner& c) {
+    return (b.x - a.x) * (c.z - a.z) - (b.z - a.z) * (c.x - a.x);
+}
 
 // Counter-clockwise in x and z: along the base, then back over the top from right to left.
 std::vector<ProfileCorner> profile() {
@@ -30,9 +32,10 @@ std::vector<ProfileCorner> profile() {
         {0, 0},       {4.3, 0},     {4.3, .700},                                             //
         {3.5, .700},  {3.5, 1.200}, {3.9, 1.200}, {3.9, 1.500}, {3.2, 1.500},                // the tee
         {3.2, 1.180}, {2.9, 1.180}, {2.9, 1.000}, {2.3, 1.000}, {2.3, .700},  {2.08, .700},  // steps
-        {2.08, .805}, {2.02, .744}, {1.6, .652},  {1.6, .300},                               // sharp ridge and ramp of 12.4°
+        {2.08, .805}, {2.02, .744}, {1.6, .652},  {1.6, .300},  // sharp ridge and ramp of 12.4°
     };
-    // The round ridge: 15° down its side it has fallen by .026, which fixes the radius. From there on down facets are steeper.
+    // The round ridge: 15° down its side it has fallen by .026, which fixes the radius. From there on down
+    // facets are steeper.
     constexpr double degree = std::numbers::pi / 180;
     const double radius = .026 / (1 - std::cos(15 * degree)), left = std::acos(1 - (.650 - .523) / radius);
     const double middle = .64 + radius * std::sin(left), right = middle + radius * std::sin(25 * degree);
@@ -46,15 +49,18 @@ std::vector<ProfileCorner> profile() {
     return p;
 }
 
-void cap(std::vector<Triangle>& triangles, std::vector<ProfileCorner> rest, double y, bool facing_negative_y) {
+void cap(std::vector<Triangle>& triangles, std::vector<ProfileCorner> rest, double y,
+         bool facing_negative_y) {
     auto add = [&](const ProfileCorner& a, const ProfileCorner& b, const ProfileCorner& c) {
-        if (facing_negative_y) triangles.push_back({place(a.x, y, a.z), place(b.x, y, b.z), place(c.x, y, c.z)});
+        if (facing_negative_y)
+            triangles.push_back({place(a.x, y, a.z), place(b.x, y, b.z), place(c.x, y, c.z)});
         else triangles.push_back({place(a.x, y, a.z), place(c.x, y, c.z), place(b.x, y, b.z)});
     };
     while (rest.size() > 3) {  // ears, cut one by one
         bool found = false;
         for (std::size_t i = 0; i < rest.size() && !found; ++i) {
-            const ProfileCorner a = rest[(i + rest.size() - 1) % rest.size()], b = rest[i], c = rest[(i + 1) % rest.size()];
+            const ProfileCorner a = rest[(i + rest.size() - 1) % rest.size()], b = rest[i],
+                                c = rest[(i + 1) % rest.size()];
             if (turn(a, b, c) <= 1e-12) continue;
             bool empty = true;
             for (std::size_t j = 0; j < rest.size() && empty; ++j) {
@@ -73,8 +79,10 @@ void cap(std::vector<Triangle>& triangles, std::vector<ProfileCorner> rest, doub
 
 // The flat at 1.000, x 2.3 to 2.9, with a pit whose four sides meet in a short line at .755.
 void flat_with_pit(std::vector<Triangle>& triangles) {
-    const std::array<Vec3f, 4> outer = {place(2.3, 0, 1), place(2.9, 0, 1), place(2.9, kDepth, 1), place(2.3, kDepth, 1)};
-    const std::array<Vec3f, 4> rim = {place(2.45, .6, 1), place(2.75, .6, 1), place(2.75, 1.4, 1), place(2.45, 1.4, 1)};
+    const std::array<Vec3f, 4> outer = {place(2.3, 0, 1), place(2.9, 0, 1), place(2.9, kDepth, 1),
+                                        place(2.3, kDepth, 1)};
+    const std::array<Vec3f, 4> rim = {place(2.45, .6, 1), place(2.75, .6, 1), place(2.75, 1.4, 1),
+                                      place(2.45, 1.4, 1)};
     const Vec3f near = place(2.6, .85, .755), far = place(2.6, 1.15, .755);
     for (std::size_t i = 0; i < 4; ++i) {
         const std::size_t j = (i + 1) % 4;

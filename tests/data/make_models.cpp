@@ -15,7 +15,8 @@ using namespace slabwright;
 
 void write_file(const std::string& path, const std::string& bytes) {
     std::ofstream file(path, std::ios::binary);
-    if (!file.write(bytes.data(), static_cast<std::streamsize>(bytes.size())).flush()) throw std::runtime_error(path + ": cannot be written");
+    if (!file.write(bytes.data(), static_cast<std::streamsize>(bytes.size())).flush())
+        throw std::runtime_error(path + ": cannot be written");
 }
 
 void write_all(const std::string& directory) {
@@ -26,7 +27,8 @@ void write_all(const std::string& directory) {
 }
 
 void write_metre(const std::string& path, const MetrePattern& pattern, bool shuffled) {
-    const std::uint64_t facets = metre_pattern_facets(pattern);  // before anything is written: it refuses what cannot be made
+    const std::uint64_t facets =
+        metre_pattern_facets(pattern);  // before anything is written: it refuses what cannot be made
     std::ofstream file(path, std::ios::binary);
     auto write_head = [&](std::uint64_t count) {
         const std::string head = stl_head("metre", count);

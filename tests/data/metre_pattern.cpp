@@ -1,6 +1,6 @@
-// A plate of square tiles with one feature in each. Every tile is meshed by rings of equally many vertices, from its square
-// border inward, so neighbours share their border vertices and the whole is closed, whatever the number of facets; and
-// nothing but one ring is ever held.
+// A plate of square tiles with one feature in each. Every tile is meshed by rings of equally many vertices,
+// from its square border inward, so neighbours share their border vertices and the whole is closed, whatever
+// the number of facets; and nothing but one ring is ever held.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -28,16 +28,21 @@ public:
         return v ^ v >> 31;
     }
     std::uint64_t below(std::uint64_t n) { return next() % n; }
-    double between(double low, double high) { return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53; }
+    double between(double low, double high) {
+        return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
+    }
 
 private:
     std::uint64_t state_;
 };
 
-/// How the facets are shared out: tiles × tiles, `around` vertices to a ring, `rings` strips and a fan in each tile.
+/// How the facets are shared out: tiles × tiles, `around` vertices to a ring, `rings` strips and a fan in
+/// each tile.
 struct Grid {
     std::uint64_t tiles = 1, around = 16, rings = kFewestRings;
-    [[nodiscard]] std::uint64_t facets() const { return around * (tiles * tiles * (2 * rings + 1) + 3 * tiles); }
+    [[nodiscard]] std::uint64_t facets() const {
+        return around * (tiles * tiles * (2 * rings + 1) + 3 * tiles);
+    }
 };
 
 Grid share_out(const MetrePattern& pattern) {
@@ -46,15 +51,19 @@ Grid share_out(const MetrePattern& pattern) {
     Grid best;
     best.tiles = pattern.facets >= 12'000 ? 8 : pattern.facets >= 3000 ? 4 : pattern.facets >= 800 ? 2 : 1;
     if (pattern.height_mm > 3 * pattern.size_mm / static_cast<double>(best.tiles))
-        throw std::invalid_argument("metre_pattern: the height is over 3 × size / tiles, drafted walls do not fit");
-    // Twice as many vertices around as rings, so that facets keep their shape as they grow in number, and hardly more than were wished
-    // for: one per cent too many counts as much as a shape that is a tenth off.
+        throw std::invalid_argument(
+            "metre_pattern: the height is over 3 × size / tiles, drafted walls do not fit");
+    // Twice as many vertices around as rings, so that facets keep their shape as they grow in number, and
+    // hardly more than were wished for: one per cent too many counts as much as a shape that is a tenth off.
     const double area = static_cast<double>(pattern.facets) / static_cast<double>(best.tiles * best.tiles);
-    const std::uint64_t middle = std::max<std::uint64_t>(kFewestRings, static_cast<std::uint64_t>(std::sqrt(area / 4)));
+    const std::uint64_t middle =
+        std::max<std::uint64_t>(kFewestRings, static_cast<std::uint64_t>(std::sqrt(area / 4)));
     double least = std::numeric_limits<double>::infinity();
-    for (std::uint64_t rings = std::max(kFewestRings, middle / 2); rings <= middle + middle / 2 + 4; ++rings) {
+    for (std::uint64_t rings = std::max(kFewestRings, middle / 2); rings <= middle + middle / 2 + 4;
+         ++rings) {
         Grid grid{best.tiles, 1, rings};
-        grid.around = std::max<std::uint64_t>(16, (pattern.facets + 8 * grid.facets() - 1) / (8 * grid.facets()) * 8);
+        grid.around =
+            std::max<std::uint64_t>(16, (pattern.facets + 8 * grid.facets() - 1) / (8 * grid.facets()) * 8);
         const double excess = static_cast<double>(grid.facets()) / static_cast<double>(pattern.facets) - 1;
         const double shape = std::log(static_cast<double>(grid.around) / static_cast<double>(2 * rings));
         if (const double cost = excess + 0.1 * std::abs(shape); cost < least) least = cost, best = grid;
@@ -62,17 +71,19 @@ Grid share_out(const MetrePattern& pattern) {
     return best;
 }
 
-/// What stands on a tile: an outline (a rectangle with rounded corners around the tile's centre), a profile, and a cap.
+/// What stands on a tile: an outline (a rectangle with rounded corners around the tile's centre), a profile,
+/// and a cap.
 struct Feature {
     double half_x = 0, half_y = 0, corner = 0;
     Profile profile;
     double dome = 0;  ///< height of the paraboloid over the last ring; 0: a flat
 };
 
-/// The outline's point number i of `around`, counter-clockwise. A quarter of them belongs to each side of the tile, from the middle of
-/// one corner's arc to that of the next, shared out by length but always with one where an arc begins, so that walls are true planes and
-/// cones and ends of ribs as smooth as bosses. Both this and the border run monotonically along the side, with the border further out,
-/// so that nothing between them folds over.
+/// The outline's point number i of `around`, counter-clockwise. A quarter of them belongs to each side of the
+/// tile, from the middle of one corner's arc to that of the next, shared out by length but always with one
+/// where an arc begins, so that walls are true planes and cones and ends of ribs as smooth as bosses. Both
+/// this and the border run monotonically along the side, with the border further out, so that nothing between
+/// them folds over.
 OutlinePoint outline_point(const Feature& f, std::size_t i, std::size_t around) {
     const std::size_t quarter = around / 4, half = quarter / 2, side = i / quarter, k = i % quarter;
     // Outward normal and running direction of the sides: bottom, right, top, left.
@@ -83,13 +94,18 @@ OutlinePoint outline_point(const Feature& f, std::size_t i, std::size_t around) 
     // Steps from the side's middle to the end of its straight part, and from there to the middle of the arc.
     std::size_t on_straight = 0;
     if (straight > 1e-9)
-        on_straight = std::clamp<std::size_t>(static_cast<std::size_t>(static_cast<double>(half) * straight / (straight + arc) + 0.5), 1, half - 1);
+        on_straight = std::clamp<std::size_t>(
+            static_cast<std::size_t>(static_cast<double>(half) * straight / (straight + arc) + 0.5), 1,
+            half - 1);
     const std::size_t step = k < half ? half - k : k - half;
     const double sign = k < half ? -1 : 1;
     double angle = 0, run = straight;
     if (step < on_straight) run = straight * static_cast<double>(step) / static_cast<double>(on_straight);
-    else angle = std::numbers::pi / 4 * static_cast<double>(step - on_straight) / static_cast<double>(half - on_straight);
-    const double across = out - f.corner * (1 - std::cos(angle)), along = sign * (run + f.corner * std::sin(angle));
+    else
+        angle = std::numbers::pi / 4 * static_cast<double>(step - on_straight) /
+                static_cast<double>(half - on_straight);
+    const double across = out - f.corner * (1 - std::cos(angle)),
+                 along = sign * (run + f.corner * std::sin(angle));
     const double c = std::cos(angle), d = sign * std::sin(angle);
     return {nx * across + tx * along, ny * across + ty * along, nx * c + tx * d, ny * c + ty * d};
 }
@@ -117,7 +133,8 @@ Feature make_feature(Random& random, double tile, double base, double top) {
         const double step = base + rise * random.between(0.3, 0.7);
         wall(base, step), ledge(tile * random.between(0.03, 0.05)), wall(step, top);
     } else if (kind == 2) {  // crater
-        wall(base, top), ledge(tile * random.between(0.03, 0.05)), wall(top, top - rise * random.between(0.2, 0.6));
+        wall(base, top), ledge(tile * random.between(0.03, 0.05)),
+            wall(top, top - rise * random.between(0.2, 0.6));
     } else if (kind == 3) {  // rib
         wall(base, top);
     } else {  // a low wall that carries a high dome
@@ -128,14 +145,16 @@ Feature make_feature(Random& random, double tile, double base, double top) {
     // Corners must be rounder than all that is taken off them; ribs are no wider than that.
     const double room = 0.42 * tile;
     const bool rib = kind == 3, round = kind == 0 || kind == 4;
-    f.corner = std::min(room, -offset + tile * (rib ? random.between(0.03, 0.06) : random.between(0.12, 0.22)));
+    f.corner =
+        std::min(room, -offset + tile * (rib ? random.between(0.03, 0.06) : random.between(0.12, 0.22)));
     f.half_x = round ? f.corner : f.corner + (room - f.corner) * random.between(0.3, 1.0);
     f.half_y = round || rib ? f.corner : f.corner + (room - f.corner) * random.between(0.0, 1.0);
     if (random.below(2)) std::swap(f.half_x, f.half_y);
     return f;
 }
 
-/// Shares `rings` strips among segments by their lengths, at least one each: what is left goes where strips are longest.
+/// Shares `rings` strips among segments by their lengths, at least one each: what is left goes where strips
+/// are longest.
 std::vector<std::uint64_t> strips_of(const std::vector<double>& lengths, std::uint64_t rings) {
     std::vector<std::uint64_t> strips(lengths.size(), 1);
     double total = 0;
@@ -149,7 +168,9 @@ std::vector<std::uint64_t> strips_of(const std::vector<double>& lengths, std::ui
     for (; used < rings; ++used) {
         std::size_t longest = 0;
         for (std::size_t i = 1; i < lengths.size(); ++i)
-            if (lengths[i] / static_cast<double>(strips[i]) > lengths[longest] / static_cast<double>(strips[longest])) longest = i;
+            if (lengths[i] / static_cast<double>(strips[i]) >
+                lengths[longest] / static_cast<double>(strips[longest]))
+                longest = i;
         ++strips[longest];
     }
     return strips;
@@ -169,7 +190,8 @@ void mesh_tile(const Ring& border, const Feature& f, double centre_x, double cen
     // Lengths of the flat around the feature, of the profile's segments, and of the cap.
     std::vector<double> lengths{std::max(1e-3, border[border.size() / 8].x - centre_x - f.half_x)};
     for (std::size_t i = 1; i < f.profile.size(); ++i)
-        lengths.push_back(std::hypot(f.profile[i].offset - f.profile[i - 1].offset, f.profile[i].z - f.profile[i - 1].z));
+        lengths.push_back(
+            std::hypot(f.profile[i].offset - f.profile[i - 1].offset, f.profile[i].z - f.profile[i - 1].z));
     const double end_offset = f.profile.back().offset, end_z = f.profile.back().z;
     lengths.push_back(std::hypot(std::max(f.half_x, f.half_y) + end_offset, f.dome));
     const std::vector<std::uint64_t> strips = strips_of(lengths, rings);
@@ -225,9 +247,12 @@ void metre_pattern(const MetrePattern& pattern, const std::function<void(const F
     const std::uint64_t side = grid.around / 4, steps = grid.tiles * side;
     const double base = pattern.height_mm * kPlate;
     const double inset = base * std::tan(kDraft * std::numbers::pi / 180);
-    const auto at_foot = [&](std::uint64_t i) { return on_grid(pattern.size_mm * static_cast<double>(i) / static_cast<double>(steps)); };
+    const auto at_foot = [&](std::uint64_t i) {
+        return on_grid(pattern.size_mm * static_cast<double>(i) / static_cast<double>(steps));
+    };
     const auto at_top = [&](std::uint64_t i) {
-        return on_grid(inset + (pattern.size_mm - 2 * inset) * static_cast<double>(i) / static_cast<double>(steps));
+        return on_grid(inset +
+                       (pattern.size_mm - 2 * inset) * static_cast<double>(i) / static_cast<double>(steps));
     };
     // The square from (i, j), n steps wide, counter-clockwise.
     const auto square = [](std::uint64_t i, std::uint64_t j, std::uint64_t n, auto&& at, float z) {
@@ -251,12 +276,16 @@ void metre_pattern(const MetrePattern& pattern, const std::function<void(const F
     const double tile = (pattern.size_mm - 2 * inset) / static_cast<double>(grid.tiles);
     for (std::uint64_t j = 0; j < grid.tiles; ++j) {
         for (std::uint64_t i = 0; i < grid.tiles; ++i) {
-            // Seven heights, the middle ones oftener, so that flats of several tiles lie level as in real patterns.
+            // Seven heights, the middle ones oftener, so that flats of several tiles lie level as in real
+            // patterns.
             const double step = static_cast<double>(1 + random.below(4) + random.below(4)) / 12;
             const bool full = j * grid.tiles + i == tallest;
-            const Feature feature = make_feature(random, tile, base, full ? pattern.height_mm : base + (pattern.height_mm - base) * step);
-            const double centre_x = inset + tile * (static_cast<double>(i) + 0.5), centre_y = inset + tile * (static_cast<double>(j) + 0.5);
-            mesh_tile(square(i * side, j * side, side, at_top, on_grid(base)), feature, centre_x, centre_y, grid.rings, sink);
+            const Feature feature = make_feature(
+                random, tile, base, full ? pattern.height_mm : base + (pattern.height_mm - base) * step);
+            const double centre_x = inset + tile * (static_cast<double>(i) + 0.5),
+                         centre_y = inset + tile * (static_cast<double>(j) + 0.5);
+            mesh_tile(square(i * side, j * side, side, at_top, on_grid(base)), feature, centre_x, centre_y,
+                      grid.rings, sink);
         }
     }
 }

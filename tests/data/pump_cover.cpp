@@ -17,7 +17,9 @@ Outline flange_outline() {
     std::vector<Corner> corners;
     const std::vector<Corner> quarter{{100, 40, 14}, {100, 75, 18}, {56, 75, 14}, {42, 67, 14}};
     // One quarter, mirrored into the others; every second one runs backwards.
-    const auto add = [&](const Corner& c, double sx, double sy) { corners.push_back({sx * c.x, sy * c.y, c.radius}); };
+    const auto add = [&](const Corner& c, double sx, double sy) {
+        corners.push_back({sx * c.x, sy * c.y, c.radius});
+    };
     const Corner side{90, 26, 14};
     add(side, 1, 1);
     for (const Corner& c : quarter) add(c, 1, 1);
@@ -40,8 +42,11 @@ Outline body_outline() {
     const auto rib = [&](double degrees) {
         const double c = std::cos(radians(degrees)), s = std::sin(radians(degrees));
         const double root = std::sqrt(radius * radius - rib_half * rib_half);
-        const auto at = [&](double along, double across, double r) { corners.push_back({along * c - across * s, along * s + across * c, r}); };
-        at(root, -rib_half, 7), at(rib_end, -rib_half, 5.5), at(rib_end, rib_half, 5.5), at(root, rib_half, 7);
+        const auto at = [&](double along, double across, double r) {
+            corners.push_back({along * c - across * s, along * s + across * c, r});
+        };
+        at(root, -rib_half, 7), at(rib_end, -rib_half, 5.5), at(rib_end, rib_half, 5.5),
+            at(root, rib_half, 7);
     };
     for (const double side : {0.0, 180.0}) {
         for (int a = -14; a <= 14; a += 14) polar(side + a, radius, 40);
@@ -65,7 +70,8 @@ Outline volute_outline() {
 }  // namespace
 
 std::vector<Facet> pump_cover() {
-    constexpr double flange_top = 14, lug_top = 20, body_top = 28, volute_top = 44, hub_top = 52, print_top = 60, pocket_floor = 8;
+    constexpr double flange_top = 14, lug_top = 20, body_top = 28, volute_top = 44, hub_top = 52,
+                     print_top = 60, pocket_floor = 8;
     std::vector<Facet> facets;
     const Outline flange = flange_outline(), body = body_outline(), volute = volute_outline();
     const Profile flange_wall = drafted_wall(0, flange_top, kDraft, 0, 2, kChord);
@@ -96,7 +102,8 @@ std::vector<Facet> pump_cover() {
     // The volute carries the hub and, where the spiral is wide, a vent boss under a spherical cap.
     const Outline hub = circle(0, 0, 16, kChord);
     const Profile hub_wall = drafted_wall(volute_top, hub_top, kDraft, 4, 1.5, kChord);
-    const double vent_angle = radians(330), vent_x = 30 * std::cos(vent_angle), vent_y = 30 * std::sin(vent_angle);
+    const double vent_angle = radians(330), vent_x = 30 * std::cos(vent_angle),
+                 vent_y = 30 * std::sin(vent_angle);
     constexpr double vent_radius = 5, cap_z = volute_top + 5;
     const Outline vent = circle(vent_x, vent_y, vent_radius, kChord);
     Profile vent_wall = drafted_wall(volute_top, cap_z, kDraft, 3.5, 0, kChord);
@@ -105,10 +112,13 @@ std::vector<Facet> pump_cover() {
     constexpr int cap_rings = 7;
     for (int k = 1; k < cap_rings; ++k) {
         const double slope = std::numbers::pi / 4 * (1 - static_cast<double>(k) / cap_rings);
-        vent_wall.push_back({cap_radius * std::sin(slope) - vent_radius, cap_z + cap_radius * std::cos(slope) - rim});
+        vent_wall.push_back(
+            {cap_radius * std::sin(slope) - vent_radius, cap_z + cap_radius * std::cos(slope) - rim});
     }
-    flat(facets, sweep(facets, volute, volute_wall), {ring(hub, hub_wall.front()), ring(vent, vent_wall.front())}, true);
-    fan(facets, sweep(facets, vent, vent_wall), {on_grid(vent_x), on_grid(vent_y), on_grid(cap_z + cap_radius - rim)});
+    flat(facets, sweep(facets, volute, volute_wall),
+         {ring(hub, hub_wall.front()), ring(vent, vent_wall.front())}, true);
+    fan(facets, sweep(facets, vent, vent_wall),
+        {on_grid(vent_x), on_grid(vent_y), on_grid(cap_z + cap_radius - rim)});
 
     // The core print on the hub, with the larger taper that seats a core.
     const Outline print = circle(0, 0, 10, kChord);

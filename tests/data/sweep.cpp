@@ -21,7 +21,8 @@ int arc_steps(double radius, double angle, double chord) {
     return std::max(1, static_cast<int>(std::ceil(std::abs(angle) / step - 1e-9)));
 }
 
-void append_arc(Profile& profile, double centre_o, double centre_z, double radius, double from, double to, double chord) {
+void append_arc(Profile& profile, double centre_o, double centre_z, double radius, double from, double to,
+                double chord) {
     const int steps = arc_steps(radius, to - from, chord);
     for (int i = 0; i <= steps; ++i) {
         const double a = from + (to - from) * i / steps;
@@ -35,13 +36,18 @@ struct GridPoint {
     friend bool operator==(const GridPoint&, const GridPoint&) = default;
 };
 
-std::int64_t orient(GridPoint a, GridPoint b, GridPoint c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
+std::int64_t orient(GridPoint a, GridPoint b, GridPoint c) {
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
 
-bool in_triangle(GridPoint a, GridPoint b, GridPoint c, GridPoint p) { return orient(a, b, p) >= 0 && orient(b, c, p) >= 0 && orient(c, a, p) >= 0; }
+bool in_triangle(GridPoint a, GridPoint b, GridPoint c, GridPoint p) {
+    return orient(a, b, p) >= 0 && orient(b, c, p) >= 0 && orient(c, a, p) >= 0;
+}
 
 bool crosses(GridPoint a, GridPoint b, GridPoint c, GridPoint d) {
     const auto sign = [](std::int64_t v) { return (v > 0) - (v < 0); };
-    return sign(orient(a, b, c)) * sign(orient(a, b, d)) < 0 && sign(orient(c, d, a)) * sign(orient(c, d, b)) < 0;
+    return sign(orient(a, b, c)) * sign(orient(a, b, d)) < 0 &&
+           sign(orient(c, d, a)) * sign(orient(c, d, b)) < 0;
 }
 
 /// How well shaped a triangle is: twice its area over the square of its longest side.
@@ -59,8 +65,10 @@ struct Chain {
     std::vector<std::size_t> order;
 };
 
-/// Joins a hole (clockwise in `order`) to the chain by the shortest bridge that crosses no edge of either nor of the holes still to come.
-void bridge(Chain& chain, const std::vector<std::size_t>& hole, const std::vector<std::vector<std::size_t>>& others) {
+/// Joins a hole (clockwise in `order`) to the chain by the shortest bridge that crosses no edge of either nor
+/// of the holes still to come.
+void bridge(Chain& chain, const std::vector<std::size_t>& hole,
+            const std::vector<std::vector<std::size_t>>& others) {
     const auto& p = chain.points;
     const auto free = [&](GridPoint a, GridPoint b) {
         const auto blocked_by = [&](const std::vector<std::size_t>& loop) {
@@ -68,8 +76,8 @@ void bridge(Chain& chain, const std::vector<std::size_t>& hole, const std::vecto
                 const GridPoint c = p[loop[i]], d = p[loop[(i + 1) % loop.size()]];
                 if (crosses(a, b, c, d)) return true;
                 // A vertex in the middle of the bridge would be touched by it.
-                if (c != a && c != b && orient(a, b, c) == 0 && std::min(a.x, b.x) <= c.x && c.x <= std::max(a.x, b.x) && std::min(a.y, b.y) <= c.y &&
-                    c.y <= std::max(a.y, b.y))
+                if (c != a && c != b && orient(a, b, c) == 0 && std::min(a.x, b.x) <= c.x &&
+                    c.x <= std::max(a.x, b.x) && std::min(a.y, b.y) <= c.y && c.y <= std::max(a.y, b.y))
                     return true;
             }
             return false;
@@ -84,7 +92,8 @@ void bridge(Chain& chain, const std::vector<std::size_t>& hole, const std::vecto
             const GridPoint a = p[chain.order[i]], b = p[hole[j]];
             const double d = std::hypot(static_cast<double>(a.x - b.x), static_cast<double>(a.y - b.y));
             if (d >= best) continue;
-            // Where a vertex stands twice in the chain (an earlier bridge), the new one must leave within this occurrence's angle.
+            // Where a vertex stands twice in the chain (an earlier bridge), the new one must leave within
+            // this occurrence's angle.
             const GridPoint before = p[chain.order[(i + chain.order.size() - 1) % chain.order.size()]];
             const GridPoint after = p[chain.order[(i + 1) % chain.order.size()]];
             const bool convex = orient(before, a, after) > 0;
@@ -95,9 +104,11 @@ void bridge(Chain& chain, const std::vector<std::size_t>& hole, const std::vecto
         }
     }
     if (!std::isfinite(best)) throw std::logic_error("flat: a hole cannot be joined to the outline");
-    std::vector<std::size_t> joined(chain.order.begin(), chain.order.begin() + static_cast<std::ptrdiff_t>(best_outer) + 1);
+    std::vector<std::size_t> joined(chain.order.begin(),
+                                    chain.order.begin() + static_cast<std::ptrdiff_t>(best_outer) + 1);
     for (std::size_t j = 0; j <= hole.size(); ++j) joined.push_back(hole[(best_hole + j) % hole.size()]);
-    joined.insert(joined.end(), chain.order.begin() + static_cast<std::ptrdiff_t>(best_outer), chain.order.end());
+    joined.insert(joined.end(), chain.order.begin() + static_cast<std::ptrdiff_t>(best_outer),
+                  chain.order.end());
     chain.order = std::move(joined);
 }
 
@@ -121,22 +132,28 @@ Outline rounded_polygon(std::span<const Corner> corners, double chord_mm) {
     for (std::size_t i = 0; i < n; ++i) {
         const Corner &c = corners[i], &next = corners[(i + 1) % n];
         const double length = std::hypot(next.x - c.x, next.y - c.y);
-        if (tangent[i] + tangent[(i + 1) % n] > length + 1e-9) throw std::logic_error("rounded_polygon: the arcs of an edge overlap");
+        if (tangent[i] + tangent[(i + 1) % n] > length + 1e-9)
+            throw std::logic_error("rounded_polygon: the arcs of an edge overlap");
         const double before = heading[(i + n - 1) % n];
         const double side = turn[i] > 0 ? 1 : -1;
-        const double start_x = c.x - tangent[i] * std::cos(before), start_y = c.y - tangent[i] * std::sin(before);
+        const double start_x = c.x - tangent[i] * std::cos(before),
+                     start_y = c.y - tangent[i] * std::sin(before);
         // The centre lies to the left of a left turn, to the right of a right turn.
-        const double centre_x = start_x - side * c.radius * std::sin(before), centre_y = start_y + side * c.radius * std::cos(before);
+        const double centre_x = start_x - side * c.radius * std::sin(before),
+                     centre_y = start_y + side * c.radius * std::cos(before);
         const int steps = arc_steps(c.radius, turn[i], chord_mm);
         for (int k = 0; k <= steps; ++k) {
             const double h = before + turn[i] * k / steps;  // heading along the arc; outward is to its right
-            const OutlinePoint p{centre_x + side * c.radius * std::sin(h), centre_y - side * c.radius * std::cos(h), std::sin(h), -std::cos(h)};
+            const OutlinePoint p{centre_x + side * c.radius * std::sin(h),
+                                 centre_y - side * c.radius * std::cos(h), std::sin(h), -std::cos(h)};
             // Arcs that use an edge up meet in one point.
-            if (!outline.empty() && std::hypot(outline.back().x - p.x, outline.back().y - p.y) < 1e-6) continue;
+            if (!outline.empty() && std::hypot(outline.back().x - p.x, outline.back().y - p.y) < 1e-6)
+                continue;
             outline.push_back(p);
         }
     }
-    if (std::hypot(outline.back().x - outline.front().x, outline.back().y - outline.front().y) < 1e-6) outline.pop_back();
+    if (std::hypot(outline.back().x - outline.front().x, outline.back().y - outline.front().y) < 1e-6)
+        outline.pop_back();
     return outline;
 }
 
@@ -157,20 +174,25 @@ Outline stadium(double x0, double y0, double x1, double y1, double radius, doubl
     for (int end = 0; end < 2; ++end) {
         for (int i = 0; i <= steps; ++i) {
             const double a = heading - kPi / 2 + kPi * (end + static_cast<double>(i) / steps);
-            outline.push_back({(end ? x0 : x1) + radius * std::cos(a), (end ? y0 : y1) + radius * std::sin(a), std::cos(a), std::sin(a)});
+            outline.push_back({(end ? x0 : x1) + radius * std::cos(a), (end ? y0 : y1) + radius * std::sin(a),
+                               std::cos(a), std::sin(a)});
         }
     }
     return outline;
 }
 
-Profile drafted_wall(double z0, double z1, double draft_deg, double fillet_mm, double round_mm, double chord_mm) {
+Profile drafted_wall(double z0, double z1, double draft_deg, double fillet_mm, double round_mm,
+                     double chord_mm) {
     const double d = draft_deg * kPi / 180;
-    const double tangent = 1 / std::tan((kPi / 2 + d) / 2);  // per mm of radius; floor and wall, wall and top enclose 90° + d
+    const double tangent =
+        1 / std::tan((kPi / 2 + d) / 2);  // per mm of radius; floor and wall, wall and top enclose 90° + d
     Profile profile;
-    if (fillet_mm > 0) append_arc(profile, tangent * fillet_mm, z0 + fillet_mm, fillet_mm, 1.5 * kPi, kPi + d, chord_mm);
+    if (fillet_mm > 0)
+        append_arc(profile, tangent * fillet_mm, z0 + fillet_mm, fillet_mm, 1.5 * kPi, kPi + d, chord_mm);
     else profile.push_back({0, z0});
     const double top = -(z1 - z0) * std::tan(d);
-    if (round_mm > 0) append_arc(profile, top - tangent * round_mm, z1 - round_mm, round_mm, d, kPi / 2, chord_mm);
+    if (round_mm > 0)
+        append_arc(profile, top - tangent * round_mm, z1 - round_mm, round_mm, d, kPi / 2, chord_mm);
     else profile.push_back({top, z1});
     profile.front().z = z0, profile.back().z = z1;
     return profile;
@@ -180,7 +202,9 @@ Profile drafted_pocket(double z1, double z0, double draft_deg, double fillet_mm,
     const double d = draft_deg * kPi / 180;
     const double foot = -(z1 - z0) * std::tan(d);
     Profile profile{{0, z1}};
-    if (fillet_mm > 0) append_arc(profile, foot - fillet_mm / std::tan((kPi / 2 + d) / 2), z0 + fillet_mm, fillet_mm, -d, -kPi / 2, chord_mm);
+    if (fillet_mm > 0)
+        append_arc(profile, foot - fillet_mm / std::tan((kPi / 2 + d) / 2), z0 + fillet_mm, fillet_mm, -d,
+                   -kPi / 2, chord_mm);
     else profile.push_back({foot, z0});
     profile.back().z = z0;
     return profile;
@@ -188,7 +212,8 @@ Profile drafted_pocket(double z1, double z0, double draft_deg, double fillet_mm,
 
 Ring ring(const Outline& outline, ProfilePoint at) {
     Ring ring;
-    for (const OutlinePoint& p : outline) ring.push_back({on_grid(p.x + at.offset * p.nx), on_grid(p.y + at.offset * p.ny), on_grid(at.z)});
+    for (const OutlinePoint& p : outline)
+        ring.push_back({on_grid(p.x + at.offset * p.nx), on_grid(p.y + at.offset * p.ny), on_grid(at.z)});
     return ring;
 }
 
@@ -216,7 +241,8 @@ void flat(std::vector<Facet>& facets, const Ring& outer, const std::vector<Ring>
     const auto add = [&](const Ring& ring) {
         std::vector<std::size_t> loop;
         for (const Vec3f& v : ring) {
-            const GridPoint p{std::llround(static_cast<double>(v.x) * kGrid), std::llround(static_cast<double>(v.y) * kGrid)};
+            const GridPoint p{std::llround(static_cast<double>(v.x) * kGrid),
+                              std::llround(static_cast<double>(v.y) * kGrid)};
             if (!loop.empty() && chain.points[loop.back()] == p) continue;
             loop.push_back(chain.points.size());
             chain.points.push_back(p);
@@ -253,10 +279,12 @@ void flat(std::vector<Facet>& facets, const Ring& outer, const std::vector<Ring>
     for (std::size_t i = 0; i < order.size(); ++i) ears[i] = quality(i);
     const float z = outer.front().z;
     const auto vertex = [&](std::size_t k) {
-        return Vec3f{static_cast<float>(static_cast<double>(p[k].x) / kGrid), static_cast<float>(static_cast<double>(p[k].y) / kGrid), z};
+        return Vec3f{static_cast<float>(static_cast<double>(p[k].x) / kGrid),
+                     static_cast<float>(static_cast<double>(p[k].y) / kGrid), z};
     };
     while (order.size() > 2) {
-        const std::size_t i = static_cast<std::size_t>(std::max_element(ears.begin(), ears.end()) - ears.begin());
+        const std::size_t i =
+            static_cast<std::size_t>(std::max_element(ears.begin(), ears.end()) - ears.begin());
         if (ears[i] <= 0) throw std::logic_error("flat: no ear left, the loops cross");
         const std::size_t n = order.size();
         const Vec3f a = vertex(order[(i + n - 1) % n]), b = vertex(order[i]), c = vertex(order[(i + 1) % n]);
@@ -270,7 +298,8 @@ void flat(std::vector<Facet>& facets, const Ring& outer, const std::vector<Ring>
 }
 
 void fan(std::vector<Facet>& facets, const Ring& ring, Vec3f tip) {
-    for (std::size_t i = 0; i < ring.size(); ++i) facets.push_back({ring[i], ring[(i + 1) % ring.size()], tip});
+    for (std::size_t i = 0; i < ring.size(); ++i)
+        facets.push_back({ring[i], ring[(i + 1) % ring.size()], tip});
 }
 
 }  // namespace slabwright

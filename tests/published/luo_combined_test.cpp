@@ -1,18 +1,25 @@
-// LUO 6.5.3: layers and tools together on the sample pattern. The tool map, the lengths and the layers are computed from the sample's geometry and
-// from the forces of the job's cutters; run it to see them beside the print.
+// LUO 6.5.3: layers and tools together on the sample pattern. The tool map, the lengths and the layers are
+// computed from the sample's geometry and from the forces of the job's cutters; run it to see them beside the
+// print.
 //
 // What the print leaves open, and what is put in its place:
-//   the part        figure 6.11 is lost in the scan. The text machines the part of 5.6 with the plan of 6.4 ("the previous tool size
-//                   selection strategy"), so the part is the tool sample, built from what the text says of it (tests/data/luo_tool_sample.cpp).
-//   the slot        table 6.3 has its floor at 1.70 in and .125 in as the largest tool from there to the top: its width is print's only in that.
-//   the slices      print does not say how far apart: here .05 in, and at the flats' heights too.
-//   AR              97.5 % as in 5.6, by what a disc leaves of a slice (print's rule for corners loses R/ρ of every arc that a tool does reach).
-//   "similar" tool  print joins slices of "the same or similar" tool and does not say how similar: here the same.
-//   δ = 0.002       without a unit; its lengths are in inches.
-//   F               6.5.1's cut is a flat end mill's roughing; the finish tool's is not given, and the three lengths of 6.5.3 share no force
-//                   (luo_forces_test). Here it is each ball's own hardest finish cut: what roughing leaves on a wall, its largest stepdown, its feed.
-//   flutes          tools of table 6.2 have no flute length. The library's flutes are longer than a slab (5.6) and shorter than print's 8.0 and 3.4 in,
-//                   so the flutes decide how tall a layer of the larger tools may be; .95 in is less than the .25 in tool's, more than a slab.
+//   the part        figure 6.11 is lost in the scan. The text machines the part of 5.6 with the plan of 6.4
+//   ("the previous tool size
+//                   selection strategy"), so the part is the tool sample, built from what the text says of it
+//                   (tests/data/luo_tool_sample.cpp).
+//   the slot        table 6.3 has its floor at 1.70 in and .125 in as the largest tool from there to the top:
+//   its width is print's only in that. the slices      print does not say how far apart: here .05 in, and at
+//   the flats' heights too. AR              97.5 % as in 5.6, by what a disc leaves of a slice (print's rule
+//   for corners loses R/ρ of every arc that a tool does reach). "similar" tool  print joins slices of "the
+//   same or similar" tool and does not say how similar: here the same. δ = 0.002       without a unit; its
+//   lengths are in inches. F               6.5.1's cut is a flat end mill's roughing; the finish tool's is
+//   not given, and the three lengths of 6.5.3 share no force
+//                   (luo_forces_test). Here it is each ball's own hardest finish cut: what roughing leaves on
+//                   a wall, its largest stepdown, its feed.
+//   flutes          tools of table 6.2 have no flute length. The library's flutes are longer than a slab
+//   (5.6) and shorter than print's 8.0 and 3.4 in,
+//                   so the flutes decide how tall a layer of the larger tools may be; .95 in is less than the
+//                   .25 in tool's, more than a slab.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -55,22 +62,27 @@ TEST_F(LuoCombined, ToolMap) {
     for (const ToolSlice& s : map.slices)
         if (!joined.empty() && joined.back().tool == s.tool) joined.back().z_high = s.z_high;
         else joined.push_back(s);
-    std::printf("LUO table 6.3, in: published / computed, and how tall a layer the tool may make (print: 8.0, 3.4, .57)\n");
+    std::printf(
+        "LUO table 6.3, in: published / computed, and how tall a layer the tool may make (print: 8.0, 3.4, "
+        ".57)\n");
     for (const ToolSlice& s : joined)
-        std::printf("  %.3f to %.3f: %.3f in, %.2f in\n", s.z_low / kInch, s.z_high / kInch, map.tools[s.tool].diameter / kInch,
-                    map.allowed_mm[s.tool] / kInch);
+        std::printf("  %.3f to %.3f: %.3f in, %.2f in\n", s.z_low / kInch, s.z_high / kInch,
+                    map.tools[s.tool].diameter / kInch, map.allowed_mm[s.tool] / kInch);
     ASSERT_EQ(joined.size(), 3U);
     for (int i = 0; i < 3; ++i) {
         EXPECT_NEAR(joined[i].z_low, kTable[i][0] * kInch, kNear);
         EXPECT_NEAR(joined[i].z_high, kTable[i][1] * kInch, kNear);
         EXPECT_NEAR(map.tools[joined[i].tool].diameter, kTable[i][2] * kInch, 1e-9);
-        // "the layer covers .75 to 1.70 and is within the allowed machining error", and so do the others: none is cut again.
+        // "the layer covers .75 to 1.70 and is within the allowed machining error", and so do the others:
+        // none is cut again.
         EXPECT_GT(map.allowed_mm[joined[i].tool], joined[i].z_high - joined[i].z_low);
     }
-    EXPECT_GT(joined[1].z_high - joined[1].z_low, job.slabs.thicknesses[0]) << "which a slab alone would not hold";
+    EXPECT_GT(joined[1].z_high - joined[1].z_low, job.slabs.thicknesses[0])
+        << "which a slab alone would not hold";
 }
 
-// The strategy itself: among what `combined` plans are the three layers of table 6.3, the second of two slabs.
+// The strategy itself: among what `combined` plans are the three layers of table 6.3, the second of two
+// slabs.
 TEST_F(LuoCombined, Layers) {
     LayerRequest request;
     request.height = bounds(mesh.view()).max.z;
@@ -105,7 +117,8 @@ TEST_F(LuoCombined, Layers) {
                 if (tool.kind == kind) smallest = std::min(smallest, tool.diameter);
             EXPECT_LE(smallest, kTable[i][2] * kInch + 1e-9);
             if (i == 1) {
-                EXPECT_NEAR(smallest, 0.25 * kInch, 1e-9) << "the .125 in tool's flutes do not make a layer of .95 in";
+                EXPECT_NEAR(smallest, 0.25 * kInch, 1e-9)
+                    << "the .125 in tool's flutes do not make a layer of .95 in";
             }
         }
     }

@@ -1,4 +1,6 @@
-// The forces, thicknesses and lengths of LUO 6.5 (table 6.3: luo_combined_test; the 10 minutes saved come without the times they are of), published, computed, and why they differ where they do. Run it to see the table.
+// The forces, thicknesses and lengths of LUO 6.5 (table 6.3: luo_combined_test; the 10 minutes saved come
+// without the times they are of), published, computed, and why they differ where they do. Run it to see the
+// table.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -59,7 +61,8 @@ TEST(LuoForces, Given) {
     row("Kfc, N/mm2", 0.6188, kDippon.kfc, "");
     row("Kfe, N/mm", 2.4948, kDippon.kfe, "");
     row("flutes", 2, s.flutes, "");
-    row("cutter diameter, in", "-", 2 * s.radius_mm / kInch, "print does not say; 1/2 in is the set's roughing tool");
+    row("cutter diameter, in", "-", 2 * s.radius_mm / kInch,
+        "print does not say; 1/2 in is the set's roughing tool");
     row("specimen: strength, MPa", 27, c.strength_mpa, "");
     row("  depth of cut d, in", 0.12, s.high_mm / kInch, "the forces are those of 3 mm, .118 in");
     row("  overhang b, in", 2, c.overhang_mm / kInch, "");
@@ -111,7 +114,8 @@ TEST(LuoForces, PeakForces) {
     row("Fy,max, no helix lag", 49.07, straight.peak_y_n, "cannot follow: above the bound of the plane");
     row("Fx,max, helix lag", 40.00, helical.peak_x_n, "as above");
     row("Fy,max, helix lag", 49.07, helical.peak_y_n, "as above");
-    row("bound of the in-plane resultant", std::hypot(40.00, 49.07), bound, "a tooth at full chip; print's, if at one instant");
+    row("bound of the in-plane resultant", std::hypot(40.00, 49.07), bound,
+        "a tooth at full chip; print's, if at one instant");
     row("Fx,max, oblique", 40.00, ours.peak_x_n, "our transform");
     row("Fy,max, oblique", 49.07, ours.peak_y_n, "our transform");
     row("Fz,max, oblique", 10.13, ours.peak_z_n, "our transform; Ka is the same");
@@ -136,18 +140,21 @@ TEST(LuoForces, PeakForces) {
 // The cut of 6.5.1 on a specimen that overhangs by 2 in: all six of .12 in broke, five of six of .13 in held.
 TEST(LuoForces, SpecimenThickness) {
     const SegmentForces f = closed_form_forces(slot(0, CoefficientTransform::printed), 1e-7);
-    const OverhangCut model = specimen(f.peak_x_n, f.peak_y_n, f.peak_z_n), print = specimen(40.00, 49.07, 10.13);
+    const OverhangCut model = specimen(f.peak_x_n, f.peak_y_n, f.peak_z_n),
+                      print = specimen(40.00, 49.07, 10.13);
     const OverhangThickness t = least_overhang_thickness(model), misprint = least_overhang_thickness(print);
     std::printf("LUO 6.5.2, specimen                published   computed   why\n");
     row("failure thickness, in", 0.124, t.least_mm / kInch, "reproduced with the model's own 32.94 N");
-    row("  with print's 40.00 and 49.07 N", 0.124, misprint.least_mm / kInch, "so these forces are the misprint");
+    row("  with print's 40.00 and 49.07 N", 0.124, misprint.least_mm / kInch,
+        "so these forces are the misprint");
     row("t1, sideways, in", 0.124, t.sideways_mm / kInch, "the smaller, which print's eq. 9 would take");
     row(".12 in holds (0 no, 1 yes)", 0.0, overhang_holds(model, 0.12 * kInch), "6 of 6 broke");
     row(".13 in holds", 1.0, overhang_holds(model, 0.13 * kInch), "5 of 6 held");
     EXPECT_NEAR(t.upwards_mm / kInch, 0.1238, 5e-5);
     EXPECT_EQ(t.least_mm, std::max(t.sideways_mm, t.upwards_mm));
     EXPECT_NEAR(misprint.upwards_mm / kInch, 0.126, 5e-4);
-    EXPECT_LT(t.sideways_mm, t.upwards_mm);  // the minimum that print writes would pass the specimens that broke
+    EXPECT_LT(t.sideways_mm,
+              t.upwards_mm);  // the minimum that print writes would pass the specimens that broke
     EXPECT_LT(t.sideways_mm / kInch, 0.12);
     EXPECT_FALSE(overhang_holds(model, 0.12 * kInch));
     EXPECT_TRUE(overhang_holds(model, 0.13 * kInch));
@@ -182,7 +189,8 @@ TEST(LuoForces, AllowedLengths) {
     }
     // At one force L goes with d^(4/3); print's three lengths would need forces that differ many times over.
     EXPECT_GT(*std::max_element(force, force + 3) / *std::min_element(force, force + 3), 3);
-    EXPECT_NEAR(allowed_tool_length(20, delta, kInch) / allowed_tool_length(20, delta, kInch / 4), std::pow(4, 4.0 / 3), 1e-9);
+    EXPECT_NEAR(allowed_tool_length(20, delta, kInch) / allowed_tool_length(20, delta, kInch / 4),
+                std::pow(4, 4.0 / 3), 1e-9);
     EXPECT_GT(model[0], model[1]);
     EXPECT_GT(model[1], model[2]);
 }

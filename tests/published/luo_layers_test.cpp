@@ -1,4 +1,5 @@
-// LUO tables 4.1 and 4.2, on the sample part built from table 4.1's design heights (method.md sections 3 and 4).
+// LUO tables 4.1 and 4.2, on the sample part built from table 4.1's design heights (method.md sections 3 and
+// 4).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,10 +35,12 @@ protected:
     static std::vector<double> heights(const FeatureSet& set, FeatureType type) {
         std::vector<double> z;
         for (const Feature& f : set.features)
-            if (f.type == type && (z.empty() || f.z_low / kInch - z.back() > 1e-4)) z.push_back(f.z_low / kInch);
+            if (f.type == type && (z.empty() || f.z_low / kInch - z.back() > 1e-4))
+                z.push_back(f.z_low / kInch);
         return z;
     }
-    static void expect_heights(const std::vector<double>& found, const std::vector<double>& design, double within) {
+    static void expect_heights(const std::vector<double>& found, const std::vector<double>& design,
+                               double within) {
         ASSERT_EQ(found.size(), design.size());
         for (std::size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], design[i], within);
     }
@@ -59,7 +62,9 @@ protected:
         std::vector<Feature> found = features(Finder::exact).features;
         for (Feature& f : found) {
             auto moved = [&](double design_low, double design_high, double low, double high) {
-                if (std::abs(f.z_low / kInch - design_low) > 1e-4 || std::abs(f.z_high / kInch - design_high) > 1e-4) return;
+                if (std::abs(f.z_low / kInch - design_low) > 1e-4 ||
+                    std::abs(f.z_high / kInch - design_high) > 1e-4)
+                    return;
                 f.z_low = low * kInch;
                 f.z_high = high * kInch;
             };
@@ -126,19 +131,23 @@ TEST_F(LuoLayers, Table42FromTheDetectedHeights) {
     EXPECT_NEAR(z[2], 1.200, 1e-6);
     EXPECT_NEAR(z[3], 1.500, 1e-6);
     EXPECT_EQ(placement.cost.broken_type2, 0);
-    EXPECT_NE(placement.boundaries[0].reason.find("5.08 mm below the peak at 16.586 mm"), std::string::npos) << placement.boundaries[0].reason;
-    EXPECT_NE(placement.boundaries[2].reason.find("down-facing flat at 30.48 mm"), std::string::npos) << placement.boundaries[2].reason;
+    EXPECT_NE(placement.boundaries[0].reason.find("5.08 mm below the peak at 16.586 mm"), std::string::npos)
+        << placement.boundaries[0].reason;
+    EXPECT_NE(placement.boundaries[2].reason.find("down-facing flat at 30.48 mm"), std::string::npos)
+        << placement.boundaries[2].reason;
     for (const Boundary& b : placement.boundaries) EXPECT_DOUBLE_EQ(b.slab_thickness, 0.7 * kInch);
 }
 
-// Print puts the second boundary at .556. The candidate .500 reaches the flat at 1.200 with a layer of exactly .70 in, which is
-// LTmax; in single precision, which print's program seems to have used, that layer is too tall.
+// Print puts the second boundary at .556. The candidate .500 reaches the flat at 1.200 with a layer of
+// exactly .70 in, which is LTmax; in single precision, which print's program seems to have used, that layer
+// is too tall.
 TEST_F(LuoLayers, Table42SecondBoundaryOfPrintFollowsFromSinglePrecision) {
     const float type2 = 1.2f, boundary = 0.5f, tallest = 0.7f;
     EXPECT_GT(type2 - boundary, tallest);
     EXPECT_NEAR(type2 - boundary, tallest, 1e-6);
 
-    // Refuse it in the same way: a tallest layer eight millionths of an inch shorter gives print's boundary, the next best Q.
+    // Refuse it in the same way: a tallest layer eight millionths of an inch shorter gives print's boundary,
+    // the next best Q.
     LayerRequest r = request(detected());
     r.max_layer = 0.7 * kInch - 2 * kSameHeight;
     const std::vector<double> z = tops(place_layers_printed(r));
@@ -168,7 +177,8 @@ TEST_F(LuoLayers, OptimalIsNoWorseThanPrint) {
 }
 
 TEST_F(LuoLayers, WithPrintsLayersNothingStaysUnmade) {
-    const std::vector<double> print = {.453 * kInch, .556 * kInch, 1.2 * kInch, 1.5 * kInch}, whole = {1.5 * kInch};
+    const std::vector<double> print = {.453 * kInch, .556 * kInch, 1.2 * kInch, 1.5 * kInch},
+                              whole = {1.5 * kInch};
     EXPECT_TRUE(measure_undercuts(context, mesh.view(), print).empty());
     const auto unmade = measure_undercuts(context, mesh.view(), whole);
     ASSERT_EQ(unmade.size(), 1u);

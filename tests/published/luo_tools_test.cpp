@@ -1,5 +1,6 @@
-// LUO 5.6: the tools of the sample part, layer by layer. Print's drawing is lost; the part is built from what the text says of it (see
-// tests/data/luo_tool_sample.cpp), so that what LUO chooses follows from LUO's rules.
+// LUO 5.6: the tools of the sample part, layer by layer. Print's drawing is lost; the part is built from what
+// the text says of it (see tests/data/luo_tool_sample.cpp), so that what LUO chooses follows from LUO's
+// rules.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -58,16 +59,21 @@ protected:
         layer.z_top = z_top_in * kInch;
         layer.slab_thickness = 0.75 * kInch;
         const Box3 box = bounds(mesh.view());
-        const double dx = (job.slabs.length - (box.max.x - box.min.x)) / 2, dy = (job.slabs.width - (box.max.y - box.min.y)) / 2;
+        const double dx = (job.slabs.length - (box.max.x - box.min.x)) / 2,
+                     dy = (job.slabs.width - (box.max.y - box.min.y)) / 2;
         layer.stock_min = {box.min.x - dx, box.min.y - dy};
         layer.stock_max = {box.max.x + dx, box.max.y + dy};
         for (const Feature& f : features)
-            if (f.type == FeatureType::up_flat && f.z_low > layer.z_bottom && f.z_low < layer.z_top) layer.flats.push_back({f.z_low, f.z_low});
-        ToolChoice choice = select_tools(context, layer, GetParam() == Source::tables ? tables(z_bottom_in) : reach_ratio(context, layer, nullptr));
+            if (f.type == FeatureType::up_flat && f.z_low > layer.z_bottom && f.z_low < layer.z_top)
+                layer.flats.push_back({f.z_low, f.z_low});
+        ToolChoice choice = select_tools(
+            context, layer,
+            GetParam() == Source::tables ? tables(z_bottom_in) : reach_ratio(context, layer, nullptr));
         for (const ToolCandidate& c : choice.record.candidates)
-            std::printf("%-10s %-4s T%-2d AR %.4f AS %6.1f mm2 stepdown %.4f in %6.2f min: %s\n", c.purpose.c_str(), c.chosen ? "yes" : "no", c.tool,
-                        c.accessibility.value_or(NAN), c.semi_rough_mm2.value_or(NAN), c.stepdown.value_or(NAN) / kInch, c.minutes.value_or(NAN),
-                        c.reason.c_str());
+            std::printf("%-10s %-4s T%-2d AR %.4f AS %6.1f mm2 stepdown %.4f in %6.2f min: %s\n",
+                        c.purpose.c_str(), c.chosen ? "yes" : "no", c.tool, c.accessibility.value_or(NAN),
+                        c.semi_rough_mm2.value_or(NAN), c.stepdown.value_or(NAN) / kInch,
+                        c.minutes.value_or(NAN), c.reason.c_str());
         return choice;
     }
 };
@@ -91,7 +97,8 @@ TEST_P(LuoTools, SecondLayer) {
     EXPECT_NEAR(choice.tools.rough.stepdown_max, 0.15 * kInch, 1e-9);
     EXPECT_TRUE(choice.tools.semi_rough.empty());
     EXPECT_NEAR(choice.record.finish_stepdown_printed, 0.0445 * kInch, 0.0001 * kInch);
-    EXPECT_NEAR(choice.record.finish_stepdown, 0.0639 * kInch, 0.0005 * kInch) << "the same cusp, by the true limit";
+    EXPECT_NEAR(choice.record.finish_stepdown, 0.0639 * kInch, 0.0005 * kInch)
+        << "the same cusp, by the true limit";
     EXPECT_NEAR(choice.record.rough_stepdown, 0.191 * kInch, 0.001 * kInch);
 }
 
@@ -108,7 +115,9 @@ TEST_P(LuoTools, ThirdLayer) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Accessibility, LuoTools, testing::Values(Source::tables, Source::printed),
-                         [](const auto& source) { return source.param == Source::printed ? "printed" : "tables"; });
+                         [](const auto& source) {
+                             return source.param == Source::printed ? "printed" : "tables";
+                         });
 
 }  // namespace
 }  // namespace slabwright

@@ -1,11 +1,12 @@
-// SHAPING table 1 (half sphere R 50, ball r 12.7) against the closed forms of the path lengths on a sphere: what the emitted
-// programs travel on the surface, by levels alone, projection alone, both over everything, and split by slope.
+// SHAPING table 1 (half sphere R 50, ball r 12.7) against the closed forms of the path lengths on a sphere:
+// what the emitted programs travel on the surface, by levels alone, projection alone, both over everything,
+// and split by slope.
 //
-// The tool's tip moves as the ball's centre does, on a sphere of radius ρ = R + r; at slope α the centre is ρ·cos α above the
-// base and ρ·sin α from the axis. With one stepdown c and one step-over s:
-//   levels from slope a up:            (1/c) ∫ 2π√(ρ² − h²) dh over 0 … H = ρ·cos a   = π(H√(ρ² − H²) + ρ²·asin(H/ρ)) / c
-//   offset curves up to slope a:       (1/s) ∫ 2πx dx over 0 … A = ρ·sin a            = πA² / s
-//   a raster up to slope a:            (1/s) ∫ 2√(ρ² − y²)·asin√((A² − y²)/(ρ² − y²)) dy over −A … A
+// The tool's tip moves as the ball's centre does, on a sphere of radius ρ = R + r; at slope α the centre is
+// ρ·cos α above the base and ρ·sin α from the axis. With one stepdown c and one step-over s:
+//   levels from slope a up:            (1/c) ∫ 2π√(ρ² − h²) dh over 0 … H = ρ·cos a   = π(H√(ρ² − H²) +
+//   ρ²·asin(H/ρ)) / c offset curves up to slope a:       (1/s) ∫ 2πx dx over 0 … A = ρ·sin a            = πA²
+//   / s a raster up to slope a:            (1/s) ∫ 2√(ρ² − y²)·asin√((A² − y²)/(ρ² − y²)) dy over −A … A
 // Over the whole: π²ρ²/2c, πρ²/s and π²ρ²/2s. So, with c = s, levels are π/2 times the offset curves, and
 //   both/split = (1 + π/2) / (1 + π/4) = 1.4399.
 #include <gtest/gtest.h>
@@ -23,7 +24,8 @@
 namespace slabwright {
 namespace {
 
-constexpr double pi = std::numbers::pi, kSphere = 50, kBall = 12.7, kRho = kSphere + kBall, kStep = 0.4, kQuarter = pi / 4;
+constexpr double pi = std::numbers::pi, kSphere = 50, kBall = 12.7, kRho = kSphere + kBall, kStep = 0.4,
+                 kQuarter = pi / 4;
 
 double levels_length(double from_slope, double c) {
     const double h = kRho * std::cos(from_slope);
@@ -39,8 +41,10 @@ double raster_length(double to_slope, double s) {
     constexpr int n = 2000;
     double sum = 0;
     for (int k = 0; k <= n; ++k) {
-        const double t = -pi / 2 + pi * k / n, y = a * std::sin(t), chord = std::max(0.0, a * a - y * y), circle = kRho * kRho - y * y;
-        const double f = circle > 0 ? 2 * std::sqrt(circle) * std::asin(std::min(1.0, std::sqrt(chord / circle))) : 0;
+        const double t = -pi / 2 + pi * k / n, y = a * std::sin(t), chord = std::max(0.0, a * a - y * y),
+                     circle = kRho * kRho - y * y;
+        const double f =
+            circle > 0 ? 2 * std::sqrt(circle) * std::asin(std::min(1.0, std::sqrt(chord / circle))) : 0;
         sum += (k == 0 || k == n ? 1 : k % 2 == 1 ? 4 : 2) * f * a * std::cos(t);
     }
     return sum * pi / n / 3 / s;
@@ -61,7 +65,8 @@ Job shaping_job(FinishStrategy strategy, Projection projection) {
     ball.stepdown_max = 2;
     job.cutting.finish_strategy = strategy;
     job.cutting.projection = projection;
-    // SHAPING's steps are constant; this one is just over what the cusp of .003 mm asks for at 45°, so every method has it.
+    // SHAPING's steps are constant; this one is just over what the cusp of .003 mm asks for at 45°, so every
+    // method has it.
     job.cutting.uniform_steps = true;
     job.cutting.min_stepdown = job.cutting.min_stepover = kStep;
     job.cutting.overlap_deg = 0;
@@ -74,7 +79,8 @@ struct Lengths {
     [[nodiscard]] double all() const { return levels + projection; }
 };
 
-/// What the emitted finish programs travel with the ball on the sphere, mm. Plunges, leads and links through air do not count.
+/// What the emitted finish programs travel with the ball on the sphere, mm. Plunges, leads and links through
+/// air do not count.
 Lengths finish_lengths(FinishStrategy strategy, Projection projection) {
     Context context;
     const Mesh mesh = weld(context, half_sphere());
@@ -83,7 +89,8 @@ Lengths finish_lengths(FinishStrategy strategy, Projection projection) {
     Lengths lengths;
     for (const Layer& layer : plan.layers)
         for (const Operation& op : layer.operations) {
-            const bool levels = op.purpose == "level contours", projected = op.purpose == "projected raster" || op.purpose == "projected offsets";
+            const bool levels = op.purpose == "level contours",
+                       projected = op.purpose == "projected raster" || op.purpose == "projected offsets";
             if (!levels && !projected) continue;
             EXPECT_NEAR(levels ? op.stepdown : op.stepover, kStep, 1e-9) << op.purpose;
             const Program program = read_gcode(program_text(plan, layer, op), op.purpose);
@@ -92,7 +99,9 @@ Lengths finish_lengths(FinishStrategy strategy, Projection projection) {
                 const ProgramStep &a = program.steps[i - 1], &b = program.steps[i];
                 if (!a.known() || b.rapid()) continue;
                 // The model's facets lie up to 0.015 mm inside its sphere, and so does the ball.
-                auto on_surface = [](const ProgramStep& s) { return std::abs(std::hypot(s.x, s.y, s.z + kBall) - kRho) < 0.05; };
+                auto on_surface = [](const ProgramStep& s) {
+                    return std::abs(std::hypot(s.x, s.y, s.z + kBall) - kRho) < 0.05;
+                };
                 if (on_surface(a) && on_surface(b)) length += std::hypot(b.x - a.x, b.y - a.y, b.z - a.z);
             }
             (levels ? lengths.levels : lengths.projection) += length;
@@ -101,7 +110,8 @@ Lengths finish_lengths(FinishStrategy strategy, Projection projection) {
 }
 
 void expect_near(double measured, double integral, const char* what) {
-    std::printf("%-34s programs %8.2f m, integral %8.2f m, %+.2f %%\n", what, measured / 1000, integral / 1000, 100 * (measured / integral - 1));
+    std::printf("%-34s programs %8.2f m, integral %8.2f m, %+.2f %%\n", what, measured / 1000,
+                integral / 1000, 100 * (measured / integral - 1));
     EXPECT_NEAR(measured, integral, 0.02 * integral) << what;
 }
 
@@ -126,31 +136,48 @@ TEST(Shaping, LengthsOfTheEmittedProgramsAreTheIntegrals) {
     EXPECT_GT(split_ratio, 28.5 / 20.5);
     EXPECT_LT(split_ratio, 29.5 / 19.5);
 
-    // Absolute figures: at 1000 mm/min a minute is a metre. `ours` is the tip's way at the step that this cusp asks for.
-    const double root = std::sqrt(2 * kBall * 0.003 - 0.003 * 0.003), step45 = 2 * root * std::sin(kQuarter), scale = kStep / step45 / 1000;
-    const double on_contact = kSphere * kSphere / (kRho * kRho);  // were the way of the contact meant, on R instead of ρ
+    // Absolute figures: at 1000 mm/min a minute is a metre. `ours` is the tip's way at the step that this
+    // cusp asks for.
+    const double root = std::sqrt(2 * kBall * 0.003 - 0.003 * 0.003), step45 = 2 * root * std::sin(kQuarter),
+                 scale = kStep / step45 / 1000;
+    const double on_contact =
+        kSphere * kSphere / (kRho * kRho);  // were the way of the contact meant, on R instead of ρ
     EXPECT_NEAR(ball_level_stepdown_printed(kBall, kQuarter, 0.003), step45, 1e-9);
     std::printf("\nSHAPING table 1, minutes at 1000 mm/min     published  computed  why they differ\n");
-    std::printf("levels / projection                            %6.3f    %6.3f  they agree: pi/2 at one step\n", 2028.0 / 1292, levels_ratio);
-    std::printf("both / split                                   %6.3f    %6.3f  they agree within the rounding of 29 and 20 to minutes\n", 29.0 / 20,
-                split_ratio);
-    std::printf("both, cusp .003 mm                             %6d    %6.1f  by the tip; by the contact %.1f: print has a cusp of %.4f mm\n", 29,
-                both.all() * scale, both.all() * scale * on_contact,
-                kBall - std::sqrt(kBall * kBall - std::pow(pi * kSphere * kSphere * (1 + pi / 2) / 29000 / 2 / std::sin(kQuarter), 2)));
-    std::printf("split, cusp .003 mm                            %6d    %6.1f  as above; by the contact %.1f\n", 20, split.all() * scale,
-                split.all() * scale * on_contact);
-    // Levels and projection alone need a step of zero where the sphere is level or vertical: print's steps stand for a limit slope.
-    for (const auto& [what, published, length] :
-         {std::tuple{"levels alone", 2028.0, levels_length(0, 1)}, {"projection alone", 1292.0, offsets_length(pi / 2, 1)}}) {
+    std::printf(
+        "levels / projection                            %6.3f    %6.3f  they agree: pi/2 at one step\n",
+        2028.0 / 1292, levels_ratio);
+    std::printf(
+        "both / split                                   %6.3f    %6.3f  they agree within the rounding of 29 "
+        "and 20 to minutes\n",
+        29.0 / 20, split_ratio);
+    std::printf(
+        "both, cusp .003 mm                             %6d    %6.1f  by the tip; by the contact %.1f: print "
+        "has a cusp of %.4f mm\n",
+        29, both.all() * scale, both.all() * scale * on_contact,
+        kBall -
+            std::sqrt(kBall * kBall -
+                      std::pow(pi * kSphere * kSphere * (1 + pi / 2) / 29000 / 2 / std::sin(kQuarter), 2)));
+    std::printf(
+        "split, cusp .003 mm                            %6d    %6.1f  as above; by the contact %.1f\n", 20,
+        split.all() * scale, split.all() * scale * on_contact);
+    // Levels and projection alone need a step of zero where the sphere is level or vertical: print's steps
+    // stand for a limit slope.
+    for (const auto& [what, published, length] : {std::tuple{"levels alone", 2028.0, levels_length(0, 1)},
+                                                  {"projection alone", 1292.0, offsets_length(pi / 2, 1)}}) {
         const double tip = length / published / 1000, contact = tip * on_contact;
-        std::printf("%-46s %6.0f      any   a step of %.4f mm by the tip, of slopes over %.2f degrees only; %.4f mm, %.2f by the contact\n", what,
-                    published, tip, std::asin(tip / 2 / root) * 180 / pi, contact, std::asin(contact / 2 / root) * 180 / pi);
+        std::printf(
+            "%-46s %6.0f      any   a step of %.4f mm by the tip, of slopes over %.2f degrees only; %.4f mm, "
+            "%.2f by the contact\n",
+            what, published, tip, std::asin(tip / 2 / root) * 180 / pi, contact,
+            std::asin(contact / 2 / root) * 180 / pi);
     }
 }
 
 // Parallel lines, the planner's default: over all slopes they are as long as levels, not π/2 shorter.
 TEST(Shaping, ARasterIsLongerThanOffsetCurves) {
-    EXPECT_NEAR(raster_length(pi / 2, kStep), pi * pi * kRho * kRho / 2 / kStep, 1e-4 * raster_length(pi / 2, kStep));
+    EXPECT_NEAR(raster_length(pi / 2, kStep), pi * pi * kRho * kRho / 2 / kStep,
+                1e-4 * raster_length(pi / 2, kStep));
     const Lengths projection = finish_lengths(FinishStrategy::projection, Projection::raster);
     expect_near(projection.projection, raster_length(pi / 2, kStep), "raster alone");
     const Lengths split = finish_lengths(FinishStrategy::split, Projection::raster);

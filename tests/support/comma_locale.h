@@ -1,4 +1,5 @@
-// A locale with decimal commas, for proving that nothing listens to locales. Debian installs none, so it is compiled on the spot.
+// A locale with decimal commas, for proving that nothing listens to locales. Debian installs none, so it is
+// compiled on the spot.
 #pragma once
 
 #include <unistd.h>
@@ -18,20 +19,23 @@
 
 namespace slabwright::support {
 
-/// Compiles de_DE.UTF-8 into a folder that lives as long as this object. LOCPATH must name `folder`, LC_ALL `name`.
+/// Compiles de_DE.UTF-8 into a folder that lives as long as this object. LOCPATH must name `folder`, LC_ALL
+/// `name`.
 struct CommaLocale {
     TemporaryFolder temporary;
     std::string folder = temporary.path.string(), name = "de_DE.UTF-8";
     bool made = false;
     CommaLocale() {
-        (void)std::system(("localedef -i de_DE -f UTF-8 '" + folder + "/" + name + "' >/dev/null 2>&1 </dev/null").c_str());
+        (void)std::system(
+            ("localedef -i de_DE -f UTF-8 '" + folder + "/" + name + "' >/dev/null 2>&1 </dev/null").c_str());
         made = std::filesystem::exists(folder + "/" + name);
     }
     CommaLocale(const CommaLocale&) = delete;
     CommaLocale& operator=(const CommaLocale&) = delete;
 };
 
-/// Makes it this process's own, in C and in C++, until the end of the scope. `active` says whether that worked.
+/// Makes it this process's own, in C and in C++, until the end of the scope. `active` says whether that
+/// worked.
 struct CommaScope {
     explicit CommaScope(const CommaLocale& locale) {
         if (!locale.made) return;

@@ -31,12 +31,14 @@ struct CommandResult {
 };
 
 /// @param interrupt_after seconds until SIGINT is sent; negative: never
-inline CommandResult run_command(const std::vector<std::string>& arguments, const std::vector<std::pair<std::string, std::string>>& environment = {},
+inline CommandResult run_command(const std::vector<std::string>& arguments,
+                                 const std::vector<std::pair<std::string, std::string>>& environment = {},
                                  double interrupt_after = -1) {
     using Clock = std::chrono::steady_clock;
     const TemporaryFolder temporary;
     const std::string out_name = temporary / "out", err_name = temporary / "err";
-    const int out = ::open(out_name.c_str(), O_RDWR | O_CREAT | O_EXCL, 0600), err = ::open(err_name.c_str(), O_RDWR | O_CREAT | O_EXCL, 0600);
+    const int out = ::open(out_name.c_str(), O_RDWR | O_CREAT | O_EXCL, 0600),
+              err = ::open(err_name.c_str(), O_RDWR | O_CREAT | O_EXCL, 0600);
     if (out < 0 || err < 0) throw std::runtime_error("no temporary files");
     const auto begin = Clock::now();
     const pid_t child = ::fork();
@@ -52,7 +54,9 @@ inline CommandResult run_command(const std::vector<std::string>& arguments, cons
         ::execv(argv[0], argv.data());
         ::_exit(127);
     }
-    const auto since = [](Clock::time_point then) { return std::chrono::duration<double>(Clock::now() - then).count(); };
+    const auto since = [](Clock::time_point then) {
+        return std::chrono::duration<double>(Clock::now() - then).count();
+    };
     CommandResult result;
     int status = 0;
     bool interrupted = false;

@@ -9,7 +9,9 @@
 
 namespace slabwright::support {
 
-inline void spit(const std::filesystem::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+inline void spit(const std::filesystem::path& path, const std::string& text) {
+    std::ofstream(path, std::ios::binary) << text;
+}
 
 inline std::string slurp(const std::filesystem::path& path) {
     std::ifstream in(path, std::ios::binary);
@@ -18,12 +20,14 @@ inline std::string slurp(const std::filesystem::path& path) {
     return text.str();
 }
 
-/// Everything under a folder by its path from there: files with their bytes, folders with none; nothing where there is no folder.
+/// Everything under a folder by its path from there: files with their bytes, folders with none; nothing where
+/// there is no folder.
 inline std::map<std::string, std::string> tree(const std::filesystem::path& root) {
     std::map<std::string, std::string> files;
     if (!std::filesystem::exists(root)) return files;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(root))
-        files[std::filesystem::relative(entry.path(), root).string()] = entry.is_regular_file() ? slurp(entry.path()) : "";
+        files[std::filesystem::relative(entry.path(), root).string()] =
+            entry.is_regular_file() ? slurp(entry.path()) : "";
     return files;
 }
 

@@ -1,4 +1,5 @@
-// Pictures of height maps for the eye: PNG with stored (uncompressed) blocks, so that nothing but this header is needed.
+// Pictures of height maps for the eye: PNG with stored (uncompressed) blocks, so that nothing but this header
+// is needed.
 #pragma once
 
 #include <algorithm>
@@ -45,7 +46,8 @@ inline void write_png(const std::string& path, const std::vector<std::uint8_t>& 
             zlib.push_back(static_cast<std::uint8_t>(v & 255));
             zlib.push_back(static_cast<std::uint8_t>(v >> 8 & 255));
         }
-        zlib.insert(zlib.end(), raw.begin() + static_cast<std::ptrdiff_t>(at), raw.begin() + static_cast<std::ptrdiff_t>(at + n));
+        zlib.insert(zlib.end(), raw.begin() + static_cast<std::ptrdiff_t>(at),
+                    raw.begin() + static_cast<std::ptrdiff_t>(at + n));
         at += n;
     }
     big(zlib, b << 16 | a);
@@ -66,18 +68,25 @@ inline void write_png(const std::string& path, const std::vector<std::uint8_t>& 
     chunk("IHDR", header);
     chunk("IDAT", zlib);
     chunk("IEND", {});
-    std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
 }
 
-/// A map with rows from the bottom: 0 grey, positive (left over) to red, negative (gouge) to blue, saturated at ± full mm.
-inline void write_signed(const std::string& path, std::span<const float> map, int width, int height, double full) {
+/// A map with rows from the bottom: 0 grey, positive (left over) to red, negative (gouge) to blue, saturated
+/// at ± full mm.
+inline void write_signed(const std::string& path, std::span<const float> map, int width, int height,
+                         double full) {
     std::vector<std::uint8_t> rgb;
     rgb.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);
     for (int y = height - 1; y >= 0; --y)
         for (int x = 0; x < width; ++x) {
-            const double v =
-                std::clamp(map[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)] / full, -1.0, 1.0);
-            const auto level = [](double t) { return static_cast<std::uint8_t>(t < 0 ? 0 : t > 255 ? 255 : t); };
+            const double v = std::clamp(map[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                                            static_cast<std::size_t>(x)] /
+                                            full,
+                                        -1.0, 1.0);
+            const auto level = [](double t) {
+                return static_cast<std::uint8_t>(t < 0 ? 0 : t > 255 ? 255 : t);
+            };
             rgb.push_back(level(v >= 0 ? 200 + 55 * v : 200 * (1 + v)));
             rgb.push_back(level(200 * (1 - std::abs(v))));
             rgb.push_back(level(v <= 0 ? 200 - 55 * v : 200 * (1 - v)));
@@ -86,11 +95,15 @@ inline void write_signed(const std::string& path, std::span<const float> map, in
 }
 
 /// A height map, dark at `low`, light at `high`.
-inline void write_heights(const std::string& path, std::span<const float> map, int width, int height, double low, double high) {
+inline void write_heights(const std::string& path, std::span<const float> map, int width, int height,
+                          double low, double high) {
     std::vector<std::uint8_t> rgb;
     for (int y = height - 1; y >= 0; --y)
         for (int x = 0; x < width; ++x) {
-            const double v = (map[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)] - low) / (high - low);
+            const double v = (map[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                                  static_cast<std::size_t>(x)] -
+                              low) /
+                             (high - low);
             const auto grey = static_cast<std::uint8_t>(std::clamp(v, 0.0, 1.0) * 255);
             rgb.insert(rgb.end(), 3, grey);
         }

@@ -1,4 +1,5 @@
-// LinuxCNC's interpreter as the judge of programs: runs `rs274` (Debian's linuxcnc-uspace) and reads its canonical motions.
+// LinuxCNC's interpreter as the judge of programs: runs `rs274` (Debian's linuxcnc-uspace) and reads its
+// canonical motions.
 #pragma once
 
 #include <sys/wait.h>
@@ -18,7 +19,8 @@
 
 namespace slabwright::support {
 
-/// Where a motion ends, mm; an arc in the XY plane is one motion; `feed` is the rate in force (mm/min), 0 for a rapid.
+/// Where a motion ends, mm; an arc in the XY plane is one motion; `feed` is the rate in force (mm/min), 0 for
+/// a rapid.
 struct CanonMotion {
     double x = 0, y = 0, z = 0;
     bool rapid = false;
@@ -53,8 +55,8 @@ inline std::vector<double> canon_numbers(std::string_view arguments) {
     return numbers;
 }
 
-/// Interprets a program's text with a tool table's text. @throws std::runtime_error with the interpreter's own words when it
-/// refuses the program or is not installed
+/// Interprets a program's text with a tool table's text. @throws std::runtime_error with the interpreter's
+/// own words when it refuses the program or is not installed
 inline CanonProgram interpret_rs274(std::string_view program, std::string_view tool_table) {
     namespace fs = std::filesystem;
     const TemporaryFolder temporary;
@@ -62,7 +64,8 @@ inline CanonProgram interpret_rs274(std::string_view program, std::string_view t
     std::ofstream(folder + "/in.ngc", std::ios::binary) << program;
     std::ofstream(folder + "/tool.tbl", std::ios::binary) << tool_table;
     // The interpreter keeps its tools in $HOME/.tool.mmap: two at once in one home die of bus errors.
-    const std::string command = "cd '" + folder + "' && HOME=\"$PWD\" rs274 -g -t tool.tbl in.ngc out.txt </dev/null >log.txt 2>&1";
+    const std::string command =
+        "cd '" + folder + "' && HOME=\"$PWD\" rs274 -g -t tool.tbl in.ngc out.txt </dev/null >log.txt 2>&1";
     const int status = std::system(command.c_str());
     const auto slurp = [&](const char* name) {
         std::ifstream in(folder + "/" + name, std::ios::binary);
@@ -71,7 +74,8 @@ inline CanonProgram interpret_rs274(std::string_view program, std::string_view t
         return text.str();
     };
     if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-        if (WIFEXITED(status) && WEXITSTATUS(status) == 127) throw std::runtime_error("rs274 is missing: install linuxcnc-uspace");
+        if (WIFEXITED(status) && WEXITSTATUS(status) == 127)
+            throw std::runtime_error("rs274 is missing: install linuxcnc-uspace");
         throw std::runtime_error("rs274 refuses the program: " + slurp("log.txt"));
     }
     CanonProgram canon;

@@ -13,7 +13,8 @@ namespace slabwright::support {
 class TemporaryFolder {
 public:
     TemporaryFolder() {
-        std::string name = (std::filesystem::temp_directory_path() / ("slabwright-" + std::string(6, 'X'))).string();  // mkdtemp fills the X in
+        std::string name = (std::filesystem::temp_directory_path() / ("slabwright-" + std::string(6, 'X')))
+                               .string();  // mkdtemp fills the X in
         if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder under " + name);
         path = name;
     }
