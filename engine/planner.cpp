@@ -274,6 +274,19 @@ void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnos
                                {}});
 }
 
+// Every program begins where the one before has ended.
+void add_approaches(Plan& plan) {
+    const auto place = [](const Move& m) { return std::array{to_mm(m.x), to_mm(m.y), to_mm(m.z)}; };
+    const Move* end = nullptr;
+    for (Layer& layer : plan.layers)
+        for (Operation& op : layer.operations) {
+            if (op.moves.empty()) continue;
+            if (end)
+                op.minutes += approach_seconds(place(*end), place(op.moves.front()), plan.job.machine) / 60;
+            end = &op.moves.back();
+        }
+}
+
 // The programs of all layers, with their diagnostics.
 void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vector<Loops>& joints,
                 ProgressShare share) {
@@ -325,6 +338,7 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
             rate(job, plan.layers[i], op, rated[i]);
         }
     });
+    add_approaches(plan);
     for (std::size_t i = 0; i < planned.size(); ++i)
         for (const auto* found : {&planned[i].diagnostics, &rated[i]})
             plan.diagnostics.insert(plan.diagnostics.end(), found->begin(), found->end());

@@ -15,29 +15,84 @@ using namespace slabwright;
 
 namespace {
 
-/// Backwards over all legs, then forwards.
-double reference_seconds(const std::vector<MotionLeg>& legs, double a, double junction_mm) {
-    std::vector<double> entry(legs.size() + 1, 0);
-    for (std::size_t i = 1; i < legs.size(); ++i) {
-        const auto &u = legs[i - 1].leaving, &v = legs[i].direction;
-        const double cosine = std::clamp(u[0] * v[0] + u[1] * v[1] + u[2] * v[2], -1.0, 1.0),
-                     half = std::sqrt((1 + cosine) / 2);
-        double corner = 1e9;
-        if (half < 1 - 1e-12) {
-            const double touches = std::min(legs[i - 1].length, legs[i].length) / 2;
-            corner = std::sqrt(
-                a * std::min(junction_mm * half / (1 - half), touches * half / std::sqrt(1 - half * half)));
-        }
-        entry[i] = std::min({corner, legs[i - 1].speed, legs[i].speed});
+struct Stretch {
+    double length, speed, acceleration, entry;
+};
+
+/// All stretches of legs as Travel documents them, then backwards over all of them, then forwards.
+double reference_seconds(std::vector<MotionLeg> legs, double a, double junction_mm) {
+    const double dt = 0.001, share = std::sqrt(0.75);
+    const auto along = [&](double v, double r) {
+        return a * std::sqrt(std::max(0.0, 1 - std::pow(v * v / (r * a), 2)));
+    };
+    for (MotionLeg& leg : legs) {
+        leg.speed = std::min(leg.speed, leg.length / (1.02 * dt));
+        if (leg.radius > 0) leg.speed = std::min(leg.speed, std::sqrt(share * a * leg.radius));
     }
-    for (std::size_t i = legs.size(); i-- > 0;)
-        entry[i] = std::min(entry[i], std::sqrt(entry[i + 1] * entry[i + 1] + 2 * a * legs[i].length));
-    double seconds = 0, v = 0;
+    std::vector<Stretch> all;
+    double taken = 0, entry = 0;
     for (std::size_t i = 0; i < legs.size(); ++i) {
-        const double length = legs[i].length, out = std::min(entry[i + 1], std::sqrt(v * v + 2 * a * length));
-        const double peak = std::min(legs[i].speed, std::sqrt((2 * a * length + v * v + out * out) / 2));
-        const double ramps = (2 * peak * peak - v * v - out * out) / (2 * a);
-        seconds += (2 * peak - v - out) / a + std::max(0.0, length - ramps) / std::max(peak, 1e-9);
+        const MotionLeg& leg = legs[i];
+        const double own = leg.radius > 0 ? along(leg.speed, leg.radius) : a;
+        if (i + 1 == legs.size()) {
+            all.push_back({std::max(0.0, leg.length - taken), leg.speed, own, entry});
+            break;
+        }
+        const MotionLeg& next = legs[i + 1];
+        double cosine = 0, step = 0, speed = 0, setback = 0, arc = 0, arc_acceleration = 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            cosine += leg.leaving[k] * next.direction[k];
+            step = std::max(step, std::abs(next.direction[k] - leg.leaving[k]));
+        }
+        cosine = std::clamp(cosine, -1.0, 1.0);
+        if (leg.rapid == next.rapid) {
+            const double slower = std::min(leg.speed, next.speed), kink = step * (slower / dt + a) / a;
+            const double c = std::sqrt((1 + cosine) / 2), s = std::sqrt((1 - cosine) / 2);
+            if (kink <= 0.1) speed = slower;
+            else if (c > std::sin(std::numbers::pi / 180)) speed = slower * 0.1 / kink;
+            if (kink > 0.1 && c > std::sin(std::numbers::pi / 180)) {
+                const double d = std::min({leg.length / 2, next.length / 2, s * junction_mm / (1 - c)});
+                const double widest = d * c / s, turn = 2 * std::asin(s);
+                const double v = std::min(std::max(leg.speed, next.speed), std::sqrt(share * a * widest));
+                const double ramp = std::min(v, std::sqrt(a * d)) / (a / 2) * v;
+                const double r = std::max(v * v / (share * a), std::min(ramp / turn, widest));
+                if (const double w = std::min(v, r * turn / (1.02 * dt)); w > speed) {
+                    speed = w;
+                    setback = r * s / c;
+                    arc = r * turn;
+                    arc_acceleration = along(w, r);
+                }
+            }
+        }
+        const double left = std::max(0.0, leg.length - taken - setback);
+        const bool consumed = arc > 0 && left < 4 * dt * speed;
+        if (!consumed) all.push_back({left, leg.speed, own, entry});
+        if (arc > 0)
+            all.push_back({arc + (consumed ? left : 0), speed, arc_acceleration,
+                           std::min({speed, leg.speed, consumed ? entry : leg.speed})});
+        entry = arc > 0 ? std::min(speed, next.speed) : std::min({speed, leg.speed, next.speed});
+        taken = setback;
+    }
+    const std::size_t n = all.size();
+    std::vector<double> at(n + 1, 0);
+    for (std::size_t i = n; i-- > 0;)
+        at[i] = std::min(all[i].entry,
+                         std::sqrt(at[i + 1] * at[i + 1] + 2 * all[i].acceleration * all[i].length));
+    for (std::size_t i = 0; i + 50 <= n; ++i) {
+        double square = 0;
+        for (std::size_t k = i; k < i + 50; ++k) square += 2 * all[k].acceleration * all[k].length;
+        at[i] = std::min(at[i], std::sqrt(square));
+    }
+    double seconds = 0, v = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        const auto [length, speed, acceleration, first] = all[i];
+        const double out = std::min(at[i + 1], std::sqrt(v * v + 2 * acceleration * length));
+        const double peak = std::max(
+            {v, out, std::min(speed, std::sqrt((2 * acceleration * length + v * v + out * out) / 2))});
+        const double ramps =
+            acceleration > 0 ? (2 * peak * peak - v * v - out * out) / (2 * acceleration) : 0;
+        if (acceleration > 0) seconds += (2 * peak - v - out) / acceleration;
+        seconds += std::max(0.0, length - ramps) / std::max(peak, 1e-9);
         v = out;
     }
     return seconds;
@@ -66,11 +121,12 @@ TEST(Travel, LegByLegIsAllAtOnce) {
                 if (i % 7 == 0) travel.add({0, 1, {0, 0, 1}});  // passed over
             }
             const double expected = reference_seconds(legs, acceleration, kJunction);
-            EXPECT_EQ(travel.seconds(), expected) << "seed " << seed << " legs " << count << " of " << size;
-            EXPECT_EQ(travel_seconds(legs, acceleration), expected);
+            EXPECT_NEAR(travel.seconds(), expected, 1e-9 * expected)
+                << "seed " << seed << " legs " << count << " of " << size;
+            EXPECT_NEAR(travel_seconds(legs, acceleration), expected, 1e-9 * expected);
             // Begins anew.
             for (const MotionLeg& leg : legs) travel.add(leg);
-            EXPECT_EQ(travel.seconds(), expected);
+            EXPECT_NEAR(travel.seconds(), expected, 1e-9 * expected);
             EXPECT_EQ(travel.seconds(), 0);
         }
 }
@@ -79,7 +135,7 @@ TEST(Travel, LegByLegIsAllAtOnce) {
 // their corners bear.
 TEST(Travel, ChordsAreRunNoFasterThanTheirCircle) {
     const double acceleration = 1000, radius = 6, feed = 150, blend = 0.1,
-                 bears = std::sqrt(acceleration * radius);
+                 bears = std::sqrt(std::sqrt(0.75) * acceleration * radius);
     auto seconds = [&](int chords) {
         std::vector<MotionLeg> legs;
         const int turns = 20;
@@ -93,9 +149,10 @@ TEST(Travel, ChordsAreRunNoFasterThanTheirCircle) {
         return travel_seconds(legs, acceleration, blend) / turns;
     };
     const double circle = 2 * std::numbers::pi * radius / bears;
-    for (const int chords : {20, 30, 100, 1000}) {
+    for (const int chords : {20, 30, 100}) {
         EXPECT_GT(seconds(chords), 0.9 * circle) << chords << ": but for what is gained between corners";
         EXPECT_LT(seconds(chords), 1.03 * circle) << chords << ": they leave it by no more than the blend";
     }
+    EXPECT_GT(seconds(1000), 1.05 * circle) << "50 of them are too short to stop on";
     EXPECT_GT(seconds(8), 1.3 * circle) << "they leave it by 0.46 mm";
 }

@@ -2,6 +2,8 @@
 // reported as what it is.
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include <cmath>
 #include <functional>
 #include <random>
@@ -613,18 +615,28 @@ TEST(Simulate, TimeInClosedForm) {
     EXPECT_NEAR(program_seconds(p, m), 2 * (0.5 + 0.1), 1e-9);  // back: a full stop
     p.dwell_s = 3, m.tool_change_s = 15;
     EXPECT_NEAR(program_seconds(p, m), 19.2, 1e-9);
-    // A corner of 90° bears √(a·δ·c/(1 − c)) with c = cos 45°.
+    // A corner of 90° is rounded by an arc of r = δ·c/(1 − c), c = cos 45°, that bears √(√¾·a·r).
     m.tool_change_s = p.dwell_s = 0;
     p.steps[2] = {50, 50, 0, 6000, 3, true};
-    const double c = std::sqrt(0.5), v = std::sqrt(1000 * 0.02 * c / (1 - c)),
-                 leg = 50.0 / 100 + (100.0 * 100 + (100 - v) * (100 - v)) / (2 * 1000 * 100);
-    EXPECT_NEAR(program_seconds(p, m), 2 * leg, 1e-9);
-    p.blend = 0.1;
-    const double w = std::sqrt(1000 * 0.1 * c / (1 - c));
-    EXPECT_NEAR(program_seconds(p, m),
-                2 * (50.0 / 100 + (100.0 * 100 + (100 - w) * (100 - w)) / (2 * 1000 * 100)), 1e-9);
+    for (const double blend : {0.02, 0.1}) {
+        p.blend = blend;
+        const double c = std::sqrt(0.5), r = blend * c / (1 - c), v = std::sqrt(std::sqrt(0.75) * 1000 * r);
+        const double leg = (50 - r) / 100 + (100.0 * 100 + (100 - v) * (100 - v)) / (2 * 1000 * 100);
+        EXPECT_NEAR(program_seconds(p, m), 2 * leg + r * std::numbers::pi / 2 / v, 1e-9);
+    }
     p.blend = 0;  // exactly by the corner: a stop
     EXPECT_NEAR(program_seconds(p, m), 2 * (0.5 + 0.1), 1e-9);
+    // On from a rapid the machine stands still, though the way is straight.
+    p.steps = {{0, 0, 0, 0, 1, true}, {50, 0, 0, 0, 2, true}, {100, 0, 0, 6000, 3, true}};
+    EXPECT_NEAR(program_seconds(p, m), 50.0 / 200 + 0.2 + 50.0 / 100 + 0.1, 1e-9);
+    // From where the program before has ended: up 20, across 50; its tool stays.
+    m.tool_change_s = 15;
+    Program before = p;
+    before.steps = {{0, 0, 0, 0, 1, true}, {30, 40, -20, 0, 2, true}};
+    const double approach = 2 * std::sqrt(20.0 / 1000) + 50.0 / 200 + 0.2;
+    EXPECT_NEAR(program_seconds(p, m, &before), 50.0 / 200 + 0.2 + 50.0 / 100 + 0.1 + approach, 1e-9);
+    before.tool = p.tool + 1;
+    EXPECT_NEAR(program_seconds(p, m, &before), 50.0 / 200 + 0.2 + 50.0 / 100 + 0.1 + approach + 15, 1e-9);
 }
 
 TEST(Simulate, MapsCancelMemoryAndNonsense) {

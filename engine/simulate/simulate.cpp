@@ -352,7 +352,7 @@ private:
         const SimulatedLayer& layer = input_.layers[static_cast<std::size_t>(program.layer)];
         f.lowest = layer.z_top;
         f.stock_top = -1e300;
-        f.seconds = program_seconds(program, input_.machine);
+        f.seconds = program_seconds(program, input_.machine, i > 0 ? &input_.programs[i - 1] : nullptr);
         StepBox box;
         for (const ProgramArc& a : program.arcs) {
             box.add(a);

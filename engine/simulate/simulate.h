@@ -146,8 +146,12 @@ struct SimulationReport {
 [[nodiscard]] SimulationReport simulate(Context& context, const SimulationInput& input,
                                         const StandingPart& part, const SimulationOptions& options = {});
 
-/// Time of a program in seconds: trapezoids of speed under one acceleration, slowed at corners so that a path
-/// rounded by Program::blend at most would need no more than that acceleration across (junction deviation).
-[[nodiscard]] double program_seconds(const Program& program, const Machine& machine);
+/// Time of a program in seconds, by the rules of Travel (engine/schedule/motion_time.h), its dwell included.
+/// @param before the program that the machine ran before: from its end the spindle comes, and its tool need
+/// not
+///        be changed where it is the same; null: the tool is fetched, and the way to the first place not
+///        counted
+[[nodiscard]] double program_seconds(const Program& program, const Machine& machine,
+                                     const Program* before = nullptr);
 
 }  // namespace slabwright
