@@ -7,13 +7,15 @@
 
 namespace slabwright {
 
-/// @throws Error(input) unless `directory` can become a folder of ours: it does not exist, is an empty
-/// folder, or is a folder that holds
-///         a plan.json of ours and nothing that we do not write
+/// Makes sure, before hours of planning, that `directory` can become a plan folder: it does not exist, is an
+/// empty folder, or is a folder that holds a plan of ours and nothing that such a folder cannot hold; and a
+/// folder can be made beside it and take its place. Takes away what dead processes left beside it.
+/// @throws Error(input) that names what stands against it
 void require_replaceable(const std::string& directory);
 
 /// A folder under way. If commit() is not reached, the destructor takes it away again, with the parent
-/// folders that were made for it.
+/// folders that were made for it. While it lives it holds a lock on its folder, by which others know that it
+/// is not a dead process's.
 class OutputFolder {
 public:
     /// Makes the fresh folder. @throws Error(input) as require_replaceable, or when the place cannot be
@@ -23,33 +25,19 @@ public:
     OutputFolder(const OutputFolder&) = delete;
     OutputFolder& operator=(const OutputFolder&) = delete;
 
-    /// Where `name` is to be written until commit().
-    [[nodiscard]] std::filesystem::path path(std::string_view name) const { return fresh_ / name; }
-    /// The target takes the fresh folder's content; an older one goes. @throws Error(input), and the target
+    /// The folder to write to until commit().
+    [[nodiscard]] const std::filesystem::path& path() const noexcept { return fresh_; }
+    /// The target takes the fresh folder's content; an older plan goes. @throws Error(input), and the target
     /// is as it was
     void commit();
 
 private:
+    void take_place();
+    void remove_made_parents() noexcept;
+
     std::filesystem::path target_, fresh_, made_parent_;
+    int lock_ = -1;
     bool committed_ = false;
 };
-
-/// A file written piece by piece. @throws Error(input) with path and reason when the disk does not take it
-class OutputFile {
-public:
-    explicit OutputFile(std::filesystem::path path);
-    ~OutputFile();
-    OutputFile(const OutputFile&) = delete;
-    OutputFile& operator=(const OutputFile&) = delete;
-    void write(std::string_view text);
-    void close();  ///< every byte is handed over, or it throws
-
-private:
-    std::filesystem::path path_;
-    int file_ = -1;
-};
-
-/// Writes one file, all or nothing: beside it first, then renamed over it. @throws Error(input)
-void write_file_whole(const std::string& path, std::string_view text);
 
 }  // namespace slabwright

@@ -21,7 +21,7 @@
 #include "engine/simulate/replay.h"
 #include "io/base64.h"
 #include "io/job_keys.h"
-#include "io/output_folder.h"
+#include "io/output_file.h"
 #include "io/report_template.h"
 #include "io/stl.h"
 #include "io/thinned_path.h"
@@ -781,8 +781,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
 
 void write_report(Context& context, const std::string& directory, const ReportOptions& options,
                   std::optional<Verification> verified) {
-    write_file_whole((fs::path(directory) / "report.html").string(),
-                     report_html(context, directory, options, std::move(verified)));
+    write_file_in(directory, "report.html", report_html(context, directory, options, std::move(verified)));
 }
 
 }  // namespace slabwright

@@ -18,8 +18,10 @@
 #include "engine/tools/tools.h"
 #include "io/access_ply.h"
 #include "io/gcode_writer.h"
+#include "io/input_file.h"
 #include "io/inspect_json.h"
 #include "io/job_toml.h"
+#include "io/output_file.h"
 #include "io/output_folder.h"
 #include "io/pattern.h"
 #include "io/plan_json.h"
@@ -57,35 +59,16 @@ auto guarded(Body&& body) -> decltype(body()) {
     }
 }
 
-std::string read_text(const std::string& path) {
-    const auto refuse = [&] {
-        const std::string reason = std::strerror(errno);
-        throw Error(ErrorKind::usage, "job.unreadable", fmt::format("cannot read the job file: {}", reason),
-                    path, "check the path after --job");
-    };
-    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (file < 0) refuse();
-    std::string text;
-    char buffer[1 << 16];
-    ssize_t got = 0;
-    while ((got = ::read(file, buffer, sizeof buffer)) > 0)
-        text.append(buffer, static_cast<std::size_t>(got));
-    if (got < 0) {
-        const int reason = errno;
-        ::close(file);
-        errno = reason;
-        refuse();
-    }
-    ::close(file);
-    return text;
-}
-
 }  // namespace
 
 std::string version() { return SLABWRIGHT_VERSION; }
 
 Job read_job(const std::string& path) {
-    return guarded([&] { return parse_job(read_text(path), path); });
+    return guarded([&] {
+        const std::string text = read_whole(
+            path, {ErrorKind::usage, "job.unreadable", kMostJobBytes, "check the path after --job"});
+        return parse_job(text, path);
+    });
 }
 
 std::string default_job_toml(std::string_view library) {
@@ -153,15 +136,11 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out) {
     for (const Layer& layer : plan.layers)
         for (const Operation& operation : layer.operations) programs.push_back({&layer, &operation});
     context.begin_phase("writing", 0.985, 1.0, programs.size() + 1);
-    std::filesystem::create_directory(out.path("nc"));
-    const auto write_whole = [&](const char* name, const std::string& text) {
-        OutputFile file(out.path(name));
-        file.write(text);
-        file.close();
-    };
+    const std::filesystem::path programs_folder = out.path() / "nc";
+    std::filesystem::create_directory(programs_folder);
     // Each program is a file of its own, so threads cannot mix their texts.
     parallel_each(context, programs.size(), [&](std::size_t i) {
-        OutputFile file(out.path("nc/" + programs[i].operation->file));
+        OutputFile file(programs_folder, programs[i].operation->file);
         write_program(plan, *programs[i].layer, *programs[i].operation, [&](std::string_view piece) {
             context.throw_if_cancelled();
             file.write(piece);
@@ -169,9 +148,9 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out) {
         file.close();
         context.advance();
     });
-    write_whole("tool.tbl", tool_table(plan.job));
-    write_whole("sequence.json", sequence_json(plan));
-    write_whole("plan.json", plan_json(plan));
+    write_file_in(out.path(), "tool.tbl", tool_table(plan.job));
+    write_file_in(out.path(), "sequence.json", sequence_json(plan));
+    write_file_in(out.path(), "plan.json", plan_json(plan));
     context.throw_if_cancelled();
     context.advance();
 }
@@ -226,8 +205,7 @@ void write(Context& context, const Plan& plan, const std::string& directory, con
     guarded([&] {
         OutputFolder out(directory);
         fill(context, plan, out);
-        if (!stl_path.empty() && reports_are_built())
-            write_report(context, out.path("").string(), {stl_path});
+        if (!stl_path.empty() && reports_are_built()) write_report(context, out.path().string(), {stl_path});
         context.throw_if_cancelled();
         out.commit();
     });
@@ -244,10 +222,10 @@ VerifyResult write_and_verify(Context& context, const Plan& plan, const std::str
         const bool reports = reports_are_built();
         const double verified = reports ? verifying_share(plan, options.cell) : 1;
         context.share_progress(kPlanningShare, verified);
-        Verification found = verify_folder(context, out.path("").string(), options);
+        Verification found = verify_folder(context, out.path().string(), options);
         VerifyResult result = verdict(found);
         context.share_progress(verified, 1);
-        if (reports) write_report(context, out.path("").string(), {options.stl}, std::move(found));
+        if (reports) write_report(context, out.path().string(), {options.stl}, std::move(found));
         context.throw_if_cancelled();
         out.commit();
         return result;
@@ -274,20 +252,15 @@ void write_access_maps(Context& context, const Plan& plan, const std::string& st
         if (stl.input.sha256 != plan.input.sha256)
             throw Error(ErrorKind::input, "access_maps.stl", "is not the pattern that was planned", stl_path,
                         "give the STL of the plan");
-        std::error_code failed;
-        std::filesystem::create_directories(directory, failed);
-        if (failed)
-            throw Error(ErrorKind::input, "access_maps.write", "cannot be made: " + failed.message(),
-                        directory, "choose another folder for the maps");
+        make_output_directory(directory);
         context.begin_phase("access maps", 1, 1);
         access_maps(context, stl.mesh.view(), plan, [&](const AccessMap& map) {
             const Accessibility& a = map.accessibility;
             const std::string comment = fmt::format(
                 "{}: layer {}, tool {} reaches {:.4f} of the surface to be machined; mm, z = 0 at the bottom",
                 plan.input.sha256.substr(0, 12), map.layer, map.tool, a.ratio());
-            const std::filesystem::path file = std::filesystem::path(directory) /
-                                               fmt::format("layer_{:02}_tool_{:02}.ply", map.layer, map.tool);
-            write_file_whole(file.string(), access_ply(stl.mesh.view(), a.share, comment));
+            write_file_in(directory, fmt::format("layer_{:02}_tool_{:02}.ply", map.layer, map.tool),
+                          access_ply(stl.mesh.view(), a.share, comment));
         });
     });
 }

@@ -20,6 +20,7 @@
 #include <string_view>
 #include <utility>
 
+#include "io/output_file.h"
 #include "io/sha256.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/raw_array.h"
@@ -734,33 +735,13 @@ void require_solid(Context& context, const StlMesh& stl, const std::string& path
 }
 
 void write_stl(const std::string& path, const Mesh& mesh) {
-    // A fresh file beside the target takes its place when complete, so nobody ever reads half of one.
-    auto fail = [&](int error) {
-        refuse("write", "the file cannot be written: " + reason(error), path,
-               "check the folder and the space on its disk");
-    };
-    std::string fresh;
-    int file = -1;
-    for (int attempt = 0; file < 0; ++attempt) {
-        fresh = fmt::format("{}.{}.{}.partial", path, ::getpid(), attempt);
-        file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (file < 0 && (errno != EEXIST || attempt == 1000)) fail(errno);
-    }
-    auto abandon = [&](int error) {
-        if (file >= 0) ::close(file);
-        ::unlink(fresh.c_str());
-        fail(error);
-    };
+    const std::filesystem::path place(path);
+    OutputFile file(place.has_parent_path() ? place.parent_path() : ".", place.filename().string());
     std::string buffer = "binary STL, millimetres, written by Slabwright";
     buffer.resize(80, '\0');
     auto append = [&](auto value) { buffer.append(reinterpret_cast<const char*>(&value), sizeof value); };
     auto flush = [&] {
-        for (std::size_t at = 0; at < buffer.size();) {
-            const ssize_t written = ::write(file, buffer.data() + at, buffer.size() - at);
-            if (written < 0 && errno == EINTR) continue;
-            if (written < 0) abandon(errno);
-            at += static_cast<std::size_t>(written);
-        }
+        file.write(buffer);
         buffer.clear();
     };
     append(static_cast<std::uint32_t>(mesh.facets.size()));
@@ -776,8 +757,7 @@ void write_stl(const std::string& path, const Mesh& mesh) {
         if (buffer.size() > (std::size_t{1} << 20)) flush();
     }
     flush();
-    if (::close(std::exchange(file, -1)) != 0) abandon(errno);
-    if (::rename(fresh.c_str(), path.c_str()) != 0) abandon(errno);
+    file.close();
 }
 
 }  // namespace slabwright

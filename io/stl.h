@@ -46,7 +46,7 @@ struct StlMesh {
 void require_solid(Context& context, const StlMesh& stl, const std::string& path);
 
 /// Binary STL, for models that the project makes; takes its place at `path` only when complete.
-/// @throws Error(input, "stl.write")
+/// @throws Error(input, "out.unwritable") and as OutputFile
 void write_stl(const std::string& path, const Mesh& mesh);
 
 }  // namespace slabwright

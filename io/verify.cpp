@@ -13,6 +13,7 @@
 
 #include "io/job_keys.h"
 #include "io/json_text.h"
+#include "io/output_file.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 
@@ -386,17 +387,12 @@ void write_maps(const SimulationReport& report, const std::string& directory) {
         }
         return {60, 60, 60};
     };
-    std::error_code failed;
-    fs::create_directories(directory, failed);
-    if (failed)
-        throw Error(ErrorKind::input, "verify.write", "cannot be made: " + failed.message(), directory,
-                    "choose another folder for the maps");
+    make_output_directory(directory);
     for (std::size_t l = 0; l < report.layers.size(); ++l) {
         const std::vector<CellKind>& kinds = report.layers[l].kinds;
-        const fs::path file = fs::path(directory) / fmt::format("layer_{:02}.ppm", l + 1);
-        std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-        stream << "P6\n" << std::to_string(report.nx) << ' ' << std::to_string(report.ny) << "\n255\n";
-        std::vector<char> row(3 * static_cast<std::size_t>(report.nx));
+        OutputFile file(directory, fmt::format("layer_{:02}.ppm", l + 1));
+        file.write(fmt::format("P6\n{} {}\n255\n", report.nx, report.ny));
+        std::string row(3 * static_cast<std::size_t>(report.nx), '\0');
         for (int j = report.ny; j-- > 0 && !kinds.empty();) {
             for (int i = 0; i < report.nx; ++i) {
                 const auto c =
@@ -405,12 +401,9 @@ void write_maps(const SimulationReport& report, const std::string& directory) {
                 for (std::size_t k = 0; k < 3; ++k)
                     row[3 * static_cast<std::size_t>(i) + k] = static_cast<char>(c[k]);
             }
-            stream.write(row.data(), static_cast<std::streamsize>(row.size()));
+            file.write(row);
         }
-        stream.flush();
-        if (!stream)
-            throw Error(ErrorKind::input, "verify.write", "cannot be written", file.string(),
-                        "free space, or choose another folder for the maps");
+        file.close();
     }
 }
 
@@ -551,22 +544,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
                               part.stated);
 
     if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);
-    if (options.write) {
-        const fs::path file = out / "verify.json", fresh = out / "verify.json.part";
-        {
-            std::ofstream stream(fresh, std::ios::binary | std::ios::trunc);
-            stream << result.json;
-            stream.flush();
-            if (!stream)
-                throw Error(ErrorKind::input, "verify.write", "cannot be written", fresh.string(),
-                            "free space, or choose another folder");
-        }
-        std::error_code failed;
-        fs::rename(fresh, file, failed);
-        if (failed)
-            throw Error(ErrorKind::input, "verify.write", "cannot be written: " + failed.message(),
-                        file.string(), "free space, or choose another folder");
-    }
+    if (options.write) write_file_in(out, "verify.json", result.json);
     return result;
 }
 

@@ -47,7 +47,7 @@ struct Verification {
 /// Writes one picture (binary PPM, a pixel a cell, y upwards) for each layer of a report with maps: beside
 /// the pattern light grey, the pattern grey, left-over above the cusp but within tolerance yellow, missed
 /// orange, unreachable blue, gouge red, flask dark grey. The directory is made if it is not there. @throws
-/// Error(input, "verify.write") when it cannot be written
+/// Error(input, "out.unwritable") when it cannot be written
 void write_maps(const SimulationReport& report, const std::string& directory);
 
 }  // namespace slabwright

@@ -591,7 +591,7 @@ TEST_F(Stl, WritingWhereNothingCanBeWritten) {
         write_stl((folder / "none" / "out.stl").string(), Mesh{});
         FAIL();
     } catch (const Error& error) {
-        EXPECT_EQ(error.code(), "stl.write");
+        EXPECT_EQ(error.code(), "out.unwritable");
     }
     std::filesystem::create_directory(folder / "taken");
     EXPECT_THROW(write_stl((folder / "taken").string(), Mesh{}), Error);

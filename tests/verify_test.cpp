@@ -178,7 +178,7 @@ TEST(Verify, MapsShowEachLayer) {
                             {.stl = {}, .cell = 0.5, .maps_directory = (f.path / "file").string()});
         FAIL() << "a file is no folder";
     } catch (const Error& e) {
-        EXPECT_EQ(e.code(), "verify.write");
+        EXPECT_EQ(e.code(), "out.unwritable");
     }
 }
 

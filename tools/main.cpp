@@ -235,6 +235,8 @@ void with_context(const Options& options, Body&& body) {
     running = &context;
     std::signal(SIGINT, on_signal);
     std::signal(SIGTERM, on_signal);
+    // Whoever runs it under nohup wants it to go on when the terminal is closed.
+    if (std::signal(SIGHUP, on_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
     struct Done {
         ProgressBar& bar;
         ~Done() {
