@@ -18,14 +18,22 @@ struct GcodeLimits {
 };
 
 /// What a program commands, line by line, arcs as chords; Program::arcs holds the level ones whose two radii
-/// agree to twice arc_error. Understands comments, line numbers, % lines, G0–G3 (centre I J K, in planes G17
-/// G18 G19, or radius R), G4, G17–G19, G20/G21, G40, G43/G43.1 (length offset: taken as measured), G49,
-/// G54–G59.3, G61, G64 (P, Q), G80, G90/G91, G90.1/G91.1, G94, M0–M9, M30, F, S, T, H, and modal motion.
-/// Nothing after M2 or M30 is run.
-/// @throws Error(verification, "gcode.…") with file:line for any other word or number, a word twice on a
-/// line, a motion
-///   without feed (G1 with no F), a feed motion from or to an unknown place, an arc that is none, a tool
-///   change that names no tool, two tools in one program, no M2 or M30 at the end, a coordinate beyond 214 m
+/// agree to twice arc_error.
+///
+/// Understands comments, line numbers, a % before and after the program, G0–G3 (centre I J K, in planes G17
+/// G18 G19, or radius R), G4, G8, G17–G19, G20/G21, G40, G43 (length offset of the tool that is loaded: taken
+/// as measured), G49, G54, G61, G64 P (Q), G80, G90/G91, G90.1/G91.1, G94, G97, M2, M3, M5, M6, M9, M30, M48,
+/// F, S, T, H, and modal motion. Words of a line act in LinuxCNC's order.
+///
+/// Nothing is taken for granted of what the machine was left in (ModalState): before its first motion a
+/// program must state tool, length offset, work offset, units, plane, distances, feed mode, G40, G8, G97 and
+/// the path mode.
+/// @throws Error(verification, "gcode.…") with file:line for any other word, number or byte, and for every
+///   program that LinuxCNC refuses or runs by what is not in its text: a word twice on a line, a line too
+///   long, a motion before what decides where it goes, a motion without feed (G1 with no F), a feed motion
+///   from or to an unknown place, an arc that is none, a tool change that names no tool, a second one, words
+///   after M2 or M30 or none of them at the end, inches or increments left in force, a coordinate beyond 214
+///   m
 [[nodiscard]] Program read_gcode(std::string_view text, const std::string& file,
                                  const GcodeLimits& limits = {});
 

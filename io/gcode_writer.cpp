@@ -148,10 +148,10 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
     comment(fmt::format("tool {}: {}, diameter {} mm", tool->number, tool->name, decimal(tool->diameter, 4)));
     comment(fmt::format("cutting {} mm, {} min", decimal(operation.cutting_mm, 1),
                         decimal(operation.minutes, 2)));
-    text +=
-        fmt::format("G21 G17 G90 G94 G40 G49 G80\nG64 P{3} Q0\nG54\nT{0} M6\nG43 H{0}\nS{1} M3\nG4 P{2}\n",
-                    tool->number, decimal(operation.spindle_rpm, 0),
-                    decimal(plan.job.machine.spindle_dwell_s, 3), decimal(operation.blend, 4));
+    text += fmt::format(
+        "G21 G17 G90 G94 G40 G49 G80\nG8 G97\nG64 P{3} Q0\nG54\nT{0} M6\nG43 H{0}\nS{1} M3\nG4 P{2}\n",
+        tool->number, decimal(operation.spindle_rpm, 0), decimal(plan.job.machine.spindle_dwell_s, 3),
+        decimal(operation.blend, 4));
 
     const std::vector<Move>& moves = operation.moves;
     // Centres count from where an arc begins, whatever the program before has left in force.

@@ -14,8 +14,9 @@ namespace slabwright {
 /// Takes the next piece of a program's text.
 using TextSink = std::function<void(std::string_view)>;
 
-/// Writes the program of one operation: comment header, G21 G17 G90 G94 G40 G49 G80, G54, tool and length
-/// offset, spindle with dwell, the moves as G0 and G1 (arcs as G2 and G3 with I and J, after G91.1), M5, M2.
+/// Writes the program of one operation: comment header, G21 G17 G90 G94 G40 G49 G80, G8 G97 (x as it is,
+/// speeds in revolutions, whatever a lathe's program has left in force), G64, G54, tool and length offset,
+/// spindle with dwell, the moves as G0 and G1 (arcs as G2 and G3 with I and J, after G91.1), M5, M2.
 /// Coordinates are exact from the integers of 0.1 µm: at most four decimals, no exponent. Words are modal.
 /// The first and the last motion are Z-only G0 to the clearance height. With the frame layer-top, z counts
 /// from the layer's top.

@@ -12,7 +12,9 @@ using namespace slabwright;
 
 namespace {
 
-const std::string kHead = "(a comment)\nG21 G17 G90 G94 G40 G49 G80\nG54\nT3 M6\nG43 H3\nS18000 M3\nG4 P3\n";
+const std::string kBlend = " G64 P0.02 Q0";
+const std::string kHead = "(a comment)\nG21 G17 G90 G94 G40 G49 G80\nG54 G8 G97 G91.1" + kBlend +
+                          "\nT3 M6\nG43 H3\nS18000 M3\nG4 P3\n";
 
 Program read(const std::string& body, const GcodeLimits& limits = {}) {
     return read_gcode(kHead + body + "M5\nM2\n", "nc/test.ngc", limits);
@@ -64,26 +66,27 @@ TEST(GcodeReader, SpindleAndUnits) {
     EXPECT_DOUBLE_EQ(incremental.steps[2].x, 5);
     EXPECT_DOUBLE_EQ(incremental.steps[2].z, 0.5);
     EXPECT_DOUBLE_EQ(incremental.steps[3].x, 0);
-    const Program stops = read_gcode("G0 Z1\nM2\nthis is never read\n", "x");
-    EXPECT_EQ(stops.steps.size(), 1u);
-    const Program small =
-        read_gcode("%\nn10 g0 x 1.5 y-2 (lower case and blanks) z+3 ; the rest\nm30\n%\n", "x");
+    const Program small = read_gcode(
+        "%\n" + kHead + "n10 g0 x 1.5 y-2 (lower case and blanks) z+3 ; the rest\nm30\n\n(end)\n%\n", "x");
     EXPECT_EQ(small.steps.at(0).x, 1.5);
     EXPECT_EQ(small.steps.at(0).z, 3);
 }
 
 TEST(GcodeReader, HowFarCornersMayBeRounded) {
-    const auto blends = [](const std::string& body) {
-        const Program p = read(body + "G0 X0 Y0 Z1\nG1 X1 F10\n");
+    std::string bare = kHead;
+    bare.erase(bare.find(kBlend), kBlend.size());
+    const auto blends = [&](const std::string& body) {
+        const Program p = read_gcode(bare + body + "G0 X0 Y0 Z1\nG1 X1 F10\nM5\nM2\n", "nc/test.ngc");
         return std::pair{p.blend, p.strays};
     };
-    EXPECT_EQ(blends(""), std::pair(kJunction, kJunction));
-    EXPECT_EQ(blends("G64\n"), std::pair(kJunction, kJunction));
+    EXPECT_EQ(refusal(bare + "G0 X0 Y0 Z1\nM2\n"), "gcode.unset nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G64\n"), "gcode.path_mode nc/x.ngc:8") << "LinuxCNC then strays without limit";
+    EXPECT_EQ(refused_body("G64 P0\n"), "gcode.path_mode nc/x.ngc:8") << "no limit either";
+    EXPECT_EQ(refused_body("G64 Q0.03\n"), "gcode.path_mode nc/x.ngc:8");
     EXPECT_EQ(blends("G64 P0.1 Q0\n"), std::pair(0.1, 0.1));
     EXPECT_EQ(blends("G64 P0.1\n"), std::pair(0.1, 0.2))
         << "points within P of a straight way are left out too";
     EXPECT_EQ(blends("G64 P0.1 Q0.03\n"), std::pair(0.1, 0.1 + 0.03));
-    EXPECT_EQ(blends("G64 Q0.03\n"), std::pair(kJunction, kJunction + 0.03));
     EXPECT_EQ(blends("G20\nG64 P0.01 Q0\nG21\n"), std::pair(0.254, 0.254));
     EXPECT_EQ(blends("G64 P0.1 Q0\nG64 P0.05 Q0\n"), std::pair(0.05, 0.1));
     EXPECT_EQ(blends("G64 P0.1 Q0\nG61\n"), std::pair(0.0, 0.1));
@@ -193,4 +196,143 @@ TEST(GcodeReader, RefusesWithFileAndLine) {
     EXPECT_EQ(refusal("G21\nM6\nM2\n"), "gcode.tool nc/x.ngc:2");
     EXPECT_EQ(refusal(kHead + "G0 Z5\n").substr(0, 12), "gcode.no_end");
     EXPECT_EQ(refusal("").substr(0, 12), "gcode.no_end");
+}
+
+// The machine may have been left in any state: what decides where a motion goes must be stated before it.
+TEST(GcodeReader, NothingIsTakenForGrantedOfWhatRanBefore) {
+    const std::string motion = "G0 Z5\nX0 Y0\nG1 X1 F100\nG3 X2 Y1 I0 J1\nG0 Z5\nM5\nM2\n";
+    EXPECT_EQ(refusal(kHead + motion), "accepted");
+    for (const auto& [word, found] : {std::pair{"G21", "gcode.unset nc/x.ngc:3"},
+                                      {"G17", "gcode.unset nc/x.ngc:8"},
+                                      {"G90 ", "gcode.unset nc/x.ngc:8"},
+                                      {"G94", "gcode.unset nc/x.ngc:8"},
+                                      {"G40", "gcode.unset nc/x.ngc:8"},
+                                      {"G54", "gcode.unset nc/x.ngc:8"},
+                                      {"G8 ", "gcode.unset nc/x.ngc:8"},
+                                      {"G97", "gcode.unset nc/x.ngc:8"},
+                                      {"G91.1", "gcode.unset nc/x.ngc:11"},
+                                      {"G64 P0.02 Q0", "gcode.unset nc/x.ngc:8"},
+                                      {"G43 H3", "gcode.offset nc/x.ngc:8"},
+                                      {"T3", "gcode.tool nc/x.ngc:4"},
+                                      {"M6", "gcode.offset nc/x.ngc:5"},
+                                      {" P0.02", "gcode.path_mode nc/x.ngc:3"},
+                                      {" F100", "gcode.feed nc/x.ngc:10"},
+                                      // These do not matter: G43 and G0 state anew what they would.
+                                      {"G49", "accepted"},
+                                      {"G80", "accepted"}}) {
+        std::string text = kHead + motion;
+        text.erase(text.find(word), std::string(word).size());
+        EXPECT_EQ(refusal(text), found) << "without " << word;
+    }
+    // Speed and spindle are the simulation's matter: the steps say whether it turns.
+    std::string silent = kHead + motion;
+    silent.erase(silent.find("S18000 M3"), 9);
+    EXPECT_FALSE(read_gcode(silent, "x").steps[2].spindle);
+}
+
+TEST(GcodeReader, NothingThatDecidesAMotionIsTakenBack) {
+    const std::string cut = "G0 Z5\nX0 Y0\nG1 X1 F100\n", rest = "X2\n";
+    const auto within = [&](const std::string& line) { return refused_body(cut + line + "\n" + rest); };
+    EXPECT_EQ(within("G43"), "accepted") << "the length of the tool in the spindle";
+    EXPECT_EQ(within("G49"), "gcode.offset nc/x.ngc:12");
+    EXPECT_EQ(within("T3 M6"), "gcode.tool nc/x.ngc:11");
+    EXPECT_EQ(within("T4"), "gcode.tool nc/x.ngc:11");
+    EXPECT_EQ(within("G43 H0"), "gcode.offset nc/x.ngc:11");
+    EXPECT_EQ(within("G43 H5"), "gcode.offset nc/x.ngc:11");
+    EXPECT_EQ(within("G43.2 H3"), "gcode.unknown_word nc/x.ngc:11");
+    EXPECT_EQ(within("G64 P0"), "gcode.path_mode nc/x.ngc:11");
+    EXPECT_EQ(within("%"), "gcode.percent nc/x.ngc:11");
+    EXPECT_EQ(within("M2"), "gcode.after_end nc/x.ngc:12");
+    EXPECT_EQ(within("G0 F"), "gcode.number nc/x.ngc:11");
+    for (const char* stop : {"M0", "M1", "M60"}) EXPECT_EQ(within(stop), "gcode.pause nc/x.ngc:11") << stop;
+    for (const char* wet : {"M7", "M8"}) EXPECT_EQ(within(wet), "gcode.coolant nc/x.ngc:11") << wet;
+    EXPECT_EQ(within("M9"), "accepted");
+    EXPECT_EQ(within("G4 P-1"), "gcode.dwell nc/x.ngc:11");
+    EXPECT_EQ(within("G4"), "gcode.dwell nc/x.ngc:11");
+    EXPECT_EQ(within("G4 P1 X5"), "gcode.dwell nc/x.ngc:11");
+    EXPECT_EQ(within("G4 G64 P1"), "gcode.dwell nc/x.ngc:11");
+    for (const char* foreign : {"G7",
+                                "G10 L2 P1 X0",
+                                "G28",
+                                "G30",
+                                "G33 K1",
+                                "G38.2 Z-5",
+                                "G41 D3",
+                                "G42 D3",
+                                "G52 X1",
+                                "G53 G0 Z0",
+                                "G73 X1",
+                                "G76",
+                                "G81 X1 Z-5 R2",
+                                "G89",
+                                "G92 X0",
+                                "G92.1",
+                                "G93",
+                                "G95",
+                                "G96 D3000 S100",
+                                "G98",
+                                "M19",
+                                "M49",
+                                "M61 Q3",
+                                "M62 P1",
+                                "M66",
+                                "M100",
+                                "M199 P1",
+                                "/G0 Z-5",
+                                "O100 call",
+                                "#1=5",
+                                "A90",
+                                "U1",
+                                "E1",
+                                "D3",
+                                "L1",
+                                "$1"})
+        EXPECT_EQ(within(foreign), "gcode.unknown_word nc/x.ngc:11") << foreign;
+    EXPECT_EQ(within("G20"), "gcode.left_in_force nc/x.ngc:14") << "inches to the end";
+    EXPECT_EQ(within("G91"), "gcode.left_in_force nc/x.ngc:14");
+    EXPECT_EQ(within("G20\nX0.1\nG21"), "accepted");
+}
+
+TEST(GcodeReader, LinesAsLinuxcncTakesThem) {
+    EXPECT_EQ(refused_body("G0" + std::string(248, ' ') + "Z5\n"), "accepted") << "252 characters";
+    EXPECT_EQ(refused_body("G0" + std::string(249, ' ') + "Z5\n"), "gcode.line_length nc/x.ngc:8");
+    EXPECT_EQ(refused_body("(" + std::string(300, 'x') + ")\n"), "gcode.line_length nc/x.ngc:8");
+    EXPECT_EQ(refused_body(std::string("G0 Z5\0 Z-5\n", 12)), "gcode.character nc/x.ngc:8");
+    EXPECT_EQ(refused_body("(\xC3\xA4)\n"), "gcode.character nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 Z5\rX2\n"), "gcode.character nc/x.ngc:8");
+    EXPECT_EQ(refused_body("G0 Z5\r\n"), "accepted");
+    EXPECT_EQ(refused_body("G0 Z5 N7\n"), "gcode.unknown_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("N7 N8 G0 Z5\n"), "gcode.unknown_word nc/x.ngc:8");
+    EXPECT_EQ(refused_body("N-7 G0 Z5\n"), "gcode.number nc/x.ngc:8");
+    for (const char* active : {"(MSG, put the clamp on)", "(msg,x)", "( DEBUG, #1)", "(PRINT,x)", "(LOG,x)",
+                               "(LOGOPEN,/etc/passwd)", "(LOGAPPEND,x)", "(LOGCLOSE)", "(PROBEOPEN x.txt)",
+                               "(PROBECLOSE)", "(AXIS,stop)", "(py,import os)", ";py,import os"})
+        EXPECT_EQ(refused_body(std::string(active) + "\n"), "gcode.comment nc/x.ngc:8") << active;
+    for (const char* plain : {"(tool 2: mill, long)", "(pattern a, b.stl)", "; x", "()", "(12, 13)"})
+        EXPECT_EQ(refused_body(std::string(plain) + "\n"), "accepted") << plain;
+    for (const char* twice :
+         {"G17 G18", "G90 G91", "G20 G21", "M3 M5", "G64 P1 G61", "G54 G54", "G43 H3 G49"})
+        EXPECT_EQ(refused_body(std::string(twice) + "\n"), "gcode.twice nc/x.ngc:8") << twice;
+    EXPECT_EQ(refusal("(c)\n%\n" + kHead + "M2\n"), "gcode.percent nc/x.ngc:2");
+    EXPECT_EQ(refusal("%\n%\n" + kHead + "M2\n"), "gcode.percent nc/x.ngc:2");
+    EXPECT_EQ(refusal(kHead + "M2\n%\nG0 Z5\n"), "gcode.after_end nc/x.ngc:10");
+    // F counts in the unit before the line's own; P and coordinates in the line's.
+    const Program p = read("G0 Z1 X0 Y0\nG20 F10 G1 X1\nG21 X0\n");
+    EXPECT_EQ(p.steps[1].feed, 10);
+    EXPECT_EQ(p.steps[1].x, 25.4);
+}
+
+TEST(GcodeReader, TellsHowTheSpindleTurnsWhereItFeeds) {
+    const Program p = read("G0 X0 Y0 Z5\nG1 X1 F100\nS9000\nX2\nM5\nG0 Z9\nM3\nG4 P0.5\nG4 P7\nG1 X3\n");
+    EXPECT_EQ(p.fastest_spindle.value, 18000);
+    EXPECT_EQ(p.fastest_spindle.line, 9u);
+    EXPECT_EQ(p.slowest_spindle.value, 9000);
+    EXPECT_EQ(p.slowest_spindle.line, 11u);
+    EXPECT_EQ(p.shortest_spin_up.value, 0) << "none after the change of speed";
+    EXPECT_EQ(p.shortest_spin_up.line, 11u);
+    EXPECT_EQ(p.longest_dwell.value, 7);
+    EXPECT_EQ(p.longest_dwell.line, 16u);
+    EXPECT_EQ(p.dwell_s, 10.5);
+    EXPECT_EQ(read("G0 X0 Y0 Z5\nG1 X1 F100\n").shortest_spin_up.value, 3);
+    EXPECT_EQ(read("G0 X0 Y0 Z5\nM5\nG1 X1 F100\n").slowest_spindle.value, 0);
 }

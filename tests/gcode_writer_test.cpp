@@ -103,7 +103,7 @@ TEST(Gcode, WordForWord) {
                   "pattern's bottom)\n"
                   "(z = 0 at the pattern's bottom)\n(rough: levels)\n(tool 2: flat end mill 1/2 in, diameter "
                   "12.7 mm)\n(cutting 0 mm, 0 min)\n"
-                  "G21 G17 G90 G94 G40 G49 G80\nG64 P0.02 Q0\nG54\nT2 M6\nG43 H2\nS18000 M3\nG4 P3\n"
+                  "G21 G17 G90 G94 G40 G49 G80\nG8 G97\nG64 P0.02 Q0\nG54\nT2 M6\nG43 H2\nS18000 M3\nG4 P3\n"
                   "G0 Z47\nX-1.25 Y3\nZ38\nG1 Z35.0001 F1500\nX0.0001 F9000\nY-0.5\nG0 Z47\nM5\nM2\n");
 }
 
@@ -164,7 +164,8 @@ TEST(Gcode, EveryLineIsPlain) {
         "(G[01] )?(X-?(0|[1-9][0-9]*)(\\.[0-9]{0,3}[1-9])?)?( ?Y-?(0|[1-9][0-9]*)(\\.[0-9]{0,3}[1-9])?)?( "
         "?Z-?(0|[1-9][0-9]*)(\\.[0-9]{0,3}[1-9])?)?( F[0-9]+)?");
     const std::regex other(
-        "\\([^()]*\\)|G21 G17 G90 G94 G40 G49 G80|G64 P0\\.02 Q0|G54|T2 M6|G43 H2|S18000 M3|G4 P3|M5|M2");
+        "\\([^()]*\\)|G21 G17 G90 G94 G40 G49 G80|G8 G97|G64 P0\\.02 Q0|G54|T2 M6|G43 H2|S18000 M3|G4 "
+        "P3|M5|M2");
     std::istringstream lines(text);
     std::vector<std::string> motions;
     for (std::string line; std::getline(lines, line);) {

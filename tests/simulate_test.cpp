@@ -19,6 +19,9 @@ using namespace slabwright;
 
 namespace {
 
+/// What a program must state before its first motion.
+const std::string kStart = "G21 G17 G90 G94 G40 G49 G80\nG54 G8 G97 G91.1 G64 P0.02 Q0\nT3 M6\nG43 H3\n";
+
 struct Solid {
     Mesh mesh;
     void quad(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
@@ -509,7 +512,7 @@ TEST(Simulate, NoCellIsGougedDeeperThanTheExactCheckSays) {
 
 // A program of arcs, cut as arcs, does to the stock what its chords do.
 TEST(Simulate, ArcsCutWhatTheirChordsCut) {
-    std::string text = "T3 M6\nG21 G17 G90\nS12000 M3\nG0 X-5 Y-5 Z25\nZ7\nF3000\n";
+    std::string text = kStart + "S12000 M3\nG0 X-5 Y-5 Z25\nZ7\nF3000\n";
     for (const char* z : {"7", "4", "1"})
         text += std::string("G1 Z") + z +
                 "\nG2 X25 Y25 I15 J15\nG3 X-5 Y-5 I-30 J0\nG2 X-5 Y-5 I4 J2\nG3 X-8 Y20 R40\nG1 X-5 Y-5\n";
@@ -548,10 +551,10 @@ TEST(Simulate, ArcsCutWhatTheirChordsCut) {
 // An arc is seen to leave the machine's travel though both its ends lie within it, and by how much.
 TEST(Simulate, ArcsBulgeBeyondTheTravel) {
     Block block;
-    Program p = read_gcode(
-        "T3 M6\nG21 G17 G90\nS12000 M3\nG0 X-200 Y-150 Z25\nF3000\nG3 X-200 Y-350 I100 J-100\nG0 "
-        "X0\nM5\nM2\n",
-        "arcs", {.level_arc_error = 50});
+    Program p = read_gcode(kStart +
+                               "S12000 M3\nG0 X-200 Y-150 Z25\nF3000\nG3 X-200 Y-350 I100 J-100\nG0 "
+                               "X0\nM5\nM2\n",
+                           "arcs", {.level_arc_error = 50});
     ASSERT_EQ(p.arcs.size(), 1u);
     ASSERT_EQ(p.arcs[0].end - p.arcs[0].begin, 1u) << "its steps do not show where it bulges";
     p.file = "L1_02", p.planned_tool = 3, p.kind = OperationKind::finish;

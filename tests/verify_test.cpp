@@ -53,7 +53,8 @@ Mesh block() {
     return m;
 }
 
-const char* const kHead = "G21 G17 G90 G94 G40 G49 G80\nG54\nT%d M6\nG43 H%d\nS12000 M3\nG4 P3\n";
+const char* const kHead =
+    "G21 G17 G90 G94 G40 G49 G80\nG54 G8 G97 G91.1 G64 P0.02 Q0\nT%d M6\nG43 H%d\nS12000 M3\nG4 P3\n";
 std::string head(int tool) {
     char text[200];
     std::snprintf(text, sizeof text, kHead, tool, tool);
@@ -236,8 +237,13 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
         {"deleted return",
          [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "X-9\nY-9\nX-5 Y0", "X-9\nX-5 Y0", true); },
          "left.too_much"},
-        {"inches", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G21", "G20"); }, "left.too_much"},
-        {"inches travel", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "G21", "G20"); },
+        {"inches", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G21", "G20"); },
+         "error gcode.left_in_force L1_02.ngc:42"},
+        {"inches travel",
+         [&](const fs::path& p) {
+             replace(p / nc("L1_01.ngc"), "G21", "G20");
+             replace(p / nc("L1_01.ngc"), "M5\n", "M5\nG21\n");
+         },
          "travel.exceeded"},
         {"incremental", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G90", "G91"); },
          "error gcode.unknown_place L1_02.ngc:7"},

@@ -46,20 +46,31 @@ struct ProgramArc {
     }
 };
 
+/// Something that a program says, and its line; 0 where it does not say it.
+struct ProgramWord {
+    double value = 0;
+    std::uint32_t line = 0;
+};
+
 /// One program and what it says of itself.
 struct Program {
     std::string file;  ///< its name under nc/
     int layer = 0;     ///< index into the layers
     OperationKind kind{};
-    int tool = 0;                 ///< that the program loads (T … M6)
-    int planned_tool = 0;         ///< that the plan names for it
-    double planned_stepdown = 0;  ///< mm, that the plan names for it; 0: none
-    double spindle_rpm = 0;       ///< highest
-    double dwell_s = 0;           ///< of all G4 together
+    int tool = 0;                                  ///< that the program loads (T … M6)
+    int planned_tool = 0;                          ///< that the plan names for it
+    double planned_stepdown = 0;                   ///< mm, that the plan names for it; 0: none
+    double spindle_rpm = 0;                        ///< highest
+    ProgramWord slowest_spindle, fastest_spindle;  ///< rpm while it feeds; 0 rpm: it stands
+    double dwell_s = 0;                            ///< of all G4 together
+    ProgramWord longest_dwell;                     ///< s, of one G4
+    ProgramWord shortest_spin_up;  ///< s of dwell between the spindle's start, or a change of its speed, and
+                                   ///< the next feed motion; the line is that motion's
     double blend = kJunction;   ///< mm by which the machine may round the corners (G64 P; 0: G61), the least
                                 ///< that the program names
     double strays = kJunction;  ///< mm by which it may leave the path at most: P, and Q for points that it
                                 ///< leaves out (P where no Q is given)
+    std::uint32_t strays_line = 0;  ///< that says so
     std::vector<ProgramStep> steps;
     std::vector<ProgramArc> arcs;  ///< in the order of their steps
     double chord_error = 0;        ///< mm: how far any arc is from its steps at most

@@ -1,0 +1,77 @@
+// One line of RS-274: which words it has, spelled as LinuxCNC reads them. What they mean is ModalState's and
+// the reader's matter.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace slabwright {
+
+/// Where a program is being read: every refusal names it.
+struct GcodePlace {
+    std::string file;
+    std::uint32_t line = 0;
+
+    /// @throws Error(verification, code, message, "file:line", remedy)
+    [[noreturn]] void fail(const char* code, const std::string& message,
+                           const char* remedy = "plan again") const;
+};
+
+/// The longest line that LinuxCNC takes: a character more and it says "Command too long".
+inline constexpr std::size_t kLongestLine = 252;
+
+/// G or M words of one line by their numbers in tenths (G43.1 is 431), in the order of the line.
+struct GcodeNumbers {
+    std::array<int, 16> tenths;  // count of them
+    std::size_t count = 0;
+    [[nodiscard]] const int* begin() const { return tenths.data(); }
+    [[nodiscard]] const int* end() const { return tenths.data() + count; }
+    [[nodiscard]] bool has(int number) const;
+};
+
+/// The words of one line. Letters other than G, M and N stand once at most.
+class GcodeLine {
+public:
+    GcodeNumbers g, m;
+
+    [[nodiscard]] bool has(char letter) const { return (given_ >> (letter - 'A') & 1u) != 0; }
+    /// The word's number; 0 where the line has none.
+    [[nodiscard]] double operator[](char letter) const {
+        return has(letter) ? values_[static_cast<std::size_t>(letter - 'A')] : 0;
+    }
+    /// Whether it says nothing: blank, or a comment.
+    [[nodiscard]] bool empty() const { return given_ == 0 && g.count == 0 && m.count == 0; }
+    /// A % alone: where a program may begin and end.
+    bool percent = false;
+
+    void clear() {
+        given_ = 0;
+        g.count = m.count = 0;
+        percent = false;
+    }
+    void set(char letter, double value) {
+        given_ |= 1u << (letter - 'A');
+        values_[static_cast<std::size_t>(letter - 'A')] = value;
+    }
+
+private:
+    std::uint32_t given_ = 0;
+    std::array<double, 26> values_;  // of given letters only
+};
+
+/// Reads a line without its line feed; a carriage return may end it. Comments are ( … ) and ; to the end; a
+/// comment that LinuxCNC acts on ("MSG, …", "LOGOPEN, …", any word and a comma) is refused.
+/// @throws Error(verification): gcode.line_length over kLongestLine characters, gcode.character beyond
+///   printing ASCII and tabs, gcode.comment, gcode.percent, gcode.unknown_word for a letter or number that
+///   names nothing here, gcode.number, gcode.twice
+/// @param words are those of the line afterwards; one object serves for all lines of a program
+void read_gcode_line(std::string_view line, const GcodePlace& place, GcodeLine& words);
+
+/// A G or M number as it is written: 431 is "43.1".
+[[nodiscard]] std::string gcode_number(int tenths);
+
+}  // namespace slabwright
