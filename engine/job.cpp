@@ -97,6 +97,11 @@ Job with_tools_for(const Job& job, double height) {
     return fitted;
 }
 
+Frame frame_of(const Machine& machine) {
+    if (machine.frame != Frame::automatic) return machine.frame;
+    return machine.table == BuildTable::moving ? Frame::layer_top : Frame::pattern_base;
+}
+
 double max_layer_thickness(const Job& job) {
     const double slab = job.slabs.thicknesses.empty()
                             ? 0
@@ -185,6 +190,9 @@ void validate(const Job& job) {
     require("machine.travel_z", c.travel_z, 0, 100000, Ends::open_low);
     require("machine.build_height", c.build_height, 0, 100000, Ends::open_low);
     require("machine.build_mass_kg", c.build_mass_kg, 0, 1e6, Ends::open_low);
+    require("machine.table_speed", c.table_speed, 0, 1e6, Ends::open_low);
+    require("machine.feed_height", c.feed_height, 0, 100000);
+    require("machine.feed_mass_kg", c.feed_mass_kg, 0, 1e6, Ends::open_low);
     require("machine.max_feed", c.max_feed, 1, 1e6);
     require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
     require("machine.acceleration", c.acceleration, 0, 1e6, Ends::open_low);

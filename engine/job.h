@@ -17,7 +17,11 @@ enum class LengthUnit : std::uint8_t { mm, inch };
 /// Boundaries as printed (LUO 4.2.5), by the dynamic program, or, slabs bonded to any thickness, those with
 /// which the whole build takes least.
 enum class LayerStrategy : std::uint8_t { printed, optimal, combined };
-enum class Frame : std::uint8_t { pattern_base, layer_top };
+/// Where z = 0 lies in the programs: at the pattern's bottom, at the layer's top, or as suits the machine's
+/// table (frame_of).
+enum class Frame : std::uint8_t { pattern_base, layer_top, automatic };
+/// Whether the build table sinks by every layer, so that all of them are cut at one height (RPM), or stays.
+enum class BuildTable : std::uint8_t { moving, fixed };
 /// Which slopes level contours finish and which projected paths do (SHAPING 5): each its own side of the
 /// steep limit, one of them everything, or both everything, each in the steps that it needs at the limit.
 enum class FinishStrategy : std::uint8_t { split, levels, projection, both };
@@ -91,15 +95,19 @@ struct Slabs {
 struct Machine {
     std::string name = "RPM 1160";
     double travel_x = 1220, travel_y = 1220, travel_z = 150;  ///< of the spindle
-    double build_height = 1200;                               ///< build chamber
+    BuildTable table = BuildTable::moving;
+    double table_speed = 600;    ///< mm/min, of a build table that moves
+    double build_height = 1200;  ///< of the build chamber: how far a table that moves goes down
     double build_mass_kg = 1440;
+    double feed_height = 1200;  ///< of the feed chamber, from which slabs are taken; 0: laid by hand
+    double feed_mass_kg = 1440;
     double max_feed = 9000, rapid_feed = 12000;  ///< mm/min
     double acceleration = 1000;                  ///< mm/s²
     double max_rpm = 18000;
     double spindle_dwell_s = 3;
     double tool_change_s = 15;
     double clearance = 10;  ///< mm of air between a rapid and the highest stock
-    Frame frame = Frame::pattern_base;
+    Frame frame = Frame::automatic;
     double base_board_thickness = 19;  ///< the sacrificial board under the first layer
     double base_board_cut = -1;        ///< how deep it may be cut; negative: the finish tool's overrun
 };
@@ -213,6 +221,10 @@ struct Job {
          std::numbers::pi / 6, 18000, 9000, 1500, 0.0625 * kInch, 0.125 * kInch, 0.5, true},
     };
 };
+
+/// The frame of the programs, never `automatic`: the machine's, or else layer_top where its table moves and
+/// pattern_base where it is fixed.
+[[nodiscard]] Frame frame_of(const Machine& machine);
 
 /// The tallest layer this job can cut (LTmax, method.md section 4): the thickest slab less the facing
 /// allowance, and for every tool its flutes less overrun and holder clearance.

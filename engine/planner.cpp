@@ -17,6 +17,7 @@
 #include "engine/layers/layers.h"
 #include "engine/paths/layer_stock.h"
 #include "engine/paths/standing.h"
+#include "engine/schedule/heights.h"
 #include "engine/schedule/motion_time.h"
 #include "engine/schedule/op_forces.h"
 #include "engine/schedule/schedule.h"
@@ -356,6 +357,7 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
                             placement.diagnostics.end());
     warn_of_overhang(plan, request, placement.boundaries);
     plan.layers = layers_between(plan.job, placement.boundaries);
+    check_chambers(plan);
     settle_undercuts(context, plan, pattern);
     if (plan.job.flask.enabled) plan.flask = place_flask(context, pattern, plan);
     const std::vector<Loops> joints = joints_of(context, plan, pattern);
@@ -369,6 +371,7 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
         plan.diagnostics.insert(plan.diagnostics.end(), found.begin(), found.end());
     context.throw_if_cancelled();
     schedule(plan);
+    check_spindle(plan);
     check_mass(plan);
     return plan;
 }

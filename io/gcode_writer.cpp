@@ -135,7 +135,7 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
         std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == operation.tool; });
     require_safe(layer, operation, tool == tools.end() ? nullptr : &*tool);
 
-    const bool layer_top = plan.job.machine.frame == Frame::layer_top;
+    const bool layer_top = frame_of(plan.job.machine) == Frame::layer_top;
     std::string text;
     text.reserve(kPiece + 4096);
     const auto comment = [&](const std::string& line) { text += fmt::format("({})\n", comment_text(line)); };

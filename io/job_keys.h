@@ -32,8 +32,10 @@ inline constexpr Word<RoughPattern> kRoughWords[] = {{"contour", RoughPattern::c
 inline constexpr Word<RestPattern> kRestWords[] = {{"by_library", RestPattern::by_library},
                                                    {"raster", RestPattern::raster},
                                                    {"contour", RestPattern::contour}};
-inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base},
-                                              {"layer-top", Frame::layer_top}};
+inline constexpr Word<Frame> kFrameWords[] = {
+    {"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}, {"auto", Frame::automatic}};
+inline constexpr Word<BuildTable> kTableWords[] = {{"moving", BuildTable::moving},
+                                                   {"fixed", BuildTable::fixed}};
 inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated},
                                                         {"nominal", Engagement::nominal}};
 inline constexpr Word<SelectionMode> kSelectionWords[] = {{"select", SelectionMode::select},
@@ -124,8 +126,15 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("travel_x", job.machine.travel_x, "mm");
     visit.key("travel_y", job.machine.travel_y, "mm");
     visit.key("travel_z", job.machine.travel_z, "mm, of the spindle");
-    visit.key("build_height", job.machine.build_height, "mm, of the build chamber");
+    visit.word("table", job.machine.table, kTableWords,
+               "moving: the build table sinks by every layer; fixed: a router whose table stays");
+    visit.key("table_speed", job.machine.table_speed, "mm/min, of a table that moves");
+    visit.key("build_height", job.machine.build_height,
+              "mm, of the build chamber: how far a table that moves goes down");
     visit.key("build_mass_kg", job.machine.build_mass_kg, "kg that the build table carries");
+    visit.key("feed_height", job.machine.feed_height,
+              "mm, of the feed chamber, which slabs are taken from; 0: they are laid by hand");
+    visit.key("feed_mass_kg", job.machine.feed_mass_kg, "kg that the feed table carries");
     visit.key("max_feed", job.machine.max_feed, "mm/min");
     visit.key("rapid_feed", job.machine.rapid_feed, "mm/min");
     visit.key("acceleration", job.machine.acceleration, "mm/s^2");
@@ -134,7 +143,8 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("tool_change_s", job.machine.tool_change_s, "s");
     visit.key("clearance", job.machine.clearance, "mm of air between a rapid and the highest stock");
     visit.word("frame", job.machine.frame, kFrameWords,
-               "pattern-base (z = 0 at the pattern's bottom) or layer-top (z = 0 at the layer's top)");
+               "pattern-base (z = 0 at the pattern's bottom), layer-top (z = 0 at the layer's top), or auto: "
+               "layer-top where the table moves");
     visit.key("base_board_thickness", job.machine.base_board_thickness,
               "mm, the sacrificial board under the first layer");
     visit.key("base_board_cut", job.machine.base_board_cut,

@@ -240,6 +240,7 @@ void put_totals(JsonText& json, const Totals& totals) {
     json.key("cutting_minutes").rounded(totals.cutting_minutes, kMinutes);
     json.key("bonding_minutes").rounded(totals.bonding_minutes, kMinutes);
     json.key("tool_change_minutes").rounded(totals.tool_change_minutes, kMinutes);
+    json.key("table_minutes").rounded(totals.table_minutes, kMinutes);
     json.key("build_minutes").rounded(totals.build_minutes, kMinutes);
     json.key("stock_volume_mm3").rounded(totals.stock_volume_mm3, kArea);
     json.key("part_volume_mm3").rounded(totals.part_volume_mm3, kArea);
@@ -299,7 +300,7 @@ std::string plan_json(const Plan& plan) {
     json.key("schema").string("slabwright.plan/1");
     json.key("version").string(SLABWRIGHT_VERSION);
     json.key("units").string("mm");
-    json.key("frame").string(word_of(kFrameWords, plan.job.machine.frame));
+    json.key("frame").string(word_of(kFrameWords, frame_of(plan.job.machine)));
     json.key("input");
     put_input(json, plan.input);
     json.key("job").begin_object();

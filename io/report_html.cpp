@@ -325,9 +325,11 @@ Program read_program(const fs::path& out, const PlanFolder& folder, const Named&
     try {
         Program program = read_gcode(text, named.file, gcode_limits(folder.tolerances));
         program.layer = named.layer;
-        if (folder.frame == Frame::layer_top)
-            for (ProgramStep& s : program.steps)
-                s.z += folder.input.layers[static_cast<std::size_t>(named.layer)].z_top;
+        if (folder.frame == Frame::layer_top) {
+            const double up = folder.input.layers[static_cast<std::size_t>(named.layer)].z_top;
+            for (ProgramStep& s : program.steps) s.z += up;
+            for (ProgramArc& a : program.arcs) a.arc.z += up;
+        }
         return program;
     } catch (const Error& e) {
         throw Error(ErrorKind::input, "report.program", e.message(), e.place(), e.remedy());

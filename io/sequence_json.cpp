@@ -13,7 +13,7 @@ std::string sequence_json(const Plan& plan) {
     json.begin_object();
     json.key("schema").string("slabwright.sequence/1");
     json.key("units").string("mm");
-    json.key("frame").string(word_of(kFrameWords, plan.job.machine.frame));
+    json.key("frame").string(word_of(kFrameWords, frame_of(plan.job.machine)));
     json.key("pattern").string(plan.input.file);
     json.key("sha256").string(plan.input.sha256);
     std::map<int, std::size_t> glue_of;

@@ -430,6 +430,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     if (plan["schema"].text() != "slabwright.plan/1") plan["schema"].fail("is not slabwright.plan/1");
     if (plan["units"].text() != "mm") plan["units"].fail("is not mm");
     const Frame frame = enumerator(kFrameWords, plan["frame"]);
+    if (frame == Frame::automatic) plan["frame"].fail("names no frame");
     const JobPart part = read_job_part(plan);
 
     const GcodeLimits limits = gcode_limits(part.job.tolerances);

@@ -257,6 +257,7 @@ TEST(Arcs, AreNoneWhereTheyWouldBeRunSlower) {
 Plan plan_with(std::vector<Move> moves) {
     Plan plan;
     plan.input.file = "arcs.stl";
+    plan.job.machine.frame = Frame::pattern_base;
     Layer layer;
     layer.index = 1;
     layer.z_top = layer.slab_thickness = 19;

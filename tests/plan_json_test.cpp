@@ -232,7 +232,8 @@ TEST(PlanJson, SaysWhatThePlanHolds) {
     EXPECT_EQ(j["totals"]["tool_changes"], 6);
     EXPECT_TRUE(j["diagnostics"][0]["where"].is_null());
     EXPECT_EQ(j["diagnostics"][1]["where"], json::array({1, 2, 3.5}));
-    EXPECT_EQ(j["job"]["machine"]["frame"], "pattern-base");
+    EXPECT_EQ(j["frame"], "layer-top");
+    EXPECT_EQ(j["job"]["machine"]["frame"], "auto");
     EXPECT_EQ(j["job"]["cutting"]["finish_feed"], 5000);
     EXPECT_EQ(text.find("e-"), std::string::npos) << "no number has an exponent";
     EXPECT_EQ(plan_json(plan), text);

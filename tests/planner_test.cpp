@@ -66,6 +66,19 @@ TEST(Planner, SaysByHowMuchAPartIsTooLarge) {
     EXPECT_NE(
         refusal(box(context, 100, 100, 30), low, "fit.travel").find("leaves the machine's travel in z by"),
         std::string::npos);
+    // Each program by itself stays within the travel; from the first to the last layer they do not.
+    Job fixed;
+    fixed.machine.table = BuildTable::fixed;
+    fixed.machine.travel_z = 70;
+    const std::string said = refusal(box(context, 60, 60, 60), fixed, "machine.travel_z");
+    EXPECT_NE(said.find("in layer 1"), std::string::npos) << said;
+    EXPECT_NE(said.find("in layer 4"), std::string::npos) << said;
+    EXPECT_NE(said.find("machine.travel_z of 70.0 mm"), std::string::npos) << said;
+    fixed.machine.table = BuildTable::moving;
+    EXPECT_EQ(make_plan(context, box(context, 60, 60, 60), {}, fixed).layers.size(), 4U);
+    Job shallow;
+    shallow.machine.build_height = 70;
+    (void)refusal(box(context, 60, 60, 60), shallow, "machine.build_height");
 }
 
 TEST(Planner, APartThatFillsTheSlabStaysWithinTheTravel) {

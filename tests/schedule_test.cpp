@@ -139,7 +139,9 @@ TEST(Schedule, TotalsAddUp) {
     EXPECT_NEAR(t.rapid_mm, 3 * 135, 1e-9);
     EXPECT_NEAR(t.bonding_minutes, 3 * (60 + 60 * 0.005 + 30) / 60, 1e-9);
     EXPECT_NEAR(t.tool_change_minutes, 9 * 15 / 60.0, 1e-9);
-    EXPECT_NEAR(t.build_minutes, t.cutting_minutes + t.bonding_minutes + t.tool_change_minutes, 1e-9);
+    EXPECT_NEAR(t.table_minutes, 2 * 18 / 600.0, 1e-9);
+    EXPECT_NEAR(t.build_minutes,
+                t.cutting_minutes + t.bonding_minutes + t.tool_change_minutes + t.table_minutes, 1e-9);
     EXPECT_NEAR(t.stock_volume_mm3, 3 * 19 * 200 * 100, 1e-6);
     EXPECT_NEAR(t.stack_mass_kg, 4 * 19 * 200 * 100 * 1e-9 * 750, 1e-9);
     EXPECT_EQ(t.part_volume_mm3, 1234);
@@ -156,7 +158,7 @@ TEST(Schedule, ToolIsChangedOnlyWhenTheNextProgramHasAnother) {
     EXPECT_EQ(plan.totals.tool_changes, 1);
 }
 
-TEST(Schedule, LayerTopFrameSinksTheTable) {
+TEST(Schedule, ATableThatMovesSinksInEitherFrame) {
     Plan plan = plan_of_layers(2);
     const auto heights = [&] {
         schedule(plan);
@@ -168,9 +170,17 @@ TEST(Schedule, LayerTopFrameSinksTheTable) {
         }
         return out;
     };
+    const std::vector<std::pair<double, double>> from_top{{-37, 1}, {-55, 1}};
+    EXPECT_EQ(heights(), from_top) << "the default machine's table moves";
+    plan.job.machine.frame = Frame::layer_top;
+    EXPECT_EQ(heights(), from_top);
+    plan.job.machine.frame = Frame::pattern_base;
+    EXPECT_EQ(heights(), (std::vector<std::pair<double, double>>{{-19, 19}, {-37, 37}}))
+        << "the offset on the control follows it";
+    plan.job.machine.table = BuildTable::fixed;
     EXPECT_EQ(heights(), (std::vector<std::pair<double, double>>{{-19, 19}, {-19, 37}}));
     plan.job.machine.frame = Frame::layer_top;
-    EXPECT_EQ(heights(), (std::vector<std::pair<double, double>>{{-37, 1}, {-55, 1}}));
+    EXPECT_EQ(heights(), (std::vector<std::pair<double, double>>{{-37, 1}, {-37, 1}}));
 }
 
 TEST(Bonding, GlueKeepsItsSetbackAndPressItsPressure) {

@@ -7,6 +7,7 @@
 
 #include "engine/forces/cuts.h"
 #include "engine/paths/path_builder.h"
+#include "engine/schedule/heights.h"
 #include "kernels/polygons/hull.h"
 
 namespace slabwright {
@@ -118,6 +119,53 @@ void report_islands(const Layer& layer, const Loops& below, double setback,
              std::array<double, 3>{to_mm((std::int64_t{box.min.x} + box.max.x) / 2),
                                    to_mm((std::int64_t{box.min.y} + box.max.y) / 2), layer.z_bottom}});
     }
+}
+
+/// The slabs in the feed chamber, in the order in which they are taken. Where they are laid by hand, none lie
+/// there and nothing is loaded.
+class FeedChamber {
+public:
+    explicit FeedChamber(const Plan& plan) : plan_(plan), loads_(feed_loads(plan)) {
+        for (const Layer& layer : plan.layers)
+            for (int k = 0; k < layer.slabs; ++k) thicknesses_.push_back(layer.slab_thickness / layer.slabs);
+    }
+    [[nodiscard]] bool is_empty() const { return left_ == 0 && next_load_ < loads_.size(); }
+    /// Fills the chamber and says with what.
+    std::vector<std::pair<std::string, double>> load() {
+        left_ = loads_[next_load_++];
+        height_ = 0;
+        for (int k = 0; k < left_; ++k) height_ += thicknesses_[next_slab_ + static_cast<std::size_t>(k)];
+        return {{"slabs", left_}, {"height_mm", height_}, {"mass_kg", slab_mass_kg(plan_, height_)}};
+    }
+    /// Takes the next slab. @returns the height of the stack that it lay on top of, itself included, mm
+    double take() {
+        const double stack = height_;
+        if (left_ > 0) {
+            --left_;
+            height_ = left_ == 0 ? 0 : height_ - thicknesses_[next_slab_];
+        }
+        ++next_slab_;
+        return stack;
+    }
+    int last_taken = 0;  ///< the step that took the slab before; 0: none
+
+private:
+    const Plan& plan_;
+    std::vector<int> loads_;
+    std::vector<double> thicknesses_;  // of every slab of the build
+    std::size_t next_load_ = 0, next_slab_ = 0;
+    int left_ = 0;
+    double height_ = 0;
+};
+
+/// The lowest and the highest z of a program, as it counts them.
+void add_heights(SequenceStep& step, const Operation& operation, double origin) {
+    if (operation.moves.empty()) return;
+    const auto [low, high] = std::minmax_element(operation.moves.begin(), operation.moves.end(),
+                                                 [](const Move& a, const Move& b) { return a.z < b.z; });
+    const std::int32_t zero = to_units(origin);
+    step.numbers.emplace_back("z_low_mm", to_mm(std::int64_t{low->z} - zero));
+    step.numbers.emplace_back("z_high_mm", to_mm(std::int64_t{high->z} - zero));
 }
 
 /// Digits of a number, at least `least`.
@@ -244,8 +292,13 @@ void schedule(Plan& plan) {
 
     const int first_layer = plan.layers.empty() ? 0 : plan.layers.front().index;
     SequenceStep& board = add(first_layer, "mount_board", {}, 0);
-    board.numbers = {
-        {"thickness_mm", job.machine.base_board_thickness}, {"length_mm", stock_x}, {"width_mm", stock_y}};
+    board.numbers = {{"thickness_mm", job.machine.base_board_thickness},
+                     {"length_mm", stock_x},
+                     {"width_mm", stock_y},
+                     {"mass_kg", slab_mass_kg(plan, job.machine.base_board_thickness)}};
+    FeedChamber feed(plan);
+    double carried_kg = slab_mass_kg(plan, job.machine.base_board_thickness);
+    double table_height = 0;     // of the layer before
     int stack_ready = board.id;  // the step after which the stack's top is ready for the next slab
     int handler_free = 0;        // the step after which the material handler is free; 0: from the start
     int spindle_tool = 0;
@@ -263,12 +316,23 @@ void schedule(Plan& plan) {
             const double area = k == 0 ? layer.glue_area_mm2 : whole;
             // Fetching the slab and clamping it only needs the handler; it may go on while the layer below is
             // being milled.
-            SequenceStep& take =
-                add(layer.index, "take_slab",
-                    handler_free == 0 ? std::vector<int>{} : std::vector<int>{handler_free}, third);
-            take.numbers = {{"thickness_mm", slab}, {"length_mm", stock_x}, {"width_mm", stock_y}};
+            std::vector<int> needs;
+            if (feed.is_empty()) {
+                SequenceStep& load =
+                    add(layer.index, "load_feed",
+                        feed.last_taken == 0 ? std::vector<int>{} : std::vector<int>{feed.last_taken}, 0);
+                load.numbers = feed.load();
+                needs.push_back(load.id);
+            }
+            if (handler_free != 0) needs.push_back(handler_free);
+            SequenceStep& take = add(layer.index, "take_slab", std::move(needs), third);
+            take.numbers = {{"thickness_mm", slab},
+                            {"length_mm", stock_x},
+                            {"width_mm", stock_y},
+                            {"mass_kg", slab_mass_kg(plan, slab)},
+                            {"feed_stack_mm", feed.take()}};
             take.words = {{"material", job.material.name}};
-            const int taken = take.id;
+            const int taken = feed.last_taken = take.id;
             const int clamped = add(layer.index, "clamp", {taken}, third).id;
             SequenceStep& glue = add(layer.index, "glue", {k == 0 ? stack_ready : pressed},
                                      job.bonding.glue_s_per_m2 * area * 1e-6);
@@ -276,9 +340,11 @@ void schedule(Plan& plan) {
             glue.words = {{"glue", job.bonding.glue}};
             const int glued = glue.id;
             SequenceStep& place = add(layer.index, "place", {clamped, glued}, third);
+            carried_kg += slab_mass_kg(plan, slab);
             place.numbers = {{"x_mm", plan.stock_min[0]},
                              {"y_mm", plan.stock_min[1]},
-                             {"z_bottom_mm", layer.z_bottom + k * slab}};
+                             {"z_bottom_mm", layer.z_bottom + k * slab},
+                             {"table_load_kg", carried_kg}};
             handler_free = place.id;
             SequenceStep& press = add(layer.index, "press", {handler_free}, job.bonding.press_time_s);
             // Every press goes through the joint under the layer.
@@ -289,15 +355,17 @@ void schedule(Plan& plan) {
                                       60;
         }
 
-        // The table's height is that of its surface under the plane from which the programs count z, so it is
-        // fixed in the frame pattern-base and sinks layer by layer in layer-top.
-        const bool layer_top = job.machine.frame == Frame::layer_top;
-        const double origin = layer_top ? layer.z_top : 0;
-        SequenceStep& table = add(layer.index, "table", {pressed}, 0);
-        table.numbers = {{"table_height_mm", -(job.machine.base_board_thickness + origin)}};
+        // Where the table moves, it sinks until this layer's top will be cut where the first one's was.
+        const LayerHeights heights = layer_heights(job.machine, plan.layers.front().z_top, layer.z_top);
+        const double sinking =
+            totals.layers == 1 ? 0 : table_seconds(job.machine, table_height, heights.table);
+        table_height = heights.table;
+        totals.table_minutes += sinking / 60;
+        SequenceStep& table = add(layer.index, "table", {pressed}, sinking);
+        table.numbers = {{"table_height_mm", heights.table}, {"work_offset_z_mm", heights.work_offset}};
         // What the touch-off has to find: the raw slab's top, in the programs' frame.
         SequenceStep& touch = add(layer.index, "touch_off", {table.id}, 0);
-        touch.numbers = {{"slab_top_mm", layer.z_bottom + layer.slab_thickness - origin}};
+        touch.numbers = {{"slab_top_mm", layer.z_bottom + layer.slab_thickness - heights.origin}};
         int last = touch.id;
 
         for (const Operation& operation : layer.operations) {
@@ -318,6 +386,7 @@ void schedule(Plan& plan) {
             SequenceStep& mill = add(layer.index, operation.kind == OperationKind::face ? "face" : "mill",
                                      {last}, operation.minutes * 60);
             mill.numbers = {{"tool", operation.tool}};
+            add_heights(mill, operation, heights.origin);
             mill.words = {{"program", "nc/" + operation.file}, {"purpose", operation.purpose}};
             last = mill.id;
         }
@@ -335,7 +404,8 @@ void schedule(Plan& plan) {
             {"sand_litres", std::max(0.0, plan.flask->opening_mm3 - totals.part_volume_mm3) * 1e-6}};
     }
 
-    totals.build_minutes = totals.cutting_minutes + totals.bonding_minutes + totals.tool_change_minutes;
+    totals.build_minutes =
+        totals.cutting_minutes + totals.bonding_minutes + totals.tool_change_minutes + totals.table_minutes;
     totals.stack_mass_kg = (totals.stock_volume_mm3 + stock_x * stock_y * job.machine.base_board_thickness) *
                            1e-9 * job.material.density_kg_m3;
     plan.totals = totals;
