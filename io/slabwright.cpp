@@ -161,6 +161,11 @@ VerifyResult verdict(const Verification& found) {
     result.gouge_mm = found.report.gouge_max;
     result.cell_mm = found.report.cell;
     result.minutes = found.report.seconds / 60;
+    result.pattern_mm2 = found.report.pattern_mm2;
+    result.unreachable_mm2 = found.report.unreachable_mm2();
+    result.unreachable_mm = found.report.unreachable().size;
+    result.unmade_mm3 = found.report.unmade_mm3();
+    result.unmade_mm = found.report.unmade().size;
     for (const Violation& v : found.report.violations) {
         Diagnostic d{Severity::error, v.code, v.message, v.where};
         if (!v.file.empty())

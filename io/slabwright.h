@@ -82,7 +82,16 @@ inline constexpr double kPlanningShare = 0.67;
 
 /// What the simulation of a folder's programs found.
 struct VerifyResult {
-    bool passed = false;
+    bool passed = false;         ///< no violation
+    double pattern_mm2 = 0;      ///< of the pattern, seen from above
+    double unreachable_mm2 = 0;  ///< of it: more than the tolerance is left, for no tool gets there
+    double unreachable_mm = 0;   ///< the most that is left there, along the normal
+    double unmade_mm3 = 0;       ///< what stays filled under part of the same layer: undercuts
+    double unmade_mm = 0;        ///< its greatest height
+    /// Whether the pattern comes out whole: passed, nothing unmade, at most a hundredth of it out of reach.
+    [[nodiscard]] bool is_whole() const {
+        return passed && unmade_mm3 == 0 && unreachable_mm2 <= 0.01 * pattern_mm2;
+    }
     double gouge_mm = 0;  ///< deepest place of a cutter in the part, along the normal
     double cell_mm = 0;   ///< between the points of the simulated stock
     double minutes = 0;   ///< of all programs on the plan's machine

@@ -279,7 +279,14 @@ std::string report_json(const SimulationInput& input, const SimulationReport& r,
     text.key("left_over_rms_mm").rounded(std::sqrt(squares / n), 5);
     text.key("left_over_missed_max_mm").rounded(missed, 4);
     text.key("within_tolerance_share").rounded(1 - static_cast<double>(missed_cells) / reachable, 6);
+    text.key("pattern_mm2").rounded(r.pattern_mm2, 1);
     text.key("unreachable_share").rounded(static_cast<double>(unreachable) / n, 6);
+    text.key("unreachable_mm2").rounded(r.unreachable_mm2(), 1);
+    text.key("unreachable_of_pattern_share")
+        .rounded(r.pattern_mm2 > 0 ? r.unreachable_mm2() / r.pattern_mm2 : 0, 6);
+    text.key("unreachable_max_mm").rounded(r.unreachable().size, 4);
+    text.key("unmade_mm3").rounded(r.unmade_mm3(), 0);
+    text.key("unmade_height_mm").rounded(r.unmade().size, 3);
     text.key("removed_mm3").rounded(r.removed_mm3, 0);
     text.key("cutting_mm").rounded(r.cutting_mm, 1);
     text.key("rapid_mm").rounded(r.rapid_mm, 1);
@@ -317,6 +324,8 @@ std::string report_json(const SimulationInput& input, const SimulationReport& r,
         text.key("over_mm2").rounded(static_cast<double>(f.over) * area, 3);
         text.key("unreachable_mm2").rounded(static_cast<double>(f.unreachable) * area, 3);
         put_extreme(text, "unreachable", f.unreachable_left);
+        text.key("unmade_mm3").rounded(f.unmade_mm3, 0);
+        put_extreme(text, "unmade", f.unmade);
         text.key("missed_mm2").rounded(static_cast<double>(f.missed) * area, 3);
         put_extreme(text, "missed", f.missed_left);
         text.key("within_tolerance_share").rounded(f.within_share, 6);

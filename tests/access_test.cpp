@@ -588,6 +588,53 @@ TEST(StandingPart, EnvelopeByPointsAndByGrid) {
     }
 }
 
+// Air under part between two planes, against the boxes themselves.
+TEST(StandingPart, CoveredAirOfStackedBoxes) {
+    Context context;
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_int_distribution<int> place(0, 9), size(1, 6);
+    for (int round = 0; round < 20; ++round) {
+        Mesh solid;
+        std::vector<std::array<int, 6>> boxes;
+        for (int b = 0; b < 6; ++b) {
+            const std::array<int, 3> low{place(random), place(random), place(random)};
+            const std::array<int, 3> high{low[0] + size(random), low[1] + size(random),
+                                          low[2] + size(random)};
+            boxes.push_back({low[0], low[1], low[2], high[0], high[1], high[2]});
+            box(solid, {1.0 * low[0], 1.0 * low[1], 1.0 * low[2]},
+                {1.0 * high[0], 1.0 * high[1], 1.0 * high[2]});
+        }
+        const StandingPart part(context, solid.view());
+        const int n = 16;
+        std::vector<float> heights(n * n), air(n * n);
+        RisingEnvelope rising(part, 0.5, 0.5, 1, n, n);
+        double bottom = 0;
+        for (const double top : {3.5, 7.25, 9.5, 16.0}) {
+            rising.at(top, -1, heights.data());
+            rising.covered_air(bottom, air.data());
+            for (int j = 0; j < n; ++j)
+                for (int i = 0; i < n; ++i) {
+                    const auto solid_at = [&](double z) {
+                        return std::any_of(boxes.begin(), boxes.end(), [&](const auto& b) {
+                            return b[0] <= i && i < b[3] && b[1] <= j && j < b[4] && b[2] < z && z < b[5];
+                        });
+                    };
+                    double expected = 0;
+                    bool under = false;
+                    constexpr double step = 0.05;
+                    for (double z = top - step / 2; z > bottom; z -= step) {
+                        if (solid_at(z)) under = true;
+                        else if (under) expected += step;
+                    }
+                    ASSERT_NEAR(air[static_cast<std::size_t>(j * n + i)], expected, 2e-3)
+                        << "seed " << seed << " round " << round << " top " << top << " at " << i << ' ' << j;
+                }
+            bottom = top;
+        }
+    }
+}
+
 // Whether the facets are known to close, or share no vertices, or do not close.
 TEST(StandingPart, EnvelopeByGridOfFacetsThatDoNotClose) {
     Context context;

@@ -404,6 +404,29 @@ TEST(Simulate, WhatNoToolReachesIsExcusedAndTheRestIsNot) {
     EXPECT_GT(r.layers[0].missed, r.layers[0].unreachable) << "the middle of the slot can be dipped into";
 }
 
+TEST(Simulate, WhatStaysFilledUnderARoof) {
+    Block whole;
+    SimulationReport r = whole.run();
+    EXPECT_EQ(r.unmade_mm3(), 0);
+    EXPECT_NEAR(r.pattern_mm2, 400, 1e-9);
+    // A roof 5 mm over the board on a leg 8 mm wide: the wood under the roof stays.
+    Block table;
+    table.solid = {};
+    table.solid.box({0, 0, 5}, {20, 20, 10});
+    table.solid.box({0, 0, 0}, {8, 20, 5});
+    r = table.run();
+    EXPECT_EQ(codes(r), "");
+    EXPECT_NEAR(r.unmade_mm3(), 11.5 * 19.5 * 5, 1) << "all but a cell at the rim";
+    EXPECT_NEAR(r.unmade().size, 5, 1e-4);
+    EXPECT_NEAR(r.pattern_mm2, 400, 1e-9);
+    // A wall that leans by less than a cell is not told.
+    Block leaning;
+    leaning.solid = {};
+    leaning.solid.box({0, 0, 0}, {19.9F, 20, 5});
+    leaning.solid.box({0, 0, 5}, {20, 20, 10});
+    EXPECT_EQ(leaning.run().unmade_mm3(), 0);
+}
+
 TEST(Simulate, InnerCornersLeaveARoundThatIsExcused) {
     // An L: its inner corner keeps a round of the end mill's radius 5 (or the ball's 3, which the plan did
     // not use: missed).

@@ -175,11 +175,27 @@ std::string summary(const Plan& plan, const std::string& out) {
     return text;
 }
 
+/// "makes the part", or what of it is not made.
+std::string makes(const VerifyResult& result) {
+    if (!result.passed) return "does NOT make the part";
+    if (result.is_whole()) return "makes the part";
+    std::string text = "makes all but";
+    if (result.unmade_mm3 > 0)
+        text += fmt::format(" {} cm³ that stay filled under overhangs (up to {} mm high)",
+                            number(result.unmade_mm3 / 1000, result.unmade_mm3 < 1e5 ? 2 : 0),
+                            number(result.unmade_mm, 2));
+    if (result.unreachable_mm2 > 0.01 * result.pattern_mm2)
+        text += fmt::format(
+            "{} {} mm² that no tool reaches ({} % of the pattern seen from above, up to {} mm)",
+            result.unmade_mm3 > 0 ? " and" : "", number(result.unreachable_mm2, 0),
+            number(100 * result.unreachable_mm2 / result.pattern_mm2, 1), number(result.unreachable_mm, 2));
+    return text;
+}
+
 /// What the simulation of the programs says.
 std::string verdict(const VerifyResult& result, const std::string& out) {
     std::string text = fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, {}\n", out,
-                                   result.passed ? "makes the part" : "does NOT make the part",
-                                   result.gouge_mm, result.cell_mm, duration(result.minutes));
+                                   makes(result), result.gouge_mm, result.cell_mm, duration(result.minutes));
     constexpr std::size_t shown = 20;  // verify.json holds them all
     for (std::size_t i = 0; i < std::min(shown, result.violations.size()); ++i)
         text += fmt::format("{}: {}\n", result.violations[i].code, result.violations[i].message);
@@ -197,7 +213,9 @@ std::string summary_json(const Plan& plan, const std::string& out, const VerifyR
     json.key("diagnostics");
     put_diagnostics(json, plan.diagnostics);
     if (found) {
-        json.key("verified").boolean(found->passed).key("violations");
+        json.key("verified").boolean(found->passed).key("whole").boolean(found->is_whole());
+        json.key("unmade_mm3").rounded(found->unmade_mm3, 0);
+        json.key("unreachable_mm2").rounded(found->unreachable_mm2, 1).key("violations");
         put_diagnostics(json, found->violations);
     }
     json.end();

@@ -103,6 +103,7 @@ struct TileResult {
     std::vector<TileProgram> programs;
     std::vector<TileLayer> layers;
     double board_cut = 0;
+    std::uint64_t pattern_cells = 0;  // that have part at any height
     Extreme flask;
 };
 
@@ -439,6 +440,8 @@ private:
                 f.cells += l.cells, f.gouge_cells += l.gouge_cells, f.over += l.over,
                     f.unreachable += l.unreachable, f.missed += l.missed, f.waste += l.waste;
                 f.waste_mm3 += l.waste_mm3;
+                f.unmade_mm3 += l.unmade_mm3;
+                raise(f.unmade, l.unmade.size, l.unmade.where);
                 raise(f.gouge, l.gouge.size, l.gouge.where);
                 raise(f.left, l.left.size, l.left.where);
                 raise(f.unreachable_left, l.unreachable_left.size, l.unreachable_left.where);
@@ -446,6 +449,7 @@ private:
                 squares[i] += r.layers[i].squares;
             }
             report.board_cut = std::max(report.board_cut, r.board_cut);
+            report.pattern_mm2 += static_cast<double>(r.pattern_cells) * cell_ * cell_;
             raise(flask_cut_, r.flask.size, r.flask.where);
         }
         for (std::size_t i = 0; i < report.layers.size(); ++i) {
@@ -481,14 +485,39 @@ private:
         }
         for (std::size_t c = 0; c < grid.count(); ++c)
             result.board_cut = std::max(result.board_cut, stock.board_cut(c));
-        std::vector<float> heights(grid.count());
+        constexpr float nothing = std::numeric_limits<float>::lowest();
+        std::vector<float> heights(grid.count()), air(grid.count());
         RisingEnvelope envelope(part_, grid.x0, grid.y0, grid.cell, grid.nx, grid.ny);
         for (std::size_t l = 0; l < input_.layers.size(); ++l) {
             context_.throw_if_cancelled();
-            envelope.at(input_.layers[l].z_top, std::numeric_limits<float>::lowest(), heights.data());
+            envelope.at(input_.layers[l].z_top, nothing, heights.data());
             measure_layer(l, stock, heights, result, i0, j0, report);
+            envelope.covered_air(input_.layers[l].z_bottom, air.data());
+            measure_unmade(grid, air, input_.layers[l].z_bottom, result.layers[l].findings);
         }
+        result.pattern_cells = static_cast<std::uint64_t>(
+            std::count_if(heights.begin(), heights.end(), [](float z) { return z != nothing; }));
         return result;
+    }
+
+    /// Sums the air that stays filled in one layer. A column at the rim of it does not count: a wall that
+    /// leans inwards by a hair leaves tall air as thin as that hair.
+    void measure_unmade(const CellGrid& grid, const std::vector<float>& air, double z_bottom,
+                        LayerFindings& f) const {
+        const auto has_air = [&](int i, int j) {
+            if (i < 0 || j < 0 || i >= grid.nx || j >= grid.ny) return true;
+            return air[static_cast<std::size_t>(j) * static_cast<std::size_t>(grid.nx) +
+                       static_cast<std::size_t>(i)] > StandingPart::kSheet;
+        };
+        std::size_t c = 0;
+        for (int j = 0; j < grid.ny; ++j)
+            for (int i = 0; i < grid.nx; ++i, ++c) {
+                if (!has_air(i, j) || !has_air(i - 1, j) || !has_air(i + 1, j) || !has_air(i, j - 1) ||
+                    !has_air(i, j + 1))
+                    continue;
+                f.unmade_mm3 += air[c] * cell_ * cell_;
+                raise(f.unmade, air[c], {grid.x0 + i * cell_, grid.y0 + j * cell_, z_bottom});
+            }
     }
 
     /// Straight level motions of a flat cutter at one height that follow one another in a tile. What they
@@ -966,6 +995,32 @@ private:
 };
 
 }  // namespace
+
+double SimulationReport::unreachable_mm2() const {
+    std::uint64_t cells = 0;
+    for (const LayerFindings& f : layers) cells += f.unreachable;
+    return static_cast<double>(cells) * cell * cell;
+}
+
+Extreme SimulationReport::unreachable() const {
+    Extreme most;
+    for (const LayerFindings& f : layers)
+        if (f.unreachable_left.size > most.size) most = f.unreachable_left;
+    return most;
+}
+
+double SimulationReport::unmade_mm3() const {
+    double sum = 0;
+    for (const LayerFindings& f : layers) sum += f.unmade_mm3;
+    return sum;
+}
+
+Extreme SimulationReport::unmade() const {
+    Extreme most;
+    for (const LayerFindings& f : layers)
+        if (f.unmade.size > most.size) most = f.unmade;
+    return most;
+}
 
 double simulation_cell(const std::vector<Tool>& tools, double cusp) {
     double ball = 0, any = 0;

@@ -92,7 +92,11 @@ struct LayerFindings {
     std::uint64_t missed = 0;  ///< of those: a tool could
     Extreme missed_left;       ///< how much of it a tool could have taken
     double within_share = 1;   ///< reachable cells with at most cusp + slack
-    std::uint64_t waste = 0;   ///< cells beside the pattern (no part of it in the layer) that were missed
+    /// Air under part that stays filled, in columns whose four neighbours have some too: undercuts of the
+    /// layer.
+    double unmade_mm3 = 0;
+    Extreme unmade;           ///< its greatest height in one column, and there the layer's bottom
+    std::uint64_t waste = 0;  ///< cells beside the pattern (no part of it in the layer) that were missed
     double waste_mm3 = 0;
     /// With SimulationOptions::maps, row after row: left-over (positive) or gouge (negative) along the
     /// normal.
@@ -130,8 +134,16 @@ struct SimulationReport {
     double seconds = 0;
     double cutting_mm = 0, rapid_mm = 0, removed_mm3 = 0;
     double board_cut = 0;               ///< mm
+    double pattern_mm2 = 0;             ///< of the pattern, seen from above
     std::vector<Violation> violations;  ///< by kind, then in the order of the programs
     [[nodiscard]] bool passed() const { return violations.empty(); }
+    /// Where more than cusp + slack is left because no tool of the library gets there: mm² seen from above,
+    /// layer by layer, and the most that is left, mm along the normal.
+    [[nodiscard]] double unreachable_mm2() const;
+    [[nodiscard]] Extreme unreachable() const;
+    /// What stays filled because it lies under part of its layer.
+    [[nodiscard]] double unmade_mm3() const;
+    [[nodiscard]] Extreme unmade() const;
 };
 
 /// The cell size that the tolerance asks for: a quarter of the distance of passes that leave the cusp,

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <tuple>
 
 #include "kernels/access/near_facets.h"
 #include "kernels/access/triangle.h"
@@ -1178,8 +1179,10 @@ RisingEnvelope::RisingEnvelope(const StandingPart& part, double x0, double y0, d
 
 void RisingEnvelope::at(double z_top, float none, float* out) {
     const double top = z_top - StandingPart::kSheet;
+    crossings_.clear();
     for_each_point(passed_, top, [&](std::size_t k, int w, double z) {
         if (z < passed_ || z >= top) return;
+        crossings_.push_back({static_cast<std::uint32_t>(k), w, z});
         above_[k] -= w;
         below_[k] = std::max(below_[k], static_cast<float>(z));
     });
@@ -1188,6 +1191,30 @@ void RisingEnvelope::at(double z_top, float none, float* out) {
         out[k] = above_[k] > 0                                          ? static_cast<float>(z_top)
                  : below_[k] == -std::numeric_limits<float>::infinity() ? none
                                                                         : below_[k];
+}
+
+void RisingEnvelope::covered_air(double z_bottom, float* out) {
+    std::fill(out, out + above_.size(), 0.0F);
+    std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
+        return std::tie(a.column, a.z, a.winding) < std::tie(b.column, b.z, b.winding);
+    });
+    for (auto first = crossings_.begin(); first != crossings_.end();) {
+        const auto end = std::find_if(first, crossings_.end(),
+                                      [&](const Crossing& c) { return c.column != first->column; });
+        // From above: the winding number over the highest crossing is known.
+        std::int32_t winding = above_[first->column];
+        bool under_part = winding != 0;
+        double air = 0, upper = 0;
+        for (auto c = std::make_reverse_iterator(end); c != std::make_reverse_iterator(first); ++c) {
+            if (winding == 0 && under_part) air += std::max(0.0, upper - std::max(c->z, z_bottom));
+            winding += c->winding;
+            under_part = under_part || winding != 0;
+            upper = c->z;
+        }
+        if (winding == 0 && under_part) air += std::max(0.0, upper - z_bottom);
+        out[first->column] = static_cast<float>(air);
+        first = end;
+    }
 }
 
 StandingPart::Clearance StandingPart::from_shadow(const Point3& point, double z_top, double limit,

@@ -228,15 +228,27 @@ public:
     /// no part
     void at(double z_top, float none, float* out);
 
+    /// Of each column the length of air that has part over it, between `z_bottom` and the plane asked for
+    /// last, mm: what a layer that is milled from above leaves filled. The planes asked for before lie no
+    /// higher than `z_bottom`. @param out gets nx × ny lengths
+    void covered_air(double z_bottom, float* out);
+
 private:
     template <class Fn>
     void for_each_point(double z_low, double z_high, Fn&& fn) const;
+    /// Where a column passes through a facet.
+    struct Crossing {
+        std::uint32_t column;
+        std::int32_t winding;
+        double z;
+    };
     const StandingPart* part_;
     double x0_, y0_, cell_;
     int nx_, ny_;
     double passed_;                    // facets are looked at up to here
     std::vector<std::int32_t> above_;  // winding number of what is there or higher
     std::vector<float> below_;         // highest of what is lower
+    std::vector<Crossing> crossings_;  // between the last two planes
 };
 
 }  // namespace slabwright
