@@ -65,6 +65,17 @@ export const remarks = [
     })),
 ];
 
+// What the simulation found that the programs do not make, in words.
+function notMade() {
+    const totals = verify?.totals ?? {};
+    const missing = [];
+    if (totals.unmade_mm3 > 0)
+        missing.push(`${(totals.unmade_mm3 / 1000).toFixed(totals.unmade_mm3 < 1e5 ? 2 : 0)} cm³ that stay filled under overhangs (up to ${totals.unmade_height_mm.toFixed(2)} mm high)`);
+    if (totals.unreachable_mm2 > 0.01 * totals.pattern_mm2)
+        missing.push(`${totals.unreachable_mm2.toFixed(0)} mm² that no tool reaches (${(100 * totals.unreachable_of_pattern_share).toFixed(1)} % of the pattern seen from above, up to ${totals.unreachable_max_mm.toFixed(2)} mm)`);
+    return missing;
+}
+
 export function verdict() {
     const count = severity => remarks.filter(r => r.severity === severity).length;
     const errors = count('error'), warnings = count('warning');
@@ -74,6 +85,14 @@ export function verdict() {
         return {
             kind: 'open', title: warnings ? 'Planned, with remarks' : 'Planned',
             text: 'The programs have not been simulated yet: run “slabwright verify” on this folder, then “slabwright report”.',
+        };
+    }
+    const missing = notMade();
+    if (missing.length) {
+        return {
+            kind: 'remarks', title: 'All but a part of it',
+            text: `The simulated programs make the pattern but for ${missing.join(' and ')}.`
+                + (warnings ? ` ${plural(warnings, 'remark')} to read first.` : ''),
         };
     }
     if (warnings) return {kind: 'remarks', title: 'Yes, with remarks', text: `The simulated programs make the part; ${plural(warnings, 'remark')} to read first.`};
