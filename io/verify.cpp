@@ -8,12 +8,14 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "io/job_keys.h"
-#include "io/json_text.h"
 #include "io/output_file.h"
+#include "io/sequence_reader.h"
+#include "io/verify_json.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 
@@ -138,12 +140,29 @@ JobPart read_job_part(const Field& plan) {
                                   {"rapid_feed", &m.rapid_feed},
                                   {"acceleration", &m.acceleration},
                                   {"tool_change_s", &m.tool_change_s},
+                                  {"table_speed", &m.table_speed},
+                                  {"build_height", &m.build_height},
+                                  {"build_mass_kg", &m.build_mass_kg},
+                                  {"feed_height", &m.feed_height},
+                                  {"feed_mass_kg", &m.feed_mass_kg},
                                   {"base_board_thickness", &m.base_board_thickness},
                                   {"base_board_cut", &m.base_board_cut}}) {
         *to = machine[key].number();
     }
     if (!(m.acceleration > 0) || !(m.rapid_feed > 0) || !(m.max_feed > 0))
         machine.fail("states a machine that does not move");
+    m.table = enumerator(kTableWords, machine["table"]);
+    part.job.material.name = job["material"]["name"].text();
+    part.job.material.density_kg_m3 = job["material"]["density_kg_m3"].number();
+    const Field bonding = job["bonding"];
+    Bonding& b = part.job.bonding;
+    b.glue = bonding["glue"].text();
+    for (const auto& [key, to] : {std::pair{"press_force", &b.press_force},
+                                  {"press_time_s", &b.press_time_s},
+                                  {"edge_setback", &b.edge_setback},
+                                  {"handling_s", &b.handling_s},
+                                  {"glue_s_per_m2", &b.glue_s_per_m2}})
+        *to = bonding[key].number();
     part.job.tolerances.gouge = tolerances["gouge"].number();
     part.job.tolerances.cusp = tolerances["cusp"].number();
     part.job.tolerances.weld = tolerances["weld"].number();
@@ -158,6 +177,95 @@ void add_polygon(Loops& loops, const Field& polygon) {
         loops.points.push_back({to_units(x), to_units(y)});
     }
     loops.close_loop();
+}
+
+/// What the sequence has to build, by plan.json and the programs that were read.
+BuildPlan planned_build(const Field& plan, const JobPart& part, Frame frame, const SimulationInput& input) {
+    BuildPlan build;
+    build.job = part.job;
+    build.job_stated = part.stated;
+    build.frame = frame;
+    build.pattern = plan["input"]["file"].text();
+    build.sha256 = plan["input"]["sha256"].text();
+    build.stock_min = input.stock_min, build.stock_max = input.stock_max;
+    build.tools = input.tools;
+    build.flask = plan.has("flask");
+    if (build.flask && plan["flask"].has("mass_kg")) build.flask_mass_kg = plan["flask"]["mass_kg"].number();
+    if (build.flask && plan.has("totals")) {
+        const double slab =
+            (input.stock_max[0] - input.stock_min[0]) * (input.stock_max[1] - input.stock_min[1]);
+        double opening = 0;
+        for (const SimulatedLayer& layer : input.layers)
+            opening += (slab - area(layer.flask)) * (layer.z_top - layer.z_bottom);
+        build.sand_litres = std::max(0.0, opening - plan["totals"]["part_volume_mm3"].number()) * 1e-6;
+    }
+    std::map<std::string, std::array<double, 2>> heights;  // of the programs
+    for (const Program& program : input.programs) {
+        std::array<double, 2>& z = heights["nc/" + program.file] = {INFINITY, -INFINITY};
+        for (const ProgramStep& step : program.steps)
+            if (std::isfinite(step.z)) z = {std::min(z[0], step.z), std::max(z[1], step.z)};
+    }
+    const Field layers = plan["layers"];
+    for (std::size_t l = 0; l < layers.size(); ++l) {
+        const Field from = layers[l];
+        PlannedLayer& layer = build.layers.emplace_back();
+        layer.index = from["index"].whole();
+        layer.z_bottom = from["z_bottom"].number(), layer.z_top = from["z_top"].number();
+        layer.slab_thickness = from["slab_thickness"].number();
+        if (from.has("slabs")) layer.slabs = from["slabs"].whole();
+        if (layer.slabs < 1 || layer.slabs > 1000) from["slabs"].fail("is no count of slabs");
+        const auto joint = [](const Field& of) {
+            PlannedJoint planned;
+            if (of.has("glue_area_mm2")) planned.glue_area_mm2 = of["glue_area_mm2"].number();
+            if (of.has("press_force_n")) planned.press_force_n = of["press_force_n"].number();
+            return planned;
+        };
+        // Where the plan does not tell a layer's joints apart, they are pressed alike.
+        layer.joints.assign(static_cast<std::size_t>(layer.slabs), {{}, joint(from).press_force_n});
+        layer.joints.front() = joint(from);
+        if (from.has("joints"))
+            for (std::size_t k = 0; k < std::min(layer.joints.size(), from["joints"].size()); ++k)
+                layer.joints[k] = joint(from["joints"][k]);
+        const Field operations = from["operations"];
+        for (std::size_t o = 0; o < operations.size(); ++o) {
+            const Field op = operations[o];
+            PlannedProgram& program = build.programs.emplace_back();
+            program.file = op["file"].text();
+            if (!program.file.starts_with("nc/")) program.file.insert(0, "nc/");
+            program.layer = l;
+            program.kind = operation_kind(op["kind"]);
+            program.tool = op["tool"].whole();
+            if (op.has("purpose")) program.purpose = op["purpose"].text();
+            if (op.has("minutes")) program.minutes = op["minutes"].number();
+            if (const auto z = heights.find(program.file); z != heights.end() && z->second[0] <= z->second[1])
+                program.low = z->second[0], program.high = z->second[1];
+        }
+    }
+    return build;
+}
+
+/// sequence.json, replayed. That there is none, or none that can be read, is a violation too.
+void check_sequence(const fs::path& path, const BuildPlan& build, std::vector<Violation>& violations) {
+    const std::string file = path.filename().string();
+    std::error_code failed;
+    if (const auto size = fs::file_size(path, failed); failed || size > kLargestSequence) {
+        violations.push_back({failed ? "sequence.no_file" : "sequence.unreadable",
+                              failed ? "there is none, or none that can be read"
+                                     : fmt::format("has {} bytes, over {}", size, kLargestSequence),
+                              file,
+                              0,
+                              {},
+                              0});
+        return;
+    }
+    try {
+        const std::vector<Violation> found =
+            replay_build(build, read_sequence(read_text(path, "verify.sequence")));
+        violations.insert(violations.end(), found.begin(), found.end());
+    } catch (const Error& e) {
+        if (e.code() != "verify.sequence") throw;
+        violations.push_back({"sequence.unreadable", e.message(), file, 0, {}, 0});
+    }
 }
 
 /// tool.tbl against the library: what the machine believes of a tool is what the paths were made for.
@@ -221,157 +329,6 @@ void check_tool_table(const fs::path& path, const std::vector<Tool>& tools,
     for (const Tool& tool : tools)
         if (!seen.contains(tool.number))
             complain(fmt::format("tool {} of the plan is not in the table", tool.number), 0);
-}
-
-void put_point(JsonText& text, const Point3& p) {
-    text.begin_array(JsonText::Shape::line);
-    for (const double v : p) text.rounded(v, 4);
-    text.end();
-}
-
-void put_extreme(JsonText& text, const char* key, const Extreme& e) {
-    text.key(key).begin_object(JsonText::Shape::line).key("mm").rounded(e.size, 5);
-    text.key("where");
-    if (e.size > 0) put_point(text, e.where);
-    else text.null();
-    text.end();
-}
-
-std::string report_json(const SimulationInput& input, const SimulationReport& r,
-                        const SimulationOptions& options, const std::string& pattern, bool job_stated) {
-    JsonText text;
-    text.begin_object();
-    text.key("schema").string("slabwright.verify/1");
-    text.key("passed").boolean(r.passed());
-    text.key("pattern").string(pattern);
-    text.key("limits").begin_object();
-    text.key("stated_by").string(job_stated ? "plan.json" : "defaults");
-    text.key("gouge_mm").exact(options.gouge);
-    text.key("left_over_mm").exact(options.cusp + options.slack);
-    text.key("left_over_share").exact(options.leftover_share);
-    text.key("left_over_max_mm").exact(options.leftover_limit);
-    text.key("board_cut_mm");
-    if (options.board_cut >= 0) text.exact(options.board_cut);
-    else text.null();
-    text.end();
-    text.key("resolution").begin_object();
-    text.key("cell_mm").exact(r.cell);
-    text.key("cells").begin_array(JsonText::Shape::line).integer(r.nx).integer(r.ny).end();
-    double arc_error = 0;
-    for (const Program& p : input.programs) arc_error = std::max(arc_error, p.arc_error);
-    text.key("exact_check_error_mm").exact(StandingPart::kSheet + arc_error);
-    text.key("arc_error_mm").exact(arc_error);
-    text.end();
-    double gouge_stock = 0, left = 0, missed = 0, squares = 0;
-    std::uint64_t cells = 0, unreachable = 0, missed_cells = 0;
-    for (const LayerFindings& f : r.layers) {
-        gouge_stock = std::max(gouge_stock, f.gouge.size), left = std::max(left, f.left.size),
-        missed = std::max(missed, f.missed_left.size);
-        squares += f.left_rms * f.left_rms * static_cast<double>(f.cells);
-        cells += f.cells, unreachable += f.unreachable, missed_cells += f.missed;
-    }
-    const double n = static_cast<double>(std::max<std::uint64_t>(1, cells)),
-                 reachable = static_cast<double>(std::max<std::uint64_t>(1, cells - unreachable));
-    text.key("totals").begin_object();
-    text.key("gouge_max_mm").rounded(r.gouge_max, 5);
-    text.key("gouge_stock_max_mm").rounded(gouge_stock, 5);
-    text.key("left_over_max_mm").rounded(left, 4);
-    text.key("left_over_rms_mm").rounded(std::sqrt(squares / n), 5);
-    text.key("left_over_missed_max_mm").rounded(missed, 4);
-    text.key("within_tolerance_share").rounded(1 - static_cast<double>(missed_cells) / reachable, 6);
-    text.key("pattern_mm2").rounded(r.pattern_mm2, 1);
-    text.key("unreachable_share").rounded(static_cast<double>(unreachable) / n, 6);
-    text.key("unreachable_mm2").rounded(r.unreachable_mm2(), 1);
-    text.key("unreachable_of_pattern_share")
-        .rounded(r.pattern_mm2 > 0 ? r.unreachable_mm2() / r.pattern_mm2 : 0, 6);
-    text.key("unreachable_max_mm").rounded(r.unreachable().size, 4);
-    text.key("unmade_mm3").rounded(r.unmade_mm3(), 0);
-    text.key("unmade_height_mm").rounded(r.unmade().size, 3);
-    text.key("removed_mm3").rounded(r.removed_mm3, 0);
-    text.key("cutting_mm").rounded(r.cutting_mm, 1);
-    text.key("rapid_mm").rounded(r.rapid_mm, 1);
-    text.key("minutes").rounded(r.seconds / 60, 2);
-    text.key("board_cut_mm").rounded(r.board_cut, 4);
-    text.key("violations").count(r.violations.size());
-    text.end();
-    text.key("violations").begin_array();
-    for (const Violation& v : r.violations) {
-        text.begin_object(JsonText::Shape::line);
-        text.key("code").string(v.code).key("message").string(v.message);
-        text.key("file");
-        if (v.file.empty()) text.null();
-        else text.string(v.file);
-        text.key("line");
-        if (v.line == 0) text.null();
-        else text.count(v.line);
-        text.key("where");
-        if (v.where) put_point(text, *v.where);
-        else text.null();
-        text.key("size").rounded(v.size, 5).end();
-    }
-    text.end();
-    text.key("layers").begin_array();
-    for (std::size_t l = 0; l < r.layers.size(); ++l) {
-        const LayerFindings& f = r.layers[l];
-        const double area = r.cell * r.cell;
-        text.begin_object();
-        text.key("index").count(l + 1);
-        text.key("z_bottom").exact(input.layers[l].z_bottom).key("z_top").exact(input.layers[l].z_top);
-        put_extreme(text, "gouge", f.gouge);
-        text.key("gouge_mm2").rounded(static_cast<double>(f.gouge_cells) * area, 3);
-        put_extreme(text, "left_over", f.left);
-        text.key("left_over_rms_mm").rounded(f.left_rms, 5);
-        text.key("over_mm2").rounded(static_cast<double>(f.over) * area, 3);
-        text.key("unreachable_mm2").rounded(static_cast<double>(f.unreachable) * area, 3);
-        put_extreme(text, "unreachable", f.unreachable_left);
-        text.key("unmade_mm3").rounded(f.unmade_mm3, 0);
-        put_extreme(text, "unmade", f.unmade);
-        text.key("missed_mm2").rounded(static_cast<double>(f.missed) * area, 3);
-        put_extreme(text, "missed", f.missed_left);
-        text.key("within_tolerance_share").rounded(f.within_share, 6);
-        text.key("waste_mm2").rounded(static_cast<double>(f.waste) * area, 3);
-        text.key("waste_mm3").rounded(f.waste_mm3, 1);
-        text.end();
-    }
-    text.end();
-    text.key("programs").begin_array();
-    for (std::size_t i = 0; i < r.programs.size(); ++i) {
-        const ProgramFindings& f = r.programs[i];
-        const Program& p = input.programs[i];
-        text.begin_object(JsonText::Shape::line);
-        text.key("file")
-            .string("nc/" + p.file)
-            .key("layer")
-            .integer(p.layer + 1)
-            .key("kind")
-            .string(name(p.kind))
-            .key("tool")
-            .integer(p.tool);
-        text.key("gouge_mm").rounded(f.gouge.cutter.depth, 5);
-        text.key("gouge_line");
-        if (f.gouge.cutter.line != 0) text.count(f.gouge.cutter.line);
-        else text.null();
-        text.key("shank_in_part_mm")
-            .rounded(f.gouge.shank.depth, 5)
-            .key("holder_in_part_mm")
-            .rounded(f.gouge.holder.depth, 5);
-        text.key("rapid_takes_mm")
-            .rounded(f.rapid.size, 4)
-            .key("removed_mm3")
-            .rounded(f.removed_mm3, 1)
-            .key("lowest_z")
-            .rounded(f.lowest, 4);
-        text.key("cutting_mm")
-            .rounded(f.cutting_mm, 1)
-            .key("rapid_mm")
-            .rounded(f.rapid_mm, 1)
-            .key("minutes")
-            .rounded(f.seconds / 60, 3)
-            .end();
-    }
-    text.end();
-    text.end();
-    return text.take();
 }
 
 }  // namespace
@@ -523,6 +480,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
                 {"program.unplanned", "nc/ holds it, plan.json does not name it", file, 0, {}, 0});
     }
 
+    check_sequence(out / "sequence.json", planned_build(plan, part, frame, input), violations);
+
     const PlannedPattern planned_pattern{plan["input"]["file"].text(),
                                          plan["input"]["sha256"].text(),
                                          {part.job.units, part.job.tolerances.weld}};
@@ -550,7 +509,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     result.report = simulate(context, input, *pattern.part, simulation);
     input.mesh = {};
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
-    result.json = report_json(input, result.report, simulation, fs::path(pattern.path).filename().string(),
+    result.json = verify_json(input, result.report, simulation, fs::path(pattern.path).filename().string(),
                               part.stated);
 
     if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);

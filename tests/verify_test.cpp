@@ -61,6 +61,8 @@ std::string head(int tool) {
     return text;
 }
 
+void write_block_sequence(const fs::path& out, const std::string& sha256, bool layer_top);
+
 /// A block of 20 × 20 × 10 in a slab of 40 × 40 × 12, cleared in two steps by a ring with round corners, and
 /// its corners.
 void write_block(const fs::path& out) {
@@ -87,6 +89,34 @@ void write_block(const fs::path& out) {
         rough += "G0 Z25\nX-20 Y-9\n";
     }
     spill(out / "nc/L1_02.ngc", rough + "M5\nM2\n");
+    write_block_sequence(out, stl.input.sha256, false);
+}
+
+/// How that block is built.
+void write_block_sequence(const fs::path& out, const std::string& sha256, bool layer_top) {
+    const int down = layer_top ? 10 : 0;
+    const auto n = [&](int z) { return std::to_string(z - down); };
+    spill(out / "sequence.json", R"({"schema": "slabwright.sequence/1", "units": "mm", "frame": ")" +
+                                     std::string(layer_top ? "layer-top" : "pattern-base") +
+                                     R"(", "pattern": "block.stl", "sha256": ")" + sha256 + R"(", "steps": [
+{"id": 1, "layer": 1, "action": "mount_board", "needs": [], "seconds": 0, "thickness_mm": 19, "length_mm": 40, "width_mm": 40},
+{"id": 2, "layer": 1, "action": "take_slab", "needs": [], "seconds": 20, "thickness_mm": 12, "length_mm": 40, "width_mm": 40},
+{"id": 3, "layer": 1, "action": "clamp", "needs": [2], "seconds": 20},
+{"id": 4, "layer": 1, "action": "glue", "needs": [1], "seconds": 1, "polygons": "#/glue/0", "area_mm2": 100},
+{"id": 5, "layer": 1, "action": "place", "needs": [3, 4], "seconds": 20, "x_mm": -10, "y_mm": -10, "z_bottom_mm": 0},
+{"id": 6, "layer": 1, "action": "press", "needs": [5], "seconds": 30},
+{"id": 7, "layer": 1, "action": "table", "needs": [6], "seconds": 0, "table_height_mm": )" +
+                                     n(-19) + R"(, "work_offset_z_mm": 0},
+{"id": 8, "layer": 1, "action": "touch_off", "needs": [7], "seconds": 0, "slab_top_mm": )" +
+                                     n(12) + R"(},
+{"id": 9, "layer": 1, "action": "tool_change", "needs": [8], "seconds": 15, "tool": 1},
+{"id": 10, "layer": 1, "action": "face", "needs": [9], "seconds": 60, "program": "nc/L1_01.ngc", "tool": 1, "z_low_mm": )" +
+                                     n(10) + R"(, "z_high_mm": )" + n(25) + R"(},
+{"id": 11, "layer": 1, "action": "tool_change", "needs": [10], "seconds": 15, "tool": 2},
+{"id": 12, "layer": 1, "action": "mill", "needs": [11], "seconds": 60, "program": "nc/L1_02.ngc", "tool": 2, "z_low_mm": )" +
+                                     n(0) + R"(, "z_high_mm": )" + n(25) + R"(},
+{"id": 13, "layer": 1, "action": "unload", "needs": [12], "seconds": 0}],
+"glue": [{"layer": 1, "loops": [[[5, 5], [15, 5], [15, 15], [5, 15]]]}]})");
 }
 
 /// Codes of the violations, or the code and place of the error.
@@ -196,6 +226,8 @@ TEST(Verify, LayerTopFrameMeansTheSame) {
              at = rough.find(from, at + to.size()))
             rough.replace(at, from.size(), to);
     spill(f.path / "nc/L1_02.ngc", rough);
+    const auto plan = nlohmann::json::parse(slurp(f.path / "plan.json"));
+    write_block_sequence(f.path, plan["input"]["sha256"].get<std::string>(), true);
     EXPECT_EQ(verdict(f.path), "");
 }
 
@@ -275,6 +307,24 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
          "tool.table"},
         {"tool table broken", [&](const fs::path& p) { replace(p / "tool.tbl", "D10", "Dten"); },
          "error verify.tool_table tool.tbl:2"},
+        {"no sequence", [&](const fs::path& p) { fs::remove(p / "sequence.json"); }, "sequence.no_file"},
+        {"sequence broken", [&](const fs::path& p) { replace(p / "sequence.json", "]", "}"); },
+         "sequence.unreadable"},
+        {"programs exchanged in the sequence",
+         [&](const fs::path& p) {
+             replace(p / "sequence.json", "L1_01", "L1_00");
+             replace(p / "sequence.json", "L1_02", "L1_01");
+             replace(p / "sequence.json", "L1_00", "L1_02");
+         },
+         "sequence.program"},
+        {"tool of the sequence",
+         [&](const fs::path& p) { replace(p / "sequence.json", "\"tool\": 2", "\"tool\": 99"); },
+         "sequence.tool"},
+        {"touch-off",
+         [&](const fs::path& p) {
+             replace(p / "sequence.json", "\"slab_top_mm\": 12", "\"slab_top_mm\": 5");
+         },
+         "sequence.touch_off"},
         {"thinner slab",
          [&](const fs::path& p) {
              replace(p / "plan.json", "\"slab_thickness\": 12", "\"slab_thickness\": 9");

@@ -57,7 +57,8 @@ struct Extreme {
 /// stack.short, stack.narrow, stack.gap, stack.thin, gouge.cutter, gouge.stock, gouge.flask, contact.shank,
 /// contact.holder, rapid.through_stock, rapid.unknown_start, flute.too_deep, cut.too_deep, spindle.off,
 /// travel.exceeded, board.too_deep, operation.empty, tool.wrong, tool.unknown, left.missed, left.too_much;
-/// and by io/verify program.order, program.unplanned, program.missing, tool.table.
+/// and by io/verify program.order, program.unplanned, program.missing, tool.table, sequence.no_file,
+/// sequence.unreadable and those of replay_build.
 struct Violation {
     std::string code;
     std::string message;  ///< one line, sizes with units

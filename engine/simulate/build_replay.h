@@ -1,0 +1,87 @@
+// The machine's sequence, replayed: a machine of states does what each step says, with the bodies that it
+// moves (slabs, glue, stack, tool), and says where a step cannot, must not, or does not do what the plan
+// asks. Nothing of how sequences are made is used here; steps come as they were read from text.
+//
+// Two things are asked of every step: that in the order of the list the machine is in a state for it, and
+// that its `needs` say so too, directly or by way of others, since a machine may begin a step as soon as
+// these are done.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/job.h"
+#include "engine/plan.h"
+#include "engine/simulate/simulate.h"
+
+namespace slabwright {
+
+/// A joint under a slab, as the plan states it.
+struct PlannedJoint {
+    std::optional<double> glue_area_mm2, press_force_n;
+};
+
+/// A layer as the plan states it.
+struct PlannedLayer {
+    int index = 0;
+    double z_bottom = 0, z_top = 0, slab_thickness = 0;  ///< mm, pattern-base; of all its slabs together
+    int slabs = 1;
+    /// Of the joint under each of its slabs, upwards; what is not stated is not checked.
+    std::vector<PlannedJoint> joints;
+};
+
+/// A program as the plan states it, in the order of execution, and how far it goes down and up.
+struct PlannedProgram {
+    std::string file;       ///< "nc/…"
+    std::size_t layer = 0;  ///< index into the layers
+    OperationKind kind{};
+    int tool = 0;
+    std::string purpose;              ///< "": not stated
+    std::optional<double> minutes;    ///< none: not stated
+    std::optional<double> low, high;  ///< mm, pattern-base, of its text; none where it could not be read
+};
+
+/// What a sequence has to build.
+struct BuildPlan {
+    Job job;                  ///< of it machine, material and bonding
+    bool job_stated = false;  ///< false: what the job would say is not checked
+    Frame frame = Frame::pattern_base;
+    std::string pattern, sha256;
+    std::array<double, 2> stock_min{}, stock_max{};
+    std::vector<PlannedLayer> layers;
+    std::vector<PlannedProgram> programs;
+    std::vector<Tool> tools;
+    bool flask = false;
+    std::optional<double> flask_mass_kg, sand_litres;
+};
+
+/// Where glue goes on one joint, as the sequence states it: under each layer first, in their order.
+struct StatedGlue {
+    int layer = 0;
+    double area_mm2 = 0;                         ///< of its loops, holes taken off
+    std::array<double, 2> min{0, 0}, max{0, 0};  ///< of its points, mm
+};
+
+/// A sequence as it was read.
+struct BuildSequence {
+    Frame frame = Frame::pattern_base;
+    std::string pattern, sha256;
+    std::vector<SequenceStep> steps;
+    std::vector<StatedGlue> glue;
+};
+
+/// Replays a sequence. Each violation's message begins with the step it is about; its file is
+/// "sequence.json".
+/// Of very many only the first are listed (kMostSequenceViolations).
+///
+/// Codes: sequence.pattern, sequence.frame (another plan's), sequence.length (far too many steps),
+/// sequence.id, sequence.needs, sequence.action (unknown), sequence.order (the machine is not in a state for
+/// the step), sequence.layer, sequence.feed, sequence.slab, sequence.glue, sequence.place, sequence.press,
+/// sequence.table, sequence.touch_off, sequence.tool, sequence.program, sequence.height (of a program),
+/// sequence.mass, sequence.travel, sequence.time, sequence.value (a quantity that is missing or not what the
+/// plan says), sequence.missing (what was not done in the end).
+[[nodiscard]] std::vector<Violation> replay_build(const BuildPlan& plan, const BuildSequence& sequence);
+
+}  // namespace slabwright
