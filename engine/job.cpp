@@ -19,42 +19,60 @@ namespace {
 
 enum class Ends { closed, open_low, open_both };
 
-/// One number must lie between low and high; `ends` says which of them it may equal.
-void require(const std::string& key, double value, double low, double high, Ends ends = Ends::closed) {
+// Why a number may be no smaller: what a job can mean bounds the work that it makes.
+constexpr const char* kNoCutter = "no cutter is smaller";
+constexpr const char* kNoRouter = "no router does less";
+constexpr const char* kFinerThanProgrammed =
+    "programs are written to 0.0001 mm, and some of that is rounding";
+constexpr const char* kFinerThanUseful = "finer steps show nowhere in wood, and take without end";
+
+constexpr double kLeastAdvance = 0.02;  ///< mm from one cut to the next beside it: step-over times diameter
+constexpr double kLeastLayer = 0.3;     ///< mm that slab and tools must leave a layer
+
+/// One number must lie between low and high; `ends` says which of them it may equal, `why` what speaks
+/// against less.
+void require(const std::string& key, double value, double low, double high, Ends ends = Ends::closed,
+             const char* why = nullptr) {
     const bool low_ok = ends == Ends::closed ? value >= low : value > low;
     const bool high_ok = ends == Ends::open_both ? value < high : value <= high;
     if (low_ok && high_ok) return;  // a NaN fails both
     refuse(key, fmt::format("{} is {}, out of range", key, value),
-           fmt::format("give a number {} {} and {} {}", ends == Ends::closed ? "from" : "over", low,
-                       ends == Ends::open_both ? "under" : "up to", high));
+           fmt::format("give a number {} {} and {} {}{}", ends == Ends::closed ? "from" : "over", low,
+                       ends == Ends::open_both ? "under" : "up to", high,
+                       why != nullptr && value < low ? fmt::format(" ({})", why) : ""));
 }
 
 void validate_tool(const Tool& tool, std::size_t position) {
     const auto key = [&](const char* name) { return fmt::format("tool[{}].{}", position + 1, name); };
     require(key("number"), tool.number, 1, 99999);
-    require(key("diameter"), tool.diameter, 0, 1000, Ends::open_low);
-    require(key("flute_length"), tool.flute_length, 0, 1000, Ends::open_low);
-    require(key("shank_diameter"), tool.shank_diameter, 0, 1000, Ends::open_low);
-    require(key("stickout"), tool.stickout, 0, 2000, Ends::open_low);
+    require(key("diameter"), tool.diameter, 0.1, 1000, Ends::closed, kNoCutter);
+    require(key("flute_length"), tool.flute_length, 0.1, 1000, Ends::closed, kNoCutter);
+    require(key("shank_diameter"), tool.shank_diameter, 0.1, 1000, Ends::closed, kNoCutter);
+    require(key("stickout"), tool.stickout, 0.1, 2000, Ends::closed, kNoCutter);
     if (tool.stickout < tool.flute_length)
         refuse(key("stickout"),
                fmt::format("{} is {}, less than the flute length {}", key("stickout"), tool.stickout,
                            tool.flute_length),
                "give the length from the holder's nose to the tip");
-    require(key("holder_diameter"), tool.holder_diameter, 0, 1000, Ends::open_low);
+    require(key("holder_diameter"), tool.holder_diameter, 0.1, 1000, Ends::closed, kNoCutter);
     require(key("flutes"), tool.flutes, 1, 100);
     require(key("helix_deg"), tool.helix_rad * 180 / std::numbers::pi, 0, 80);
-    require(key("max_rpm"), tool.max_rpm, 0, 1e6, Ends::open_low);
+    require(key("max_rpm"), tool.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
     require(key("max_feed"), tool.max_feed, 1, 1e6);
     require(key("plunge_feed"), tool.plunge_feed, 1, 1e6);
     require(key("stepdown_min"), tool.stepdown_min, 0, 1000);
-    require(key("stepdown_max"), tool.stepdown_max, 0, 1000, Ends::open_low);
+    require(key("stepdown_max"), tool.stepdown_max, 0.05, 1000, Ends::closed, kFinerThanUseful);
     if (tool.stepdown_max < tool.stepdown_min)
         refuse(key("stepdown_max"),
                fmt::format("{} is {}, less than stepdown_min {}", key("stepdown_max"), tool.stepdown_max,
                            tool.stepdown_min),
                "swap the two");
-    require(key("stepover"), tool.stepover, 0, 1, Ends::open_low);
+    require(key("stepover"), tool.stepover, 0.01, 1, Ends::closed, kFinerThanUseful);
+    if (tool.stepover * tool.diameter < kLeastAdvance)
+        refuse(key("stepover"),
+               fmt::format("{} is {}: cuts would lie {:g} mm apart", key("stepover"), tool.stepover,
+                           tool.stepover * tool.diameter),
+               fmt::format("give a share of the diameter that makes {} mm at least", kLeastAdvance));
     require(key("strength_mpa"), tool.strength_mpa, 0, 1e5);
 }
 
@@ -154,10 +172,10 @@ const Tool& tool_of_kind(const Job& job, ToolKind kind) {
 
 void validate(const Job& job) {
     const Material& m = job.material;
-    require("material.strength_mpa", m.strength_mpa, 0, 10000, Ends::open_low);
+    require("material.strength_mpa", m.strength_mpa, 0.01, 10000);
     require("material.min_thickness", m.min_thickness, 0, 1000);
     require("material.shallow_limit_deg", m.shallow_limit_deg, 0, 90, Ends::open_both);
-    require("material.density_kg_m3", m.density_kg_m3, 0, 30000, Ends::open_low);
+    require("material.density_kg_m3", m.density_kg_m3, 1, 30000);
     require("material.ktc", m.ktc, 0, 100000);
     require("material.kte", m.kte, 0, 100000);
     require("material.kfc", m.kfc, 0, 100000);
@@ -168,53 +186,54 @@ void validate(const Job& job) {
         refuse("slabs.thicknesses", "slabs.thicknesses is empty",
                "list the thicknesses in stock, e.g. [19.0]");
     for (std::size_t i = 0; i < s.thicknesses.size(); ++i) {
-        require("slabs.thicknesses", s.thicknesses[i], 0, 1000, Ends::open_low);
+        require("slabs.thicknesses", s.thicknesses[i], 0.5, 1000, Ends::closed, "no board is thinner");
         if (i > 0 && !(s.thicknesses[i] > s.thicknesses[i - 1]))
             refuse("slabs.thicknesses",
                    fmt::format("slabs.thicknesses has {} after {}", s.thicknesses[i], s.thicknesses[i - 1]),
                    "list them in ascending order, each once");
     }
-    require("slabs.length", s.length, 0, 100000, Ends::open_low);
-    require("slabs.width", s.width, 0, 100000, Ends::open_low);
+    require("slabs.length", s.length, 1, 100000);
+    require("slabs.width", s.width, 1, 100000);
     require("slabs.margin", s.margin, 0, 10000);
     require("slabs.facing_allowance", s.facing_allowance, 0, 1000);
-    if (s.facing_allowance >= s.thicknesses.front())
+    if (s.facing_allowance > s.thicknesses.front() - kLeastLayer)
         refuse("slabs.facing_allowance",
-               fmt::format("slabs.facing_allowance is {}: nothing is left of the {} mm slab",
+               fmt::format("slabs.facing_allowance is {}: next to nothing is left of the {} mm slab",
                            s.facing_allowance, s.thicknesses.front()),
                "face off less, or take that slab out of the list");
 
     const Machine& c = job.machine;
-    require("machine.travel_x", c.travel_x, 0, 100000, Ends::open_low);
-    require("machine.travel_y", c.travel_y, 0, 100000, Ends::open_low);
-    require("machine.travel_z", c.travel_z, 0, 100000, Ends::open_low);
-    require("machine.build_height", c.build_height, 0, 100000, Ends::open_low);
-    require("machine.build_mass_kg", c.build_mass_kg, 0, 1e6, Ends::open_low);
-    require("machine.table_speed", c.table_speed, 0, 1e6, Ends::open_low);
+    require("machine.travel_x", c.travel_x, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.travel_y", c.travel_y, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.travel_z", c.travel_z, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.build_height", c.build_height, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.build_mass_kg", c.build_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
+    require("machine.table_speed", c.table_speed, 1, 1e6, Ends::closed, kNoRouter);
     require("machine.feed_height", c.feed_height, 0, 100000);
-    require("machine.feed_mass_kg", c.feed_mass_kg, 0, 1e6, Ends::open_low);
+    require("machine.feed_mass_kg", c.feed_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
     require("machine.max_feed", c.max_feed, 1, 1e6);
     require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
-    require("machine.acceleration", c.acceleration, 0, 1e6, Ends::open_low);
-    require("machine.max_rpm", c.max_rpm, 0, 1e6, Ends::open_low);
+    require("machine.acceleration", c.acceleration, 1, 1e6, Ends::closed, kNoRouter);
+    require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
     require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
     require("machine.tool_change_s", c.tool_change_s, 0, 36000);
-    require("machine.clearance", c.clearance, 0, 1000, Ends::open_low);
+    require("machine.clearance", c.clearance, 1, 1000, Ends::closed,
+            "rapids pass the stock at that height, on a machine that rounds its corners");
     require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
     require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
 
     const Bonding& b = job.bonding;
     require("bonding.press_force", b.press_force, 0, 1e7);
     require("bonding.press_time_s", b.press_time_s, 0, 1e6);
-    require("bonding.max_pressure_mpa", b.max_pressure_mpa, 0, 1000, Ends::open_low);
+    require("bonding.max_pressure_mpa", b.max_pressure_mpa, 0.0001, 1000);
     require("bonding.edge_setback", b.edge_setback, 0, 1000);
     require("bonding.handling_s", b.handling_s, 0, 1e6);
     require("bonding.glue_s_per_m2", b.glue_s_per_m2, 0, 1e6);
 
     const Tolerances& t = job.tolerances;
-    require("tolerances.gouge", t.gouge, 0, 10, Ends::open_low);
-    require("tolerances.cusp", t.cusp, 0, 10, Ends::open_low);
-    require("tolerances.rough_cusp", t.rough_cusp, 0, 100, Ends::open_low);
+    require("tolerances.gouge", t.gouge, 0.001, 10, Ends::closed, kFinerThanProgrammed);
+    require("tolerances.cusp", t.cusp, 0.001, 10, Ends::closed, kFinerThanProgrammed);
+    require("tolerances.rough_cusp", t.rough_cusp, 0.001, 100, Ends::closed, kFinerThanProgrammed);
     require("tolerances.chordal_deviation", t.chordal_deviation, 0, 10);
     require("tolerances.simplify", t.simplify, 0, 0.5);
     require("tolerances.undercut", t.undercut, 0, 10000);
@@ -226,8 +245,8 @@ void validate(const Job& job) {
     require("layers.alpha", l.alpha, 0, 1e6);
     require("layers.beta", l.beta, 0, 1e6);
     require("layers.flat_merge", l.flat_merge, 0, 1000);
-    require("layers.halving_coarse", l.halving_coarse, 0, 1000, Ends::open_low);
-    require("layers.halving_resolution", l.halving_resolution, 0, 1000, Ends::open_low);
+    require("layers.halving_coarse", l.halving_coarse, 0.01, 1000, Ends::closed, kFinerThanUseful);
+    require("layers.halving_resolution", l.halving_resolution, 0.01, 1000, Ends::closed, kFinerThanUseful);
     if (l.halving_resolution > l.halving_coarse)
         refuse("layers.halving_resolution",
                fmt::format("layers.halving_resolution is {}, over halving_coarse {}", l.halving_resolution,
@@ -246,12 +265,13 @@ void validate(const Job& job) {
                fmt::format("cutting.vertical_deg is {}, not over steep_limit_deg {}", k.vertical_deg,
                            k.steep_limit_deg),
                "vertical walls are steeper than steep ones");
-    require("cutting.min_stepdown", k.min_stepdown, 0, 100, Ends::open_low);
-    require("cutting.min_stepover", k.min_stepover, 0, 100, Ends::open_low);
+    require("cutting.min_stepdown", k.min_stepdown, 0.01, 100, Ends::closed, kFinerThanUseful);
+    require("cutting.min_stepover", k.min_stepover, 0.01, 100, Ends::closed, kFinerThanUseful);
     require("cutting.min_flat_area", k.min_flat_area, 0, 1e6);
-    require("cutting.face_depth", k.face_depth, 0, 1000, Ends::open_low);
-    require("cutting.ramp_deg", k.ramp_deg, 0, 90, Ends::open_low);
-    require("cutting.max_engagement", k.max_engagement, 0, 1, Ends::open_low);
+    require("cutting.face_depth", k.face_depth, 0.05, 1000, Ends::closed, kFinerThanUseful);
+    require("cutting.ramp_deg", k.ramp_deg, 0.1, 90, Ends::closed,
+            "the way into the stock grows as it falls");
+    require("cutting.max_engagement", k.max_engagement, 0.01, 1, Ends::closed, kFinerThanUseful);
     require("cutting.holder_clearance", k.holder_clearance, 0, 1000);
     require("cutting.finish_feed", k.finish_feed, 1, 1e6);
 
@@ -287,12 +307,13 @@ void validate(const Job& job) {
                        "number each tool once");
     }
     const double tallest = max_layer_thickness(job);
-    if (!(tallest > 0) || tallest < l.min_layer)
-        throw Error(ErrorKind::usage, "job.no_layer",
-                    fmt::format("the tallest layer that these slabs and tools can cut is {:.3f} mm, under "
-                                "layers.min_layer {}",
-                                tallest, l.min_layer),
-                    "", "take thicker slabs or tools with longer flutes, or lower the minimum");
+    const double least = std::max(kLeastLayer, l.min_layer);
+    if (!(tallest >= least))
+        throw Error(
+            ErrorKind::usage, "job.no_layer",
+            fmt::format("the tallest layer that these slabs and tools can cut is {:.3f} mm, under {} {}",
+                        tallest, l.min_layer < kLeastLayer ? "the least," : "layers.min_layer", least),
+            "", "take thicker slabs or tools with longer flutes, or lower the minimum");
 }
 
 }  // namespace slabwright

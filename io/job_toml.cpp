@@ -19,6 +19,8 @@ namespace slabwright {
 
 namespace {
 
+constexpr std::size_t kShown = 60;  // letters of what is wrong that an error repeats
+
 /// Levenshtein's distance, letters without case.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
     const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
@@ -129,7 +131,7 @@ public:
     void word(const char* name, Enum& value, const Word<Enum> (&words)[N], const char*) {
         const toml::node* node = find(name);
         if (node == nullptr) return;
-        const std::string given = text(*node, prefix_ + name);
+        const std::string given = text(*node, prefix_ + name).substr(0, kShown);
         std::vector<std::string> known;
         for (const Word<Enum>& w : words) {
             if (given == w.text) {
@@ -215,6 +217,43 @@ private:
     const toml::table& root_;
 };
 
+constexpr std::size_t kMostKeyParts = 8;  ///< those of a job have two; a number or a date has one point
+
+/// Refuses keys of many parts before they are parsed: the parser calls itself for each part.
+void require_shallow_keys(std::string_view text, const std::string& file) {
+    std::size_t line = 1, points = 0;
+    for (std::size_t at = 0; at < text.size(); ++at) {
+        const char c = text[at];
+        if (c == '#') {
+            at = std::min(text.find('\n', at), text.size()) - 1;
+        } else if (c == '"' || c == '\'') {
+            // A text in one or three quotes, in which only " knows \. An unclosed one is the parser's to
+            // tell.
+            const std::string three(3, c);
+            const std::size_t quotes = text.substr(at, 3) == three ? 3 : 1;
+            std::size_t end = at + quotes;
+            while (end < text.size() && text.substr(end, quotes) != three.substr(0, quotes) &&
+                   (quotes == 3 || text[end] != '\n')) {
+                if (c == '"' && text[end] == '\\') ++end;
+                if (end < text.size() && text[end] == '\n') ++line;
+                ++end;
+            }
+            at = end + quotes - 1;
+            if (quotes == 3)  // two more may stand before the closing three
+                while (at + 1 < text.size() && at < end + 4 && text[at + 1] == c) ++at;
+            if (quotes == 1 && end < text.size() && text[end] == '\n') at = end - 1;
+        } else if (c == '.') {
+            if (++points < kMostKeyParts) continue;
+            throw Error(ErrorKind::usage, "job.syntax",
+                        fmt::format("a key of more than {} parts", kMostKeyParts),
+                        fmt::format("{}:{}", file, line), "keys have two parts, as in machine.clearance");
+        } else if (c == '\n' || c == '=' || c == ',' || c == '[' || c == ']' || c == '{' || c == '}') {
+            points = 0;
+            line += c == '\n' ? 1 : 0;
+        }
+    }
+}
+
 KeyNames all_keys() {
     const Job job;
     KeyNames names;
@@ -241,8 +280,10 @@ void refuse_unknown(const toml::table& values, const std::string& prefix, const 
             if (const toml::table* inner = node->as_table()) refuse_unknown(*inner, key + ".", known, reader);
             continue;
         }
-        const std::string full = prefix + key;
-        if (std::find(known.names.begin(), known.names.end(), full) != known.names.end()) continue;
+        // A key that is not known may be as long as the file: it is compared and told by its beginning.
+        const std::string shown = key.substr(0, kShown), full = prefix + shown;
+        if (key == shown && std::find(known.names.begin(), known.names.end(), full) != known.names.end())
+            continue;
         // The key may be misspelt, or right but in the wrong table: both are found by the better of two
         // distances.
         std::string best;
@@ -255,7 +296,7 @@ void refuse_unknown(const toml::table& values, const std::string& prefix, const 
                                               ? std::string_view(candidate)
                                               : std::string_view(candidate).substr(dot + 1);
             const std::size_t distance =
-                std::min(2 * edit_distance(full, candidate), 2 * edit_distance(key, bare) + 1);
+                std::min(2 * edit_distance(full, candidate), 2 * edit_distance(shown, bare) + 1);
             if (distance < best_distance) {
                 best = candidate;
                 best_distance = distance;
@@ -326,6 +367,7 @@ struct Printer {
 }  // namespace
 
 Job parse_job(std::string_view text, const std::string& file) {
+    require_shallow_keys(text, file);
     toml::table root;
     try {
         root = toml::parse(text, file);

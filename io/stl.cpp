@@ -1,17 +1,11 @@
 #include "io/stl.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <limits>
@@ -20,6 +14,7 @@
 #include <string_view>
 #include <utility>
 
+#include "io/input_file.h"
 #include "io/output_file.h"
 #include "io/sha256.h"
 #include "kernels/errors.h"
@@ -32,6 +27,8 @@ namespace {
 
 constexpr std::size_t kHeaderBytes = 84;  ///< 80 of text, 4 of facet count
 constexpr std::size_t kFacetBytes = 50;   ///< normal, three corners, attribute
+constexpr std::size_t kHead = 4096;       ///< first bytes, in which text has no zero
+constexpr std::size_t kWeldBytes = 56;    ///< of memory a facet, for a mesh and its welding
 constexpr double kAbsurdMm = 1e6;         ///< no pattern lies a kilometre from its origin
 constexpr double kSmallBox = 5;           ///< in the declared unit; below, the unit is suspicious
 constexpr double kLargeBox = 5000;        ///< likewise, above
@@ -44,55 +41,6 @@ constexpr std::string_view kExportAgain = "export the file again";
                          std::string_view remedy) {
     throw Error(ErrorKind::input, "stl." + code, message, place, std::string(remedy));
 }
-
-std::string reason(int error) { return std::error_code(error, std::generic_category()).message(); }
-
-/// A file's bytes, mapped for as long as this lives.
-class MappedFile {
-public:
-    explicit MappedFile(const std::string& path) {
-        // A pipe without a writer would keep open() waiting.
-        const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-        if (file < 0) {
-            const int error = errno;
-            if (error == ENOENT || error == ENOTDIR)
-                refuse("missing", "there is no such file", path, "check the path");
-            refuse("unreadable", "the file cannot be opened: " + reason(error), path,
-                   "check its permissions");
-        }
-        struct stat info {};
-        const bool known = ::fstat(file, &info) == 0;
-        if (!known || !S_ISREG(info.st_mode)) {
-            ::close(file);
-            if (known && S_ISDIR(info.st_mode))
-                refuse("directory", "this is a directory", path, "name an STL file in it");
-            refuse("unreadable", "this is no regular file", path, "copy the mesh to a file first");
-        }
-        size_ = static_cast<std::size_t>(info.st_size);
-        if (size_ > 0) {
-            void* data = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, file, 0);
-            const int error = errno;
-            ::close(file);
-            if (data == MAP_FAILED)
-                refuse("unreadable", "the file cannot be mapped: " + reason(error), path,
-                       "copy it to a local disk");
-            data_ = static_cast<const char*>(data);
-            ::madvise(data, size_, MADV_WILLNEED);
-        } else {
-            ::close(file);
-        }
-    }
-    ~MappedFile() {
-        if (size_ > 0) ::munmap(const_cast<char*>(data_), size_);
-    }
-    MappedFile(const MappedFile&) = delete;
-    MappedFile& operator=(const MappedFile&) = delete;
-    [[nodiscard]] std::string_view bytes() const noexcept { return {data_, size_}; }
-
-private:
-    const char* data_ = nullptr;
-    std::size_t size_ = 0;
-};
 
 std::string hash_file(Context& context, std::string_view bytes) {
     Sha256 hash;
@@ -109,7 +57,7 @@ std::string hash_file(Context& context, std::string_view bytes) {
 
 /// Facets, to be set on z = 0 in millimetres, and where they lie in the file.
 struct Corners {
-    FacetRecords facets;                   ///< of the mapped file, or of what a text said
+    FacetRecords facets;                   ///< of the file's bytes, or of what a text said
     RawArray<std::array<Vec3f, 3>> spelt;  ///< the corners of a text
     std::array<double, 3> min{}, max{};    ///< mm, as in the file
 };
@@ -450,40 +398,41 @@ std::size_t ascii_begin(std::string_view bytes) {
     words.skip_space();
     const std::size_t begin = words.at;
     if (!is_word(words.next(), "solid")) return std::string_view::npos;
-    if (bytes.substr(0, 4096).find('\0') != std::string_view::npos) return std::string_view::npos;
+    if (bytes.substr(0, kHead).find('\0') != std::string_view::npos) return std::string_view::npos;
     return begin;
 }
 
-Corners read_facets(Context& context, std::string_view bytes, double mm_per_unit, const std::string& path) {
-    if (bytes.empty()) refuse("empty", "the file is empty (0 bytes)", path, kExportAgain);
-    // The length decides first: it fits a binary file by chance only if its text spells out its own length.
-    const bool has_header = bytes.size() >= kHeaderBytes;
-    const std::uint64_t count = has_header ? load<std::uint32_t>(bytes.data() + 80) : 0;
-    const std::uint64_t expected = kHeaderBytes + kFacetBytes * count;
-    if (has_header && expected == bytes.size()) {
-        if (count == 0)
-            refuse("no_facets", "the header announces 0 facets and none follow", path, kExportAgain);
-        return read_binary(context, bytes, count, mm_per_unit, path);
-    }
-    const std::size_t begin = ascii_begin(bytes);
-    if (begin != std::string_view::npos) return read_ascii(context, bytes, begin, mm_per_unit, path);
-    if (bytes.substr(0, 4096).find('\0') == std::string_view::npos)
+/// The facets that a binary file of so many bytes announces; nothing where its length is another, or it is
+/// shorter than a header. The length decides first: it fits a binary file by chance only if its text spells
+/// out its own length.
+std::optional<std::uint64_t> binary_count(std::string_view head, std::uint64_t size) {
+    if (size < kHeaderBytes) return std::nullopt;
+    const std::uint64_t count = load<std::uint32_t>(head.data() + 80);
+    if (kHeaderBytes + kFacetBytes * count != size) return std::nullopt;
+    return count;
+}
+
+/// Refuses a file that is neither of the two. @param head its first bytes. @param size of all of it
+[[noreturn]] void refuse_format(std::string_view head, std::uint64_t size, const std::string& path) {
+    if (head.substr(0, kHead).find('\0') == std::string_view::npos)
         refuse("not_stl",
-               "found " + printable(Words{bytes}.next()) +
+               "found " + printable(Words{head}.next()) +
                    " where an ASCII STL begins with 'solid', and the length fits no binary STL",
                path + ", line 1", "name an STL file");
-    if (!has_header)
+    const std::string place = fmt::format("{}, offset {}", path, size);
+    if (size < kHeaderBytes)
         refuse("truncated",
-               fmt::format("the file ends at offset {}, inside the {} bytes of a binary header", bytes.size(),
+               fmt::format("the file ends at offset {}, inside the {} bytes of a binary header", size,
                            kHeaderBytes),
-               fmt::format("{}, offset {}", path, bytes.size()), kExportAgain);
-    const std::uint64_t present = (bytes.size() - kHeaderBytes) / kFacetBytes,
-                        rest = (bytes.size() - kHeaderBytes) % kFacetBytes;
+               place, kExportAgain);
+    const std::uint64_t count = load<std::uint32_t>(head.data() + 80),
+                        expected = kHeaderBytes + kFacetBytes * count,
+                        present = (size - kHeaderBytes) / kFacetBytes,
+                        rest = (size - kHeaderBytes) % kFacetBytes;
     const std::string both = fmt::format(
         "the header announces {} facets ({} bytes), but the data ends at offset {} after {} facets", count,
-        expected, bytes.size(), present);
-    const std::string place = fmt::format("{}, offset {}", path, bytes.size());
-    if (rest != 0 && expected > bytes.size())
+        expected, size, present);
+    if (rest != 0 && expected > size)
         refuse("truncated", fmt::format("{} and {} bytes of the next", both, rest), place,
                "copy or export the file again; its end is missing");
     if (rest != 0)
@@ -492,6 +441,71 @@ Corners read_facets(Context& context, std::string_view bytes, double mm_per_unit
     refuse("facet_count", both, place,
            "export the file again; the writer did not correct its header, or facets are missing");
 }
+
+/// Refuses what the first bytes show to be no STL, before all of it is read.
+void require_format(std::string_view head, std::uint64_t size, const std::string& path) {
+    if (size == 0) refuse("empty", "the file is empty (0 bytes)", path, kExportAgain);
+    if (const auto count = binary_count(head, size)) {
+        if (*count == 0)
+            refuse("no_facets", "the header announces 0 facets and none follow", path, kExportAgain);
+        return;
+    }
+    if (ascii_begin(head) != std::string_view::npos) return;
+    Words words{head};
+    (void)words.next();
+    // Else its first word is not all here.
+    const bool known =
+        words.at < head.size() || head.size() == size || head.find('\0') != std::string_view::npos;
+    if (known) refuse_format(head, size, path);
+}
+
+Corners read_facets(Context& context, std::string_view bytes, double mm_per_unit, const std::string& path) {
+    if (const auto count = binary_count(bytes, bytes.size()))
+        return read_binary(context, bytes, *count, mm_per_unit, path);
+    const std::size_t begin = ascii_begin(bytes);
+    if (begin == std::string_view::npos) refuse_format(bytes, bytes.size(), path);
+    return read_ascii(context, bytes, begin, mm_per_unit, path);
+}
+
+/// A file whose bytes are copied into memory that the context accounts for. Mapped memory would end the
+/// process where somebody shortens the file while it is read.
+class FileBytes {
+public:
+    /// @throws Error(input) where it is no STL by its first bytes, Error(no_plan, "memory.limit") where
+    /// reading it would pass the limit
+    FileBytes(Context& context, const std::string& path)
+        : file_(path, {ErrorKind::input, "stl.", kMostMeshBytes}) {
+        std::string head(std::min<std::uint64_t>(file_.size(), kHead), '\0');
+        file_.read(0, head.data(), head.size());
+        require_format(head, file_.size(), path);
+        // What a mesh of so many bytes takes beside them while it is welded, asked before they are read.
+        const MemoryCharge need(context, file_.size() + file_.size() / kFacetBytes * kWeldBytes,
+                                "reading " + path);
+        load(context, path);
+    }
+    /// Reads all of it, unless it is there already. @throws Error(input, "stl.changed") where somebody has
+    /// written the file since it was opened
+    void load(Context& context, const std::string& path) {
+        if (charge_) return;
+        charge_.emplace(context, file_.size(), "the bytes of " + path);
+        bytes_ = RawArray<char>(file_.size());
+        constexpr std::size_t piece = std::size_t{1} << 22;
+        parallel_for(context, bytes_.size(), piece, [&](std::size_t begin, std::size_t end) {
+            file_.read(begin, bytes_.data() + begin, end - begin);
+        });
+        file_.require_unchanged();
+    }
+    void let_go() {
+        bytes_ = {};
+        charge_.reset();
+    }
+    [[nodiscard]] std::string_view bytes() const noexcept { return {bytes_.data(), bytes_.size()}; }
+
+private:
+    InputFile file_;
+    std::optional<MemoryCharge> charge_;
+    RawArray<char> bytes_;
+};
 
 // ----------------------------------------------------------------------------------------------------
 // diagnostics
@@ -623,7 +637,7 @@ bool names_a_facet(const MeshReport& r) {
 
 Mesh read_mesh(Context& context, const std::string& path, LengthUnit units) {
     context.begin_phase("read STL", 0.0, 0.05, 2);
-    const MappedFile file(path);
+    const FileBytes file(context, path);
     InputInfo ignored;
     FacetOrder order = FacetOrder::near;
     Mesh mesh = load_mesh(context, file.bytes(), units == LengthUnit::inch ? kInch : 1.0, path, ignored,
@@ -634,7 +648,7 @@ Mesh read_mesh(Context& context, const std::string& path, LengthUnit units) {
 
 StlMesh read_stl(Context& context, const std::string& path, const StlOptions& options) {
     context.begin_phase("read STL", 0.0, 0.01, 4);
-    const MappedFile file(path);
+    FileBytes file(context, path);
     const double mm_per_unit = options.units == LengthUnit::inch ? kInch : 1.0;
     StlMesh stl;
     stl.input.file = std::filesystem::path(path).filename().string();
@@ -649,6 +663,7 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
             context.advance();
         }
     });
+    file.let_go();
     question_units(stl.input, options.units, stl.diagnostics);
     const auto weld_and_report = [&]() -> std::optional<Diagnostic> {
         if (options.weld_mm == 0) {
@@ -674,7 +689,9 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
         names_a_facet(stl.report)) {  // what is wrong is told by the file's facets
         order = FacetOrder::file;
         stl.mesh = {};
+        file.load(context, path);
         stl.mesh = load_mesh(context, file.bytes(), mm_per_unit, path, stl.input, &odd, order);
+        file.let_go();
         note = weld_and_report();
     }
     if (note) stl.diagnostics.push_back(std::move(*note));

@@ -1,4 +1,4 @@
-// STL in: binary and ASCII, memory-mapped, decoded and welded in parallel.
+// STL in: binary and ASCII, decoded and welded in parallel.
 #pragma once
 
 #include <string>

@@ -139,6 +139,36 @@ TEST(Job, ValuesAreTaken) {
     EXPECT_TRUE(job.tools[0].plunges) << "a ball end mill does, unless the job says otherwise";
 }
 
+TEST(Job, DepthAndLengthOfAFileAreBounded) {
+    const auto repeated = [](const std::string& piece, std::size_t times) {
+        std::string text;
+        for (std::size_t i = 0; i < times; ++i) text += piece;
+        return text;
+    };
+    const std::size_t many = 50'000;
+    const std::string deep = repeated("a.", many) + "a";
+    for (const std::string& text :
+         {deep + " = 1\n", "[" + deep + "]\n", "[[" + deep + "]]\n", "machine = {" + deep + " = 1}\n",
+          repeated("\"a b\" . ", many) + "a = 1\n", repeated("'#'.", many) + "a = 1\n",
+          "x = [{a = \"\"\" # \"\"\"\"\", " + deep + " = 1}]\n", "x = " + repeated("[", many) + "\n",
+          "x = " + repeated("{a = ", many) + "\n", repeated("[a]\n", many), repeated("[[a]]\n", many),
+          repeated("a", 1 << 20) + " = 1\n", "[machine]\n" + repeated("a", 1 << 20) + " = 1\n",
+          "units = \"" + repeated("a", 1 << 20) + "\"\n"}) {
+        const Error error = error_of(text);
+        EXPECT_LT(std::string(error.what()).size(), 1000u) << text.substr(0, 60);
+        EXPECT_NE(error.place().find("my.toml"), std::string::npos);
+    }
+    // Fifty thousand keys of their own: the first is told.
+    std::string wide;
+    for (std::size_t i = 0; i < many; ++i) wide += "a.b" + std::to_string(i) + " = 1\n";
+    EXPECT_EQ(error_of(wide).code(), "job.unknown_key");
+    // What looks like a deep key inside a text or a comment is none.
+    const std::string harmless = "# " + deep + "\n[machine]\nname = \"" + deep + "\\\"" + deep + "\" # " +
+                                 deep + "\n[material]\nname = \"\"\"" + deep + "\n\"\"\"\nsource = '" + deep +
+                                 "'\n[tolerances]\ngouge = 0.02 # a.b\n";
+    EXPECT_EQ(parse_job(harmless, "x").tolerances.gouge, 0.02);
+}
+
 TEST(Job, UnknownKeysNameTheNearest) {
     Error error = error_of("# a job\n[machine]\nclearence = 5\n");
     EXPECT_EQ(error.code(), "job.unknown_key");
@@ -268,6 +298,16 @@ TEST(Job, ValidateRefusesWhatNoMachineHas) {
     EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].stepover = 1.1; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].flutes = 0; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.tools[2].flute_length = 5; })) << "no layer is left";
+    // What would never end, or divide by a step of nothing.
+    EXPECT_FALSE(is_valid([](Job& j) { j.tolerances.gouge = 1e-10; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].stepdown_max = 1e-9, j.tools[1].stepdown_min = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].stepover = 1e-6; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].diameter = 1e-6; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[1].diameter = 0.1, j.tools[1].stepover = 0.1; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.slabs.thicknesses = {0.001}, j.slabs.facing_allowance = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.slabs.facing_allowance = 18.99, j.layers.min_layer = 0; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.machine.clearance = 1e-6; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.cutting.ramp_deg = 1e-6; }));
 }
 
 TEST(Job, TallestLayerIsTheLeastOfSlabAndTools) {

@@ -2,9 +2,13 @@
 #include "io/stl.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <clocale>
 #include <cmath>
 #include <cstring>
@@ -13,9 +17,11 @@
 #include <functional>
 #include <limits>
 #include <locale>
+#include <map>
 #include <random>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "io/sha256.h"
@@ -426,6 +432,63 @@ TEST_F(Stl, MemoryAndCancel) {
             EXPECT_EQ(error.kind(), ErrorKind::cancelled);
         }
     }
+}
+
+TEST_F(Stl, AFileThatIsWrittenWhileItIsReadIsAnErrorNotASignal) {
+    const Facets torus = shapes::torus(300);
+    const std::string bytes = binary(torus), path = save("t.stl", bytes);
+    std::atomic<bool> stop{false};
+    std::thread writer([&] {
+        for (int i = 0; !stop; ++i) {
+            if (::truncate(path.c_str(), static_cast<off_t>(84 + 50 * (i % 7) * torus.size() / 9)) != 0)
+                break;
+            std::this_thread::sleep_for(std::chrono::microseconds(300 * (i % 11)));
+            std::ofstream(path, std::ios::binary) << bytes;
+            std::this_thread::sleep_for(std::chrono::microseconds(700 * (i % 5)));
+        }
+    });
+    std::map<std::string, int> outcomes;
+    Context context({.threads = 2});
+    for (int i = 0; i < 100'000 && (outcomes["read"] < 20 || outcomes["stl.changed"] < 5); ++i) {
+        try {
+            EXPECT_EQ(read_stl(context, path).mesh.facets.size(), torus.size());
+            ++outcomes["read"];
+        } catch (const Error& error) {
+            EXPECT_EQ(error.kind(), ErrorKind::input) << error.what();
+            ++outcomes[error.code()];
+        }
+    }
+    stop = true;
+    writer.join();
+    for (const auto& [what, count] : outcomes) std::printf("%s: %d\n", what.c_str(), count);
+    EXPECT_GT(outcomes["stl.changed"], 0) << "no read met a write";
+}
+
+TEST_F(Stl, WhatIsTooLargeForTheMemoryIsToldBeforeItIsRead) {
+    // Ten gigabytes on the disk's books, none of them written; the header announces as many facets as fit.
+    const std::uint32_t count = 200'000'000;
+    std::string head(80, ' ');
+    head.append(reinterpret_cast<const char*>(&count), sizeof count);
+    const std::string path = save("sparse.stl", head), zeros = save("zeros.stl", "");
+    ASSERT_EQ(::truncate(path.c_str(), 84 + off_t{50} * count), 0);
+    ASSERT_EQ(::truncate(zeros.c_str(), off_t{10'000'000'000}), 0);
+    Context context({.threads = 2, .memory_bytes = std::uint64_t{12} << 30});
+    try {
+        static_cast<void>(read_stl(context, path));
+        FAIL() << "over the limit";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), "memory.limit");
+        EXPECT_NE(error.message().find("sparse.stl"), std::string::npos);
+    }
+    try {
+        static_cast<void>(read_stl(context, zeros));
+        FAIL() << "no STL";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), "stl.facet_count");
+    }
+    rusage used{};
+    ::getrusage(RUSAGE_SELF, &used);
+    EXPECT_LT(used.ru_maxrss, 1 << 20) << "KiB; neither was read";
 }
 
 // ------------------------------------------------------------------------------------------------- solids

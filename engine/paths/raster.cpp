@@ -107,7 +107,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         for (const Tool& semi : cut.layer.tools.semi_rough) add_flat(semi);
     const double chord = safe_chord_mm(r, gouge);
     // Samples stand on multiples of one step, so that those of neighbouring lines are neighbours.
-    const auto step = static_cast<std::int32_t>(0.75 * chord * kUnitsPerMm);
+    const std::int32_t step = safe_step(r, gouge);
     auto is_floor = [&](const SolidFacet& f) {
         return std::any_of(cut.floors.begin(), cut.floors.end(),
                            [&](double z) { return lies_on_floor(f, z); });

@@ -29,7 +29,6 @@ constexpr double kFinest = 0.04;  // mm between places where the rest jumps: a w
 constexpr double kJump = 0.05;    // mm by which a flat end mill's tip may step between neighbouring places
 constexpr double kSettle = 0.01;  // mm by which a low point of a line lies under its neighbours
 constexpr float kRise = 0.5F;     // mm: a wall that is lower than what stands beside it by less is as high
-constexpr double kPlaces = 0.75;  // of the longest chord, between places of a line
 constexpr double kOver = 0.5;     // mm over all that stands for it: how much higher a place lies is not asked
 constexpr float kMuch = 0.25F;    // mm left that are worth a search for a place (probe)
 constexpr double kProbed = 1.0;   // mm: of squares of this side one cell is
@@ -242,10 +241,9 @@ public:
                    r_),
           tolerance_(std::max(cut.job.tolerances.gouge, pass.allowance)),
           chord_(safe_chord_mm(wide_, tolerance_)),
-          step_(static_cast<std::int32_t>(kPlaces * chord_ * kUnitsPerMm)),
+          step_(safe_step(wide_, tolerance_)),
           finest_(to_units(std::max(kFinest, 2 * pass.allowance))),
-          finest_step_(static_cast<std::int32_t>(kPlaces * safe_chord_mm(r_, cut.job.tolerances.gouge) *
-                                                 kUnitsPerMm)) {}
+          finest_step_(safe_step(r_, cut.job.tolerances.gouge)) {}
 
     Operation run() {
         Operation op = cut_.operation(pass_.kind, pass_.purpose, tool_);
@@ -425,9 +423,9 @@ private:
     void lay_lines() {
         const CellGrid& grid = stock_.grid();
         const auto [first, last] = targets_.rows();
-        spacing_ = to_units(pass_.in_steps ? 0.7 * r_
-                            : ball_        ? std::sqrt(8 * r_ * cut_.job.tolerances.cusp)
-                                           : std::min(1.0, r_ / 4));
+        spacing_ = std::max(1, to_units(pass_.in_steps ? 0.7 * r_
+                                        : ball_        ? std::sqrt(8 * r_ * cut_.job.tolerances.cusp)
+                                                       : std::min(1.0, r_ / 4)));
         const auto low = static_cast<std::int32_t>(std::floor((grid.y(first) - r_) * kUnitsPerMm / spacing_)),
                    high = static_cast<std::int32_t>(std::ceil((grid.y(last) + r_) * kUnitsPerMm / spacing_));
         const double y_low = cut_.low(1, r_), y_high = cut_.high(1, r_);

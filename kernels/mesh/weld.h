@@ -11,7 +11,7 @@
 
 namespace slabwright {
 
-/// Facets as they lie in memory, in a mapped file for one: corner c of facet f is three floats, in the
+/// Facets as they lie in memory, in a file that was read for one: corner c of facet f is three floats, in the
 /// machine's byte order and not aligned, at data + f·stride_bytes + 12·c. Each is scaled and lowered in
 /// double, then rounded to float.
 struct FacetRecords {
