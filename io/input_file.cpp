@@ -80,4 +80,22 @@ std::string read_whole(const std::filesystem::path& path, const ReadRule& rule) 
     return text;
 }
 
+std::string read_document(const std::filesystem::path& path, ErrorKind kind, const std::string& code,
+                          const std::string& remedy) {
+    std::string text = read_whole(path, {kind, code, kMostDocumentBytes, remedy});
+    constexpr int deepest = 64;  // plan.json has 9 levels
+    int depth = 0;
+    bool in_text = false;
+    for (std::size_t at = 0; at < text.size(); ++at) {
+        const char c = text[at];
+        if (in_text && c == '\\') ++at;
+        else if (c == '"') in_text = !in_text;
+        else if (!in_text && (c == ']' || c == '}')) --depth;
+        else if (!in_text && (c == '[' || c == '{') && ++depth > deepest)
+            throw Error(kind, code, fmt::format("is nested deeper than {} levels, at offset {}", deepest, at),
+                        path.string(), remedy);
+    }
+    return text;
+}
+
 }  // namespace slabwright

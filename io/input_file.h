@@ -58,4 +58,9 @@ private:
 /// The whole of a file. @throws Error as the rule says
 [[nodiscard]] std::string read_whole(const std::filesystem::path& path, const ReadRule& rule);
 
+/// The whole of a JSON document of kMostDocumentBytes at most, nested no deeper than documents of ours: who
+/// writes it again calls himself for each level. @throws Error as kind, code and remedy say
+[[nodiscard]] std::string read_document(const std::filesystem::path& path, ErrorKind kind,
+                                        const std::string& code, const std::string& remedy);
+
 }  // namespace slabwright

@@ -112,8 +112,7 @@ std::optional<Stranger> stranger_in(const fs::path& folder, IsProgram&& is_progr
 std::optional<std::set<std::string>> programs_of(const fs::path& plan) {
     using nlohmann::json;
     try {
-        const json document =
-            json::parse(read_whole(plan, {ErrorKind::input, "out.not_ours", kMostDocumentBytes}));
+        const json document = json::parse(read_document(plan, ErrorKind::input, "out.not_ours", ""));
         if (document.at("schema").get<std::string>().rfind("slabwright.plan/", 0) != 0) return std::nullopt;
         std::set<std::string> names;
         for (const json& layer : document.at("layers"))

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -20,6 +19,7 @@
 #include "engine/simulate/reach.h"
 #include "engine/simulate/replay.h"
 #include "io/base64.h"
+#include "io/input_file.h"
 #include "io/job_keys.h"
 #include "io/output_file.h"
 #include "io/report_template.h"
@@ -54,13 +54,6 @@ constexpr double kReachDistance = 0.1;      // mm from the surface that a tool m
 constexpr std::string_view kDataMark = "/*slabwright:data*/null";
 constexpr std::string_view kModelBegin = "<!--slabwright:3d-->", kModelEnd = "<!--/slabwright:3d-->";
 
-std::string read_text(const fs::path& path, const char* code) {
-    std::ifstream file(path, std::ios::binary);
-    std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    if (!file) throw Error(ErrorKind::input, code, "cannot be read", path.string(), "plan again");
-    return text;
-}
-
 /// Runs `body` over a document of OUT; what the JSON library says against it becomes an error that names the
 /// file.
 template <class Body>
@@ -74,7 +67,7 @@ auto understood(const fs::path& path, const char* code, Body&& body) {
 }
 
 Json read_json(const fs::path& path, const char* code) {
-    const std::string text = read_text(path, code);
+    const std::string text = read_document(path, ErrorKind::input, code, "plan again");
     return understood(path, code, [&] { return Json::parse(text); });
 }
 
@@ -321,7 +314,8 @@ std::uint8_t left_over_code(float left, double gouge) {
 
 /// Reads a program of OUT.
 Program read_program(const fs::path& out, const PlanFolder& folder, const Named& named) {
-    const std::string text = read_text(out / named.file, "report.program");
+    const std::string text =
+        read_whole(out / named.file, {ErrorKind::input, "report.program", kMostProgramBytes, "plan again"});
     try {
         Program program = read_gcode(text, named.file, gcode_limits(folder.tolerances));
         program.layer = named.layer;

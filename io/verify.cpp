@@ -7,11 +7,11 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "io/input_file.h"
 #include "io/job_keys.h"
 #include "io/output_file.h"
 #include "io/sequence_reader.h"
@@ -29,16 +29,8 @@ namespace {
 constexpr double kArcShare = 0.05;       // of the gouge tolerance, by which an arc may miss its chords
 constexpr double kLevelArcError = 0.01;  // mm: what must be nearer to a level arc takes the arc itself
 
-std::string read_text(const fs::path& path, const std::string& code) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw Error(ErrorKind::verification, code, "cannot be read", path.string(), "plan again");
-    std::string text;
-    std::array<char, 1 << 16> piece;
-    while (file.read(piece.data(), piece.size()) || file.gcount() > 0)
-        text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
-    if (file.bad())
-        throw Error(ErrorKind::verification, code, "cannot be read to its end", path.string(), "plan again");
-    return text;
+std::string read_file(const fs::path& path, const char* code, std::uint64_t most_bytes) {
+    return read_whole(path, {ErrorKind::verification, code, most_bytes, "plan again"});
 }
 
 /// A value of plan.json with the way to it, so that what is missing can be named.
@@ -247,20 +239,13 @@ BuildPlan planned_build(const Field& plan, const JobPart& part, Frame frame, con
 /// sequence.json, replayed. That there is none, or none that can be read, is a violation too.
 void check_sequence(const fs::path& path, const BuildPlan& build, std::vector<Violation>& violations) {
     const std::string file = path.filename().string();
-    std::error_code failed;
-    if (const auto size = fs::file_size(path, failed); failed || size > kLargestSequence) {
-        violations.push_back({failed ? "sequence.no_file" : "sequence.unreadable",
-                              failed ? "there is none, or none that can be read"
-                                     : fmt::format("has {} bytes, over {}", size, kLargestSequence),
-                              file,
-                              0,
-                              {},
-                              0});
+    if (std::error_code failed; !fs::exists(path, failed)) {
+        violations.push_back({"sequence.no_file", "there is none, or none that can be read", file, 0, {}, 0});
         return;
     }
     try {
         const std::vector<Violation> found =
-            replay_build(build, read_sequence(read_text(path, "verify.sequence")));
+            replay_build(build, read_sequence(read_file(path, "verify.sequence", kLargestSequence)));
         violations.insert(violations.end(), found.begin(), found.end());
     } catch (const Error& e) {
         if (e.code() != "verify.sequence") throw;
@@ -271,7 +256,7 @@ void check_sequence(const fs::path& path, const BuildPlan& build, std::vector<Vi
 /// tool.tbl against the library: what the machine believes of a tool is what the paths were made for.
 void check_tool_table(const fs::path& path, const std::vector<Tool>& tools,
                       std::vector<Violation>& violations) {
-    const std::string text = read_text(path, "verify.tool_table");
+    const std::string text = read_file(path, "verify.tool_table", kMostToolTableBytes);
     std::set<int> seen;
     std::size_t at = 0;
     std::uint32_t line_number = 0;
@@ -387,7 +372,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
     const std::string plan_path = (out / "plan.json").string();
     json document;
     try {
-        document = json::parse(read_text(plan_path, "verify.plan"));
+        document =
+            json::parse(read_document(plan_path, ErrorKind::verification, "verify.plan", "plan again"));
     } catch (const json::exception& e) {
         throw Error(ErrorKind::verification, "verify.plan", std::string("is no JSON: ") + e.what(), plan_path,
                     "plan again");
@@ -459,8 +445,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
     }
     parallel_each(context, input.programs.size(), [&](std::size_t i) {
         Program& program = input.programs[i];
-        Program read =
-            read_gcode(read_text(out / "nc" / program.file, "verify.program"), "nc/" + program.file, limits);
+        Program read = read_gcode(read_file(out / "nc" / program.file, "verify.program", kMostProgramBytes),
+                                  "nc/" + program.file, limits);
         const double up =
             frame == Frame::layer_top ? input.layers[static_cast<std::size_t>(program.layer)].z_top : 0;
         for (ProgramStep& s : read.steps) s.z += up;

@@ -10,11 +10,11 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <fstream>
 #include <map>
 #include <string>
 #include <string_view>
 
+#include "io/input_file.h"
 #include "io/inspect_json.h"
 #include "io/job_keys.h"
 #include "io/json_text.h"
@@ -298,12 +298,15 @@ bool run_plan(const Options& options) {
 /// simulation found. What keeps it from being made is told, and changes no verdict. Empty when all went well.
 std::string refresh_report(Context& context, const Options& options) {
     const std::string page = options.out + "/report.html";
-    std::ifstream file(page, std::ios::binary);
-    if (!file) return {};
-    std::string head(1 << 20,
-                     '\0');  // the page's own parts lie in its first half megabyte, what it shows behind them
-    file.read(head.data(), static_cast<std::streamsize>(head.size()));
-    file.close();
+    // The page's own parts lie in its first half megabyte, what it shows behind them.
+    std::string head;
+    try {
+        const InputFile file(page, {ErrorKind::input, "report.page", kMostProgramBytes});
+        head.resize(std::min<std::uint64_t>(file.size(), kMebibyte));
+        file.read(0, head.data(), head.size());
+    } catch (const Error&) {
+        return {};
+    }
     try {
         report(context, options.out, options.stl, head.find("<section id=\"view\"") != std::string::npos);
         return {};
