@@ -270,6 +270,32 @@ TEST(MeshReport, CountsEqualBruteForceOnRandomSoup) {
     }
 }
 
+// Of n facets at one edge, pairs would be 80 000 000 000.
+TEST(MeshReport, AnyNumberOfFacetsMayHangOnOneEdge) {
+    constexpr std::size_t kFacets = 400'000, kPlaces = 150'000;
+    std::mt19937 random(test::seed());
+    Facets facets;
+    std::vector<bool> seen(kPlaces, false);
+    std::uint64_t duplicates = 0;
+    std::uint32_t first = kNoFacet;
+    const Vec3f a{0, 0, 0}, b{0, 0, 10};
+    for (std::uint32_t f = 0; f < kFacets; ++f) {
+        const std::size_t place = random() % kPlaces;
+        const Vec3f c{20, static_cast<float>(place), 5};
+        facets.push_back(random() % 2 == 0 ? std::array{a, b, c} : std::array{b, a, c});
+        if (seen[place] && duplicates++ == 0) first = f;
+        seen[place] = true;
+    }
+    const MeshReport report = report_of(facets);
+    expect_finding(report.duplicate_facets, duplicates, first);
+    EXPECT_EQ(
+        report.non_manifold_edges.count, 1 + 2 * [&] {
+            std::vector<int> times(kPlaces, 0);
+            for (const auto& facet : facets) ++times[static_cast<std::size_t>(facet[2].y)];
+            return std::count_if(times.begin(), times.end(), [](int n) { return n > 2; });
+        }());
+}
+
 TEST(MeshReport, InsideOutBodiesCavitiesAndIslands) {
     const Facets outer = shapes::box({0, 0, 0}, {10, 10, 10}), middle = shapes::box({2, 2, 2}, {8, 8, 8}),
                  inner = shapes::box({4, 4, 4}, {6, 6, 6});
