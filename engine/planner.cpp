@@ -49,7 +49,8 @@ struct PathGround {
 PathGround ground_of(Context& context, Plan& plan, MeshView pattern) {
     const Tolerances& tolerances = plan.job.tolerances;
     PathGround ground{pattern, pattern};
-    if (tolerances.simplify <= 0 || pattern.size() < kManyFacets) return ground;
+    // Facets whose sides are not all alike are left as they are.
+    if (tolerances.simplify <= 0 || pattern.size() < kManyFacets || !pattern.roles.empty()) return ground;
     ground.gap = tolerances.simplify * tolerances.gouge;
     std::vector<double> tops;
     for (const Layer& layer : plan.layers) tops.push_back(layer.z_top);

@@ -18,6 +18,7 @@
 #include "io/output_file.h"
 #include "io/sha256.h"
 #include "kernels/errors.h"
+#include "kernels/mesh/facet_roles.h"
 #include "kernels/mesh/raw_array.h"
 #include "kernels/parallel/parallel.h"
 
@@ -696,6 +697,7 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
     }
     if (note) stl.diagnostics.push_back(std::move(*note));
     stl.input.volume_mm3 = stl.report.volume_mm3;
+    stl.mesh.roles = facet_roles(context, stl.mesh.view());
     context.advance();
     describe_report(stl.mesh, stl.report, stl.diagnostics);
     return stl;

@@ -187,7 +187,7 @@ ClosestHit ClosestPoint::query_unsigned(const Point3& point, double max_radius) 
 
 ClosestHit ClosestPoint::query(const Point3& point, double max_radius) const {
     ClosestHit hit = query_unsigned(point, max_radius);
-    if (hit.facet != kNoFacet && hit.distance > 0 && winding(point) > 0) hit.distance = -hit.distance;
+    if (hit.facet != kNoFacet && hit.distance > 0 && winding(point) != 0) hit.distance = -hit.distance;
     return hit;
 }
 

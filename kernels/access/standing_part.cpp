@@ -1097,7 +1097,7 @@ bool StandingPart::covered(double x, double y, double z) const {
         const int w = facet_winding(f.v, x, y);
         if (w != 0 && facet_height(f.v, x, y) >= z) winding += w;
     });
-    return winding > 0;
+    return winding != 0;
 }
 
 double StandingPart::envelope(double x, double y, double z_top, double none) const {
@@ -1111,7 +1111,7 @@ double StandingPart::envelope(double x, double y, double z_top, double none) con
         if (z >= top) winding += w;
         else height = std::max(height, z);
     });
-    if (winding > 0) return z_top;
+    if (winding != 0) return z_top;
     return height > -kInfinity ? height : none;
 }
 
@@ -1188,7 +1188,7 @@ void RisingEnvelope::at(double z_top, float none, float* out) {
     });
     passed_ = std::max(passed_, top);
     for (std::size_t k = 0; k < above_.size(); ++k)
-        out[k] = above_[k] > 0                                          ? static_cast<float>(z_top)
+        out[k] = above_[k] != 0                                         ? static_cast<float>(z_top)
                  : below_[k] == -std::numeric_limits<float>::infinity() ? none
                                                                         : below_[k];
 }

@@ -33,10 +33,19 @@ Vec3d unit_normal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
     return {n[0] / length, n[1] / length, n[2] / length};
 }
 
+// None for a facet that is no wider than its corners are rounded by: those tell nothing of how it faces.
 Vec3d normal_of(MeshView mesh, std::uint32_t f) {
+    constexpr double rounding = 0x1p-22;  // of a coordinate
     const Index3& v = mesh.facets[f];
-    return unit_normal(to_double(mesh.vertices[v[0]]), to_double(mesh.vertices[v[1]]),
-                       to_double(mesh.vertices[v[2]]));
+    const Vec3d a = to_double(mesh.vertices[v[0]]), b = to_double(mesh.vertices[v[1]]),
+                c = to_double(mesh.vertices[v[2]]);
+    const Vec3d e = minus(b, a), g = minus(c, b), h = minus(a, c), n = cross(e, g);
+    double largest = 0;
+    for (const Vec3d& p : {a, b, c})
+        for (const double x : p) largest = std::max(largest, std::abs(x));
+    const double width = rounding * largest, longest2 = std::max({dot(e, e), dot(g, g), dot(h, h)});
+    if (dot(n, n) <= width * width * longest2) return {0, 0, 0};
+    return unit_normal(a, b, c);
 }
 
 // The crossing is computed from the lower end to the upper one, so that both facets of an edge get the same
@@ -59,7 +68,7 @@ bool edge_matters(MeshView mesh, std::uint32_t f, int k, const Vec3d& a, const V
     for (const std::uint32_t v : mesh.facets[g]) {
         if (v == e0 || v == e1) continue;
         const Vec3d w = minus(to_double(mesh.vertices[v]), a);
-        return dot(n, w) <= 1e-7 * std::sqrt(dot(w, w));
+        return dot(n, w) <= 1e-7 * std::sqrt(dot(w, w)) || normal_of(mesh, g) == Vec3d{0, 0, 0};
     }
     return true;
 }
@@ -128,12 +137,24 @@ void widen(NormalBox& box, const NormalBox& other) {
         box.low[k] = std::min(box.low[k], other.low[k]), box.high[k] = std::max(box.high[k], other.high[k]);
 }
 
+SolidFacet turned_over(const SolidFacet& f) {
+    SolidFacet back = f;
+    std::swap(back.p[1], back.p[2]);
+    std::swap(back.aside[1], back.aside[2]);
+    for (double& n : back.normal) n = -n;
+    back.nz = -f.nz;
+    back.edges = static_cast<std::uint8_t>((f.edges & 2) | (f.edges & 1) << 2 | (f.edges & 4) >> 2) & 7;
+    back.ends = static_cast<std::uint8_t>((f.ends & 1) | (f.ends & 2) << 1 | (f.ends & 4) >> 1) & 7;
+    return back;
+}
+
 // Writes the facets that it makes to `out` and `normals`, as many as pieces() says, and moves these on.
 void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_top, SolidFacet*& out,
                   FacetNormals*& normals) {
     std::array<Vec3d, 3> p;
     for (int k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.facets[f][k]]);
     const Vec3d n = unit_normal(p[0], p[1], p[2]);
+    const FacetRole role = mesh.role(f);
     std::array<bool, 3> matters;
     for (int k = 0; k < 3; ++k) matters[k] = turn.edges >> k & 1;
 
@@ -173,7 +194,8 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
     // one.
     NormalBox along_cut, at_cut;
     const std::uint8_t most_aside = *std::max_element(turn.aside.begin(), turn.aside.end());
-    if (std::find(cut.begin(), cut.begin() + corners, true) != cut.begin() + corners) {
+    if (role == FacetRole::surface &&
+        std::find(cut.begin(), cut.begin() + corners, true) != cut.begin() + corners) {
         along_cut = between(n, {0, 0, 1});
         at_cut = {{0, 0, 127}, {0, 0, 127}};
         for (const NormalBox& box : turn.normals.corner) widen(at_cut, box);
@@ -194,7 +216,6 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
         s.ends = static_cast<std::uint8_t>((ends_here(i) ? 1 : 0) | (ends_here(j) ? 2 : 0) |
                                            (ends_here(k) ? 4 : 0)) &
                  7;
-        *out++ = s;
         FacetNormals around;
         at = 0;
         for (const int c : {i, j, k}) {
@@ -202,7 +223,12 @@ void append_facet(MeshView mesh, std::uint32_t f, const Turns& turn, double z_to
                 of[c] == along_top ? along_cut : turn.normals.edge[static_cast<std::size_t>(of[c])];
             around.corner[at++] = cut[c] ? at_cut : turn.normals.corner[static_cast<std::size_t>(which[c])];
         }
-        *normals++ = around;
+        if (role != FacetRole::turned) *out++ = s, *normals++ = around;
+        if (role == FacetRole::surface) return;
+        // Of what may be touched from behind, its other side; the edges are tested once.
+        SolidFacet back = turned_over(s);
+        if (role == FacetRole::unsure) back.edges = back.ends = 0;
+        *out++ = back, *normals++ = FacetNormals{};
     };
     if (corners == 3) emit(0, 1, 2, edge[0], edge[1], edge[2], true);
     else {
@@ -264,6 +290,13 @@ BulkVector<Turns> turns(Context& context, MeshView mesh, std::span<const std::ui
             const Index3& across = mesh.neighbours[facets[i]];
             normals[i] = normal_of(mesh, facets[i]);
             turns[i] = {};
+            if (mesh.role(facets[i]) != FacetRole::surface) {
+                // Concave edges are convex seen from behind, and facets that pass through one another part
+                // where their edges do not tell.
+                turns[i].edges = 7;
+                normals[i] = {0, 0, 0};
+                continue;
+            }
             for (int k = 0; k < 3; ++k) {
                 if (!edge_matters(mesh, facets[i], k, to_double(mesh.vertices[v[k]]), normals[i])) continue;
                 turns[i].edges |= static_cast<std::uint8_t>(1 << k);
@@ -329,7 +362,8 @@ std::size_t pieces(MeshView mesh, std::uint32_t f, double z_top) {
         corners += a <= z_top;
         corners += (a <= z_top) != (b <= z_top) && a != z_top && b != z_top;
     }
-    return corners < 3 ? 0 : corners - 2;
+    const std::size_t sides = mesh.role(f) == FacetRole::unsure ? 2 : 1;
+    return corners < 3 ? 0 : sides * (corners - 2);
 }
 
 constexpr std::size_t kGrain = std::size_t{1} << 14;
@@ -351,7 +385,8 @@ BulkVector<std::uint32_t> facets_between(Context& context, MeshView mesh, double
             box.max = {std::max({box.max.x, a.x, b.x, c.x}), std::max({box.max.y, a.y, b.y, c.y}),
                        std::max({box.max.z, a.z, b.z, c.z})};
             if (std::min({a.z, b.z, c.z}) >= cut_off || std::max({a.z, b.z, c.z}) < z_low)
-                continue;  // a flat at the top itself belongs to the cap
+                continue;                                    // a flat at the top itself belongs to the cap
+            if (mesh.role(f) == FacetRole::inner) continue;  // wood all around
             part.push_back(static_cast<std::uint32_t>(f));
         }
         boxes[begin / grain] = box;
@@ -538,6 +573,9 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     const double cut_off = z_top - kTopSheet;  // the part is cut off here, facets and cap alike
     const BulkVector<std::uint32_t> facets = facets_between(context, mesh, z_low, cut_off);
     const BulkVector<Turns> turn = turns(context, mesh, facets, cut_off);
+    // A cutter may touch what is unsure on either side, so by its normals nothing is told of where.
+    solid.part = std::any_of(facets.begin(), facets.end(),
+                             [&](std::uint32_t f) { return mesh.role(f) == FacetRole::unsure; });
     std::vector<std::size_t> starts((facets.size() + kGrain - 1) / kGrain + 1, 0);
     parallel_for(context, facets.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         std::size_t count = 0;

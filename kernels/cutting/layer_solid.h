@@ -104,13 +104,15 @@ struct LayerSolid {
     BulkVector<GroupCorners> corners;    ///< of the groups; none: fibres look at each facet by itself
     FacetTree tree;                      ///< of the facets, for drops
     CapCells cap_cells;                  ///< of the cap
-    bool part = false;  ///< of a solid: where its facets end it may be touched with any normal
+    bool part = false;  ///< of a solid, or with unsure facets: it may be touched with any normal anywhere
 };
 
 /// Material thinner than this under the layer's top is not counted, mm: a facet that lies in the top plane to
 /// within rounding belongs to the next layer.
 inline constexpr double kTopSheet = 0.001;
 
+/// Facets of the mesh that are turned stand the other way about, unsure ones both ways, inner ones are left
+/// out.
 /// @param z_low how far down a cutter of this layer can touch anything
 [[nodiscard]] LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_top);
 

@@ -68,8 +68,14 @@ double ring_area(MeshView mesh, std::uint32_t facet, float z, double eps, const 
 }
 
 // The type of a plateau whose star is all on one side; nothing for ceilings and for the undersides of bulges.
+// Where the star's facets are not all surface, its sides do not tell: then any that could be.
 bool extremum(MeshView mesh, std::span<const std::uint32_t> star_facets, std::uint32_t vertex,
               const Star& star, FeatureType& type) {
+    if (std::any_of(star_facets.begin(), star_facets.end(),
+                    [&](std::uint32_t f) { return mesh.role(f) != FacetRole::surface; })) {
+        type = star.below ? FeatureType::peak : FeatureType::valley;
+        return star.below || star.above;
+    }
     const Vec3d origin = to_double(mesh.vertices[vertex]);
     double area = 0;
     for (const std::uint32_t f : star_facets)

@@ -65,9 +65,14 @@ Vec3d centroid_of(MeshView mesh, std::uint32_t facet) {
 }  // namespace
 
 Vec3d area_normal(MeshView mesh, std::uint32_t facet) {
-    const Index3 t = mesh.facets[facet];
+    const Index3 t = outward(mesh, facet);
     return normal_of(to_double(mesh.vertices[t[0]]), to_double(mesh.vertices[t[1]]),
                      to_double(mesh.vertices[t[2]]));
+}
+
+Index3 outward(MeshView mesh, std::uint32_t facet) {
+    const Index3 t = mesh.facets[facet];
+    return mesh.role(facet) == FacetRole::turned ? Index3{t[0], t[2], t[1]} : t;
 }
 
 double smallest_height(MeshView mesh, std::uint32_t facet) {
@@ -93,9 +98,10 @@ FacetClasses classify_facets(Context& context, MeshView mesh, const FeatureOptio
     parallel_for(context, mesh.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const auto f = static_cast<std::uint32_t>(i);
-            const Index3 t = mesh.facets[f];
+            const Index3 t = outward(mesh, f);
             const Vec3d p = to_double(mesh.vertices[t[0]]), q = to_double(mesh.vertices[t[1]]),
                         r = to_double(mesh.vertices[t[2]]);
+            if (mesh.role(i) == FacetRole::inner) continue;  // no part of the surface
             const Vec3d n = normal_of(p, q, r);
             const double across2 = n[0] * n[0] + n[1] * n[1], low = std::min({p[2], q[2], r[2]}),
                          high = std::max({p[2], q[2], r[2]});

@@ -37,6 +37,8 @@ using Vec3d = std::array<double, 3>;
 /// Twice the area times the outward unit normal, in double from the float corners.
 [[nodiscard]] Vec3d area_normal(MeshView mesh, std::uint32_t facet);
 
+/// The facet's corners counter-clockwise seen from outside the solid that the mesh means (FacetRole::turned).
+[[nodiscard]] Index3 outward(MeshView mesh, std::uint32_t facet);
 /// Twice the area over the longest edge: the facet's smallest height, mm.
 [[nodiscard]] double smallest_height(MeshView mesh, std::uint32_t facet);
 

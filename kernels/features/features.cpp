@@ -1,12 +1,14 @@
 #include "kernels/features/features.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <tuple>
 
 #include "kernels/errors.h"
 #include "kernels/features/finders.h"
+#include "kernels/mesh/windings.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -108,6 +110,17 @@ std::vector<FinderDisagreement> compare(const std::vector<Feature>& exact,
     return alone;
 }
 
+// Leaves out peaks, valleys and saddles that lie inside the solid: what is just above them is wood.
+void drop_inner(Context& context, MeshView mesh, std::vector<Feature>& features) {
+    if (mesh.roles.empty()) return;
+    constexpr double above = 2e-6;  // mm
+    std::vector<std::array<double, 3>> places;
+    for (const Feature& f : features) places.push_back({f.x, f.y, f.z_high + above});
+    const std::vector<int> winding = windings_at(context, mesh, places);
+    std::size_t i = 0;
+    std::erase_if(features, [&](const Feature&) { return winding[i++] != 0; });
+}
+
 }  // namespace
 
 FeatureSet find_features(Context& context, MeshView mesh, const FeatureOptions& options) {
@@ -137,6 +150,7 @@ FeatureSet find_features(Context& context, MeshView mesh, const FeatureOptions& 
     std::vector<Feature> exact, halving;
     if (options.finder != Finder::halving) {
         exact = find_exact(context, mesh, std::move(stars), flats, options.flat_merge_mm);
+        drop_inner(context, mesh, exact);
         drop_near_flats(context, mesh, flats, options.flat_merge_mm, options.flat_merge_mm, exact);
         sort_features(exact);
     }

@@ -7,6 +7,7 @@
 #include "kernels/mesh/raw_array.h"
 #include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
+#include "kernels/slicing/slicing.h"
 
 namespace slabwright {
 
@@ -48,6 +49,10 @@ std::size_t SectionAreas::slab(double z) const {
 SectionAreas::SectionAreas(Context& context, MeshView mesh) : mesh_(mesh) {
     const Box3 box = bounds(context, mesh);
     bottom_ = box.min.z;
+    if (!mesh.roles.empty()) {  // what facets cover in plan then counts overlaps twice
+        context_ = &context;
+        return;
+    }
     const double height = std::max(1e-3, static_cast<double>(box.max.z) - bottom_);
     const std::size_t grain = std::max(std::size_t{1} << 16, mesh.size() / 64);
     // The slabs [first, last] that a facet reaches into; last < first of one that is seen from the side.
@@ -116,6 +121,10 @@ SectionAreas::SectionAreas(Context& context, MeshView mesh) : mesh_(mesh) {
 
 double SectionAreas::operator()(double z) const {
     if (mesh_.size() == 0 || z < bottom_) return 0;
+    if (context_ != nullptr) {
+        const Plane plane{z, Side::above};
+        return area(slice(*context_, mesh_, {&plane, 1})[0].loops);
+    }
     const std::size_t k = slab(z);
     double area = whole_[k];
     for (std::uint32_t i = starts_[k]; i < starts_[k + 1]; ++i) area += plan_area_above(mesh_, facets_[i], z);

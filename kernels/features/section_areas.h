@@ -13,9 +13,10 @@ namespace slabwright {
 /// Answers "how large is the section at z" in microseconds once it is made, from any thread. The part of a
 /// closed surface above a plane and the section close one another, so the section's area is the sum of what
 /// the facets above cover in plan, signed: Σ N_z·A over the parts of facets above z. Exact up to rounding
-/// where the mesh is closed above z; facets that overlap count twice. Keeps a view of the mesh, and charges 4
-/// bytes for each slab of 1/1024 of the height that a facet reaches into; while it is made, 4 bytes more for
-/// each facet.
+/// where the mesh is closed above z. Where its facets are not all surface (MeshView::roles) it is sliced,
+/// since overlaps would count twice; the context must then outlive this. Keeps a view of the mesh, and
+/// charges 4 bytes for each slab of 1/1024 of the height that a facet reaches into; while it is made, 4 bytes
+/// more for each facet.
 class SectionAreas {
 public:
     /// @throws Error(no_plan, "memory.limit"), Error(cancelled)
@@ -25,6 +26,7 @@ public:
 private:
     [[nodiscard]] std::size_t slab(double z) const;
     MeshView mesh_;
+    Context* context_ = nullptr;  // to slice with, if that is how
     double bottom_ = 0, pitch_ = 1;
     std::vector<double> whole_;  // per slab: area in plan of the facets that lie wholly above it
     std::vector<std::uint32_t> starts_;

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "kernels/access/triangle.h"
 #include "kernels/errors.h"
 #include "kernels/features/finders.h"
 #include "kernels/features/plan_bins.h"
@@ -32,6 +33,8 @@ constexpr double kAtBoundary = 1e-3;  // mm: a flat this near a boundary is made
 constexpr double kLeastDepth = 1e-3;  // mm: less than this left standing is rounding
 constexpr double kJoin =
     1e-3;  // mm: intervals this near are one; edges of neighbours agree to float rounding only
+constexpr double kSliver = 2e-3;  // mm: a path that runs this near along another wall is under what that wall
+                                  // leans by, which noise in the vertices does, and no depth
 constexpr double kInside = 1e-5;  // mm: a point this near a facet's edge in plan is under the facet
 
 struct Interval {
@@ -89,6 +92,7 @@ public:
             bins_.visit(x0, y0, x1, y1, [&](std::uint32_t f) {
                 // Facets wholly under this stretch or over the layer neither cover nor stop it.
                 if (spans_[f].high < lowest || spans_[f].low > top) return;
+                if (mesh_.role(f) == FacetRole::inner) return;
                 const Index3 t = mesh_.facets[f];
                 const Vec3f &a = mesh_.vertices[t[0]], &b = mesh_.vertices[t[1]], &c = mesh_.vertices[t[2]];
                 if (std::max({a.x, b.x, c.x}) < x0 || std::min({a.x, b.x, c.x}) > x1 ||
@@ -135,7 +139,21 @@ public:
             if (n[2] != 0 && a[2] - (n[0] * (q[0] - a[0]) + n[1] * (q[1] - a[1])) / n[2] > q[2])
                 winding += turns;
         }
-        return winding > 0;
+        return winding != 0;
+    }
+
+    // True when a facet lies within `distance` of q.
+    [[nodiscard]] bool beside(const Vec3d& q, double distance) const {
+        bool found = false;
+        bins_.visit(q[0] - distance, q[1] - distance, q[0] + distance, q[1] + distance, [&](std::uint32_t f) {
+            if (found || spans_[f].low > q[2] + distance || spans_[f].high < q[2] - distance) return;
+            const Index3& t = mesh_.facets[f];
+            const Vec3d p = minus(
+                q, closest_on_triangle(q, {to_double(mesh_.vertices[t[0]]), to_double(mesh_.vertices[t[1]]),
+                                           to_double(mesh_.vertices[t[2]])}));
+            found = dot(p, p) <= distance * distance;
+        });
+        return found;
     }
 
 private:
@@ -143,7 +161,7 @@ private:
                std::vector<Interval>& intervals) const {
         Interval i{0, path.length};
         const Vec3d &s = path.start, &d = path.direction;
-        const Index3 t = mesh_.facets[f];
+        const Index3 t = outward(mesh_, f);
         const Vec3d origin = to_double(mesh_.vertices[t[0]]), from = minus(s, origin);
         // Signed height of q over the facet's plane, as a + b·t; the facet faces down, so dividing by n_z
         // turns it over.
@@ -165,7 +183,7 @@ private:
 
     // Where the path enters the solid through this facet; the path's length where it does not.
     [[nodiscard]] double meet(std::uint32_t f, const Vec3d& n, const Path& path) const {
-        const Index3 t = mesh_.facets[f];
+        const Index3 t = outward(mesh_, f);
         const Vec3d a = to_double(mesh_.vertices[t[0]]);
         const double at = dot(n, minus(a, path.start)) / dot(n, path.direction);
         if (!(at > kInside) || at >= path.length) return path.length;
@@ -240,7 +258,9 @@ FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f
             const double depth = measure.covered({s, n, room}, top, intervals);
             if (depth <= std::max(kLeastDepth, deepest.mm)) return;
             const double half = depth / 2;
-            if (measure.inside_solid({s[0] + half * n[0], s[1] + half * n[1], s[2] + half * n[2]})) return;
+            const Vec3d middle{s[0] + half * n[0], s[1] + half * n[1], s[2] + half * n[2]};
+            if (half > kSliver && measure.beside(middle, kSliver)) return;
+            if (measure.inside_solid(middle)) return;
             deepest = {depth, s};
         };
         for (std::size_t i = 1; i + 1 < piece.size(); ++i) {

@@ -24,13 +24,26 @@ using Index3 = std::array<std::uint32_t, 3>;
 /// No facet lies across this edge: the mesh is open there.
 inline constexpr std::uint32_t kNoFacet = 0xFFFFFFFFu;
 
+/// What a facet is to the solid that its mesh means: where the winding number is not zero.
+enum class FacetRole : std::uint8_t {
+    surface,  ///< the solid lies behind it, and nothing in front of it
+    turned,   ///< the solid lies in front of it, and nothing behind it: of a body that is inside out
+    unsure,   ///< it meets other facets, so that it may be part of the surface with either side
+    inner,    ///< the solid lies on both sides
+};
+
 /// Borrowed arrays of a mesh. Facets are counter-clockwise seen from outside.
 struct MeshView {
     std::span<const Vec3f> vertices;
     std::span<const Index3> facets;
     /// neighbours[f][k] is the facet across the edge (facets[f][k], facets[f][(k + 1) % 3]), or kNoFacet.
     std::span<const Index3> neighbours;
+    /// Of every facet, as facet_roles() tells them; none: all are surface.
+    std::span<const FacetRole> roles = {};
 
+    [[nodiscard]] FacetRole role(std::size_t facet) const {
+        return roles.empty() ? FacetRole::surface : roles[facet];
+    }
     [[nodiscard]] std::size_t size() const noexcept { return facets.size(); }
 };
 
@@ -43,8 +56,9 @@ struct Mesh {
     BulkVector<Vec3f> vertices;
     BulkVector<Index3> facets;
     BulkVector<Index3> neighbours;
+    BulkVector<FacetRole> roles;  ///< none: all are surface
 
-    [[nodiscard]] MeshView view() const noexcept { return {vertices, facets, neighbours}; }
+    [[nodiscard]] MeshView view() const noexcept { return {vertices, facets, neighbours, roles}; }
 };
 
 /// Bounding box of the vertices that facets use; all zeros for an empty mesh.

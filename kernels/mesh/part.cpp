@@ -66,6 +66,7 @@ Mesh part_between(Context& context, MeshView mesh, double low, double high) {
     Mesh part;
     part.facets.resize(facets.count());
     part.neighbours.resize(part.facets.size());
+    if (!mesh.roles.empty()) part.roles.resize(part.facets.size());
     facets.each(0, facets.words.size(), [&](std::uint32_t f) {
         for (const std::uint32_t v : mesh.facets[f]) vertices.add(v);
     });
@@ -77,6 +78,7 @@ Mesh part_between(Context& context, MeshView mesh, double low, double high) {
     parallel_for(context, facets.words.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         facets.each(begin, end, [&](std::uint32_t f) {
             const std::uint32_t at = facets.rank(f);
+            if (!mesh.roles.empty()) part.roles[at] = mesh.roles[f];
             for (std::size_t k = 0; k < 3; ++k) {
                 const std::uint32_t g = mesh.neighbours[f][k];
                 part.facets[at][k] = vertices.rank(mesh.facets[f][k]);

@@ -309,6 +309,15 @@ void cut(MeshView mesh, float limit, std::span<const std::uint32_t> crossed, con
             section.open_chains.close_loop();
         }
     }
+    // Where facets meet others, or bodies overlap or are inside out, loops cross, or wind around the solid
+    // otherwise than once; elsewhere they are the outline already.
+    const bool plain = mesh.roles.empty() ||
+                       std::all_of(crossed.begin(), crossed.end(),
+                                   [&](std::uint32_t f) { return mesh.roles[f] == FacetRole::surface; });
+    if (!plain) {
+        section.loops = simplify(scratch.loops);
+        return;
+    }
     section.loops = taken(scratch.loops);
     nest(section.loops);
 }

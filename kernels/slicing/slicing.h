@@ -22,8 +22,8 @@ struct Plane {
 
 /// The polygons of solid ∩ plane. Points lie where mesh edges cross the plane, rounded to 0.1 µm; outer loops
 /// run counter-clockwise, holes clockwise. Each starts where it leaves its facet of lowest index; they are in
-/// the order of that facet. Where a mesh cuts through itself the loops cross too; unite them (simplify) for
-/// the outline.
+/// the order of that facet. Where the mesh has facets that are not all surface (MeshView::roles) the loops
+/// are the outline of what they wind around, in either sense: where the winding number is not zero.
 struct Section {
     Plane plane;
     Loops loops;  ///< nested

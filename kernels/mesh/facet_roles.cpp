@@ -1,0 +1,321 @@
+// Facets stand in Morton order in a tree of boxes, eight together; each eight is held against the tree. Where
+// boxes meet, two facets are apart if their projections on some axis are: on the normals, on those of the
+// edges within each facet, or square to an edge of either.
+#include "kernels/mesh/facet_roles.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+#include "kernels/mesh/clusters.h"
+#include "kernels/mesh/morton.h"
+#include "kernels/mesh/windings.h"
+#include "kernels/parallel/parallel.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr std::size_t kTogether = 8;
+constexpr std::size_t kGrain = std::size_t{1} << 15;
+constexpr double kApart = 1e-5;   // mm: facets of which this is not said may touch; under what a float tells
+constexpr double kTouch = 1e-9;   // mm: facets that share a corner are apart if they overlap by no more
+constexpr double kBeside = 2e-6;  // mm: how far from a patch the winding number is counted
+constexpr double kFolded = 1e-4;  // short of 1, the cosine between facets beside each other of which one is
+                                  // folded back onto the other: less than a degree
+
+struct Point {
+    double x = 0, y = 0, z = 0;
+};
+Point operator-(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Point operator+(const Point& a, const Point& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+Point operator*(double s, const Point& a) { return {s * a.x, s * a.y, s * a.z}; }
+Point cross(const Point& a, const Point& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+double dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Point point(const Vec3f& v) { return {v.x, v.y, v.z}; }
+
+using Corners = std::array<Point, 3>;
+Corners corners(MeshView mesh, std::uint32_t f) {
+    const Index3& facet = mesh.facets[f];
+    return {point(mesh.vertices[facet[0]]), point(mesh.vertices[facet[1]]), point(mesh.vertices[facet[2]])};
+}
+Point normal(const Corners& p) { return cross(p[1] - p[0], p[2] - p[0]); }
+
+bool collapsed(const Index3& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+/// Whether the two stand at least `gap` apart along an axis; false for one that is no direction.
+bool apart_along(const Corners& a, const Corners& b, const Point& axis, double gap) {
+    const double length2 = dot(axis, axis);
+    if (!(length2 > 0)) return false;
+    const auto [a0, a1] = std::minmax({dot(axis, a[0]), dot(axis, a[1]), dot(axis, a[2])});
+    const auto [b0, b1] = std::minmax({dot(axis, b[0]), dot(axis, b[1]), dot(axis, b[2])});
+    return std::max(b0 - a1, a0 - b1) >= gap * std::sqrt(length2);
+}
+
+/// @param gap mm; negative: they may overlap by that much
+bool apart(const Corners& a, Corners b, double gap) {
+    // From one of the corners, so that no digits are lost far from the origin.
+    Corners p;
+    const Point origin = a[0];
+    for (std::size_t k = 0; k < 3; ++k) p[k] = a[k] - origin, b[k] = b[k] - origin;
+    const Point m = normal(p), n = normal(b);
+    if (apart_along(p, b, m, gap) || apart_along(p, b, n, gap)) return true;
+    std::array<Point, 3> e, f;
+    for (std::size_t k = 0; k < 3; ++k) e[k] = p[(k + 1) % 3] - p[k], f[k] = b[(k + 1) % 3] - b[k];
+    for (std::size_t k = 0; k < 3; ++k)
+        if (apart_along(p, b, cross(m, e[k]), gap) || apart_along(p, b, cross(n, f[k]), gap)) return true;
+    for (const Point& u : e)
+        for (const Point& v : f)
+            if (apart_along(p, b, cross(u, v), gap)) return true;
+    return false;
+}
+
+/// Whether two facets meet elsewhere than in the corners that they share.
+bool meet(MeshView mesh, std::uint32_t f, std::uint32_t g) {
+    const Index3 &s = mesh.facets[f], &t = mesh.facets[g];
+    std::size_t shared = 0;
+    for (const std::uint32_t v : s) shared += v == t[0] || v == t[1] || v == t[2];
+    const Corners a = corners(mesh, f), b = corners(mesh, g);
+    if (shared < 2) return !apart(a, b, shared == 0 ? kApart : -kTouch);
+    if (shared == 3) return true;
+    // Along an edge they are apart unless one is folded back onto the other.
+    std::size_t i = 0, j = 0;  // the corners that they do not share
+    while (s[i] == t[0] || s[i] == t[1] || s[i] == t[2]) ++i;
+    while (t[j] == s[0] || t[j] == s[1] || t[j] == s[2]) ++j;
+    const Point edge = a[(i + 2) % 3] - a[(i + 1) % 3];
+    const Point u = cross(edge, a[i] - a[(i + 1) % 3]), v = cross(edge, b[j] - a[(i + 1) % 3]);
+    return dot(u, v) > (1 - kFolded) * std::sqrt(dot(u, u) * dot(v, v));
+}
+
+/// Boxes of eight things, rounded so that they hold them.
+struct Boxes {
+    std::array<std::array<float, kTogether>, 3> low, high;
+    Boxes() {
+        for (std::size_t k = 0; k < 3; ++k)
+            low[k].fill(std::numeric_limits<float>::infinity()),
+                high[k].fill(-std::numeric_limits<float>::infinity());
+    }
+};
+struct Box {
+    std::array<float, 3> low, high;
+};
+Box whole(const Boxes& boxes) {
+    Box box{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        box.low[k] = *std::min_element(boxes.low[k].begin(), boxes.low[k].end());
+        box.high[k] = *std::max_element(boxes.high[k].begin(), boxes.high[k].end());
+    }
+    return box;
+}
+Box child(const Boxes& boxes, std::size_t i) {
+    return {{boxes.low[0][i], boxes.low[1][i], boxes.low[2][i]},
+            {boxes.high[0][i], boxes.high[1][i], boxes.high[2][i]}};
+}
+/// A bit for each of the eight that a box meets.
+unsigned meeting(const Boxes& boxes, const Box& box) {
+    unsigned bits = 0;
+    for (std::size_t i = 0; i < kTogether; ++i)
+        bits |= static_cast<unsigned>((boxes.low[0][i] <= box.high[0]) & (box.low[0] <= boxes.high[0][i]) &
+                                      (boxes.low[1][i] <= box.high[1]) & (box.low[1] <= boxes.high[1][i]) &
+                                      (boxes.low[2][i] <= box.high[2]) & (box.low[2] <= boxes.high[2][i]))
+                << i;
+    return bits;
+}
+
+/// The facets in Morton order and their boxes; levels[0] those of facets, levels[k] those of levels[k − 1].
+struct BoxTree {
+    std::vector<std::uint32_t> facets;
+    std::vector<std::vector<Boxes>> levels;
+};
+
+BoxTree box_tree(Context& context, MeshView mesh) {
+    struct Key {
+        std::uint64_t code;
+        std::uint32_t facet;
+    };
+    BulkVector<Key> keys(mesh.size());
+    const MortonGrid grid(bounds(context, mesh));
+    parallel_for(context, mesh.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t f = begin; f < end; ++f) {
+            const Corners p = corners(mesh, static_cast<std::uint32_t>(f));
+            const Point middle = (1.0 / 3) * (p[0] + p[1] + p[2]);
+            keys[f] = {grid.code(middle.x, middle.y, middle.z), static_cast<std::uint32_t>(f)};
+        }
+    });
+    parallel_sort(context, keys.begin(), keys.end(), [](const Key& a, const Key& b) {
+        return a.code != b.code ? a.code < b.code : a.facet < b.facet;
+    });
+    BoxTree tree;
+    tree.facets.resize(keys.size());
+    for (std::size_t i = 0; i < keys.size(); ++i) tree.facets[i] = keys[i].facet;
+    keys = {};
+    constexpr auto far = static_cast<float>(kApart);
+    auto level = [&](std::size_t count, auto&& box_of) {
+        std::vector<Boxes>& boxes = tree.levels.emplace_back((count + kTogether - 1) / kTogether);
+        parallel_for(context, boxes.size(), kGrain / kTogether, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = kTogether * begin; i < std::min(count, kTogether * end); ++i) {
+                const Box box = box_of(i);
+                for (std::size_t k = 0; k < 3; ++k) {
+                    boxes[i / kTogether].low[k][i % kTogether] = box.low[k];
+                    boxes[i / kTogether].high[k][i % kTogether] = box.high[k];
+                }
+            }
+        });
+        return boxes.size();
+    };
+    std::size_t count = level(tree.facets.size(), [&](std::size_t i) {
+        const Index3& t = mesh.facets[tree.facets[i]];
+        const Vec3f &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+        // Wider by what facets may be apart and still touch, rounding included.
+        const auto down = [&](float u, float v, float w) {
+            const float low = std::min({u, v, w});
+            return low - far - std::abs(low) * std::numeric_limits<float>::epsilon();
+        };
+        const auto up = [&](float u, float v, float w) { return std::max({u, v, w}); };
+        return Box{{down(a.x, b.x, c.x), down(a.y, b.y, c.y), down(a.z, b.z, c.z)},
+                   {up(a.x, b.x, c.x), up(a.y, b.y, c.y), up(a.z, b.z, c.z)}};
+    });
+    while (count > 1) {
+        const std::size_t below = tree.levels.size() - 1;
+        count = level(count, [&](std::size_t i) { return whole(tree.levels[below][i]); });
+    }
+    return tree;
+}
+
+/// Marks what meets others.
+class Meetings {
+public:
+    Meetings(MeshView mesh, const BoxTree& tree, std::span<std::uint8_t> met)
+        : mesh_(mesh), tree_(tree), met_(met) {}
+
+    /// Holds the facets of one eight against each other and against all eights that follow it.
+    void look_from(std::size_t eight) {
+        const Box box = whole(tree_.levels[0][eight]);
+        waiting_.assign(1, {tree_.levels.size() - 1, 0});
+        while (!waiting_.empty()) {
+            const auto [level, node] = waiting_.back();
+            waiting_.pop_back();
+            if (level == 0) {
+                pairs(eight, node);
+                continue;
+            }
+            // Children of a node follow one another, so those wholly before this eight are none of its own.
+            const std::size_t span = std::size_t{1} << 3 * (level - 1);
+            for (unsigned bits = meeting(tree_.levels[level][node], box); bits != 0; bits &= bits - 1) {
+                const std::size_t next = kTogether * node + static_cast<std::size_t>(std::countr_zero(bits));
+                if ((next + 1) * span > eight) waiting_.push_back({level - 1, next});
+            }
+        }
+    }
+
+private:
+    void pairs(std::size_t eight, std::size_t other) {
+        const Boxes &own = tree_.levels[0][eight], &boxes = tree_.levels[0][other];
+        for (std::size_t i = 0; i < kTogether && kTogether * eight + i < tree_.facets.size(); ++i) {
+            unsigned bits = meeting(boxes, child(own, i));
+            if (other == eight) bits &= ~0U << (i + 1);
+            for (; bits != 0; bits &= bits - 1) {
+                const std::size_t j = static_cast<std::size_t>(std::countr_zero(bits));
+                const std::uint32_t f = tree_.facets[kTogether * eight + i],
+                                    g = tree_.facets[kTogether * other + j];
+                if (collapsed(mesh_.facets[f]) || collapsed(mesh_.facets[g]) || (is_met(f) && is_met(g)) ||
+                    !meet(mesh_, f, g))
+                    continue;
+                std::atomic_ref(met_[f]).store(1, std::memory_order_relaxed);
+                std::atomic_ref(met_[g]).store(1, std::memory_order_relaxed);
+            }
+        }
+    }
+    [[nodiscard]] bool is_met(std::uint32_t f) {
+        return std::atomic_ref(met_[f]).load(std::memory_order_relaxed) != 0;
+    }
+    MeshView mesh_;
+    const BoxTree& tree_;
+    std::span<std::uint8_t> met_;
+    struct Waiting {
+        std::size_t level, node;
+    };
+    std::vector<Waiting> waiting_;
+};
+
+std::vector<std::uint8_t> find_met(Context& context, MeshView mesh) {
+    const MemoryCharge charge(context, mesh.size() * (sizeof(Boxes) / kTogether + 24), "facets that meet");
+    const BoxTree tree = box_tree(context, mesh);
+    std::vector<std::uint8_t> met(mesh.size(), 0);
+    if (tree.levels.empty()) return met;
+    parallel_for(context, tree.levels[0].size(), kGrain / 64, [&](std::size_t begin, std::size_t end) {
+        Meetings meetings(mesh, tree, met);
+        for (std::size_t e = begin; e < end; ++e) meetings.look_from(e);
+    });
+    return met;
+}
+
+FacetRole role_between(int in_front, int behind) {
+    if (in_front == 0 && behind > 0) return FacetRole::surface;
+    if (in_front < 0 && behind == 0) return FacetRole::turned;
+    return in_front != 0 && behind != 0 ? FacetRole::inner : FacetRole::unsure;
+}
+
+}  // namespace
+
+BulkVector<FacetRole> facet_roles(Context& context, MeshView mesh) {
+    const std::vector<std::uint8_t> met = find_met(context, mesh);
+    BulkVector<std::uint32_t> patch(mesh.size());
+    for (std::size_t f = 0; f < mesh.size(); ++f) patch[f] = static_cast<std::uint32_t>(f);
+    parallel_for(context, mesh.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t f = begin; f < end; ++f)
+            for (const std::uint32_t g : mesh.neighbours[f])
+                if (g != kNoFacet && g < f && met[f] == 0 && met[g] == 0)
+                    join_clusters(patch, static_cast<std::uint32_t>(f), g);
+    });
+    // The largest facet of each patch is asked.
+    struct Largest {
+        double area2 = 0;
+        std::uint32_t facet = kNoFacet;
+    };
+    std::vector<std::uint32_t> number(mesh.size(), kNoFacet);
+    std::vector<Largest> largest;
+    for (std::uint32_t f = 0; f < mesh.size(); ++f) {
+        if (met[f] != 0) continue;
+        const std::uint32_t root = cluster_root(patch, f);
+        if (number[root] == kNoFacet) {
+            number[root] = static_cast<std::uint32_t>(largest.size());
+            largest.emplace_back();
+        }
+        patch[f] = root;
+        const Point n = normal(corners(mesh, f));
+        if (const double area2 = dot(n, n); area2 > largest[number[root]].area2)
+            largest[number[root]] = {area2, f};
+    }
+    std::vector<std::array<double, 3>> places;
+    for (const Largest& l : largest) {
+        Point middle, away;
+        if (l.facet != kNoFacet) {
+            const Corners c = corners(mesh, l.facet);
+            middle = (1.0 / 3) * (c[0] + c[1] + c[2]);
+            away = (kBeside / std::sqrt(l.area2)) * normal(c);
+        }
+        for (const Point& p : {middle + away, middle - away}) places.push_back({p.x, p.y, p.z});
+    }
+    const std::vector<int> winding = windings_at(context, mesh, places);
+    BulkVector<FacetRole> roles(mesh.size());
+    bool all_surface = true;
+    for (std::uint32_t f = 0; f < mesh.size(); ++f) {
+        const std::uint32_t p = number[patch[f]];
+        if (met[f] != 0) roles[f] = FacetRole::unsure;
+        else if (largest[p].facet == kNoFacet) roles[f] = FacetRole::surface;
+        else roles[f] = role_between(winding[2 * p], winding[2 * p + 1]);
+        all_surface = all_surface && roles[f] == FacetRole::surface;
+    }
+    if (all_surface) return {};
+    return roles;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,266 @@
+// The solid that a mesh means is where its winding number is not zero: roles, sections, heights and cutters
+// against winding numbers counted by brute force, on random bodies that overlap, touch and are inside out.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "kernels/access/standing_part.h"
+#include "kernels/cutting/drop.h"
+#include "kernels/cutting/fibres.h"
+#include "kernels/cutting/layer_solid.h"
+#include "kernels/features/features.h"
+#include "kernels/mesh/facet_roles.h"
+#include "kernels/mesh/weld.h"
+#include "kernels/mesh/windings.h"
+#include "kernels/slicing/slicing.h"
+#include "tests/support/compositions.h"
+#include "tests/support/seed.h"
+
+using namespace slabwright;
+
+namespace {
+
+using Point = std::array<double, 3>;
+
+Mesh solid_of(Context& context, const shapes::Facets& facets) {
+    Mesh mesh = weld(context, facets);
+    mesh.roles = facet_roles(context, mesh.view());
+    return mesh;
+}
+
+Point within(const std::array<Vec3f, 3>& f, std::mt19937& random) {
+    std::uniform_real_distribution<double> u(0, 1);
+    double a = u(random), b = u(random);
+    if (a + b > 1) a = 1 - a, b = 1 - b;
+    const double c = 1 - a - b;
+    return {c * f[0].x + a * f[1].x + b * f[2].x, c * f[0].y + a * f[1].y + b * f[2].y,
+            c * f[0].z + a * f[1].z + b * f[2].z};
+}
+
+Point unit_normal(const std::array<Vec3f, 3>& f) {
+    const double ux = double{f[1].x} - f[0].x, uy = double{f[1].y} - f[0].y, uz = double{f[1].z} - f[0].z,
+                 vx = double{f[2].x} - f[0].x, vy = double{f[2].y} - f[0].y, vz = double{f[2].z} - f[0].z;
+    const Point n{uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx};
+    const double length = std::hypot(n[0], n[1], n[2]);
+    return {n[0] / length, n[1] / length, n[2] / length};
+}
+
+std::size_t count(const Mesh& mesh, FacetRole role) {
+    return static_cast<std::size_t>(std::count(mesh.roles.begin(), mesh.roles.end(), role));
+}
+
+constexpr int kCompositions = 40;
+
+}  // namespace
+
+TEST(FacetRoles, ABodyByItselfIsAllSurface) {
+    Context context;
+    EXPECT_TRUE(solid_of(context, shapes::box({0, 0, 0}, {10, 20, 30})).roles.empty());
+    EXPECT_TRUE(solid_of(context, shapes::torus(40)).roles.empty());
+    shapes::Facets hollow = shapes::box({0, 0, 0}, {10, 20, 30});
+    shapes::append(hollow, shapes::flipped(shapes::box({3, 3, 3}, {6, 6, 6})));
+    EXPECT_TRUE(solid_of(context, hollow).roles.empty());
+}
+
+TEST(FacetRoles, TellBodiesInsideOutAndInOthers) {
+    Context context;
+    shapes::Facets facets = shapes::box({0, 0, 0}, {10, 20, 30});
+    shapes::append(facets, shapes::box({3, 3, 3}, {6, 6, 6}));
+    const Mesh nested = solid_of(context, facets);
+    EXPECT_EQ(count(nested, FacetRole::inner), 12U);
+    EXPECT_EQ(count(nested, FacetRole::surface), 12U);
+    facets = shapes::box({0, 0, 0}, {10, 20, 30});
+    shapes::append(facets, shapes::flipped(shapes::box({30, 0, 0}, {40, 20, 30})));
+    const Mesh apart = solid_of(context, facets);
+    EXPECT_EQ(count(apart, FacetRole::turned), 12U);
+    facets = shapes::box({0, 0, 0}, {10, 20, 30});
+    shapes::append(facets, shapes::box({5, 5, 5}, {15, 15, 25}));
+    const Mesh overlapping = solid_of(context, facets);
+    EXPECT_EQ(count(overlapping, FacetRole::turned), 0U);
+    EXPECT_GT(count(overlapping, FacetRole::unsure), 0U);
+    EXPECT_GT(count(overlapping, FacetRole::inner), 0U);
+}
+
+TEST(FacetRoles, AreWhatWindingNumbersSayAtRandom) {
+    Context context;
+    std::mt19937 random(test::seed());
+    constexpr double beside = 2e-6;
+    for (int trial = 0; trial < kCompositions; ++trial) {
+        const shapes::Facets facets = test::Composer(random, {}).facets();
+        const Mesh mesh = solid_of(context, facets);
+        for (std::size_t f = 0; f < facets.size(); ++f) {
+            const Point p = within(facets[f], random), n = unit_normal(facets[f]);
+            const int front = test::winding_by_angles(
+                          facets, {p[0] + beside * n[0], p[1] + beside * n[1], p[2] + beside * n[2]}),
+                      behind = test::winding_by_angles(
+                          facets, {p[0] - beside * n[0], p[1] - beside * n[1], p[2] - beside * n[2]});
+            switch (mesh.view().role(f)) {
+                case FacetRole::surface:
+                    EXPECT_TRUE(front == 0 && behind != 0) << trial << ' ' << f << ' ' << front << behind;
+                    break;
+                case FacetRole::turned:
+                    EXPECT_TRUE(front != 0 && behind == 0) << trial << ' ' << f << ' ' << front << behind;
+                    break;
+                case FacetRole::inner:
+                    EXPECT_TRUE(front != 0 && behind != 0) << trial << ' ' << f << ' ' << front << behind;
+                    break;
+                case FacetRole::unsure:
+                    break;
+            }
+        }
+    }
+}
+
+TEST(Windings, AreThoseOfAngles) {
+    Context context;
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> u(-5, 70);
+    for (int trial = 0; trial < kCompositions; ++trial) {
+        const shapes::Facets facets = test::Composer(random, {}).facets();
+        const Mesh mesh = weld(context, facets);
+        std::vector<Point> points;
+        for (int i = 0; i < 60; ++i) points.push_back({u(random), u(random), u(random) / 2});
+        const std::vector<int> winding = windings_at(context, mesh.view(), points);
+        for (std::size_t i = 0; i < points.size(); ++i)
+            EXPECT_EQ(winding[i], test::winding_by_angles(facets, points[i])) << trial << ' ' << i;
+    }
+}
+
+TEST(Sections, AreWhereTheWindingNumberIsNotZero) {
+    Context context;
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> u(-5, 65), uz(0.1, 45);
+    for (int trial = 0; trial < kCompositions; ++trial) {
+        const shapes::Facets facets = test::Composer(random, {}).facets();
+        const Mesh mesh = solid_of(context, facets);
+        std::vector<Plane> planes;
+        for (int i = 0; i < 4; ++i) planes.push_back({uz(random), Side::above});
+        for (const Section& section : slice(context, mesh.view(), planes)) {
+            for (int i = 0; i < 60; ++i) {
+                const Point p{u(random), u(random), section.plane.z};
+                const int w = winding(section.loops, {to_units(p[0]), to_units(p[1])});
+                EXPECT_EQ(w, test::winding_by_angles(facets, p) != 0 ? 1 : 0) << trial << " z " << p[2];
+            }
+        }
+    }
+}
+
+TEST(StandingPart, CoversWhereTheWindingNumberIsNotZero) {
+    Context context;
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> u(-5, 65), uz(0.1, 45);
+    for (int trial = 0; trial < kCompositions; ++trial) {
+        const shapes::Facets facets = test::Composer(random, {}).facets();
+        const Mesh mesh = solid_of(context, facets);
+        const StandingPart part(context, mesh.view());
+        const double z_top = uz(random), x0 = -5.03, y0 = -4.98, cell = 3.1;
+        constexpr int nx = 22, ny = 20;
+        RisingEnvelope rising(part, x0, y0, cell, nx, ny);
+        std::vector<float> heights(nx * ny);
+        rising.at(z_top, -1, heights.data());
+        for (int j = 0; j < ny; ++j)
+            for (int i = 0; i < nx; ++i) {
+                const double x = x0 + i * cell, y = y0 + j * cell;
+                const Point under{x, y, z_top - StandingPart::kSheet};
+                const bool stands = test::winding_by_angles(facets, under) != 0;
+                EXPECT_EQ(part.covered(x, y, under[2]), stands)
+                    << trial << " at " << x << ' ' << y << ' ' << under[2];
+                const double height = part.envelope(x, y, z_top, -1);
+                EXPECT_EQ(heights[static_cast<std::size_t>(j * nx + i)], static_cast<float>(height));
+                EXPECT_EQ(height == z_top, stands);
+                if (height < 0 || stands) continue;
+                EXPECT_NE(test::winding_by_angles(facets, {x, y, height - 2e-7}), 0) << trial;
+                EXPECT_EQ(test::winding_by_angles(facets, {x, y, (height + under[2]) / 2}), 0) << trial;
+            }
+    }
+}
+
+// Every point of every facet lies in the solid or on it: none may be within a cutter.
+TEST(Cutting, KeepsOutOfWhateverWindsAroundNotZero) {
+    Context context;
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> u(-5, 65), uz(5, 45), share(0, 1);
+    for (int trial = 0; trial < kCompositions; ++trial) {
+        const shapes::Facets facets = test::Composer(random, {}).facets();
+        const Mesh mesh = solid_of(context, facets);
+        const double z_top = uz(random), z_low = std::max(0.0, z_top - 20);
+        const LayerSolid solid = layer_solid(context, mesh.view(), z_low, z_top);
+        std::vector<Point> points;
+        for (const auto& f : facets)
+            for (int i = 0; i < 30; ++i)
+                if (const Point p = within(f, random); p[2] > z_low && p[2] < z_top - 0.002)
+                    points.push_back(p);
+        for (const auto profile : {Cutter::Profile::ball, Cutter::Profile::flat}) {
+            const Cutter cutter{profile, 1.5 + 4 * share(random)};
+            const double r = cutter.radius;
+            // How deep the point is in the cutter with its tip there, mm.
+            const auto depth = [&](const Point& p, double x, double y, double tip) {
+                const double across = std::hypot(p[0] - x, p[1] - y);
+                if (profile == Cutter::Profile::flat) return std::min(r - across, p[2] - tip);
+                return p[2] >= tip + r ? r - across : r - std::hypot(across, p[2] - tip - r);
+            };
+            const DropIndex drops(solid, cutter);
+            for (int i = 0; i < 100; ++i) {
+                const double x = u(random), y = u(random), tip = drops.drop(x, y).tip_z;
+                if (!(tip > z_low)) continue;
+                for (const Point& p : points)
+                    ASSERT_LT(depth(p, x, y, tip), 1e-4) << trial << " drop at " << x << ' ' << y;
+            }
+            const double tip = z_low + share(random) * (z_top - z_low);
+            const Plane plane = inside_plane(solid, cutter, tip);
+            const Loops inside = slice(context, mesh.view(), {&plane, 1})[0].loops;
+            std::vector<std::int32_t> lines;
+            for (int i = -5; i < 66; i += 3) lines.push_back(to_units(i + 0.0371));
+            for (const Axis axis : {Axis::x, Axis::y}) {
+                const Fibres rows = fibres(context, solid, inside, cutter, tip, axis, lines);
+                for (std::size_t l = 0; l < lines.size(); ++l)
+                    for (int i = 0; i < 20; ++i) {
+                        const double at = u(random);
+                        bool free = true;
+                        for (const Forbidden& f : rows.line(l)) free = free && (at <= f.low || at >= f.high);
+                        if (!free) continue;
+                        const double x = axis == Axis::x ? at : to_mm(lines[l]),
+                                     y = axis == Axis::x ? to_mm(lines[l]) : at;
+                        for (const Point& p : points)
+                            ASSERT_LT(depth(p, x, y, tip), 1e-4)
+                                << trial << " tip " << tip << " at " << x << ' ' << y << " r " << r;
+                    }
+            }
+        }
+    }
+}
+
+TEST(Features, NoPeakLiesInAnotherBody) {
+    Context context;
+    std::mt19937 random(test::seed());
+    for (int trial = 0; trial < kCompositions; ++trial) {
+        const shapes::Facets facets = test::Composer(random, {}).facets();
+        const Mesh mesh = solid_of(context, facets);
+        for (const Feature& f : find_features(context, mesh.view(), {}).features) {
+            if (f.type != FeatureType::peak && f.type != FeatureType::valley) continue;
+            const auto at = [&](double z) {
+                return test::winding_by_angles(facets, {f.x + 3e-7, f.y + 5e-7, z}) != 0;
+            };
+            EXPECT_FALSE(at(f.z_high + 4e-6)) << trial << " at " << f.x << ' ' << f.y << ' ' << f.z_high;
+        }
+    }
+    // A cone whose tip lies within a box, and one inside out that stands out of it.
+    shapes::Facets facets = shapes::box({0, 0, 0}, {40, 40, 20});
+    const auto spike = [](float x, float low, float high) {
+        shapes::Facets f;
+        const std::array<Vec3f, 3> foot{{{x, 10, low}, {x + 6, 10, low}, {x + 3, 16, low}}};
+        const Vec3f tip{x + 3, 12, high};
+        f.push_back({foot[0], foot[2], foot[1]});
+        for (std::size_t k = 0; k < 3; ++k) f.push_back({foot[k], foot[(k + 1) % 3], tip});
+        return f;
+    };
+    shapes::append(facets, spike(5, -0.0F + 5, 15));
+    shapes::append(facets, shapes::flipped(spike(20, 10, 30)));
+    std::vector<double> peaks;
+    for (const Feature& f : find_features(context, solid_of(context, facets).view(), {}).features)
+        if (f.type == FeatureType::peak) peaks.push_back(f.z_high);
+    EXPECT_EQ(peaks, std::vector<double>{30});
+}
