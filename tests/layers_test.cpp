@@ -191,6 +191,25 @@ TEST(Layers, TypeTwoSplitsARegion) {
     EXPECT_TRUE(has(p, "layers.type1"));
 }
 
+// A casting has down-facing flats that differ by what its drawing was rounded to: one boundary, at the
+// lowest, makes them all, and no layer is thinner than a cutter could tell.
+TEST(Layers, FlatsOfNextToOneHeightAreMadeByOneBoundary) {
+    const LayerRequest r =
+        request(30, {level(FeatureType::down_flat, 0.00066), level(FeatureType::down_flat, 0.0008),
+                     level(FeatureType::down_flat, 15.0002729), level(FeatureType::down_flat, 15.0005038)});
+    for (const LayerPlacement& placement : {place_layers_printed(r), place_layers_optimal(r)}) {
+        double below = 0;
+        bool made = false;
+        for (const Boundary& b : placement.boundaries) {
+            EXPECT_GT(b.z - below, 0.01);
+            made = made || std::abs(b.z - 15.0002729) < 1e-6;
+            below = b.z;
+        }
+        EXPECT_TRUE(made);
+        EXPECT_EQ(placement.cost.broken_type2, 0);
+    }
+}
+
 TEST(Layers, CostCountsEachBreach) {
     LayerRequest r =
         request(40, {level(FeatureType::up_flat, 20, 300), level(FeatureType::peak, 21, 0),

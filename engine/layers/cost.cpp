@@ -14,6 +14,7 @@ namespace {
 
 double mm_of(Ticks ticks) { return static_cast<double>(ticks) / kTicksPerMm; }
 
+constexpr Ticks kOneJoint = 100'000;  // 0.01 mm: down-facing flats this near are made by one boundary
 constexpr double kAreaUnits = 1e3, kQUnits = 1e9;
 // A peak is a point and has no area; breaking it still breaks something.
 constexpr double kLeastArea = 1.0;  // mm²
@@ -153,7 +154,7 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
                     up_flats_.push_back({low, std::llround(f.area * kAreaUnits), i});
                 break;
             case FeatureType::down_flat:
-                if (low > kSame && low < height_ - kSame) down.push_back({low, weight_of(f), i});
+                if (low > kOneJoint && low < height_ - kSame) down.push_back({low, weight_of(f), i});
                 break;
             case FeatureType::shallow:
                 if (high - low > 2 * kSame && high > kSame && low < height_ - kSame)
@@ -169,8 +170,10 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
     std::sort(type1_.begin(), type1_.end(), by_height);
     std::sort(up_flats_.begin(), up_flats_.end(), by_height);
     std::sort(down.begin(), down.end(), by_height);
-    for (const Level& l : down)  // one boundary makes all flats of one height
-        if (type2_.empty() || l.z - type2_.back().z > kSame) type2_.push_back(l);
+    // One boundary makes all flats of one height, at the lowest of them: under those that are higher by less
+    // than a layer could be cut, the wood of the layer above stays.
+    for (const Level& l : down)
+        if (type2_.empty() || l.z - type2_.back().z > kOneJoint) type2_.push_back(l);
         else type2_.back().weight += l.weight;
     std::sort(type3_.begin(), type3_.end(), [](const Range& a, const Range& b) {
         return a.low != b.low ? a.low < b.low : a.high != b.high ? a.high < b.high : a.feature < b.feature;

@@ -303,8 +303,9 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
             const Tool& tool =
                 op.tool == tools.rough.number ? tools.rough : tool_of_kind(cut.job, ToolKind::face);
             const bool idle = op.kind != OperationKind::face && stock.cut(cut, op, tool).nothing();
-            // A floor's cutter may have taken the whole wall beside it.
-            if (!idle || op.kind != OperationKind::finish) useful.push_back(std::move(op));
+            // A floor's cutter may have taken the whole wall beside it, and the face mill all that roughing
+            // would.
+            if (!idle) useful.push_back(std::move(op));
         }
         result.operations = std::move(useful);
         const bool contours = clears_on_contours(cut.job);
