@@ -16,6 +16,7 @@
 #include "kernels/mesh/weld.h"
 #include "kernels/mesh/windings.h"
 #include "kernels/slicing/slicing.h"
+#include "tests/data/luo_layer_sample.h"
 #include "tests/support/compositions.h"
 #include "tests/support/seed.h"
 
@@ -230,6 +231,26 @@ TEST(Cutting, KeepsOutOfWhateverWindsAroundNotZero) {
                     }
             }
         }
+    }
+}
+
+// Walls then lean out by what the noise is: no more of them stays than that, however far a way along them
+// runs.
+TEST(Undercuts, NoiseInTheVerticesMakesNone) {
+    Context context;
+    std::mt19937 random(test::seed());
+    for (int trial = 0; trial < 40; ++trial) {
+        const double most = std::pow(10, std::uniform_real_distribution<double>(-4, -3)(random));
+        std::uniform_real_distribution<double> noise(-most, most);
+        Mesh mesh = weld(context, luo_layer_sample());
+        std::vector<double> tops{1.2 * 25.4, 1.5 * 25.4};  // its down-facing flat is made by a boundary
+        for (Vec3f& p : mesh.vertices) {
+            p.x = static_cast<float>(p.x + noise(random));
+            p.y = static_cast<float>(p.y + noise(random));
+        }
+        mesh.roles = facet_roles(context, mesh.view());
+        for (const UnmadeUndercut& u : measure_undercuts(context, mesh.view(), tops, {}))
+            EXPECT_LT(u.depth_mm, 0.01) << trial << " at " << u.x << ' ' << u.y << ' ' << u.z;
     }
 }
 

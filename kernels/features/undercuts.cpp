@@ -11,7 +11,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "kernels/access/triangle.h"
 #include "kernels/errors.h"
 #include "kernels/features/finders.h"
 #include "kernels/features/plan_bins.h"
@@ -33,8 +32,6 @@ constexpr double kAtBoundary = 1e-3;  // mm: a flat this near a boundary is made
 constexpr double kLeastDepth = 1e-3;  // mm: less than this left standing is rounding
 constexpr double kJoin =
     1e-3;  // mm: intervals this near are one; edges of neighbours agree to float rounding only
-constexpr double kSliver = 2e-3;  // mm: a path that runs this near along another wall is under what that wall
-                                  // leans by, which noise in the vertices does, and no depth
 constexpr double kInside = 1e-5;  // mm: a point this near a facet's edge in plan is under the facet
 
 struct Interval {
@@ -142,20 +139,6 @@ public:
         return winding != 0;
     }
 
-    // True when a facet lies within `distance` of q.
-    [[nodiscard]] bool beside(const Vec3d& q, double distance) const {
-        bool found = false;
-        bins_.visit(q[0] - distance, q[1] - distance, q[0] + distance, q[1] + distance, [&](std::uint32_t f) {
-            if (found || spans_[f].low > q[2] + distance || spans_[f].high < q[2] - distance) return;
-            const Index3& t = mesh_.facets[f];
-            const Vec3d p = minus(
-                q, closest_on_triangle(q, {to_double(mesh_.vertices[t[0]]), to_double(mesh_.vertices[t[1]]),
-                                           to_double(mesh_.vertices[t[2]])}));
-            found = dot(p, p) <= distance * distance;
-        });
-        return found;
-    }
-
 private:
     void cover(std::uint32_t f, const Vec3d& n, const Path& path, double top, double reached,
                std::vector<Interval>& intervals) const {
@@ -177,6 +160,15 @@ private:
             // Down-facing facets run clockwise in plan: their inside is on the right.
             i.keep((ey * (s[0] - a[0]) - ex * (s[1] - a[1])) / length + kInside,
                    (ey * d[0] - ex * d[1]) / length);
+        }
+        // Moved outwards by kInside, two long edges of a sliver in plan meet far away.
+        for (std::size_t k = 0; k < 2; ++k) {
+            double low = origin[k], high = low;
+            for (const std::uint32_t v : t)
+                low = std::min(low, to_double(mesh_.vertices[v])[k]),
+                high = std::max(high, to_double(mesh_.vertices[v])[k]);
+            i.keep(s[k] - low + kInside, d[k]);
+            i.keep(high - s[k] + kInside, -d[k]);
         }
         if (i.to >= i.from) intervals.push_back(i);
     }
@@ -259,7 +251,6 @@ FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f
             if (depth <= std::max(kLeastDepth, deepest.mm)) return;
             const double half = depth / 2;
             const Vec3d middle{s[0] + half * n[0], s[1] + half * n[1], s[2] + half * n[2]};
-            if (half > kSliver && measure.beside(middle, kSliver)) return;
             if (measure.inside_solid(middle)) return;
             deepest = {depth, s};
         };
