@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/paths/kept_off.h"
+
 namespace slabwright {
 
 namespace {
@@ -100,7 +102,7 @@ Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<Open
     PathBuilder path(op, face, feed_of(cut, face), cut.layer.z_top + cut.job.machine.clearance,
                      cut.layer.z_top + 2);
     const DropIndex part(cut.solid,
-                         {Cutter::Profile::flat, face.diameter / 2 + cut.job.cutting.wall_allowance});
+                         {Cutter::Profile::flat, face.diameter / 2 + kept_off_walls(cut.job.cutting)});
     Surroundings around = cut.around(face, &part);
     around.ramp_deg = std::min(around.ramp_deg, kRamp);
     around.from_side = true;

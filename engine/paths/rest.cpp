@@ -255,7 +255,7 @@ public:
             LayerStock::Trial places(stock_);  // the stock stands as before when its lines are known
             lay_lines();
             settle();
-            if (!ball_ && !(pass_.allowance > 0))
+            if (!(pass_.allowance > 0))
                 probe();  // the pass after one that keeps off the walls is the one for narrow slots
             places.undo();
         }
@@ -321,7 +321,8 @@ private:
                         room_[grid.index(i, j)] = 1;
     }
 
-    [[nodiscard]] Place place(std::int32_t ux, std::int32_t uy, MetPoints& met) const {
+    // @param high also where a ball lies over all that stands for it
+    [[nodiscard]] Place place(std::int32_t ux, std::int32_t uy, MetPoints& met, bool high = false) const {
         const double x = to_mm(ux), y = to_mm(uy);
         // How far a flat end mill would go under the layer's bottom does not matter.
         const double matters = ball_ ? -std::numeric_limits<double>::infinity()
@@ -331,25 +332,29 @@ private:
         p.y = uy;
         // A flat end mill's leaning walls lead down into slots that are hardly wider (settle), from as high
         // as they are.
-        p.tip = ball_ ? stock_.z_bottom() + std::max(0.0, static_cast<double>(targets_.highest_near(x, y))) +
-                            kOver
-                      : std::numeric_limits<double>::infinity();
+        p.tip = ball_ && !high ? stock_.z_bottom() +
+                                     std::max(0.0, static_cast<double>(targets_.highest_near(x, y))) + kOver
+                               : std::numeric_limits<double>::infinity();
         const std::optional<Rest> found = index_->drop_within(x, y, matters, p.tip - under_, &met);
         if (!found) return p;
         const Rest& rest = *found;
         const double on_surface = rest.tip_z + under_;
-        // A flat end mill stands on the layer's bottom; a ball may pass it where its shape needs it, over
-        // waste it does not.
-        const double lowest =
-            ball_ && on_surface > cut_.layer.z_bottom - r_ ? cut_.layer.floor_below : cut_.layer.z_bottom;
-        p.tip = std::max(on_surface, std::max(lowest, cut_.layer.floor_below));
-        p.touches = p.tip == on_surface;
-        p.contact = {x - wide_ * rest.nx, y - wide_ * rest.ny, p.tip - under_ + wide_ * (1 - rest.nz)};
-        p.reachable = !rest.on_cap && p.tip < cut_.layer.z_top - 1e-3 && beside_flask(x, y);
-        if (p.reachable) {
+        const auto stand = [&](double lowest) {
+            p.tip = std::max(on_surface, std::max(lowest, cut_.layer.floor_below));
+            p.touches = p.tip == on_surface;
+            p.contact = {x - wide_ * rest.nx, y - wide_ * rest.ny, p.tip - under_ + wide_ * (1 - rest.nz)};
+            p.reachable = !rest.on_cap && p.tip < cut_.layer.z_top - 1e-3 && beside_flask(x, y);
+            if (!p.reachable) return;
             p.z = to_units(p.tip) + 1;
             p.useful = lowers(x, y, p.tip);
-        }
+        };
+        // A flat end mill stands on the layer's bottom; a ball may pass it where its shape needs it, over
+        // waste only for what it leaves beside its tip there.
+        const bool waste = ball_ && on_surface <= cut_.layer.z_bottom - r_;
+        stand(ball_ && !waste ? cut_.layer.floor_below : cut_.layer.z_bottom);
+        if (waste && p.reachable && !p.useful && !pass_.in_steps &&
+            lowers(x, y, std::max(on_surface, cut_.layer.floor_below)))
+            stand(cut_.layer.floor_below);
         return p;
     }
 
@@ -558,7 +563,8 @@ private:
 
     // A slot so narrow that the raster's places on both sides of it stand on its walls' tops, which are
     // level, shows nowhere. Where much is left, a flat end mill is held with its rim over it, all around, and
-    // slides down from where it is lowest.
+    // slides down from where it is lowest. A ball slides from over what is left: where its places on a slot's
+    // walls lie over all that still stands, the raster has not looked at them.
     void probe() {
         const std::array<int, 2> rows = targets_.rows();
         const int first = rows[0], last = rows[1];
@@ -586,12 +592,13 @@ private:
             for (const auto& [i, j] : cells) {
                 Place lowest;
                 lowest.tip = std::numeric_limits<double>::infinity();
-                for (int k = 0; k < kProbes; ++k) {
-                    const double turn = 2 * std::numbers::pi * k / kProbes,
-                                 x = grid.x(i) + beside * std::cos(turn),
-                                 y = grid.y(j) + beside * std::sin(turn);
+                const int probes = ball_ ? 1 : kProbes;
+                const double off = ball_ ? 0 : beside;
+                for (int k = 0; k < probes; ++k) {
+                    const double turn = 2 * std::numbers::pi * k / probes,
+                                 x = grid.x(i) + off * std::cos(turn), y = grid.y(j) + off * std::sin(turn);
                     if (x < x_low || x > x_high || y < y_low || y > y_high) continue;
-                    const Place p = place(to_units(x), to_units(y), met);
+                    const Place p = place(to_units(x), to_units(y), met, true);
                     if (p.reachable && p.tip < lowest.tip) lowest = p;
                 }
                 if (std::isinf(lowest.tip)) continue;

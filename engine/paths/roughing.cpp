@@ -11,6 +11,7 @@
 
 #include "engine/paths/engagement.h"
 #include "engine/paths/feet.h"
+#include "engine/paths/kept_off.h"
 #include "engine/paths/layer_cut.h"
 #include "engine/paths/open_waste.h"
 #include "engine/paths/rings.h"
@@ -159,7 +160,7 @@ std::vector<Operation> rough_layer(const LayerCut& cut) {
         cut.operation(OperationKind::rough, contour ? "contour-parallel levels" : "zigzag levels", tool);
     op.blend = rough_blend(cut.job.cutting);
     const double r = tool.diameter / 2, clearance = cut.layer.z_top + cut.job.machine.clearance;
-    const Cutter cutter{Cutter::Profile::flat, r + cut.job.cutting.wall_allowance};
+    const Cutter cutter{Cutter::Profile::flat, r + kept_off_walls(cut.job.cutting)};
     const double allowance = cut.job.cutting.floor_allowance;
     const std::vector<RoughStep> steps =
         contour ? terraced_steps(cut, tool, allowance) : level_steps(cut, tool, allowance);
