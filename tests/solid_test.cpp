@@ -185,7 +185,12 @@ TEST(Cutting, KeepsOutOfWhateverWindsAroundNotZero) {
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> u(-5, 65), uz(5, 45), share(0, 1);
     for (int trial = 0; trial < kCompositions; ++trial) {
-        const shapes::Facets facets = test::Composer(random, {}).facets();
+        shapes::Facets facets = test::Composer(random, {}).facets();
+        // And a sheet without thickness, as folds leave them.
+        const auto sheet_x = static_cast<float>(u(random));
+        const shapes::Facets sheet{{Vec3f{sheet_x, 9, 8}, {sheet_x, 25, 12}, {sheet_x, 19, 40}}};
+        shapes::append(facets, sheet);
+        shapes::append(facets, shapes::flipped(sheet));
         const Mesh mesh = solid_of(context, facets);
         const double z_top = uz(random), z_low = std::max(0.0, z_top - 20);
         const LayerSolid solid = layer_solid(context, mesh.view(), z_low, z_top);

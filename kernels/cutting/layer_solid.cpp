@@ -142,7 +142,10 @@ SolidFacet turned_over(const SolidFacet& f) {
     std::swap(back.p[1], back.p[2]);
     std::swap(back.aside[1], back.aside[2]);
     for (double& n : back.normal) n = -n;
-    back.nz = -f.nz;
+    // An upright facet hides behind what it bounds, unless it bounds nothing: of two that lie in one another,
+    // one faces down.
+    constexpr float hardly = -1e-12F;
+    back.nz = f.nz == 0 ? hardly : -f.nz;
     back.edges = static_cast<std::uint8_t>((f.edges & 2) | (f.edges & 1) << 2 | (f.edges & 4) >> 2) & 7;
     back.ends = static_cast<std::uint8_t>((f.ends & 1) | (f.ends & 2) << 1 | (f.ends & 4) >> 1) & 7;
     return back;
