@@ -14,6 +14,9 @@
 namespace slabwright {
 
 enum class LengthUnit : std::uint8_t { mm, inch };
+/// What is done to a mesh that is no solid: nothing (it is refused), its defects are mended one by one, or
+/// its surface is made anew where mending does not close it.
+enum class Repair : std::uint8_t { none, mend, rebuild };
 /// Boundaries as printed (LUO 4.2.5), by the dynamic program, or, slabs bonded to any thickness, those with
 /// which the whole build takes least.
 enum class LayerStrategy : std::uint8_t { printed, optimal, combined };
@@ -200,9 +203,15 @@ struct FlaskShape {
     double draft_deg = 1;  ///< of the opening, wider at the top
 };
 
+/// How the STL becomes the pattern.
+struct InputJob {
+    Repair repair = Repair::none;
+};
+
 struct Job {
     LengthUnit units = LengthUnit::mm;  ///< of the STL
     bool allow_undercut = false;
+    InputJob input;
     Material material;
     Slabs slabs;
     Machine machine;

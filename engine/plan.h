@@ -167,11 +167,32 @@ struct Totals {
     double stock_volume_mm3 = 0, part_volume_mm3 = 0, stack_mass_kg = 0;
 };
 
+/// Defects of one kind that a repair took away.
+struct RepairedDefect {
+    std::string kind;  ///< "crack", "hole" …: the last part of its diagnostic's code
+    std::uint64_t count = 0;
+    double size = 0;                ///< of the largest, in `unit`; 0 where the kind has none
+    std::string unit;               ///< "mm", "mm^2" or ""
+    std::array<double, 3> where{};  ///< of the largest, or of the first, pattern-base, mm
+};
+
+/// What a repair did to a mesh. Nothing where the mesh needed none.
+struct InputRepair {
+    std::string how;                      ///< "none", "mend" or "rebuild"
+    std::vector<RepairedDefect> defects;  ///< mended, by kind
+    double moved_mm = 0;  ///< the farthest that a vertex moved, or an edge was bent, to meet another
+    /// Of a rebuilt surface: its cell; how far it lies from the mesh, and the mesh from it, mm. 0: not
+    /// rebuilt.
+    double cell_mm = 0, deviation_mm = 0, missed_mm = 0;
+    std::uint64_t triangles = 0;  ///< after it
+};
+
 struct InputInfo {
     std::string file, sha256;
     std::uint64_t triangles = 0;
     std::array<double, 3> min{}, max{};  ///< mm, as in the STL (before the pattern is set on z = 0)
     double volume_mm3 = 0;               ///< enclosed; an opening in the base plane counts as filled
+    std::optional<InputRepair> repair;   ///< where one was asked for
 };
 
 struct Plan {

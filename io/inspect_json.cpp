@@ -41,7 +41,7 @@ std::string mm(double value, int decimals = 3) {
 
 Inspection inspect_stl(Context& context, const std::string& stl_path, const Job& job) {
     Inspection result;
-    StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld});
+    StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld, job.input.repair});
     result.input = stl.input;
     result.diagnostics = stl.diagnostics;
     try {

@@ -14,6 +14,8 @@ struct Word {
 };
 
 inline constexpr Word<LengthUnit> kUnitWords[] = {{"mm", LengthUnit::mm}, {"in", LengthUnit::inch}};
+inline constexpr Word<Repair> kRepairWords[] = {
+    {"none", Repair::none}, {"mend", Repair::mend}, {"rebuild", Repair::rebuild}};
 inline constexpr Word<LayerStrategy> kStrategyWords[] = {{"printed", LayerStrategy::printed},
                                                          {"optimal", LayerStrategy::optimal},
                                                          {"combined", LayerStrategy::combined}};
@@ -94,6 +96,11 @@ template <class JobLike, class Visit>
 void visit_job_keys(JobLike& job, Visit& visit) {
     visit.word("units", job.units, kUnitWords, "of the STL: mm or in; every length in this file is in mm");
     visit.key("allow_undercut", job.allow_undercut, "plan although undercuts stay unmade");
+
+    visit.table("input", "how the STL becomes the pattern");
+    visit.word(
+        "repair", job.input.repair, kRepairWords,
+        "of a mesh that is no solid: none (it is refused), mend, or rebuild where mending does not close it");
 
     visit.table("material", "what the slabs are made of");
     visit.key("name", job.material.name, "");

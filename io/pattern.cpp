@@ -30,8 +30,7 @@ fs::path find_pattern(const fs::path& directory, const std::string& file, const 
 }  // namespace
 
 bool Pattern::is(const PlannedPattern& planned) const {
-    return stl.input.sha256 == planned.sha256 && reading.units == planned.reading.units &&
-           reading.weld_mm == planned.reading.weld_mm;
+    return stl.input.sha256 == planned.sha256 && reading == planned.reading;
 }
 
 std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory,

@@ -14,7 +14,7 @@ namespace slabwright {
 /// What plan.json says of its pattern.
 struct PlannedPattern {
     std::string file, sha256;
-    StlOptions reading;  ///< units and tolerance that it was planned with
+    StlOptions reading;  ///< units, tolerance and repair that it was planned with
 };
 
 struct Pattern {

@@ -250,6 +250,27 @@ void put_totals(JsonText& json, const Totals& totals) {
 
 }  // namespace
 
+void put_repair(JsonText& json, const InputRepair& repair) {
+    json.begin_object();
+    json.key("how").string(repair.how);
+    json.key("triangles").count(repair.triangles);
+    json.key("moved").rounded(repair.moved_mm, 6);
+    if (repair.how == "rebuild") {
+        json.key("cell").rounded(repair.cell_mm, 6);
+        json.key("deviation").rounded(repair.deviation_mm, 6);
+        json.key("missed").rounded(repair.missed_mm, 6);
+    }
+    json.key("defects").begin_array();
+    for (const RepairedDefect& d : repair.defects) {
+        json.begin_object(Shape::line).key("kind").string(d.kind).key("count").count(d.count);
+        if (!d.unit.empty()) json.key("size").rounded(d.size, 6).key("unit").string(d.unit);
+        json.key("where").begin_array();
+        for (const double v : d.where) json.rounded(v, 4);
+        json.end().end();
+    }
+    json.end().end();
+}
+
 void put_input(JsonText& json, const InputInfo& input) {
     json.begin_object();
     json.key("file").string(input.file);
@@ -260,7 +281,12 @@ void put_input(JsonText& json, const InputInfo& input) {
     for (const double v : input.min) json.rounded(v, 6);
     json.end().key("max").begin_array();
     for (const double v : input.max) json.rounded(v, 6);
-    json.end().end().end();
+    json.end().end();
+    if (input.repair) {
+        json.key("repair");
+        put_repair(json, *input.repair);
+    }
+    json.end();
 }
 
 void put_features(JsonText& json, const std::vector<Feature>& features) {

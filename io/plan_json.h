@@ -14,6 +14,7 @@ namespace slabwright {
 
 /// Pieces that inspect_json writes the same way.
 void put_input(JsonText& json, const InputInfo& input);
+void put_repair(JsonText& json, const InputRepair& repair);
 void put_features(JsonText& json, const std::vector<Feature>& features);
 void put_diagnostics(JsonText& json, const std::vector<Diagnostic>& diagnostics);
 

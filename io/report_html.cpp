@@ -98,6 +98,7 @@ struct PlanFolder {
     Material material;
     Tolerances tolerances;
     LengthUnit units = LengthUnit::mm;
+    Repair repair = Repair::none;
     Frame frame = Frame::pattern_base;
     double base_board_cut = -1;
     std::vector<Named> programs;
@@ -136,6 +137,8 @@ PlanFolder read_plan_folder(const fs::path& out) {
         const Json &job = plan.at("job"), &material = job.at("material"), &machine = job.at("machine"),
                    &tolerances = job.at("tolerances");
         folder.units = word_value(kUnitWords, job.at("units").get<std::string>());
+        if (job.contains("input"))
+            folder.repair = word_value(kRepairWords, job.at("input").at("repair").get<std::string>());
         for (const auto& [key, to] : {std::pair{"ktc", &folder.material.ktc},
                                       {"kte", &folder.material.kte},
                                       {"kfc", &folder.material.kfc},
@@ -196,7 +199,7 @@ PlannedPattern planned_pattern(const PlanFolder& folder) {
     const Json& input = folder.plan.at("input");
     return {input.at("file").get<std::string>(),
             input.value("sha256", ""),
-            {folder.units, folder.tolerances.weld}};
+            {folder.units, folder.tolerances.weld, folder.repair}};
 }
 
 /// Douglas and Peucker on a closed loop, from its first point and the one farthest from that.

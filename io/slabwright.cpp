@@ -10,6 +10,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <new>
 
 #include "engine/planner.h"
@@ -25,6 +26,7 @@
 #include "io/output_folder.h"
 #include "io/pattern.h"
 #include "io/plan_json.h"
+#include "io/repair.h"
 #include "io/report_html.h"
 #include "io/sections_dxf.h"
 #include "io/sections_json.h"
@@ -85,7 +87,7 @@ std::string default_job_toml(std::string_view library) {
 std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& stl_path, const Job& job) {
     return guarded([&] {
         validate(job);
-        const StlOptions reading{job.units, job.tolerances.weld};
+        const StlOptions reading{job.units, job.tolerances.weld, job.input.repair};
         return std::make_shared<Pattern>(
             Pattern{stl_path, reading, read_stl(context, stl_path, reading), {}});
     });
@@ -100,10 +102,11 @@ Plan plan(Context& context, const Pattern& pattern, const Job& job) {
         validate(job);
         const StlMesh& stl = pattern.stl;
         const std::string& stl_path = pattern.path;
-        if (pattern.reading.units != job.units || pattern.reading.weld_mm != job.tolerances.weld)
-            throw Error(ErrorKind::usage, "plan.reading",
-                        "was read with other units or another tolerance of welding than the job's", stl_path,
-                        "read the pattern with the job that it is planned with");
+        if (pattern.reading != StlOptions{job.units, job.tolerances.weld, job.input.repair})
+            throw Error(
+                ErrorKind::usage, "plan.reading",
+                "was read with other units, another tolerance of welding or another repair than the job's",
+                stl_path, "read the pattern with the job that it is planned with");
         require_solid(context, stl, stl_path);
         const auto planned = [&] {
             try {
@@ -253,7 +256,8 @@ VerifyResult write_verified(Context& context, const Plan& plan, const std::strin
 void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path,
                        const std::string& directory) {
     guarded([&] {
-        const StlMesh stl = read_stl(context, stl_path, {plan.job.units, plan.job.tolerances.weld});
+        const StlMesh stl =
+            read_stl(context, stl_path, {plan.job.units, plan.job.tolerances.weld, plan.job.input.repair});
         if (stl.input.sha256 != plan.input.sha256)
             throw Error(ErrorKind::input, "access_maps.stl", "is not the pattern that was planned", stl_path,
                         "give the STL of the plan");
@@ -294,6 +298,51 @@ std::string inspect(Context& context, const std::string& stl_path, const Job& jo
     });
 }
 
+namespace {
+
+/// Copies a file, all or nothing.
+void copy_file(Context& context, const std::string& from, const std::string& to) {
+    std::ifstream in(from, std::ios::binary);
+    const std::filesystem::path place(to);
+    OutputFile out(place.has_parent_path() ? place.parent_path() : ".", place.filename().string());
+    std::string piece(1 << 20, '\0');
+    while (in.read(piece.data(), static_cast<std::streamsize>(piece.size())), in.gcount() > 0) {
+        context.throw_if_cancelled();
+        out.write(std::string_view(piece).substr(0, static_cast<std::size_t>(in.gcount())));
+    }
+    if (!in.eof())
+        throw Error(ErrorKind::input, "repair.read", "the file cannot be read to its end", from,
+                    "check its disk");
+    out.close();
+}
+
+}  // namespace
+
+RepairResult repair(Context& context, const std::string& stl_path, const std::string& out, const Job& job) {
+    return guarded([&] {
+        validate(job);
+        StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld, Repair::none});
+        context.begin_phase("repair", 0.05, 0.95);
+        const Repair how = job.input.repair == Repair::none ? Repair::mend : job.input.repair;
+        Repaired repaired = repair_mesh(context, stl.mesh.view(), stl.report, how, stl_path);
+        RepairResult result{std::move(repaired.told), std::move(repaired.diagnostics), stl.report.volume_mm3};
+        const bool needed = result.repair.how != "none";
+        if (!needed && job.tolerances.weld == 0) {
+            copy_file(context, stl_path, out);
+            return result;
+        }
+        Mesh mesh = std::move(needed ? repaired.mesh : stl.mesh);
+        if (needed) result.volume_mm3 = repaired.report.volume_mm3;
+        // Back to where the file has it, in its unit.
+        const double unit = job.units == LengthUnit::inch ? kInch : 1.0, lowest = stl.input.min[2];
+        for (Vec3f& v : mesh.vertices)
+            v = {static_cast<float>(v.x / unit), static_cast<float>(v.y / unit),
+                 static_cast<float>((v.z + lowest) / unit)};
+        write_stl(out, mesh, job.units);
+        return result;
+    });
+}
+
 void slice_to_file(Context& context, const std::string& stl_path, const Job& job, double every_mm,
                    const std::string& out) {
     guarded([&] {
@@ -308,7 +357,7 @@ void slice_to_file(Context& context, const std::string& stl_path, const Job& job
             throw Error(ErrorKind::usage, "slice.format",
                         fmt::format("no format has the ending \"{}\"", ending), out,
                         "end the name in .svg, .dxf or .json");
-        const StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld});
+        const StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld, job.input.repair});
         const double height = bounds(stl.mesh.view()).max.z;
         const double number = std::ceil(height / every_mm) - 1;  // multiples of every_mm inside (0, height)
         constexpr double most = 1e6;

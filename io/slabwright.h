@@ -136,6 +136,21 @@ struct VerifyResult {
 [[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const std::string& stl_path,
                                                  const Job& job);
 
+/// What a repair did.
+struct RepairResult {
+    InputRepair repair;                   ///< how == "none": the mesh needed none
+    std::vector<Diagnostic> diagnostics;  ///< each kind of defect with count, size and place
+    double volume_mm3 = 0;                ///< of the solid that was written
+};
+
+/// Mends the mesh of a file, or makes its surface anew where `job.input.repair` says so and mending does not
+/// close it, and writes it as binary STL in the file's unit and place. A mesh that needs no repair is written
+/// with the bytes of its file, unless the job welds within a tolerance.
+/// @throws Error(input) when the file cannot be read or repaired or the place cannot be written,
+/// Error(usage), Error(no_plan) when memory does not suffice, Error(cancelled)
+SLABWRIGHT_API RepairResult repair(Context& context, const std::string& stl_path, const std::string& out,
+                                   const Job& job);
+
 /// Sections every `every_mm` (at its multiples above the bottom) written by the ending of `out`: .svg, .dxf
 /// or .json.
 SLABWRIGHT_API void slice_to_file(Context& context, const std::string& stl_path, const Job& job,

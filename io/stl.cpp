@@ -16,6 +16,7 @@
 
 #include "io/input_file.h"
 #include "io/output_file.h"
+#include "io/repair.h"
 #include "io/sha256.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/facet_roles.h"
@@ -696,6 +697,20 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
         note = weld_and_report();
     }
     if (note) stl.diagnostics.push_back(std::move(*note));
+    if (options.repair != Repair::none) {
+        Repaired repaired = repair_mesh(context, stl.mesh.view(), stl.report, options.repair, path);
+        if (repaired.told.how != "none") {
+            stl.mesh = std::move(repaired.mesh);
+            stl.report = std::move(repaired.report);
+            if (stl.report.box.min.z != 0) {
+                set_on_base(stl.mesh);
+                stl.report = report_mesh(context, stl.mesh.view());
+            }
+        }
+        stl.input.repair = std::move(repaired.told);
+        stl.diagnostics.insert(stl.diagnostics.end(), repaired.diagnostics.begin(),
+                               repaired.diagnostics.end());
+    }
     stl.input.volume_mm3 = stl.report.volume_mm3;
     stl.mesh.roles = facet_roles(context, stl.mesh.view());
     context.advance();
@@ -738,25 +753,30 @@ void require_solid(Context& context, const StlMesh& stl, const std::string& path
         refuse("open",
                number_of(report.open_edges_off_base.count, "edge", "edges") +
                    " above the base with one facet only: the mesh is open",
-               place(report.open_edges_off_base), remedy);
+               place(report.open_edges_off_base),
+               remedy + "; " + repair_offer(context, stl.mesh.view(), report));
     }
     if (report.misoriented_edges.count > 0)
         refuse("misoriented",
                number_of(report.misoriented_edges.count, "edge", "edges") +
                    " whose facets do not face the same side",
                place(report.misoriented_edges),
-               "make the normals consistent in the program that made the mesh");
+               "make the normals consistent in the program that made the mesh; " +
+                   repair_offer(context, stl.mesh.view(), report));
     if (report.inverted_components.count > 0)
         refuse("inverted",
                number_of(report.inverted_components.count, "body is", "bodies are") +
                    " inside out (negative volume)",
-               place(report.inverted_components), "flip its normals in the program that made the mesh");
+               place(report.inverted_components),
+               "flip its normals in the program that made the mesh; " +
+                   repair_offer(context, stl.mesh.view(), report));
 }
 
-void write_stl(const std::string& path, const Mesh& mesh) {
+void write_stl(const std::string& path, const Mesh& mesh, LengthUnit unit_of_file) {
     const std::filesystem::path place(path);
     OutputFile file(place.has_parent_path() ? place.parent_path() : ".", place.filename().string());
-    std::string buffer = "binary STL, millimetres, written by Slabwright";
+    std::string buffer = unit_of_file == LengthUnit::mm ? "binary STL, millimetres, written by Slabwright"
+                                                        : "binary STL, inches, written by Slabwright";
     buffer.resize(80, '\0');
     auto append = [&](auto value) { buffer.append(reinterpret_cast<const char*>(&value), sizeof value); };
     auto flush = [&] {

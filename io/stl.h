@@ -12,7 +12,9 @@ namespace slabwright {
 
 struct StlOptions {
     LengthUnit units = LengthUnit::mm;
-    double weld_mm = 0;  ///< 0: bit-exact only
+    double weld_mm = 0;            ///< 0: bit-exact only
+    Repair repair = Repair::none;  ///< of a mesh that is no solid, once it is welded
+    friend bool operator==(const StlOptions&, const StlOptions&) = default;
 };
 
 struct StlMesh {
@@ -32,7 +34,8 @@ struct StlMesh {
 ///         non-finite or absurd (over 1e6 mm) coordinates, no facets. Codes: stl.missing, directory,
 ///         unreadable, empty, not_stl, no_facets, facet_count, truncated, unparsable, non_finite, absurd
 /// Diagnostics: units.suspicious, mesh.welded, and mesh.open, open_base, misoriented, inverted, non_manifold,
-/// duplicate, degenerate, each with its count and the centre of its first facet.
+/// duplicate, degenerate, each with its count and the centre of its first facet. Where a repair was asked
+/// for, they are of what it left, and what it did is told as repair_mesh() does. @throws as that
 [[nodiscard]] StlMesh read_stl(Context& context, const std::string& path, const StlOptions& options = {});
 
 /// Only the mesh of read_stl(), without digest, report and weld within a tolerance. @throws as read_stl()
@@ -47,6 +50,6 @@ void require_solid(Context& context, const StlMesh& stl, const std::string& path
 
 /// Binary STL, for models that the project makes; takes its place at `path` only when complete.
 /// @throws Error(input, "out.unwritable") and as OutputFile
-void write_stl(const std::string& path, const Mesh& mesh);
+void write_stl(const std::string& path, const Mesh& mesh, LengthUnit unit = LengthUnit::mm);
 
 }  // namespace slabwright

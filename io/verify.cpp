@@ -123,6 +123,7 @@ JobPart read_job_part(const Field& plan) {
     part.stated = true;
     const Field job = plan["job"];
     part.job.units = enumerator(kUnitWords, job["units"]);
+    if (job.has("input")) part.job.input.repair = enumerator(kRepairWords, job["input"]["repair"]);
     const Field machine = job["machine"], tolerances = job["tolerances"];
     Machine& m = part.job.machine;
     for (const auto& [key, to] : {std::pair{"travel_x", &m.travel_x},
@@ -470,7 +471,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
 
     const PlannedPattern planned_pattern{plan["input"]["file"].text(),
                                          plan["input"]["sha256"].text(),
-                                         {part.job.units, part.job.tolerances.weld}};
+                                         {part.job.units, part.job.tolerances.weld, part.job.input.repair}};
     result.pattern = options.pattern && options.pattern->is(planned_pattern)
                          ? options.pattern
                          : read_pattern(context, directory, planned_pattern, options.stl, "verify");

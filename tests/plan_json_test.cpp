@@ -185,6 +185,14 @@ TEST(PlanJson, KeepsItsSchema) {
         EXPECT_EQ(schema_complaint(plan_json(plan), "plan.schema.json"), "");
         EXPECT_EQ(schema_complaint(sequence_json(plan), "sequence.schema.json"), "");
     }
+    Plan plan = hand_made();
+    schedule(plan);
+    for (const char* how : {"none", "mend", "rebuild"}) {
+        plan.input.repair = InputRepair{how, {}, .02, .25, .1, .05, 1000};
+        plan.input.repair->defects = {{"crack", 12, .03, "mm", {1, 2, 3}}, {"degenerate", 1, 0, "", {}}};
+        EXPECT_EQ(schema_complaint(plan_json(plan), "plan.schema.json"), "");
+        EXPECT_EQ(json::parse(plan_json(plan))["input"]["repair"]["defects"][0]["count"], 12);
+    }
 }
 
 TEST(PlanJson, SchemaRefusesWhatBreaksTheContract) {

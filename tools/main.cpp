@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, report, inspect, slice, job. Errors are one line on stderr, their
-// kind is the exit code.
+// The `slabwright` command: plan, verify, report, inspect, repair, slice, job. Errors are one line on stderr,
+// their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -36,11 +36,11 @@ extern "C" void on_signal(int signal) {
 }
 
 struct Options {
-    std::string stl, out, maps, access_maps, job_file, units, strategy, finder, device, library;
+    std::string repair, stl, out, maps, access_maps, job_file, units, strategy, finder, device, library;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, no_verify = false, json = false, quiet = false, defaults = false,
-         weld_given = false, no_3d = false;
+         weld_given = false, no_3d = false, rebuild = false;
 };
 
 /// A bar with phase and time left, redrawn at most ten times a second on a terminal's last line.
@@ -129,6 +129,15 @@ std::string duration(double minutes) {
     return total < 60 ? fmt::format("{} min", total) : fmt::format("{} h {:02} min", total / 60, total % 60);
 }
 
+/// One line on a finding.
+std::string told(const Diagnostic& d) {
+    std::string text = fmt::format("{}: {}", name(d.severity), d.message);
+    if (d.where)
+        text += fmt::format(" (x {} y {} z {})", number((*d.where)[0], 1), number((*d.where)[1], 1),
+                            number((*d.where)[2], 1));
+    return text + '\n';
+}
+
 /// What the person at the router needs to know before the build: how long, what to load, what to mind.
 std::string summary(const Plan& plan, const std::string& out) {
     const Totals& t = plan.totals;
@@ -162,11 +171,7 @@ std::string summary(const Plan& plan, const std::string& out) {
         std::map<std::string, int> seen;
         for (const Diagnostic& d : plan.diagnostics) {
             if (d.severity != severity || ++seen[d.code] > 5) continue;
-            text += fmt::format("{}: {}", name(severity), d.message);
-            if (d.where)
-                text += fmt::format(" (x {} y {} z {})", number((*d.where)[0], 1), number((*d.where)[1], 1),
-                                    number((*d.where)[2], 1));
-            text += '\n';
+            text += told(d);
         }
         for (const auto& [code, count] : seen)
             if (count > 5)
@@ -229,6 +234,7 @@ Job job_of(const Options& options) {
             if (given == word.text) value = word.value;
     };
     take(options.units, kUnitWords, job.units);
+    take(options.repair, kRepairWords, job.input.repair);
     take(options.strategy, kStrategyWords, job.layers.strategy);
     take(options.finder, kFinderWords, job.layers.finder);
     if (options.allow_undercut) job.allow_undercut = true;
@@ -346,6 +352,30 @@ void run_inspect(const Options& options) {
     });
 }
 
+void run_repair(const Options& options) {
+    Job job = job_of(options);
+    job.input.repair = options.rebuild ? Repair::rebuild : Repair::mend;
+    with_context(options, [&](Context& context) {
+        const RepairResult result = repair(context, options.stl, options.out, job);
+        if (options.json) {
+            JsonText json;
+            json.begin_object().key("stl").string(options.out).key("repair");
+            put_repair(json, result.repair);
+            json.key("diagnostics");
+            put_diagnostics(json, result.diagnostics);
+            json.end();
+            return json.take();
+        }
+        std::string text;
+        for (const Diagnostic& d : result.diagnostics) text += told(d);
+        return text + fmt::format("{}: {}, {} facets, {} cm3\n", options.out,
+                                  result.repair.how == "none"   ? "needed no repair"
+                                  : result.repair.how == "mend" ? "mended"
+                                                                : "made anew",
+                                  result.repair.triangles, number(result.volume_mm3 / 1000, 2));
+    });
+}
+
 void run_slice(const Options& options) {
     const Job job = job_of(options);
     with_context(options, [&](Context& context) {
@@ -368,9 +398,7 @@ void add_limits(CLI::App& command, Options& options) {
     command.add_flag("--quiet", options.quiet, "no progress bar, nothing on stdout");
 }
 
-void add_common(CLI::App& command, Options& options) {
-    add_limits(command, options);
-    command.add_option("--job", options.job_file, "job file; `slabwright job --defaults` prints one");
+void add_reading(CLI::App& command, Options& options) {
     command.add_option("--units", options.units, "of the STL: mm or in")->check(CLI::IsMember({"mm", "in"}));
     command
         .add_option_function<double>(
@@ -381,6 +409,17 @@ void add_common(CLI::App& command, Options& options) {
             },
             "mm: vertices this near are merged, and reported")
         ->check(CLI::Range(0.0, 100.0));
+}
+
+void add_common(CLI::App& command, Options& options) {
+    add_limits(command, options);
+    command.add_option("--job", options.job_file, "job file; `slabwright job --defaults` prints one");
+    add_reading(command, options);
+    command
+        .add_flag("--repair{mend}", options.repair,
+                  "mend a mesh that is no solid; --repair=rebuild makes its surface anew where mending does "
+                  "not close it")
+        ->check(CLI::IsMember({"none", "mend", "rebuild"}));
 }
 
 }  // namespace
@@ -455,6 +494,16 @@ int main(int argc, char** argv) {
     inspect_command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
 
+    CLI::App* repair_command = app.add_subcommand(
+        "repair", "mend a mesh that is no solid: what was wrong is told, and a solid is written");
+    repair_command->add_option("STL", options.stl, "the mesh")->required();
+    repair_command->add_option("-o,--out", options.out, "STL for the solid, in the mesh's unit and place")
+        ->required();
+    repair_command->add_flag("--rebuild", options.rebuild,
+                             "make the surface anew where mending does not close it");
+    add_reading(*repair_command, options);
+    add_limits(*repair_command, options);
+
     CLI::App* slice_command = app.add_subcommand("slice", "cut the pattern by level planes");
     slice_command->add_option("STL", options.stl, "the pattern")->required();
     slice_command->add_option("--every", options.every, "mm from one section to the next")->required();
@@ -483,6 +532,7 @@ int main(int argc, char** argv) {
         else if (*verify_command) return run_verify(options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*report_command) run_report(options);
         else if (*inspect_command) run_inspect(options);
+        else if (*repair_command) run_repair(options);
         else if (*slice_command) run_slice(options);
         else print(default_job_toml(options.library.empty() ? "default" : options.library));
         return 0;
