@@ -226,6 +226,7 @@ void validate(const Job& job) {
     require("bonding.press_force", b.press_force, 0, 1e7);
     require("bonding.press_time_s", b.press_time_s, 0, 1e6);
     require("bonding.max_pressure_mpa", b.max_pressure_mpa, 0.0001, 1000);
+    require("bonding.min_pressure_mpa", b.min_pressure_mpa, 0, b.max_pressure_mpa);
     require("bonding.edge_setback", b.edge_setback, 0, 1000);
     require("bonding.handling_s", b.handling_s, 0, 1e6);
     require("bonding.glue_s_per_m2", b.glue_s_per_m2, 0, 1e6);

@@ -123,6 +123,18 @@ struct LayerSelection {
     std::vector<ToolSet> sets;
 };
 
+/// A joint under or within a layer. Glue under a layer goes where wood stands on both sides, held back from
+/// finished edges; between slabs that are bonded into one before any is cut it goes everywhere.
+struct Joint {
+    double z = 0;                          ///< mm
+    double standing_mm2 = 0;               ///< where wood stands on both sides of it once the layer is milled
+    double area_mm2 = 0;                   ///< glued
+    std::array<double, 2> centroid{0, 0};  ///< of the glue, mm
+    double force_n = 0;                    ///< of the press
+    double pressure_mpa = 0;               ///< of that force on the glued area, its mean
+    Loops glue;                            ///< where glue goes
+};
+
 struct Layer {
     int index = 0;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
@@ -130,10 +142,8 @@ struct Layer {
     std::string reason;  ///< why z_top lies where it lies, in words
     std::vector<Operation> operations;
     std::optional<LayerSelection> selection;  ///< none where there was nothing to select
-    double glue_area_mm2 = 0;                 ///< under this layer's slab
-    std::array<double, 2> glue_centroid{0, 0};
-    double press_force_n = 0;
-    Loops glue;  ///< where glue goes
+    std::vector<Joint> joints;  ///< upwards: under its lowest slab, on the board or the layer below; then
+                                ///< between its slabs
 };
 
 /// A step of the machine's sequence (method.md section 12); `needs` are ids of the steps that must be done

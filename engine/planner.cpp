@@ -18,6 +18,7 @@
 #include "engine/paths/layer_stock.h"
 #include "engine/paths/standing.h"
 #include "engine/schedule/heights.h"
+#include "engine/schedule/joints.h"
 #include "engine/schedule/motion_time.h"
 #include "engine/schedule/op_forces.h"
 #include "engine/schedule/schedule.h"
@@ -239,23 +240,6 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
                at_once;
 }
 
-// What a slab is glued to, layer by layer: the section of the pattern at its joint and what of the flask
-// stays there.
-std::vector<Loops> joints_of(Context& context, const Plan& plan, MeshView mesh) {
-    std::vector<Plane> planes;
-    for (const Layer& layer : plan.layers)
-        planes.push_back({layer.z_bottom, layer.index == 1 ? Side::above : Side::below});
-    // A gap in the mesh shows as an open chain; sections at every boundary and feature would miss one in
-    // between, so the loader has refused all open edges but those in the base plane already. What is left
-    // here is proof by section.
-    std::vector<Section> sections = slice(context, mesh, planes, {plan.job.tolerances.gap});
-    std::vector<Loops> joints;
-    for (std::size_t i = 0; i < plan.layers.size(); ++i)
-        joints.push_back(plan.flask ? unite(sections[i].loops, flask_frame(*plan.flask, i))
-                                    : std::move(sections[i].loops));
-    return joints;
-}
-
 // Lengths and times of an operation; its forces too where the job takes cuts as nominal.
 void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnostic>& diagnostics) {
     const MotionTime time = motion_time(op.moves, job.machine, op.blend);
@@ -290,8 +274,9 @@ void add_approaches(Plan& plan) {
 }
 
 // The programs of all layers, with their diagnostics.
-void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vector<Loops>& joints,
-                ProgressShare share) {
+// @param joints what each layer lies on is that of its first
+void cut_layers(Context& context, Plan& plan, MeshView pattern,
+                const std::vector<std::vector<JointWood>>& joints, ProgressShare share) {
     const Job& job = plan.job;
     const PathGround ground = ground_of(context, plan, pattern);
     std::optional<AccessScene> scene;
@@ -318,7 +303,7 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
     parallel_each(context, plan.layers.size(), [&](std::size_t task) {
         const std::size_t i = largest_first[task < half ? 2 * task : 2 * (task - half) + 1];
         ProgressPart progress(context, steps[i]);
-        const Loops* const carried_by = i > 0 ? &joints[i] : nullptr;
+        const Loops* const carried_by = i > 0 ? &joints[i].front().below : nullptr;
         planned[i] = plan_layer(context,
                                 {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr,
                                  carried_by, &stock_memory, &known_cuts},
@@ -350,6 +335,38 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern, const std::vecto
     check_travel(plan);
 }
 
+// Joints that cannot hold are warned of where the job accepts them; else the first is a refusal.
+void settle_joints(Plan& plan, const std::vector<std::vector<WeakJoint>>& found) {
+    for (const std::vector<WeakJoint>& of_layer : found)
+        for (const WeakJoint& weak : of_layer) {
+            if (!plan.job.bonding.accept_weak)
+                throw refusal(
+                    weak.code.c_str(), weak.message,
+                    fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", weak.where[0], weak.where[1], weak.where[2]),
+                    weak.remedy + ", or accept it with --accept-weak-joints");
+            plan.diagnostics.push_back({Severity::warning, weak.code, weak.message, weak.where});
+        }
+}
+
+// Glue and press of every joint.
+void bond_layers(Context& context, Plan& plan, const std::vector<std::vector<JointWood>>& joints) {
+    std::vector<std::vector<WeakJoint>> weak(plan.layers.size());
+    std::vector<std::vector<Diagnostic>> notes(plan.layers.size());
+    parallel_each(context, plan.layers.size(),
+                  [&](std::size_t i) { weak[i] = bond_layer(plan.layers[i], joints[i], plan, notes[i]); });
+    for (const std::vector<Diagnostic>& found : notes)
+        plan.diagnostics.insert(plan.diagnostics.end(), found.begin(), found.end());
+    settle_joints(plan, weak);
+}
+
+// Whether the joints bear the programs' forces.
+void load_joints(Context& context, Plan& plan, const std::vector<std::vector<JointWood>>& joints) {
+    std::vector<std::vector<WeakJoint>> weak(plan.layers.size());
+    parallel_each(context, plan.layers.size(),
+                  [&](std::size_t i) { weak[i] = joints_under_load(plan.layers[i], joints[i], plan); });
+    settle_joints(plan, weak);
+}
+
 // From layers on. `begun` is a plan with its stock and features.
 Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request,
                  const LayerPlacement& placement, ProgressShare share) {
@@ -361,15 +378,12 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     check_chambers(plan);
     settle_undercuts(context, plan, pattern);
     if (plan.job.flask.enabled) plan.flask = place_flask(context, pattern, plan);
-    const std::vector<Loops> joints = joints_of(context, plan, pattern);
+    const std::vector<std::vector<JointWood>> joints = wood_at_joints(context, pattern, plan);
+    bond_layers(context, plan, joints);
     cut_layers(context, plan, pattern, joints, share);
 
     context.begin_phase("schedule", share.at(0.99), share.at(1));
-    std::vector<std::vector<Diagnostic>> bonded(plan.layers.size());
-    parallel_each(context, plan.layers.size(),
-                  [&](std::size_t i) { bond_layer(plan.layers[i], joints[i], plan, bonded[i]); });
-    for (const std::vector<Diagnostic>& found : bonded)
-        plan.diagnostics.insert(plan.diagnostics.end(), found.begin(), found.end());
+    load_joints(context, plan, joints);
     context.throw_if_cancelled();
     schedule(plan);
     check_spindle(plan);

@@ -163,9 +163,12 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("press_time_s", job.bonding.press_time_s, "s");
     visit.key("max_pressure_mpa", job.bonding.max_pressure_mpa,
               "MPa on the glued area, so that no rib is crushed");
+    visit.key("min_pressure_mpa", job.bonding.min_pressure_mpa,
+              "MPa that close a joint, by the glue; cyanoacrylate on RPM's machine: 17 kN on 1.2 m2");
     visit.key("edge_setback", job.bonding.edge_setback, "mm that glue keeps from finished edges");
     visit.key("handling_s", job.bonding.handling_s, "s, to fetch, clamp and place a slab");
     visit.key("glue_s_per_m2", job.bonding.glue_s_per_m2, "s for each square metre of glue");
+    visit.key("accept_weak", job.bonding.accept_weak, "plan although a joint may not hold");
 
     visit.table("tolerances", "");
     visit.key("gouge", job.tolerances.gouge, "mm along the normal: no move cuts deeper into the part");

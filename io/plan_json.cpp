@@ -182,6 +182,13 @@ void put_selection(JsonText& json, const std::optional<LayerSelection>& selectio
     json.end().end();
 }
 
+void put_centroid(JsonText& json, const Joint& joint) {
+    json.begin_array(Shape::line)
+        .rounded(joint.centroid[0], kLength)
+        .rounded(joint.centroid[1], kLength)
+        .end();
+}
+
 void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     json.begin_object();
     json.key("index").integer(layer.index);
@@ -192,13 +199,24 @@ void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     json.key("reason").string(layer.reason);
     json.key("selection");
     put_selection(json, layer.selection);
-    json.key("glue_area_mm2").rounded(layer.glue_area_mm2, kArea);
-    json.key("glue_centroid")
-        .begin_array(Shape::line)
-        .rounded(layer.glue_centroid[0], kLength)
-        .rounded(layer.glue_centroid[1], kLength)
-        .end();
-    json.key("press_force_n").rounded(layer.press_force_n, kForce);
+    const Joint own = layer.joints.empty() ? Joint{} : layer.joints.front();
+    json.key("glue_area_mm2").rounded(own.area_mm2, kArea);
+    json.key("glue_centroid");
+    put_centroid(json, own);
+    json.key("press_force_n").rounded(own.force_n, kForce);
+    json.key("joints").begin_array();
+    for (const Joint& joint : layer.joints) {
+        json.begin_object(Shape::line);
+        json.key("z").rounded(joint.z, kLength);
+        json.key("standing_mm2").rounded(joint.standing_mm2, kArea);
+        json.key("glue_area_mm2").rounded(joint.area_mm2, kArea);
+        json.key("glue_centroid");
+        put_centroid(json, joint);
+        json.key("press_force_n").rounded(joint.force_n, kForce);
+        json.key("pressure_mpa").rounded(joint.pressure_mpa, kDeflection);
+        json.end();
+    }
+    json.end();
     json.key("operations").begin_array();
     for (const Operation& operation : layer.operations) put_operation(json, plan, layer, operation);
     json.end().end();

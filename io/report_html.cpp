@@ -407,8 +407,11 @@ void draw_figures(Context& context, MeshView mesh, const PlanFolder& folder, con
     const Box3 box = bounds(context, mesh);
     std::vector<Plane> planes;
     for (const SimulatedLayer& layer : input.layers) {
-        planes.push_back({layer.z_bottom, Side::above});
-        planes.push_back({std::min(layer.z_top, static_cast<double>(box.max.z)), Side::below});
+        // Clearly within the layer: its ends are as high as vertices there but for rounding.
+        const double top = std::min(layer.z_top, static_cast<double>(box.max.z)),
+                     within = std::min(0.01, (top - layer.z_bottom) / 4);
+        planes.push_back({layer.z_bottom + within, Side::above});
+        planes.push_back({top - within, Side::below});
     }
     const double step = (static_cast<double>(box.max.z) - box.min.z) / kSilhouetteRows;
     for (int i = 0; i < kSilhouetteRows; ++i) planes.push_back({box.min.z + (i + 0.5) * step, Side::above});

@@ -1,6 +1,7 @@
 #include "io/sequence_json.h"
 
 #include <map>
+#include <vector>
 
 #include "io/job_keys.h"
 #include "io/json_text.h"
@@ -16,8 +17,22 @@ std::string sequence_json(const Plan& plan) {
     json.key("frame").string(word_of(kFrameWords, frame_of(plan.job.machine)));
     json.key("pattern").string(plan.input.file);
     json.key("sha256").string(plan.input.sha256);
-    std::map<int, std::size_t> glue_of;
-    for (std::size_t i = 0; i < plan.layers.size(); ++i) glue_of.emplace(plan.layers[i].index, i);
+    // The glue under each layer, then that between the slabs of each; a layer's glue steps go upwards.
+    struct Glue {
+        int layer = 0;
+        const Joint* joint = nullptr;
+    };
+    std::vector<Glue> glue;
+    std::map<int, std::vector<std::size_t>> glue_of;
+    const auto add = [&](const Layer& layer, const Joint& joint) {
+        glue_of[layer.index].push_back(glue.size());
+        glue.push_back({layer.index, &joint});
+    };
+    for (const Layer& layer : plan.layers)
+        if (!layer.joints.empty()) add(layer, layer.joints.front());
+    for (const Layer& layer : plan.layers)
+        for (std::size_t k = 1; k < layer.joints.size(); ++k) add(layer, layer.joints[k]);
+    std::map<int, std::size_t> told;
     json.key("steps").begin_array();
     for (const SequenceStep& step : plan.sequence) {
         json.begin_object(Shape::line);
@@ -29,18 +44,21 @@ std::string sequence_json(const Plan& plan) {
         json.end();
         json.key("seconds").rounded(step.seconds, 2);
         for (const auto& [key, value] : step.words) json.key(key).string(value);
-        if (const auto glue = glue_of.find(step.layer); step.action == "glue" && glue != glue_of.end())
-            json.key("polygons").string("#/glue/" + std::to_string(glue->second));
+        if (const auto of = glue_of.find(step.layer); step.action == "glue" && of != glue_of.end())
+            if (const std::size_t k = told[step.layer]++; k < of->second.size())
+                json.key("polygons").string("#/glue/" + std::to_string(of->second[k]));
         for (const auto& [key, value] : step.numbers) json.key(key).rounded(value, 6);
         json.end();
     }
     json.end();
     json.key("glue").begin_array();
-    for (const Layer& layer : plan.layers) {
-        json.begin_object().key("layer").integer(layer.index).key("loops").begin_array();
-        for (std::size_t i = 0; i < layer.glue.size(); ++i) {
+    for (const Glue& g : glue) {
+        json.begin_object().key("layer").integer(g.layer);
+        json.key("z_mm").rounded(g.joint->z, 6);
+        json.key("loops").begin_array();
+        for (std::size_t i = 0; i < g.joint->glue.size(); ++i) {
             json.begin_array(Shape::line);
-            for (const Point2 p : layer.glue.loop(i)) json.begin_array().units(p.x).units(p.y).end();
+            for (const Point2 p : g.joint->glue.loop(i)) json.begin_array().units(p.x).units(p.y).end();
             json.end();
         }
         json.end().end();

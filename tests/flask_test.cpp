@@ -184,14 +184,14 @@ TEST_P(FlaskPlan, IsMadeAndStays) {
     const Plan made = plan(context, stl, job);
     ASSERT_TRUE(made.flask);
     for (const Layer& layer : made.layers) {
-        const Loops glued_flask =
-            intersect(layer.glue, flask_frame(*made.flask, static_cast<std::size_t>(layer.index - 1)));
+        const Loops glued_flask = intersect(
+            layer.joints[0].glue, flask_frame(*made.flask, static_cast<std::size_t>(layer.index - 1)));
         EXPECT_GT(area(glued_flask),
                   0.5 * area(flask_frame(*made.flask, static_cast<std::size_t>(layer.index - 1))))
             << "layer " << layer.index;
     }
     EXPECT_EQ(made.sequence.back().action, "mould_box");
-    for (const Diagnostic& d : made.diagnostics) EXPECT_NE(d.code, "schedule.tips");
+    for (const Diagnostic& d : made.diagnostics) EXPECT_NE(d.code, "joint.tips");
     write(context, made, out);
     VerifyOptions options;
     options.stl = stl;

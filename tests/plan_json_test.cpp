@@ -86,11 +86,15 @@ Plan hand_made() {
         layer.z_top = 18.5 * i;
         layer.slab_thickness = 19;
         layer.reason = "as high as a layer may be";
-        layer.glue.points = {{0, 0}, {500000, 0}, {500000, 300000}, {0, 300000}};
-        layer.glue.close_loop();
-        layer.glue_area_mm2 = 1500;
-        layer.glue_centroid = {25, 15};
-        layer.press_force_n = 750;
+        Joint& joint = layer.joints.emplace_back();
+        joint.z = layer.z_bottom;
+        joint.glue.points = {{0, 0}, {500000, 0}, {500000, 300000}, {0, 300000}};
+        joint.glue.close_loop();
+        joint.standing_mm2 = 1800;
+        joint.area_mm2 = 1500;
+        joint.centroid = {25, 15};
+        joint.force_n = 750;
+        joint.pressure_mpa = 0.5;
         for (int k = 0; k < 3; ++k) {
             Operation operation;
             operation.kind = k == 0   ? OperationKind::face

@@ -231,6 +231,7 @@ TEST(Planner, NoProgramTouchesTheOwnModels) {
         Context context;
         Job job;
         job.allow_undercut = true;
+        job.bonding.accept_weak = true;  // the slab of luo-layer-sample's uppermost layer tips
         const std::string stl = std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl";
         const support::TemporaryFolder folder;
         const std::string out = folder / "out";

@@ -39,8 +39,8 @@ struct Options {
     std::string repair, stl, out, maps, access_maps, job_file, units, strategy, finder, device, library;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
-    bool allow_undercut = false, no_verify = false, json = false, quiet = false, defaults = false,
-         weld_given = false, no_3d = false, rebuild = false;
+    bool allow_undercut = false, accept_weak = false, no_verify = false, json = false, quiet = false,
+         defaults = false, weld_given = false, no_3d = false, rebuild = false;
 };
 
 /// A bar with phase and time left, redrawn at most ten times a second on a terminal's last line.
@@ -238,6 +238,7 @@ Job job_of(const Options& options) {
     take(options.strategy, kStrategyWords, job.layers.strategy);
     take(options.finder, kFinderWords, job.layers.finder);
     if (options.allow_undercut) job.allow_undercut = true;
+    if (options.accept_weak) job.bonding.accept_weak = true;
     if (options.weld_given) job.tolerances.weld = options.weld;
     return job;
 }
@@ -454,6 +455,7 @@ int main(int argc, char** argv) {
     plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
     plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
+    plan_command->add_flag("--accept-weak-joints", options.accept_weak, "plan although a joint may not hold");
 
     plan_command->add_option("--access-maps", options.access_maps,
                              "folder for what each tool reaches of each layer's facets, as PLY");

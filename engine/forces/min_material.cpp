@@ -158,7 +158,8 @@ SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {
         heights = std::move(spread);
     }
     std::vector<Plane> planes;
-    for (const double z : heights) planes.push_back({z, Side::below});
+    // Clearly below: a height is that of vertices but for rounding.
+    for (const double z : heights) planes.push_back({std::max(z - 0.01, z / 2), Side::below});
     const std::vector<Section> sections = slice(context, mesh, planes, {plan.job.tolerances.gap});
 
     Loops frame;

@@ -5,6 +5,7 @@
 
 #include "engine/layers/rules.h"
 #include "kernels/errors.h"
+#include "kernels/mesh/report.h"
 
 namespace slabwright {
 
@@ -138,6 +139,7 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
     min_layer_ = to_ticks(request.min_layer);
     min_material_ = to_ticks(request.min_material);
     std::vector<Level> down;
+    const Ticks base = to_ticks(kBaseFlatness);
     for (std::size_t i = 0; i < request.features.size(); ++i) {
         const Feature& f = request.features[i];
         const Ticks low = to_ticks(f.z_low), high = to_ticks(f.z_high);
@@ -148,13 +150,14 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
             case FeatureType::peak:
             case FeatureType::valley:
             case FeatureType::up_flat:
-                if (low <= kSame || low > height_ + kSame) break;
+                if (low <= base || low > height_ + kSame) break;
                 type1_.push_back({low, weight_of(f), i});
                 if (f.type == FeatureType::up_flat)
                     up_flats_.push_back({low, std::llround(f.area * kAreaUnits), i});
                 break;
             case FeatureType::down_flat:
-                if (low > kOneJoint && low < height_ - kSame) down.push_back({low, weight_of(f), i});
+                if (low > std::max(base, kOneJoint) && low < height_ - kSame)
+                    down.push_back({low, weight_of(f), i});
                 break;
             case FeatureType::shallow:
                 if (high - low > 2 * kSame && high > kSame && low < height_ - kSame)

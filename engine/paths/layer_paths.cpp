@@ -177,7 +177,9 @@ Operation clear_between(const LayerCut& cut, LayerStock& stock, RestPass pass, d
 void report_loose(const LayerCut& cut, LayerResult& result) {
     const LayerJob& layer = cut.layer;
     HeldSlab slab{layer.stock_min, layer.stock_max, layer.z_bottom, layer.z_top, {}, {}};
-    const std::array<Plane, 2> planes{Plane{layer.z_bottom, Side::above}, Plane{layer.z_bottom, Side::below}};
+    // Clearly beside the boundary, whose height is that of the vertices there but for rounding.
+    const std::array<Plane, 2> planes{Plane{layer.z_bottom + 10 * kTopSheet, Side::above},
+                                      Plane{layer.z_bottom - 10 * kTopSheet, Side::below}};
     const std::vector<Section> sections = slice(cut.context, layer.mesh, planes, {cut.job.tolerances.gap});
     slab.kept = simplify(sections[0].loops);
     slab.glued = simplify(sections[1].loops);

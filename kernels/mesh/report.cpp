@@ -90,7 +90,7 @@ void inspect_edge(MeshView mesh, float base, std::span<const EdgeUse> uses,
     }
     if (facets == 1) {
         note(found.open, first);
-        if (mesh.vertices[uses[0].low].z != base || mesh.vertices[uses[0].high].z != base)
+        if (std::max(mesh.vertices[uses[0].low].z, mesh.vertices[uses[0].high].z) > base + kBaseFlatness)
             note(found.open_off_base, first);
     }
     if (facets > 2) note(found.non_manifold, first);
@@ -250,7 +250,7 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
                 for (int k = 0; k < 3; ++k) {
                     const std::uint32_t a = facet[k], b = facet[(k + 1) % 3];
                     if (mesh.neighbours[f][k] != kNoFacet || a == b) continue;
-                    if (mesh.vertices[a].z == base && mesh.vertices[b].z == base) continue;
+                    if (std::max(mesh.vertices[a].z, mesh.vertices[b].z) <= base + kBaseFlatness) continue;
                     if (part.open.empty() || part.open.back() != mine) part.open.push_back(mine);
                 }
             }

@@ -16,17 +16,21 @@ struct Finding {
     std::uint32_t first_facet = kNoFacet;
 };
 
+/// How far above its lowest vertex a pattern's base may lie, mm: exports and turning in single precision
+/// leave a flat base flat to about 1e-5 of its size. What lies lower is the base.
+inline constexpr double kBaseFlatness = 0.01;
+
 struct MeshReport {
     std::uint64_t facets = 0, vertices = 0, components = 0;
     Finding
         open_edges;  ///< edges with one facet (here and below, a facet with two equal corners does not count)
-    Finding open_edges_off_base;  ///< those of them that do not lie wholly in the lowest plane
+    Finding open_edges_off_base;  ///< those of them that do not lie wholly in the base (kBaseFlatness)
     Finding non_manifold_edges;   ///< edges with more than two facets
     Finding
         misoriented_edges;  ///< edges whose facets do not run along them in opposite directions, one for one
     Finding degenerate_facets;  ///< two equal corners, or no area
     Finding duplicate_facets;   ///< same three (different) vertices as an earlier facet, whichever way round
-    /// Components of negative volume, closed but for edges in the lowest plane, around which the other
+    /// Components of negative volume, closed but for edges in the base, around which the other
     /// components make no material (winding number at most 0); a cavity, which lies in material, is none.
     Finding inverted_components;
     double volume_mm3 = 0;  ///< signed, of the whole; an opening in the lowest plane counts as filled
