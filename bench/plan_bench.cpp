@@ -32,6 +32,7 @@ void plan_metre_pattern(benchmark::State& state) {
     }
     Job job;
     job.allow_undercut = true;
+    job.bonding.accept_weak = true;
     InputInfo input;
     input.file = "metre pattern";
     double metres = 0, moves = 0;

@@ -37,6 +37,7 @@ const Planned& planned(int size_mm) {
     made.mesh = weld(context, facets);
     Job job;
     job.allow_undercut = true;
+    job.bonding.accept_weak = true;
     InputInfo source;
     source.file = "metre pattern";
     made.plan = make_plan(context, made.mesh, source, job);

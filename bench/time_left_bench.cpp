@@ -88,6 +88,7 @@ void measure(benchmark::State& state, const std::string& stl, const Scratch& scr
         context.share_progress(0, kPlanningShare);
         Job job;
         job.allow_undercut = true;
+        job.bonding.accept_weak = true;
         const Plan planned = plan(context, stl, job);
         const VerifyResult result =
             write_verified(context, planned, (scratch.path / "out").string(), stl, cell_mm);

@@ -160,6 +160,7 @@ TEST(Cancel, StopsEveryPhaseAndLeavesNothing) {
     }
     Job job;
     job.allow_undercut = true;
+    job.bonding.accept_weak = true;
     Plan kept;
     cancel_everywhere(
         [&](Context& context) {

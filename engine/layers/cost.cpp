@@ -196,14 +196,19 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
     std::vector<Ticks> limits{tallest};
     if (min_layer_ > kSame) limits.push_back(min_layer_ - kSame - 1);
     const Ticks allowance = to_ticks(request.facing_allowance);
-    Ticks thickest = 0;
     for (const double s : request.slab_thicknesses) {
         limits.push_back(to_ticks(s) + kSame - allowance);
-        thickest = std::max(thickest, to_ticks(s));
+        thickest_ = std::max(thickest_, to_ticks(s));
     }
-    if (thickest > 0)
-        for (Ticks stack = 2 * thickest; stack - thickest + kSame - allowance < tallest; stack += thickest)
+    // Of slabs bonded into one, a class also ends where one more joint lies within the layer, and where the
+    // wood over that is no longer thin.
+    if (thickest_ > 0)
+        for (Ticks stack = 2 * thickest_; stack - thickest_ + kSame - allowance < tallest;
+             stack += thickest_) {
             limits.push_back(stack + kSame - allowance);
+            limits.push_back(stack - thickest_ + kSame);
+            if (min_layer_ > kSame) limits.push_back(stack - thickest_ + min_layer_ - kSame - 1);
+        }
     std::erase_if(limits, [&](Ticks l) { return l <= 0 || l > tallest; });
     std::sort(limits.begin(), limits.end());
     limits.erase(std::unique(limits.begin(), limits.end()), limits.end());
@@ -213,6 +218,9 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
         c.layers = 1;
         c.thin_layers = l < min_layer_ - kSame;
         c.wood = to_ticks(slab_for(mm_of(l)));
+        class_joints_.push_back(slab_joints(0, l));
+        if (!class_joints_.back().empty() && l - class_joints_.back().back() < min_layer_ - kSame)
+            c.thin_layers = 1;
         class_costs_.push_back(c);
     }
     class_costs_.emplace_back();
@@ -232,6 +240,22 @@ double LayerRules::slab_for(double thickness_mm) const {
                request_.facing_allowance;  // no stock named: slabs made to fit the tallest layer
     const Ticks slabs = (need + to_ticks(thickest) - 1) / to_ticks(thickest);
     return thickest * static_cast<double>(slabs);
+}
+
+std::vector<Ticks> LayerRules::slab_joints(Ticks bottom, Ticks top) const {
+    std::vector<Ticks> joints;
+    if (thickest_ == 0) return joints;
+    const Ticks stack = to_ticks(slab_for(mm_of(top - bottom)));
+    for (Ticks z = thickest_; z + kSame < stack && z < top - bottom - kSame; z += thickest_)
+        joints.push_back(bottom + z);
+    return joints;
+}
+
+CostUnits LayerRules::slab_joints_cost(Ticks bottom, std::size_t c) const {
+    CostUnits cost;
+    if (c < class_joints_.size())
+        for (const Ticks z : class_joints_[c]) cost += joint(bottom + z);
+    return cost;
 }
 
 std::size_t LayerRules::class_of(Ticks thickness) const {
@@ -271,6 +295,7 @@ CostUnits LayerRules::layer(Ticks bottom, Ticks top) const {
         c.layers = 1;
         c.wood = to_ticks(slab_for(mm_of(top - bottom)));
     }
+    for (const Ticks z : slab_joints(bottom, top)) c += joint(z);
     c.broken_type2 = weight_between(type2_, type2_sums_, bottom + kSame + 1, top - kSame - 1);
     return c;
 }
@@ -358,87 +383,110 @@ std::string LayerRules::describe(Ticks below, Ticks z) const {
     return it == type1_.end() ? words_mm(mm_of(height_ - z)) + " mm below the top" : below_words(z, *it);
 }
 
+namespace {
+
+std::string others(std::size_t n, const char* what) {
+    return n == 0 ? std::string{} : " and " + std::to_string(n) + " more " + what;
+}
+
+std::string square(double area) { return words_mm(area) + " mm²"; }
+
+std::array<double, 3> place_of(const Feature& f, double z) { return {f.x, f.y, z}; }
+
+}  // namespace
+
+/// What a boundary, or a joint between the slabs of a layer, breaks.
+void LayerRules::diagnose_joint(Ticks z, bool inner, std::vector<Diagnostic>& found) const {
+    const double z_mm = mm_of(z);
+    const std::string joint =
+        (inner ? "the joint between slabs at " : "the boundary at ") + words_mm(z_mm) + " mm ";
+    const auto first = std::upper_bound(type1_.begin(), type1_.end(), z + kSame,
+                                        [](Ticks t, const Level& l) { return t < l.z; });
+    const Ticks least = min_material(z);
+    const auto last = std::lower_bound(first, type1_.end(), z + least - kSame,
+                                       [](const Level& l, Ticks t) { return l.z < t; });
+    if (first < last) {
+        const auto worst =
+            std::max_element(first, last, [](const Level& a, const Level& b) { return a.weight < b.weight; });
+        found.push_back({Severity::warning, inner ? "joint.thin" : "layers.type1",
+                         joint + "leaves less than " + words_mm(mm_of(least)) + " mm of material: it is " +
+                             below_words(z, *worst) +
+                             others(static_cast<std::size_t>(last - first) - 1, "features"),
+                         place_of(request_.features[worst->feature], z_mm)});
+    }
+    const Level* flat = nullptr;
+    for (auto it = std::lower_bound(up_flats_.begin(), up_flats_.end(), z - kSame,
+                                    [](const Level&l, Ticks t) { return l.z < t; });
+         it != up_flats_.end() && it->z <= z + kSame; ++it)
+        if (!flat || it->weight > flat->weight) flat = &*it;
+    if (flat)
+        found.push_back({Severity::warning, "layers.exposed_glue",
+                         joint + "lies at an up-facing flat of " +
+                             square(request_.features[flat->feature].area) + ", which shows the glue",
+                         place_of(request_.features[flat->feature], z_mm)});
+    const Range* shallow = nullptr;
+    std::size_t count = 0;
+    for (const Range& r : type3_) {
+        if (r.low >= z - kSame) break;
+        if (r.high <= z + kSame) continue;
+        ++count;
+        if (!shallow || r.weight > shallow->weight) shallow = &r;
+    }
+    if (shallow) {
+        const Feature& f = request_.features[shallow->feature];
+        found.push_back({Severity::warning, "layers.type3",
+                         joint + "lies in the shallow slope from " + words_mm(f.z_low) + " to " +
+                             words_mm(f.z_high) + " mm (" + square(f.area) + ")" +
+                             others(count - 1, "slopes"),
+                         place_of(f, z_mm)});
+    }
+}
+
+/// Says of which slabs a layer is bonded, and what the joints between them break.
+void LayerRules::diagnose_slabs(Ticks bottom, Ticks top, std::vector<Diagnostic>& found) const {
+    if (request_.slab_thicknesses.empty()) return;
+    const double slab = slab_for(mm_of(top - bottom)),
+                 thickest =
+                     *std::max_element(request_.slab_thicknesses.begin(), request_.slab_thicknesses.end());
+    if (!(slab > thickest)) return;
+    found.push_back({Severity::note,
+                     "layers.bonded",
+                     "the layer up to " + words_mm(mm_of(top)) + " mm needs " +
+                         words_mm(std::round(slab / thickest)) + " slabs of " + words_mm(thickest) +
+                         " mm bonded into one",
+                     {}});
+    const std::vector<Ticks> joints = slab_joints(bottom, top);
+    for (const Ticks z : joints) diagnose_joint(z, true, found);
+    if (!joints.empty() && top - joints.back() < min_layer_ - kSame)
+        found.push_back({Severity::warning,
+                         "joint.thin",
+                         "the joint between slabs at " + words_mm(mm_of(joints.back())) + " mm leaves " +
+                             words_mm(mm_of(top - joints.back())) +
+                             " mm of the slab over it, less than the minimum of " +
+                             words_mm(request_.min_layer) + " mm",
+                         {}});
+}
+
 std::vector<Diagnostic> LayerRules::diagnose(const std::vector<double>& tops) const {
     std::vector<Diagnostic> found;
-    auto others = [](std::size_t n, const char* what) {
-        return n == 0 ? std::string{} : " and " + std::to_string(n) + " more " + what;
-    };
-    auto place = [&](std::size_t feature, double z) {
-        const Feature& f = request_.features[feature];
-        return std::array<double, 3>{f.x, f.y, z};
-    };
-    auto square = [](double area) { return words_mm(area) + " mm²"; };
     Ticks bottom = 0;
     for (std::size_t i = 0; i < tops.size(); ++i) {
         const Ticks z = to_ticks(tops[i]);
-        const std::string boundary = "the boundary at " + words_mm(tops[i]) + " mm ";
         if (z - bottom < min_layer_ - kSame)
             found.push_back({Severity::warning,
                              "layers.thin",
                              "the layer from " + words_mm(mm_of(bottom)) + " to " + words_mm(tops[i]) +
                                  " mm is thinner than the minimum of " + words_mm(request_.min_layer) + " mm",
                              {}});
-        if (!request_.slab_thicknesses.empty()) {
-            const double slab = slab_for(mm_of(z - bottom)),
-                         thickest = *std::max_element(request_.slab_thicknesses.begin(),
-                                                      request_.slab_thicknesses.end());
-            if (slab > thickest)
-                found.push_back({Severity::note,
-                                 "layers.bonded",
-                                 "the layer up to " + words_mm(tops[i]) + " mm needs " +
-                                     words_mm(std::round(slab / thickest)) + " slabs of " +
-                                     words_mm(thickest) + " mm bonded into one",
-                                 {}});
-        }
+        diagnose_slabs(bottom, z, found);
         for (const Level& l : type2_)
             if (l.z > bottom + kSame && l.z < z - kSame)
                 found.push_back({Severity::error, "layers.type2",
                                  "no boundary lies at the down-facing flat at " + words_mm(mm_of(l.z)) +
                                      " mm (" + square(static_cast<double>(l.weight) / kAreaUnits) + ")",
-                                 place(l.feature, mm_of(l.z))});
+                                 place_of(request_.features[l.feature], mm_of(l.z))});
         bottom = z;
-        if (i + 1 == tops.size()) break;
-
-        const auto first = std::upper_bound(type1_.begin(), type1_.end(), z + kSame,
-                                            [](Ticks t, const Level& l) { return t < l.z; });
-        const Ticks least = min_material(z);
-        const auto last = std::lower_bound(first, type1_.end(), z + least - kSame,
-                                           [](const Level& l, Ticks t) { return l.z < t; });
-        if (first < last) {
-            const auto worst = std::max_element(
-                first, last, [](const Level& a, const Level& b) { return a.weight < b.weight; });
-            found.push_back({Severity::warning, "layers.type1",
-                             boundary + "leaves less than " + words_mm(mm_of(least)) +
-                                 " mm of material: it is " + below_words(z, *worst) +
-                                 others(static_cast<std::size_t>(last - first) - 1, "features"),
-                             place(worst->feature, tops[i])});
-        }
-        const Level* flat = nullptr;
-        for (auto it = std::lower_bound(up_flats_.begin(), up_flats_.end(), z - kSame,
-                                        [](const Level&l, Ticks t) { return l.z < t; });
-             it != up_flats_.end() && it->z <= z + kSame; ++it)
-            if (!flat || it->weight > flat->weight) flat = &*it;
-        if (flat)
-            found.push_back({Severity::warning, "layers.exposed_glue",
-                             boundary + "lies at an up-facing flat of " +
-                                 square(request_.features[flat->feature].area) + ", which shows the glue",
-                             place(flat->feature, tops[i])});
-        const Range* shallow = nullptr;
-        std::size_t count = 0;
-        for (const Range& r : type3_) {
-            if (r.low >= z - kSame) break;
-            if (r.high <= z + kSame) continue;
-            ++count;
-            if (!shallow || r.weight > shallow->weight) shallow = &r;
-        }
-        if (shallow) {
-            const Feature& f = request_.features[shallow->feature];
-            found.push_back({Severity::warning, "layers.type3",
-                             boundary + "lies in the shallow slope from " + words_mm(f.z_low) + " to " +
-                                 words_mm(f.z_high) + " mm (" + square(f.area) + ")" +
-                                 others(count - 1, "slopes"),
-                             place(shallow->feature, tops[i])});
-        }
+        if (i + 1 < tops.size()) diagnose_joint(z, false, found);
     }
     return found;
 }

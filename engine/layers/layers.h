@@ -41,14 +41,15 @@ struct Boundary {
     std::string reason;         ///< in words, with the feature that decided
 };
 
-/// What a placement breaks, in the order in which `optimal` minimises it. Sums of whole units (0.001 mm², 0.1
+/// What a placement breaks, at its boundaries and at the joints between slabs that are bonded into one layer,
+/// in the order in which `optimal` minimises it. Sums of whole units (0.001 mm², 0.1
 /// nm, 1e-9 of Q), so that equal placements compare equal. The pattern's top is no joint: nothing is glued
 /// there.
 struct LayerCost {
     double broken_type2 = 0;  ///< area-weighted count: mm² of down-facing flats no boundary meets
     double broken_type1 =
         0;  ///< mm², each feature by its area, at least 1 mm², for every boundary inside (h − MTmin, h)
-    int thin_layers = 0;
+    int thin_layers = 0;      ///< with them those whose uppermost slab is left so thin
     double exposed_glue = 0;  ///< mm² of finished up-facing flats within [h − MTmin, h] of a boundary, closed
     double broken_type3 = 0;  ///< mm²
     int layers = 0;
@@ -61,7 +62,8 @@ struct LayerPlacement {
     std::vector<Boundary> boundaries;  ///< ascending; the last is the pattern's height
     LayerCost cost;
     /// layers.type1, .type2, .type3 (broken ranges), .exposed_glue, .thin, .bonded (several slabs in one
-    /// layer): one of a code per boundary, with the count of features and the worst of them.
+    /// layer), joint.thin (little wood over a joint between its slabs): one of a code per joint, with the
+    /// count of features and the worst of them.
     std::vector<Diagnostic> diagnostics;
 };
 

@@ -1,8 +1,9 @@
 // The best placement over a finite set of heights, by dynamic programming.
 //
 // Cost is a sum over joints (what a boundary breaks) and over layers (one more layer, thin or not, its slab).
-// A layer's cost depends on its thickness only, by classes, so the best predecessor of a boundary is the
-// cheapest one in each of a few windows that slide upwards with it: the whole search is linear in the number
+// A layer's cost depends on its thickness only, by classes, and on where the joints between its slabs lie,
+// which is counted from its bottom: so the best predecessor of a boundary is the cheapest one, those joints
+// included, in each of a few windows that slide upwards with it, and the whole search is linear in the number
 // of candidates. No layer may pass a Type II height, since meeting them all is always possible and comes
 // first.
 //
@@ -28,16 +29,22 @@ struct Search {
     std::vector<std::uint8_t> reached;
 };
 
+enum class From : std::uint8_t { below, above };
+
 // Candidates ascend, the first is where layers start, the last where they end; `stops` are Type II heights,
-// ascending.
+// ascending. From above all of these are depths under the pattern's top.
 Search search(const LayerRules& rules, const std::vector<Candidate>& candidates,
-              const std::vector<Ticks>& stops) {
+              const std::vector<Ticks>& stops, From from) {
     const std::size_t n = candidates.size(), classes = rules.classes() - 1;
     Search s{std::vector<CostUnits>(n), std::vector<std::size_t>(n, 0), std::vector<std::uint8_t>(n, 0)};
     s.reached[0] = 1;
     // Window c holds the candidates under b whose layer up to b is of class c: [begins[c], begins[c − 1]).
     std::vector<std::size_t> begins(classes, 0), pushed(classes, 0);
-    std::vector<std::deque<std::size_t>> windows(classes);
+    struct Entry {
+        std::size_t at;
+        CostUnits cost;
+    };
+    std::vector<std::deque<Entry>> windows(classes);
     std::size_t stop = 0, first = 0;  // no layer begins under `first`: it would pass a stop
     for (std::size_t b = 1; b < n; ++b) {
         while (stop < stops.size() && stops[stop] < candidates[b].z - kSame) {
@@ -51,18 +58,21 @@ Search search(const LayerRules& rules, const std::vector<Candidate>& candidates,
             auto& window = windows[c];
             for (std::size_t a = std::max(pushed[c], begins[c]); a < end; ++a) {
                 if (!s.reached[a]) continue;
+                CostUnits cost = s.cost[a];
+                if (from == From::below) cost += rules.slab_joints_cost(candidates[a].z, c);
                 // Equal costs keep the lower candidate in front, so ties go to the thicker layer.
-                while (!window.empty() && s.cost[window.back()] > s.cost[a]) window.pop_back();
-                window.push_back(a);
+                while (!window.empty() && window.back().cost > cost) window.pop_back();
+                window.push_back({a, cost});
             }
             pushed[c] = std::max(pushed[c], end);
-            while (!window.empty() && window.front() < std::max(begins[c], first)) window.pop_front();
+            while (!window.empty() && window.front().at < std::max(begins[c], first)) window.pop_front();
             if (window.empty()) continue;
-            const CostUnits total = s.cost[window.front()] + rules.class_cost(c) + candidates[b].joint;
+            CostUnits total = window.front().cost + rules.class_cost(c) + candidates[b].joint;
+            if (from == From::above) total += rules.slab_joints_cost(rules.height() - candidates[b].z, c);
             if (s.reached[b] && !(total < s.cost[b])) continue;
             s.reached[b] = 1;
             s.cost[b] = total;
-            s.before[b] = window.front();
+            s.before[b] = window.front().at;
         }
     }
     return s;
@@ -86,6 +96,12 @@ std::vector<Ticks> candidate_heights(const LayerRules& rules, const LayerPlaceme
         add(r.low);
         add(r.high);
     }
+    // Where slabs are bonded, a joint between two may lie at such a height as well: then the layer begins
+    // whole slabs lower.
+    const Ticks slab = rules.thickest_slab();
+    if (slab > 0 && step > slab)
+        for (std::size_t i = 0, own = heights.size(); i < own; ++i)
+            for (Ticks z = heights[i] - slab; z > kSame && heights[i] - z < step; z -= slab) add(z);
     std::sort(heights.begin(), heights.end());
     heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
     // Closed under + LTmax: whole columns from the base, from Type II heights and from print's boundaries,
@@ -131,11 +147,11 @@ LayerPlacement place_layers_optimal(const LayerRequest& request) {
     for (const Level& l : rules.type2()) stops.push_back(l.z);
     for (auto it = stops.rbegin(); it != stops.rend(); ++it) stops_from_above.push_back(top - *it);
 
-    const Search up = search(rules, candidates, stops);
+    const Search up = search(rules, candidates, stops, From::below);
     if (!up.reached.back()) return printed;
     std::vector<Candidate> from_above(candidates.rbegin(), candidates.rend());
     for (Candidate& c : from_above) c.z = top - c.z;
-    const Search down = search(rules, from_above, stops_from_above);
+    const Search down = search(rules, from_above, stops_from_above, From::above);
     std::vector<Candidate> tied;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
         const std::size_t j = candidates.size() - 1 - i;
@@ -145,7 +161,7 @@ LayerPlacement place_layers_optimal(const LayerRequest& request) {
         tied.push_back(candidates[i]);
         if (i > 0 && i + 1 < candidates.size()) tied.back().joint.minus_q = rules.minus_q(candidates[i].z);
     }
-    const Search last = search(rules, tied, stops);
+    const Search last = search(rules, tied, stops, From::below);
 
     LayerPlacement placement;
     Ticks below = 0;

@@ -53,6 +53,8 @@ public:
     [[nodiscard]] const LayerRequest& request() const { return request_; }
     [[nodiscard]] Ticks height() const { return height_; }
     [[nodiscard]] Ticks max_layer() const { return max_layer_; }
+    /// Of the stock; 0 where none is named.
+    [[nodiscard]] Ticks thickest_slab() const { return thickest_; }
     /// MTmin above a boundary at z.
     [[nodiscard]] Ticks min_material(Ticks z) const;
     /// The highest boundary under a feature at h that leaves MTmin below it, or near enough to that.
@@ -77,7 +79,13 @@ public:
     [[nodiscard]] std::size_t class_of(Ticks thickness) const;
     /// Cost of a layer of that class, Type II heights apart. @pre not the last class
     [[nodiscard]] const CostUnits& class_cost(std::size_t c) const { return class_costs_[c]; }
-    [[nodiscard]] CostUnits layer(Ticks bottom, Ticks top) const;  ///< Type II included, any thickness
+    /// Type II and the joints between its slabs included, any thickness.
+    [[nodiscard]] CostUnits layer(Ticks bottom, Ticks top) const;
+    /// The joints between the slabs that are bonded into a layer, upwards; what lies above its top is faced
+    /// off. None where one slab does.
+    [[nodiscard]] std::vector<Ticks> slab_joints(Ticks bottom, Ticks top) const;
+    /// What those joints break, of a layer of that class with this bottom; nothing for most.
+    [[nodiscard]] CostUnits slab_joints_cost(Ticks bottom, std::size_t c) const;
     [[nodiscard]] double slab_for(
         double thickness_mm) const;  ///< several of the thickest, where one does not do
 
@@ -91,9 +99,11 @@ public:
 private:
     [[nodiscard]] double section_area(Ticks z) const;
     [[nodiscard]] Ticks above(Ticks z) const;  ///< distance up to the next Type I feature
+    void diagnose_joint(Ticks z, bool inner, std::vector<Diagnostic>& found) const;
+    void diagnose_slabs(Ticks bottom, Ticks top, std::vector<Diagnostic>& found) const;
 
     const LayerRequest& request_;
-    Ticks height_ = 0, max_layer_ = 0, min_layer_ = 0, min_material_ = 0;
+    Ticks height_ = 0, max_layer_ = 0, min_layer_ = 0, min_material_ = 0, thickest_ = 0;
     std::vector<Level> type1_, type2_, up_flats_;
     std::vector<Range> type3_;
     std::vector<std::int64_t> type1_sums_, type2_sums_, up_flat_sums_;  // of weights, one more than levels
@@ -101,6 +111,8 @@ private:
         highs_;                        // of Type III: end, sum of weights up to and with it
     std::vector<Ticks> class_limits_;  // thickest layer of each class but the last
     std::vector<CostUnits> class_costs_;
+    std::vector<std::vector<Ticks>>
+        class_joints_;  // between the slabs of a class's layers, from their bottom
     mutable double largest_section_ = -1;
     mutable std::unordered_map<Ticks, double> areas_;
 };
