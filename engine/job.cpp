@@ -74,6 +74,14 @@ void validate_tool(const Tool& tool, std::size_t position) {
                            tool.stepover * tool.diameter),
                fmt::format("give a share of the diameter that makes {} mm at least", kLeastAdvance));
     require(key("strength_mpa"), tool.strength_mpa, 0, 1e5);
+    require(key("core_diameter"), tool.core_diameter, -tool.diameter, tool.diameter, Ends::open_both);
+    const bool may_have_core = !tool.plunges && (tool.kind == ToolKind::flat || tool.kind == ToolKind::face);
+    if (tool.core_diameter > 0 && !may_have_core)
+        refuse(key("core_diameter"),
+               fmt::format("{} is {}, but the tool cuts at its middle", key("core_diameter"),
+                           tool.core_diameter),
+               "only flat end mills and face mills with plunges = false have a core; leave it out");
+    require(key("ramp_deg"), tool.ramp_deg, -90, 90);
 }
 
 // A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the
@@ -157,6 +165,26 @@ FeatureOptions feature_options(const Job& job) {
 }
 
 bool plunges_by_default(ToolKind kind) { return kind == ToolKind::ball || kind == ToolKind::drill; }
+
+double core_diameter_of(const Tool& tool) {
+    constexpr double kFlatShare = 0.3, kFaceShare = 0.8;
+    const bool face = tool.kind == ToolKind::face;
+    if (tool.plunges || (!face && tool.kind != ToolKind::flat)) return 0;
+    if (tool.core_diameter >= 0) return tool.core_diameter;
+    return (face ? kFaceShare : kFlatShare) * tool.diameter;
+}
+
+double ramp_limit_deg(const Tool& tool) {
+    constexpr double kFlat = 10, kFace = 2, kAny = 90;
+    if (tool.ramp_deg >= 0) return tool.ramp_deg;
+    if (core_diameter_of(tool) <= 0) return kAny;
+    return tool.kind == ToolKind::face ? kFace : kFlat;
+}
+
+double core_recess(const Tool& tool) {
+    const double core = core_diameter_of(tool);
+    return core > 0 ? core * std::tan(ramp_limit_deg(tool) * std::numbers::pi / 180) : 0;
+}
 
 const Tool& tool_of_kind(const Job& job, ToolKind kind) {
     static constexpr const char* words[] = {"flat end mill", "ball end mill", "face mill", "drill"};

@@ -71,7 +71,9 @@ struct Tool {
     double stepdown_min = 0, stepdown_max = 0;  ///< LUO table 5.4
     double stepover = 0.5;                      ///< share of the diameter, for clearing
     bool plunges = false;                       ///< cuts straight down into stock (plunges_by_default)
-    double strength_mpa = 0;  ///< the cutter's own in bending, as its maker states it; 0: not checked
+    double strength_mpa = 0;    ///< the cutter's own in bending, as its maker states it; 0: not checked
+    double core_diameter = -1;  ///< within which it has no edge, flat and face; negative: core_diameter_of()
+    double ramp_deg = -1;       ///< steepest way down into stock; negative: ramp_limit_deg()
 };
 
 struct Material {
@@ -273,6 +275,19 @@ struct Job {
 /// Whether tools of a kind mill straight down unless the job says otherwise: ball end mills and drills do;
 /// the edges of a face mill do not reach its middle, nor do those of many flat end mills.
 [[nodiscard]] bool plunges_by_default(ToolKind kind);
+
+/// The diameter within which a flat end mill or a face mill has no edge, mm. Tool::core_diameter where that
+/// is given; else 0.3 of an end mill's diameter and 0.8 of a face mill's. 0 of all others and of what
+/// plunges.
+[[nodiscard]] double core_diameter_of(const Tool& tool);
+
+/// The steepest ramp into stock, degrees. Tool::ramp_deg where that is given; else 2 for a face mill, 10 for
+/// an end mill with a core, and 90 for what has none.
+[[nodiscard]] double ramp_limit_deg(const Tool& tool);
+
+/// How high stock may stand under a tool's core, mm: as high as its steepest straight ramp leaves it there,
+/// the core's diameter times the ramp's slope. The core must be recessed by that for the ramp to be possible.
+[[nodiscard]] double core_recess(const Tool& tool);
 
 /// The first tool of a kind. @throws Error(usage, "job.tool") when the library has none
 [[nodiscard]] const Tool& tool_of_kind(const Job& job, ToolKind kind);

@@ -89,6 +89,12 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.key(
         "plunges", tool.plunges,
         "cuts straight down into stock; when left out: true for ball and drill, false for flat and face");
+    visit.key("core_diameter", tool.core_diameter,
+              "mm within which a flat or face mill has no edge; negative: 0 where it plunges, else 0.3 of a "
+              "flat's diameter and 0.8 of a face mill's");
+    visit.key("ramp_deg", tool.ramp_deg,
+              "degrees, steepest ramp into stock; negative: 10 of a flat, 2 of a face mill, any of what "
+              "plunges");
 }
 
 /// Walks every key of the job but the tools: first those of the top, then table by table.

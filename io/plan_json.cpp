@@ -75,6 +75,8 @@ void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
     json.key("stepdown").begin_array().exact(tool.stepdown_min).exact(tool.stepdown_max).end();
     json.key("stepover").exact(tool.stepover);
     json.key("plunges").boolean(tool.plunges);
+    json.key("core_diameter").exact(core_diameter_of(tool));
+    json.key("ramp_deg").exact(ramp_limit_deg(tool));
     json.key("strength_mpa").exact(tool.strength_mpa);
     double allowed = 0;
     for (const Layer& layer : plan.layers)

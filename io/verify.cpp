@@ -65,6 +65,10 @@ public:
         if (!value_.is_number_integer() || std::abs(number()) > 1e9) fail(way_, "is no whole number");
         return value_.get<int>();
     }
+    [[nodiscard]] bool boolean() const {
+        if (!value_.is_boolean()) fail(way_, "is neither true nor false");
+        return value_.get<bool>();
+    }
     [[nodiscard]] std::string text() const {
         if (!value_.is_string()) fail(way_, "is no text");
         return value_.get<std::string>();
@@ -109,6 +113,11 @@ Tool read_tool(const Field& t) {
     if (!(tool.diameter > 0)) t["diameter"].fail("is no diameter");
     if (t.has("name")) tool.name = t["name"].text();
     if (t.has("max_rpm")) tool.max_rpm = t["max_rpm"].number();
+    tool.plunges = t.has("plunges") ? t["plunges"].boolean() : plunges_by_default(tool.kind);
+    if (t.has("core_diameter")) tool.core_diameter = t["core_diameter"].number();
+    if (t.has("ramp_deg")) tool.ramp_deg = t["ramp_deg"].number();
+    if (tool.core_diameter >= tool.diameter) t["core_diameter"].fail("is no less than the diameter");
+    if (tool.ramp_deg > 90) t["ramp_deg"].fail("is no slope");
     return tool;
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <random>
 
 #include "io/job_keys.h"
@@ -167,6 +168,35 @@ TEST(Job, DepthAndLengthOfAFileAreBounded) {
                                  deep + "\n[material]\nname = \"\"\"" + deep + "\n\"\"\"\nsource = '" + deep +
                                  "'\n[tolerances]\ngouge = 0.02 # a.b\n";
     EXPECT_EQ(parse_job(harmless, "x").tolerances.gouge, 0.02);
+}
+
+// Within which a tool has no edge, and how steeply it may go down because of that.
+TEST(Job, ToolsHaveACoreUnlessTheyPlunge) {
+    const Job job;
+    const Tool &face = job.tools[0], &flat = job.tools[1], &ball = job.tools[2];
+    EXPECT_DOUBLE_EQ(core_diameter_of(face), 40);
+    EXPECT_DOUBLE_EQ(core_diameter_of(flat), 0.3 * 12.7);
+    EXPECT_EQ(core_diameter_of(ball), 0);
+    EXPECT_EQ(ramp_limit_deg(face), 2);
+    EXPECT_EQ(ramp_limit_deg(flat), 10);
+    EXPECT_EQ(ramp_limit_deg(ball), 90);
+    EXPECT_NEAR(core_recess(face), 40 * std::tan(2 * std::numbers::pi / 180), 1e-12);
+    EXPECT_EQ(core_recess(ball), 0);
+    Tool plunging = flat;
+    plunging.plunges = true;
+    EXPECT_EQ(core_diameter_of(plunging), 0);
+    const Job read = parse_job(
+        "[[tool]]\nnumber = 7\nkind = \"flat\"\ndiameter = 10\nflute_length = 25\nstickout = "
+        "40\nshank_diameter = 10\nstepdown_max = 3\nholder_diameter = 32\ncore_diameter = 4\n"
+        "ramp_deg = 3\n",
+        "x");
+    EXPECT_EQ(core_diameter_of(read.tools[0]), 4);
+    EXPECT_EQ(ramp_limit_deg(read.tools[0]), 3);
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[0].core_diameter = 50; })) << "no edge at all";
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[0].core_diameter = 20, j.tools[0].plunges = true; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[2].core_diameter = 1, j.tools[2].plunges = false; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.tools[0].ramp_deg = 91; }));
+    EXPECT_TRUE(is_valid([](Job& j) { j.tools[0].core_diameter = 20, j.tools[0].ramp_deg = 0; }));
 }
 
 TEST(Job, UnknownKeysNameTheNearest) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "engine/simulate/core_contact.h"
 #include "engine/simulate/reach.h"
 #include "engine/simulate/work.h"
 #include "kernels/errors.h"
@@ -94,6 +95,7 @@ struct TileProgram {
     Extreme rapid, over_flute, deepest, shank, holder;
     std::uint32_t rapid_line = 0, over_flute_line = 0, deepest_line = 0, shank_line = 0, holder_line = 0;
     double most = 0;  // mm that any cell lost
+    CoreContact::Findings core;
 };
 struct TileLayer {
     LayerFindings findings;
@@ -433,6 +435,9 @@ private:
                 raise(f.deepest, f.deepest_line, p.deepest, p.deepest_line);
                 raise(f.shank, f.shank_line, p.shank, p.shank_line);
                 raise(f.holder, f.holder_line, p.holder, p.holder_line);
+                raise(f.crushed, f.crushed_line,
+                      {p.core.deepest, {p.core.where[0], p.core.where[1], p.core.z}}, p.core.line);
+                f.crushed_mm2 += static_cast<double>(p.core.cells) * cell_ * cell_;
             }
             for (std::size_t i = 0; i < r.layers.size(); ++i) {
                 const LayerFindings& l = r.layers[i].findings;
@@ -561,6 +566,7 @@ private:
             return box.meets(grid, margin, top);
         };
         const auto& arcs = p.program->arcs;
+        CoreContact core(tool, grid);
         std::size_t arc = 0, cut_arcs = 0;  // the arc at hand or next; how many have been cut
         bool any = false;
         const auto tell = [&](std::size_t i, const CutEffect& e) {
@@ -603,6 +609,10 @@ private:
             if (!a.known() || !b.known()) return;
             const StepBox box = box_of(a, b);
             if (!meets(box)) return;
+            if (core.watches() && core.concerns(stock, a, b)) {
+                cut_level();
+                core.follow(stock, a, b);
+            }
             const Point3 from{a.x, a.y, a.z}, to{b.x, b.y, b.z};
             const double low = std::min(a.z, b.z);
             // An arc is cut whole at the first of its chords that comes near; the others then have nothing to
@@ -676,6 +686,7 @@ private:
             }
         }
         cut_level();
+        out.core = core.findings();
         return any;
     }
 
@@ -897,6 +908,14 @@ private:
                 violate(report, "contact.holder",
                         fmt::format("the holder runs into stock, {:.3f} mm deep", f.holder.size), &p,
                         f.holder_line, f.holder.where, f.holder.size);
+        });
+        each([&](const Program& p, const ProgramFindings& f, std::size_t) {
+            if (f.crushed.size > 0)
+                violate(report, "plunge.not_center_cutting",
+                        fmt::format("goes down on {:.3f} mm of stock under its middle, where it has no edge "
+                                    "({:.1f} mm2 in all)",
+                                    f.crushed.size, f.crushed_mm2),
+                        &p, f.crushed_line, f.crushed.where, f.crushed.size);
         });
         each([&](const Program& p, const ProgramFindings& f, std::size_t) {
             if (f.rapid.size > 0)

@@ -55,10 +55,10 @@ struct Extreme {
 
 /// Something that must not be. The code's family names the kind of fault:
 /// stack.short, stack.narrow, stack.gap, stack.thin, gouge.cutter, gouge.stock, gouge.flask, contact.shank,
-/// contact.holder, rapid.through_stock, rapid.unknown_start, flute.too_deep, cut.too_deep, spindle.off,
-/// travel.exceeded, board.too_deep, operation.empty, tool.wrong, tool.unknown, left.missed, left.too_much;
-/// and by io/verify program.order, program.unplanned, program.missing, tool.table, sequence.no_file,
-/// sequence.unreadable and those of replay_build.
+/// contact.holder, plunge.not_center_cutting, rapid.through_stock, rapid.unknown_start, flute.too_deep,
+/// cut.too_deep, spindle.off, travel.exceeded, board.too_deep, operation.empty, tool.wrong, tool.unknown,
+/// left.missed, left.too_much; and by io/verify program.order, program.unplanned, program.missing,
+/// tool.table, sequence.no_file, sequence.unreadable and those of replay_build.
 struct Violation {
     std::string code;
     std::string message;  ///< one line, sizes with units
@@ -119,7 +119,10 @@ struct ProgramFindings {
                       ///< cells abreast, it took more than planned
     std::uint32_t deepest_line = 0;
     Extreme shank, holder;  ///< standing stock that they run into
-    GougePlace flask;       ///< how deep it goes into the flask's walls, by the exact check
+    Extreme crushed;        ///< stock that the core of a tool came down on, where it may not (core_contact.h)
+    double crushed_mm2 = 0;  ///< of such stock, seen from above
+    std::uint32_t crushed_line = 0;
+    GougePlace flask;  ///< how deep it goes into the flask's walls, by the exact check
     std::uint32_t shank_line = 0, holder_line = 0;
     double lowest = 0;     ///< z of the lowest point cut; the layer's top if none
     double stock_top = 0;  ///< z of the highest stock when the program starts
