@@ -234,8 +234,10 @@ TEST(RestMachining, FollowsChannelsAsFarAsTheyAreWideEnough) {
         LayerStock stock(w.cut, 0.2);
         for (const auto& [radius, z] : {std::pair{width / 2 + 1, top}, {width / 2 - 1, floor}}) {
             const CutterEnd end{CutterEnd::Form::flat, radius, 0};
-            if (narrows) stock.cut_along(end, {-40, 0.68, z}, {40, 0.68, z});
-            else stock.cut_along(end, {0.217, -40, z}, {0.217, 40, z});
+            const std::array<double, 3> from{narrows ? -40 : 0.217, narrows ? 0.68 : -40, z},
+                to{narrows ? 40 : 0.217, narrows ? 0.68 : 40, z};
+            stock.cut_along(end, from, to);
+            w.standing.cut({Cutter::Profile::flat, radius}, from, to);
         }
         const std::size_t before = could_be_lowered(w, stock, tool, limit, worth);
         const Operation op = cut_rest(w.cut, stock, tool, {OperationKind::corner, "rest", limit, false});

@@ -25,12 +25,24 @@ Operation face_layer(const LayerCut& cut) {
     PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance,
                      cut.stock_top + 2);
     const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
+    // Where the machine's travel does not let it go down beside the stock, it goes down on a ramp.
+    const bool beside = cut.low(1, r + 2) <= lo[1] - r;
+    Standing standing(lo, hi, cut.stock_top);
+    if (!beside) {
+        Surroundings around{&standing, nullptr, {Cutter::Profile::flat, r}};
+        around.ramp_deg = cut.job.cutting.ramp_deg;
+        path.know(around);
+    }
     for (int step = 1; step <= steps; ++step) {
         const std::int32_t z = to_units(step == steps ? cut.layer.z_top : cut.stock_top - op.stepdown * step);
         double inset = stepover - r;  // of the cutter's centre from the stock's edge
         const double x0 = std::max(lo[0] + inset, cut.low(0, r)), y_out = cut.low(1, r + 2);
-        path.go_above({to_units(std::min(x0, hi[0])), to_units(y_out)});
-        path.sink(z);
+        const PathPoint begin{to_units(std::min(x0, hi[0])), to_units(y_out), z};
+        if (!beside) {
+            const std::int32_t north = to_units(std::min(hi[1] - inset, cut.high(1, r)));
+            path.follow(std::array<PathPoint, 2>{begin, PathPoint{begin.x, std::max(begin.y, north), z}});
+        }
+        if (beside || path.z() != z) path.go_above({begin.x, begin.y}), path.sink(z);
         for (;; inset += stepover) {
             const double w = hi[0] - lo[0] - 2 * inset, d = hi[1] - lo[1] - 2 * inset;
             const double left = std::max(lo[0] + inset, cut.low(0, r)),

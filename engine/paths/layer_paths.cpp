@@ -103,6 +103,10 @@ Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
     around.ramp_deg = job.cutting.ramp_deg;
     around.no_way_in = &no_way_in;
     around.lowest_rapid = layer.z_bottom + PathBuilder::kStop;
+    for (const int axis : {0, 1}) {
+        const auto a = static_cast<std::size_t>(axis);
+        around.reach_min[a] = low(axis, 1e9), around.reach_max[a] = high(axis, 1e9);
+    }
     if (!layer.opening.empty()) around.room = std::make_shared<const Loops>(flask_room(*this, cutter.radius));
     return around;
 }

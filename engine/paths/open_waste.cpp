@@ -13,9 +13,7 @@ constexpr double kCollar = 1.5;        // mm that stay of the waste beside what 
                                        // ring_tolerance(): one light cut of it
 constexpr double kOverlap = 0.1;       // mm: more than a border ring and offsets may leave their lines by
 constexpr double kOffsetError = 0.01;  // mm
-constexpr double kRamp =
-    2;  // degrees: a face mill's teeth are at its rim, so it goes down gently where it must
-constexpr double kWorth = 1;  // minutes
+constexpr double kWorth = 1;           // minutes
 
 double feed_of(const LayerCut& cut, const Tool& tool) {
     return std::min(tool.max_feed, cut.job.machine.max_feed);
@@ -90,39 +88,55 @@ void leave_below_first_gap(std::span<OpenLevel> levels) {
     }
 }
 
-Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<OpenLevel> levels,
-                           EngagedStock* stock) {
-    Operation op = cut.operation(OperationKind::rough, "open waste", face);
-    op.blend = rough_blend(cut.job.cutting);
-    const bool in_spindle = to_units(cut.stock_top - cut.layer.z_top) > 0;
-    double saved = in_spindle ? 0 : -cut.job.machine.tool_change_s / 60;
-    for (const OpenLevel& level : levels)
-        if (!level.rings.pieces.empty()) saved += level.saved;
-    if (saved < kWorth) return op;
+namespace {
+
+// Cuts levels until one has a run that has no way in. Returns how many levels were cut whole.
+std::size_t cut_open_levels(const LayerCut& cut, const Tool& face, std::span<const OpenLevel> levels,
+                            const DropIndex& part, Operation& op) {
     PathBuilder path(op, face, feed_of(cut, face), cut.layer.z_top + cut.job.machine.clearance,
                      cut.layer.z_top + 2);
-    const DropIndex part(cut.solid,
-                         {Cutter::Profile::flat, face.diameter / 2 + kept_off_walls(cut.job.cutting)});
     Surroundings around = cut.around(face, &part);
-    around.ramp_deg = std::min(around.ramp_deg, kRamp);
     around.from_side = true;
     path.know(around);
-    const Standing stood = *cut.standing;
     const std::size_t no_ways = cut.no_way_in.size();
-    for (OpenLevel& level : levels) {
+    for (std::size_t l = 0; l < levels.size(); ++l) {
+        const OpenLevel& level = levels[l];
         if (level.rings.pieces.empty()) continue;
         const double deep = level.above - to_mm(level.rings.z);
         const int passes = std::max(1, static_cast<int>(std::ceil(deep / face_step(cut.job, face) - 1e-9)));
         op.stepdown = std::max(op.stepdown, deep / passes);
         op.stepover = std::max(op.stepover, level.rings.widest_step());
-        for (int pass = 1; pass < passes; ++pass)
+        for (int pass = 1; pass <= passes; ++pass) {
             clear_from_afar(path, cut, lifted(level.rings, deep * (passes - pass) / passes));
-        clear_from_afar(path, cut, std::move(level.rings));
+            if (cut.no_way_in.size() > no_ways) return l;
+        }
     }
     path.finish();
-    if (cut.no_way_in.size() > no_ways) {  // what it has left out the end mill would not know of
+    return levels.size();
+}
+
+}  // namespace
+
+Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<OpenLevel> levels,
+                           EngagedStock* stock) {
+    Operation op;
+    const bool in_spindle = to_units(cut.stock_top - cut.layer.z_top) > 0;
+    const DropIndex part(cut.solid,
+                         {Cutter::Profile::flat, face.diameter / 2 + kept_off_walls(cut.job.cutting)});
+    const Standing stood = *cut.standing;
+    const std::size_t no_ways = cut.no_way_in.size();
+    for (;;) {
+        op = cut.operation(OperationKind::rough, "open waste", face);
+        op.blend = rough_blend(cut.job.cutting);
+        double saved = in_spindle ? 0 : -cut.job.machine.tool_change_s / 60;
+        for (const OpenLevel& level : levels)
+            if (!level.rings.pieces.empty()) saved += level.saved;
+        if (saved < kWorth) return op;
+        const std::size_t whole = cut_open_levels(cut, face, levels, part, op);
+        if (whole == levels.size()) break;
+        // What it leaves out of a level the end mill would not know of: it takes the level, and all below.
         *cut.standing = stood, cut.no_way_in.resize(no_ways);
-        op.moves.clear();
+        for (OpenLevel& level : levels.subspan(whole)) level = {};
     }
     if (stock != nullptr && !op.moves.empty()) {
         stock->change_cutter(face.diameter / 2);

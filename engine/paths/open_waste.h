@@ -40,8 +40,9 @@ struct OpenLevel {
 /// @param levels descending
 void leave_below_first_gap(std::span<OpenLevel> levels);
 
-/// Cuts levels, which descend. No moves, and nothing changed, where there are none, where they are not worth
-/// the face mill's time, or where a run of theirs has no way in.
+/// Cuts levels, which descend. One with a run that has no way in is left to the end mill, and so are those
+/// below it: they are made empty. No moves, and nothing changed, where there are none left, or where they are
+/// not worth the face mill's time.
 /// @param stock what the feed is lowered by (engagement.h), which is cut; null: it is not lowered
 [[nodiscard]] Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<OpenLevel> levels,
                                          EngagedStock* stock);

@@ -15,13 +15,42 @@ constexpr double kBallMiddle = 0.75;  // of a ball's radius: what counts as head
 constexpr std::array kHelixRadii{
     0.9, 0.65, 0.45};  // of the cutter's radius: under it, so that no post is left in the middle
 constexpr int kSideRings = 6,
-              kSideWays = 16;      // places looked at beside a run that no helix and no ramp reaches
-constexpr double kSideStep = 0.4;  // of the cutter's radius, between their rings
+              kSideWays = 16;          // places looked at beside a run that no helix and no ramp reaches
+constexpr double kSideStep = 0.4;      // of the cutter's radius, between their rings
+constexpr double kRecessShare = 0.9;   // of a core's recess that helices and ramps fill
+constexpr double kClearOfPost = 1.02;  // of the core's radius: the least radius of a helix
 
-// The middle of a cutter: what stands there is entered head-on.
-Cutter middle(const Cutter& cutter) {
-    return {cutter.profile,
-            (cutter.profile == Cutter::Profile::ball ? kBallMiddle : PathBuilder::kMiddle) * cutter.radius};
+double distance_mm(const PathPoint& a, const PathPoint& b) {
+    return std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y) / kUnitsPerMm;
+}
+
+// How far along a line from its beginning, seen from above, it first is `far` mm from there; none where it
+// never is.
+template <class Iterator>
+std::optional<double> way_until_far(Iterator begin, Iterator end, double far) {
+    double way = 0;
+    for (Iterator p = begin, q = std::next(begin); q != end; p = q++) {
+        const double ax = to_mm(p->x) - to_mm(begin->x), ay = to_mm(p->y) - to_mm(begin->y);
+        const double dx = to_mm(q->x) - to_mm(p->x), dy = to_mm(q->y) - to_mm(p->y);
+        const double length = std::hypot(dx, dy);
+        if (std::hypot(ax + dx, ay + dy) >= far && length > 0) {
+            // Within this segment: |a + t·d/length| = far.
+            const double along = (ax * dx + ay * dy) / length;
+            return way - along + std::sqrt(std::max(0.0, along * along + far * far - ax * ax - ay * ay));
+        }
+        way += length;
+    }
+    return std::nullopt;
+}
+
+// The longest way along a line between two of its points that are no farther than `far` mm from each other,
+// the first of them a point of the list, as far as the line leads that far away.
+double longest_within(std::span<const PathPoint> line, double far) {
+    double longest = 0;
+    for (std::size_t k = 0; k + 1 < line.size(); ++k)
+        if (const auto way = way_until_far(line.begin() + static_cast<std::ptrdiff_t>(k), line.end(), far))
+            longest = std::max(longest, *way);
+    return longest;
 }
 
 }  // namespace
@@ -34,8 +63,47 @@ PathBuilder::PathBuilder(Operation& operation, const Tool& tool, double feed, do
       sink_feed_(static_cast<std::uint32_t>(std::lround(tool.max_feed))),
       clearance_(to_units(clearance_z)),
       link_(to_units(link_z)),
-      plunges_(tool.plunges) {
+      plunges_(tool.plunges),
+      face_(tool.kind == ToolKind::face),
+      core_(core_diameter_of(tool) / 2),
+      recess_(core_recess(tool)),
+      ramp_limit_deg_(ramp_limit_deg(tool)) {
     operation_.clearance_z = clearance_z;
+}
+
+// The middle of a cutter: what stands there is entered head-on. Of a face mill that is nearly all of it.
+Cutter PathBuilder::middle() const {
+    const Cutter& cutter = around_.cutter;
+    if (cutter.profile == Cutter::Profile::ball) return {cutter.profile, kBallMiddle * cutter.radius};
+    const bool whole = face_ && !plunges_;
+    return {cutter.profile, std::max(core_, whole ? cutter.radius - kRim : kMiddle * cutter.radius)};
+}
+
+// The steepest slope on which no more stands under the core than its recess, where a point is under it for
+// `way` mm.
+double PathBuilder::slope_under_core(double way) const {
+    const double most = std::tan(std::min(around_.ramp_deg, ramp_limit_deg_) * std::numbers::pi / 180);
+    return core_ > 0 ? std::min(most, kRecessShare * recess_ / way) : most;
+}
+
+// The same to and fro over a line; 0 where it is so short that a post would stay under the core. Two places
+// from which the core covers the same point are no farther apart than the core is wide. So a point is under
+// it no longer than the line takes to lead that far away, and at the line's ends twice as long, there and
+// back.
+double PathBuilder::slope_to_and_fro(std::span<const PathPoint> line) const {
+    if (core_ <= 0) return slope_under_core(1);
+    const auto first = way_until_far(line.begin(), line.end(), 2 * core_),
+               last = way_until_far(line.rbegin(), line.rend(), 2 * core_);
+    if (!first || !last) return 0;
+    return slope_under_core(std::max({2 * *first, 2 * *last, longest_within(line, 2 * core_)}));
+}
+
+double PathBuilder::slope_around(std::span<const PathPoint> ring) const {
+    if (core_ <= 0) return slope_under_core(1);
+    std::vector<PathPoint> twice(ring.begin(), ring.end());
+    twice.insert(twice.end(), ring.begin() + 1, ring.end());
+    if (!way_until_far(ring.begin(), ring.end(), 2 * core_)) return 0;
+    return slope_under_core(longest_within(twice, 2 * core_));
 }
 
 void PathBuilder::add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t feed) {
@@ -100,7 +168,7 @@ double PathBuilder::standing_middle(Point2 at) {
     learn();
     const std::array<double, 2> p{to_mm(at.x), to_mm(at.y)};
     // Of a flat end every cell counts that its middle may touch; the walls beside the cutter are farther off.
-    const Cutter inner = middle(around_.cutter);
+    const Cutter inner = middle();
     return inner.profile == Cutter::Profile::flat ? around_.standing->top(inner.radius, p, p)
                                                   : around_.standing->free_tip(inner, p, p);
 }
@@ -196,6 +264,9 @@ bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
     for (const double share : kHelixRadii) {
         const double radius = share * around_.cutter.radius, cx = to_mm(first.x) - radius * uy,
                      cy = to_mm(first.y) + radius * ux;
+        if (radius < kClearOfPost * core_) return false;
+        // Round a circle wider than the core, no point is under it for longer.
+        const double slope = slope_under_core(2 * radius * std::asin(core_ / radius));
         // Chords that the machine takes as fast as the circle: no farther from it than it may pass by a
         // corner.
         const double chord = std::min(around_.chord, std::sqrt(8 * radius * operation_.blend));
@@ -218,17 +289,16 @@ bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
                 std::max(top, around_.standing->free_tip(around_.cutter, circle[static_cast<std::size_t>(k)],
                                                          circle[static_cast<std::size_t>(k) + 1]));
         const double drop = (top + 0.1 - to_mm(first.z)) * kUnitsPerMm;
-        const double turns = std::ceil(drop / (2 * std::numbers::pi * radius * kUnitsPerMm *
-                                               std::tan(around_.ramp_deg * std::numbers::pi / 180)));
+        const double turns = std::ceil(drop / (2 * std::numbers::pi * radius * kUnitsPerMm * slope));
         if (turns > 100) return false;
         sink(first.z + static_cast<std::int32_t>(drop));
-        const int places = static_cast<int>(turns) * chords;
-        for (int k = 1; k <= places; ++k) {
+        const int places = static_cast<int>(turns) * chords, level = core_ > 0 ? chords : 0;
+        for (int k = 1; k <= places + level; ++k) {
             const std::array<double, 2>& p = circle[static_cast<std::size_t>(k % chords)];
             const Point2 at =
                 k % chords == 0 ? Point2{first.x, first.y} : Point2{to_units(p[0]), to_units(p[1])};
-            cut(at,
-                first.z + static_cast<std::int32_t>(std::ceil(drop * (1 - static_cast<double>(k) / places))));
+            const double left = std::max(0.0, 1 - static_cast<double>(k) / places);
+            cut(at, first.z + static_cast<std::int32_t>(std::ceil(drop * left)));
         }
         return true;
     }
@@ -244,6 +314,7 @@ bool PathBuilder::enter_on_ramp(std::span<const PathPoint> run) {
     for (std::size_t k = 1; k < run.size() && length < longest; ++k) {
         const PathPoint& p = run[k - 1];
         PathPoint q = run[k];
+        if (core_ > 0 && q.z != first.z) break;
         const double way = std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y);
         if (length + way > longest) {
             const double t = (longest - length) / way;
@@ -251,18 +322,18 @@ bool PathBuilder::enter_on_ramp(std::span<const PathPoint> run) {
                  p.y + static_cast<std::int32_t>(t * (static_cast<double>(q.y) - p.y)), std::max(p.z, q.z)};
         }
         length += std::min(way, longest - length);
-        height = std::max(height, around_.standing->free_tip(middle(around_.cutter), {to_mm(p.x), to_mm(p.y)},
-                                                             {to_mm(q.x), to_mm(q.y)}) -
-                                      to_mm(std::min(p.z, q.z)));
+        height = std::max(
+            height, around_.standing->free_tip(middle(), {to_mm(p.x), to_mm(p.y)}, {to_mm(q.x), to_mm(q.y)}) -
+                        to_mm(std::min(p.z, q.z)));
         stretch.push_back(q);
     }
-    const double drop = (height + 0.1) * kUnitsPerMm,
-                 slope = std::tan(around_.ramp_deg * std::numbers::pi / 180);
-    const double legs = length > kUnitsPerMm ? 2 * std::ceil(drop / (2 * length * slope)) : 0;
+    const double drop = (height + 0.1) * kUnitsPerMm, slope = slope_to_and_fro(stretch);
+    const double legs = length > kUnitsPerMm && slope > 0 ? 2 * std::ceil(drop / (2 * length * slope)) : 0;
     if (legs <= 0 || legs >= 1000) return false;
     sink(first.z + static_cast<std::int32_t>(drop));
     double done = 0;
-    for (int leg = 0; leg < static_cast<int>(legs); ++leg) {
+    const int level = core_ > 0 ? 2 : 0;
+    for (int leg = 0; leg < static_cast<int>(legs) + level; ++leg) {
         if (leg > 0) std::reverse(stretch.begin(), stretch.end());
         for (std::size_t k = 1; k < stretch.size(); ++k) {
             const PathPoint &p = stretch[k - 1], &q = stretch[k];
@@ -319,8 +390,24 @@ bool PathBuilder::go_straight(Point2 to, std::int32_t z) {
     return true;
 }
 
+// Whether a tool with a core would go down to a place more steeply than on a ramp, where its core meets what
+// stands.
+bool PathBuilder::comes_down_on_stock(const PathPoint& to) {
+    if (core_ <= 0 || around_.standing == nullptr || to.z >= z_) return false;
+    const double way = distance_mm({x_, y_, z_}, to);
+    if (to_mm(z_ - to.z) <= way * slope_under_core(2 * core_)) return false;
+    learn();
+    return around_.standing->top(core_, {to_mm(x_), to_mm(y_)}, {to_mm(to.x), to_mm(to.y)}) >
+           to_mm(to.z) + kScrape;
+}
+
 void PathBuilder::follow(std::span<const PathPoint> run) {
-    if (run.empty()) return;
+    while (!run.empty()) run = run.subspan(follow_part(run));
+}
+
+// Follows a run to where it has to be entered anew; where there is no way in, leaves out what goes on at that
+// height. Returns how many points that are.
+std::size_t PathBuilder::follow_part(std::span<const PathPoint> run) {
     const Point2 first{run.front().x, run.front().y};
     if (around_.standing == nullptr) {
         go_above(first);
@@ -333,10 +420,16 @@ void PathBuilder::follow(std::span<const PathPoint> run) {
         if (!from_side && !enter(run)) {
             if (around_.no_way_in != nullptr)
                 around_.no_way_in->push_back({to_mm(first.x), to_mm(first.y), to_mm(run.front().z)});
-            return;
+            std::size_t past = 1;
+            while (past < run.size() && run[past].z == run.front().z) ++past;
+            return past;
         }
     }
-    for (const PathPoint& p : run.subspan(1)) cut({p.x, p.y}, p.z);
+    for (std::size_t k = 1; k < run.size(); ++k) {
+        if (comes_down_on_stock(run[k])) return k;
+        cut({run[k].x, run[k].y}, run[k].z);
+    }
+    return run.size();
 }
 
 void PathBuilder::plunge(std::int32_t z) {

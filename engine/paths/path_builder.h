@@ -23,7 +23,9 @@ struct Surroundings {
     double chord = 0;  ///< mm: longest chord between places where `part` is free that is safe (safe_chord_mm)
     double ramp_deg = 5;                  ///< entry into stock
     std::shared_ptr<const Loops> room{};  ///< where the cutter's middle may be beside a flask; none: anywhere
-    double lowest_rapid = -1e9;           ///< mm: rapids go no deeper
+    std::array<double, 2> reach_min{-1e9, -1e9};  ///< mm: where the machine's travel takes the tip
+    std::array<double, 2> reach_max{1e9, 1e9};
+    double lowest_rapid = -1e9;  ///< mm: rapids go no deeper
     bool from_side =
         false;  ///< comes from beside a run where that is possible, rather than on a helix or a ramp
     /// Gets where a run begins that was left out: neither helix nor ramp has room, and the tool does not cut
@@ -55,10 +57,17 @@ public:
     /// leaves room for one; else on a ramp along the run, to and fro; up to kPlunge of it straight down, or
     /// kScrape by a tool that does not plunge. Where a run is too short for a ramp, a tool that plunges does;
     /// others come from beside it, where they have room already, or else the run is left out
-    /// (Surroundings::no_way_in).
+    /// (Surroundings::no_way_in), as far as it goes on at that height.
+    ///
+    /// Helices and ramps of a tool with a core are so gentle that nothing stands higher under it than its
+    /// recess (core_recess), and end on a level turn or leg that clears the rest. Where a run goes down
+    /// steeply on standing stock, such a tool enters anew.
     /// Every point of the run must be free, and so must be what lies straight above it (as of a drop or a
     /// level contour).
     void follow(std::span<const PathPoint> run);
+    /// The steepest slope on which the tool may go down round and round a closed ring (its first point is
+    /// repeated at the end); 0 where the ring is so small that its core would leave a post.
+    [[nodiscard]] double slope_around(std::span<const PathPoint> ring) const;
     /// Straight down (or up) by plunge feed to z.
     void plunge(std::int32_t z);
     /// Fast down to z through air that is known to be empty: space already cut, or beside the stock. Still by
@@ -75,8 +84,12 @@ public:
     [[nodiscard]] bool is_down() const { return down_; }
     [[nodiscard]] Point2 at() const { return {x_, y_}; }
     [[nodiscard]] std::int32_t z() const { return z_; }
-    /// Whether a flask leaves room for the cutter's middle here.
-    [[nodiscard]] bool has_room(Point2 at) const { return !around_.room || winding(*around_.room, at) > 0; }
+    /// Whether the machine's travel and a flask leave room for the cutter's middle here.
+    [[nodiscard]] bool has_room(Point2 at) const {
+        return to_mm(at.x) >= around_.reach_min[0] && to_mm(at.x) <= around_.reach_max[0] &&
+               to_mm(at.y) >= around_.reach_min[1] && to_mm(at.y) <= around_.reach_max[1] &&
+               (!around_.room || winding(*around_.room, at) > 0);
+    }
     /// How low the cutter gets over a place before it meets what is known to stand; −infinity when nothing
     /// is.
     [[nodiscard]] double standing_tip(Point2 at);
@@ -92,12 +105,19 @@ public:
         0.2;  ///< mm of stock that the middle of any other may meet on its way down
     static constexpr double kMiddle =
         0.6;  ///< of a flat end mill's radius: what it does not enter straight down
+    static constexpr double kRim =
+        1.0;  ///< mm from a face mill's rim inwards in which something may stand where it goes straight down
     static constexpr double kBite = 0.1;         ///< mm that a tool may meet where it stays down
     static constexpr double kLongestWay = 40.0;  ///< mm that it stays down; above, lifting is quicker
 
 private:
     void add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t feed);
     void learn();
+    [[nodiscard]] Cutter middle() const;
+    [[nodiscard]] double slope_under_core(double way) const;
+    [[nodiscard]] double slope_to_and_fro(std::span<const PathPoint> line) const;
+    [[nodiscard]] bool comes_down_on_stock(const PathPoint& to);
+    [[nodiscard]] std::size_t follow_part(std::span<const PathPoint> run);
     [[nodiscard]] bool straight_is_free(Point2 to, std::int32_t z);
     void descend(const PathPoint& to);
     void land(std::int32_t z);
@@ -116,7 +136,9 @@ private:
     std::uint32_t feed_, plunge_feed_, sink_feed_;
     std::int32_t clearance_, link_;
     std::int32_t x_ = 0, y_ = 0, z_ = 0;
-    bool started_ = false, down_ = false, plunges_ = false;
+    bool started_ = false, down_ = false, plunges_ = false, face_ = false;
+    double core_ = 0, recess_ = 0;  // mm: the core's radius, and how much may stand under it
+    double ramp_limit_deg_ = 90;
 };
 
 /// Leaves out points of a polyline that lie within `tolerance` (0.1 µm units) of the chord between kept ones

@@ -266,12 +266,17 @@ void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_
     const double around = length(ring);
     const double drop = static_cast<double>(above) - z;
     if (around < 1) return;
+    const double slope = std::min(std::tan(ramp_deg * std::numbers::pi / 180), path.slope_around(ring));
+    if (drop > 0 && slope <= 0) {
+        path.follow(ring);
+        return;
+    }
     path.sink(above);
     if (drop <= 0) {
         for (const PathPoint& p : ring) path.cut({p.x, p.y}, z);
         return;
     }
-    const double ramp = drop / std::tan(ramp_deg * std::numbers::pi / 180);
+    const double ramp = drop / slope;
     double done = 0;
     bool down = false;
     for (std::size_t k = 1; done < ramp + around; k = k + 1 < ring.size() ? k + 1 : 1) {
@@ -377,13 +382,14 @@ std::vector<std::array<double, 4>> frames_around(const LayerCut& cut, double r, 
 void cut_frames(PathBuilder& path, const RingPlan& plan) {
     double south = plan.south;
     for (const std::array<double, 4>& ring : plan.frames) {
-        const Point2 begin{to_units(ring[0]), to_units(south)};
-        if (&ring == &plan.frames.front()) path.go_above(begin), path.sink(plan.z);
-        else path.cut(begin, plan.z);
-        path.cut({to_units(ring[0]), to_units(ring[3])}, plan.z);
-        path.cut({to_units(ring[2]), to_units(ring[3])}, plan.z);
-        path.cut({to_units(ring[2]), to_units(ring[1])}, plan.z);
-        path.cut({to_units(ring[0]), to_units(ring[1])}, plan.z);
+        const std::int32_t x0 = to_units(ring[0]), x1 = to_units(ring[2]), y0 = to_units(ring[1]),
+                           y1 = to_units(ring[3]), z = plan.z;
+        const std::array<PathPoint, 5> run{
+            {{x0, to_units(south), z}, {x0, y1, z}, {x1, y1, z}, {x1, y0, z}, {x0, y0, z}}};
+        // Beside the stock nothing stands, but the machine's travel may not reach so far.
+        if (&ring == &plan.frames.front() || path.z() != z) path.follow(run);
+        else
+            for (const PathPoint& p : run) path.cut({p.x, p.y}, z);
         south = ring[1];
     }
 }

@@ -26,7 +26,8 @@ namespace slabwright {
                                   std::span<const std::int32_t> lines);
 
 /// Cuts once around a closed ring (its first point is repeated at the end), entered at its start from `above`
-/// down a ramp along the ring itself; the stretch of the ramp is cut again. Heights in 0.1 µm.
+/// down a ramp along the ring itself; the stretch of the ramp is cut again. A ring in which the tool's core
+/// would leave a post is followed (PathBuilder::follow). Heights in 0.1 µm.
 void cut_ring(PathBuilder& path, const std::vector<PathPoint>& ring, std::int32_t above, std::int32_t z,
               double ramp_deg);
 

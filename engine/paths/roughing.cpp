@@ -294,8 +294,7 @@ std::vector<Operation> rough_layer(const LayerCut& cut) {
                 cut_ring(path, ring, to_units(above), z, cut.job.cutting.ramp_deg);
                 continue;
             }
-            path.sink(z);
-            for (const PathPoint& p : ring) path.cut({p.x, p.y}, z);
+            path.follow(ring);
         }
         // Along the flask, which is finished with that.
         for (std::size_t l = 0; l < room.size(); ++l) {
