@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "engine/forces/feeds.h"
+#include "engine/schedule/feed_lengths.h"
 #include "io/gcode_writer.h"
 #include "io/job_keys.h"
 
@@ -14,7 +15,7 @@ namespace {
 using Shape = JsonText::Shape;
 
 // Decimals of derived quantities. What the job or the engine decided is written exactly.
-constexpr int kLength = 4, kMinutes = 4, kForce = 3, kArea = 3, kDeflection = 6;
+constexpr int kLength = 4, kMinutes = 4, kForce = 3, kArea = 3, kDeflection = 6, kExact = 6;
 
 void put_xy(JsonText& json, const std::array<double, 2>& xy) {
     json.begin_array(Shape::line).exact(xy[0]).exact(xy[1]).end();
@@ -124,6 +125,14 @@ void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const O
     json.key("minutes").rounded(operation.minutes, kMinutes);
     json.key("spindle_rpm").rounded(operation.spindle_rpm, 0);
     json.key("blend").rounded(operation.blend, kLength);
+    json.key("feeds").begin_array(Shape::line);
+    for (const FeedLength& f : feed_lengths(operation.moves)) {
+        json.begin_object(Shape::line).key("feed").exact(f.feed).key("mm").rounded(f.mm, kExact);
+        json.key("centre").begin_array(Shape::line);
+        for (const double v : f.centre()) json.rounded(v, kExact);
+        json.end().end();
+    }
+    json.end();
     json.key("bending_limit").rounded(bending_limit(operation, plan.job), kLength);
     json.key("peak_force_n").rounded(operation.peak_force_n, kForce);
     json.key("deflection_mm").rounded(operation.deflection_mm, kDeflection);

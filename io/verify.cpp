@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -14,7 +13,9 @@
 #include "io/input_file.h"
 #include "io/job_keys.h"
 #include "io/output_file.h"
+#include "io/program_check.h"
 #include "io/sequence_reader.h"
+#include "io/tool_table_check.h"
 #include "io/verify_json.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
@@ -113,6 +114,7 @@ Tool read_tool(const Field& t) {
     if (!(tool.diameter > 0)) t["diameter"].fail("is no diameter");
     if (t.has("name")) tool.name = t["name"].text();
     if (t.has("max_rpm")) tool.max_rpm = t["max_rpm"].number();
+    if (t.has("max_feed")) tool.max_feed = t["max_feed"].number();
     tool.plunges = t.has("plunges") ? t["plunges"].boolean() : plunges_by_default(tool.kind);
     if (t.has("core_diameter")) tool.core_diameter = t["core_diameter"].number();
     if (t.has("ramp_deg")) tool.ramp_deg = t["ramp_deg"].number();
@@ -141,6 +143,8 @@ JobPart read_job_part(const Field& plan) {
                                   {"max_feed", &m.max_feed},
                                   {"rapid_feed", &m.rapid_feed},
                                   {"acceleration", &m.acceleration},
+                                  {"max_rpm", &m.max_rpm},
+                                  {"spindle_dwell_s", &m.spindle_dwell_s},
                                   {"tool_change_s", &m.tool_change_s},
                                   {"table_speed", &m.table_speed},
                                   {"build_height", &m.build_height},
@@ -169,6 +173,23 @@ JobPart read_job_part(const Field& plan) {
     part.job.tolerances.cusp = tolerances["cusp"].number();
     part.job.tolerances.weld = tolerances["weld"].number();
     return part;
+}
+
+/// What an operation of plan.json says of its program.
+ProgramPlan read_program_plan(const Field& op) {
+    ProgramPlan planned;
+    if (op.has("spindle_rpm")) planned.spindle_rpm = op["spindle_rpm"].number();
+    if (op.has("blend")) planned.blend = op["blend"].number();
+    if (op.has("feeds")) {
+        const Field feeds = op["feeds"];
+        planned.feeds.emplace();
+        for (std::size_t i = 0; i < feeds.size(); ++i) {
+            FeedLength f{feeds[i]["feed"].number(), feeds[i]["mm"].number(), {}};
+            for (std::size_t k = 0; k < 3; ++k) f.moment[k] = f.mm * feeds[i]["centre"][k].number();
+            add_length(*planned.feeds, f);
+        }
+    }
+    return planned;
 }
 
 /// Closed polygons as plan.json writes them.
@@ -263,69 +284,6 @@ void check_sequence(const fs::path& path, const BuildPlan& build, std::vector<Vi
     }
 }
 
-/// tool.tbl against the library: what the machine believes of a tool is what the paths were made for.
-void check_tool_table(const fs::path& path, const std::vector<Tool>& tools,
-                      std::vector<Violation>& violations) {
-    const std::string text = read_file(path, "verify.tool_table", kMostToolTableBytes);
-    std::set<int> seen;
-    std::size_t at = 0;
-    std::uint32_t line_number = 0;
-    auto complain = [&](const std::string& message, double size) {
-        violations.push_back({"tool.table", message, path.filename().string(), line_number, {}, size});
-    };
-    while (at < text.size()) {
-        std::size_t end = text.find('\n', at);
-        if (end == std::string::npos) end = text.size();
-        std::string_view line(text.data() + at, end - at);
-        at = end + 1;
-        ++line_number;
-        if (const std::size_t comment = line.find(';'); comment != std::string_view::npos)
-            line = line.substr(0, comment);
-        double t = -1, d = -1, z = 0;
-        std::size_t i = 0;
-        while (i < line.size()) {
-            if (line[i] == ' ' || line[i] == '\t' || line[i] == '\r') {
-                ++i;
-                continue;
-            }
-            const char letter = line[i++];
-            std::size_t stop = i;
-            while (stop < line.size() && line[stop] != ' ' && line[stop] != '\t' && line[stop] != '\r')
-                ++stop;
-            std::string_view digits = line.substr(i, stop - i);
-            if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
-            double value = 0;
-            const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value,
-                                                        std::chars_format::fixed);
-            if (status != std::errc{} || rest != digits.data() + digits.size())
-                throw Error(ErrorKind::verification, "verify.tool_table",
-                            std::string("no number follows ") + letter,
-                            path.string() + ":" + std::to_string(line_number), "plan again");
-            if (letter == 'T') t = value;
-            if (letter == 'D') d = value;
-            if (letter == 'Z') z = value;
-            i = stop;
-        }
-        if (t < 0) continue;
-        const auto tool =
-            std::find_if(tools.begin(), tools.end(), [&](const Tool& k) { return k.number == t; });
-        if (tool == tools.end()) {
-            complain(fmt::format("tool {} is not in the plan", t), 0);
-            continue;
-        }
-        seen.insert(tool->number);
-        if (std::abs(d - tool->diameter) > 1e-3)
-            complain(fmt::format("tool {} has the diameter {} where the plan says {}", t, d, tool->diameter),
-                     std::abs(d - tool->diameter));
-        if (z != 0)
-            complain(fmt::format("tool {} has a length; the machine keeps what it measured", t), std::abs(z));
-    }
-    line_number = 0;
-    for (const Tool& tool : tools)
-        if (!seen.contains(tool.number))
-            complain(fmt::format("tool {} of the plan is not in the table", tool.number), 0);
-}
-
 }  // namespace
 
 void write_maps(const SimulationReport& report, const std::string& directory) {
@@ -406,10 +364,12 @@ Verification verify_folder(Context& context, const std::string& directory, const
         input.stock_max[k] = plan["stock"]["max"][static_cast<std::size_t>(k)].number();
     const Field tools = plan["tools"];
     for (std::size_t i = 0; i < tools.size(); ++i) input.tools.push_back(read_tool(tools[i]));
-    check_tool_table(out / "tool.tbl", input.tools, violations);
+    const fs::path table = out / "tool.tbl";
+    violations = check_tool_table(read_file(table, "verify.tool_table", kMostToolTableBytes), table.string(), input.tools);
 
     const Field layers = plan["layers"];
     std::set<std::string> planned;
+    std::vector<ProgramPlan> sayings;  // of input.programs
     std::string last;
     for (std::size_t l = 0; l < layers.size(); ++l) {
         const SimulatedLayer layer{layers[l]["z_bottom"].number(), layers[l]["z_top"].number(),
@@ -451,8 +411,10 @@ Verification verify_folder(Context& context, const std::string& directory, const
             program.planned_tool = op["tool"].whole();
             if (op.has("stepdown")) program.planned_stepdown = op["stepdown"].number();
             input.programs.push_back(std::move(program));
+            sayings.push_back(read_program_plan(op));
         }
     }
+    std::vector<std::vector<Violation>> of_programs(input.programs.size());
     parallel_each(context, input.programs.size(), [&](std::size_t i) {
         Program& program = input.programs[i];
         Program read = read_gcode(read_file(out / "nc" / program.file, "verify.program", kMostProgramBytes),
@@ -464,7 +426,13 @@ Verification verify_folder(Context& context, const std::string& directory, const
         read.file = program.file, read.layer = program.layer, read.kind = program.kind;
         read.planned_tool = program.planned_tool, read.planned_stepdown = program.planned_stepdown;
         program = std::move(read);
+        const auto tool = std::find_if(input.tools.begin(), input.tools.end(),
+                                       [&](const Tool& t) { return t.number == program.tool; });
+        of_programs[i] =
+            check_program(program, sayings[i], tool == input.tools.end() ? nullptr : &*tool, input.machine);
     });
+    for (const std::vector<Violation>& found : of_programs)
+        violations.insert(violations.end(), found.begin(), found.end());
     if (std::error_code ignored; fs::is_directory(out / "nc", ignored)) {
         std::vector<std::string> strangers;
         for (const auto& entry : fs::directory_iterator(out / "nc"))

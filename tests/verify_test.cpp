@@ -86,7 +86,7 @@ void write_block(const fs::path& out) {
         rough +=
             "X-5 Y0\nG3 X0 Y-5 I5 J0\nG1 X20\nG3 X25 Y0 I0 J5\nG1 Y20\nG3 X20 Y25 I-5 J0\nG1 X0\nG3 X-5 Y20 "
             "I0 J-5\nG1 Y0\n";
-        rough += "G0 Z25\nX-20 Y-9\n";
+        rough += z == std::string("5") ? "G0 Z25\nX-20 Y-9\n" : "G0 Z25\n";
     }
     spill(out / "nc/L1_02.ngc", rough + "M5\nM2\n");
     write_block_sequence(out, stl.input.sha256, false);
@@ -270,7 +270,7 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
          [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "X-9\nY-9\nX-5 Y0", "X-9\nX-5 Y0", true); },
          "left.too_much"},
         {"inches", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G21", "G20"); },
-         "error gcode.left_in_force L1_02.ngc:42"},
+         "error gcode.left_in_force L1_02.ngc:41"},
         {"inches travel",
          [&](const fs::path& p) {
              replace(p / nc("L1_01.ngc"), "G21", "G20");
@@ -302,6 +302,39 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
              replace(p / "plan.json", "L1_02.ngc", "L1_00.ngc");
          },
          "program.order"},
+        {"fast spindle", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "S12000", "S999999"); },
+         "program.spindle"},
+        {"no spin-up", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G4 P3\n", ""); },
+         "program.spin_up"},
+        {"long dwell", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G4 P3", "G4 P999999"); },
+         "program.dwell"},
+        {"fast feed", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "F5000", "F99999"); },
+         "program.feed"},
+        {"wide corners", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "P0.02 Q0", "P0.5 Q0"); },
+         "program.path_mode"},
+        {"points left out", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "P0.02 Q0", "P0.02"); },
+         "program.path_mode"},
+        {"exact corners", [&](const fs::path& p) { replace(p / nc("L1_02.ngc"), "G64 P0.02 Q0", "G61"); },
+         "program.path_mode"},
+        {"no last retract", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "G0 Z25\nM5", "M5"); },
+         "program.end"},
+        {"low last retract", [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "Z25\nM5", "Z15\nM5"); },
+         "program.end"},
+        {"slanting start",
+         [&](const fs::path& p) { replace(p / nc("L1_01.ngc"), "G0 Z25\nX-45", "G0 Z25 X-45"); },
+         "program.begin"},
+        {"other rpm than planned",
+         [&](const fs::path& p) {
+             replace(p / "plan.json", "\"file\": \"nc/L1_02", "\"spindle_rpm\": 12001, \"file\": \"nc/L1_02");
+         },
+         "program.spindle"},
+        {"other lengths than planned",
+         [&](const fs::path& p) {
+             replace(p / "plan.json", "\"file\": \"nc/L1_01",
+                     R"("feeds": [{"feed": 0, "mm": 30, "centre": [10, 10, 17.5]},)"
+                     R"({"feed": 5000, "mm": 110.001, "centre": [10, 10, 10]}], "file": "nc/L1_01)");
+         },
+         "program.lengths"},
         {"tool table", [&](const fs::path& p) { replace(p / "tool.tbl", "D10", "D12.7"); }, "tool.table"},
         {"tool table lacks", [&](const fs::path& p) { replace(p / "tool.tbl", "T3 P3 D6 Z0 ;ball\n", ""); },
          "tool.table"},
@@ -325,6 +358,8 @@ TEST(Verify, EachCorruptionIsReportedAsWhatItIs) {
              replace(p / "sequence.json", "\"slab_top_mm\": 12", "\"slab_top_mm\": 5");
          },
          "sequence.touch_off"},
+        {"tool table shifts", [&](const fs::path& p) { replace(p / "tool.tbl", "D10", "X50 Y-30 D10"); },
+         "tool.table"},
         {"thinner slab",
          [&](const fs::path& p) {
              replace(p / "plan.json", "\"slab_thickness\": 12", "\"slab_thickness\": 9");
