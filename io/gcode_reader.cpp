@@ -104,27 +104,29 @@ private:
             if (std::abs(to[k]) > kFarthest) fail("gcode.number", "a coordinate beyond 214 m");
         }
         if (motion == Motion::rapid) {
+            if (program_.slowest_spindle.line != 0) note_spindle();
             step(to, 0);
             return;
         }
         for (int k = 0; k < 3; ++k)
             if (!std::isfinite(to[k]) || !std::isfinite(at_[k]))
                 fail("gcode.unknown_place", "a feed motion from or to an unknown place");
-        turn_on_feed();
+        note_spindle();
+        end_spin_up();
         if (motion == Motion::line) step(to, state_.feed());
         else arc(line, to);
     }
 
-    /// How fast the spindle turns while feeding, and how long it had to get there.
-    void turn_on_feed() {
+    void note_spindle() {
         const ProgramWord speed{state_.turning() ? state_.speed() : 0, place_.line};
-        if (program_.slowest_spindle.line == 0 || speed.value < program_.slowest_spindle.value)
-            program_.slowest_spindle = speed;
-        if (program_.fastest_spindle.line == 0 || speed.value > program_.fastest_spindle.value)
-            program_.fastest_spindle = speed;
-        if (spinning_up_ &&
-            (program_.shortest_spin_up.line == 0 || spin_up_s_ < program_.shortest_spin_up.value))
-            program_.shortest_spin_up = {spin_up_s_, place_.line};
+        ProgramWord &slow = program_.slowest_spindle, &fast = program_.fastest_spindle;
+        if (slow.line == 0 || speed.value < slow.value) slow = speed;
+        if (fast.line == 0 || speed.value > fast.value) fast = speed;
+    }
+
+    void end_spin_up() {
+        ProgramWord& least = program_.shortest_spin_up;
+        if (spinning_up_ && (least.line == 0 || spin_up_s_ < least.value)) least = {spin_up_s_, place_.line};
         spinning_up_ = false;
     }
 

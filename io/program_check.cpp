@@ -9,7 +9,8 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kRevolutions = 0.5;  // rpm: programs and plan.json round to whole ones
+constexpr double kRpm = 1e-3;         // programs and plan.json round to the same whole number
+constexpr double kWholeRpm = 0.5;     // by which that may pass a limit
 constexpr double kFeed = 1e-6;        // mm/min: rounding
 constexpr double kSeconds = 1e-3;     // the last decimal of a dwell
 constexpr double kBlend = 1e-4;       // mm: the last decimal of G64 P
@@ -62,14 +63,19 @@ private:
         const ProgramWord &slow = program_.slowest_spindle, &fast = program_.fastest_spindle;
         if (fast.line == 0) return;  // it feeds nowhere
         const double limit = std::min(tool_ ? tool_->max_rpm : machine_.max_rpm, machine_.max_rpm);
-        if (fast.value > limit + kRevolutions)
+        if (fast.value > limit + kWholeRpm)
             violate("program.spindle",
                     fmt::format("the spindle turns at {:.0f} rpm; tool and machine bear {:.0f}", fast.value,
                                 limit),
                     fast.line, fast.value - limit);
+        if (slow.value == 0) {
+            violate("program.spindle", "the spindle stands before the cutter is out of the work", slow.line,
+                    0);
+            return;
+        }
         if (!planned_.spindle_rpm) return;
         for (const ProgramWord& speed : {slow, fast})
-            if (std::abs(speed.value - *planned_.spindle_rpm) > kRevolutions) {
+            if (std::abs(speed.value - *planned_.spindle_rpm) > kRpm) {
                 violate("program.spindle",
                         fmt::format("cuts at {:.0f} rpm where the plan says {:.0f}", speed.value,
                                     *planned_.spindle_rpm),

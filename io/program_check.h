@@ -21,7 +21,8 @@ struct ProgramPlan {
 /// Violations of one program, in a fixed order:
 /// program.begin, program.end: its first and its last motion are not G0 in z alone, or it ends lower than it
 ///   began, so that the next tool change finds the cutter in the work;
-/// program.spindle: it feeds at another speed than planned, or above the tool's or the machine's;
+/// program.spindle: from its first feed motion to its last retract the spindle turns at another speed than
+///   planned, above the tool's or the machine's, or not at all;
 /// program.spin_up: it feeds before the spindle has had the machine's time to start;
 /// program.dwell: it dwells longer than that in all, which burns wood where it cuts;
 /// program.feed: above the tool's or the machine's feed;

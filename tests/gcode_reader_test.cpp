@@ -326,8 +326,9 @@ TEST(GcodeReader, TellsHowTheSpindleTurnsWhereItFeeds) {
     const Program p = read("G0 X0 Y0 Z5\nG1 X1 F100\nS9000\nX2\nM5\nG0 Z9\nM3\nG4 P0.5\nG4 P7\nG1 X3\n");
     EXPECT_EQ(p.fastest_spindle.value, 18000);
     EXPECT_EQ(p.fastest_spindle.line, 9u);
-    EXPECT_EQ(p.slowest_spindle.value, 9000);
-    EXPECT_EQ(p.slowest_spindle.line, 11u);
+    EXPECT_EQ(p.slowest_spindle.value, 0) << "it stands while the cutter leaves the work";
+    EXPECT_EQ(p.slowest_spindle.line, 13u);
+    EXPECT_EQ(read("G0 X0 Y0 Z5\nG1 X1 F100\nS9000\nX2\nG0 Z9\n").slowest_spindle.value, 9000);
     EXPECT_EQ(p.shortest_spin_up.value, 0) << "none after the change of speed";
     EXPECT_EQ(p.shortest_spin_up.line, 11u);
     EXPECT_EQ(p.longest_dwell.value, 7);

@@ -163,7 +163,9 @@ TEST(ProgramCheck, EachFaultByItsName) {
     EXPECT_EQ(found("", ""), "");
     EXPECT_EQ(found("S18000", "S50"), "program.spindle:18");
     EXPECT_EQ(found("S18000", "S20000"), "program.spindle:18 program.spindle:18");
-    EXPECT_EQ(found("F9000", "F9000\nS17000"), "") << "after the last cut, at full speed until then";
+    EXPECT_EQ(found("F9000", "F9000\nS17000"), "program.spindle:21") << "before the last retract";
+    EXPECT_EQ(found("F9000", "F9000\nM5"), "program.spindle:21");
+    EXPECT_EQ(found("M5", "S17000\nM5"), "");
     EXPECT_EQ(found("X50 F9000", "S17000\nX50 F9000"), "program.spindle:20 program.spin_up:20");
     EXPECT_EQ(found("G4 P3", "G4 P0.5"), "program.spin_up:18");
     EXPECT_EQ(found("G4 P3", "G4 P3600"), "program.dwell:15");

@@ -61,9 +61,10 @@ struct Program {
     int planned_tool = 0;                          ///< that the plan names for it
     double planned_stepdown = 0;                   ///< mm, that the plan names for it; 0: none
     double spindle_rpm = 0;                        ///< highest
-    ProgramWord slowest_spindle, fastest_spindle;  ///< rpm while it feeds; 0 rpm: it stands
-    double dwell_s = 0;                            ///< of all G4 together
-    ProgramWord longest_dwell;                     ///< s, of one G4
+    ProgramWord slowest_spindle, fastest_spindle;  ///< rpm from its first feed motion to its last retract; 0
+                                                   ///< rpm: it stands
+    double dwell_s = 0;            ///< of all G4 together
+    ProgramWord longest_dwell;     ///< s, of one G4
     ProgramWord shortest_spin_up;  ///< s of dwell between the spindle's start, or a change of its speed, and
                                    ///< the next feed motion; the line is that motion's
     double blend = kJunction;   ///< mm by which the machine may round the corners (G64 P; 0: G61), the least
