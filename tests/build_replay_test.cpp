@@ -455,6 +455,58 @@ TEST(BuildReplay, RandomCorruptionsAreToldOrChangeNothing) {
         std::printf("%-10s told %d, changes nothing %d\n", kind.c_str(), count.first, count.second);
 }
 
+// Texts with many corruptions at once, and texts that are no JSON any more: the reader refuses or the replay
+// tells, and neither fails in another way.
+TEST(BuildReplay, SequencesCorruptedThroughAndThroughAreToldOrRefused) {
+    std::mt19937 random(test::seed());
+    int told = 0, refused = 0;
+    for (int round = 0; round < 400; ++round) {
+        const Plan plan = block(random_job(random), random_shape(random));
+        const BuildPlan build = stated(plan);
+        const std::string good = sequence_json(plan);
+        json sequence = json::parse(good);
+        json& steps = sequence["steps"];
+        for (int k = 0, n = 2 + static_cast<int>(random() % 30); k < n && !steps.empty(); ++k) {
+            json& step = steps[random() % steps.size()];
+            switch (random() % 5) {
+                case 0:
+                    steps.erase(random() % steps.size());
+                    break;
+                case 1:
+                    steps.insert(steps.begin() + static_cast<std::ptrdiff_t>(random() % steps.size()),
+                                 json(step));
+                    break;
+                case 2:
+                    std::swap(step, steps[random() % steps.size()]);
+                    break;
+                case 3:
+                    for (auto& [key, value] : step.items())
+                        if (value.is_number() && key != "seconds" && random() % 3 == 0)
+                            value = static_cast<int>(random() % 2001) - 1000;
+                    break;
+                default:
+                    step["action"] = steps[random() % steps.size()]["action"];
+            }
+        }
+        std::string text = sequence.dump();
+        if (random() % 2) {
+            text = good;
+            for (int k = 0, n = 1 + static_cast<int>(random() % 8); k < n; ++k)
+                text[random() % text.size()] = static_cast<char>(random() & 255U);
+        }
+        try {
+            const BuildSequence read = read_sequence(text);
+            told += !replay_build(build, read).empty();
+        } catch (const Error& e) {
+            ASSERT_EQ(e.code(), "verify.sequence") << e.message();
+            ++refused;
+        }
+    }
+    std::printf("told %d, refused %d of 400\n", told, refused);
+    EXPECT_GT(told, 100);
+    EXPECT_GT(refused, 100);
+}
+
 TEST(SequenceReader, RefusesWhatIsNoSequence) {
     const json good = json::parse(sequence_json(block(Job{}, {2, 1, false})));
     const auto refused = [](const std::string& text) -> std::string {

@@ -31,6 +31,14 @@ function picture(l) {
         make('circle', {cx: 0, cy: 0, r: edge / 2, fill: 'none', stroke: '#a3202c', 'stroke-width': 2 * thin})));
 }
 
+// Where the build table stands, and by how much the control's zero has moved with it or without it.
+function tableHeight(l) {
+    const {table, base_board_thickness: board} = plan.job.machine, moves = table === 'moving', layer = plan.layers[l];
+    const risen = layer.z_top - plan.layers[0].z_top, offset = plan.frame === 'layer-top' ? (moves ? 0 : risen) : (moves ? -risen : 0);
+    const standing = moves ? `sunk to ${figure(board + layer.z_top, 2)} mm below this layer’s top` : 'fixed';
+    return offset === 0 ? standing : `${standing}; the work offset’s Z is ${figure(Math.abs(offset), 2)} mm ${offset > 0 ? 'above' : 'below'} that of layer 1`;
+}
+
 function sheet(l, minutes) {
     const layer = plan.layers[l], above = plan.frame === 'layer-top', programs = operations.filter(operation => operation.layer === l);
     const tools = [...new Set(layer.operations.map(operation => operation.tool))].sort((a, b) => a - b).map(number => toolOf(number)).filter(Boolean);
@@ -50,6 +58,7 @@ function sheet(l, minutes) {
                     term('Face to', `z ${figure(layer.z_top, 3)} mm (${figure(layer.z_bottom + layer.slab_thickness - layer.z_top, 3)} mm off)`),
                     term('Boundary', layer.reason),
                     term('Zero point', `x 0, y 0 as in the STL; z 0 at ${above ? 'this layer’s top' : 'the pattern’s bottom (top of the base board)'}`),
+                    term('Table', tableHeight(l)),
                     term('Slab corner', `x ${figure(plan.stock.min[0], 2)}, y ${figure(plan.stock.min[1], 2)} mm`),
                     term('Glue', `${plan.job.bonding.glue}, ${figure(layer.glue_area_mm2 / 100, 1)} cm²`),
                     term('Press', `${figure(layer.press_force_n, 0)} N for ${figure(plan.job.bonding.press_time_s, 0)} s`)),
