@@ -1,6 +1,7 @@
 #include "engine/layer_plan.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <string>
@@ -40,6 +41,17 @@ double minutes_of(const Layer& layer, const Machine& machine) {
         before = &op;
     }
     return minutes;
+}
+
+// No program asks for more than tool and machine can: ways down through air are planned at the tool's own
+// feeds. Times are those of the machine anyway.
+void limit_feeds(Operation& op, const Job& job) {
+    const auto tool =
+        std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+    const double most =
+        tool == job.tools.end() ? job.machine.max_feed : std::min(tool->max_feed, job.machine.max_feed);
+    const auto fastest = static_cast<std::uint32_t>(std::max(1.0, std::floor(most)));
+    for (Move& move : op.moves) move.feed = std::min(move.feed, fastest);
 }
 
 std::vector<int> tools_in_order(const Layer& layer) {
@@ -170,6 +182,7 @@ private:
         Trial trial;
         Layer& layer = trial.planned.layer = layer_;
         layer.operations = std::move(result.operations);
+        for (Operation& op : layer.operations) limit_feeds(op, job);
         trial.planned.diagnostics = std::move(result.diagnostics);
         // None may leave more than the first set, but for what differently fine cells see.
         constexpr double kMore = 1.1, kFew = 5;  // mm²

@@ -419,8 +419,10 @@ Verification verify_folder(Context& context, const std::string& directory, const
         Program& program = input.programs[i];
         Program read = read_gcode(read_file(out / "nc" / program.file, "verify.program", kMostProgramBytes),
                                   "nc/" + program.file, limits);
-        const double up =
-            frame == Frame::layer_top ? input.layers[static_cast<std::size_t>(program.layer)].z_top : 0;
+        // Programs count from the top in whole 0.1 µm, as they were written.
+        const double up = frame == Frame::layer_top
+                              ? to_mm(to_units(input.layers[static_cast<std::size_t>(program.layer)].z_top))
+                              : 0;
         for (ProgramStep& s : read.steps) s.z += up;
         for (ProgramArc& a : read.arcs) a.arc.z += up;
         read.file = program.file, read.layer = program.layer, read.kind = program.kind;
