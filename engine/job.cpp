@@ -260,7 +260,7 @@ void validate(const Job& job) {
     require("bonding.glue_s_per_m2", b.glue_s_per_m2, 0, 1e6);
 
     const Tolerances& t = job.tolerances;
-    require("tolerances.gouge", t.gouge, 0.001, 10, Ends::closed, kFinerThanProgrammed);
+    require("tolerances.gouge", t.gouge, 0.001, 1, Ends::closed, kFinerThanProgrammed);
     require("tolerances.cusp", t.cusp, 0.001, 10, Ends::closed, kFinerThanProgrammed);
     require("tolerances.rough_cusp", t.rough_cusp, 0.001, 100, Ends::closed, kFinerThanProgrammed);
     require("tolerances.chordal_deviation", t.chordal_deviation, 0, 10);
@@ -283,7 +283,8 @@ void validate(const Job& job) {
                "halving starts at the coarse spacing and ends at the resolution");
 
     const Cutting& k = job.cutting;
-    require("cutting.wall_allowance", k.wall_allowance, 0, 100);
+    require("cutting.wall_allowance", k.wall_allowance, kJunction, 100, Ends::closed,
+            "the machine may round corners of roughing by that");
     require("cutting.floor_allowance", k.floor_allowance, 0, 100);
     require("cutting.rough_blend", k.rough_blend, 0.02, 1);
     require("cutting.steep_limit_deg", k.steep_limit_deg, 1, 89);

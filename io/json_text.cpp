@@ -1,5 +1,6 @@
 #include "io/json_text.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <utility>
@@ -17,8 +18,8 @@ void require_finite(double value) {
                     "", "report this with the pattern and the job");
 }
 
-/// Length of the well-formed UTF-8 sequence at text[i], 0 when there is none (RFC 3629: no overlong forms, no
-/// surrogates).
+}  // namespace
+
 std::size_t utf8_length(std::string_view text, std::size_t i) {
     const auto byte = [&](std::size_t k) {
         return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u;
@@ -40,7 +41,21 @@ std::size_t utf8_length(std::string_view text, std::size_t i) {
     return 0;
 }
 
-}  // namespace
+std::string printable(std::string_view text, bool one_line) {
+    std::string shown;
+    for (std::size_t i = 0; i < text.size();) {
+        const std::size_t length = utf8_length(text, i);
+        const auto byte = static_cast<unsigned char>(text[i]);
+        const bool control = length == 1 ? byte < 0x20 || byte == 0x7F
+                                         : byte == 0xC2 && static_cast<unsigned char>(text[i + 1]) < 0xA0;
+        const bool breaks = !one_line && byte == '\n';
+        if (length == 0) shown += '?';
+        else if (control && !breaks) shown += ' ';
+        else shown.append(text.substr(i, length));
+        i += std::max<std::size_t>(1, length);
+    }
+    return shown;
+}
 
 void append_rounded(std::string& text, double value, int decimals) {
     require_finite(value);
@@ -151,7 +166,10 @@ JsonText& JsonText::string(std::string_view value) {
             continue;
         }
         const char c = value[i];
-        if (length > 1) text_.append(value.substr(i, length));
+        const auto second = length == 2 ? static_cast<unsigned char>(value[i + 1]) : 0u;
+        if (c == '\xC2' && second < 0xA0)  // a control of the second set, which terminals obey too
+            ((text_ += "\\u00") += hex[second >> 4]) += hex[second & 15];
+        else if (length > 1) text_.append(value.substr(i, length));
         else if (c == '"' || c == '\\') (text_ += '\\') += c;
         else if (c == '\n') text_ += "\\n";
         else if (c == '\t') text_ += "\\t";

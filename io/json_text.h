@@ -9,6 +9,14 @@
 
 namespace slabwright {
 
+/// Length of the well-formed UTF-8 sequence at text[i], 0 when there is none (RFC 3629: no overlong forms, no
+/// surrogates).
+[[nodiscard]] std::size_t utf8_length(std::string_view text, std::size_t i);
+
+/// Text that a terminal may be given, whatever names it holds: control characters become spaces, bytes that
+/// are no UTF-8 question marks. @param one_line line breaks too
+[[nodiscard]] std::string printable(std::string_view text, bool one_line);
+
 /// Appends `value` rounded to `decimals` (0…9) places, trailing zeros cut; never "-0". @throws Error(no_plan,
 /// "number.not_finite"): no file of ours has a place for NaN or infinity
 void append_rounded(std::string& text, double value, int decimals);

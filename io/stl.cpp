@@ -31,6 +31,7 @@ constexpr std::size_t kHeaderBytes = 84;  ///< 80 of text, 4 of facet count
 constexpr std::size_t kFacetBytes = 50;   ///< normal, three corners, attribute
 constexpr std::size_t kHead = 4096;       ///< first bytes, in which text has no zero
 constexpr std::size_t kWeldBytes = 56;    ///< of memory a facet, for a mesh and its welding
+constexpr double kLeastHeight = 0.01;     ///< mm
 constexpr double kAbsurdMm = 1e6;         ///< no pattern lies a kilometre from its origin
 constexpr double kSmallBox = 5;           ///< in the declared unit; below, the unit is suspicious
 constexpr double kLargeBox = 5000;        ///< likewise, above
@@ -696,6 +697,10 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
         file.let_go();
         note = weld_and_report();
     }
+    const double height = double(stl.report.box.max.z) - stl.report.box.min.z;
+    if (!(height >= kLeastHeight))
+        refuse("flat", fmt::format("the mesh is {:g} mm high: nothing can be built of it", height), path,
+               "check the unit (--units), and which way is up in the file");
     if (note) stl.diagnostics.push_back(std::move(*note));
     if (options.repair != Repair::none) {
         Repaired repaired = repair_mesh(context, stl.mesh.view(), stl.report, options.repair, path);

@@ -32,7 +32,8 @@ struct StlMesh {
 /// @throws Error(input) with the file, and the facet, offset or line: missing, empty, truncated, wrong count,
 /// unparsable,
 ///         non-finite or absurd (over 1e6 mm) coordinates, no facets. Codes: stl.missing, directory,
-///         unreadable, empty, not_stl, no_facets, facet_count, truncated, unparsable, non_finite, absurd
+///         unreadable, changed, empty, not_stl, no_facets, facet_count, truncated, unparsable, non_finite,
+///         absurd, flat (of no height)
 /// Diagnostics: units.suspicious, mesh.welded, and mesh.open, open_base, misoriented, inverted, non_manifold,
 /// duplicate, degenerate, each with its count and the centre of its first facet. Where a repair was asked
 /// for, they are of what it left, and what it did is told as repair_mesh() does. @throws as that

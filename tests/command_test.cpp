@@ -191,7 +191,8 @@ TEST(Command, UnusableInputExitsThree) {
     spit(folder.path / "short.stl", whole.substr(0, whole.size() - 7));
     spit(folder.path / "text.stl", "solid x\nfacet normal 0 0 1\nouter loop\nvertex 1 2 three\n");
     spit(folder.path / "open.stl", stl_bytes("open", box({0, 0, 0}, {50, 40, 30}, true)));
-    for (const char* name : {"missing.stl", "empty.stl", "short.stl", "text.stl", "open.stl"}) {
+    spit(folder.path / "flat.stl", stl_bytes("flat", box({0, 0, 7}, {50, 40, 7})));
+    for (const char* name : {"missing.stl", "empty.stl", "short.stl", "text.stl", "open.stl", "flat.stl"}) {
         const CommandResult result = slabwright_command({"plan", folder / name, "-o", out});
         EXPECT_EQ(result.exit, 3) << name << result.err;
         expect_one_line(result);
@@ -385,6 +386,74 @@ TEST(Command, InspectTellsPeopleAndPrograms) {
     const json undercut = json::parse(slabwright_command({"inspect", folder / "mushroom.stl", "--json"}).out);
     ASSERT_EQ(undercut["undercuts"].size(), 1u);
     EXPECT_GT(undercut["undercuts"][0]["depth"].get<double>(), 1);
+}
+
+TEST(Command, WhatDoesNotReachStdoutIsAnError) {
+    TemporaryFolder folder;
+    const std::string stl = kData + "half-sphere.stl", out = folder / "out";
+    for (const std::vector<std::string>& arguments :
+         std::vector<std::vector<std::string>>{{"job", "--defaults"},
+                                               {"inspect", stl},
+                                               {"inspect", stl, "--json"},
+                                               {"--help"},
+                                               {"plan", "--help"},
+                                               {"--version"},
+                                               {"plan", stl, "-o", out, "--no-verify"},
+                                               {"plan", stl, "-o", out, "--no-verify", "--json"},
+                                               {"verify", out, "--stl", stl}}) {
+        std::vector<std::string> all = {"/bin/sh", "-c", "exec \"$@\" >/dev/full", "sh", SLABWRIGHT_COMMAND};
+        all.insert(all.end(), arguments.begin(), arguments.end());
+        const CommandResult result = run_command(all);
+        EXPECT_EQ(result.exit, 3) << arguments.front() << result.err;
+        EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+        EXPECT_NE(result.err.find("standard output"), std::string::npos) << result.err;
+    }
+}
+
+TEST(Command, NamesGiveATerminalNoCommands) {
+    TemporaryFolder folder;
+    // Escape, the same as one character of the second set, a backspace, a broken UTF-8 sequence.
+    const std::string name =
+                          "a\x1b]0;owned\x07"
+                          "b\xC2\x9B"
+                          "2Jc\bd\x9B"
+                          "e\n.stl",
+                      stl = folder / name;
+    fs::copy_file(kData + "half-sphere.stl", stl);
+    spit(folder.path / "job.toml", "[material]\nname = \"x\\u001b[2Jy\\u009b3Jz\"\n");
+    for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+             {"inspect", stl},
+             {"inspect", stl, "--json"},
+             {"inspect", stl + "\x1b[1m"},
+             {"inspect", stl + "\x1b[1m", "--json"},
+             {"plan", stl, "-o", folder / "out\x1b[1m\xC2\x9B", "--job", folder / "job.toml", "--no-verify"},
+             {"plan", stl, "-o", folder / "out\x1b[1m\xC2\x9B", "--no-verify", "--json"}}) {
+        const CommandResult result = slabwright_command(arguments);
+        for (const std::string& text : {result.out, result.err}) {
+            for (const char c : text)
+                EXPECT_TRUE(c == '\n' || !(static_cast<unsigned char>(c) < 0x20 || c == 0x7F)) << text;
+            EXPECT_EQ(text.find("\xC2\x9B"), std::string::npos);
+            EXPECT_EQ(text.find("\x9B"), std::string::npos);
+        }
+        EXPECT_FALSE(result.out.empty() && result.err.empty());
+    }
+}
+
+TEST(Command, AHangUpCancels) {
+    TemporaryFolder folder;
+    write_metre_pattern(folder / "big.stl", {.size_mm = 1000, .height_mm = 200, .facets = 600'000});
+    fs::create_directory(folder.path / "place");
+    const std::string line = "exec timeout -s HUP 2 \"$@\"";
+    CommandResult result =
+        run_command({"/bin/sh", "-c", line, "sh", SLABWRIGHT_COMMAND, "plan", folder / "big.stl", "-o",
+                     folder / "place/a/out", "--allow-undercut", "--no-verify"});
+    EXPECT_NE(result.err.find("cancelled"), std::string::npos) << result.err;
+    EXPECT_TRUE(fs::is_empty(folder.path / "place")) << "nothing half-written stays";
+    // Under nohup it goes on.
+    result = run_command({"/bin/sh", "-c", "trap '' HUP; \"$@\" & sleep 0.3; kill -HUP $!; wait $!", "sh",
+                          SLABWRIGHT_COMMAND, "plan", kData + "pump-cover.stl", "-o", folder / "place/out"});
+    EXPECT_EQ(result.exit, 0) << result.err;
+    EXPECT_NE(result.out.find("layers"), std::string::npos) << result.err;
 }
 
 TEST(Command, SliceWritesEveryFormatWhole) {

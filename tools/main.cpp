@@ -7,9 +7,12 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
+#include <iostream>
 #include <map>
 #include <string>
 #include <string_view>
@@ -101,20 +104,25 @@ int complain(const Error& error, bool as_json) {
         json.key("place").string(error.place()).key("remedy").string(error.remedy()).end().end();
         line = json.take();
     } else {
-        line = fmt::format("slabwright: {}", error.what());
         // One error, one line, whatever a file name or a parser's message holds.
-        std::replace_if(
-            line.begin(), line.end(),
-            [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }, ' ');
-        line += '\n';
+        line = printable(fmt::format("slabwright: {}", error.what()), true) + '\n';
     }
     std::fwrite(line.data(), 1, line.size(), stderr);
     return static_cast<int>(error.kind());
 }
 
+/// Whether all that went to stdout has arrived, on a full disk for one. @throws Error(input) when not
+void require_told(bool arrived) {
+    if (arrived) return;
+    throw Error(ErrorKind::input, "stdout.unwritable",
+                fmt::format("standard output cannot be written: {}", std::strerror(errno)), "",
+                "make room where it goes, or send it elsewhere");
+}
+
 void print(std::string_view text) {
-    std::fwrite(text.data(), 1, text.size(), stdout);
-    std::fflush(stdout);
+    const std::string shown = printable(text, false);
+    const bool written = std::fwrite(shown.data(), 1, shown.size(), stdout) == shown.size();
+    require_told(written && std::fflush(stdout) == 0);
 }
 
 std::string number(double value, int decimals) {
@@ -525,7 +533,14 @@ int main(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+        if (error.get_exit_code() == 0) {  // --help, --version
+            app.exit(error);
+            std::cout.flush();
+            if (std::cout.good() && std::fflush(stdout) == 0) return 0;
+            return complain(Error(ErrorKind::input, "stdout.unwritable", "standard output cannot be written",
+                                  "", "make room where it goes, or send it elsewhere"),
+                            json_wanted);
+        }
         return complain(Error(ErrorKind::usage, "usage", error.what(), "", "see slabwright --help"),
                         json_wanted);
     }
