@@ -20,13 +20,14 @@ namespace {
 enum class Ends { closed, open_low, open_both };
 
 // Why a number may be no smaller: what a job can mean bounds the work that it makes.
-constexpr const char* kNoCutter = "no cutter is smaller";
+constexpr const char* kNoCutter = "no cutter for wood is smaller";
 constexpr const char* kNoRouter = "no router does less";
 constexpr const char* kFinerThanProgrammed =
     "programs are written to 0.0001 mm, and some of that is rounding";
 constexpr const char* kFinerThanUseful = "finer steps show nowhere in wood, and take without end";
 
-constexpr double kLeastAdvance = 0.02;  ///< mm from one cut to the next beside it: step-over times diameter
+constexpr double kLeastAdvance = 0.05;  ///< mm from one cut to the next beside it: step-over times diameter
+constexpr double kWidestFacing = 0.9;   ///< share of a face mill's diameter from pass to pass
 constexpr double kLeastLayer = 0.3;     ///< mm that slab and tools must leave a layer
 
 /// One number must lie between low and high; `ends` says which of them it may equal, `why` what speaks
@@ -45,7 +46,7 @@ void require(const std::string& key, double value, double low, double high, Ends
 void validate_tool(const Tool& tool, std::size_t position) {
     const auto key = [&](const char* name) { return fmt::format("tool[{}].{}", position + 1, name); };
     require(key("number"), tool.number, 1, 99999);
-    require(key("diameter"), tool.diameter, 0.1, 1000, Ends::closed, kNoCutter);
+    require(key("diameter"), tool.diameter, 0.3, 1000, Ends::closed, kNoCutter);
     require(key("flute_length"), tool.flute_length, 0.1, 1000, Ends::closed, kNoCutter);
     require(key("shank_diameter"), tool.shank_diameter, 0.1, 1000, Ends::closed, kNoCutter);
     require(key("stickout"), tool.stickout, 0.1, 2000, Ends::closed, kNoCutter);
@@ -67,7 +68,14 @@ void validate_tool(const Tool& tool, std::size_t position) {
                fmt::format("{} is {}, less than stepdown_min {}", key("stepdown_max"), tool.stepdown_max,
                            tool.stepdown_min),
                "swap the two");
-    require(key("stepover"), tool.stepover, 0.01, 1, Ends::closed, kFinerThanUseful);
+    if (tool.stepdown_max > tool.flute_length)
+        refuse(key("stepdown_max"),
+               fmt::format("{} is {}, deeper than the flutes of {} mm", key("stepdown_max"),
+                           tool.stepdown_max, tool.flute_length),
+               "give a step that the flutes cut");
+    // Passes of a face mill that hardly overlap leave corners between their ends.
+    require(key("stepover"), tool.stepover, 0.01, tool.kind == ToolKind::face ? kWidestFacing : 1,
+            Ends::closed, kFinerThanUseful);
     if (tool.stepover * tool.diameter < kLeastAdvance)
         refuse(key("stepover"),
                fmt::format("{} is {}: cuts would lie {:g} mm apart", key("stepover"), tool.stepover,
