@@ -37,11 +37,19 @@ Operation operation(OperationKind kind, int tool, double low, double high, doubl
     return op;
 }
 
+// Under the layer; between its slabs everywhere, pressed no harder.
 void set_glue(Layer& layer, std::int32_t width, std::int32_t depth) {
-    layer.glue.points = {{0, 0}, {width, 0}, {width, depth}, {0, depth}};
-    layer.glue.close_loop();
-    layer.glue_area_mm2 = to_mm(width) * to_mm(depth);
-    layer.press_force_n = layer.glue_area_mm2 / 4;
+    for (int k = 0; k < layer.slabs; ++k) {
+        Joint& joint = layer.joints.emplace_back();
+        if (k == 0) joint.glue.points = {{0, 0}, {width, 0}, {width, depth}, {0, depth}};
+        else
+            joint.glue.points = {
+                {-200'000, -100'000}, {1'800'000, -100'000}, {1'800'000, 900'000}, {-200'000, 900'000}};
+        joint.glue.close_loop();
+        joint.z = layer.z_bottom + k * layer.slab_thickness / layer.slabs;
+        joint.area_mm2 = area(joint.glue);
+        joint.force_n = layer.joints.front().area_mm2 / (k == 0 ? 4 : 5);
+    }
 }
 
 struct Shape {
@@ -102,8 +110,7 @@ BuildPlan stated(const Plan& plan) {
         to.index = layer.index;
         to.z_bottom = layer.z_bottom, to.z_top = layer.z_top;
         to.slab_thickness = layer.slab_thickness, to.slabs = layer.slabs;
-        to.joints.assign(static_cast<std::size_t>(layer.slabs), PlannedJoint{{}, layer.press_force_n});
-        to.joints.front().glue_area_mm2 = layer.glue_area_mm2;
+        for (const Joint& joint : layer.joints) to.joints.push_back({joint.area_mm2, joint.force_n});
         for (const Operation& op : layer.operations) {
             PlannedProgram& program = build.programs.emplace_back();
             program.file = "nc/" + op.file;

@@ -124,7 +124,9 @@ void schedule(Plan& plan) {
         const double slab = layer.slab_thickness / layer.slabs;
         int pressed = 0;
         for (int k = 0; k < layer.slabs; ++k) {
-            const Joint& joint = layer.joints.at(static_cast<std::size_t>(k));
+            static const Joint kNone;  // of a layer that nobody has bonded
+            const auto at = static_cast<std::size_t>(k);
+            const Joint& joint = at < layer.joints.size() ? layer.joints[at] : kNone;
             const double area = joint.area_mm2;
             // Fetching the slab and clamping it only needs the handler; it may go on while the layer below is
             // being milled.
