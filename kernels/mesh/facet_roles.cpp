@@ -8,6 +8,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <vector>
@@ -82,9 +83,12 @@ bool meet(MeshView mesh, std::uint32_t f, std::uint32_t g) {
     const Index3 &s = mesh.facets[f], &t = mesh.facets[g];
     std::size_t shared = 0;
     for (const std::uint32_t v : s) shared += v == t[0] || v == t[1] || v == t[2];
-    const Corners a = corners(mesh, f), b = corners(mesh, g);
-    if (shared < 2) return !apart(a, b, shared == 0 ? kApart : -kTouch);
     if (shared == 3) return true;
+    const Corners a = corners(mesh, f), b = corners(mesh, g);
+    if (shared == 0) return !apart(a, b, kApart);
+    // Around a corner facets that face alike go once around, mostly all of them: nothing is folded there.
+    if (dot(normal(a), normal(b)) > 0) return false;
+    if (shared == 1) return !apart(a, b, -kTouch);
     // Along an edge they are apart unless one is folded back onto the other.
     std::size_t i = 0, j = 0;  // the corners that they do not share
     while (s[i] == t[0] || s[i] == t[1] || s[i] == t[2]) ++i;
@@ -120,13 +124,18 @@ Box child(const Boxes& boxes, std::size_t i) {
 }
 /// A bit for each of the eight that a box meets.
 unsigned meeting(const Boxes& boxes, const Box& box) {
-    unsigned bits = 0;
-    for (std::size_t i = 0; i < kTogether; ++i)
-        bits |= static_cast<unsigned>((boxes.low[0][i] <= box.high[0]) & (box.low[0] <= boxes.high[0][i]) &
-                                      (boxes.low[1][i] <= box.high[1]) & (box.low[1] <= boxes.high[1][i]) &
-                                      (boxes.low[2][i] <= box.high[2]) & (box.low[2] <= boxes.high[2][i]))
-                << i;
-    return bits;
+    using Floats [[gnu::vector_size(kTogether * sizeof(float))]] = float;
+    using Bits [[gnu::vector_size(kTogether * sizeof(float))]] = std::int32_t;
+    Bits all{1, 2, 4, 8, 16, 32, 64, 128};
+    for (std::size_t k = 0; k < 3; ++k) {
+        Floats low, high;
+        std::memcpy(&low, boxes.low[k].data(), sizeof low);
+        std::memcpy(&high, boxes.high[k].data(), sizeof high);
+        all &= (low <= box.high[k]) & (high >= box.low[k]);
+    }
+    std::int32_t bits = 0;
+    for (std::size_t i = 0; i < kTogether; ++i) bits |= all[i];
+    return static_cast<unsigned>(bits);
 }
 
 /// The facets in Morton order and their boxes; levels[0] those of facets, levels[k] those of levels[k − 1].
