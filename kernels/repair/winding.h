@@ -24,7 +24,8 @@ public:
     /// Copies the facets. 96 bytes a facet, charged while it is built.
     WindingTree(Context& context, std::span<const Vec3f> vertices, std::span<const Index3> facets);
 
-    /// Error under .1, most of it within the nearest clusters. On a facet itself it is half of what lies on either side.
+    /// Error under .1, most of it within the nearest clusters. On a facet itself it is half of what lies on
+    /// either side.
     [[nodiscard]] double at(const Xyz& p) const;
 
 private:
