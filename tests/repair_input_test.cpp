@@ -17,6 +17,7 @@
 #include "kernels/mesh/weld.h"
 #include "kernels/repair/repair.h"
 #include "tests/mesh_shapes.h"
+#include "tests/support/command.h"
 #include "tests/support/files.h"
 #include "tests/support/temporary_folder.h"
 
@@ -197,6 +198,35 @@ TEST(RepairInput, RebuildingTellsItsCellAndDeviation) {
     } catch (const Error& error) {
         EXPECT_EQ(error.code(), "repair.nothing") << error.what();
     }
+}
+
+TEST(RepairInput, TheCommandRefusesMendsAndTells) {
+    const TemporaryFolder folder;
+    save(folder / "cracked.stl", cracked());
+    const auto run = [](std::vector<std::string> arguments) {
+        arguments.insert(arguments.begin(), SLABWRIGHT_COMMAND);
+        return support::run_command(arguments);
+    };
+    const auto refused = run({"plan", folder / "cracked.stl", "-o", folder / "out"});
+    EXPECT_EQ(refused.exit, 3);
+    EXPECT_NE(refused.err.find("--repair would close 1 crack"), std::string::npos) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+    const auto planned =
+        run({"plan", folder / "cracked.stl", "-o", folder / "out", "--repair", "--no-verify"});
+    EXPECT_EQ(planned.exit, 0) << planned.err;
+    EXPECT_NE(planned.out.find("the repair closed 1 crack of at most 0.02 mm"), std::string::npos)
+        << planned.out;
+    EXPECT_EQ(run({"plan", folder / "cracked.stl", "-o", folder / "out", "--repair=wrong"}).exit, 2);
+    const auto mended = run({"repair", folder / "cracked.stl", "-o", folder / "mended.stl"});
+    EXPECT_EQ(mended.exit, 0) << mended.err;
+    EXPECT_NE(mended.out.find("mended, 12 facets"), std::string::npos) << mended.out;
+    const auto again = run({"repair", folder / "mended.stl", "-o", folder / "again.stl", "--json"});
+    EXPECT_EQ(again.exit, 0);
+    EXPECT_EQ(nlohmann::json::parse(again.out)["repair"]["how"], "none");
+    EXPECT_EQ(slurp(folder / "again.stl"), slurp(folder / "mended.stl"));
+    save(folder / "open.stl", open_torus());
+    EXPECT_EQ(run({"repair", folder / "open.stl", "-o", folder / "never.stl"}).exit, 3);
+    EXPECT_FALSE(std::filesystem::exists(folder / "never.stl"));
 }
 
 TEST(RepairInput, RefusedMeshesOfTheCorpusAreMended) {

@@ -344,6 +344,26 @@ TEST(Repair, RandomSoupsNeitherCrashNorHang) {
     std::printf("%d of 400 soups became solids\n", solids);
 }
 
+TEST(Repair, ASoupIsRebuiltAsASolidOrAsNothing) {
+    Random random(test::seed());
+    int solids = 0;
+    for (int round = 0; round < 20; ++round) {
+        Facets facets;
+        const auto number = [&] { return static_cast<float>(random() % 40) / 2; };
+        for (std::size_t i = 0; i < 60; ++i) {
+            std::array<Vec3f, 3> f;
+            for (Vec3f& v : f) v = {number(), number(), number()};
+            facets.push_back(f);
+        }
+        const Mesh mesh = welded(facets);
+        Context context({.threads = 2});
+        const Rebuilt result = rebuild(context, mesh.view(), mesh.view(), {.cell_mm = 1});
+        EXPECT_TRUE(result.mesh.facets.empty() || test::closed(result.mesh.view()));
+        solids += result.solid ? 1 : 0;
+    }
+    std::printf("%d of 20 soups became solids\n", solids);
+}
+
 TEST(Repair, StopsWhenCancelled) {
     Facets facets = shapes::torus(64);
     facets.pop_back();
