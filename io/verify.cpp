@@ -243,12 +243,9 @@ BuildPlan planned_build(const Field& plan, const JobPart& part, Frame frame, con
             if (of.has("press_force_n")) planned.press_force_n = of["press_force_n"].number();
             return planned;
         };
-        // Where the plan does not tell a layer's joints apart, they are pressed alike.
-        layer.joints.assign(static_cast<std::size_t>(layer.slabs), {{}, joint(from).press_force_n});
-        layer.joints.front() = joint(from);
         if (from.has("joints"))
-            for (std::size_t k = 0; k < std::min(layer.joints.size(), from["joints"].size()); ++k)
-                layer.joints[k] = joint(from["joints"][k]);
+            for (std::size_t k = 0; k < from["joints"].size(); ++k)
+                layer.joints.push_back(joint(from["joints"][k]));
         const Field operations = from["operations"];
         for (std::size_t o = 0; o < operations.size(); ++o) {
             const Field op = operations[o];

@@ -34,6 +34,7 @@ Layer layer_at(int index, double bottom, double height, double slab, int slabs, 
     layer.z_top = bottom + height;
     layer.slab_thickness = slab * slabs;
     layer.slabs = slabs;
+    layer.joints.resize(static_cast<std::size_t>(slabs));
     const double clear = bottom + slab * slabs + job.machine.clearance;
     layer.operations = {operation(OperationKind::face, 1, layer.z_top, clear),
                         operation(OperationKind::rough, 2, bottom, clear),

@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
-#include <string_view>
 #include <unordered_map>
 
 #include "engine/simulate/sequence_findings.h"
@@ -27,6 +25,7 @@ struct DueSlab {
     std::size_t layer = 0;  // index into the layers
     int number = 0;         // within its layer, from 0
     double thickness = 0, z_bottom = 0;
+    std::size_t glue = 0;  // which of the sequence's: those under layers first, then those between slabs
 };
 
 /// A state of the machine that a step brought about; none: it does not hold.
@@ -36,10 +35,12 @@ class BuildReplay : SequenceFindings {
 public:
     BuildReplay(const BuildPlan& plan, const BuildSequence& sequence)
         : SequenceFindings(sequence.steps), plan_(plan), sequence_(sequence), order_(sequence.steps) {
+        std::size_t between = plan.layers.size();
         for (std::size_t l = 0; l < plan.layers.size(); ++l) {
             const PlannedLayer& layer = plan.layers[l];
             const double each = layer.slab_thickness / layer.slabs;
-            for (int k = 0; k < layer.slabs; ++k) slabs_.push_back({l, k, each, layer.z_bottom + k * each});
+            for (int k = 0; k < layer.slabs; ++k)
+                slabs_.push_back({l, k, each, layer.z_bottom + k * each, k == 0 ? l : between++});
         }
         programs_left_.resize(plan.layers.size());
         for (const PlannedProgram& program : plan.programs) ++programs_left_[program.layer];
@@ -282,20 +283,13 @@ private:
     void check_glue_place(const DueSlab& slab, double area, double slack) {
         const std::optional<std::string> pointer = word("polygons");
         if (!pointer) return;
-        // Those under layers come first, in the layers' order; those between a layer's slabs follow.
-        constexpr std::string_view start = "#/glue/";
-        std::size_t entry = sequence_.glue.size();
-        if (pointer->starts_with(start))
-            std::from_chars(pointer->data() + start.size(), pointer->data() + pointer->size(), entry);
-        if (*pointer != "#/glue/" + std::to_string(entry) || entry >= sequence_.glue.size() ||
-            sequence_.glue[entry].layer != plan_.layers[slab.layer].index ||
-            (slab.number == 0 && entry != slab.layer)) {
+        if (*pointer != "#/glue/" + std::to_string(slab.glue) || slab.glue >= sequence_.glue.size() ||
+            sequence_.glue[slab.glue].layer != plan_.layers[slab.layer].index) {
             complain("sequence.glue",
                      fmt::format("points to {}, which is not where its glue goes", *pointer));
             return;
         }
-        if (slab.number > 0 && entry == slab.layer) return;  // everywhere, without polygons of its own
-        const StatedGlue& place = sequence_.glue[entry];
+        const StatedGlue& place = sequence_.glue[slab.glue];
         if (!(std::abs(place.area_mm2 - area) <= slack))
             complain("sequence.glue",
                      fmt::format("its polygons have {:.3f} mm2, the step says {:.3f}", place.area_mm2, area));
