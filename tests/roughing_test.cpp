@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "engine/paths/layer_cut.h"
+#include "engine/paths/open_waste.h"
 #include "tests/support/height_field.h"
 
 namespace slabwright {
@@ -252,6 +253,35 @@ TEST(Roughing, FaceMillTakesWhatLiesOpenAndTheEndMillTheRest) {
         EXPECT_LE(less, 1);
         EXPECT_LT(both.way(true), 0.45 * alone.way(true)) << "the end mill's";
     }
+}
+
+// A level with a run that the face mill has no way into is left to the end mill, and so are those below it;
+// those above it stay the face mill's.
+TEST(Roughing, ALevelWithoutAWayInIsTheEndMills) {
+    Roughed r(posts_and_pocket, {-160, -150}, {150, 140}, 2.2, 2, true);
+    const auto level = [](double depth, double from, double to, double y) {
+        const std::int32_t z = to_units(kTop - depth);
+        RingPlan::Piece piece;
+        piece.points = {{to_units(from), to_units(y), z}, {to_units(to), to_units(y), z}};
+        OpenLevel open;
+        open.whole = true, open.above = kTop - depth + 4, open.saved = 5;
+        open.rings.z = z, open.rings.radius = 25, open.rings.step = 5, open.rings.from_open = true;
+        open.rings.pieces = {piece};
+        return open;
+    };
+    // From beside the stock; three millimetres in the midst of it; from beside it again.
+    std::vector<OpenLevel> levels{level(4, -200, 0, -120), level(8, 0, 3, -10), level(12, -200, 0, -120)};
+    const Operation op = clear_open_waste(r.cut, r.job.tools[0], levels, nullptr);
+    ASSERT_FALSE(op.moves.empty());
+    std::int32_t lowest = INT32_MAX;
+    for (const Move& m : op.moves) lowest = std::min(lowest, m.z);
+    EXPECT_EQ(lowest, to_units(kTop - 4));
+    EXPECT_FALSE(levels[0].rings.pieces.empty());
+    EXPECT_TRUE(levels[1].rings.pieces.empty());
+    EXPECT_TRUE(levels[2].rings.pieces.empty());
+    EXPECT_TRUE(r.cut.no_way_in.empty()) << "the end mill takes it: nothing is left out";
+    EXPECT_NEAR(r.standing.top(5, {-50, -120}, {-50, -120}), kTop - 4, 1e-3);
+    EXPECT_NEAR(r.standing.top(1, {1, -10}, {1, -10}), kTop, 1e-3);
 }
 
 // Passes of .75 mm take longer than the end mill on whole levels, but not on the shallow last ones: over
