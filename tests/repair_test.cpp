@@ -115,7 +115,8 @@ std::vector<Damage> damages() {
              fs.erase(std::remove_if(fs.begin(), fs.end(),
                                      [](const auto& f) {
                                          return f[0].z == 64 && f[1].z == 64 && f[2].z == 64 &&
-                                                middle(f, &Vec3f::x) > 115 && middle(f, &Vec3f::x) < 190;
+                                                middle(f, &Vec3f::x) > 115 && middle(f, &Vec3f::x) < 190 &&
+                                                std::abs(middle(f, &Vec3f::y)) < 28;
                                      }),
                       fs.end());
          }},
@@ -262,8 +263,14 @@ TEST(Repair, SeveralDefectsAtOnce) {
             damage.make(bad, random);
         }
         SCOPED_TRACE(names);
-        const Mended result = mended(welded(bad));
-        EXPECT_TRUE(result.solid);
+        // Facets that are missing side by side leave a hole that is larger than is closed unasked.
+        Context context({.threads = 1});
+        const Mended result = mended(context, welded(bad), {.hole_mm = 60});
+        EXPECT_TRUE(result.solid) << result.left.holes << " holes, " << result.left.sheets << " sheets, "
+                                  << result.report.inverted_components.count << " inside out, "
+                                  << result.report.open_edges.count << " open, "
+                                  << result.report.misoriented_edges.count << " misoriented, "
+                                  << result.left.one_sided << " one-sided";
         EXPECT_NEAR(test::volume(result.mesh.view()), volume, .01 * volume);
         EXPECT_EQ(mended(result.mesh).needed, !result.solid);
     }

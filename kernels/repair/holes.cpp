@@ -76,17 +76,15 @@ private:
         std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
             return std::tie(loops_[a].area_mm2, a) < std::tie(loops_[b].area_mm2, b);
         });
-        for (std::size_t i = 0; i < order.size(); ++i) {
+        // From the largest on: what lies in a hole of another is an outline again.
+        for (std::size_t i = order.size(); i-- > 0;) {
             context_.throw_if_cancelled();
-            for (std::size_t j = i + 1; j < order.size(); ++j) {
-                if (!holds(loops_[order[j]], loops_[order[i]])) continue;
-                if (inner(loops_[order[i]].normal, loops_[order[j]].normal) < 0 &&
-                    !patches_[order[j]].in_other) {
-                    patches_[order[i]].in_other = true;
-                    patches_[order[j]].holes.push_back(order[i]);
-                }
-                break;
-            }
+            std::size_t around = i + 1;
+            while (around < order.size() && !holds(loops_[order[around]], loops_[order[i]])) ++around;
+            if (around == order.size() || patches_[order[around]].in_other) continue;
+            if (inner(loops_[order[i]].normal, loops_[order[around]].normal) >= 0) continue;
+            patches_[order[i]].in_other = true;
+            patches_[order[around]].holes.push_back(order[i]);
         }
     }
 
