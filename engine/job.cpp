@@ -291,8 +291,7 @@ void validate(const Job& job) {
                "halving starts at the coarse spacing and ends at the resolution");
 
     const Cutting& k = job.cutting;
-    require("cutting.wall_allowance", k.wall_allowance, kJunction, 100, Ends::closed,
-            "the machine may round corners of roughing by that");
+    require("cutting.wall_allowance", k.wall_allowance, 0, 100);
     require("cutting.floor_allowance", k.floor_allowance, 0, 100);
     require("cutting.rough_blend", k.rough_blend, 0.02, 1);
     require("cutting.steep_limit_deg", k.steep_limit_deg, 1, 89);
