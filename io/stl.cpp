@@ -590,6 +590,43 @@ void set_on_base(Mesh& mesh) {
     for (Vec3f& v : mesh.vertices) v.z = static_cast<float>(static_cast<double>(v.z) - lowest);
 }
 
+/// Facets without area that hang together with no other lie anywhere and are no part of the solid, but would
+/// lift it off its base or enlarge its stock. Draws their corners together in a corner of the solid, where
+/// they do nothing; their numbers stay. What hangs together with facets that have area fills a gap between
+/// them, and stays.
+/// @return how many; 0 where no facet has area
+std::uint64_t draw_strays_in(Mesh& mesh, const MeshReport& report) {
+    const auto has_area = [&](const Index3& f) {
+        const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
+        const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z,
+                     vx = double{c.x} - a.x, vy = double{c.y} - a.y, vz = double{c.z} - a.z;
+        return uy * vz != uz * vy || uz * vx != ux * vz || ux * vy != uy * vx;
+    };
+    std::vector<char> solid(report.components, 0);
+    std::uint32_t corner = 0;
+    for (std::size_t f = mesh.facets.size(); f-- > 0;)
+        if (has_area(mesh.facets[f])) {
+            solid[report.component_of[f]] = 1;
+            corner = mesh.facets[f][0];
+        }
+    if (std::find(solid.begin(), solid.end(), 1) == solid.end()) return 0;
+    std::vector<char> used(mesh.vertices.size(), 0);
+    for (std::size_t f = 0; f < mesh.facets.size(); ++f)
+        if (solid[report.component_of[f]])
+            for (const std::uint32_t v : mesh.facets[f]) used[v] = 1;
+    std::uint64_t strays = 0;
+    for (std::size_t f = 0; f < mesh.facets.size(); ++f) {
+        if (solid[report.component_of[f]]) continue;
+        ++strays;
+        mesh.facets[f] = {corner, corner, corner};
+        mesh.neighbours[f] = {kNoFacet, kNoFacet, kNoFacet};
+    }
+    if (strays == 0) return 0;
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+        if (!used[v]) mesh.vertices[v] = mesh.vertices[corner];
+    return strays;
+}
+
 /// In which order a mesh has the facets of its file.
 enum class FacetOrder : std::uint8_t {
     file,
@@ -702,6 +739,19 @@ StlMesh read_stl(Context& context, const std::string& path, const StlOptions& op
         refuse("flat", fmt::format("the mesh is {:g} mm high: nothing can be built of it", height), path,
                "check the unit (--units), and which way is up in the file");
     if (note) stl.diagnostics.push_back(std::move(*note));
+    if (stl.report.degenerate_facets.count > 0)
+        if (const std::uint64_t strays = draw_strays_in(stl.mesh, stl.report)) {
+            const double base = stl.input.min[2] + double{bounds(stl.mesh.view()).min.z};
+            set_on_base(stl.mesh);
+            stl.report = report_mesh(context, stl.mesh.view());
+            const Box3& box = stl.report.box;
+            stl.input.min = {box.min.x, box.min.y, base};
+            stl.input.max = {box.max.x, box.max.y, base + box.max.z};
+            stl.diagnostics.push_back({Severity::note, "mesh.stray",
+                                       number_of(strays, "facet", "facets") +
+                                           " without area that hang together with no body: left out",
+                                       std::nullopt});
+        }
     if (options.repair != Repair::none) {
         Repaired repaired = repair_mesh(context, stl.mesh.view(), stl.report, options.repair, path);
         if (repaired.told.how != "none") {

@@ -34,9 +34,11 @@ struct StlMesh {
 ///         non-finite or absurd (over 1e6 mm) coordinates, no facets. Codes: stl.missing, directory,
 ///         unreadable, changed, empty, not_stl, no_facets, facet_count, truncated, unparsable, non_finite,
 ///         absurd, flat (of no height)
-/// Diagnostics: units.suspicious, mesh.welded, and mesh.open, open_base, misoriented, inverted, non_manifold,
-/// duplicate, degenerate, each with its count and the centre of its first facet. Where a repair was asked
-/// for, they are of what it left, and what it did is told as repair_mesh() does. @throws as that
+/// Facets without area that hang together with no body bound nothing and are left out of box and base
+/// (mesh.stray). Diagnostics: units.suspicious, mesh.welded, mesh.stray, and mesh.open, open_base,
+/// misoriented, inverted, non_manifold, duplicate, degenerate, each with its count and the centre of its
+/// first facet. Where a repair was asked for, they are of what it left, and what it did is told as
+/// repair_mesh() does. @throws as that
 [[nodiscard]] StlMesh read_stl(Context& context, const std::string& path, const StlOptions& options = {});
 
 /// Only the mesh of read_stl(), without digest, report and weld within a tolerance. @throws as read_stl()

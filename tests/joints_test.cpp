@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <numbers>
 #include <random>
 #include <string>
@@ -27,6 +28,7 @@
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/seed.h"
+#include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
 
@@ -660,6 +662,58 @@ TEST(Joints, JointsBetweenSlabsHaveGlueAndPressOfTheirOwn) {
         ++k;
     }
     EXPECT_EQ(k, 3u);
+}
+
+// Facets without area that hang together with nothing: they neither lift the pattern nor enlarge its stock.
+TEST(Joints, StrayFacetsWithoutAreaLiftNothing) {
+    const support::TemporaryFolder folder;
+    const shapes::Facets block = shapes::box({0, 0, 0}, {60, 40, 30});
+    const auto read = [&](const shapes::Facets& facets) {
+        // As a file holds them: header, count, and 50 bytes a facet.
+        const std::string path = folder / "part.stl";
+        std::ofstream file(path, std::ios::binary);
+        file << std::string(80, ' ');
+        const auto count = static_cast<std::uint32_t>(facets.size());
+        file.write(reinterpret_cast<const char*>(&count), 4);
+        for (const auto& facet : facets) {
+            file.write("\0\0\0\0\0\0\0\0\0\0\0\0", 12);
+            for (const Vec3f& v : facet) {
+                file.write(reinterpret_cast<const char*>(&v.x), 4);
+                file.write(reinterpret_cast<const char*>(&v.y), 4);
+                file.write(reinterpret_cast<const char*>(&v.z), 4);
+            }
+            file.write("\0\0", 2);
+        }
+        file.close();
+        Context context;
+        return read_stl(context, path);
+    };
+    const std::vector<std::array<Vec3f, 3>> strays{
+        {Vec3f{5, 5, -7}, Vec3f{5, 5, -7}, Vec3f{5, 5, -7}},         // a point
+        {Vec3f{5, 5, -7}, Vec3f{9, 5, -7}, Vec3f{5, 5, -7}},         // a line there and back
+        {Vec3f{-90, 5, -7}, Vec3f{-88, 5, -7}, Vec3f{-86, 5, -7}},   // three points on a line
+        {Vec3f{200, 5, 70}, Vec3f{200, 5, 71}, Vec3f{200, 5, 72}}};  // upright, above
+    for (std::size_t s = 0; s <= strays.size(); ++s) {
+        SCOPED_TRACE(s);
+        shapes::Facets facets = block;
+        for (std::size_t k = 0; k < strays.size(); ++k)
+            if (k == s || s == strays.size())
+                facets.insert(facets.begin() + static_cast<std::ptrdiff_t>(k), strays[k]);
+        const StlMesh stl = read(facets);
+        const Box3 box = bounds(stl.mesh.view());
+        EXPECT_EQ(box.min, (Vec3f{0, 0, 0}));
+        EXPECT_EQ(box.max, (Vec3f{60, 40, 30}));
+        EXPECT_EQ(stl.input.min, (std::array<double, 3>{0, 0, 0}));
+        EXPECT_EQ(stl.input.max, (std::array<double, 3>{60, 40, 30}));
+        EXPECT_EQ(stl.report.open_edges.count, 0u);
+        EXPECT_TRUE(std::any_of(stl.diagnostics.begin(), stl.diagnostics.end(),
+                                [](const Diagnostic& d) { return d.code == "mesh.stray"; }));
+        Context context;
+        EXPECT_NO_THROW(require_solid(context, stl, "part.stl"));
+        Plan plan = layers_of(context, stl.mesh.view(), {});
+        (void)bond_all(context, stl.mesh.view(), plan);
+        EXPECT_NEAR(plan.layers[0].joints[0].standing_mm2, 60 * 40, 0.1);
+    }
 }
 
 TEST(Joints, APlanWithAJointThatCannotHoldIsRefusedUnlessAccepted) {
