@@ -231,7 +231,7 @@ BuildPlan planned_build(const Field& plan, const JobPart& part, Frame frame, con
     const Field layers = plan["layers"];
     for (std::size_t l = 0; l < layers.size(); ++l) {
         const Field from = layers[l];
-        PlannedLayer& layer = build.layers.emplace_back();
+        LayerToBuild& layer = build.layers.emplace_back();
         layer.index = from["index"].whole();
         layer.z_bottom = from["z_bottom"].number(), layer.z_top = from["z_top"].number();
         layer.slab_thickness = from["slab_thickness"].number();
@@ -362,7 +362,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
     const Field tools = plan["tools"];
     for (std::size_t i = 0; i < tools.size(); ++i) input.tools.push_back(read_tool(tools[i]));
     const fs::path table = out / "tool.tbl";
-    violations = check_tool_table(read_file(table, "verify.tool_table", kMostToolTableBytes), table.string(), input.tools);
+    violations = check_tool_table(read_file(table, "verify.tool_table", kMostToolTableBytes), table.string(),
+                                  input.tools);
 
     const Field layers = plan["layers"];
     std::set<std::string> planned;

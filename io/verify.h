@@ -35,8 +35,8 @@ struct Verification {
 [[nodiscard]] GcodeLimits gcode_limits(const Tolerances& tolerances);
 
 /// Reads plan.json, every program of nc/, tool.tbl, sequence.json and, if it is not given, the pattern,
-/// replays the sequence, simulates the programs, and writes OUT/verify.json (a whole file or none). The report's violations say what is wrong with programs and
-/// part; `report.passed()` is the verdict.
+/// replays the sequence, simulates the programs, and writes OUT/verify.json (a whole file or none). The
+/// report's violations say what is wrong with programs and part; `report.passed()` is the verdict.
 /// @throws Error(verification) when OUT cannot be understood: plan.json missing or not of schema
 /// slabwright.plan/1 or without
 ///   a key (names it), a program that read_gcode refuses (file:line)

@@ -102,7 +102,7 @@ BuildPlan stated(const Plan& plan) {
     }
     for (std::size_t l = 0; l < plan.layers.size(); ++l) {
         const Layer& layer = plan.layers[l];
-        PlannedLayer& to = build.layers.emplace_back();
+        LayerToBuild& to = build.layers.emplace_back();
         to.index = layer.index;
         to.z_bottom = layer.z_bottom, to.z_top = layer.z_top;
         to.slab_thickness = layer.slab_thickness, to.slabs = layer.slabs;

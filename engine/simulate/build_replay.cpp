@@ -37,7 +37,7 @@ public:
         : SequenceFindings(sequence.steps), plan_(plan), sequence_(sequence), order_(sequence.steps) {
         std::size_t between = plan.layers.size();
         for (std::size_t l = 0; l < plan.layers.size(); ++l) {
-            const PlannedLayer& layer = plan.layers[l];
+            const LayerToBuild& layer = plan.layers[l];
             const double each = layer.slab_thickness / layer.slabs;
             for (int k = 0; k < layer.slabs; ++k)
                 slabs_.push_back({l, k, each, layer.z_bottom + k * each, k == 0 ? l : between++});
@@ -396,7 +396,7 @@ private:
         expect_seconds(0, kSeconds);
         if (placed_ > 0) {
             const std::size_t l = slabs_[placed_ - 1].layer;
-            const PlannedLayer& layer = plan_.layers[l];
+            const LayerToBuild& layer = plan_.layers[l];
             expect_layer(l);
             expect("sequence.touch_off", "slab_top_mm", layer.z_bottom + layer.slab_thickness - origin_of(l),
                    kLength);

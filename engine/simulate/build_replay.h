@@ -24,7 +24,7 @@ struct PlannedJoint {
 };
 
 /// A layer as the plan states it.
-struct PlannedLayer {
+struct LayerToBuild {
     int index = 0;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;  ///< mm, pattern-base; of all its slabs together
     int slabs = 1;
@@ -50,7 +50,7 @@ struct BuildPlan {
     Frame frame = Frame::pattern_base;
     std::string pattern, sha256;
     std::array<double, 2> stock_min{}, stock_max{};
-    std::vector<PlannedLayer> layers;
+    std::vector<LayerToBuild> layers;
     std::vector<PlannedProgram> programs;
     std::vector<Tool> tools;
     bool flask = false;

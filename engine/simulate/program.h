@@ -63,8 +63,8 @@ struct Program {
     double spindle_rpm = 0;                        ///< highest
     ProgramWord slowest_spindle, fastest_spindle;  ///< rpm from its first feed motion to its last retract; 0
                                                    ///< rpm: it stands
-    double dwell_s = 0;            ///< of all G4 together
-    ProgramWord longest_dwell;     ///< s, of one G4
+    double dwell_s = 0;                            ///< of all G4 together
+    ProgramWord longest_dwell;                     ///< s, of one G4
     ProgramWord shortest_spin_up;  ///< s of dwell between the spindle's start, or a change of its speed, and
                                    ///< the next feed motion; the line is that motion's
     double blend = kJunction;   ///< mm by which the machine may round the corners (G64 P; 0: G61), the least
