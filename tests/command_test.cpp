@@ -446,7 +446,7 @@ TEST(Command, AHangUpCancels) {
     const std::string line = "exec timeout -s HUP 2 \"$@\"";
     CommandResult result =
         run_command({"/bin/sh", "-c", line, "sh", SLABWRIGHT_COMMAND, "plan", folder / "big.stl", "-o",
-                     folder / "place/a/out", "--allow-undercut", "--no-verify"});
+                     folder / "place/a/out", "--allow-undercut", "--accept-weak-joints", "--no-verify"});
     EXPECT_NE(result.err.find("cancelled"), std::string::npos) << result.err;
     EXPECT_TRUE(fs::is_empty(folder.path / "place")) << "nothing half-written stays";
     // Under nohup it goes on.
