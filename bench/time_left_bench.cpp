@@ -1,7 +1,7 @@
 // How true the time left is that a progress bar shows while a pattern is planned, written and verified: after
 // the first tenth of the progress and of the time, the time that was foretold over the time that it took in
 // the end.
-//     SLABWRIGHT_CORPUS=../shared/corpus build/release/time_left_bench --benchmark_counters_tabular=true
+//     SLABWRIGHT_CORPUS=corpus build/release/time_left_bench --benchmark_counters_tabular=true
 // Generated patterns, the pump cover, and where SLABWRIGHT_CORPUS is set two of its castings.
 #include <benchmark/benchmark.h>
 #include <unistd.h>

@@ -241,7 +241,7 @@ struct Job {
 /// pattern_base where it is fixed.
 [[nodiscard]] Frame frame_of(const Machine& machine);
 
-/// The tallest layer this job can cut (LTmax, method.md section 4): the thickest slab less the facing
+/// The tallest layer this job can cut (LTmax, METHOD.md section 4): the thickest slab less the facing
 /// allowance, and for every tool its flutes less overrun and holder clearance.
 [[nodiscard]] double max_layer_thickness(const Job& job);
 

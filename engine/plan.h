@@ -146,7 +146,7 @@ struct Layer {
                                 ///< between its slabs
 };
 
-/// A step of the machine's sequence (method.md section 12); `needs` are ids of the steps that must be done
+/// A step of the machine's sequence (METHOD.md section 12); `needs` are ids of the steps that must be done
 /// before.
 struct SequenceStep {
     int id = 0;

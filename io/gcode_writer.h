@@ -1,4 +1,4 @@
-// RS-274 out: one program per operation (method.md section 11), judged by LinuxCNC's interpreter in the
+// RS-274 out: one program per operation (METHOD.md section 11), judged by LinuxCNC's interpreter in the
 // tests.
 #pragma once
 

@@ -1,4 +1,4 @@
-// sequence.json: the machine's steps (method.md section 12), schema slabwright.sequence/1.
+// sequence.json: the machine's steps (METHOD.md section 12), schema slabwright.sequence/1.
 #pragma once
 
 #include <string>

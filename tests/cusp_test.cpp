@@ -1,4 +1,4 @@
-// The figures of method.md section 5, each against a brute-force cut of a plane by tool profiles.
+// The figures of METHOD.md section 5, each against a brute-force cut of a plane by tool profiles.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -75,7 +75,7 @@ TEST(Cusp, StepdownIsTheInverse) {
 }
 
 // LUO's table: R .125 in, 87°, L .002 in gives .0445 in; the true limit is .0636 in, 30 % fewer passes.
-// (method.md says .0639, which leaves .00201 in by its own formula and by the sampled profiles alike.)
+// (METHOD.md says .0639, which leaves .00201 in by its own formula and by the sampled profiles alike.)
 TEST(Cusp, LuoStepdowns) {
     EXPECT_NEAR(ball_level_stepdown_printed(0.125, 87 * kDegree, 0.002), 0.04448, 5e-6);
     EXPECT_NEAR(ball_level_stepdown(0.125, 87 * kDegree, 0.002), 0.0636, 5e-5);

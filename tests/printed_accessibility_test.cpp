@@ -78,7 +78,7 @@ TEST(PrintedAccessibility, OfASlot) {
 }
 
 // On an arc of radius ρ > R the corner rule loses R/ρ of the length, though a tool reaches all of it
-// (method.md section 6).
+// (METHOD.md section 6).
 TEST(PrintedAccessibility, OfARoundedCorner) {
     constexpr double rho = 10, radius = 4;
     constexpr int steps = 90;  // of a quarter

@@ -607,7 +607,7 @@ TEST(Stock, ARegionIsCutAsItsWaysAre) {
     EXPECT_GT(cut, 100U);
 }
 
-// Level passes of a ball on a plane at α leave L = R − √(R² − (SD / (2 sin α))²) (method.md section 5).
+// Level passes of a ball on a plane at α leave L = R − √(R² − (SD / (2 sin α))²) (METHOD.md section 5).
 TEST(Stock, CuspOfLevelPassesOnAPlane) {
     const double R = 3.175, alpha = 50 * std::numbers::pi / 180, cusp = 0.1;
     const double sd = 2 * std::sqrt(2 * R * cusp - cusp * cusp) * std::sin(alpha);

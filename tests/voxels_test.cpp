@@ -1,4 +1,4 @@
-// AS on voxels (LUO 5.5.2; method.md section 7): closed forms of slots and corners, and brute force over
+// AS on voxels (LUO 5.5.2; METHOD.md section 7): closed forms of slots and corners, and brute force over
 // every cell.
 #include "kernels/voxels/voxels.h"
 #include "tests/support/seed.h"

@@ -1,4 +1,4 @@
-// The flask (RPM; method.md section 11): a frame of every slab that stays around the pattern. It carries the
+// The flask (RPM; METHOD.md section 11): a frame of every slab that stays around the pattern. It carries the
 // slab where that hangs over while it is cut, and is the moulding box afterwards.
 //
 // Its opening is the pattern's silhouette, holes filled, grown by the job's gap, round; where that falls into

@@ -1,4 +1,4 @@
-// The hardest cuts that a job's cutters make, as the force model takes them (method.md section 8).
+// The hardest cuts that a job's cutters make, as the force model takes them (METHOD.md section 8).
 #pragma once
 
 #include "engine/job.h"

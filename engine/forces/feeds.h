@@ -1,4 +1,4 @@
-// The forces of every stretch of a layer's programs, and feeds that fit them (method.md sections 8 and 9).
+// The forces of every stretch of a layer's programs, and feeds that fit them (METHOD.md sections 8 and 9).
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
 // How thick the wood above a layer boundary must be to bear being cut where its slab hangs over (LUO 6.3;
-// method.md section 9).
+// METHOD.md section 9).
 #pragma once
 
 #include <array>

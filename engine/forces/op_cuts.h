@@ -1,5 +1,5 @@
 // What the moves of a layer's programs meet when they are run one after the other: the engagement of every
-// stretch of way, from what stands (method.md section 8).
+// stretch of way, from what stands (METHOD.md section 8).
 #pragma once
 
 #include <array>

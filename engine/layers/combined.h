@@ -1,4 +1,4 @@
-// Layers and finish tools decided together (LUO 6.4.2; method.md section 10): with slabs bonded to any
+// Layers and finish tools decided together (LUO 6.4.2; METHOD.md section 10): with slabs bonded to any
 // thickness a layer may be as tall as its tool is allowed to be long, so layers begin and end where the tool
 // changes.
 #pragma once

@@ -1,4 +1,4 @@
-// Where one layer ends and the next begins (LUO 4.2.4–4.2.5; method.md section 4).
+// Where one layer ends and the next begins (LUO 4.2.4–4.2.5; METHOD.md section 4).
 #pragma once
 
 #include <functional>
@@ -67,7 +67,7 @@ struct LayerPlacement {
     std::vector<Diagnostic> diagnostics;
 };
 
-/// Print's algorithm, with the corrections of method.md section 4. Ends on every input.
+/// Print's algorithm, with the corrections of METHOD.md section 4. Ends on every input.
 /// @throws Error(usage, "layers.request") when no placement can answer: no height, no tallest layer, slabs
 /// that are no lengths
 [[nodiscard]] LayerPlacement place_layers_printed(const LayerRequest& request);

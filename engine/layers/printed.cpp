@@ -1,6 +1,6 @@
 // Print's placement (LUO 4.2.4–4.2.5): bottom-up, each boundary as high as it may be, non-deposition regions
 // of Type I features avoided, down-facing flats met, shallow ranges avoided where that costs nothing.
-// Corrections: method.md section 4.
+// Corrections: METHOD.md section 4.
 //
 // Print searches the boundaries inside a tall region by branch and bound. Fewest boundaries first and the
 // largest sum of Q among those is a shortest path over the candidates, so a dynamic program with a sliding

@@ -1,4 +1,4 @@
-// Pieces of waste that come loose while a layer is cut (method.md section 11, Breakthrough). Nothing of how
+// Pieces of waste that come loose while a layer is cut (METHOD.md section 11, Breakthrough). Nothing of how
 // the paths were made is known here: the slab just above its layer's bottom is drawn on a grid, and the moves
 // that cut it through are run backwards.
 #pragma once

@@ -1,4 +1,4 @@
-// The tool paths of one layer (SHAPING, FINISH; method.md sections 5 and 11), with the tools that were chosen
+// The tool paths of one layer (SHAPING, FINISH; METHOD.md sections 5 and 11), with the tools that were chosen
 // for it.
 #pragma once
 

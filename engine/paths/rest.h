@@ -1,5 +1,5 @@
 // Rest machining: what earlier operations of the layer left standing, and only that, is cut by a cutter
-// dropped onto the surface over it (method.md section 11: corners that a ball does not reach; waste where the
+// dropped onto the surface over it (METHOD.md section 11: corners that a ball does not reach; waste where the
 // roughing cutter does not fit).
 #pragma once
 

@@ -1,4 +1,4 @@
-// What holds the build together (method.md section 18): where glue goes at every joint, how hard the press
+// What holds the build together (METHOD.md section 18): where glue goes at every joint, how hard the press
 // may press there, and what of it cannot hold.
 #pragma once
 

@@ -1,4 +1,4 @@
-// What an operation's heaviest cut does to its tool, for the plan (method.md sections 8 and 9).
+// What an operation's heaviest cut does to its tool, for the plan (METHOD.md sections 8 and 9).
 #pragma once
 
 #include "engine/plan.h"

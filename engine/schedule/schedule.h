@@ -1,4 +1,4 @@
-// The machine's steps (RPM; method.md section 12).
+// The machine's steps (RPM; METHOD.md section 12).
 #pragma once
 
 #include "engine/plan.h"

@@ -19,7 +19,7 @@ struct ReplayOptions {
 
 /// One piece of a program. Depth is the most that any point of the stock lost in one motion, width the volume
 /// taken over the way cut times that depth, both as the points of the stock show them; forces are the model's
-/// for that cut at the piece's fastest feed in the plane (method.md sections 8 and 9). All 0 where the piece
+/// for that cut at the piece's fastest feed in the plane (METHOD.md sections 8 and 9). All 0 where the piece
 /// cuts nothing.
 struct ReplayPiece {
     double depth_mm = 0, width_mm = 0;

@@ -1,4 +1,4 @@
-// AR of a tool in a layer, by the rule that the job names (LUO 5.5.1; method.md section 6).
+// AR of a tool in a layer, by the rule that the job names (LUO 5.5.1; METHOD.md section 6).
 #pragma once
 
 #include "engine/tools/select.h"

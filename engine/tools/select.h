@@ -1,4 +1,4 @@
-// Choosing the tools of a layer and their stepdowns (LUO 5.5.2 and 5.5.3; method.md section 7).
+// Choosing the tools of a layer and their stepdowns (LUO 5.5.2 and 5.5.3; METHOD.md section 7).
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// How much of a layer's surface a tool reaches (method.md section 6, `exact`): by area, in 3D, with Embree.
+// How much of a layer's surface a tool reaches (METHOD.md section 6, `exact`): by area, in 3D, with Embree.
 //
 // A point of the part is reached if there is a place of the tool, its axis upright, in which the cutter's
 // surface passes within the tolerance of the point and nothing of the part, as it stands while the layer is

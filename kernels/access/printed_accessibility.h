@@ -1,4 +1,4 @@
-// Accessibility as printed (LUO 5.5.1; method.md section 6): by length, over the section polylines of a
+// Accessibility as printed (LUO 5.5.1; METHOD.md section 6): by length, over the section polylines of a
 // layer.
 #pragma once
 

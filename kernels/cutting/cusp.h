@@ -1,4 +1,4 @@
-// Cusps, stepdowns and step-overs (LUO 5.4, SHAPING 3, FINISH eq. 9; method.md section 5). Millimetres,
+// Cusps, stepdowns and step-overs (LUO 5.4, SHAPING 3, FINISH eq. 9; METHOD.md section 5). Millimetres,
 // radians. α is the slope of the surface: 0 flat, π/2 vertical.
 #pragma once
 
@@ -6,7 +6,7 @@ namespace slabwright {
 
 /// Height, normal to the surface, of the cusp that a ball of radius `r` leaves on a plane at slope `alpha`
 /// between two level passes `stepdown` apart. Where the lower pass's shank cuts too the second formula of
-/// method.md section 5 holds, which replaces LUO eq. 5. Infinite where the passes leave an uncut strip
+/// METHOD.md section 5 holds, which replaces LUO eq. 5. Infinite where the passes leave an uncut strip
 /// (stepdown·cot α > 2r).
 [[nodiscard]] double ball_level_cusp(double r, double alpha, double stepdown);
 

@@ -1,7 +1,7 @@
 // Push-cutter fibres: at one tip height, along straight lines in x or y, the intervals in which the cutter
 // would touch the solid. Every facet (prism), convex edge (cylinder) and vertex (sphere) within reach forbids
 // an interval in closed form; so do the section's inside and whatever overhangs the tip. The ends of the
-// merged intervals are exact cutter locations (method.md section 11).
+// merged intervals are exact cutter locations (METHOD.md section 11).
 #pragma once
 
 #include <cstdint>

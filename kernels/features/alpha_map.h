@@ -1,4 +1,4 @@
-// The α-map of a layer: how steep its surface is at each height (LUO 5.4, method.md section 5).
+// The α-map of a layer: how steep its surface is at each height (LUO 5.4, METHOD.md section 5).
 #pragma once
 
 #include <cstdint>

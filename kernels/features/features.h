@@ -1,4 +1,4 @@
-// Features that decide where layer boundaries may lie (LUO 4.2.3; method.md section 3).
+// Features that decide where layer boundaries may lie (LUO 4.2.3; METHOD.md section 3).
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// How thin a slab may be cut and how long a cutter may be (LUO 6.3, 6.4; method.md section 9). Lengths mm,
+// How thin a slab may be cut and how long a cutter may be (LUO 6.3, 6.4; METHOD.md section 9). Lengths mm,
 // forces N, stresses MPa.
 #pragma once
 

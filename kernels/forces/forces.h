@@ -1,4 +1,4 @@
-// What a milling cut does to cutter and wood (LUO 6.2, 6.5.1; method.md section 8): the edge-force model of
+// What a milling cut does to cutter and wood (LUO 6.2, 6.5.1; METHOD.md section 8): the edge-force model of
 // Altintas for flat and ball end mills, for one cut in double precision and for any number of cuts on an
 // OpenCL device.
 //

@@ -1,4 +1,4 @@
-// What is wrong with a mesh, counted and placed (method.md section 1). Nothing is repaired here.
+// What is wrong with a mesh, counted and placed (METHOD.md section 1). Nothing is repaired here.
 #pragma once
 
 #include <cstdint>

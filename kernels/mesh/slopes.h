@@ -1,4 +1,4 @@
-// How steep a pattern is, and where (LUO 5.4; method.md section 5).
+// How steep a pattern is, and where (LUO 5.4; METHOD.md section 5).
 #pragma once
 
 #include <vector>

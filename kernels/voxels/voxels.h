@@ -1,5 +1,5 @@
 // The stock of one layer as voxels, and what roughing leaves of it outside the swath of the cutter that
-// follows: the semi-rough area AS of LUO 5.5.2 (method.md section 7).
+// follows: the semi-rough area AS of LUO 5.5.2 (METHOD.md section 7).
 #pragma once
 
 #include <array>

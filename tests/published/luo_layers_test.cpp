@@ -1,4 +1,4 @@
-// LUO tables 4.1 and 4.2, on the sample part built from table 4.1's design heights (method.md sections 3 and
+// LUO tables 4.1 and 4.2, on the sample part built from table 4.1's design heights (METHOD.md sections 3 and
 // 4).
 #include <gtest/gtest.h>
 
