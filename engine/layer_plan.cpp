@@ -38,6 +38,9 @@ double minutes_of(const Layer& layer, const Machine& machine) {
     for (const Operation& op : layer.operations) {
         minutes += motion_time(op.moves, machine, op.blend).minutes + machine.spindle_dwell_s / 60;
         if (before && before->tool != op.tool) minutes += machine.tool_change_s / 60;
+        if (before && !before->moves.empty() && !op.moves.empty())
+            minutes +=
+                approach_seconds(place_of(before->moves.back()), place_of(op.moves.front()), machine) / 60;
         before = &op;
     }
     return minutes;

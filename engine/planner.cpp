@@ -262,13 +262,13 @@ void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnos
 
 // Every program begins where the one before has ended.
 void add_approaches(Plan& plan) {
-    const auto place = [](const Move& m) { return std::array{to_mm(m.x), to_mm(m.y), to_mm(m.z)}; };
     const Move* end = nullptr;
     for (Layer& layer : plan.layers)
         for (Operation& op : layer.operations) {
             if (op.moves.empty()) continue;
             if (end)
-                op.minutes += approach_seconds(place(*end), place(op.moves.front()), plan.job.machine) / 60;
+                op.minutes +=
+                    approach_seconds(place_of(*end), place_of(op.moves.front()), plan.job.machine) / 60;
             end = &op.moves.back();
         }
 }

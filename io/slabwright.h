@@ -88,9 +88,10 @@ struct VerifyResult {
     double unreachable_mm = 0;   ///< the most that is left there, along the normal
     double unmade_mm3 = 0;       ///< what stays filled under part of the same layer: undercuts
     double unmade_mm = 0;        ///< its greatest height
-    /// Whether the pattern comes out whole: passed, nothing unmade, at most a hundredth of it out of reach.
+    /// Whether the pattern comes out whole: passed, less than a cubic millimetre unmade, at most a hundredth
+    /// of it out of reach.
     [[nodiscard]] bool is_whole() const {
-        return passed && unmade_mm3 == 0 && unreachable_mm2 <= 0.01 * pattern_mm2;
+        return passed && unmade_mm3 < 1 && unreachable_mm2 <= 0.01 * pattern_mm2;
     }
     double gouge_mm = 0;  ///< deepest place of a cutter in the part, along the normal
     double cell_mm = 0;   ///< between the points of the simulated stock

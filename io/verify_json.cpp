@@ -73,7 +73,7 @@ std::string verify_json(const SimulationInput& input, const SimulationReport& r,
     text.key("unreachable_of_pattern_share")
         .rounded(r.pattern_mm2 > 0 ? r.unreachable_mm2() / r.pattern_mm2 : 0, 6);
     text.key("unreachable_max_mm").rounded(r.unreachable().size, 4);
-    text.key("unmade_mm3").rounded(r.unmade_mm3(), 0);
+    text.key("unmade_mm3").rounded(r.unmade_mm3(), 1);
     text.key("unmade_height_mm").rounded(r.unmade().size, 3);
     text.key("removed_mm3").rounded(r.removed_mm3, 0);
     text.key("cutting_mm").rounded(r.cutting_mm, 1);

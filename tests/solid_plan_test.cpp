@@ -60,6 +60,7 @@ Outcome plan_and_prove(const shapes::Facets& facets, const Job& job, const std::
 Job lenient() {
     Job job;
     job.allow_undercut = true;
+    job.bonding.accept_weak = true;
     return job;
 }
 

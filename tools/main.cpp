@@ -193,14 +193,15 @@ std::string makes(const VerifyResult& result) {
     if (!result.passed) return "does NOT make the part";
     if (result.is_whole()) return "makes the part";
     std::string text = "makes all but";
-    if (result.unmade_mm3 > 0)
-        text += fmt::format(" {} cm³ that stay filled under overhangs (up to {} mm high)",
-                            number(result.unmade_mm3 / 1000, result.unmade_mm3 < 1e5 ? 2 : 0),
+    if (result.unmade_mm3 >= 1)
+        text += fmt::format(" {} that stay filled under overhangs (up to {} mm high)",
+                            result.unmade_mm3 < 1000 ? number(result.unmade_mm3, 0) + " mm³"
+                                                     : number(result.unmade_mm3 / 1000, 0) + " cm³",
                             number(result.unmade_mm, 2));
     if (result.unreachable_mm2 > 0.01 * result.pattern_mm2)
         text += fmt::format(
             "{} {} mm² that no tool reaches ({} % of the pattern seen from above, up to {} mm)",
-            result.unmade_mm3 > 0 ? " and" : "", number(result.unreachable_mm2, 0),
+            result.unmade_mm3 >= 1 ? " and" : "", number(result.unreachable_mm2, 0),
             number(100 * result.unreachable_mm2 / result.pattern_mm2, 1), number(result.unreachable_mm, 2));
     return text;
 }

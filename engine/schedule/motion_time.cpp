@@ -150,6 +150,8 @@ double approach_seconds(const std::array<double, 3>& from, const std::array<doub
     return alone(std::fabs(to[2] - from[2])) + alone(std::hypot(to[0] - from[0], to[1] - from[1]));
 }
 
+std::array<double, 3> place_of(const Move& move) { return {to_mm(move.x), to_mm(move.y), to_mm(move.z)}; }
+
 MotionTime motion_time(std::span<const Move> moves, const Machine& machine, double junction_mm) {
     MotionTime total;
     Travel travel(machine.acceleration, junction_mm);

@@ -83,6 +83,9 @@ private:
 [[nodiscard]] double approach_seconds(const std::array<double, 3>& from, const std::array<double, 3>& to,
                                       const Machine& machine);
 
+/// Where a move ends, mm.
+[[nodiscard]] std::array<double, 3> place_of(const Move& move);
+
 struct MotionTime {
     double cutting_mm = 0, rapid_mm = 0;
     double minutes = 0;

@@ -63,6 +63,7 @@ Job shaping_job(FinishStrategy strategy, Projection projection) {
     ball.diameter = ball.shank_diameter = 2 * kBall;
     ball.holder_diameter = 50;
     ball.stepdown_max = 2;
+    job.machine.frame = Frame::pattern_base;  // so that the programs' z is the sphere's
     job.cutting.finish_strategy = strategy;
     job.cutting.projection = projection;
     // SHAPING's steps are constant; this one is just over what the cusp of .003 mm asks for at 45°, so every

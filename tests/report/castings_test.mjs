@@ -7,7 +7,7 @@ import {copyFileSync, mkdirSync, readFileSync, rmSync, statSync, writeFileSync} 
 import {basename} from 'node:path';
 import {browser, Checks, open, pdfPages} from './browser.mjs';
 
-const whole = ({totals}) => totals.unmade_mm3 === 0 && totals.unreachable_mm2 <= 0.01 * totals.pattern_mm2;
+const whole = ({totals}) => totals.unmade_mm3 < 1 && totals.unreachable_mm2 <= 0.01 * totals.pattern_mm2;
 
 const [,, source, command, work, makeModels] = process.argv;
 const {started, missing} = await browser(source);

@@ -69,8 +69,8 @@ export const remarks = [
 function notMade() {
     const totals = verify?.totals ?? {};
     const missing = [];
-    if (totals.unmade_mm3 > 0)
-        missing.push(`${(totals.unmade_mm3 / 1000).toFixed(totals.unmade_mm3 < 1e5 ? 2 : 0)} cm³ that stay filled under overhangs (up to ${totals.unmade_height_mm.toFixed(2)} mm high)`);
+    if (totals.unmade_mm3 >= 1)
+        missing.push(`${totals.unmade_mm3 < 1000 ? `${totals.unmade_mm3.toFixed(0)} mm³` : `${(totals.unmade_mm3 / 1000).toFixed(0)} cm³`} that stay filled under overhangs (up to ${totals.unmade_height_mm.toFixed(2)} mm high)`);
     if (totals.unreachable_mm2 > 0.01 * totals.pattern_mm2)
         missing.push(`${totals.unreachable_mm2.toFixed(0)} mm² that no tool reaches (${(100 * totals.unreachable_of_pattern_share).toFixed(1)} % of the pattern seen from above, up to ${totals.unreachable_max_mm.toFixed(2)} mm)`);
     return missing;
