@@ -85,7 +85,8 @@ SequenceStep read_step(const Json& from, std::size_t place) {
     for (const auto& [key, value] : from.items()) {
         if (own.contains(key)) continue;
         if (value.is_string()) step.words.emplace_back(key, value.get<std::string>());
-        else if (value.is_number()) step.numbers.emplace_back(key, number_of(value, of + "." + key));
+        else if (value.is_number())
+            step.numbers.emplace_back(key, number_of(value, fmt::format("{}.{}", of, key)));
         else if (!value.is_array() && !value.is_object())
             refuse(fmt::format("{}.{} is neither number nor text", of, key));
     }

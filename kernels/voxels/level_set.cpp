@@ -187,7 +187,8 @@ private:
 
     void sample_region(CellBlock& block, std::span<const std::uint8_t> cells, int i0, int j0, int k0) const {
         const auto ask = [&](int p) {
-            return winding_at(block.at, i0 + p / (kPart * kPart), j0 + p / kPart % kPart, k0 + p % kPart);
+            const int i = i0 + p / (kPart * kPart), j = j0 + p / kPart % kPart, k = k0 + p % kPart;
+            return winding_at(block.at, i, j, k);
         };
         const double first = ask(cells.front()), last = cells.size() > 1 ? ask(cells.back()) : first;
         const bool clear = std::abs(first - 0.5) > kClearly && std::abs(first - last) < kClearly / 2;
