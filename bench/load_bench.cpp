@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "bench/peak_memory.h"
-#include "io/stl.h"
+#include "io/read/stl.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 #include "tests/data/models.h"

@@ -8,8 +8,8 @@
 
 #include "engine/planner.h"
 #include "engine/simulate/simulate.h"
-#include "io/gcode_reader.h"
-#include "io/gcode_writer.h"
+#include "io/posts/gcode_reader.h"
+#include "io/posts/gcode_writer.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
 

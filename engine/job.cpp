@@ -12,7 +12,7 @@ namespace slabwright {
 
 namespace {
 
-/// Throws with the key as the place; io/job_toml puts file and line there when the job came from a file.
+/// Throws with the key as the place; io/read/job_toml puts file and line there when the job came from a file.
 [[noreturn]] void refuse(const std::string& key, const std::string& message, const std::string& remedy) {
     throw Error(ErrorKind::usage, "job.range", message, key, remedy);
 }

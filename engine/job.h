@@ -1,6 +1,6 @@
 // What the user decides: material, slabs, machine, tools, tolerances, strategy. Every default plans a 0.75 in
 // MDF pattern on the 1160 mm machine of the RPM paper. Millimetres, newtons, seconds and millimetres a
-// minute, unless a name says otherwise. The TOML spelling of every key is io/job_toml.
+// minute, unless a name says otherwise. The TOML spelling of every key is io/read/job_toml.
 #pragma once
 
 #include <cstdint>

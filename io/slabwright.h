@@ -59,8 +59,9 @@ SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string&
                           const std::string& stl_path = {});
 
 /// Writes what tools reach into `directory`, for viewers of meshes: layer_01_tool_02.ply and so on, the
-/// facets of layer 1 that are to be machined with the share of each that tool 2 reaches (io/access_ply.h),
-/// pattern-base. Of the flat and ball end mills that were looked at for a layer or cut it.
+/// facets of layer 1 that are to be machined with the share of each that tool 2 reaches
+/// (io/write/access_ply.h), pattern-base. Of the flat and ball end mills that were looked at for a layer or
+/// cut it.
 /// @param stl_path the pattern that was planned
 /// @throws Error(input) when the place cannot be written or the STL is another one, Error(cancelled)
 SLABWRIGHT_API void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path,

@@ -10,13 +10,13 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "io/input_file.h"
-#include "io/job_keys.h"
-#include "io/output_file.h"
-#include "io/program_check.h"
-#include "io/sequence_reader.h"
-#include "io/tool_table_check.h"
-#include "io/verify_json.h"
+#include "io/posts/program_check.h"
+#include "io/posts/tool_table_check.h"
+#include "io/read/input_file.h"
+#include "io/read/sequence_reader.h"
+#include "io/text/job_keys.h"
+#include "io/write/output_file.h"
+#include "io/write/verify_json.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 

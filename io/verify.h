@@ -5,8 +5,8 @@
 #include <string>
 
 #include "engine/simulate/simulate.h"
-#include "io/gcode_reader.h"
-#include "io/pattern.h"
+#include "io/posts/gcode_reader.h"
+#include "io/read/pattern.h"
 
 namespace slabwright {
 

@@ -13,7 +13,7 @@
 #include "engine/planner.h"
 #include "engine/tools/access_map.h"
 #include "engine/tools/tools.h"
-#include "io/access_ply.h"
+#include "io/write/access_ply.h"
 #include "kernels/errors.h"
 #include "tests/support/height_field.h"
 

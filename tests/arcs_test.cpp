@@ -11,9 +11,9 @@
 
 #include "engine/planner.h"
 #include "engine/schedule/motion_time.h"
-#include "io/gcode_reader.h"
-#include "io/gcode_writer.h"
-#include "io/tool_table.h"
+#include "io/posts/gcode_reader.h"
+#include "io/posts/gcode_writer.h"
+#include "io/posts/tool_table.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/sweep.h"

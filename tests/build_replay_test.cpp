@@ -14,9 +14,9 @@
 
 #include "engine/schedule/schedule.h"
 #include "engine/simulate/sequence_findings.h"
-#include "io/sequence_json.h"
-#include "io/sequence_reader.h"
+#include "io/read/sequence_reader.h"
 #include "io/slabwright.h"
+#include "io/write/sequence_json.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/seed.h"

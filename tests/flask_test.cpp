@@ -10,9 +10,9 @@
 
 #include "engine/flask/flask.h"
 #include "engine/planner.h"
-#include "io/plan_json.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
+#include "io/write/plan_json.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/slicing/silhouette.h"

@@ -17,12 +17,12 @@
 #include <vector>
 
 #include "engine/schedule/feed_lengths.h"
-#include "io/gcode_reader.h"
-#include "io/program_check.h"
+#include "io/posts/gcode_reader.h"
+#include "io/posts/program_check.h"
+#include "io/posts/tool_table.h"
+#include "io/posts/tool_table_check.h"
+#include "io/read/stl.h"
 #include "io/slabwright.h"
-#include "io/stl.h"
-#include "io/tool_table.h"
-#include "io/tool_table_check.h"
 #include "io/verify.h"
 #include "kernels/errors.h"
 #include "tests/support/canon_motions.h"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <string>
 
-#include "io/gcode_reader.h"
+#include "io/posts/gcode_reader.h"
 #include "kernels/errors.h"
 
 using namespace slabwright;

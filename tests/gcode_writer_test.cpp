@@ -1,6 +1,6 @@
 // Programs, judged by LinuxCNC's interpreter: it accepts them, and its motions are the engine's moves to the
 // last 0.1 µm.
-#include "io/gcode_writer.h"
+#include "io/posts/gcode_writer.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <regex>
 #include <sstream>
 
+#include "io/posts/tool_table.h"
 #include "io/slabwright.h"
-#include "io/tool_table.h"
 #include "kernels/errors.h"
 #include "tests/support/rs274.h"
 #include "tests/support/seed.h"

@@ -1,5 +1,5 @@
 // Whatever stands where a file is to be read: an answer at once, never a wait, never memory without end.
-#include "io/input_file.h"
+#include "io/read/input_file.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

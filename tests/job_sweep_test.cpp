@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "io/job_keys.h"
 #include "io/slabwright.h"
+#include "io/text/job_keys.h"
 #include "kernels/errors.h"
 #include "tests/data/models.h"
 #include "tests/support/seed.h"

@@ -10,8 +10,8 @@
 #include <numbers>
 #include <random>
 
-#include "io/job_keys.h"
-#include "io/job_toml.h"
+#include "io/read/job_toml.h"
+#include "io/text/job_keys.h"
 #include "kernels/errors.h"
 #include "tests/support/seed.h"
 

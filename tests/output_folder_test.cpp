@@ -1,5 +1,5 @@
 // What plan, verify and report may touch on the disk, and what is left when they fail.
-#include "io/output_folder.h"
+#include "io/write/output_folder.h"
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "io/output_file.h"
 #include "io/slabwright.h"
+#include "io/write/output_file.h"
 #include "kernels/errors.h"
 #include "tests/support/command.h"
 #include "tests/support/files.h"

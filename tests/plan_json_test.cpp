@@ -1,6 +1,6 @@
 // plan.json and sequence.json keep their contracts (the schemas beside the writers), and OUT is all or
 // nothing.
-#include "io/plan_json.h"
+#include "io/write/plan_json.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -20,12 +20,12 @@
 #include <sstream>
 
 #include "engine/schedule/schedule.h"
-#include "io/gcode_writer.h"
-#include "io/job_toml.h"
-#include "io/json_text.h"
-#include "io/sequence_json.h"
+#include "io/posts/gcode_writer.h"
+#include "io/posts/tool_table.h"
+#include "io/read/job_toml.h"
 #include "io/slabwright.h"
-#include "io/tool_table.h"
+#include "io/text/json_text.h"
+#include "io/write/sequence_json.h"
 #include "kernels/errors.h"
 #include "tests/support/comma_locale.h"
 #include "tests/support/files.h"

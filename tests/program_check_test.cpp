@@ -1,15 +1,15 @@
 // A program against what its plan says of it, and the tool table against the plan's tools.
-#include "io/program_check.h"
+#include "io/posts/program_check.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
 #include "engine/schedule/motion_time.h"
-#include "io/gcode_reader.h"
-#include "io/gcode_writer.h"
-#include "io/tool_table.h"
-#include "io/tool_table_check.h"
+#include "io/posts/gcode_reader.h"
+#include "io/posts/gcode_writer.h"
+#include "io/posts/tool_table.h"
+#include "io/posts/tool_table_check.h"
 #include "kernels/errors.h"
 #include "tests/support/seed.h"
 

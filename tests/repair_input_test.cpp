@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "io/repair.h"
+#include "io/read/repair.h"
+#include "io/read/stl.h"
 #include "io/slabwright.h"
-#include "io/stl.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/repair/repair.h"
 #include "tests/mesh_shapes.h"

@@ -9,10 +9,10 @@
 #include <random>
 
 #include "engine/simulate/replay.h"
-#include "io/base64.h"
+#include "io/read/stl.h"
 #include "io/slabwright.h"
-#include "io/stl.h"
-#include "io/thinned_path.h"
+#include "io/text/base64.h"
+#include "io/write/thinned_path.h"
 #include "kernels/access/standing_part.h"
 #include "tests/support/files.h"
 #include "tests/support/temporary_folder.h"

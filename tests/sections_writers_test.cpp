@@ -10,10 +10,10 @@
 #include <set>
 #include <sstream>
 
-#include "io/decimal.h"
-#include "io/sections_dxf.h"
-#include "io/sections_json.h"
-#include "io/sections_svg.h"
+#include "io/text/decimal.h"
+#include "io/write/sections_dxf.h"
+#include "io/write/sections_json.h"
+#include "io/write/sections_svg.h"
 
 namespace {
 

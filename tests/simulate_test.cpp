@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "engine/simulate/simulate.h"
-#include "io/gcode_reader.h"
+#include "io/posts/gcode_reader.h"
 #include "kernels/errors.h"
 #include "tests/support/seed.h"
 

@@ -15,7 +15,7 @@
 #include <set>
 #include <sstream>
 
-#include "io/stl.h"
+#include "io/read/stl.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/part.h"
 #include "kernels/slicing/slicing.h"

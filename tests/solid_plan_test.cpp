@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "engine/job.h"
+#include "io/read/stl.h"
 #include "io/slabwright.h"
-#include "io/stl.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "tests/support/compositions.h"

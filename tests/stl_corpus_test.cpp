@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "io/stl.h"
+#include "io/read/stl.h"
 #include "kernels/errors.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,5 +1,5 @@
 // STL in and out: both forms, every refusal, units, and files damaged at random.
-#include "io/stl.h"
+#include "io/read/stl.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -24,7 +24,7 @@
 #include <thread>
 #include <vector>
 
-#include "io/sha256.h"
+#include "io/text/sha256.h"
 #include "kernels/errors.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/seed.h"

@@ -11,8 +11,8 @@
 #include <sstream>
 #include <string>
 
+#include "io/read/stl.h"
 #include "io/slabwright.h"
-#include "io/stl.h"
 #include "io/verify.h"
 
 using namespace slabwright;

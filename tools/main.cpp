@@ -17,13 +17,13 @@
 #include <string>
 #include <string_view>
 
-#include "io/input_file.h"
-#include "io/inspect_json.h"
-#include "io/job_keys.h"
-#include "io/json_text.h"
-#include "io/output_folder.h"
-#include "io/plan_json.h"
+#include "io/read/input_file.h"
 #include "io/slabwright.h"
+#include "io/text/job_keys.h"
+#include "io/text/json_text.h"
+#include "io/write/inspect_json.h"
+#include "io/write/output_folder.h"
+#include "io/write/plan_json.h"
 #include "tools/allocator.h"
 
 namespace {

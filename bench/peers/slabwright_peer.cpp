@@ -8,7 +8,7 @@
 #include <ctime>
 #include <vector>
 
-#include "io/stl.h"
+#include "io/read/stl.h"
 #include "kernels/errors.h"
 #include "kernels/slicing/slicing.h"
 

@@ -15,8 +15,8 @@
 #include <numbers>
 #include <sstream>
 
-#include "io/gcode_reader.h"
-#include "io/stl.h"
+#include "io/posts/gcode_reader.h"
+#include "io/read/stl.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/rs274.h"

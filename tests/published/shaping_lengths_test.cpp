@@ -15,8 +15,8 @@
 #include <numbers>
 
 #include "engine/planner.h"
-#include "io/gcode_reader.h"
-#include "io/gcode_writer.h"
+#include "io/posts/gcode_reader.h"
+#include "io/posts/gcode_writer.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"

@@ -1,0 +1,338 @@
+#include "io/posts/modal_state.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdint>
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kInchInMm = 25.4;
+
+/// The groups of which a line may hold one word; those without a bit are no words of this project.
+std::uint32_t group_of_g(int g) {
+    switch (g) {
+        case 40:
+            return 1u << 0;
+        case 0:
+        case 10:
+        case 20:
+        case 30:
+        case 800:
+            return 1u << 1;
+        case 170:
+        case 180:
+        case 190:
+            return 1u << 2;
+        case 900:
+        case 910:
+            return 1u << 3;
+        case 901:
+        case 911:
+            return 1u << 4;
+        case 940:
+            return 1u << 5;
+        case 200:
+        case 210:
+            return 1u << 6;
+        case 400:
+            return 1u << 7;
+        case 430:
+        case 431:
+        case 490:
+            return 1u << 8;
+        case 540:
+        case 550:
+        case 560:
+        case 570:
+        case 580:
+        case 590:
+        case 591:
+        case 592:
+        case 593:
+            return 1u << 9;
+        case 610:
+        case 611:
+        case 640:
+            return 1u << 10;
+        case 970:
+            return 1u << 11;
+        case 80:
+            return 1u << 12;
+        default:
+            return 0;
+    }
+}
+
+std::uint32_t group_of_m(int m) {
+    switch (m) {
+        case 0:
+        case 10:
+        case 20:
+        case 300:
+        case 600:
+            return 1u << 0;
+        case 30:
+        case 40:
+        case 50:
+            return 1u << 1;
+        case 60:
+            return 1u << 2;
+        case 70:
+        case 80:
+        case 90:
+            return 1u << 3;
+        case 480:
+            return 1u << 4;
+        default:
+            return 0;
+    }
+}
+
+void check_groups(const GcodeNumbers& numbers, char letter, std::uint32_t (*group_of)(int),
+                  const GcodePlace& place) {
+    std::uint32_t seen = 0;
+    for (const int number : numbers) {
+        const std::uint32_t group = group_of(number);
+        if (group == 0)
+            place.fail("gcode.unknown_word",
+                       fmt::format("{}{} is no word that this reader knows", letter, gcode_number(number)));
+        if ((seen & group) != 0)
+            place.fail("gcode.twice", group == 1u << 1 && letter == 'G'
+                                          ? std::string("two motion words in one line")
+                                          : fmt::format("{}{} beside another word of its group", letter,
+                                                        gcode_number(number)));
+        seen |= group;
+    }
+}
+
+int whole(double value, char letter, const GcodePlace& place) {
+    if (value < 0 || value > 99999 || value != std::floor(value))
+        place.fail("gcode.number", fmt::format("{} needs a whole number", letter));
+    return static_cast<int>(value);
+}
+
+}  // namespace
+
+void ModalState::apply(const GcodeLine& line, const GcodePlace& place) {
+    motion_named_ = spins_up_ = false;
+    named_path_mode_.reset();
+    dwell_.reset();
+    if (line.g.count > 0) check_groups(line.g, 'G', group_of_g, place);
+    if (line.m.count > 0) check_groups(line.m, 'M', group_of_m, place);
+    check_words(line, place);
+    speed_and_feed(line, place);
+    if (line.has('T')) {
+        if (selected_ != 0 || loaded_ != 0) place.fail("gcode.tool", "a second tool in one program");
+        selected_ = whole(line['T'], 'T', place);
+    }
+    if (line.m.has(60)) change_tool(place);
+    for (const int m : line.m) m_word(m, place);
+    if (line.g.has(40)) {
+        if (!line.has('P') || line['P'] < 0) place.fail("gcode.dwell", "G4 without a time P");
+        dwell_ = line['P'];
+    }
+    for (const int g : line.g) g_word(g, place);
+    if (line.g.has(430)) length_offset(line, place);
+    if (line.g.has(640)) path_mode(line, place);
+}
+
+/// A parameter that no word of the line takes is a slip that LinuxCNC refuses.
+void ModalState::check_words(const GcodeLine& line, const GcodePlace& place) const {
+    const bool dwells = line.g.has(40), blends = line.g.has(640);
+    if (line.has('P') && !dwells && !blends) place.fail("gcode.unused_word", "P without G4 or G64");
+    if (line.has('Q') && !blends) place.fail("gcode.unused_word", "Q without G64");
+    if (line.has('H') && !line.g.has(430)) place.fail("gcode.unused_word", "H without G43");
+    if (dwells && (blends || line.has('X') || line.has('Y') || line.has('Z')))
+        place.fail("gcode.dwell", "G4 beside other words that take numbers");
+}
+
+void ModalState::speed_and_feed(const GcodeLine& line, const GcodePlace& place) {
+    if (line.has('F')) {
+        if (!(line['F'] > 0)) place.fail("gcode.number", "a feed of zero or less");
+        feed_ = length(line['F'], place);  // in the unit before a G20 or G21 of this line
+    }
+    if (line.has('S')) {
+        if (line['S'] < 0) place.fail("gcode.number", "a negative spindle speed");
+        spins_up_ = spindle_ == Spindle::clockwise && line['S'] != speed_;
+        speed_ = line['S'];
+    }
+}
+
+void ModalState::change_tool(const GcodePlace& place) {
+    if (loaded_ != 0) place.fail("gcode.tool", "a second tool change (M6) in one program");
+    if (selected_ <= 0) place.fail("gcode.tool", "a tool change (M6) that names no tool");
+    loaded_ = selected_;
+    length_offset_ = false;
+    spindle_ = Spindle::off;
+}
+
+void ModalState::m_word(int m, const GcodePlace& place) {
+    switch (m) {
+        case 0:
+        case 10:
+        case 600:
+            place.fail("gcode.pause",
+                       fmt::format("a stop in the program (M{}) with the cutter where it is", m / 10),
+                       "programs run through; pause the machine by hand");
+        case 30:
+            spins_up_ = spins_up_ || spindle_ != Spindle::clockwise;
+            spindle_ = Spindle::clockwise;
+            break;
+        case 40:
+            place.fail("gcode.spindle", "a spindle turning backwards (M4)",
+                       "the cutters are right-hand ones");
+        case 50:
+            spindle_ = Spindle::off;
+            break;
+        case 70:
+        case 80:
+            place.fail("gcode.coolant", fmt::format("coolant (M{}) on wood", m / 10));
+        default:
+            break;  // M6 and M2 have their own place; M9 and M48 are as a router should be
+    }
+}
+
+void ModalState::g_word(int g, const GcodePlace& place) {
+    const auto motion = [&](Motion to) {
+        motion_ = to;
+        motion_named_ = to != Motion::none;
+    };
+    switch (g) {
+        case 0:
+            return motion(Motion::rapid);
+        case 10:
+            return motion(Motion::line);
+        case 20:
+            return motion(Motion::clockwise);
+        case 30:
+            return motion(Motion::counter_clockwise);
+        case 800:
+            return motion(Motion::none);
+        case 170:
+            plane_ = {0, 1, 2};
+            break;
+        case 180:
+            plane_ = {2, 0, 1};
+            break;
+        case 190:
+            plane_ = {1, 2, 0};
+            break;
+        case 200:
+            unit_ = kInchInMm;
+            break;
+        case 210:
+            unit_ = 1;
+            break;
+        case 80:
+            radius_mode_ = true;
+            break;
+        case 400:
+            no_compensation_ = true;
+            break;
+        case 490:
+            length_offset_ = false;
+            break;
+        case 431:
+            place.fail("gcode.offset", "a length offset written into the program (G43.1)",
+                       "the machine keeps what it measured");
+        case 540:
+            work_offset_ = true;
+            break;
+        case 610:
+        case 611:
+            named_path_mode_ = PathMode{};
+            path_mode_ = true;
+            break;
+        case 900:
+            distance_ = Distance::absolute;
+            break;
+        case 910:
+            distance_ = Distance::incremental;
+            break;
+        case 901:
+            absolute_centres_ = true;
+            break;
+        case 911:
+            absolute_centres_ = false;
+            break;
+        case 940:
+            feed_per_minute_ = true;
+            break;
+        case 970:
+            revolutions_ = true;
+            break;
+        case 40:
+        case 430:
+        case 640:
+            break;  // with their parameters, in apply()
+        default:
+            place.fail("gcode.offset",
+                       fmt::format("the work offset G{}, where every program of a plan counts from G54",
+                                   gcode_number(g)));
+    }
+}
+
+void ModalState::length_offset(const GcodeLine& line, const GcodePlace& place) {
+    if (loaded_ == 0)
+        place.fail("gcode.offset", "a length offset (G43) before the tool is loaded (M6)",
+                   "the machine measures a tool when it loads it");
+    if (line.has('H') && whole(line['H'], 'H', place) != loaded_)
+        place.fail("gcode.offset", "the length offset of another tool than the one loaded");
+    length_offset_ = true;
+}
+
+void ModalState::path_mode(const GcodeLine& line, const GcodePlace& place) {
+    for (const char letter : {'P', 'Q'})
+        if (line[letter] < 0)
+            place.fail("gcode.number", fmt::format("G64 with a negative tolerance {}", letter));
+    // LinuxCNC takes 0 for none, leaves out points within Q of a straight way, and takes P for a Q that is
+    // not given.
+    if (!(line['P'] > 0))
+        place.fail("gcode.path_mode",
+                   "G64 without a tolerance P: the machine may leave its path as far as it likes");
+    const double rounds = length(line['P'], place);
+    named_path_mode_ = PathMode{rounds, line.has('Q') ? length(line['Q'], place) : rounds};
+    path_mode_ = true;
+}
+
+double ModalState::length(double value, const GcodePlace& place) const {
+    if (unit_ == 0)
+        place.fail("gcode.unset", "a length or feed before its unit (G21)",
+                   "the machine would take what the program before left in force");
+    return value * unit_;
+}
+
+void ModalState::require_for_motion(const GcodePlace& place) const {
+    if (loaded_ == 0) place.fail("gcode.tool", "a motion before a tool is loaded (T… M6)");
+    if (!length_offset_) place.fail("gcode.offset", "a motion without the length offset of its tool (G43)");
+    const auto require = [&](bool known, const char* what) {
+        if (!known)
+            place.fail("gcode.unset", fmt::format("a motion before {}", what),
+                       "the machine would take what the program before left in force");
+    };
+    require(unit_ != 0, "its unit (G21)");
+    require(plane_[0] >= 0, "its plane (G17)");
+    require(distance_ != Distance::unknown, "absolute or incremental distances (G90)");
+    require(feed_per_minute_, "the meaning of its feed (G94)");
+    require(no_compensation_, "cutter compensation is off (G40)");
+    require(radius_mode_, "x as it is, not as a diameter (G8)");
+    require(revolutions_, "a spindle speed in revolutions (G97)");
+    require(work_offset_, "its work offset (G54)");
+    require(path_mode_, "how far the machine may leave its path (G64 P…)");
+    if (motion_ != Motion::rapid && !(feed_ > 0))
+        place.fail("gcode.feed", "a feed motion before any feed (F)");
+}
+
+void ModalState::require_at_end(const GcodePlace& place) const {
+    const auto refuse = [&](const char* what) {
+        place.fail("gcode.left_in_force", fmt::format("the program leaves the machine {}", what),
+                   "whoever moves it by hand afterwards does not expect that");
+    };
+    if (unit_ == kInchInMm) refuse("in inches (G20)");
+    if (incremental()) refuse("in incremental distances (G91)");
+}
+
+}  // namespace slabwright

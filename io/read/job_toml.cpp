@@ -1,0 +1,427 @@
+#include "io/read/job_toml.h"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "io/text/decimal.h"
+#include "io/text/job_keys.h"
+#include "io/text/json_text.h"
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr std::size_t kShown = 60;  // letters of what is wrong that an error repeats
+
+/// Levenshtein's distance, letters without case.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+    const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+    std::vector<std::size_t> row(b.size() + 1);
+    for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        std::size_t diagonal = row[0];
+        row[0] = i;
+        for (std::size_t j = 1; j <= b.size(); ++j) {
+            const std::size_t change = diagonal + (lower(a[i - 1]) == lower(b[j - 1]) ? 0 : 1);
+            diagonal = row[j];
+            row[j] = std::min({row[j] + 1, row[j - 1] + 1, change});
+        }
+    }
+    return row.back();
+}
+
+std::string nearest(std::string_view wanted, const std::vector<std::string>& known) {
+    std::string best;
+    std::size_t best_distance = ~std::size_t{0};
+    for (const std::string& candidate : known) {
+        const std::size_t distance = edit_distance(wanted, candidate);
+        if (distance < best_distance) {
+            best = candidate;
+            best_distance = distance;
+        }
+    }
+    return best;
+}
+
+/// Lists the keys, "table.key", in the order of the table.
+struct KeyNames {
+    std::string prefix;
+    std::vector<std::string> names, tables;
+    void table(const char* name, const char*) {
+        prefix = std::string(name) + ".";
+        tables.emplace_back(name);
+    }
+    void required() {}
+    template <class Value>
+    void key(const char* name, const Value&, const char*) {
+        names.push_back(prefix + name);
+    }
+    template <class Enum, std::size_t N>
+    void word(const char* name, Enum, const Word<Enum> (&)[N], const char*) {
+        names.push_back(prefix + name);
+    }
+    void degrees(const char* name, double, const char*) { names.push_back(prefix + name); }
+};
+
+/// Fills a job from one parsed document, walking the table of keys; remembers the line of each key it meets.
+class Reader {
+public:
+    Reader(const toml::table& root, const std::string& file) : file_(file), table_(&root) {}
+
+    /// Goes on with a table of its own: one of the [[tool]] entries.
+    void enter(const toml::table* values, std::string prefix) {
+        table_ = values;
+        prefix_ = std::move(prefix);
+    }
+    void enter_root_table(const toml::table& root, const char* name) {
+        prefix_ = std::string(name) + ".";
+        table_ = nullptr;
+        const toml::node* node = root.get(name);
+        if (node == nullptr) return;
+        table_ = node->as_table();
+        if (table_ == nullptr)
+            fail(*node, "job.type", fmt::format("{} is {}, not a table", name, type_name(*node)),
+                 fmt::format("write [{}] on a line of its own", name));
+    }
+
+    void required() { required_ = true; }
+
+    void key(const char* name, double& value, const char*) {
+        if (const toml::node* node = find(name)) value = number(*node, prefix_ + name);
+    }
+    void key(const char* name, int& value, const char*) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        const auto integer = node->value_exact<std::int64_t>();
+        if (!integer || *integer < -2147483647 || *integer > 2147483647)
+            wrong_type(*node, prefix_ + name, "a whole number");
+        value = static_cast<int>(*integer);
+    }
+    void key(const char* name, bool& value, const char*) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        const auto truth = node->value_exact<bool>();
+        if (!truth) wrong_type(*node, prefix_ + name, "true or false");
+        value = *truth;
+    }
+    void key(const char* name, std::string& value, const char*) {
+        if (const toml::node* node = find(name)) value = text(*node, prefix_ + name);
+    }
+    void key(const char* name, std::vector<double>& value, const char*) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        const toml::array* array = node->as_array();
+        if (array == nullptr) wrong_type(*node, prefix_ + name, "a list of numbers");
+        value.clear();
+        for (const toml::node& element : *array) value.push_back(number(element, prefix_ + name));
+    }
+    void degrees(const char* name, double& radians, const char*) {
+        if (const toml::node* node = find(name))
+            radians = number(*node, prefix_ + name) * std::numbers::pi / 180;
+    }
+    template <class Enum, std::size_t N>
+    void word(const char* name, Enum& value, const Word<Enum> (&words)[N], const char*) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        const std::string given = text(*node, prefix_ + name).substr(0, kShown);
+        std::vector<std::string> known;
+        for (const Word<Enum>& w : words) {
+            if (given == w.text) {
+                value = w.value;
+                return;
+            }
+            known.emplace_back(w.text);
+        }
+        fail(*node, "job.word",
+             fmt::format("{}{} is \"{}\", none of {}", prefix_, name, given, fmt::join(known, ", ")),
+             fmt::format("did you mean \"{}\"?", nearest(given, known)));
+    }
+
+    [[nodiscard]] const std::map<std::string, std::string>& places() const { return places_; }
+    [[nodiscard]] std::string place_of(const toml::node& node) const {
+        return node.source().begin.line > 0 ? fmt::format("{}:{}", file_, node.source().begin.line) : file_;
+    }
+    [[noreturn]] void fail(const toml::node& node, const char* code, const std::string& message,
+                           const std::string& remedy) const {
+        throw Error(ErrorKind::usage, code, message, place_of(node), remedy);
+    }
+    static const char* type_name(const toml::node& node) {
+        switch (node.type()) {
+            case toml::node_type::string:
+                return "a text";
+            case toml::node_type::integer:
+                return "a whole number";
+            case toml::node_type::floating_point:
+                return "a number";
+            case toml::node_type::boolean:
+                return "true or false";
+            case toml::node_type::array:
+                return "a list";
+            case toml::node_type::table:
+                return "a table";
+            default:
+                return "a date or time";
+        }
+    }
+
+protected:
+    const toml::node* find(const char* name) {
+        const bool required = std::exchange(required_, false);
+        const toml::node* node = table_ != nullptr ? table_->get(name) : nullptr;
+        if (node != nullptr) places_[prefix_ + name] = place_of(*node);
+        else if (required)
+            fail(*table_, "job.missing_key", fmt::format("{}{} is missing", prefix_, name),
+                 "every [[tool]] needs it; see `slabwright job --defaults`");
+        return node;
+    }
+    double number(const toml::node& node, const std::string& key) const {
+        if (const auto real = node.value_exact<double>()) {
+            if (!std::isfinite(*real)) wrong_type(node, key, "a finite number");
+            return *real;
+        }
+        if (const auto integer = node.value_exact<std::int64_t>()) return static_cast<double>(*integer);
+        wrong_type(node, key, "a number");
+    }
+    std::string text(const toml::node& node, const std::string& key) const {
+        const auto value = node.value_exact<std::string>();
+        if (!value) wrong_type(node, key, "a text in quotes");
+        return *value;
+    }
+    [[noreturn]] void wrong_type(const toml::node& node, const std::string& key, const char* wanted) const {
+        fail(node, "job.type", fmt::format("{} is {}, not {}", key, type_name(node), wanted),
+             fmt::format("give {}", wanted));
+    }
+
+private:
+    std::string file_, prefix_;
+    const toml::table* table_;
+    bool required_ = false;
+    std::map<std::string, std::string> places_;
+};
+
+/// The same walk over the whole job: table() moves to the next [table].
+class JobReader : public Reader {
+public:
+    JobReader(const toml::table& root, const std::string& file) : Reader(root, file), root_(root) {}
+    void table(const char* name, const char*) { enter_root_table(root_, name); }
+
+private:
+    const toml::table& root_;
+};
+
+constexpr std::size_t kMostKeyParts = 8;  ///< those of a job have two; a number or a date has one point
+
+/// Refuses keys of many parts before they are parsed: the parser calls itself for each part.
+void require_shallow_keys(std::string_view text, const std::string& file) {
+    std::size_t line = 1, points = 0;
+    for (std::size_t at = 0; at < text.size(); ++at) {
+        const char c = text[at];
+        if (c == '#') {
+            at = std::min(text.find('\n', at), text.size()) - 1;
+        } else if (c == '"' || c == '\'') {
+            // A text in one or three quotes, in which only " knows \. An unclosed one is the parser's to
+            // tell.
+            const std::string three(3, c);
+            const std::size_t quotes = text.substr(at, 3) == three ? 3 : 1;
+            std::size_t end = at + quotes;
+            while (end < text.size() && text.substr(end, quotes) != three.substr(0, quotes) &&
+                   (quotes == 3 || text[end] != '\n')) {
+                if (c == '"' && text[end] == '\\') ++end;
+                if (end < text.size() && text[end] == '\n') ++line;
+                ++end;
+            }
+            at = end + quotes - 1;
+            if (quotes == 3)  // two more may stand before the closing three
+                while (at + 1 < text.size() && at < end + 4 && text[at + 1] == c) ++at;
+            if (quotes == 1 && end < text.size() && text[end] == '\n') at = end - 1;
+        } else if (c == '.') {
+            if (++points < kMostKeyParts) continue;
+            throw Error(ErrorKind::usage, "job.syntax",
+                        fmt::format("a key of more than {} parts", kMostKeyParts),
+                        fmt::format("{}:{}", file, line), "keys have two parts, as in machine.clearance");
+        } else if (c == '\n' || c == '=' || c == ',' || c == '[' || c == ']' || c == '{' || c == '}') {
+            points = 0;
+            line += c == '\n' ? 1 : 0;
+        }
+    }
+}
+
+KeyNames all_keys() {
+    const Job job;
+    KeyNames names;
+    visit_job_keys(job, names);
+    names.table("tool", "");
+    visit_tool_keys(job.tools.front(), names);
+    return names;
+}
+
+/// Refuses the first key (by line) that the table does not have, naming the nearest that it has.
+void refuse_unknown(const toml::table& values, const std::string& prefix, const KeyNames& known,
+                    const Reader& reader) {
+    std::vector<std::pair<std::string, const toml::node*>> given;
+    for (auto&& [key, node] : values) given.emplace_back(std::string(key.str()), &node);
+    std::sort(given.begin(), given.end(), [](const auto& a, const auto& b) {
+        const auto& p = a.second->source().begin;
+        const auto& q = b.second->source().begin;
+        return std::tie(p.line, p.column, a.first) < std::tie(q.line, q.column, b.first);
+    });
+    for (const auto& [key, node] : given) {
+        if (prefix.empty() &&
+            std::find(known.tables.begin(), known.tables.end(), key) != known.tables.end()) {
+            if (key == "tool") continue;  // a list; its entries are looked at one by one
+            if (const toml::table* inner = node->as_table()) refuse_unknown(*inner, key + ".", known, reader);
+            continue;
+        }
+        // A key that is not known may be as long as the file: it is compared and told by its beginning.
+        const std::string shown = key.substr(0, kShown), full = prefix + shown;
+        if (key == shown && std::find(known.names.begin(), known.names.end(), full) != known.names.end())
+            continue;
+        // The key may be misspelt, or right but in the wrong table: both are found by the better of two
+        // distances.
+        std::string best;
+        std::size_t best_distance = ~std::size_t{0};
+        std::vector<std::string> candidates = known.names;
+        if (prefix.empty()) candidates.insert(candidates.end(), known.tables.begin(), known.tables.end());
+        for (const std::string& candidate : candidates) {
+            const std::size_t dot = candidate.find('.');
+            const std::string_view bare = dot == std::string::npos
+                                              ? std::string_view(candidate)
+                                              : std::string_view(candidate).substr(dot + 1);
+            const std::size_t distance =
+                std::min(2 * edit_distance(full, candidate), 2 * edit_distance(shown, bare) + 1);
+            if (distance < best_distance) {
+                best = candidate;
+                best_distance = distance;
+            }
+        }
+        reader.fail(*node, "job.unknown_key", fmt::format("unknown key {}", full),
+                    fmt::format("did you mean {}?", best));
+    }
+}
+
+/// Prints keys as lines of TOML with their comments in one column.
+struct Printer {
+    std::string text;
+    void table(const char* name, const char* comment) {
+        text += fmt::format("\n[{}]", name);
+        if (*comment != '\0') text += fmt::format("  # {}", comment);
+        text += '\n';
+    }
+    void required() {}
+    void line(const char* name, const std::string& value, const char* comment) {
+        std::string entry = fmt::format("{} = {}", name, value);
+        if (*comment != '\0') entry = fmt::format("{:<36}  # {}", entry, comment);
+        text += entry + '\n';
+    }
+    static std::string real(double value) {
+        std::string digits;
+        append_decimal(digits, value);
+        if (digits.find('.') == std::string::npos) digits += ".0";
+        return digits;
+    }
+    static std::string quoted(const std::string& value) {
+        std::string out = "\"";
+        for (const char c : value) {
+            if (c == '"' || c == '\\') (out += '\\') += c;
+            else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F)
+                out += fmt::format("\\u{:04X}", static_cast<unsigned>(c));
+            else out += c;
+        }
+        return out + '"';
+    }
+    void key(const char* name, double value, const char* comment) { line(name, real(value), comment); }
+    void key(const char* name, int value, const char* comment) { line(name, std::to_string(value), comment); }
+    void key(const char* name, bool value, const char* comment) {
+        line(name, value ? "true" : "false", comment);
+    }
+    void key(const char* name, const std::string& value, const char* comment) {
+        line(name, quoted(value), comment);
+    }
+    void key(const char* name, const std::vector<double>& values, const char* comment) {
+        std::string list;
+        for (const double value : values) list += (list.empty() ? "" : ", ") + real(value);
+        line(name, "[" + list + "]", comment);
+    }
+    void degrees(const char* name, double radians, const char* comment) {
+        // Degrees that come out of radians carry rounding in the last digits; nine decimals bring 30 back
+        // as 30.
+        std::string digits;
+        append_rounded(digits, radians * 180 / std::numbers::pi, 9);
+        if (digits.find('.') == std::string::npos) digits += ".0";
+        line(name, digits, comment);
+    }
+    template <class Enum, std::size_t N>
+    void word(const char* name, Enum value, const Word<Enum> (&words)[N], const char* comment) {
+        line(name, quoted(word_of(words, value)), comment);
+    }
+};
+
+}  // namespace
+
+Job parse_job(std::string_view text, const std::string& file) {
+    require_shallow_keys(text, file);
+    toml::table root;
+    try {
+        root = toml::parse(text, file);
+    } catch (const toml::parse_error& error) {
+        throw Error(ErrorKind::usage, "job.syntax", fmt::format("not TOML: {}", error.description()),
+                    fmt::format("{}:{}", file, error.source().begin.line),
+                    "`slabwright job --defaults` prints a job file that is right");
+    }
+    Job job;
+    JobReader reader(root, file);
+    const KeyNames known = all_keys();
+    refuse_unknown(root, "", known, reader);
+    visit_job_keys(job, reader);
+    if (const toml::node* node = root.get("tool")) {
+        const toml::array* tools = node->as_array();
+        if (tools == nullptr || !tools->is_array_of_tables())
+            reader.fail(*node, "job.type",
+                        fmt::format("tool is {}, not a list of tables", Reader::type_name(*node)),
+                        "write [[tool]] in double brackets");
+        job.tools.clear();
+        std::size_t position = 0;
+        for (const toml::node& entry : *tools) {
+            const toml::table& values = *entry.as_table();
+            refuse_unknown(values, "tool.", known, reader);
+            reader.enter(&values, fmt::format("tool[{}].", ++position));
+            Tool tool;
+            visit_tool_keys(tool, reader);
+            if (values.get("plunges") == nullptr) tool.plunges = plunges_by_default(tool.kind);
+            job.tools.push_back(std::move(tool));
+        }
+    }
+    try {
+        validate(job);
+    } catch (const Error& error) {
+        // validate() names the key; the reader knows on which line it stands. A key at its default has no
+        // line.
+        const auto place = reader.places().find(error.place());
+        throw Error(error.kind(), error.code(), error.message(),
+                    place != reader.places().end() ? place->second : file, error.remedy());
+    }
+    return job;
+}
+
+std::string job_toml(const Job& job) {
+    Printer printer;
+    printer.text =
+        "# A job of Slabwright. Every key may be left out; lengths in mm, forces in N, angles in degrees.\n";
+    visit_job_keys(job, printer);
+    printer.text += "\n# The tool library. Any [[tool]] replaces the whole default library.\n";
+    for (const Tool& tool : job.tools) {
+        printer.text += "\n[[tool]]\n";
+        visit_tool_keys(tool, printer);
+    }
+    return std::move(printer.text);
+}
+
+}  // namespace slabwright

@@ -1,0 +1,49 @@
+#include "io/read/pattern.h"
+
+#include <filesystem>
+
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Where the pattern lies: as named, or where plan.json's file name leads.
+fs::path find_pattern(const fs::path& directory, const std::string& file, const std::string& given,
+                      const std::string& asker) {
+    if (!given.empty()) return given;
+    const auto refuse = [&](const std::string& message) -> fs::path {
+        throw Error(ErrorKind::input, asker + ".no_pattern", message, directory.string(),
+                    "name the STL with --stl");
+    };
+    const fs::path base = fs::path(file).filename();
+    if (base.empty()) return refuse("plan.json names no pattern");
+    fs::path folder = fs::absolute(directory).lexically_normal();
+    if (!folder.has_filename()) folder = folder.parent_path();
+    for (const fs::path& place : {folder / base, folder.parent_path() / base, base})
+        if (std::error_code ignored; fs::exists(place, ignored)) return place;
+    return refuse("the pattern " + base.string() + " is neither in nor beside the folder");
+}
+
+}  // namespace
+
+bool Pattern::is(const PlannedPattern& planned) const {
+    return stl.input.sha256 == planned.sha256 && reading == planned.reading;
+}
+
+std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory,
+                                      const PlannedPattern& planned, const std::string& given,
+                                      const std::string& asker) {
+    const std::string path = find_pattern(directory, planned.file, given, asker).string();
+    auto pattern = std::make_shared<Pattern>(
+        Pattern{path, planned.reading, read_stl(context, path, planned.reading), {}});
+    if (!pattern->is(planned))
+        throw Error(ErrorKind::input, asker + ".other_pattern",
+                    "is not the pattern that was planned: its SHA-256 is " + pattern->stl.input.sha256, path,
+                    "name the planned STL with --stl, or plan again");
+    return pattern;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,167 @@
+#include "io/write/inspect_json.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "io/text/json_text.h"
+#include "io/write/plan_json.h"
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+namespace {
+
+using Shape = JsonText::Shape;
+
+struct NamedFinding {
+    const char* name;
+    const char* words;
+    const Finding& finding;
+};
+
+std::vector<NamedFinding> findings(const MeshReport& report) {
+    return {{"open_edges", "open edges", report.open_edges},
+            {"open_edges_off_base", "open edges off the base", report.open_edges_off_base},
+            {"non_manifold_edges", "edges with more than two facets", report.non_manifold_edges},
+            {"misoriented_edges", "edges whose facets disagree on the outside", report.misoriented_edges},
+            {"degenerate_facets", "degenerate facets", report.degenerate_facets},
+            {"duplicate_facets", "duplicate facets", report.duplicate_facets},
+            {"inverted_components", "bodies turned inside out", report.inverted_components}};
+}
+
+std::string mm(double value, int decimals = 3) {
+    std::string text;
+    append_rounded(text, value, decimals);
+    return text;
+}
+
+}  // namespace
+
+Inspection inspect_stl(Context& context, const std::string& stl_path, const Job& job) {
+    Inspection result;
+    StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld, job.input.repair});
+    result.input = stl.input;
+    result.diagnostics = stl.diagnostics;
+    try {
+        require_solid(context, stl, stl_path);
+        result.solid = true;
+    } catch (const Error& error) {
+        if (error.kind() != ErrorKind::input) throw;
+        result.unusable = error.what();
+    }
+    if (result.solid) {
+        const FeatureOptions options = feature_options(job);
+        context.begin_phase("features", 0.3, 0.7);
+        FeatureSet found = find_features(context, stl.mesh.view(), options);
+        result.features = std::move(found.features);
+        result.disagreements = std::move(found.disagreements);
+        context.begin_phase("undercuts", 0.7, 1.0);
+        const double tops[] = {double{bounds(stl.mesh.view()).max.z}};
+        result.undercuts = measure_undercuts(context, stl.mesh.view(), tops, options);
+    }
+    result.report = std::move(stl.report);
+    return result;
+}
+
+std::string inspection_json(const Inspection& inspection) {
+    const MeshReport& report = inspection.report;
+    JsonText json;
+    json.begin_object();
+    json.key("schema").string("slabwright.inspect/1");
+    json.key("units").string("mm");
+    json.key("input");
+    put_input(json, inspection.input);
+    json.key("solid").boolean(inspection.solid);
+    json.key("unusable");
+    if (inspection.solid) json.null();
+    else json.string(inspection.unusable);
+    json.key("mesh").begin_object();
+    json.key("facets").count(report.facets);
+    json.key("vertices").count(report.vertices);
+    json.key("components").count(report.components);
+    json.key("volume_mm3").rounded(report.volume_mm3, 3);
+    json.key("area_mm2").rounded(report.area_mm2, 3);
+    for (const NamedFinding& f : findings(report)) {
+        json.key(f.name).begin_object(Shape::line).key("count").count(f.finding.count).key("first_facet");
+        if (f.finding.count == 0) json.null();
+        else json.count(f.finding.first_facet);
+        json.end();
+    }
+    json.end();
+    json.key("features");
+    put_features(json, inspection.features);
+    json.key("disagreements").begin_array();
+    for (const FinderDisagreement& d : inspection.disagreements) {
+        json.begin_object(Shape::line).key("type").string(name(d.type)).key("z").rounded(d.z, 6);
+        json.key("xy")
+            .begin_array()
+            .rounded(d.x, 6)
+            .rounded(d.y, 6)
+            .end()
+            .key("found_by")
+            .string(name(d.found_by))
+            .end();
+    }
+    json.end();
+    json.key("undercuts").begin_array();
+    for (const UnmadeUndercut& u : inspection.undercuts) {
+        json.begin_object(Shape::line).key("type").string(name(u.type));
+        json.key("z").begin_array().rounded(u.z_low, 6).rounded(u.z_high, 6).end();
+        json.key("area").rounded(u.area_mm2, 3).key("depth").rounded(u.depth_mm, 4);
+        json.key("where").begin_array().rounded(u.x, 4).rounded(u.y, 4).rounded(u.z, 4).end().end();
+    }
+    json.end();
+    json.key("diagnostics");
+    put_diagnostics(json, inspection.diagnostics);
+    json.end();
+    return json.take();
+}
+
+std::string inspection_text(const Inspection& inspection) {
+    const MeshReport& report = inspection.report;
+    const InputInfo& input = inspection.input;
+    std::string text = fmt::format("{}\n", input.file);
+    text += fmt::format("  size        {} x {} x {} mm\n", mm(input.max[0] - input.min[0]),
+                        mm(input.max[1] - input.min[1]), mm(input.max[2] - input.min[2]));
+    text += fmt::format("  facets      {} in {} {}\n", report.facets, report.components,
+                        report.components == 1 ? "body" : "bodies");
+    text += fmt::format("  volume      {} cm3, surface {} cm2\n", mm(report.volume_mm3 / 1000, 2),
+                        mm(report.area_mm2 / 100, 2));
+    for (const NamedFinding& f : findings(report))
+        if (f.finding.count > 0)
+            text += fmt::format("  {:<11} {}, the first at facet {}\n", f.finding.count, f.words,
+                                f.finding.first_facet);
+    if (!inspection.solid) text += fmt::format("  not usable: {}\n", inspection.unusable);
+    // A castings mesh can have thousands of features of one kind; people need the count and the most
+    // important ones.
+    constexpr std::size_t shown = 12;
+    for (int t = 0; t <= static_cast<int>(FeatureType::saddle); ++t) {
+        const FeatureType type = static_cast<FeatureType>(t);
+        std::vector<const Feature*> of_type;
+        for (const Feature& f : inspection.features)
+            if (f.type == type) of_type.push_back(&f);
+        if (of_type.empty()) continue;
+        text += fmt::format("  {:<11} {}:", name(type), of_type.size());
+        for (std::size_t i = 0; i < std::min(shown, of_type.size()); ++i) {
+            const Feature& f = *of_type[i];
+            text += i == 0 ? " z " : ", ";
+            text += f.z_low == f.z_high ? mm(f.z_low) : mm(f.z_low) + "-" + mm(f.z_high);
+        }
+        text += of_type.size() > shown ? ", ...\n" : "\n";
+    }
+    text += inspection.undercuts.empty() && inspection.solid ? "  undercuts   none\n" : "";
+    for (std::size_t i = 0; i < std::min(shown, inspection.undercuts.size()); ++i) {
+        const UnmadeUndercut& u = inspection.undercuts[i];
+        text += fmt::format("  undercut    {} mm2, {} mm deep at x {} y {} z {} if milled as one layer\n",
+                            mm(u.area_mm2, 1), mm(u.depth_mm), mm(u.x, 2), mm(u.y, 2), mm(u.z, 2));
+    }
+    if (inspection.undercuts.size() > shown)
+        text += fmt::format("  and {} more undercuts\n", inspection.undercuts.size() - shown);
+    for (const Diagnostic& d : inspection.diagnostics)
+        text += fmt::format("  {}: {}\n", name(d.severity), d.message);
+    return text;
+}
+
+}  // namespace slabwright

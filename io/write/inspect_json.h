@@ -1,0 +1,35 @@
+// What `slabwright inspect` finds in a file: the mesh report, features and undercuts; no plan.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/read/stl.h"
+#include "kernels/features/features.h"
+
+namespace slabwright {
+
+struct Inspection {
+    InputInfo input;
+    MeshReport report;
+    std::vector<Diagnostic> diagnostics;
+    bool solid =
+        false;  ///< whether a planner may use the mesh; features and undercuts are looked for only then
+    std::string unusable;  ///< why not, in one line
+    std::vector<Feature> features;
+    std::vector<FinderDisagreement> disagreements;
+    /// What would stay unmade if the pattern were one layer; layer boundaries can only make it less.
+    std::vector<UnmadeUndercut> undercuts;
+};
+
+/// Reads the file and looks at it. @throws Error(input | usage | cancelled) as read_stl; a mesh that is read
+/// but not solid is a finding
+[[nodiscard]] Inspection inspect_stl(Context& context, const std::string& stl_path, const Job& job);
+
+/// Schema slabwright.inspect/1.
+[[nodiscard]] std::string inspection_json(const Inspection& inspection);
+
+/// The same for people: a few lines of plain text.
+[[nodiscard]] std::string inspection_text(const Inspection& inspection);
+
+}  // namespace slabwright

@@ -1,0 +1,390 @@
+#include "io/write/plan_json.h"
+
+#include <algorithm>
+#include <numbers>
+
+#include "engine/forces/feeds.h"
+#include "engine/schedule/feed_lengths.h"
+#include "io/posts/gcode_writer.h"
+#include "io/text/job_keys.h"
+
+namespace slabwright {
+
+namespace {
+
+using Shape = JsonText::Shape;
+
+// Decimals of derived quantities. What the job or the engine decided is written exactly.
+constexpr int kLength = 4, kMinutes = 4, kForce = 3, kArea = 3, kDeflection = 6, kExact = 6;
+
+void put_xy(JsonText& json, const std::array<double, 2>& xy) {
+    json.begin_array(Shape::line).exact(xy[0]).exact(xy[1]).end();
+}
+
+/// Writes the keys of a job as they are spelled in the job file.
+struct JobPrinter {
+    JsonText& json;
+    bool in_table = false;
+    void table(const char* name, const char*) {
+        close();
+        json.key(name).begin_object();
+        in_table = true;
+    }
+    void close() {
+        if (in_table) json.end();
+        in_table = false;
+    }
+    void required() {}
+    void key(const char* name, double value, const char*) { json.key(name).exact(value); }
+    void key(const char* name, int value, const char*) { json.key(name).integer(value); }
+    void key(const char* name, bool value, const char*) { json.key(name).boolean(value); }
+    void key(const char* name, const std::string& value, const char*) { json.key(name).string(value); }
+    void key(const char* name, const std::vector<double>& values, const char*) {
+        json.key(name).begin_array(Shape::line);
+        for (const double value : values) json.exact(value);
+        json.end();
+    }
+    void degrees(const char* name, double radians, const char*) {
+        json.key(name).rounded(radians * 180 / std::numbers::pi, 9);
+    }
+    template <class Enum, std::size_t N>
+    void word(const char* name, Enum value, const Word<Enum> (&words)[N], const char*) {
+        json.key(name).string(word_of(words, value));
+    }
+};
+
+void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
+    json.begin_object(Shape::line);
+    json.key("number").integer(tool.number);
+    json.key("kind").string(word_of(kToolWords, tool.kind));
+    json.key("name").string(tool.name);
+    json.key("diameter").exact(tool.diameter);
+    json.key("flute_length").exact(tool.flute_length);
+    json.key("shank_diameter").exact(tool.shank_diameter);
+    json.key("holder")
+        .begin_object()
+        .key("diameter")
+        .exact(tool.holder_diameter)
+        .key("stickout")
+        .exact(tool.stickout)
+        .end();
+    json.key("flutes").integer(tool.flutes);
+    json.key("helix_deg").rounded(tool.helix_rad * 180 / std::numbers::pi, 9);
+    json.key("max_rpm").exact(tool.max_rpm);
+    json.key("max_feed").exact(tool.max_feed);
+    json.key("plunge_feed").exact(tool.plunge_feed);
+    json.key("stepdown").begin_array().exact(tool.stepdown_min).exact(tool.stepdown_max).end();
+    json.key("stepover").exact(tool.stepover);
+    json.key("plunges").boolean(tool.plunges);
+    json.key("core_diameter").exact(core_diameter_of(tool));
+    json.key("ramp_deg").exact(ramp_limit_deg(tool));
+    json.key("strength_mpa").exact(tool.strength_mpa);
+    double allowed = 0;
+    for (const Layer& layer : plan.layers)
+        for (const Operation& operation : layer.operations)
+            if (const double length =
+                    operation.tool == tool.number ? allowed_length(operation, tool, plan.job) : 0;
+                length > 0)
+                allowed = allowed > 0 ? std::min(allowed, length) : length;
+    json.key("allowed_length");
+    if (allowed > 0) json.rounded(allowed, kLength);
+    else json.null();
+    json.end();
+}
+
+void put_place(JsonText& json, const std::optional<std::array<double, 3>>& place) {
+    if (!place) {
+        json.null();
+        return;
+    }
+    json.begin_array();
+    for (const double v : *place) json.rounded(v, kLength);
+    json.end();
+}
+
+void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const Operation& operation) {
+    json.begin_object(Shape::line);
+    json.key("kind").string(name(operation.kind));
+    json.key("purpose").string(operation.purpose);
+    json.key("tool").integer(operation.tool);
+    json.key("stepdown").rounded(operation.stepdown, kLength);
+    json.key("stepover").rounded(operation.stepover, kLength);
+    json.key("bands").begin_array(Shape::line);
+    for (const StepBand& band : operation.bands) {
+        json.begin_object(Shape::line);
+        json.key("z_low").rounded(band.z_low, kLength);
+        json.key("z_high").rounded(band.z_high, kLength);
+        json.key("least_slope_deg").rounded(band.least_slope_deg, kLength);
+        json.key("stepdown").rounded(band.stepdown, kLength);
+        json.end();
+    }
+    json.end();
+    json.key("file").string("nc/" + operation.file);
+    json.key("cutting_mm").rounded(operation.cutting_mm, kLength);
+    json.key("rapid_mm").rounded(operation.rapid_mm, kLength);
+    json.key("minutes").rounded(operation.minutes, kMinutes);
+    json.key("spindle_rpm").rounded(operation.spindle_rpm, 0);
+    json.key("blend").rounded(operation.blend, kLength);
+    json.key("feeds").begin_array(Shape::line);
+    for (const FeedLength& f : feed_lengths(operation.moves)) {
+        json.begin_object(Shape::line).key("feed").exact(f.feed).key("mm").rounded(f.mm, kExact);
+        json.key("centre").begin_array(Shape::line);
+        for (const double v : f.centre()) json.rounded(v, kExact);
+        json.end().end();
+    }
+    json.end();
+    json.key("bending_limit").rounded(bending_limit(operation, plan.job), kLength);
+    json.key("peak_force_n").rounded(operation.peak_force_n, kForce);
+    json.key("deflection_mm").rounded(operation.deflection_mm, kDeflection);
+    json.key("wall_error_mm").rounded(operation.wall_error_mm, kDeflection);
+    json.key("peak_at");
+    put_place(json, operation.peak_at);
+    json.key("peak_line");
+    if (const std::size_t line =
+            operation.peak_move ? program_line(plan, layer, operation, *operation.peak_move) : 0;
+        line > 0)
+        json.integer(static_cast<std::int64_t>(line));
+    else json.null();
+    json.end();
+}
+
+void put_selection(JsonText& json, const std::optional<LayerSelection>& selection) {
+    if (!selection) {
+        json.null();
+        return;
+    }
+    auto put = [&](const char* key, const std::optional<double>& value, int decimals) {
+        json.key(key);
+        if (value) json.rounded(*value, decimals);
+        else json.null();
+    };
+    json.begin_object();
+    json.key("least_slope_deg").rounded(selection->least_slope_deg, kLength);
+    json.key("vertical").boolean(selection->vertical);
+    json.key("finish_stepdown").rounded(selection->finish_stepdown, kLength);
+    json.key("finish_stepdown_printed").rounded(selection->finish_stepdown_printed, kLength);
+    json.key("rough_stepdown").rounded(selection->rough_stepdown, kLength);
+    json.key("candidates").begin_array();
+    for (const ToolCandidate& candidate : selection->candidates) {
+        json.begin_object(Shape::line);
+        json.key("purpose").string(candidate.purpose);
+        json.key("tool").integer(candidate.tool);
+        json.key("chosen").boolean(candidate.chosen);
+        put("accessibility", candidate.accessibility, kDeflection);
+        put("semi_rough_mm2", candidate.semi_rough_mm2, kArea);
+        put("stepdown", candidate.stepdown, kLength);
+        put("minutes", candidate.minutes, kMinutes);
+        json.key("reason").string(candidate.reason);
+        json.end();
+    }
+    json.end().key("sets").begin_array();
+    for (const ToolSet& set : selection->sets) {
+        json.begin_object(Shape::line);
+        json.key("name").string(set.name);
+        json.key("tools").begin_array();
+        for (const int tool : set.tools) json.integer(tool);
+        json.end();
+        json.key("minutes").rounded(set.minutes, kMinutes);
+        put("left_mm2", set.left_mm2, kArea);
+        json.key("chosen").boolean(set.chosen);
+        json.key("reason").string(set.reason);
+        json.end();
+    }
+    json.end().end();
+}
+
+void put_centroid(JsonText& json, const Joint& joint) {
+    json.begin_array(Shape::line)
+        .rounded(joint.centroid[0], kLength)
+        .rounded(joint.centroid[1], kLength)
+        .end();
+}
+
+void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
+    json.begin_object();
+    json.key("index").integer(layer.index);
+    json.key("z_bottom").exact(layer.z_bottom);
+    json.key("z_top").exact(layer.z_top);
+    json.key("slab_thickness").exact(layer.slab_thickness);
+    json.key("slabs").integer(layer.slabs);
+    json.key("reason").string(layer.reason);
+    json.key("selection");
+    put_selection(json, layer.selection);
+    const Joint own = layer.joints.empty() ? Joint{} : layer.joints.front();
+    json.key("glue_area_mm2").rounded(own.area_mm2, kArea);
+    json.key("glue_centroid");
+    put_centroid(json, own);
+    json.key("press_force_n").rounded(own.force_n, kForce);
+    json.key("joints").begin_array();
+    for (const Joint& joint : layer.joints) {
+        json.begin_object(Shape::line);
+        json.key("z").rounded(joint.z, kLength);
+        json.key("standing_mm2").rounded(joint.standing_mm2, kArea);
+        json.key("glue_area_mm2").rounded(joint.area_mm2, kArea);
+        json.key("glue_centroid");
+        put_centroid(json, joint);
+        json.key("press_force_n").rounded(joint.force_n, kForce);
+        json.key("pressure_mpa").rounded(joint.pressure_mpa, kDeflection);
+        json.end();
+    }
+    json.end();
+    json.key("operations").begin_array();
+    for (const Operation& operation : layer.operations) put_operation(json, plan, layer, operation);
+    json.end().end();
+}
+
+void put_loop(JsonText& json, const Loops& region) {
+    json.begin_array(Shape::line);
+    for (const Point2 p : region.loop(0)) json.begin_array().units(p.x).units(p.y).end();
+    json.end();
+}
+
+void put_flask(JsonText& json, const Plan& plan) {
+    if (!plan.flask) {
+        json.null();
+        return;
+    }
+    const Flask& flask = *plan.flask;
+    json.begin_object();
+    json.key("gap_mm").exact(plan.job.flask.gap);
+    json.key("wall_mm").rounded(flask.wall_mm, kLength);
+    json.key("draft_deg").exact(plan.job.flask.draft_deg);
+    json.key("mass_kg").rounded(flask.volume_mm3 * 1e-9 * plan.job.material.density_kg_m3, kForce);
+    json.key("outer");
+    put_loop(json, flask.outer);
+    json.key("inner");
+    put_loop(json, flask.inner.front());
+    json.key("inner_by_layer").begin_array();
+    for (const Loops& inner : flask.inner) put_loop(json, inner);
+    json.end().end();
+}
+
+void put_totals(JsonText& json, const Totals& totals) {
+    json.begin_object();
+    json.key("layers").integer(totals.layers);
+    json.key("operations").integer(totals.operations);
+    json.key("tool_changes").integer(totals.tool_changes);
+    json.key("cutting_mm").rounded(totals.cutting_mm, kLength);
+    json.key("rapid_mm").rounded(totals.rapid_mm, kLength);
+    json.key("cutting_minutes").rounded(totals.cutting_minutes, kMinutes);
+    json.key("bonding_minutes").rounded(totals.bonding_minutes, kMinutes);
+    json.key("tool_change_minutes").rounded(totals.tool_change_minutes, kMinutes);
+    json.key("table_minutes").rounded(totals.table_minutes, kMinutes);
+    json.key("build_minutes").rounded(totals.build_minutes, kMinutes);
+    json.key("stock_volume_mm3").rounded(totals.stock_volume_mm3, kArea);
+    json.key("part_volume_mm3").rounded(totals.part_volume_mm3, kArea);
+    json.key("stack_mass_kg").rounded(totals.stack_mass_kg, kForce);
+    json.end();
+}
+
+}  // namespace
+
+void put_repair(JsonText& json, const InputRepair& repair) {
+    json.begin_object();
+    json.key("how").string(repair.how);
+    json.key("triangles").count(repair.triangles);
+    json.key("moved").rounded(repair.moved_mm, 6);
+    if (repair.how == "rebuild") {
+        json.key("cell").rounded(repair.cell_mm, 6);
+        json.key("deviation").rounded(repair.deviation_mm, 6);
+        json.key("missed").rounded(repair.missed_mm, 6);
+    }
+    json.key("defects").begin_array();
+    for (const RepairedDefect& d : repair.defects) {
+        json.begin_object(Shape::line).key("kind").string(d.kind).key("count").count(d.count);
+        if (!d.unit.empty()) json.key("size").rounded(d.size, 6).key("unit").string(d.unit);
+        json.key("where").begin_array();
+        for (const double v : d.where) json.rounded(v, 4);
+        json.end().end();
+    }
+    json.end().end();
+}
+
+void put_input(JsonText& json, const InputInfo& input) {
+    json.begin_object();
+    json.key("file").string(input.file);
+    json.key("sha256").string(input.sha256);
+    json.key("triangles").count(input.triangles);
+    json.key("bbox").begin_object(Shape::line);
+    json.key("min").begin_array();
+    for (const double v : input.min) json.rounded(v, 6);
+    json.end().key("max").begin_array();
+    for (const double v : input.max) json.rounded(v, 6);
+    json.end().end();
+    if (input.repair) {
+        json.key("repair");
+        put_repair(json, *input.repair);
+    }
+    json.end();
+}
+
+void put_features(JsonText& json, const std::vector<Feature>& features) {
+    json.begin_array();
+    for (const Feature& feature : features) {
+        json.begin_object(Shape::line);
+        json.key("type").string(name(feature.type));
+        // A patch has a range of heights, whatever its extent; everything else has one height.
+        if (feature.type == FeatureType::shallow || feature.type == FeatureType::undercut)
+            json.key("z").begin_array().rounded(feature.z_low, 6).rounded(feature.z_high, 6).end();
+        else json.key("z").rounded(feature.z_low, 6);
+        json.key("xy").begin_array().rounded(feature.x, 6).rounded(feature.y, 6).end();
+        json.key("area").rounded(feature.area, kArea);
+        json.key("found_by").string(name(feature.found_by));
+        json.end();
+    }
+    json.end();
+}
+
+void put_diagnostics(JsonText& json, const std::vector<Diagnostic>& diagnostics) {
+    json.begin_array();
+    for (const Diagnostic& diagnostic : diagnostics) {
+        json.begin_object(Shape::line);
+        json.key("severity").string(name(diagnostic.severity));
+        json.key("code").string(diagnostic.code);
+        json.key("message").string(diagnostic.message);
+        json.key("where");
+        put_place(json, diagnostic.where);
+        json.end();
+    }
+    json.end();
+}
+
+std::string plan_json(const Plan& plan) {
+    JsonText json;
+    json.begin_object();
+    json.key("schema").string("slabwright.plan/1");
+    json.key("version").string(SLABWRIGHT_VERSION);
+    json.key("units").string("mm");
+    json.key("frame").string(word_of(kFrameWords, frame_of(plan.job.machine)));
+    json.key("input");
+    put_input(json, plan.input);
+    json.key("job").begin_object();
+    JobPrinter job{json};
+    visit_job_keys(plan.job, job);
+    job.close();
+    json.end();
+    json.key("stock").begin_object(Shape::line);
+    json.key("min");
+    put_xy(json, plan.stock_min);
+    json.key("max");
+    put_xy(json, plan.stock_max);
+    json.end();
+    json.key("flask");
+    put_flask(json, plan);
+    json.key("tools").begin_array();
+    for (const Tool& tool : plan.job.tools) put_tool(json, plan, tool);
+    json.end();
+    json.key("features");
+    put_features(json, plan.features);
+    json.key("layers").begin_array();
+    for (const Layer& layer : plan.layers) put_layer(json, plan, layer);
+    json.end();
+    json.key("totals");
+    put_totals(json, plan.totals);
+    json.key("diagnostics");
+    put_diagnostics(json, plan.diagnostics);
+    json.end();
+    return json.take();
+}
+
+}  // namespace slabwright
