@@ -1,0 +1,251 @@
+// Makes the system fail as tests ask: loaded into the command by LD_PRELOAD. SLABWRIGHT_FAULT says how:
+//     write 17     the 17th write fails as on a full disk; likewise open (to write), rename, mkdir, sync,
+//     read new 17       the 17th allocation by operator new fails kill 17      the process is killed at the
+//     17th call that changes the disk short        no read or write takes more than 700 bytes interrupted
+//     every second read and write is interrupted by a signal before it does anything clock        clocks jump
+//     a day ahead or back at every look
+// SLABWRIGHT_FAULT_COUNT names a file that is told at the end how often each was called.
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+
+namespace {
+
+enum Call { kWrite, kOpen, kRename, kMkdir, kSync, kRead, kNew, kChange, kCalls };
+constexpr const char* kNames[kCalls] = {"write", "open", "rename", "mkdir", "sync", "read", "new", "kill"};
+
+struct Wish {
+    int call = -1;
+    long at = 0;
+    bool short_ones = false, interrupted = false, clock = false;
+
+    Wish() {
+        const char* text = std::getenv("SLABWRIGHT_FAULT");
+        if (text == nullptr) return;
+        short_ones = std::strcmp(text, "short") == 0;
+        interrupted = std::strcmp(text, "interrupted") == 0;
+        clock = std::strcmp(text, "clock") == 0;
+        for (int c = 0; c < kCalls; ++c) {
+            const std::size_t length = std::strlen(kNames[c]);
+            if (std::strncmp(text, kNames[c], length) != 0 || text[length] != ' ') continue;
+            call = c;
+            at = std::strtol(text + length, nullptr, 10);
+        }
+    }
+};
+
+std::atomic<long> counts[kCalls];
+
+const Wish& wish() {
+    static const Wish wish;
+    return wish;
+}
+
+/// Whether this call is the one that fails.
+bool fails(Call call) { return ++counts[call] == wish().at && wish().call == call; }
+
+void changes_disk() {
+    if (fails(kChange)) ::kill(::getpid(), SIGKILL);
+}
+
+template <class Function>
+Function real(const char* name) {
+    return reinterpret_cast<Function>(::dlsym(RTLD_NEXT, name));
+}
+
+bool refused(Call call, int error) {
+    if (!fails(call)) return false;
+    errno = error;
+    return true;
+}
+
+bool interrupted() {
+    static std::atomic<unsigned> turn;
+    if (!wish().interrupted || (turn++ & 1u) != 0) return false;
+    errno = EINTR;
+    return true;
+}
+
+std::size_t taken(std::size_t bytes) { return wish().short_ones ? std::min<std::size_t>(bytes, 700) : bytes; }
+
+struct Teller {
+    ~Teller() {
+        const char* path = std::getenv("SLABWRIGHT_FAULT_COUNT");
+        if (path == nullptr) return;
+        long told[kCalls];
+        for (int c = 0; c < kCalls; ++c) told[c] = counts[c];
+        std::FILE* file = std::fopen(path, "w");
+        if (file == nullptr) return;
+        for (int c = 0; c < kCalls; ++c) std::fprintf(file, "%s %ld\n", kNames[c], told[c]);
+        std::fclose(file);
+    }
+} teller;
+
+void* allocated(std::size_t bytes, std::size_t alignment) {
+    if (fails(kNew)) return nullptr;
+    void* at = alignment > alignof(std::max_align_t)
+                   ? std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment)
+                   : std::malloc(std::max<std::size_t>(bytes, 1));
+    return at;
+}
+
+void* allocated_or_thrown(std::size_t bytes, std::size_t alignment) {
+    void* at = allocated(bytes, alignment);
+    if (at == nullptr) throw std::bad_alloc();
+    return at;
+}
+
+}  // namespace
+
+extern "C" {
+
+ssize_t write(int file, const void* bytes, size_t count) {
+    static const auto next = real<ssize_t (*)(int, const void*, size_t)>("write");
+    if (file <= 2) return next(file, bytes, count);
+    changes_disk();
+    if (refused(kWrite, ENOSPC) || interrupted()) return -1;
+    return next(file, bytes, taken(count));
+}
+
+ssize_t pwrite(int file, const void* bytes, size_t count, off_t offset) {
+    static const auto next = real<ssize_t (*)(int, const void*, size_t, off_t)>("pwrite");
+    changes_disk();
+    if (refused(kWrite, ENOSPC) || interrupted()) return -1;
+    return next(file, bytes, taken(count), offset);
+}
+
+ssize_t read(int file, void* bytes, size_t count) {
+    static const auto next = real<ssize_t (*)(int, void*, size_t)>("read");
+    if (refused(kRead, EIO) || interrupted()) return -1;
+    return next(file, bytes, taken(count));
+}
+
+ssize_t pread(int file, void* bytes, size_t count, off_t offset) {
+    static const auto next = real<ssize_t (*)(int, void*, size_t, off_t)>("pread");
+    if (refused(kRead, EIO) || interrupted()) return -1;
+    return next(file, bytes, taken(count), offset);
+}
+
+int open(const char* path, int flags, ...) {
+    static const auto next = real<int (*)(const char*, int, ...)>("open");
+    va_list rest;
+    va_start(rest, flags);
+    const mode_t mode = (flags & (O_CREAT | O_TMPFILE)) != 0 ? va_arg(rest, mode_t) : 0;
+    va_end(rest);
+    if ((flags & O_ACCMODE) != O_RDONLY) {
+        changes_disk();
+        if (refused(kOpen, EMFILE)) return -1;
+    }
+    return next(path, flags, mode);
+}
+
+int openat(int folder, const char* path, int flags, ...) {
+    static const auto next = real<int (*)(int, const char*, int, ...)>("openat");
+    va_list rest;
+    va_start(rest, flags);
+    const mode_t mode = (flags & (O_CREAT | O_TMPFILE)) != 0 ? va_arg(rest, mode_t) : 0;
+    va_end(rest);
+    if ((flags & O_ACCMODE) != O_RDONLY) {
+        changes_disk();
+        if (refused(kOpen, EMFILE)) return -1;
+    }
+    return next(folder, path, flags, mode);
+}
+
+int rename(const char* from, const char* to) {
+    static const auto next = real<int (*)(const char*, const char*)>("rename");
+    changes_disk();
+    return refused(kRename, EIO) ? -1 : next(from, to);
+}
+
+int renameat(int from_folder, const char* from, int to_folder, const char* to) {
+    static const auto next = real<int (*)(int, const char*, int, const char*)>("renameat");
+    changes_disk();
+    return refused(kRename, EIO) ? -1 : next(from_folder, from, to_folder, to);
+}
+
+int renameat2(int from_folder, const char* from, int to_folder, const char* to, unsigned flags) {
+    static const auto next = real<int (*)(int, const char*, int, const char*, unsigned)>("renameat2");
+    changes_disk();
+    return refused(kRename, EIO) ? -1 : next(from_folder, from, to_folder, to, flags);
+}
+
+int mkdir(const char* path, mode_t mode) {
+    static const auto next = real<int (*)(const char*, mode_t)>("mkdir");
+    changes_disk();
+    return refused(kMkdir, ENOSPC) ? -1 : next(path, mode);
+}
+
+int mkdirat(int folder, const char* path, mode_t mode) {
+    static const auto next = real<int (*)(int, const char*, mode_t)>("mkdirat");
+    changes_disk();
+    return refused(kMkdir, ENOSPC) ? -1 : next(folder, path, mode);
+}
+
+int unlink(const char* path) {
+    static const auto next = real<int (*)(const char*)>("unlink");
+    changes_disk();
+    return next(path);
+}
+
+int unlinkat(int folder, const char* path, int flags) {
+    static const auto next = real<int (*)(int, const char*, int)>("unlinkat");
+    changes_disk();
+    return next(folder, path, flags);
+}
+
+int fsync(int file) {
+    static const auto next = real<int (*)(int)>("fsync");
+    return refused(kSync, EIO) ? -1 : next(file);
+}
+
+int fdatasync(int file) {
+    static const auto next = real<int (*)(int)>("fdatasync");
+    return refused(kSync, EIO) ? -1 : next(file);
+}
+
+int clock_gettime(clockid_t clock, timespec* time) {
+    static const auto next = real<int (*)(clockid_t, timespec*)>("clock_gettime");
+    const int answer = next(clock, time);
+    static std::atomic<unsigned> turn;
+    if (wish().clock && (clock == CLOCK_REALTIME || clock == CLOCK_MONOTONIC))
+        time->tv_sec += (turn++ & 1u) != 0 ? 86400 : -86400;
+    return answer;
+}
+
+}  // extern "C"
+
+void* operator new(std::size_t bytes) { return allocated_or_thrown(bytes, 0); }
+void* operator new[](std::size_t bytes) { return allocated_or_thrown(bytes, 0); }
+void* operator new(std::size_t bytes, std::align_val_t alignment) {
+    return allocated_or_thrown(bytes, static_cast<std::size_t>(alignment));
+}
+void* operator new[](std::size_t bytes, std::align_val_t alignment) {
+    return allocated_or_thrown(bytes, static_cast<std::size_t>(alignment));
+}
+void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept { return allocated(bytes, 0); }
+void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept { return allocated(bytes, 0); }
+void* operator new(std::size_t bytes, std::align_val_t alignment, const std::nothrow_t&) noexcept {
+    return allocated(bytes, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* at) noexcept { std::free(at); }
+void operator delete[](void* at) noexcept { std::free(at); }
+void operator delete(void* at, std::size_t) noexcept { std::free(at); }
+void operator delete[](void* at, std::size_t) noexcept { std::free(at); }
+void operator delete(void* at, std::align_val_t) noexcept { std::free(at); }
+void operator delete[](void* at, std::align_val_t) noexcept { std::free(at); }
+void operator delete(void* at, std::size_t, std::align_val_t) noexcept { std::free(at); }
+void operator delete[](void* at, std::size_t, std::align_val_t) noexcept { std::free(at); }
