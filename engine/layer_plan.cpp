@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "engine/forces/min_material.h"
+#include "engine/moves/motion_time.h"
 #include "engine/paths/paths.h"
-#include "engine/schedule/motion_time.h"
 #include "engine/tools/reach_ratio.h"
 #include "engine/tools/select.h"
 #include "kernels/mesh/part.h"

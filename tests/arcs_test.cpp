@@ -1,6 +1,6 @@
 // Arcs fitted to paths, compared with the paths by brute force, read by LinuxCNC's interpreter and by the
 // project's own reader.
-#include "engine/paths/arcs.h"
+#include "engine/moves/arcs.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <random>
 #include <sstream>
 
+#include "engine/moves/motion_time.h"
 #include "engine/planner.h"
-#include "engine/schedule/motion_time.h"
 #include "io/posts/gcode_reader.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/tool_table.h"

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "engine/paths/engagement.h"
+#include "engine/stock/engagement.h"
 #include "kernels/stock/stock.h"
 #include "tests/support/seed.h"
 

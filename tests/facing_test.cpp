@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/paths/layer_cut.h"
-#include "engine/paths/layer_stock.h"
+#include "engine/stock/layer_stock.h"
 #include "kernels/stock/stock.h"
 
 namespace slabwright {

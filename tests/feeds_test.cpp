@@ -11,9 +11,9 @@
 #include "engine/forces/cuts.h"
 #include "engine/forces/feeds.h"
 #include "engine/forces/min_material.h"
-#include "engine/forces/op_cuts.h"
 #include "engine/forces/split_cuts.h"
 #include "engine/planner.h"
+#include "engine/stock/cut_stretches.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"
 

@@ -10,7 +10,7 @@
 #include <random>
 #include <string>
 
-#include "engine/schedule/op_forces.h"
+#include "engine/forces/op_forces.h"
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
 #include "kernels/forces/forces.h"

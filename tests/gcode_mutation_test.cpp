@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/schedule/feed_lengths.h"
+#include "engine/moves/feed_lengths.h"
 #include "io/posts/gcode_reader.h"
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table.h"

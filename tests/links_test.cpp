@@ -7,9 +7,9 @@
 #include <numbers>
 #include <random>
 
+#include "engine/moves/motion_time.h"
 #include "engine/paths/layer_cut.h"
 #include "engine/paths/rings.h"
-#include "engine/schedule/motion_time.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"
 

@@ -7,9 +7,9 @@
 #include <queue>
 #include <random>
 
-#include "engine/paths/layer_stock.h"
-#include "engine/paths/loose.h"
 #include "engine/planner.h"
+#include "engine/stock/layer_stock.h"
+#include "engine/stock/loose.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/stock/sweep.h"
 #include "tests/data/sweep.h"

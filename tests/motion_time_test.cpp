@@ -1,5 +1,5 @@
 // The time of many legs told one after the other against the same rules over all of them at once.
-#include "engine/schedule/motion_time.h"
+#include "engine/moves/motion_time.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <tuple>
 #include <vector>
 
-#include "engine/paths/order.h"
+#include "engine/moves/order.h"
 #include "tests/support/seed.h"
 
 using namespace slabwright;

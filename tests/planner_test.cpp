@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "engine/paths/path_builder.h"
+#include "engine/moves/path_builder.h"
 #include "engine/planner.h"
 #include "io/slabwright.h"
 #include "kernels/errors.h"

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "engine/schedule/motion_time.h"
+#include "engine/moves/motion_time.h"
 #include "io/posts/gcode_reader.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/tool_table.h"

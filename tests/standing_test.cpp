@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "engine/paths/standing.h"
+#include "engine/stock/standing.h"
 #include "kernels/stock/stock.h"
 #include "tests/support/seed.h"
 

@@ -5,8 +5,8 @@
 #include <span>
 
 #include "engine/forces/min_material.h"
-#include "engine/forces/op_cuts.h"
 #include "engine/plan.h"
+#include "engine/stock/cut_stretches.h"
 #include "kernels/forces/forces.h"
 #include "kernels/parallel/context.h"
 

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/moves/order.h"
 #include "engine/paths/feet.h"
 #include "engine/paths/layer_cut.h"
-#include "engine/paths/order.h"
 
 namespace slabwright {
 

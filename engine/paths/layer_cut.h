@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "engine/paths/path_builder.h"
+#include "engine/moves/path_builder.h"
 #include "engine/paths/paths.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/cutting/level_contours.h"

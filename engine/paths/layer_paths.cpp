@@ -4,14 +4,14 @@
 
 #include <fmt/format.h>
 
-#include "engine/paths/arcs.h"
+#include "engine/moves/arcs.h"
+#include "engine/moves/motion_time.h"
 #include "engine/paths/layer_cut.h"
-#include "engine/paths/layer_stock.h"
-#include "engine/paths/loose.h"
 #include "engine/paths/rest.h"
 #include "engine/paths/rings.h"
 #include "engine/paths/semi_rough.h"
-#include "engine/schedule/motion_time.h"
+#include "engine/stock/layer_stock.h"
+#include "engine/stock/loose.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "engine/paths/order.h"
+#include "engine/moves/order.h"
 
 namespace slabwright {
 

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "engine/paths/engagement.h"
 #include "engine/paths/layer_cut.h"
 #include "engine/paths/rings.h"
+#include "engine/stock/engagement.h"
 
 namespace slabwright {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/paths/layer_cut.h"
-#include "engine/paths/layer_stock.h"
+#include "engine/stock/layer_stock.h"
 
 namespace slabwright {
 

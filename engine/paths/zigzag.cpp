@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/moves/order.h"
 #include "engine/paths/layer_cut.h"
-#include "engine/paths/order.h"
 
 namespace slabwright {
 

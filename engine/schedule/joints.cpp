@@ -8,8 +8,8 @@
 
 #include "engine/flask/flask.h"
 #include "engine/layers/layers.h"
-#include "engine/paths/loose.h"
-#include "engine/paths/path_builder.h"
+#include "engine/moves/path_builder.h"
+#include "engine/stock/loose.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/hull.h"

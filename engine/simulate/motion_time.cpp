@@ -1,6 +1,6 @@
 // How long a program takes, from its text alone.
 
-#include "engine/schedule/motion_time.h"
+#include "engine/moves/motion_time.h"
 
 #include <algorithm>
 #include <cmath>

@@ -163,7 +163,7 @@ struct SimulationReport {
 [[nodiscard]] SimulationReport simulate(Context& context, const SimulationInput& input,
                                         const StandingPart& part, const SimulationOptions& options = {});
 
-/// Time of a program in seconds, by the rules of Travel (engine/schedule/motion_time.h), its dwell included.
+/// Time of a program in seconds, by the rules of Travel (engine/moves/motion_time.h), its dwell included.
 /// @param before the program that the machine ran before: from its end the spindle comes, and its tool need
 /// not
 ///        be changed where it is the same; null: the tool is fetched, and the way to the first place not

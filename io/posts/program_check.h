@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/job.h"
-#include "engine/schedule/feed_lengths.h"
+#include "engine/moves/feed_lengths.h"
 #include "engine/simulate/simulate.h"
 
 namespace slabwright {

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "engine/forces/feeds.h"
-#include "engine/schedule/feed_lengths.h"
+#include "engine/moves/feed_lengths.h"
 #include "io/posts/gcode_writer.h"
 #include "io/text/job_keys.h"
 

@@ -1,4 +1,4 @@
-#include "engine/paths/order.h"
+#include "engine/moves/order.h"
 
 #include <algorithm>
 #include <tuple>

@@ -6,8 +6,8 @@
 #include <optional>
 #include <span>
 
-#include "engine/paths/standing.h"
 #include "engine/plan.h"
+#include "engine/stock/standing.h"
 #include "kernels/cutting/drop.h"
 
 namespace slabwright {

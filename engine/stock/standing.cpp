@@ -1,4 +1,4 @@
-#include "engine/paths/standing.h"
+#include "engine/stock/standing.h"
 
 #include <algorithm>
 #include <cmath>

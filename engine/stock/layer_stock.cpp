@@ -1,4 +1,4 @@
-#include "engine/paths/layer_stock.h"
+#include "engine/stock/layer_stock.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "engine/schedule/op_forces.h"
+#include "engine/forces/op_forces.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "engine/schedule/feed_lengths.h"
+#include "engine/moves/feed_lengths.h"
 
 #include <algorithm>
 #include <cmath>

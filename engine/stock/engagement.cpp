@@ -1,4 +1,4 @@
-#include "engine/paths/engagement.h"
+#include "engine/stock/engagement.h"
 
 #include <algorithm>
 #include <bit>

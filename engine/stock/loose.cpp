@@ -2,13 +2,13 @@
 // union-find follows them. A piece that hangs on nothing, and is joined to what is held by putting back one
 // move's cut, is what that move cut off. All that is held is one piece from the start, and nearly every cell
 // is put back beside it.
-#include "engine/paths/loose.h"
+#include "engine/stock/loose.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "engine/paths/layer_stock.h"
+#include "engine/stock/layer_stock.h"
 #include "kernels/mesh/bulk_memory.h"
 #include "kernels/stock/sweep.h"
 

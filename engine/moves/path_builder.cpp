@@ -1,10 +1,10 @@
-#include "engine/paths/path_builder.h"
+#include "engine/moves/path_builder.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "engine/schedule/motion_time.h"
+#include "engine/moves/motion_time.h"
 #include "kernels/polygons/farthest.h"
 
 namespace slabwright {

@@ -1,13 +1,13 @@
 // Greedy: from every point the longest arc that fits, found by doubling and bisection. The centre is rounded
 // to 0.1 µm and the arc judged as rounded, so the program says exactly what was judged.
-#include "engine/paths/arcs.h"
+#include "engine/moves/arcs.h"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <span>
 
-#include "engine/paths/path_builder.h"
+#include "engine/moves/path_builder.h"
 
 namespace slabwright {
 

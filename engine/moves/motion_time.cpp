@@ -1,4 +1,4 @@
-#include "engine/schedule/motion_time.h"
+#include "engine/moves/motion_time.h"
 
 #include <algorithm>
 #include <cmath>

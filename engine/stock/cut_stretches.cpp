@@ -1,4 +1,4 @@
-#include "engine/forces/op_cuts.h"
+#include "engine/stock/cut_stretches.h"
 
 #include <algorithm>
 #include <bit>
