@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string>
 
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "engine/simulate/simulate.h"
 #include "io/posts/gcode_reader.h"
 #include "io/posts/gcode_writer.h"

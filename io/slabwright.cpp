@@ -13,9 +13,9 @@
 #include <fstream>
 #include <new>
 
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "engine/simulate/work.h"
-#include "engine/tools/access_map.h"
+#include "engine/tool_choice/access_map.h"
 #include "engine/tools/tools.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/tool_table.h"

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/planner.h"
-#include "engine/tools/access_map.h"
+#include "engine/planner/planner.h"
+#include "engine/tool_choice/access_map.h"
 #include "engine/tools/tools.h"
 #include "io/write/access_ply.h"
 #include "kernels/errors.h"

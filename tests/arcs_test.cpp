@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "engine/moves/motion_time.h"
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "io/posts/gcode_reader.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/tool_table.h"

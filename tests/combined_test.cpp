@@ -8,7 +8,7 @@
 #include <random>
 
 #include "engine/layers/combined.h"
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "kernels/errors.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"

@@ -12,7 +12,7 @@
 #include "engine/forces/feeds.h"
 #include "engine/forces/min_material.h"
 #include "engine/forces/split_cuts.h"
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "engine/stock/cut_stretches.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"

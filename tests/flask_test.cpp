@@ -9,7 +9,7 @@
 #include <random>
 
 #include "engine/flask/flask.h"
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
 #include "io/write/plan_json.h"

@@ -17,9 +17,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "engine/fit.h"
 #include "engine/layers/layers.h"
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
+#include "engine/schedule/fit.h"
 #include "engine/schedule/schedule.h"
 #include "io/read/stl.h"
 #include "io/write/sequence_json.h"

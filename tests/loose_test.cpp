@@ -7,7 +7,7 @@
 #include <queue>
 #include <random>
 
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "engine/stock/layer_stock.h"
 #include "engine/stock/loose.h"
 #include "kernels/mesh/weld.h"

@@ -9,7 +9,7 @@
 #include "engine/forces/cuts.h"
 #include "engine/forces/min_material.h"
 #include "engine/layers/layers.h"
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "engine/tools/tools.h"
 #include "kernels/forces/deflection.h"
 #include "tests/support/height_field.h"

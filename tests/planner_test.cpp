@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "engine/moves/path_builder.h"
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "io/slabwright.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"

@@ -11,7 +11,7 @@
 #include <random>
 
 #include "engine/paths/layer_cut.h"
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "engine/simulate/core_contact.h"
 #include "io/slabwright.h"
 #include "tests/support/height_field.h"

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "engine/paths/semi_rough.h"
-#include "engine/planner.h"
-#include "engine/tools/select.h"
+#include "engine/planner/planner.h"
+#include "engine/tool_choice/select.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
 #include "kernels/mesh/weld.h"

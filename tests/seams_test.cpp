@@ -5,7 +5,7 @@
 #include <fstream>
 #include <vector>
 
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
 #include "tests/data/sweep.h"

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/planner.h"
-#include "engine/tools/select.h"
+#include "engine/planner/planner.h"
+#include "engine/tool_choice/select.h"
 #include "kernels/errors.h"
 #include "tests/support/height_field.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/fit.h"
+#include "engine/schedule/fit.h"
 
 namespace slabwright {
 

@@ -26,7 +26,7 @@
 
 #include "engine/layers/candidates.h"
 #include "engine/layers/tool_map.h"
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "engine/tools/tools.h"
 #include "kernels/features/section_areas.h"
 #include "kernels/mesh/weld.h"

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "engine/planner.h"
-#include "engine/tools/reach_ratio.h"
-#include "engine/tools/select.h"
+#include "engine/planner/planner.h"
+#include "engine/tool_choice/reach_ratio.h"
+#include "engine/tool_choice/select.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/mesh/weld.h"

@@ -14,7 +14,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 #include "io/posts/gcode_reader.h"
 #include "io/posts/gcode_writer.h"
 #include "kernels/cutting/cusp.h"

@@ -1,10 +1,10 @@
-#include "engine/tools/access_map.h"
+#include "engine/tool_choice/access_map.h"
 
 #include <algorithm>
 #include <set>
 
-#include "engine/layer_plan.h"
-#include "engine/tools/reach_ratio.h"
+#include "engine/planner/layer_plan.h"
+#include "engine/tool_choice/reach_ratio.h"
 
 namespace slabwright {
 

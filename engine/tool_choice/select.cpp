@@ -1,4 +1,4 @@
-#include "engine/tools/select.h"
+#include "engine/tool_choice/select.h"
 
 #include <algorithm>
 #include <cmath>

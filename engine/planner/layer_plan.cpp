@@ -1,4 +1,4 @@
-#include "engine/layer_plan.h"
+#include "engine/planner/layer_plan.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +11,8 @@
 #include "engine/forces/min_material.h"
 #include "engine/moves/motion_time.h"
 #include "engine/paths/paths.h"
-#include "engine/tools/reach_ratio.h"
-#include "engine/tools/select.h"
+#include "engine/tool_choice/reach_ratio.h"
+#include "engine/tool_choice/select.h"
 #include "kernels/mesh/part.h"
 
 namespace slabwright {

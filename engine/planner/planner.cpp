@@ -1,4 +1,4 @@
-#include "engine/planner.h"
+#include "engine/planner/planner.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,21 +8,21 @@
 
 #include <fmt/format.h>
 
-#include "engine/fit.h"
 #include "engine/flask/flask.h"
 #include "engine/forces/feeds.h"
 #include "engine/forces/min_material.h"
 #include "engine/forces/op_forces.h"
-#include "engine/layer_plan.h"
 #include "engine/layers/candidates.h"
 #include "engine/layers/layers.h"
 #include "engine/moves/motion_time.h"
+#include "engine/planner/layer_plan.h"
+#include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
 #include "engine/schedule/schedule.h"
 #include "engine/stock/layer_stock.h"
 #include "engine/stock/standing.h"
-#include "engine/tools/select.h"
+#include "engine/tool_choice/select.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"

@@ -1,4 +1,4 @@
-#include "engine/fit.h"
+#include "engine/schedule/fit.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // AR of a tool in a layer, by the rule that the job names (LUO 5.5.1; METHOD.md section 6).
 #pragma once
 
-#include "engine/tools/select.h"
+#include "engine/tool_choice/select.h"
 #include "kernels/access/accessibility.h"
 
 namespace slabwright {

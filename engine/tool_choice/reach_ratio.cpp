@@ -1,4 +1,4 @@
-#include "engine/tools/reach_ratio.h"
+#include "engine/tool_choice/reach_ratio.h"
 
 #include <algorithm>
 #include <cmath>
