@@ -9,7 +9,7 @@
 #include <random>
 #include <tuple>
 
-#include "engine/paths/feet.h"
+#include "engine/paths/runs/feet.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/cutting/level_contours.h"
 #include "kernels/mesh/weld.h"

@@ -8,8 +8,8 @@
 #include <random>
 
 #include "engine/moves/motion_time.h"
-#include "engine/paths/layer_cut.h"
-#include "engine/paths/rings.h"
+#include "engine/paths/runs/layer_cut.h"
+#include "engine/paths/runs/rings.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"
 

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <random>
 
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/layer_cut.h"
 #include "engine/planner/planner.h"
 #include "engine/simulate/core_contact.h"
 #include "io/slabwright.h"

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "engine/paths/semi_rough.h"
+#include "engine/paths/operations/semi_rough.h"
 #include "engine/planner/planner.h"
 #include "engine/tool_choice/select.h"
 #include "io/slabwright.h"

@@ -7,8 +7,8 @@
 #include <functional>
 #include <numbers>
 
-#include "engine/paths/layer_cut.h"
-#include "engine/paths/open_waste.h"
+#include "engine/paths/operations/open_waste.h"
+#include "engine/paths/runs/layer_cut.h"
 #include "tests/support/height_field.h"
 
 namespace slabwright {

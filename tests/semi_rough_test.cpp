@@ -8,8 +8,8 @@
 #include <cmath>
 #include <functional>
 
-#include "engine/paths/rest.h"
-#include "engine/paths/semi_rough.h"
+#include "engine/paths/operations/rest.h"
+#include "engine/paths/operations/semi_rough.h"
 #include "tests/support/end_mill_job.h"
 #include "tests/support/height_field.h"
 

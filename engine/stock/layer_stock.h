@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/layer_cut.h"
 #include "kernels/mesh/bulk_memory.h"
 #include "kernels/parallel/spares.h"
 #include "kernels/stock/sweep.h"

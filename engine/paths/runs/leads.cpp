@@ -4,7 +4,7 @@
 #include <numbers>
 #include <optional>
 
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/layer_cut.h"
 
 namespace slabwright {
 

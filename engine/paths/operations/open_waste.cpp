@@ -1,9 +1,9 @@
-#include "engine/paths/open_waste.h"
+#include "engine/paths/operations/open_waste.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "engine/paths/kept_off.h"
+#include "engine/paths/runs/kept_off.h"
 
 namespace slabwright {
 

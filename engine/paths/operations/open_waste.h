@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "engine/paths/layer_cut.h"
-#include "engine/paths/rings.h"
+#include "engine/paths/runs/layer_cut.h"
+#include "engine/paths/runs/rings.h"
 #include "engine/stock/engagement.h"
 
 namespace slabwright {

@@ -1,4 +1,4 @@
-#include "engine/paths/level_runs.h"
+#include "engine/paths/runs/level_runs.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "engine/paths/chains.h"
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/chains.h"
+#include "engine/paths/runs/layer_cut.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"
 

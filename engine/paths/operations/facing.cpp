@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/layer_cut.h"
 
 namespace slabwright {
 

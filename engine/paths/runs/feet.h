@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/paths/level_runs.h"
+#include "engine/paths/runs/level_runs.h"
 
 namespace slabwright {
 

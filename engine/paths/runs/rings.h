@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/layer_cut.h"
 #include "kernels/polygons/loops.h"
 
 namespace slabwright {

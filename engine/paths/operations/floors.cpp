@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "engine/moves/order.h"
-#include "engine/paths/feet.h"
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/feet.h"
+#include "engine/paths/runs/layer_cut.h"
 
 namespace slabwright {
 

@@ -1,4 +1,4 @@
-#include "engine/paths/rings.h"
+#include "engine/paths/runs/rings.h"
 
 #include <algorithm>
 #include <cmath>

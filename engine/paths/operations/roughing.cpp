@@ -9,11 +9,11 @@
 #include <numbers>
 #include <optional>
 
-#include "engine/paths/feet.h"
-#include "engine/paths/kept_off.h"
-#include "engine/paths/layer_cut.h"
-#include "engine/paths/open_waste.h"
-#include "engine/paths/rings.h"
+#include "engine/paths/operations/open_waste.h"
+#include "engine/paths/runs/feet.h"
+#include "engine/paths/runs/kept_off.h"
+#include "engine/paths/runs/layer_cut.h"
+#include "engine/paths/runs/rings.h"
 #include "engine/stock/engagement.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"

@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "engine/paths/feet.h"
-#include "engine/paths/layer_cut.h"
-#include "engine/paths/level_runs.h"
+#include "engine/paths/runs/feet.h"
+#include "engine/paths/runs/layer_cut.h"
+#include "engine/paths/runs/level_runs.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"
 

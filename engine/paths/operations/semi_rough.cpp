@@ -1,4 +1,4 @@
-#include "engine/paths/semi_rough.h"
+#include "engine/paths/operations/semi_rough.h"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 #include <optional>
 #include <span>
 
-#include "engine/paths/feet.h"
-#include "engine/paths/rings.h"
+#include "engine/paths/runs/feet.h"
+#include "engine/paths/runs/rings.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {

@@ -1,4 +1,4 @@
-#include "engine/paths/chains.h"
+#include "engine/paths/runs/chains.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 // that, is cut by contour passes, level by level.
 #pragma once
 
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/layer_cut.h"
 #include "engine/stock/layer_stock.h"
 
 namespace slabwright {

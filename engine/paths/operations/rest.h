@@ -3,7 +3,7 @@
 // roughing cutter does not fit).
 #pragma once
 
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/layer_cut.h"
 #include "engine/stock/layer_stock.h"
 
 namespace slabwright {

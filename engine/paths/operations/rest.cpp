@@ -2,7 +2,7 @@
 // be lowered there; of all places only those are kept that lower the stock, and finer lines are laid over
 // what coarser ones leave. So a wide rest is cleared by an even raster, and a corner by the few places along
 // it.
-#include "engine/paths/rest.h"
+#include "engine/paths/operations/rest.h"
 
 #include <algorithm>
 #include <bit>
@@ -14,9 +14,9 @@
 #include <numeric>
 #include <optional>
 
-#include "engine/paths/chains.h"
-#include "engine/paths/rings.h"
-#include "engine/paths/semi_rough.h"
+#include "engine/paths/operations/semi_rough.h"
+#include "engine/paths/runs/chains.h"
+#include "engine/paths/runs/rings.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/parallel/parallel.h"
 

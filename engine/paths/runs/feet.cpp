@@ -1,4 +1,4 @@
-#include "engine/paths/feet.h"
+#include "engine/paths/runs/feet.h"
 
 #include <algorithm>
 #include <array>

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "engine/paths/layer_cut.h"
+#include "engine/paths/runs/layer_cut.h"
 
 namespace slabwright {
 
