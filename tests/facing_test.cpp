@@ -1,6 +1,7 @@
 // Face milling leaves nothing of the slab above the layer's top, whatever the stock's size.
 #include <gtest/gtest.h>
 
+#include "engine/paths/operations/facing.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "engine/stock/layer_stock.h"
 #include "kernels/stock/stock.h"

@@ -9,6 +9,7 @@
 
 #include "engine/moves/motion_time.h"
 #include "engine/paths/runs/layer_cut.h"
+#include "engine/paths/runs/leads.h"
 #include "engine/paths/runs/rings.h"
 #include "tests/support/height_field.h"
 #include "tests/support/seed.h"

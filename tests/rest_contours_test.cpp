@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "engine/paths/operations/roughing.h"
 #include "engine/paths/operations/semi_rough.h"
 #include "engine/planner/planner.h"
 #include "engine/tool_choice/select.h"
@@ -90,13 +91,14 @@ TEST(LayerStock, StandsAsAfterOneMoveAfterAnother) {
                                     k % 50 == 49 ? 0U : 1000U});
             }
         }
-        LayerStock together(n.cut, 0.25), singly(n.cut, 0.25), tried(n.cut, 0.25);
+        LayerStock together(n.cut.context, n.cut.layer, n.cut.solid, 0.25), singly = together,
+                                                                            tried = together;
         const std::vector<float> whole(together.heights().begin(), together.heights().end());
-        const Taken taken = together.cut(n.cut, op, tool);
+        const Taken taken = together.cut(n.cut.context, op, tool);
         for (std::size_t i = 1; i < op.moves.size(); ++i) {
             Operation one;
             one.moves = {op.moves[i - 1], op.moves[i]};
-            singly.cut(n.cut, one, tool);
+            singly.cut(n.cut.context, one, tool);
         }
         // But for rounding, which the way that several moves are laid together may change near nothing.
         EXPECT_TRUE(std::ranges::equal(together.heights(), singly.heights(),
@@ -108,12 +110,12 @@ TEST(LayerStock, StandsAsAfterOneMoveAfterAnother) {
         EXPECT_GT(cells, whole.size() / 2);
         // In a trial all of it is kept, and counted.
         LayerStock::Trial trial(tried);
-        EXPECT_EQ(tried.cut(n.cut, op, tool).cells, cells);
+        EXPECT_EQ(tried.cut(n.cut.context, op, tool).cells, cells);
         EXPECT_TRUE(std::ranges::equal(together.heights(), tried.heights()));
         trial.undo();
         EXPECT_TRUE(std::ranges::equal(whole, tried.heights()));
         // Again nothing is there to be taken.
-        EXPECT_TRUE(together.cut(n.cut, op, tool).nothing());
+        EXPECT_TRUE(together.cut(n.cut.context, op, tool).nothing());
     }
 }
 
@@ -136,7 +138,7 @@ TEST(LayerStock, StandsAsBeforeWhenATrialIsUndone) {
         return std::uniform_real_distribution(low, high)(random);
     };
     const Tool tool = tool_of_kind(n.job, ToolKind::ball);
-    LayerStock stock(n.cut, 0.25);
+    LayerStock stock(n.cut.context, n.cut.layer, n.cut.solid, 0.25);
     const auto cut = [&] {
         for (int k = 0; k < 20; ++k)
             stock.cut_at(cutter_end(tool), somewhere(-45, 45), somewhere(-45, 45), somewhere(0, kTop));
@@ -144,7 +146,7 @@ TEST(LayerStock, StandsAsBeforeWhenATrialIsUndone) {
         for (int k = 0; k < 10; ++k)
             op.moves.push_back({to_units(somewhere(-45, 45)), to_units(somewhere(-45, 45)),
                                 to_units(somewhere(0, kTop)), k == 0 ? 0U : 1000U});
-        stock.cut(n.cut, op, tool);
+        stock.cut(n.cut.context, op, tool);
     };
     const auto heights = [&] { return std::vector<float>(stock.heights().begin(), stock.heights().end()); };
     // Whatever was asked before, on whatever stood then.
@@ -196,9 +198,9 @@ TEST(RestContours, SemiRoughingTakesWhatStandsOutsideTheSwathAndReachesIt) {
         Notch n;
         const Tool rough = n.flat(1), semi = n.flat(0.5);
         n.layer.tools.rough = rough;
-        LayerStock stock(n.cut, 0.25);
+        LayerStock stock(n.cut.context, n.cut.layer, n.cut.solid, 0.25);
         const Operation roughing = rough_layer(n.cut).back();
-        stock.cut(n.cut, roughing, rough);
+        stock.cut(n.cut.context, roughing, rough);
         const LayerStock before = stock;
         const Operation op = semi_rough_layer(n.cut, stock, semi, {"waste", 1.0, swath, 0.3});
         ASSERT_FALSE(op.moves.empty());
@@ -260,8 +262,8 @@ TEST(RestContours, ABallsRingsKeepOffTheSurface) {
         n.cut.floors.clear();
         const Tool rough = n.flat(1), ball = n.tool(ToolKind::ball, 0.25);
         n.layer.tools.rough = rough;
-        LayerStock stock(n.cut, 0.25);
-        stock.cut(n.cut, rough_layer(n.cut).back(), rough);
+        LayerStock stock(n.cut.context, n.cut.layer, n.cut.solid, 0.25);
+        stock.cut(n.cut.context, rough_layer(n.cut).back(), rough);
         const double before = stock.area_over(n.context, 1);
         const Operation op = semi_rough_layer(n.cut, stock, ball, {"waste", 1.0, 0, allowance});
         ASSERT_FALSE(op.moves.empty());
@@ -297,8 +299,8 @@ TEST(RestContours, AWiderSwathLeavesLessToSemiRoughing) {
         n.cut.floors.clear();  // on a floor the swath leaves nothing to the ball
         const Tool rough = n.flat(1), semi = n.flat(0.25);
         n.layer.tools.rough = rough;
-        LayerStock stock(n.cut, 0.25);
-        stock.cut(n.cut, rough_layer(n.cut).back(), rough);
+        LayerStock stock(n.cut.context, n.cut.layer, n.cut.solid, 0.25);
+        stock.cut(n.cut.context, rough_layer(n.cut).back(), rough);
         double mm = 0;
         const Operation op = semi_rough_layer(n.cut, stock, semi, {"waste", 1.0, swath, 0.3});
         for (std::size_t i = 1; i < op.moves.size(); ++i)

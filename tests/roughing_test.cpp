@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "engine/paths/operations/open_waste.h"
+#include "engine/paths/operations/roughing.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "tests/support/height_field.h"
 

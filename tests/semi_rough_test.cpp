@@ -9,6 +9,7 @@
 #include <functional>
 
 #include "engine/paths/operations/rest.h"
+#include "engine/paths/operations/roughing.h"
 #include "engine/paths/operations/semi_rough.h"
 #include "tests/support/end_mill_job.h"
 #include "tests/support/height_field.h"
@@ -71,8 +72,8 @@ Passed semi_roughed(const Height& height, ToolKind kind, double allowance, const
     Waste w(height, reshape);
     Tool tool = w.layer.tools.finish;
     tool.kind = kind;
-    LayerStock stock(w.cut, 0.2);
-    stock.cut(w.cut, rough_layer(w.cut).back(), w.layer.tools.rough);
+    LayerStock stock(w.cut.context, w.cut.layer, w.cut.solid, 0.2);
+    stock.cut(w.cut.context, rough_layer(w.cut).back(), w.layer.tools.rough);
     const Operation op =
         cut_rest(w.cut, stock, tool, {OperationKind::semi_rough, "waste", kLimit, true, 0, allowance});
     EXPECT_FALSE(op.moves.empty());
@@ -202,8 +203,8 @@ TEST(RestMachining, LeavesWhatItsCutterCannotTake) {
             Waste w(height, {});
             Tool tool = w.layer.tools.finish;
             tool.kind = kind;
-            LayerStock stock(w.cut, 0.2);
-            stock.cut(w.cut, rough_layer(w.cut).back(), w.layer.tools.rough);
+            LayerStock stock(w.cut.context, w.cut.layer, w.cut.solid, 0.2);
+            stock.cut(w.cut.context, rough_layer(w.cut).back(), w.layer.tools.rough);
             constexpr double limit = 0.06, worth = 0.05;  // mm; a place is visited for .05 at most
             const std::size_t before = could_be_lowered(w, stock, tool, limit, worth);
             const Operation op = cut_rest(w.cut, stock, tool, {OperationKind::corner, "rest", limit, false});
@@ -231,7 +232,7 @@ TEST(RestMachining, FollowsChannelsAsFarAsTheyAreWideEnough) {
         Waste w(narrows ? Height(along_x) : Height(along_y), narrows ? narrowing : aside);
         Tool tool = w.layer.tools.rough;
         tool.diameter = width + 0.1;
-        LayerStock stock(w.cut, 0.2);
+        LayerStock stock(w.cut.context, w.cut.layer, w.cut.solid, 0.2);
         for (const auto& [radius, z] : {std::pair{width / 2 + 1, top}, {width / 2 - 1, floor}}) {
             const CutterEnd end{CutterEnd::Form::flat, radius, 0};
             const std::array<double, 3> from{narrows ? -40 : 0.217, narrows ? 0.68 : -40, z},
@@ -261,7 +262,7 @@ TEST(RestMachining, DoesNotComeForWhatClingsToAWall) {
         Waste w(plinth, deeper);
         w.layer.floor_below = -base;
         w.job.cutting.rest_pattern = RestPattern::raster;
-        LayerStock stock(w.cut, (25 + foot + beside) / 177.5);
+        LayerStock stock(w.cut.context, w.cut.layer, w.cut.solid, (25 + foot + beside) / 177.5);
         const CutterEnd wide{CutterEnd::Form::flat, 60, 0};
         const auto clear = [&](double x0, double y0, double x1, double y1, double z) {
             stock.cut_along(wide, {x0, y0, z}, {x1, y1, z});
@@ -288,7 +289,7 @@ TEST(SemiRough, ReachesWhatStandsFarFromAnyWall) {
     };
     const std::array<std::array<double, 2>, 3> lumps{{{-11, -11}, {3, 6}, {14, 15}}};
     Waste w(peg, {});
-    LayerStock stock(w.cut, 0.2);
+    LayerStock stock(w.cut.context, w.cut.layer, w.cut.solid, 0.2);
     const CellGrid& grid = stock.grid();
     const CutterEnd needle{CutterEnd::Form::flat, 0.1, 0};
     for (int j = 0; j < grid.ny; ++j)

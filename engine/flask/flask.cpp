@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "engine/moves/path_builder.h"
+#include "engine/moves/thinning.h"
 #include "kernels/errors.h"
 #include "kernels/polygons/hull.h"
 #include "kernels/slicing/silhouette.h"

@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "engine/moves/path_builder.h"
+#include "engine/moves/thinning.h"
 
 namespace slabwright {
 

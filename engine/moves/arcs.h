@@ -21,7 +21,7 @@ struct ArcFit {
 /// three dimensions); rapids stay as they are. Every arc and chord begins and ends in points of the path
 /// given. An arc and the chords that it replaces lie within `tolerance` of one another, both ways: seen from
 /// the centre they advance together, and at no angle do their distances from it differ by more. Chords as
-/// `simplify` in path_builder.h. Where a chord would do, no arc is used. The same moves give the same result;
+/// `simplify` in thinning.h. Where a chord would do, no arc is used. The same moves give the same result;
 /// moves that are arcs already stay.
 void fit_arcs(std::vector<Move>& moves, const ArcFit& fit);
 

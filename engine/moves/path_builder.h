@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 
+#include "engine/moves/thinning.h"
 #include "engine/plan.h"
 #include "engine/stock/standing.h"
 #include "kernels/cutting/drop.h"
@@ -31,12 +32,6 @@ struct Surroundings {
     /// Gets where a run begins that was left out: neither helix nor ramp has room, and the tool does not cut
     /// straight down.
     std::vector<std::array<double, 3>>* no_way_in = nullptr;
-};
-
-/// A point of a path, 0.1 µm.
-struct PathPoint {
-    std::int32_t x = 0, y = 0, z = 0;
-    friend bool operator==(const PathPoint&, const PathPoint&) = default;
 };
 
 class PathBuilder {
@@ -140,24 +135,5 @@ private:
     double core_ = 0, recess_ = 0;  // mm: the core's radius, and how much may stand under it
     double ramp_limit_deg_ = 90;
 };
-
-/// Leaves out points of a polyline that lie within `tolerance` (0.1 µm units) of the chord between kept ones
-/// (Ramer–Douglas–Peucker in three dimensions). First and last stay. Every point of the result lies within
-/// `tolerance` of the polyline given.
-[[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double tolerance);
-
-/// The same of closed loops, `mm` at most from the chords between the points that stay; loops of fewer than
-/// three points then are left out. Loops may cross where they come nearer to each other than twice that.
-[[nodiscard]] Loops thinned(const Loops& loops, double mm);
-
-/// The same of a line to two tolerances: to `loose` (0.1 µm) where the line then turns by no more than `turn`
-/// (radians) at a point, to `fine` elsewhere. A machine slows down in sharper turns (travel_seconds), so
-/// where it need not, no time is lost by longer chords.
-[[nodiscard]] std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, double loose,
-                                              double turn);
-
-/// The turn at a point, radians, that a machine takes at a feed (mm/min) without slowing down: θ = √(8aδ)/v
-/// (travel_seconds).
-[[nodiscard]] double fast_turn(const Machine& machine, double feed, double blend = kJunction);
 
 }  // namespace slabwright

@@ -1,3 +1,5 @@
+#include "engine/paths/paths.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -6,119 +8,22 @@
 
 #include "engine/moves/arcs.h"
 #include "engine/moves/motion_time.h"
+#include "engine/paths/operations/facing.h"
+#include "engine/paths/operations/floors.h"
+#include "engine/paths/operations/levels.h"
+#include "engine/paths/operations/offsets.h"
+#include "engine/paths/operations/raster.h"
 #include "engine/paths/operations/rest.h"
+#include "engine/paths/operations/roughing.h"
 #include "engine/paths/operations/semi_rough.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "engine/paths/runs/rings.h"
+#include "engine/paths/runs/tolerances.h"
 #include "engine/stock/layer_stock.h"
 #include "engine/stock/loose.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
-
-double safe_chord_mm(double radius, double gouge) { return std::sqrt(8 * radius * 0.65 * gouge); }
-std::int32_t safe_pitch(double radius, double gouge) {
-    return std::max(1, static_cast<std::int32_t>(
-                           std::floor(safe_chord_mm(radius, gouge) / std::numbers::sqrt2 * kUnitsPerMm)));
-}
-std::int32_t safe_step(double radius, double gouge) {
-    return std::max(1, static_cast<std::int32_t>(0.75 * safe_chord_mm(radius, gouge) * kUnitsPerMm));
-}
-double simplify_tolerance_units(double gouge) { return 0.12 * gouge * kUnitsPerMm; }
-
-double arc_tolerance_units(const Job& job, OperationKind kind) {
-    const double finest = 0.18 * job.tolerances.gouge * kUnitsPerMm;
-    return kind == OperationKind::rough ? std::max(finest, rough_fit(job.cutting) * kUnitsPerMm) : finest;
-}
-
-FinishSlopes finish_slopes(const Cutting& cutting) {
-    constexpr double degree = std::numbers::pi / 180, none = 2;
-    // Contours of what is as good as level run anywhere; a ball's place over a wall is decided by the last
-    // bit.
-    const double level = 0.5 * degree, wall = std::min(cutting.vertical_deg, 89.9) * degree,
-                 limit = cutting.steep_limit_deg * degree, overlap = cutting.overlap_deg * degree;
-    switch (cutting.finish_strategy) {
-        case FinishStrategy::levels:
-            return {level, level, -1, -1};
-        case FinishStrategy::projection:
-            return {none, none, wall, wall};
-        case FinishStrategy::both:
-            return {level, limit, wall, limit};
-        case FinishStrategy::split:
-            break;
-    }
-    return {limit - overlap, limit - overlap, limit + overlap, limit + overlap};
-}
-
-// The machine's travel is centred on the stock; the planner has made sure that the stock lies within it.
-double LayerCut::low(int axis, double beyond) const {
-    const double travel = axis == 0 ? job.machine.travel_x : job.machine.travel_y;
-    return std::max(layer.stock_min[axis] - beyond,
-                    0.5 * (layer.stock_min[axis] + layer.stock_max[axis] - travel));
-}
-double LayerCut::high(int axis, double beyond) const {
-    const double travel = axis == 0 ? job.machine.travel_x : job.machine.travel_y;
-    return std::min(layer.stock_max[axis] + beyond,
-                    0.5 * (layer.stock_min[axis] + layer.stock_max[axis] + travel));
-}
-
-Loops LayerCut::stock_outline() const {
-    Loops stock;
-    const Point2 low{to_units(layer.stock_min[0]), to_units(layer.stock_min[1])},
-        high{to_units(layer.stock_max[0]), to_units(layer.stock_max[1])};
-    stock.points = {low, {high.x, low.y}, high, {low.x, high.y}};
-    stock.close_loop();
-    return stock;
-}
-
-std::vector<Section> LayerCut::insides(const Cutter& cutter, std::span<const double> tip_z) const {
-    std::vector<Plane> planes;
-    for (const double z : tip_z) planes.push_back(inside_plane(solid, cutter, z));
-    return slice(context, layer.mesh, planes, {job.tolerances.gap});
-}
-
-std::vector<Contours> LayerCut::contours(const Cutter& cutter, std::span<const double> tip_z,
-                                         std::int32_t pitch) const {
-    const std::vector<Section> inside = insides(cutter, tip_z);
-    std::vector<FibreLevel> levels;
-    for (std::size_t i = 0; i < tip_z.size(); ++i) levels.push_back({tip_z[i], &inside[i].loops});
-    return level_contours(context, solid, levels, cutter, fibre_grid(solid, cutter, pitch));
-}
-
-const DropIndex& LayerCut::drops(const Cutter& cutter) const {
-    for (const auto& [of, index] : made_drops)
-        if (of.profile == cutter.profile && of.radius == cutter.radius) return *index;
-    made_drops.emplace_back(cutter, std::make_unique<DropIndex>(solid, cutter));
-    return *made_drops.back().second;
-}
-
-Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
-    const Cutter cutter{tool.kind == ToolKind::ball ? Cutter::Profile::ball : Cutter::Profile::flat,
-                        tool.diameter / 2};
-    Surroundings around{standing, part, cutter};
-    // Where the places are those of a wider cutter, half of what it is wider by may go.
-    const double wider = part != nullptr ? part->cutter().radius - cutter.radius : 0;
-    around.chord = safe_chord_mm(cutter.radius, std::max(job.tolerances.gouge, wider / 2));
-    around.under = cutter.profile == Cutter::Profile::ball ? wider : 0;
-    around.ramp_deg = job.cutting.ramp_deg;
-    around.no_way_in = &no_way_in;
-    around.lowest_rapid = layer.z_bottom + PathBuilder::kStop;
-    for (const int axis : {0, 1}) {
-        const auto a = static_cast<std::size_t>(axis);
-        around.reach_min[a] = low(axis, 1e9), around.reach_max[a] = high(axis, 1e9);
-    }
-    if (!layer.opening.empty()) around.room = std::make_shared<const Loops>(flask_room(*this, cutter.radius));
-    return around;
-}
-
-Operation LayerCut::operation(OperationKind kind, const char* purpose, const Tool& tool) const {
-    Operation op;
-    op.kind = kind;
-    op.purpose = purpose;
-    op.tool = tool.number;
-    op.spindle_rpm = std::min(tool.max_rpm, job.machine.max_rpm);
-    return op;
-}
 
 namespace {
 
@@ -173,7 +78,7 @@ Operation clear_between(const LayerCut& cut, LayerStock& stock, RestPass pass, d
     if (minutes > kSpared * minutes_of(all, cut.job.machine)) return all;
     attempt->undo();
     *cut.standing = std::move(stands), cut.no_way_in = std::move(ways);
-    (void)stock.cut(cut, some, tool);
+    (void)stock.cut(cut.context, some, tool);
     return some;
 }
 
@@ -296,7 +201,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         Spares<StockMemory> own;
         Spares<StockMemory>& spares = layer.stock_memory != nullptr ? *layer.stock_memory : own;
         auto memory = spares.take([] { return std::make_unique<StockMemory>(); });
-        LayerStock stock(cut, stock_cell(cut), std::move(*memory));
+        LayerStock stock(cut.context, cut.layer, cut.solid, stock_cell(cut.layer), std::move(*memory));
         // Left to the next layer, however this one ends.
         struct Leaving {
             Spares<StockMemory>& spares;
@@ -308,7 +213,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         for (Operation& op : result.operations) {
             const Tool& tool =
                 op.tool == tools.rough.number ? tools.rough : tool_of_kind(cut.job, ToolKind::face);
-            const bool idle = op.kind != OperationKind::face && stock.cut(cut, op, tool).nothing();
+            const bool idle = op.kind != OperationKind::face && stock.cut(cut.context, op, tool).nothing();
             // A floor's cutter may have taken the whole wall beside it, and the face mill all that roughing
             // would.
             if (!idle) useful.push_back(std::move(op));
@@ -353,7 +258,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         reached(0.56);
         if (hopeless()) return result;
         finish([&](Operation& op) {
-            if (stock.cut(cut, op, tools.finish).few()) op.moves.clear();
+            if (stock.cut(cut.context, op, tools.finish).few()) op.moves.clear();
         });
         if (result.given_up || hopeless()) return result;
         const double limit = cut.job.tolerances.cusp + 0.02;

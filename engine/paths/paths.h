@@ -2,49 +2,12 @@
 // for it.
 #pragma once
 
-#include "engine/plan.h"
-#include "engine/tools/tools.h"
-#include "kernels/mesh/mesh.h"
+#include <vector>
+
+#include "engine/layer_job.h"
 #include "kernels/parallel/context.h"
-#include "kernels/parallel/progress_part.h"
 
 namespace slabwright {
-
-template <class T>
-class Spares;
-struct StockMemory;
-
-/// Of a layer's time, its paths; the forces that follow take the rest.
-inline constexpr double kPathsShare = 0.78;
-
-/// An up-facing flat of at least cutting.min_flat_area. Its facets may differ in their last bits.
-struct Flat {
-    double z = 0, highest = 0;  ///< mm: its height, and that of its highest vertex
-};
-
-/// A layer's work is a value in and a value out.
-struct LayerJob {
-    /// The pattern, pattern-base, or a lighter one that lies as near to it as the job's `gouge` leaves room
-    /// for; the whole of it, or what of it the layer's cutters may meet (part_between).
-    MeshView mesh;
-    const Job* job = nullptr;
-    double z_bottom = 0, z_top = 0, slab_thickness = 0;
-    double floor_below = 0;  ///< the lowest z that a tip may reach: z_bottom less what may be cut under it
-    std::array<double, 2> stock_min{}, stock_max{};  ///< mm
-    int index = 0;
-    LayerTools tools;
-    Loops opening;            ///< of the flask in this layer; empty: no flask
-    std::vector<Flat> flats;  ///< strictly between z_bottom and z_top
-    ProgressPart* progress =
-        nullptr;             ///< told how far the paths are, up to kPathsShare; the rest is the caller's
-    std::vector<Flat> feet;  ///< on which walls of this layer may stand: `flats` and those just below
-    double most_minutes = std::numeric_limits<double>::infinity();  ///< when its programs so far take longer
-                                                                    ///< than this, the layer is given up
-    double last_steps =
-        0;  ///< mm that the last two levels of roughing may go down, for the wood's sake; 0: any step
-    Spares<StockMemory>* stock_memory =
-        nullptr;  ///< which layers leave to each other; null: this one has its own
-};
 
 struct LayerResult {
     std::vector<Operation> operations;  ///< in the order of execution

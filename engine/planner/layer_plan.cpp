@@ -255,17 +255,6 @@ private:
 
 }  // namespace
 
-Overrun overrun_of(const Job& job) {
-    Overrun overrun{fixed_tools(job).finish.diameter / 2, 0};
-    if (selects_tools(job))
-        for (const Tool& tool : job.tools)
-            if (tool.kind == ToolKind::ball) overrun.below = std::max(overrun.below, tool.diameter / 2);
-    const Machine& machine = job.machine;
-    overrun.board = std::min(machine.base_board_cut >= 0 ? machine.base_board_cut : overrun.below,
-                             machine.base_board_thickness);
-    return overrun;
-}
-
 PlannedLayer plan_layer(Context& context, const LayerGround& ground, std::size_t index,
                         ProgressPart& progress) {
     return LayerPlanner(context, ground, index, progress).run();

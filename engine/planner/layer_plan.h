@@ -11,13 +11,6 @@
 
 namespace slabwright {
 
-/// How far below a layer's bottom its cutters may reach, mm.
-struct Overrun {
-    double below = 0;  ///< into the layer below, whichever finish tool is chosen
-    double board = 0;  ///< into the base board, under the first layer
-};
-[[nodiscard]] Overrun overrun_of(const Job& job);
-
 /// What a layer's planning looks at besides the layer. All outlives it.
 struct LayerGround {
     const Plan& plan;  ///< its job, stock, features and flask; of its layers only the one that is planned

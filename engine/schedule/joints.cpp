@@ -8,7 +8,7 @@
 
 #include "engine/flask/flask.h"
 #include "engine/layers/layers.h"
-#include "engine/moves/path_builder.h"
+#include "engine/moves/thinning.h"
 #include "engine/stock/loose.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/parallel/parallel.h"

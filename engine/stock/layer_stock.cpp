@@ -201,13 +201,13 @@ double cell_for(double finest, double cusp, double plane) {
 
 }  // namespace
 
-double stock_cell(const LayerCut& cut) {
-    double finest = cut.layer.tools.finish.diameter;
-    for (const Tool& tool : cut.layer.tools.rest)
+double stock_cell(const LayerJob& layer) {
+    double finest = layer.tools.finish.diameter;
+    for (const Tool& tool : layer.tools.rest)
         if (tool.kind == ToolKind::ball) finest = std::min(finest, tool.diameter);
-    const double width = cut.layer.stock_max[0] - cut.layer.stock_min[0],
-                 depth = cut.layer.stock_max[1] - cut.layer.stock_min[1];
-    return cell_for(finest, cut.job.tolerances.cusp, width * depth);
+    const double width = layer.stock_max[0] - layer.stock_min[0],
+                 depth = layer.stock_max[1] - layer.stock_min[1];
+    return cell_for(finest, layer.job->tolerances.cusp, width * depth);
 }
 
 std::uint64_t LayerStock::bytes(const Job& job, double plane_mm2) {
@@ -223,13 +223,14 @@ CutterEnd cutter_end(const Tool& tool) {
             0};
 }
 
-LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory)
-    : z_bottom_(cut.layer.z_bottom), memory_(std::move(memory)) {
-    const auto &lo = cut.layer.stock_min, &hi = cut.layer.stock_max;
+LayerStock::LayerStock(Context& context, const LayerJob& layer, const LayerSolid& solid, double cell,
+                       StockMemory memory)
+    : z_bottom_(layer.z_bottom), z_top_(layer.z_top), memory_(std::move(memory)) {
+    const auto &lo = layer.stock_min, &hi = layer.stock_max;
     grid_ = {lo[0] + cell / 2, lo[1] + cell / 2, cell,
              std::max(1, static_cast<int>(std::ceil((hi[0] - lo[0]) / cell - 0.5))),
              std::max(1, static_cast<int>(std::ceil((hi[1] - lo[1]) / cell - 0.5)))};
-    const double top = cut.layer.z_top - z_bottom_;
+    const double top = layer.z_top - z_bottom_;
     // Cleared first, so that nothing is copied where there must be more room.
     memory_.height.clear(), memory_.height.resize(grid_.count());
     memory_.surface.clear(), memory_.surface.resize(grid_.count());
@@ -246,27 +247,27 @@ LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory)
     std::vector<std::uint32_t> starts(static_cast<std::size_t>(bands) + 1, 0), members;
     auto rows = [&](const SolidFacet& f) { return std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]}); };
     auto matters = [&](const SolidFacet& f) { return f.normal[2] > 0 && f.z_max > z_bottom_; };
-    for (const SolidFacet& f : cut.solid.facets)
+    for (const SolidFacet& f : solid.facets)
         if (matters(f))
             for (int b = band_of(rows(f).first); b <= band_of(rows(f).second); ++b)
                 ++starts[static_cast<std::size_t>(b) + 1];
     for (std::size_t b = 1; b < starts.size(); ++b) starts[b] += starts[b - 1];
     members.resize(starts.back());
     std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
-    for (std::size_t i = 0; i < cut.solid.facets.size(); ++i)
-        if (matters(cut.solid.facets[i]))
-            for (int b = band_of(rows(cut.solid.facets[i]).first);
-                 b <= band_of(rows(cut.solid.facets[i]).second); ++b)
+    for (std::size_t i = 0; i < solid.facets.size(); ++i)
+        if (matters(solid.facets[i]))
+            for (int b = band_of(rows(solid.facets[i]).first); b <= band_of(rows(solid.facets[i]).second);
+                 ++b)
                 members[next[static_cast<std::size_t>(b)]++] = static_cast<std::uint32_t>(i);
-    const std::vector<std::vector<Span>> capped = line_spans(cut.solid.cap, rows_of(grid_));
-    parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
+    const std::vector<std::vector<Span>> capped = line_spans(solid.cap, rows_of(grid_));
+    parallel_each(context, static_cast<std::size_t>(bands), [&](std::size_t band) {
         const int first = static_cast<int>(band) * kBand, last = std::min(first + kBand, grid_.ny) - 1;
         const std::size_t begin = grid_.index(0, first), cells = grid_.index(0, last + 1) - begin;
         std::fill_n(memory_.height.data() + begin, cells, static_cast<float>(top));
         std::fill_n(surface + begin, cells, 0.0F);
         std::fill_n(nz + begin, cells, std::uint8_t{255});
         for (std::uint32_t m = starts[band]; m < starts[band + 1]; ++m) {
-            const SolidFacet& f = cut.solid.facets[members[m]];
+            const SolidFacet& f = solid.facets[members[m]];
             const auto [y_low, y_high] = rows(f);
             const int j0 = std::max(first, static_cast<int>(std::ceil((y_low - grid_.y0) / cell)));
             const int j1 = std::min(last, static_cast<int>(std::floor((y_high - grid_.y0) / cell)));
@@ -304,10 +305,10 @@ LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory)
                     surface[grid_.index(i, j)] = static_cast<float>(top), nz[grid_.index(i, j)] = 255;
             }
     });
-    if (cut.layer.opening.empty()) return;
+    if (layer.opening.empty()) return;
     // The flask is to stay, so nothing is left over on it; nor is what roughing keeps off its wall.
     constexpr double beside = 0.1;  // mm
-    const Loops opening = offset(cut.layer.opening, -beside, 0.01);
+    const Loops opening = offset(layer.opening, -beside, 0.01);
     const std::vector<std::vector<Span>> open = line_spans(opening, rows_of(grid_));
     for (int j = 0; j < grid_.ny; ++j) {
         std::vector<char> free(static_cast<std::size_t>(grid_.nx), 0);
@@ -321,11 +322,11 @@ LayerStock::LayerStock(const LayerCut& cut, double cell, StockMemory memory)
     }
 }
 
-Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Tool& tool) {
+Taken LayerStock::cut(Context& context, const Operation& operation, const Tool& tool) {
     const std::vector<Move>& moves = operation.moves;
     if (moves.size() < 2) return {};
     const CutterEnd end = cutter_end(tool);
-    const double r = end.radius, top = cut.layer.z_top, cell_mm2 = grid_.cell * grid_.cell;
+    const double r = end.radius, top = z_top_, cell_mm2 = grid_.cell * grid_.cell;
     auto over_bottom = [&](const Move& m) {
         return std::array<double, 3>{to_mm(m.x), to_mm(m.y), to_mm(m.z) - z_bottom_};
     };
@@ -344,7 +345,7 @@ Taken LayerStock::cut(const LayerCut& cut, const Operation& operation, const Too
     const int bands = (grid_.ny + kBand - 1) / kBand;
     std::vector<Taken> taken(static_cast<std::size_t>(bands));
     if (trial_ != nullptr) trial_->kept_.make_room();
-    parallel_each(cut.context, static_cast<std::size_t>(bands), [&](std::size_t band) {
+    parallel_each(context, static_cast<std::size_t>(bands), [&](std::size_t band) {
         const int first = static_cast<int>(band) * kBand, rows = std::min(kBand, grid_.ny - first);
         const CellGrid part{grid_.x0, grid_.y(first), grid_.cell, grid_.nx, rows};
         const double y0 = part.y0 - r, y1 = part.y(rows - 1) + r;

@@ -9,8 +9,10 @@
 #include <span>
 #include <vector>
 
-#include "engine/paths/runs/layer_cut.h"
+#include "engine/layer_job.h"
+#include "kernels/cutting/layer_solid.h"
 #include "kernels/mesh/bulk_memory.h"
+#include "kernels/parallel/context.h"
 #include "kernels/parallel/spares.h"
 #include "kernels/stock/sweep.h"
 
@@ -94,14 +96,15 @@ private:
 /// that is left to do.
 class LayerStock {
 public:
-    /// The faced slab, `cell` mm fine, and the solid's upper surface over the same cells.
-    LayerStock(const LayerCut& cut, double cell, StockMemory memory = {});
+    /// The faced slab, `cell` mm fine, and the upper surface of the layer's solid over the same cells.
+    LayerStock(Context& context, const LayerJob& layer, const LayerSolid& solid, double cell,
+               StockMemory memory = {});
     /// What it was kept in.
     [[nodiscard]] StockMemory release() && { return std::move(memory_); }
 
     /// Takes away what the operation's feed moves meet, all of them straight (arcs are fitted when a layer is
     /// planned). Rows in parallel.
-    Taken cut(const LayerCut& cut, const Operation& operation, const Tool& tool);
+    Taken cut(Context& context, const Operation& operation, const Tool& tool);
     /// Takes away what one place of a cutter covers.
     void cut_at(const CutterEnd& end, double x, double y, double tip_z);
     /// Takes away what a cutter covers whose tip goes straight between two places, mm.
@@ -174,7 +177,7 @@ private:
     static constexpr int kWord = 64;  // cells that are asked together
 
     CellGrid grid_;
-    double z_bottom_ = 0;
+    double z_bottom_ = 0, z_top_ = 0;
     StockMemory memory_;
     std::size_t words_ = 0;  // of a row
     mutable std::vector<float>
@@ -185,7 +188,7 @@ private:
 /// Cells that resolve what passes of the layer's finest ball leave: a quarter of their distance, coarser
 /// where the layer would take more than kStockCells of them.
 inline constexpr double kStockCells = 8e6;
-[[nodiscard]] double stock_cell(const LayerCut& cut);
+[[nodiscard]] double stock_cell(const LayerJob& layer);
 
 [[nodiscard]] CutterEnd cutter_end(const Tool& tool);
 

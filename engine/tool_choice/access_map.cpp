@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <set>
 
-#include "engine/planner/layer_plan.h"
 #include "engine/tool_choice/reach_ratio.h"
 
 namespace slabwright {

@@ -385,6 +385,17 @@ bool selects_tools(const Job& job) {
            (falling(job, ToolKind::flat).size() > 1 || falling(job, ToolKind::ball).size() > 1);
 }
 
+Overrun overrun_of(const Job& job) {
+    Overrun overrun{fixed_tools(job).finish.diameter / 2, 0};
+    if (selects_tools(job))
+        for (const Tool& tool : job.tools)
+            if (tool.kind == ToolKind::ball) overrun.below = std::max(overrun.below, tool.diameter / 2);
+    const Machine& machine = job.machine;
+    overrun.board = std::min(machine.base_board_cut >= 0 ? machine.base_board_cut : overrun.below,
+                             machine.base_board_thickness);
+    return overrun;
+}
+
 std::optional<Tool> next_wider_ball(const Job& job, const Tool& finish) {
     std::optional<Tool> wider;
     for (const Tool& ball : falling(job, ToolKind::ball))

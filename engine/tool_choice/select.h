@@ -4,7 +4,8 @@
 #include <functional>
 #include <optional>
 
-#include "engine/paths/paths.h"
+#include "engine/layer_job.h"
+#include "kernels/parallel/context.h"
 
 namespace slabwright {
 
@@ -22,6 +23,13 @@ struct ToolChoice {
 /// Whether the job's library leaves anything to choose: two flats or two balls, and not the fixed set by
 /// order.
 [[nodiscard]] bool selects_tools(const Job& job);
+
+/// How far below a layer's bottom its cutters may reach, mm.
+struct Overrun {
+    double below = 0;  ///< into the layer below, whichever finish tool is chosen
+    double board = 0;  ///< into the base board, under the first layer
+};
+[[nodiscard]] Overrun overrun_of(const Job& job);
 
 /// LUO's four steps: the largest ball whose AR is at least the threshold, else the smallest; one flat where
 /// every wall is upright; the largest flat that leaves no semi-rough area at some stepdown of its range, and

@@ -12,7 +12,8 @@ int main(int argc, char** argv) {
         if (plan.layers.empty()) return 1;
         double below = 0;
         for (const slabwright::Layer& layer : plan.layers) {
-            if (layer.z_bottom != below || layer.z_top <= layer.z_bottom || layer.operations.empty()) return 1;
+            if (layer.z_bottom != below || layer.z_top <= layer.z_bottom || layer.operations.empty())
+                return 1;
             below = layer.z_top;
         }
         if (below < 49.99 || below > 50.01) return 1;

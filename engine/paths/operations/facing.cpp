@@ -1,5 +1,7 @@
 // Face milling: from the bonded slab down to the layer's top, in rectangles from outside in, clockwise, so
 // that the cutter always climbs and never lifts an edge that hangs over.
+#include "engine/paths/operations/facing.h"
+
 #include <algorithm>
 #include <cmath>
 

@@ -1,10 +1,15 @@
 // Finishing of up-facing flats by the flat end mill: roughing left its allowance on them.
+#include "engine/paths/operations/floors.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "engine/moves/order.h"
 #include "engine/paths/runs/feet.h"
 #include "engine/paths/runs/layer_cut.h"
+#include "engine/paths/runs/leads.h"
+#include "engine/paths/runs/tolerances.h"
+#include "engine/paths/runs/zigzag.h"
 
 namespace slabwright {
 

@@ -1,5 +1,7 @@
 // Finishing by level contours: the ball end mill on slopes of 45° and more, the flat end mill on vertical
 // walls. Of every contour only the stretches are cut whose contact lies on such a surface, within the layer.
+#include "engine/paths/operations/levels.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -7,9 +9,11 @@
 
 #include <fmt/format.h>
 
+#include "engine/paths/operations/finish_slopes.h"
 #include "engine/paths/runs/feet.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "engine/paths/runs/level_runs.h"
+#include "engine/paths/runs/tolerances.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"
 

@@ -1,13 +1,17 @@
 // Finishing by projected offsets (SHAPING 3): the border of what is to be finished is offset inwards again
 // and again by one step-over, and the ball is dropped on the surface along these curves.
+#include "engine/paths/operations/offsets.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
 
+#include "engine/paths/operations/finish_slopes.h"
 #include "engine/paths/runs/chains.h"
 #include "engine/paths/runs/layer_cut.h"
+#include "engine/paths/runs/tolerances.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"
 

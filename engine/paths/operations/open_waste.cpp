@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/paths/operations/facing.h"
 #include "engine/paths/runs/kept_off.h"
 
 namespace slabwright {

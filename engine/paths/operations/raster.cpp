@@ -1,6 +1,8 @@
 // Finishing by a projected raster: the ball is dropped on the surface along parallel lines wherever its
 // contact lies on a slope under 45°. The step-over is chosen for every pass from the slopes under it (FINISH
 // eq. 9).
+#include "engine/paths/operations/raster.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,9 +13,11 @@
 
 #include <fmt/format.h>
 
+#include "engine/paths/operations/finish_slopes.h"
 #include "engine/paths/runs/chains.h"
 #include "engine/paths/runs/feet.h"
 #include "engine/paths/runs/layer_cut.h"
+#include "engine/paths/runs/tolerances.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"
 

@@ -14,9 +14,12 @@
 #include <numeric>
 #include <optional>
 
+#include "engine/paths/operations/finish_slopes.h"
+#include "engine/paths/operations/roughing.h"
 #include "engine/paths/operations/semi_rough.h"
 #include "engine/paths/runs/chains.h"
 #include "engine/paths/runs/rings.h"
+#include "engine/paths/runs/tolerances.h"
 #include "kernels/cutting/drop.h"
 #include "kernels/parallel/parallel.h"
 
@@ -267,7 +270,7 @@ public:
         op.stepover = to_mm(spacing_);
         op.stepdown = pass_.in_steps ? tool_.stepdown_max : 0;
         emit(op, runs);
-        const Taken taken = stock_.cut(cut_, op, tool_);
+        const Taken taken = stock_.cut(cut_.context, op, tool_);
         if (taken.nothing()) op.moves.clear();
         return op;
     }

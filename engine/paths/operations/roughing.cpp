@@ -4,6 +4,8 @@
 // lies under it, so it goes in rings that leave what hangs over held to the end. What lies open goes to the
 // face mill (open_waste.h). Where a cutter meets more of its breadth than the job allows, the feed is lowered
 // (engagement.h).
+#include "engine/paths/operations/roughing.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -14,6 +16,8 @@
 #include "engine/paths/runs/kept_off.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "engine/paths/runs/rings.h"
+#include "engine/paths/runs/tolerances.h"
+#include "engine/paths/runs/zigzag.h"
 #include "engine/stock/engagement.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/parallel/parallel.h"

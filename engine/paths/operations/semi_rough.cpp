@@ -8,8 +8,10 @@
 #include <optional>
 #include <span>
 
+#include "engine/paths/operations/roughing.h"
 #include "engine/paths/runs/feet.h"
 #include "engine/paths/runs/rings.h"
+#include "engine/paths/runs/tolerances.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -367,7 +369,7 @@ public:
         }
         emit(op, runs);
         rings.undo();
-        if (stock_.cut(cut_, op, tool_).nothing()) op.moves.clear();
+        if (stock_.cut(cut_.context, op, tool_).nothing()) op.moves.clear();
         return op;
     }
 

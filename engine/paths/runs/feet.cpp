@@ -1,4 +1,5 @@
 #include "engine/paths/runs/feet.h"
+#include "engine/paths/runs/tolerances.h"
 
 #include <algorithm>
 #include <array>

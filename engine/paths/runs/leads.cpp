@@ -1,4 +1,6 @@
 // Into a finish cut and out of it on arcs that touch the run.
+#include "engine/paths/runs/leads.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>

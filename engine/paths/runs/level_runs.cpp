@@ -5,6 +5,8 @@
 #include <tuple>
 
 #include "engine/moves/order.h"
+#include "engine/paths/runs/leads.h"
+#include "engine/paths/runs/tolerances.h"
 
 namespace slabwright {
 

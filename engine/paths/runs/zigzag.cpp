@@ -1,4 +1,6 @@
 // Zigzag clearing of free stretches on parallel lines.
+#include "engine/paths/runs/zigzag.h"
+
 #include <algorithm>
 #include <cmath>
 
