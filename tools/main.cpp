@@ -1,4 +1,4 @@
-// The `slabwright` command: plan, verify, report, inspect, repair, slice, job. Errors are one line on stderr,
+// The `slabwright` command: plan, verify, report, inspect, repair, slice, bond, job. Errors are one line on stderr,
 // their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
@@ -25,6 +25,7 @@
 #include "io/write/output_folder.h"
 #include "io/write/plan_json.h"
 #include "tools/allocator.h"
+#include "tools/bond_command.h"
 
 namespace {
 
@@ -521,6 +522,9 @@ int main(int argc, char** argv) {
     slice_command->add_option("-o,--out", options.out, "drawing: .svg, .dxf or .json")->required();
     add_common(*slice_command, options);
 
+    BondOptions bond_options;
+    CLI::App* bond_command = add_bond_command(app, bond_options);
+
     CLI::App* job_command = app.add_subcommand("job", "job files");
     job_command->add_flag("--defaults", options.defaults, "print every key with its default and a comment")
         ->required();
@@ -552,13 +556,14 @@ int main(int argc, char** argv) {
         else if (*inspect_command) run_inspect(options);
         else if (*repair_command) run_repair(options);
         else if (*slice_command) run_slice(options);
+        else if (*bond_command) print(run_bond(bond_options));
         else print(default_job_toml(options.library.empty() ? "default" : options.library));
         return 0;
     } catch (const Error& error) {
-        return complain(error, options.json);
+        return complain(error, options.json || bond_options.json);
     } catch (const std::exception& error) {
         return complain(
             Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"),
-            options.json);
+            options.json || bond_options.json);
     }
 }
