@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "io/input_file.h"
+#include "io/read/input_file.h"
 
 namespace slabwright {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/json_text.h"
+#include "io/text/json_text.h"
 
 namespace slabwright {
 
