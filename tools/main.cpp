@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, report, inspect, repair, slice, bond, job. Errors are one line on stderr,
-// their kind is the exit code.
+// The `slabwright` command: plan, verify, report, inspect, repair, slice, bond, job. Errors are one line on
+// stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -14,6 +14,7 @@
 #include <cstring>
 #include <iostream>
 #include <map>
+#include <new>
 #include <string>
 #include <string_view>
 
@@ -433,9 +434,8 @@ void add_common(CLI::App& command, Options& options) {
         ->check(CLI::IsMember({"none", "mend", "rebuild"}));
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+/// Reads the command line and does what it asks for. @return the exit code
+int command(int argc, char** argv) {
 #if defined(__x86_64__) && defined(__AVX2__)
     if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("bmi2")) {
         std::fputs(
@@ -565,5 +565,17 @@ int main(int argc, char** argv) {
         return complain(
             Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"),
             options.json || bond_options.json);
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return command(argc, argv);
+    } catch (const std::bad_alloc&) {  // even before the command line was read
+        std::fputs("slabwright: there is not enough memory to begin; free some, or raise the limit\n",
+                   stderr);
+        return static_cast<int>(ErrorKind::no_plan);
     }
 }
