@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "kernels/access/accessibility.h"
-#include "kernels/access/triangle.h"
+#include "kernels/geometry/triangle.h"
 #include "kernels/mesh/morton.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"

@@ -17,6 +17,7 @@
 
 #include "kernels/forces/forces.h"
 #include "kernels/forces/turn.h"
+#include "kernels/geometry/wide.h"
 #include "kernels/parallel/parallel.h"
 
 namespace {

@@ -10,6 +10,7 @@
 #include "engine/simulate/simulate.h"
 #include "io/posts/gcode_reader.h"
 #include "io/posts/gcode_writer.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
 
@@ -46,7 +47,7 @@ const Planned& planned(int size_mm) {
     in.mesh = made.mesh.view();
     in.tools = job.tools;
     in.machine = job.machine;
-    double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
+    double low[2] = {kUnbounded, kUnbounded}, high[2] = {-kUnbounded, -kUnbounded};
     for (const Vec3f& v : made.mesh.vertices) {
         low[0] = std::min<double>(low[0], v.x), high[0] = std::max<double>(high[0], v.x);
         low[1] = std::min<double>(low[1], v.y), high[1] = std::max<double>(high[1], v.y);

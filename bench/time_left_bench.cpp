@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "io/slabwright.h"
+#include "kernels/geometry/vectors.h"
 #include "tests/data/models.h"
 
 namespace slabwright {
@@ -53,7 +54,7 @@ double processor_seconds() {
 /// The time left that was foretold over the time that it took. By the clock it is what a user sees; by the
 /// processor time of all threads it does not depend on what else the machine does.
 struct Foretold {
-    double least = 1e300, most = 0;
+    double least = kUnbounded, most = 0;
     double left_when_wrong =
         0;  ///< the share of all time that was left when it was first wrong by more than a factor of two
 

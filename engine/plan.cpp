@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "kernels/geometry/vectors.h"
+
 namespace slabwright {
 
 std::string_view name(Severity severity) {
@@ -41,7 +43,7 @@ std::string_view name(OperationKind kind) {
 double ArcShape::length() const { return radius * std::abs(sweep); }
 
 std::array<double, 4> ArcShape::box() const {
-    std::array<double, 4> box{1e300, 1e300, -1e300, -1e300};
+    std::array<double, 4> box{kUnbounded, kUnbounded, -kUnbounded, -kUnbounded};
     auto take = [&](double angle) {
         const double px = x + radius * std::cos(angle), py = y + radius * std::sin(angle);
         box = {std::min(box[0], px), std::min(box[1], py), std::max(box[2], px), std::max(box[3], py)};

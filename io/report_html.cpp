@@ -27,6 +27,7 @@
 #include "io/write/thinned_path.h"
 #include "kernels/access/deviation.h"
 #include "kernels/errors.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/mesh/decimate.h"
 #include "kernels/mesh/slopes.h"
 #include "kernels/parallel/parallel.h"
@@ -265,7 +266,7 @@ Json silhouette(std::span<const Section> sections, bool along_y) {
     for (const Section& section : sections) {
         std::vector<std::pair<double, double>> spans;
         for (std::size_t i = 0; i < section.loops.size(); ++i) {
-            double low = 1e300, high = -1e300;
+            double low = kUnbounded, high = -kUnbounded;
             for (const Point2 p : section.loops.loop(i)) {
                 const double v = to_mm(along_y ? p.x : p.y);
                 low = std::min(low, v), high = std::max(high, v);
@@ -471,7 +472,7 @@ ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder&
     const auto reach_of = [&](std::size_t l) {
         const SimulatedLayer& layer = input.layers[l];
         return std::make_unique<Reach>(part, input.tools, layer.z_bottom, layer.z_top,
-                                       l == 0 ? layer.z_bottom - board : -1e300);
+                                       l == 0 ? layer.z_bottom - board : -kUnbounded);
     };
 
     struct Side {
@@ -595,7 +596,7 @@ Json paths_json(Context& context, DrawnPaths& drawn, const PlanFolder& folder, s
     const auto shown = [&](std::size_t i) {
         return left_out[i] ? std::span<const ReplayPoint>() : std::span<const ReplayPoint>(drawn.paths[i]);
     };
-    double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
+    double low[3] = {kUnbounded, kUnbounded, kUnbounded}, high[3] = {-kUnbounded, -kUnbounded, -kUnbounded};
     for (std::size_t i = 0; i < sizes.size(); ++i)
         for (const ReplayPoint& p : shown(i)) {
             const double at[3] = {p.x, p.y, p.z};

@@ -25,6 +25,8 @@
 #include <iterator>
 #include <vector>
 
+#include "kernels/geometry/vectors.h"
+
 namespace {
 
 using Kernel = CGAL::Simple_cartesian<double>;
@@ -81,7 +83,7 @@ int main(int argc, char** argv) {
                 static_cast<std::size_t>(num_vertices(mesh)), seconds() - begin);
     if (planes == 0) return 0;
 
-    double low = 1e300, high = -1e300;
+    double low = kUnbounded, high = -kUnbounded;
     for (const auto v : mesh.vertices()) {
         low = std::min(low, mesh.point(v).z());
         high = std::max(high, mesh.point(v).z());

@@ -8,6 +8,7 @@
 
 #include "engine/moves/thinning.h"
 #include "kernels/errors.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/polygons/hull.h"
 #include "kernels/slicing/silhouette.h"
 
@@ -55,7 +56,7 @@ Flask place_flask(Context& context, MeshView mesh, const Plan& plan) {
         high{to_units(plan.stock_max[0]), to_units(plan.stock_max[1])};
     flask.outer.points = {low, {high.x, low.y}, high, {low.x, high.y}};
     flask.outer.close_loop();
-    flask.wall_mm = 1e300;
+    flask.wall_mm = kUnbounded;
     for (const Layer& layer : plan.layers) {
         const double wider = layer.z_bottom * slope(shape);
         flask.inner.push_back(wider > 1e-4 ? filled(offset(opening, wider, kArc)) : opening);

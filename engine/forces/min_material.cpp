@@ -9,6 +9,7 @@
 #include "engine/forces/cuts.h"
 #include "engine/tools/tools.h"
 #include "kernels/forces/deflection.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/loops.h"
 #include "kernels/slicing/slicing.h"
@@ -46,7 +47,7 @@ void distances(std::vector<double>& f, std::vector<double>& scratch, std::vector
     int k = -1;
     for (int q = 0; q < n; ++q) {
         if (scratch[static_cast<std::size_t>(q)] >= 1e18) continue;
-        double s = -1e300;
+        double s = -kUnbounded;
         while (k >= 0) {
             const int v = roots[static_cast<std::size_t>(k)];
             s = ((scratch[static_cast<std::size_t>(q)] + double{1} * q * q) -
@@ -54,7 +55,7 @@ void distances(std::vector<double>& f, std::vector<double>& scratch, std::vector
                 (2.0 * (q - v));
             if (s > bounds[static_cast<std::size_t>(k)]) break;
             --k;
-            s = -1e300;
+            s = -kUnbounded;
         }
         ++k;
         roots[static_cast<std::size_t>(k)] = q;

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "engine/moves/thinning.h"
+#include "kernels/geometry/vectors.h"
 
 namespace slabwright {
 
@@ -18,16 +19,6 @@ struct Centre {
     std::int32_t i = 0, j = 0;
 };
 
-struct Vector {
-    double x = 0, y = 0;
-    friend Vector operator-(Vector a, Vector b) { return {a.x - b.x, a.y - b.y}; }
-};
-double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y; }
-double cross(Vector a, Vector b) { return a.x * b.y - a.y * b.x; }
-double length(Vector a) {
-    return std::sqrt(dot(a, a));
-}  // of whole numbers of 0.1 µm: their squares add up exactly
-
 /// The arc through the first and the last point that lies within the tolerance of all chords between, if
 /// there is one. Its centre lies on the chord's bisector at the height h that is best in the least squares of
 /// |q − c|² − r², taken along the chords (Simpson's rule); that is linear in h: with q from the chord's
@@ -35,16 +26,16 @@ double length(Vector a) {
 std::optional<Centre> arc_through(std::span<const PathPoint> line, const ArcFit& fit) {
     const PathPoint &first = line.front(), &last = line.back();
     auto from_first = [&](const PathPoint& p) {
-        return Vector{static_cast<double>(p.x) - first.x, static_cast<double>(p.y) - first.y};
+        return Vec2d{static_cast<double>(p.x) - first.x, static_cast<double>(p.y) - first.y};
     };
-    const Vector end = from_first(last), middle{end.x / 2, end.y / 2};
+    const Vec2d end = from_first(last), middle{end.x / 2, end.y / 2};
     const double chord = length(end);
     if (chord == 0) return std::nullopt;
-    const Vector normal{-end.y / chord, end.x / chord};
+    const Vec2d normal{-end.y / chord, end.x / chord};
     double ww = 0, wb = 0;
     for (std::size_t m = 1; m < line.size(); ++m) {
-        const Vector a = from_first(line[m - 1]) - middle, b = from_first(line[m]) - middle,
-                     half{(a.x + b.x) / 2, (a.y + b.y) / 2};
+        const Vec2d a = from_first(line[m - 1]) - middle, b = from_first(line[m]) - middle,
+                    half{(a.x + b.x) / 2, (a.y + b.y) / 2};
         const double share = length(b - a);
         for (const auto& [q, simpson] : {std::pair{a, 1.0}, {half, 4.0}, {b, 1.0}}) {
             const double w = 2 * dot(normal, q);
@@ -58,7 +49,7 @@ std::optional<Centre> arc_through(std::span<const PathPoint> line, const ArcFit&
     const Centre centre{static_cast<std::int32_t>(std::lround(middle.x + h * normal.x)),
                         static_cast<std::int32_t>(std::lround(middle.y + h * normal.y))};
 
-    const Vector c{static_cast<double>(centre.i), static_cast<double>(centre.j)}, begin{-c.x, -c.y};
+    const Vec2d c{static_cast<double>(centre.i), static_cast<double>(centre.j)}, begin{-c.x, -c.y};
     const double radius = length(begin), slack = fit.tolerance - std::abs(length(end - c) - radius);
     const double turn = cross(end, c) > 0 ? 1 : -1;
     const double sweep = std::atan2(turn * cross(begin, end - c), dot(begin, end - c));
@@ -67,9 +58,9 @@ std::optional<Centre> arc_through(std::span<const PathPoint> line, const ArcFit&
     // Each chord goes on round the centre and the whole stays under half a turn, so arc and chords can be
     // compared angle by angle; a chord is farthest from the centre at an end, nearest at the foot of the
     // perpendicular or at an end.
-    Vector before = begin;
+    Vec2d before = begin;
     for (std::size_t m = 1; m < line.size(); ++m) {
-        const Vector p = from_first(line[m]) - c, way = p - before;
+        const Vec2d p = from_first(line[m]) - c, way = p - before;
         if (turn * cross(before, p) <= 0 || turn * cross(begin, p) <= 0) return std::nullopt;
         double nearest = length(p);
         if (std::abs(nearest - radius) > slack) return std::nullopt;

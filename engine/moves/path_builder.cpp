@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "engine/moves/motion_time.h"
+#include "kernels/geometry/vectors.h"
 
 namespace slabwright {
 
@@ -349,7 +350,7 @@ bool PathBuilder::enter_on_ramp(std::span<const PathPoint> run) {
 std::optional<Point2> PathBuilder::place_beside(const PathPoint& first) {
     if (around_.part == nullptr) return std::nullopt;
     std::optional<Point2> best;
-    double least = 1e300;
+    double least = kUnbounded;
     for (int ring = 1; ring <= kSideRings && !best; ++ring)
         for (int k = 0; k < kSideWays; ++k) {
             const double turn = 2 * std::numbers::pi * k / kSideWays,

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "engine/flask/flask.h"
+#include "kernels/geometry/vectors.h"
 
 namespace slabwright {
 
@@ -63,7 +64,7 @@ void check_travel(const Plan& plan) {
                  cy = 0.5 * (plan.stock_min[1] + plan.stock_max[1]);
     for (const Layer& layer : plan.layers)
         for (const Operation& op : layer.operations) {
-            double over_x = 0, over_y = 0, low = 1e300, high = -1e300;
+            double over_x = 0, over_y = 0, low = kUnbounded, high = -kUnbounded;
             auto reach = [&](double x, double y) {
                 over_x = std::max(over_x, std::abs(x - cx) - machine.travel_x / 2);
                 over_y = std::max(over_y, std::abs(y - cy) - machine.travel_y / 2);

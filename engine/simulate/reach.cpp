@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "kernels/geometry/wide.h"
+
 namespace slabwright {
 
 namespace {
@@ -18,7 +20,6 @@ constexpr int kRounds = 30;                 // of settling
 constexpr double kStuck = 0.99;             // of the round before: settling has ended
 constexpr std::size_t kMostPatches = 20000;  // of one tool and point; a dozen to some hundreds are usual
 
-double length(const Point3& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 /// All places of a tool that may be worth trying for one point: for a ball its centre on the upper half
 /// sphere about the point (lower ones are more in the way, higher ones do not cover it); for a flat end mill
@@ -36,18 +37,19 @@ struct Patch {
 class Near {
 public:
     void add(const Point3& q) {
-        if (count_ % kLanes == 0) groups_.push_back({Doubles{} + kFar, Doubles{} + kFar, Doubles{} + kFar});
+        if (count_ % kLanes == 0)
+            groups_.push_back({Doubles4{} + kFar, Doubles4{} + kFar, Doubles4{} + kFar});
         for (int k = 0; k < 3; ++k) groups_[count_ / kLanes][k][count_ % kLanes] = q[k];
         ++count_;
     }
     /// mm²; what lies higher than a ball's centre counts as even with it, and all counts so for a flat end
     /// mill.
     [[nodiscard]] double distance2(const Point3& c, bool ball) const {
-        Doubles least = Doubles{} + std::numeric_limits<double>::infinity();
+        Doubles4 least = Doubles4{} + std::numeric_limits<double>::infinity();
         for (const auto& [x, y, z] : groups_) {
-            const Doubles dx = c[0] - x, dy = c[1] - y, below = c[2] - z,
-                          dz = ball ? (below > 0.0 ? below : Doubles{}) : Doubles{};
-            const Doubles d2 = dx * dx + dy * dy + dz * dz;
+            const Doubles4 dx = c[0] - x, dy = c[1] - y, below = c[2] - z,
+                           dz = ball ? (below > 0.0 ? below : Doubles4{}) : Doubles4{};
+            const Doubles4 d2 = dx * dx + dy * dy + dz * dz;
             least = d2 < least ? d2 : least;
         }
         return std::min(std::min(least[0], least[1]), std::min(least[2], least[3]));
@@ -56,8 +58,7 @@ public:
 private:
     static constexpr std::size_t kLanes = 4;
     static constexpr double kFar = 1e100;  // mm
-    using Doubles [[gnu::vector_size(kLanes * sizeof(double))]] = double;
-    std::vector<std::array<Doubles, 3>> groups_;
+    std::vector<std::array<Doubles4, 3>> groups_;
     std::size_t count_ = 0;
 };
 

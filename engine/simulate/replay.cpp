@@ -10,6 +10,7 @@
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
 #include "kernels/forces/forces.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/stock/stock.h"
 
@@ -159,7 +160,7 @@ ReplayedProgram Replay::run(const Program& program) {
             };
             chain.been = end.form == CutterEnd::Form::flat && from.z == to.z && k > 1 && disc(k - 1);
             const CutEffect effect =
-                stock.cut(end, {from.x, from.y, from.z}, {to.x, to.y, to.z}, 1e300, chain);
+                stock.cut(end, {from.x, from.y, from.z}, {to.x, to.y, to.z}, kUnbounded, chain);
             if (!(effect.removed > 0)) continue;
             Taken& piece = taken[b][piece_of(k)];
             piece.volume += effect.removed * g.cell * g.cell;

@@ -12,6 +12,8 @@
 #include "engine/simulate/reach.h"
 #include "engine/simulate/work.h"
 #include "kernels/errors.h"
+#include "kernels/geometry/vectors.h"
+#include "kernels/geometry/wide.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/stock/stock.h"
 
@@ -31,7 +33,8 @@ constexpr double kArcError = 0.001;  // mm: more than rounding may add to Progra
 
 /// The least box over some motions, widened by nothing yet.
 struct StepBox {
-    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300, z0 = 1e300, z1 = -1e300;
+    double x0 = kUnbounded, y0 = kUnbounded, x1 = -kUnbounded, y1 = -kUnbounded, z0 = kUnbounded,
+           z1 = -kUnbounded;
     void add(const ProgramStep& s) {
         x0 = std::min(x0, s.x), x1 = std::max(x1, s.x);
         y0 = std::min(y0, s.y), y1 = std::max(y1, s.y);
@@ -91,7 +94,7 @@ CutterEnd cutter_end(const Tool& tool) {
 /// What one tile contributes to a program's and a layer's findings.
 struct TileProgram {
     double removed = 0;
-    double lowest = 1e300, stock_top = -1e300;
+    double lowest = kUnbounded, stock_top = -kUnbounded;
     Extreme rapid, over_flute, deepest, shank, holder;
     std::uint32_t rapid_line = 0, over_flute_line = 0, deepest_line = 0, shank_line = 0, holder_line = 0;
     double most = 0;  // mm that any cell lost
@@ -354,7 +357,7 @@ private:
         const Program& program = input_.programs[i];
         const SimulatedLayer& layer = input_.layers[static_cast<std::size_t>(program.layer)];
         f.lowest = layer.z_top;
-        f.stock_top = -1e300;
+        f.stock_top = -kUnbounded;
         f.seconds = program_seconds(program, input_.machine, i > 0 ? &input_.programs[i - 1] : nullptr);
         StepBox box;
         for (const ProgramArc& a : program.arcs) {
@@ -550,10 +553,11 @@ private:
         // A sliver that stood between passes overloads nobody; a tenth of the cutter's disc does. Where cells
         // lie one or two abreast, along a wall, they do not tell how wide what stood there was: a micrometre
         // at the cutter's rim may hold the centres of a whole row.
-        const double deep = p.program->planned_stepdown > 0 ? p.program->planned_stepdown + kDeeper : 1e300;
+        const double deep =
+            p.program->planned_stepdown > 0 ? p.program->planned_stepdown + kDeeper : kUnbounded;
         const double wide = 0.1 * std::numbers::pi * radius * radius;
         const double shallow =
-            std::min(deep, tool.flute_length > 0 ? tool.flute_length + kStanding : 1e300) - kTaken;
+            std::min(deep, tool.flute_length > 0 ? tool.flute_length + kStanding : kUnbounded) - kTaken;
         const bool thick_shank = shank > radius && tool.flute_length > 0,
                    thick_nose = nose > radius && tool.stickout > 0;
         // Shank and holder are wider, but mostly stay above all that stands.
@@ -775,16 +779,14 @@ private:
         };
         // Most cells have nothing to tell but the square of what little is left: eight are asked at once
         // whether it is so.
-        using Floats [[gnu::vector_size(8 * sizeof(float))]] = float;
-        using Doubles [[gnu::vector_size(8 * sizeof(double))]] = double;
-        Doubles squares{};
+        Doubles8 squares{};
         const auto plain = [&] {
-            Floats height, upper;
+            Floats8 height, upper;
             std::memcpy(&height, surface.height + c, sizeof height);
             std::memcpy(&upper, envelope.data() + c, sizeof upper);
-            const Doubles z = surface.bottom + __builtin_convertvector(height, Doubles),
-                          part = __builtin_convertvector(upper, Doubles);
-            const Doubles over = z - (part < part_from ? Doubles{} + layer.z_bottom : part);
+            const Doubles8 z = surface.bottom + __builtin_convertvector(height, Doubles8),
+                           part = __builtin_convertvector(upper, Doubles8);
+            const Doubles8 over = z - (part < part_from ? Doubles8{} + layer.z_bottom : part);
             const auto more = (over < 0.0) | (over > std::min(options_.cusp, f.left.size));
             std::int64_t any = 0;
             for (int k = 0; k < 8; ++k) any |= more[k];

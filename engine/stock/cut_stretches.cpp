@@ -6,6 +6,8 @@
 #include <numbers>
 #include <optional>
 
+#include "kernels/geometry/vectors.h"
+
 namespace slabwright {
 
 namespace {
@@ -15,7 +17,7 @@ constexpr double kLeastTaken = 1e-4;  // mm: less is rounding, of paths and of h
 
 // What a stretch has met so far.
 struct Met {
-    double volume = 0, low = 1e300, high = -1e300, side = 0;
+    double volume = 0, low = kUnbounded, high = -kUnbounded, side = 0;
 };
 
 // Lowers cells, and tells the part of the way on which the cutter's edge comes to each of them, or the first

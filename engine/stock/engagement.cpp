@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "kernels/geometry/vectors.h"
+
 namespace slabwright {
 
 namespace {
@@ -122,7 +124,7 @@ void EngagedStock::cut(const std::array<double, 3>& from, const std::array<doubl
 
 void EngagedStock::change_cutter(double radius) {
     end_.radius = radius;
-    last_.fill(1e300);
+    last_.fill(kUnbounded);
 }
 
 double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& stock,

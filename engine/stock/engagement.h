@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/plan.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/context.h"
 #include "kernels/stock/sweep.h"
 
@@ -32,8 +33,9 @@ private:
     CellGrid grid_;
     CutterEnd end_;
     double top_;
-    std::vector<float> height_;                        // under the top
-    std::array<double, 3> last_{1e300, 1e300, 1e300};  // where the cutter is since the last cut
+    std::vector<float> height_;  // under the top
+    std::array<double, 3> last_{kUnbounded, kUnbounded,
+                                kUnbounded};  // where the cutter is since the last cut
 };
 
 /// What a roughing cutter may meet at the feed that its moves have.

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -18,7 +19,7 @@ constexpr std::size_t kBlock = 128;          // moves that share one box
 constexpr std::size_t kPart = 16;            // of those
 
 struct Box {
-    double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300, z0 = 1e300;
+    double x0 = kUnbounded, x1 = -kUnbounded, y0 = kUnbounded, y1 = -kUnbounded, z0 = kUnbounded;
     void add(const Move& m) {
         x0 = std::min(x0, to_mm(m.x)), x1 = std::max(x1, to_mm(m.x));
         y0 = std::min(y0, to_mm(m.y)), y1 = std::max(y1, to_mm(m.y));
@@ -211,7 +212,7 @@ double stock_cell(const LayerJob& layer) {
 }
 
 std::uint64_t LayerStock::bytes(const Job& job, double plane_mm2) {
-    double finest = 1e300;
+    double finest = kUnbounded;
     for (const Tool& tool : job.tools)
         if (tool.kind == ToolKind::ball) finest = std::min(finest, tool.diameter);
     const double cell = cell_for(finest, job.tolerances.cusp, plane_mm2);
@@ -275,7 +276,7 @@ LayerStock::LayerStock(Context& context, const LayerJob& layer, const LayerSolid
                 static_cast<std::uint8_t>(std::lround(255 * std::clamp(f.normal[2], 0.0, 1.0)));
             for (int j = j0; j <= j1; ++j) {
                 const double y = grid_.y(j);
-                double low = 1e300, high = -1e300;
+                double low = kUnbounded, high = -kUnbounded;
                 for (int k = 0; k < 3; ++k) {
                     const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
                     if ((a[1] <= y) == (b[1] <= y)) continue;

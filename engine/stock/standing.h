@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/cutting/cutter.h"
+#include "kernels/geometry/vectors.h"
 
 namespace slabwright {
 
@@ -66,7 +67,7 @@ private:
     std::vector<float> height_;
     mutable std::vector<BallTable> tables_;
     // Where a flat cutter went last, level: what it covers there is no higher.
-    std::array<double, 3> last_{1e300, 1e300, 1e300};
+    std::array<double, 3> last_{kUnbounded, kUnbounded, kUnbounded};
     double last_radius_ = 0;
 };
 

@@ -19,9 +19,10 @@
 #include "kernels/access/obstacles.h"
 #include "kernels/access/poke.h"
 #include "kernels/access/tree_memory.h"
-#include "kernels/access/triangle.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/errors.h"
+#include "kernels/geometry/triangle.h"
+#include "kernels/geometry/wide.h"
 #include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
 
@@ -48,48 +49,6 @@ constexpr unsigned kTryAgain = 16;   // every so many is tried
 constexpr std::size_t kPiecesAtOnce = 128;
 
 float up(double v) { return std::nextafter(static_cast<float>(v), std::numeric_limits<float>::infinity()); }
-
-double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-double squared_distance(const Point3& a, const Point3& b) {
-    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-    return x * x + y * y + z * z;
-}
-
-/// Square of the distance to a triangle, and its nearest point q, by the regions of its corners, edges and
-/// face.
-double squared_distance(const Point3& p, const Triangle& t, Point3& q) {
-    auto sub = [](const Point3& a, const Point3& b) { return Point3{a[0] - b[0], a[1] - b[1], a[2] - b[2]}; };
-    const Point3 ab = sub(t[1], t[0]), ac = sub(t[2], t[0]), ap = sub(p, t[0]);
-    auto from = [&](double v, double w) {
-        q = {t[0][0] + v * ab[0] + w * ac[0], t[0][1] + v * ab[1] + w * ac[1],
-             t[0][2] + v * ab[2] + w * ac[2]};
-        return squared_distance(p, q);
-    };
-    const double d1 = dot(ab, ap), d2 = dot(ac, ap);
-    if (d1 <= 0 && d2 <= 0) return from(0, 0);
-    const Point3 bp = sub(p, t[1]);
-    const double d3 = dot(ab, bp), d4 = dot(ac, bp);
-    if (d3 >= 0 && d4 <= d3) return from(1, 0);
-    const double vc = d1 * d4 - d3 * d2;
-    if (vc <= 0 && d1 >= 0 && d3 <= 0) return from(d1 / (d1 - d3), 0);
-    const Point3 cp = sub(p, t[2]);
-    const double d5 = dot(ab, cp), d6 = dot(ac, cp);
-    if (d6 >= 0 && d5 <= d6) return from(0, 1);
-    const double vb = d5 * d2 - d1 * d6;
-    if (vb <= 0 && d2 >= 0 && d6 <= 0) return from(0, d2 / (d2 - d6));
-    const double va = d3 * d6 - d5 * d4;
-    if (va <= 0 && d4 >= d3 && d5 >= d6) {
-        const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return from(1 - w, w);
-    }
-    const double all = va + vb + vc;
-    if (!(all > 0)) {  // a triangle without area
-        q = closest_on_triangle(p, t);
-        return squared_distance(p, q);
-    }
-    return from(vb / all, vc / all);
-}
 
 /// What a facet leaves below a height: none, one or two triangles.
 struct Below {
@@ -126,17 +85,15 @@ struct Counts {
     }
 };
 
-using Four [[gnu::vector_size(16)]] = float;
-
-/// Four planes of a facet, n·p + d: its own, and those upright on it through its edges, which face outward. A
-/// line of the cache says how far a place is from most facets, in single precision.
+/// Floats4 planes of a facet, n·p + d: its own, and those upright on it through its edges, which face
+/// outward. A line of the cache says how far a place is from most facets, in single precision.
 struct Planes {
-    Four x, y, z, d;
+    Floats4 x, y, z, d;
     /// Whether the square of the distance is more, as far as the planes tell: they do not where a corner is
     /// nearest, and on slivers.
     [[nodiscard]] bool farther(const Vec3f& p, float squared) const {
-        const Four at = x * p.x + y * p.y + z * p.z + d, none{}, beside = at > none ? at : none,
-                   over{at[0], at[0], at[0], at[0]};
+        const Floats4 at = x * p.x + y * p.y + z * p.z + d, none{}, beside = at > none ? at : none,
+                      over{at[0], at[0], at[0], at[0]};
         const auto lanes =
             std::bit_cast<std::array<std::uint64_t, 2>>(over * over + beside * beside > squared);
         return ((lanes[0] >> 32U) | lanes[1]) != 0;  // of the edges' planes

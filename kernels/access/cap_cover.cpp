@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "kernels/wide.h"
+#include "kernels/geometry/wide.h"
 
 namespace slabwright {
 
@@ -16,8 +16,6 @@ constexpr double kClose =
 constexpr std::size_t kAtOnce = 8;  // rows are filled up to a multiple of this, with caps of no direction
 constexpr double kNowhere = 2;      // a cosine
 constexpr double kNeither = 3;      // how deep what is no crossing counts to be
-
-double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 }  // namespace
 
@@ -48,8 +46,7 @@ SLABWRIGHT_WIDE static bool cross_circles(const Cap& own, const double* __restri
     return close > 0;
 }
 
-using Eight [[gnu::vector_size(64)]] = double;
-static_assert(sizeof(Eight) == kAtOnce * sizeof(double));
+static_assert(sizeof(Doubles8) == kAtOnce * sizeof(double));
 
 // How deep n directions are in caps. In its own two a crossing is by rounding at most, which is less than
 // what counts, unless their axes are close.
@@ -58,16 +55,16 @@ SLABWRIGHT_WIDE static void deepen(const double* __restrict x, const double* __r
                                    int n, const double* __restrict ux, const double* __restrict uy,
                                    const double* __restrict uz, double* __restrict depth) {
     for (int i = 0; i < n; i += static_cast<int>(kAtOnce)) {
-        Eight vx, vy, vz, most;
-        std::memcpy(&vx, ux + i, sizeof(Eight));
-        std::memcpy(&vy, uy + i, sizeof(Eight));
-        std::memcpy(&vz, uz + i, sizeof(Eight));
-        std::memcpy(&most, depth + i, sizeof(Eight));
+        Doubles8 vx, vy, vz, most;
+        std::memcpy(&vx, ux + i, sizeof(Doubles8));
+        std::memcpy(&vy, uy + i, sizeof(Doubles8));
+        std::memcpy(&vz, uz + i, sizeof(Doubles8));
+        std::memcpy(&most, depth + i, sizeof(Doubles8));
         for (int k = 0; k < caps; ++k) {
-            const Eight in = x[k] * vx + y[k] * vy + z[k] * vz - cosine[k];
+            const Doubles8 in = x[k] * vx + y[k] * vy + z[k] * vz - cosine[k];
             most = in > most ? in : most;
         }
-        std::memcpy(depth + i, &most, sizeof(Eight));
+        std::memcpy(depth + i, &most, sizeof(Doubles8));
     }
 }
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "kernels/access/triangle.h"
+#include "kernels/geometry/triangle.h"
 
 namespace slabwright {
 

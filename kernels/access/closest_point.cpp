@@ -12,8 +12,8 @@
 #include <string>
 
 #include "kernels/access/tree_memory.h"
-#include "kernels/access/triangle.h"
 #include "kernels/errors.h"
+#include "kernels/geometry/triangle.h"
 #include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
 

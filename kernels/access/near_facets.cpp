@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "kernels/wide.h"
+#include "kernels/geometry/wide.h"
 
 namespace slabwright {
 
@@ -258,12 +258,10 @@ WayAround::WayAround(const NearWay& way, bool ball, double lowest_z, double top_
 // Written with vectors of eight, since compilers take such a short loop apart into smaller ones.
 SLABWRIGHT_WIDE static void around_eights(const ManyEights& many, const WayAround& way,
                                           unsigned* __restrict keep) {
-    using Eight [[gnu::vector_size(32)]] = float;
-    using Signs [[gnu::vector_size(32)]] = std::int32_t;
     const WayAround w = way;
-    const Eight none{};
-    const auto bits_of = [](const Signs& signs) {
-        const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
+    const Floats8 none{};
+    const auto bits_of = [](const Ints8& signs) {
+        const Ints8 own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
         std::array<std::uint64_t, 4> pairs;
         std::memcpy(pairs.data(), &bits, sizeof(pairs));
         const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
@@ -272,41 +270,42 @@ SLABWRIGHT_WIDE static void around_eights(const ManyEights& many, const WayAroun
     const float forward_x = w.dx, forward_y = w.dy, forward_z = w.dz * w.upwards;
     for (std::size_t i = 0; i < many.count; ++i) {
         const EightFacets& f = *many.eights[i];
-        Eight x0, y0, z0, x1, y1, z1, x2, y2, z2;
-        std::memcpy(&x0, f.x0.data(), sizeof(Eight)), std::memcpy(&y0, f.y0.data(), sizeof(Eight)),
-            std::memcpy(&z0, f.z0.data(), sizeof(Eight));
-        std::memcpy(&x1, f.x1.data(), sizeof(Eight)), std::memcpy(&y1, f.y1.data(), sizeof(Eight)),
-            std::memcpy(&z1, f.z1.data(), sizeof(Eight));
-        std::memcpy(&x2, f.x2.data(), sizeof(Eight)), std::memcpy(&y2, f.y2.data(), sizeof(Eight)),
-            std::memcpy(&z2, f.z2.data(), sizeof(Eight));
-        Eight lowest = z0 < z1 ? z0 : z1, highest = z0 > z1 ? z0 : z1;
+        Floats8 x0, y0, z0, x1, y1, z1, x2, y2, z2;
+        std::memcpy(&x0, f.x0.data(), sizeof(Floats8)), std::memcpy(&y0, f.y0.data(), sizeof(Floats8)),
+            std::memcpy(&z0, f.z0.data(), sizeof(Floats8));
+        std::memcpy(&x1, f.x1.data(), sizeof(Floats8)), std::memcpy(&y1, f.y1.data(), sizeof(Floats8)),
+            std::memcpy(&z1, f.z1.data(), sizeof(Floats8));
+        std::memcpy(&x2, f.x2.data(), sizeof(Floats8)), std::memcpy(&y2, f.y2.data(), sizeof(Floats8)),
+            std::memcpy(&z2, f.z2.data(), sizeof(Floats8));
+        Floats8 lowest = z0 < z1 ? z0 : z1, highest = z0 > z1 ? z0 : z1;
         lowest = lowest < z2 ? lowest : z2, highest = highest > z2 ? highest : z2;
         x0 -= w.ax, y0 -= w.ay, x1 -= w.ax, y1 -= w.ay, x2 -= w.ax, y2 -= w.ay;
-        const Eight l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
-        const Eight c0 = y0 * w.ux - x0 * w.uy, c1 = y1 * w.ux - x1 * w.uy, c2 = y2 * w.ux - x2 * w.uy;
-        Eight l_low = l0 < l1 ? l0 : l1, l_high = l0 > l1 ? l0 : l1, c_low = c0 < c1 ? c0 : c1,
-              c_high = c0 > c1 ? c0 : c1;
+        const Floats8 l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
+        const Floats8 c0 = y0 * w.ux - x0 * w.uy, c1 = y1 * w.ux - x1 * w.uy, c2 = y2 * w.ux - x2 * w.uy;
+        Floats8 l_low = l0 < l1 ? l0 : l1, l_high = l0 > l1 ? l0 : l1, c_low = c0 < c1 ? c0 : c1,
+                c_high = c0 > c1 ? c0 : c1;
         l_low = l_low < l2 ? l_low : l2, l_high = l_high > l2 ? l_high : l2, c_low = c_low < c2 ? c_low : c2,
         c_high = c_high > c2 ? c_high : c2;
-        Eight l = l_low - w.length, c = c_low > -c_high ? c_low : -c_high,
-              under = w.lowest - (highest < w.top ? highest : none + w.top);
+        Floats8 l = l_low - w.length, c = c_low > -c_high ? c_low : -c_high,
+                under = w.lowest - (highest < w.top ? highest : none + w.top);
         l = l > -l_high ? l : -l_high, l = l > none ? l : none, c = c > none ? c : none,
         under = (under > none ? under : none) * w.upwards;
-        const Signs kept =
+        const Ints8 kept =
             (lowest < w.top) & (highest > w.above) & (l * l + c * c + under * under < w.reach2);
         if (keep[i] = bits_of(kept); keep[i] != 0) {
             z0 -= w.az, z1 -= w.az, z2 -= w.az;
-            const Eight mx = (x0 + x1 + x2) * third, my = (y0 + y1 + y2) * third, mz = (z0 + z1 + z2) * third;
-            Eight t = (mx * w.dx + my * w.dy) * w.per_length2;
+            const Floats8 mx = (x0 + x1 + x2) * third, my = (y0 + y1 + y2) * third,
+                          mz = (z0 + z1 + z2) * third;
+            Floats8 t = (mx * w.dx + my * w.dy) * w.per_length2;
             t = t > none ? t : none, t = t < w.end ? t : none + w.end;
-            const Eight ux = t * w.dx - mx, uy = t * w.dy - my, over = (t * w.dz - mz) * w.upwards,
-                        uz = over > none ? over : none;
-            const Eight d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1,
-                        d2 = ux * x2 + uy * y2 + uz * z2;
-            Eight most = d0 > d1 ? d0 : d1;
+            const Floats8 ux = t * w.dx - mx, uy = t * w.dy - my, over = (t * w.dz - mz) * w.upwards,
+                          uz = over > none ? over : none;
+            const Floats8 d0 = ux * x0 + uy * y0 + uz * z0, d1 = ux * x1 + uy * y1 + uz * z1,
+                          d2 = ux * x2 + uy * y2 + uz * z2;
+            Floats8 most = d0 > d1 ? d0 : d1;
             most = most > d2 ? most : d2;
-            const Eight forward = ux * forward_x + uy * forward_y + uz * forward_z,
-                        gap = (forward < none ? forward : none) - most;
+            const Floats8 forward = ux * forward_x + uy * forward_y + uz * forward_z,
+                          gap = (forward < none ? forward : none) - most;
             keep[i] =
                 bits_of(kept & ((gap <= none) | (gap * gap < w.reach2 * (ux * ux + uy * uy + uz * uz))));
         }
@@ -378,91 +377,90 @@ void LevelWay::begin_at(double x, double y, double z) {
 // facet.
 SLABWRIGHT_WIDE static void along_eights(const ManyEights& many, const LevelWay& way,
                                          unsigned* __restrict keep) {
-    using Eight [[gnu::vector_size(32)]] = float;
-    using Signs [[gnu::vector_size(32)]] = std::int32_t;
     const LevelWay w = way;
-    const Eight none{}, one = none + 1.0F;
-    const auto bits_of = [](const Signs& signs) {
-        const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
+    const Floats8 none{}, one = none + 1.0F;
+    const auto bits_of = [](const Ints8& signs) {
+        const Ints8 own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
         std::array<std::uint64_t, 4> pairs;
         std::memcpy(pairs.data(), &bits, sizeof(pairs));
         const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
         return static_cast<unsigned>(all | all >> 32);
     };
     // (What a function gives back as a vector depends on the instruction set.)
-    const auto root = [](Eight& v) {
+    const auto root = [](Floats8& v) {
         for (std::size_t k = 0; k < 8; ++k) v[k] = std::sqrt(v[k]);
     };
-    const auto least_of = [](const Eight& a, const Eight& b, const Eight& c, Eight& least) {
+    const auto least_of = [](const Floats8& a, const Floats8& b, const Floats8& c, Floats8& least) {
         least = a < b ? a : b, least = least < c ? least : c;
     };
-    const auto most_of = [](const Eight& a, const Eight& b, const Eight& c, Eight& most) {
+    const auto most_of = [](const Floats8& a, const Floats8& b, const Floats8& c, Floats8& most) {
         most = a > b ? a : b, most = most > c ? most : c;
     };
     const float straight = w.curvature == 0 ? 1.0F : 0.0F;
     constexpr float rounding = 2e-6F;  // of a length
     for (std::size_t i = 0; i < many.count; ++i) {
         const EightFacets& f = *many.eights[i];
-        Eight x0, y0, z0, x1, y1, z1, x2, y2, z2;
-        std::memcpy(&x0, f.x0.data(), sizeof(Eight)), std::memcpy(&y0, f.y0.data(), sizeof(Eight)),
-            std::memcpy(&z0, f.z0.data(), sizeof(Eight));
-        std::memcpy(&x1, f.x1.data(), sizeof(Eight)), std::memcpy(&y1, f.y1.data(), sizeof(Eight)),
-            std::memcpy(&z1, f.z1.data(), sizeof(Eight));
-        std::memcpy(&x2, f.x2.data(), sizeof(Eight)), std::memcpy(&y2, f.y2.data(), sizeof(Eight)),
-            std::memcpy(&z2, f.z2.data(), sizeof(Eight));
-        Eight lowest, l_low, l_high, c_low, c_high, h_low, h_high;
+        Floats8 x0, y0, z0, x1, y1, z1, x2, y2, z2;
+        std::memcpy(&x0, f.x0.data(), sizeof(Floats8)), std::memcpy(&y0, f.y0.data(), sizeof(Floats8)),
+            std::memcpy(&z0, f.z0.data(), sizeof(Floats8));
+        std::memcpy(&x1, f.x1.data(), sizeof(Floats8)), std::memcpy(&y1, f.y1.data(), sizeof(Floats8)),
+            std::memcpy(&z1, f.z1.data(), sizeof(Floats8));
+        std::memcpy(&x2, f.x2.data(), sizeof(Floats8)), std::memcpy(&y2, f.y2.data(), sizeof(Floats8)),
+            std::memcpy(&z2, f.z2.data(), sizeof(Floats8));
+        Floats8 lowest, l_low, l_high, c_low, c_high, h_low, h_high;
         least_of(z0, z1, z2, lowest);
         x0 = x0 - w.ox - w.rest_x, y0 = y0 - w.oy - w.rest_y, z0 = z0 - w.oz - w.rest_z;
         x1 = x1 - w.ox - w.rest_x, y1 = y1 - w.oy - w.rest_y, z1 = z1 - w.oz - w.rest_z;
         x2 = x2 - w.ox - w.rest_x, y2 = y2 - w.oy - w.rest_y, z2 = z2 - w.oz - w.rest_z;
-        const Eight l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
-        const Eight c0 = x0 * w.uy - y0 * w.ux, c1 = x1 * w.uy - y1 * w.ux, c2 = x2 * w.uy - y2 * w.ux;
+        const Floats8 l0 = x0 * w.ux + y0 * w.uy, l1 = x1 * w.ux + y1 * w.uy, l2 = x2 * w.ux + y2 * w.uy;
+        const Floats8 c0 = x0 * w.uy - y0 * w.ux, c1 = x1 * w.uy - y1 * w.ux, c2 = x2 * w.uy - y2 * w.ux;
         least_of(l0, l1, l2, l_low), most_of(l0, l1, l2, l_high), least_of(c0, c1, c2, c_low),
             most_of(c0, c1, c2, c_high);
         least_of(z0, z1, z2, h_low), most_of(z0, z1, z2, h_high);
-        const Eight far_l = l_high > -l_low ? l_high : -l_low, far_c = c_high > -c_low ? c_high : -c_low,
-                    far_h = h_high > -h_low ? h_high : -h_low;
-        const Eight far = far_l + far_c + far_h, reach = w.reach + rounding * (far + w.curvature * far * far);
-        Eight l = l_low - w.after > -l_high - w.before ? l_low - w.after : -l_high - w.before;
+        const Floats8 far_l = l_high > -l_low ? l_high : -l_low, far_c = c_high > -c_low ? c_high : -c_low,
+                      far_h = h_high > -h_low ? h_high : -h_low;
+        const Floats8 far = far_l + far_c + far_h,
+                      reach = w.reach + rounding * (far + w.curvature * far * far);
+        Floats8 l = l_low - w.after > -l_high - w.before ? l_low - w.after : -l_high - w.before;
         l = l > none ? l : none;
-        Eight c = c_low > -c_high - w.bow ? c_low : -c_high - w.bow, under = -h_high > none ? -h_high : none,
-              reach2 = reach * reach;
+        Floats8 c = c_low > -c_high - w.bow ? c_low : -c_high - w.bow,
+                under = -h_high > none ? -h_high : none, reach2 = reach * reach;
         c = c > none ? c : none;
-        const Signs within = (lowest < w.top) & (l * l + c * c + under * under < reach2);
+        const Ints8 within = (lowest < w.top) & (l * l + c * c + under * under < reach2);
         keep[i] = bits_of(within);
         if (keep[i] == 0) continue;
         reach2 -= straight * (l * l);
         // Distance from the circle in plan, outwards.
-        Eight a0 = c0, a1 = c1, a2 = c2, bend = none;
+        Floats8 a0 = c0, a1 = c1, a2 = c2, bend = none;
         if (straight == 0) {
-            const auto outwards = [&](const Eight& along, Eight& across) {
-                const Eight a = w.curvature * along, b = one + w.curvature * across,
-                            twice = across + across + w.curvature * (along * along + across * across);
-                Eight from_axis = a * a + b * b;
+            const auto outwards = [&](const Floats8& along, Floats8& across) {
+                const Floats8 a = w.curvature * along, b = one + w.curvature * across,
+                              twice = across + across + w.curvature * (along * along + across * across);
+                Floats8 from_axis = a * a + b * b;
                 root(from_axis);
                 across = twice / (from_axis + one);
             };
             outwards(l0, a0), outwards(l1, a1), outwards(l2, a2);
-            const Eight e0 = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0),
-                        e1 = (x2 - x1) * (x2 - x1) + (y2 - y1) * (y2 - y1),
-                        e2 = (x0 - x2) * (x0 - x2) + (y0 - y2) * (y0 - y2), least = none + 1e-3F;
-            Eight edge2, edge, outmost;
+            const Floats8 e0 = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0),
+                          e1 = (x2 - x1) * (x2 - x1) + (y2 - y1) * (y2 - y1),
+                          e2 = (x0 - x2) * (x0 - x2) + (y0 - y2) * (y0 - y2), least = none + 1e-3F;
+            Floats8 edge2, edge, outmost;
             most_of(e0, e1, e2, edge2), most_of(a0, a1, a2, outmost);
             edge = edge2, root(edge);
-            const Eight inmost = one + w.curvature * (outmost - edge);
+            const Floats8 inmost = one + w.curvature * (outmost - edge);
             // A second derivative of 1 / radius at most, over a circle of the longest edge / √3 that holds
             // the facet; near the axis, no more than an edge.
             bend = inmost > least ? w.curvature * edge2 / (6.0F * inmost) : edge;
         }
-        Signs parted{};
-        const auto part = [&](const Eight& ua, const Eight& uh) {
-            Eight gap;
+        Ints8 parted{};
+        const auto part = [&](const Floats8& ua, const Floats8& uh) {
+            Floats8 gap;
             least_of(ua * a0 + uh * z0, ua * a1 + uh * z1, ua * a2 + uh * z2, gap);
             gap -= (ua > none ? ua : none) * bend;
             parted |= (gap > none) & (gap * gap >= reach2 * (ua * ua + uh * uh));
         };
-        const auto to_corner = [&](const Eight& a, const Eight& h) { part(a, h < none ? h : none); };
-        const auto by_edge = [&](const Eight& a, const Eight& h) {
+        const auto to_corner = [&](const Floats8& a, const Floats8& h) { part(a, h < none ? h : none); };
+        const auto by_edge = [&](const Floats8& a, const Floats8& h) {
             part(a > none ? h : -h, a > none ? -a : a);
         };
         to_corner(a0, z0), to_corner(a1, z1), to_corner(a2, z2);

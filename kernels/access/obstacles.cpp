@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kernels/wide.h"
+#include "kernels/geometry/wide.h"
 
 namespace slabwright {
 

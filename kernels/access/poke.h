@@ -1,8 +1,8 @@
 // Whether a facet reaches into a tool.
 #pragma once
 
-#include "kernels/access/triangle.h"
 #include "kernels/cutting/tool_shape.h"
+#include "kernels/geometry/triangle.h"
 
 namespace slabwright {
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/errors.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/slicing/slicing.h"
 
@@ -17,17 +18,10 @@ namespace {
 constexpr double kUpright = 1e-4;  // rad: what faces down by less counts as upright
 constexpr double kSame = 0.001;    // mm: an edge's middle this near to the cut of a facet is that facet's
 
-struct P {
-    double x, y;
-};
-P operator-(P a, P b) { return {a.x - b.x, a.y - b.y}; }
-double dot(P a, P b) { return a.x * b.x + a.y * b.y; }
-double cross(P a, P b) { return a.x * b.y - a.y * b.x; }
-double length(P a) { return std::sqrt(dot(a, a)); }
-P to_p(Point2 p) { return {to_mm(p.x), to_mm(p.y)}; }
+Vec2d place_mm(Point2 p) { return {to_mm(p.x), to_mm(p.y)}; }
 
 struct Segment {
-    P a, b;
+    Vec2d a, b;
 };
 
 /// Segments by square cells, for those near a box.
@@ -88,17 +82,17 @@ using Interval = std::pair<double, double>;
 /// Where a point that runs from `from` along the unit vector `along` is nearer than `radius` to a segment: it
 /// is in the convex hull of two discs, so this is one interval, the hull of what the discs and the rectangle
 /// between them give.
-Interval near(P from, P along, const Segment& s, double radius) {
+Interval near(Vec2d from, Vec2d along, const Segment& s, double radius) {
     Interval in{HUGE_VAL, -HUGE_VAL};
     auto take = [&](double low, double high) {
         if (low < high) in = {std::min(in.first, low), std::max(in.second, high)};
     };
-    for (const P end : {s.a, s.b}) {
-        const P w = end - from;
+    for (const Vec2d end : {s.a, s.b}) {
+        const Vec2d w = end - from;
         const double middle = dot(w, along), off = cross(along, w), root = radius * radius - off * off;
         if (root > 0) take(middle - std::sqrt(root), middle + std::sqrt(root));
     }
-    const P d = s.b - s.a;
+    const Vec2d d = s.b - s.a;
     const double l = length(d);
     if (l > 0) {
         double low = -HUGE_VAL, high = HUGE_VAL;
@@ -111,7 +105,7 @@ Interval near(P from, P along, const Segment& s, double radius) {
             const double t0 = (least - at) / rate, t1 = (most - at) / rate;
             low = std::max(low, std::min(t0, t1)), high = std::min(high, std::max(t0, t1));
         };
-        const P u{d.x / l, d.y / l}, w = from - s.a;
+        const Vec2d u{d.x / l, d.y / l}, w = from - s.a;
         keep(dot(w, u), dot(along, u), 0, l);
         keep(cross(u, w), cross(u, along), -radius, radius);
         take(low, high);
@@ -134,7 +128,7 @@ PrintedAccessibility printed_accessibility(const Loops& section, double radius, 
     for (std::size_t l = 0; l < section.size(); ++l) {
         const auto loop = section.loop(l);
         for (std::size_t i = 0; i < loop.size(); ++i)
-            edges.push_back({to_p(loop[i]), to_p(loop[(i + 1) % loop.size()])});
+            edges.push_back({place_mm(loop[i]), place_mm(loop[(i + 1) % loop.size()])});
     }
     const Cells cells(edges, radius);
     std::vector<Interval> lost;
@@ -143,13 +137,13 @@ PrintedAccessibility printed_accessibility(const Loops& section, double radius, 
         for (std::size_t i = 0; i < n; ++i) {
             if (!left_out.empty() && left_out[first + i] != 0) continue;
             const Segment& e = edges[first + i];
-            const P d = e.b - e.a;
+            const Vec2d d = e.b - e.a;
             const double whole = length(d);
             if (!(whole > 0)) continue;
             result.all += whole;
             // Solid is on the left, so a corner that turns right is concave; it takes R/tan(θ/2) of both its
             // edges, θ = π − turn.
-            auto corner = [&](P in, P out) {
+            auto corner = [&](Vec2d in, Vec2d out) {
                 const double turn = -std::atan2(cross(in, out), dot(in, out));
                 return turn > 0 ? radius * std::tan(turn / 2) : 0;
             };
@@ -159,9 +153,9 @@ PrintedAccessibility printed_accessibility(const Loops& section, double radius, 
             result.corners += whole - (to - from);
             if (!(to > from)) continue;
             // The tool's centre runs beside the edge.
-            const P along{d.x / whole, d.y / whole}, out{along.y, -along.x};
-            const P centre{e.a.x + radius * out.x, e.a.y + radius * out.y};
-            const P p{centre.x + from * along.x, centre.y + from * along.y},
+            const Vec2d along{d.x / whole, d.y / whole}, out{along.y, -along.x};
+            const Vec2d centre{e.a.x + radius * out.x, e.a.y + radius * out.y};
+            const Vec2d p{centre.x + from * along.x, centre.y + from * along.y},
                 q{centre.x + to * along.x, centre.y + to * along.y};
             lost.clear();
             cells.visit(std::min(p.x, q.x) - radius, std::min(p.y, q.y) - radius, std::max(p.x, q.x) + radius,
@@ -206,7 +200,7 @@ std::vector<std::uint8_t> undercut_edges(MeshView mesh, double z, const Loops& s
         const double vx = p[2][0] - p[0][0], vy = p[2][1] - p[0][1], vz = p[2][2] - p[0][2];
         const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
         if (!(nz < -kUpright * std::sqrt(nx * nx + ny * ny + nz * nz))) continue;
-        std::vector<P> ends;
+        std::vector<Vec2d> ends;
         for (int k = 0; k < 3; ++k) {
             const auto &a = p[k], &b = p[(k + 1) % 3];
             if ((a[2] <= z) == (b[2] <= z)) continue;
@@ -222,12 +216,12 @@ std::vector<std::uint8_t> undercut_edges(MeshView mesh, double z, const Loops& s
     for (std::size_t l = 0; l < section.size(); ++l) {
         const auto loop = section.loop(l);
         for (std::size_t i = 0; i < loop.size(); ++i) {
-            const P a = to_p(loop[i]), b = to_p(loop[(i + 1) % loop.size()]),
-                    m{(a.x + b.x) / 2, (a.y + b.y) / 2};
+            const Vec2d a = place_mm(loop[i]), b = place_mm(loop[(i + 1) % loop.size()]),
+                        m{(a.x + b.x) / 2, (a.y + b.y) / 2};
             cells.visit(m.x - kSame, m.y - kSame, m.x + kSame, m.y + kSame, [&](std::uint32_t c) {
-                const P d = cuts[c].b - cuts[c].a, w = m - cuts[c].a;
+                const Vec2d d = cuts[c].b - cuts[c].a, w = m - cuts[c].a;
                 const double dd = dot(d, d), t = dd > 0 ? std::clamp(dot(w, d) / dd, 0.0, 1.0) : 0;
-                if (length({w.x - t * d.x, w.y - t * d.y}) <= kSame) marks[section.starts[l] + i] = 1;
+                if (length(Vec2d{w.x - t * d.x, w.y - t * d.y}) <= kSame) marks[section.starts[l] + i] = 1;
             });
         }
     }

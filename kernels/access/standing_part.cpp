@@ -9,12 +9,12 @@
 #include <tuple>
 
 #include "kernels/access/near_facets.h"
-#include "kernels/access/triangle.h"
+#include "kernels/geometry/triangle.h"
+#include "kernels/geometry/wide.h"
 #include "kernels/mesh/morton.h"
 #include "kernels/mesh/raw_array.h"
 #include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
-#include "kernels/wide.h"
 
 namespace slabwright {
 
@@ -24,17 +24,6 @@ constexpr std::size_t kFan = 8;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kHair = 1e-9;   // mm: rounding of a bound
 constexpr double kEqual = 1e-6;  // mm: depths that differ by less may be the same
-
-struct P2 {
-    double x, y;
-};
-
-Point3 to_point(const Vec3f& v) { return {v.x, v.y, v.z}; }
-Point3 sub(const Point3& a, const Point3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Point3 between(const Point3& a, const Point3& b, double t) {
-    return {a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t};
-}
 
 /// A convex polygon of at most five corners: a triangle cut by two horizontal planes.
 struct Polygon {
@@ -57,22 +46,22 @@ Polygon clip_z(const Polygon& in, double z, bool keep_above) {
     return out;
 }
 
-double distance_2d(P2 p, P2 a, P2 b) {
+double distance_2d(Vec2d p, Vec2d a, Vec2d b) {
     const double dx = b.x - a.x, dy = b.y - a.y, l = dx * dx + dy * dy;
     const double t = l > 0 ? std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / l, 0.0, 1.0) : 0.0;
     const double ex = p.x - a.x - t * dx, ey = p.y - a.y - t * dy;
     return std::sqrt(ex * ex + ey * ey);
 }
 
-double cross_2d(P2 a, P2 b, P2 c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
+double cross_2d(Vec2d a, Vec2d b, Vec2d c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
 
-bool segments_cross(P2 a, P2 b, P2 c, P2 d) {
+bool segments_cross(Vec2d a, Vec2d b, Vec2d c, Vec2d d) {
     const double s1 = cross_2d(a, b, c), s2 = cross_2d(a, b, d), s3 = cross_2d(c, d, a),
                  s4 = cross_2d(c, d, b);
     return ((s1 > 0) != (s2 > 0)) && ((s3 > 0) != (s4 > 0));
 }
 
-bool contains_2d(const Polygon& poly, P2 q) {
+bool contains_2d(const Polygon& poly, Vec2d q) {
     // The box first: on a polygon seen edge-on all signs below are rounding, and could agree far along its
     // line.
     double x0 = kInfinity, x1 = -kInfinity, y0 = kInfinity, y1 = -kInfinity;
@@ -93,7 +82,7 @@ bool contains_2d(const Polygon& poly, P2 q) {
 }
 
 /// Horizontal distance between a segment (or a point) and a convex polygon; infinite for an empty one.
-double distance_2d(const Polygon& poly, P2 a, P2 b) {
+double distance_2d(const Polygon& poly, Vec2d a, Vec2d b) {
     if (poly.n == 0) return kInfinity;
     // Points exactly on an edge line give s == 0 for one edge only, which contains_2d tolerates: their
     // distance is 0 or is measured against the edges anyway.
@@ -107,7 +96,8 @@ double distance_2d(const Polygon& poly, P2 a, P2 b) {
     const bool moving = a.x != b.x || a.y != b.y;
     double best = kInfinity;
     for (int i = 0; i < poly.n; ++i) {
-        const P2 c{poly.p[i][0], poly.p[i][1]}, d{poly.p[(i + 1) % poly.n][0], poly.p[(i + 1) % poly.n][1]};
+        const Vec2d c{poly.p[i][0], poly.p[i][1]},
+            d{poly.p[(i + 1) % poly.n][0], poly.p[(i + 1) % poly.n][1]};
         best = std::min(best, distance_2d(a, c, d));
         if (moving) {
             if (segments_cross(a, b, c, d)) return 0;
@@ -129,7 +119,7 @@ struct RayDistance {
 RayDistance ray_distance(const Point3& c, const Triangle& t) {
     const Point3 q = closest_on_triangle(c, t);
     if (q[2] <= c[2]) {
-        const Point3 v = sub(c, q);
+        const Point3 v = minus(c, q);
         return {std::sqrt(dot(v, v)), v};
     }
     Polygon poly;
@@ -140,14 +130,14 @@ RayDistance ray_distance(const Point3& c, const Triangle& t) {
         const Point3 v{c[0] - q[0], c[1] - q[1], 0};
         return {std::sqrt(dot(v, v)), v};
     }
-    const P2 a{c[0], c[1]};
+    const Vec2d a{c[0], c[1]};
     if (distance_2d(poly, a, a) == 0) return {0, {0, 0, 0}};
     double best = kInfinity;
     Point3 v{};
     for (int i = 0; i < poly.n; ++i) {
         Point3 s = poly.p[i], e = poly.p[(i + 1) % poly.n], from = c;
         s[2] = e[2] = from[2] = 0;
-        const Point3 w = sub(from, closest_on_segment(from, s, e));
+        const Point3 w = minus(from, closest_on_segment(from, s, e));
         const double d = dot(w, w);
         if (d < best) best = d, v = w;
     }
@@ -162,12 +152,12 @@ void below(const std::array<Vec3f, 3>& facet, double z, Fn&& fn) {
     for (const Vec3f& v : facet) under += v.z < z;
     if (under == 0) return;
     if (under == 3 || (facet[0].z <= z && facet[1].z <= z && facet[2].z <= z)) {
-        fn(Triangle{to_point(facet[0]), to_point(facet[1]), to_point(facet[2])});
+        fn(Triangle{to_double(facet[0]), to_double(facet[1]), to_double(facet[2])});
         return;
     }
     Polygon poly;
     poly.n = 3;
-    for (int i = 0; i < 3; ++i) poly.p[i] = to_point(facet[i]);
+    for (int i = 0; i < 3; ++i) poly.p[i] = to_double(facet[i]);
     poly = clip_z(poly, z, false);
     for (int i = 1; i + 1 < poly.n; ++i) fn(Triangle{poly.p[0], poly.p[i], poly.p[i + 1]});
 }
@@ -180,7 +170,7 @@ struct Closest {
     double t;
 };
 Closest piece_distance(const Point3& a, const Point3& b, const Triangle& tri, double limit) {
-    const Point3 along = sub(b, a);
+    const Point3 along = minus(b, a);
     const double length = std::sqrt(dot(along, along));
     struct Sample {
         double t, d, g;
@@ -391,21 +381,19 @@ StandingPart::Within::Within(const Point3& from, const Point3& to) {
 // Written with vectors of eight, since compilers take such a short loop apart into smaller ones.
 SLABWRIGHT_WIDE void StandingPart::overlapping(const ManyNodes& many, const Within& box,
                                                unsigned* __restrict kept) {
-    using Eight [[gnu::vector_size(32)]] = float;
-    using Signs [[gnu::vector_size(32)]] = std::int32_t;
-    const Eight none{}, low_x = none + box.low[0], low_y = none + box.low[1], low_z = none + box.low[2];
-    const Eight high_x = none + box.high[0], high_y = none + box.high[1], high_z = none + box.high[2];
+    const Floats8 none{}, low_x = none + box.low[0], low_y = none + box.low[1], low_z = none + box.low[2];
+    const Floats8 high_x = none + box.high[0], high_y = none + box.high[1], high_z = none + box.high[2];
     for (std::size_t i = 0; i < many.count; ++i) {
         const Nodes& n = *many.eights[i];
-        static_assert(sizeof(n.x0) == sizeof(Eight));
-        Eight x0, y0, z0, x1, y1, z1;
-        std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)),
-            std::memcpy(&z0, n.z0.data(), sizeof(Eight));
-        std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)),
-            std::memcpy(&z1, n.z1.data(), sizeof(Eight));
-        const Signs signs =
+        static_assert(sizeof(n.x0) == sizeof(Floats8));
+        Floats8 x0, y0, z0, x1, y1, z1;
+        std::memcpy(&x0, n.x0.data(), sizeof(Floats8)), std::memcpy(&y0, n.y0.data(), sizeof(Floats8)),
+            std::memcpy(&z0, n.z0.data(), sizeof(Floats8));
+        std::memcpy(&x1, n.x1.data(), sizeof(Floats8)), std::memcpy(&y1, n.y1.data(), sizeof(Floats8)),
+            std::memcpy(&z1, n.z1.data(), sizeof(Floats8));
+        const Ints8 signs =
             (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
-        const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
+        const Ints8 own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
         std::array<std::uint64_t, 4> pairs;
         std::memcpy(pairs.data(), &bits, sizeof(pairs));
         const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
@@ -542,7 +530,7 @@ struct Cutter {
     [[nodiscard]] bool ball() const { return form == StandingPart::Form::ball; }
     /// What is asked of a motion is asked of so many pieces of it.
     [[nodiscard]] int pieces(const Point3& from, const Point3& to) const {
-        const Point3 span = sub(to, from);
+        const Point3 span = minus(to, from);
         const double length = std::sqrt(dot(span, span));
         const double count =
             ball() ? std::max(length / StandingPart::kSpan, std::abs(span[2]) / StandingPart::kRise)
@@ -592,7 +580,7 @@ void meet(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& 
     poly.n = 3;
     int under = 0;
     for (int k = 0; k < 3; ++k) {
-        poly.p[k] = to_point(facet[k]);
+        poly.p[k] = to_double(facet[k]);
         under += facet[k].z < cutter.top;
     }
     if (under == 0) return;
@@ -630,28 +618,26 @@ Penetration motion_depth(const Cutter& cutter, const Point3& from, const Point3&
 
 // Written with vectors of eight, as overlapping() is.
 SLABWRIGHT_WIDE void StandingPart::squares(const Nodes& n, const Away& from, std::array<double, 8>& squares) {
-    using Eight [[gnu::vector_size(64)]] = double;
-    using Floats [[gnu::vector_size(32)]] = float;
-    const auto wide = [](const std::array<float, 8>& row, Eight& to) {
-        Floats values;
+    const auto wide = [](const std::array<float, 8>& row, Doubles8& to) {
+        Floats8 values;
         std::memcpy(&values, row.data(), sizeof(values));
-        to = __builtin_convertvector(values, Eight);
+        to = __builtin_convertvector(values, Doubles8);
     };
-    const auto gap = [](const Eight& below, const Eight& above, Eight& most) {
-        const Eight none{};
+    const auto gap = [](const Doubles8& below, const Doubles8& above, Doubles8& most) {
+        const Doubles8 none{};
         most = below > above ? below : above;
         most = most > none ? most : none;
     };
-    Eight x0, y0, z0, x1, y1, z1, dx, dy, dz{};
+    Doubles8 x0, y0, z0, x1, y1, z1, dx, dy, dz{};
     wide(n.x0, x0), wide(n.y0, y0), wide(n.z0, z0), wide(n.x1, x1), wide(n.y1, y1), wide(n.z1, z1);
-    const Eight none{};
+    const Doubles8 none{};
     gap(x0 - from.point[0], from.point[0] - x1, dx), gap(y0 - from.point[1], from.point[1] - y1, dy);
-    Eight square = dx * dx + dy * dy;
+    Doubles8 square = dx * dx + dy * dy;
     if (from.kind == Away::Kind::facets) {
         gap(z0 - from.point[2], from.point[2] - z1, dz);
         square += dz * dz;
     } else {
-        const Eight infinite = none + kInfinity, top = none + from.top;
+        const Doubles8 infinite = none + kInfinity, top = none + from.top;
         if (from.kind == Away::Kind::shadow) {
             gap(none, from.point[2] - (z1 < top ? z1 : top), dz);
             square += dz * dz;
@@ -662,14 +648,13 @@ SLABWRIGHT_WIDE void StandingPart::squares(const Nodes& n, const Away& from, std
 }
 
 SLABWRIGHT_WIDE void StandingPart::boxes(const EightFacets& f, Nodes& boxes) {
-    using Floats [[gnu::vector_size(32)]] = float;
     const auto extent = [](const std::array<float, 8>& a, const std::array<float, 8>& b,
                            const std::array<float, 8>& c, std::array<float, 8>& low,
                            std::array<float, 8>& high) {
-        Floats u, v, w;
+        Floats8 u, v, w;
         std::memcpy(&u, a.data(), sizeof(u)), std::memcpy(&v, b.data(), sizeof(v)),
             std::memcpy(&w, c.data(), sizeof(w));
-        Floats least = u < v ? u : v, most = u > v ? u : v;
+        Floats8 least = u < v ? u : v, most = u > v ? u : v;
         least = least < w ? least : w, most = most > w ? most : w;
         std::memcpy(low.data(), &least, sizeof(least)), std::memcpy(high.data(), &most, sizeof(most));
     };
@@ -776,7 +761,7 @@ struct StandingPart::Stretch {
             for (std::size_t k = 0; k < 3; ++k)
                 low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
             if (flat) p[2] = 0;
-            const Point3 off = sub(p, closest_on_segment(p, a, b));
+            const Point3 off = minus(p, closest_on_segment(p, a, b));
             slack = std::max(slack, dot(off, off));
         }
         // The distance from the way is convex, so that a motion is nowhere farther from it than where it
@@ -791,34 +776,32 @@ struct StandingPart::Stretch {
 // Written with vectors of eight, as overlapping() is.
 SLABWRIGHT_WIDE void StandingPart::around(const ManyNodes& many, const WayAround& way, const Within& box,
                                           unsigned* __restrict kept) {
-    using Eight [[gnu::vector_size(32)]] = float;
-    using Signs [[gnu::vector_size(32)]] = std::int32_t;
     const WayAround w = way;
-    const Eight none{}, top = none + w.top;
-    const Eight low_x = none + box.low[0], low_y = none + box.low[1], low_z = none + box.low[2];
-    const Eight high_x = none + box.high[0], high_y = none + box.high[1], high_z = none + box.high[2];
+    const Floats8 none{}, top = none + w.top;
+    const Floats8 low_x = none + box.low[0], low_y = none + box.low[1], low_z = none + box.low[2];
+    const Floats8 high_x = none + box.high[0], high_y = none + box.high[1], high_z = none + box.high[2];
     const float sx = std::abs(w.ux), sy = std::abs(w.uy);
     for (std::size_t i = 0; i < many.count; ++i) {
         const Nodes& n = *many.eights[i];
-        Eight x0, y0, z0, x1, y1, z1;
-        std::memcpy(&x0, n.x0.data(), sizeof(Eight)), std::memcpy(&y0, n.y0.data(), sizeof(Eight)),
-            std::memcpy(&z0, n.z0.data(), sizeof(Eight));
-        std::memcpy(&x1, n.x1.data(), sizeof(Eight)), std::memcpy(&y1, n.y1.data(), sizeof(Eight)),
-            std::memcpy(&z1, n.z1.data(), sizeof(Eight));
-        const Signs within =
+        Floats8 x0, y0, z0, x1, y1, z1;
+        std::memcpy(&x0, n.x0.data(), sizeof(Floats8)), std::memcpy(&y0, n.y0.data(), sizeof(Floats8)),
+            std::memcpy(&z0, n.z0.data(), sizeof(Floats8));
+        std::memcpy(&x1, n.x1.data(), sizeof(Floats8)), std::memcpy(&y1, n.y1.data(), sizeof(Floats8)),
+            std::memcpy(&z1, n.z1.data(), sizeof(Floats8));
+        const Ints8 within =
             (x0 <= high_x) & (low_x <= x1) & (y0 <= high_y) & (low_y <= y1) & (z0 <= high_z) & (low_z <= z1);
-        const Eight hx = (x1 - x0) * 0.5F, hy = (y1 - y0) * 0.5F, cx = (x1 + x0) * 0.5F - w.ax,
-                    cy = (y1 + y0) * 0.5F - w.ay;
-        const Eight along = cx * w.ux + cy * w.uy, aside = cy * w.ux - cx * w.uy,
-                    across = aside > none ? aside : -aside;
-        const Eight before = -along - (hx * sx + hy * sy), behind = along - w.length - (hx * sx + hy * sy),
-                    beside = across - (hx * sy + hy * sx);
-        Eight l = before > behind ? before : behind, high = z1 < top ? z1 : top, under = w.lowest - high;
+        const Floats8 hx = (x1 - x0) * 0.5F, hy = (y1 - y0) * 0.5F, cx = (x1 + x0) * 0.5F - w.ax,
+                      cy = (y1 + y0) * 0.5F - w.ay;
+        const Floats8 along = cx * w.ux + cy * w.uy, aside = cy * w.ux - cx * w.uy,
+                      across = aside > none ? aside : -aside;
+        const Floats8 before = -along - (hx * sx + hy * sy), behind = along - w.length - (hx * sx + hy * sy),
+                      beside = across - (hx * sy + hy * sx);
+        Floats8 l = before > behind ? before : behind, high = z1 < top ? z1 : top, under = w.lowest - high;
         l = l > none ? l : none, under = under > none ? under : none;
-        const Eight c = beside > none ? beside : none, u = under * w.upwards;
-        const Signs signs =
+        const Floats8 c = beside > none ? beside : none, u = under * w.upwards;
+        const Ints8 signs =
             within & (z0 < top) & (z1 > none + w.above) & (l * l + c * c + u * u < none + w.reach2);
-        const Signs own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
+        const Ints8 own{1, 2, 4, 8, 16, 32, 64, 128}, bits = signs & own;
         std::array<std::uint64_t, 4> pairs;
         std::memcpy(pairs.data(), &bits, sizeof(pairs));
         const std::uint64_t all = pairs[0] | pairs[1] | pairs[2] | pairs[3];
@@ -983,12 +966,12 @@ bool StandingPart::stretch_from(Search& search, Stretch& s, std::span<const Moti
         const Motion& next = motions[last];
         if (std::min(next.from[2], next.to[2]) >= top || (last > m && next.from != motions[last - 1].to))
             break;
-        const Point3 way = sub(next.to, next.from);
+        const Point3 way = minus(next.to, next.from);
         length += std::sqrt(dot(way, way));
         if (length <= Stretch::kLength && last - m < Stretch::kShort) short_last = last + 1;
         else if (last - m >= search.many) break;
     }
-    const Point3 own = sub(motions[m].to, motions[m].from);
+    const Point3 own = minus(motions[m].to, motions[m].from);
     const bool whole = own[0] * own[0] + own[1] * own[1] <= kSpan * kSpan;
     if (last > short_last || !whole) {
         s.take(motions, m, last, flat);
@@ -1241,13 +1224,13 @@ StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, 
     Clearance best{limit, {0, 0, 0}};
     if (point[2] >= top) return best;
     if (covered(point[0], point[1], top)) return {0, {0, 0, 0}};
-    const P2 axis{point[0], point[1]};
+    const Vec2d axis{point[0], point[1]};
     walk_nearest(
         {Away::Kind::beside, point, top}, [&] { return best.distance * best.distance; },
         [&](const Facet& f, std::uint32_t) {
             Polygon poly;
             poly.n = 3;
-            for (int k = 0; k < 3; ++k) poly.p[k] = to_point(f.v[k]);
+            for (int k = 0; k < 3; ++k) poly.p[k] = to_double(f.v[k]);
             poly = clip_z(clip_z(poly, top, false), point[2], true);
             if (poly.n == 0) return;
             if (distance_2d(poly, axis, axis) == 0) {
@@ -1257,7 +1240,7 @@ StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, 
             for (int i = 0; i < poly.n; ++i) {
                 Point3 s = poly.p[i], e = poly.p[(i + 1) % poly.n], from = point;
                 s[2] = e[2] = from[2] = 0;
-                const Point3 w = sub(from, closest_on_segment(from, s, e));
+                const Point3 w = minus(from, closest_on_segment(from, s, e));
                 const double d = std::sqrt(dot(w, w));
                 if (d < best.distance) best = {d, w};
             }
@@ -1268,7 +1251,7 @@ StandingPart::Clearance StandingPart::beside(const Point3& point, double z_top, 
 double StandingPart::distance(const Point3& point, std::uint32_t facet) const {
     const std::array<Vec3f, 3>& v = facets_[facet].v;
     const Point3 away =
-        sub(point, closest_on_triangle(point, {to_point(v[0]), to_point(v[1]), to_point(v[2])}));
+        minus(point, closest_on_triangle(point, {to_double(v[0]), to_double(v[1]), to_double(v[2])}));
     return std::sqrt(dot(away, away));
 }
 
@@ -1289,8 +1272,8 @@ double StandingPart::from_facets(const Point3& point, double limit, double enoug
     walk_nearest(
         {Away::Kind::facets, point, 0}, [&] { return best2 <= enough * enough ? 0.0 : best2; },
         [&](const Facet& f, std::uint32_t) {
-            const Point3 away = sub(
-                point, closest_on_triangle(point, {to_point(f.v[0]), to_point(f.v[1]), to_point(f.v[2])}));
+            const Point3 away = minus(
+                point, closest_on_triangle(point, {to_double(f.v[0]), to_double(f.v[1]), to_double(f.v[2])}));
             best2 = std::min(best2, dot(away, away));
         });
     return std::sqrt(best2);

@@ -12,13 +12,12 @@
 #include <vector>
 
 #include "kernels/access/near_facets.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/mesh/bulk_memory.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 
 namespace slabwright {
-
-using Point3 = std::array<double, 3>;  ///< mm
 
 /// Where a cutter is deepest in the part during a motion.
 struct Penetration {

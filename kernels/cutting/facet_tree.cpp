@@ -5,8 +5,9 @@
 #include <limits>
 
 #include "kernels/cutting/layer_solid.h"
+#include "kernels/geometry/vectors.h"
+#include "kernels/geometry/wide.h"
 #include "kernels/parallel/parallel.h"
-#include "kernels/wide.h"
 
 namespace slabwright {
 
@@ -88,7 +89,7 @@ FacetTree::Tier tier(Context& context, std::span<const SolidFacet> facets, const
                 node.gx[k] = static_cast<float>(-m[0] / m[2]), node.gy[k] = static_cast<float>(-m[1] / m[2]);
                 const double cx = tree.x0 + tree.unit * middle(node.x_low[k], node.x_high[k]),
                              cy = tree.y0 + tree.unit * middle(node.y_low[k], node.y_high[k]);
-                double z = -1e300;
+                double z = -kUnbounded;
                 for (const Vec3d& p : f.p)
                     z = std::max(z, p[2] - node.gx[k] * (p[0] - cx) - node.gy[k] * (p[1] - cy));
                 node.z_mid[k] = rounded_up(z);
@@ -123,7 +124,7 @@ FacetTree::Tier tier(Context& context, std::span<const SolidFacet> facets, const
                         node.gy[k] = static_cast<float>(gy / weight);
                         // Over each child's box both its plane and its z_max bound it; over this plane they
                         // are highest at a corner.
-                        double z = -1e300;
+                        double z = -kUnbounded;
                         for (std::size_t c = 0; c < kLeaf && child.z_max[c] > kNowhere; ++c) {
                             const std::int32_t mx = middle(child.x_low[c], child.x_high[c]),
                                                my = middle(child.y_low[c], child.y_high[c]);

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <limits>
 
-#include "kernels/wide.h"
+#include "kernels/geometry/wide.h"
 
 namespace slabwright {
 
@@ -425,23 +425,21 @@ SLABWRIGHT_WIDE void group_out_rows(const GroupCorners& g, const FacetGroup& gro
 namespace {
 
 constexpr int kLanes = static_cast<int>(GroupRows::kFacets);
-using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
-using Bits [[gnu::vector_size(kLanes * sizeof(std::int32_t))]] = std::int32_t;
 
 // (Vectors are handed on by reference: how one is passed by value depends on the instruction set.)
 template <class T, class Vector>
 [[gnu::always_inline]] inline void load(const GroupCorners::Each<T>& from, Vector& v) {
     std::memcpy(&v, from.data(), sizeof v);
 }
-[[gnu::always_inline]] inline void load_small(const GroupCorners::Each<std::int8_t>& from, Floats& v) {
-    using Small [[gnu::vector_size(kLanes)]] = std::int8_t;
-    Small small;
+[[gnu::always_inline]] inline void load_small(const GroupCorners::Each<std::int8_t>& from, Floats8& v) {
+    Chars8 small;
     std::memcpy(&small, from.data(), sizeof small);
-    v = __builtin_convertvector(small, Floats);
+    v = __builtin_convertvector(small, Floats8);
 }
-[[gnu::always_inline]] inline void lower(Floats& a, const Floats& b) { a = b < a ? b : a; }
-[[gnu::always_inline]] inline void raise(Floats& a, const Floats& b) { a = b > a ? b : a; }
-[[gnu::always_inline]] inline void stretch(Floats& from, Floats& to, const Bits& meets, const Floats& at) {
+[[gnu::always_inline]] inline void lower(Floats8& a, const Floats8& b) { a = b < a ? b : a; }
+[[gnu::always_inline]] inline void raise(Floats8& a, const Floats8& b) { a = b > a ? b : a; }
+[[gnu::always_inline]] inline void stretch(Floats8& from, Floats8& to, const Ints8& meets,
+                                           const Floats8& at) {
     from = (meets & (at < from)) ? at : from;
     to = (meets & (at > to)) ? at : to;
 }
@@ -453,45 +451,45 @@ template <class T, class Vector>
 // `wider` is more than what floats round, of the heights and of where an edge crosses one of them.
 SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& group, std::size_t v,
                                    double radius, double zc, GroupTouched& touched) {
-    const Floats none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
+    const Floats8 none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
     const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]),
                step = r * static_cast<float>(SolidFacet::kTurn);
     const float wider = kTouchMargin + 1e-6F * (r + std::abs(z) + group.radius + group.thickness);
-    Floats nz, nv;
-    Bits edges;
+    Floats8 nz, nv;
+    Ints8 edges;
     load(g.normal[2], nz), load(g.normal[v], nv), load(g.edges, edges);
-    const auto store = [](const Floats& low, const Floats& high, GroupTouched::Range& range) {
+    const auto store = [](const Floats8& low, const Floats8& high, GroupTouched::Range& range) {
         std::memcpy(range.low.data(), &low, sizeof low), std::memcpy(range.high.data(), &high, sizeof high);
     };
-    Floats all_low = inf, all_high = -inf;
+    Floats8 all_low = inf, all_high = -inf;
     // Of each corner the normals, and where a ball touches it; of each edge what it is wide for each mm that
     // it is high.
-    std::array<Floats, 3> pz, pv, wide, least, most;
+    std::array<Floats8, 3> pz, pv, wide, least, most;
     for (std::size_t c = 0; c < 3; ++c) {
         load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]);
-        Floats down, up, left, right;
+        Floats8 down, up, left, right;
         load_small(g.corner.low[c][2], down), load_small(g.corner.high[c][2], up);
         load_small(g.corner.low[c][v], left), load_small(g.corner.high[c][v], right);
-        const Bits meets =
+        const Ints8 meets =
             ((edges & (8 << c)) != 0) & (pz[c] >= z - step * up - wider) & (pz[c] <= z - step * down + wider);
-        const Floats low = meets ? pv[c] + step * left - wider : inf,
-                     high = meets ? pv[c] + step * right + wider : -inf;
+        const Floats8 low = meets ? pv[c] + step * left - wider : inf,
+                      high = meets ? pv[c] + step * right + wider : -inf;
         store(low, high, touched.end[c]);
         lower(all_low, low), raise(all_high, high);
     }
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t next = k == 2 ? 0 : k + 1;
-        const Floats rise = pz[next] - pz[k];
+        const Floats8 rise = pz[next] - pz[k];
         wide[k] = (pv[next] - pv[k]) / (rise == 0 ? one : rise);
         least[k] = most[k] = pz[k];
         lower(least[k], pz[next]), raise(most[k], pz[next]);
     }
     // Where an edge crosses a height.
-    const auto cross = [&](Floats& low, Floats& high, std::size_t k, const Floats& height) {
+    const auto cross = [&](Floats8& low, Floats8& high, std::size_t k, const Floats8& height) {
         stretch(low, high, (least[k] <= height) & (height <= most[k]), pv[k] + (height - pz[k]) * wide[k]);
     };
-    const Floats at = z - r * nz, under = at - wider, over = at + wider;
-    Floats low = inf, high = -inf;
+    const Floats8 at = z - r * nz, under = at - wider, over = at + wider;
+    Floats8 low = inf, high = -inf;
     for (std::size_t k = 0; k < 3; ++k) {
         stretch(low, high, (pz[k] >= under) & (pz[k] <= over), pv[k]);
         cross(low, high, k, under), cross(low, high, k, over);
@@ -501,16 +499,16 @@ SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& grou
     lower(all_low, low), raise(all_high, high);
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t next = k == 2 ? 0 : k + 1;
-        Floats down, up, left, right;
+        Floats8 down, up, left, right;
         load_small(g.edge.low[k][2], down), load_small(g.edge.high[k][2], up);
         load_small(g.edge.low[k][v], left), load_small(g.edge.high[k][v], right);
-        const Floats lowest = z - step * up - wider, highest = z - step * down + wider;
+        const Floats8 lowest = z - step * up - wider, highest = z - step * down + wider;
         low = inf, high = -inf;
         stretch(low, high, (pz[k] >= lowest) & (pz[k] <= highest), pv[k]);
         stretch(low, high, (pz[next] >= lowest) & (pz[next] <= highest), pv[next]);
         cross(low, high, k, lowest), cross(low, high, k, highest);
         low += step * left - wider, high += step * right + wider;
-        const Bits tests = (edges & (1 << k)) != 0;
+        const Ints8 tests = (edges & (1 << k)) != 0;
         low = tests ? low : inf, high = tests ? high : -inf;
         store(low, high, touched.edge[k]);
         lower(all_low, low), raise(all_high, high);
@@ -522,30 +520,30 @@ SLABWRIGHT_WIDE void group_touched(const GroupCorners& g, const FacetGroup& grou
 // in one that is near enough.
 SLABWRIGHT_WIDE void group_touched_by_disc(const GroupCorners& g, const FacetGroup& group, std::size_t v,
                                            double radius, double zc, GroupTouched::Range& touched) {
-    const Floats none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
+    const Floats8 none{}, one = none + 1.0F, inf = none + std::numeric_limits<float>::infinity();
     const auto r = static_cast<float>(radius), z = static_cast<float>(zc - group.middle[2]);
     const float wider = kTouchMargin + 1e-6F * (r + std::abs(z) + group.radius + group.thickness),
                 under = z - wider, over = z + wider;
-    Floats nu, nv, across;
+    Floats8 nu, nv, across;
     load(g.normal[1 - v], nu), load(g.normal[v], nv);
     across = nu * nu + nv * nv;
     for (int i = 0; i < kLanes; ++i) across[i] = std::sqrt(across[i]);
     nv /= (across > 0) ? across : one;
-    std::array<Floats, 3> pz, pv, aside;
+    std::array<Floats8, 3> pz, pv, aside;
     for (std::size_t c = 0; c < 3; ++c)
         load(g.p[c][2], pz[c]), load(g.p[c][v], pv[c]), load(g.aside[c], aside[c]);
-    Floats low = inf, high = -inf;
-    const auto add = [&](const Bits& meets, const Floats& at, const Floats& turn) {
-        Floats least = nv - turn, most = nv + turn;
+    Floats8 low = inf, high = -inf;
+    const auto add = [&](const Ints8& meets, const Floats8& at, const Floats8& turn) {
+        Floats8 least = nv - turn, most = nv + turn;
         raise(least, -one), lower(most, one);
-        const Floats from = at + r * least, to = at + r * most;
+        const Floats8 from = at + r * least, to = at + r * most;
         low = (meets & (from < low)) ? from : low;
         high = (meets & (to > high)) ? to : high;
     };
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t next = k == 2 ? 0 : k + 1;
-        const Floats rise = pz[next] - pz[k], wide = (pv[next] - pv[k]) / (rise == 0 ? one : rise);
-        Floats least = pz[k], most = pz[k], turn = aside[k];
+        const Floats8 rise = pz[next] - pz[k], wide = (pv[next] - pv[k]) / (rise == 0 ? one : rise);
+        Floats8 least = pz[k], most = pz[k], turn = aside[k];
         lower(least, pz[next]), raise(most, pz[next]), lower(turn, aside[next]);
         add((pz[k] >= under) & (pz[k] <= over), pv[k], aside[k]);
         add((least <= under) & (under <= most), pv[k] + (under - pz[k]) * wide, turn);

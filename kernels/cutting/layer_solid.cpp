@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "kernels/cutting/fibres.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/mesh/morton.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/slicing/slicing.h"
@@ -18,13 +19,6 @@ constexpr double kLeastAlong = 0.17;  // of normals along one that is amid them:
                                       // it, within which they hold all between them
 constexpr int kMostAside = 240;       // the same in a plane: short of straight back
 constexpr double kMostTiles = 1024;   // along x and along y, of solid_near
-
-Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
-Vec3d minus(const Vec3d& a, const Vec3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 Vec3d unit_normal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
     const Vec3d u = minus(b, a), v = minus(c, a), n = cross(u, v);
@@ -599,9 +593,9 @@ LayerSolid layer_solid(Context& context, MeshView mesh, double z_low, double z_t
     });
     using Extent = std::array<double, 4>;  // least x, y; greatest x, y
     const Extent extent = parallel_reduce(
-        context, solid.facets.size(), kGrain, Extent{1e300, 1e300, -1e300, -1e300},
+        context, solid.facets.size(), kGrain, Extent{kUnbounded, kUnbounded, -kUnbounded, -kUnbounded},
         [&](std::size_t begin, std::size_t end) {
-            Extent e{1e300, 1e300, -1e300, -1e300};
+            Extent e{kUnbounded, kUnbounded, -kUnbounded, -kUnbounded};
             for (std::size_t i = begin; i < end; ++i)
                 for (const Vec3d& p : solid.facets[i].p)
                     e = {std::min(e[0], p[0]), std::min(e[1], p[1]), std::max(e[2], p[0]),

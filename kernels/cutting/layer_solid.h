@@ -9,14 +9,13 @@
 
 #include "kernels/cutting/cap_cells.h"
 #include "kernels/cutting/facet_tree.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/mesh/bulk_memory.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 #include "kernels/polygons/loops.h"
 
 namespace slabwright {
-
-using Vec3d = std::array<double, 3>;
 
 /// A facet of the layer's solid, cut off kTopSheet below the layer's top.
 struct SolidFacet {

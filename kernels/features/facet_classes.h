@@ -21,19 +21,6 @@ struct FacetClasses {
     double z_base = 0;           ///< lowest z of the facets' corners
 };
 
-using Vec3d = std::array<double, 3>;
-
-[[nodiscard]] inline Vec3d to_double(const Vec3f& v) { return {v.x, v.y, v.z}; }
-[[nodiscard]] inline Vec3d minus(const Vec3d& a, const Vec3d& b) {
-    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-[[nodiscard]] inline Vec3d cross(const Vec3d& a, const Vec3d& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-[[nodiscard]] inline double dot(const Vec3d& a, const Vec3d& b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /// Twice the area times the outward unit normal, in double from the float corners.
 [[nodiscard]] Vec3d area_normal(MeshView mesh, std::uint32_t facet);
 

@@ -12,17 +12,7 @@ namespace slabwright {
 
 namespace {
 
-struct Direction {
-    double x = 0, y = 0, z = 0;
-};
-
-Direction between(const Vec3f& a, const Vec3f& b) {
-    return {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z};
-}
-double dot(const Direction& a, const Direction& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Direction cross(const Direction& a, const Direction& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+Vec3d way(const Vec3f& a, const Vec3f& b) { return minus(to_double(b), to_double(a)); }
 
 /// Grows with the angle of (x, y) from +x, 0 … 4 for a whole turn; only divides, so no library's atan2
 /// decides an order.
@@ -55,15 +45,15 @@ void link(Mesh& mesh, const EdgeUse& a, const EdgeUse& b) {
 /// partner.
 void pair_around_edge(Mesh& mesh, std::span<const EdgeUse> uses) {
     const Vec3f low = mesh.vertices[uses[0].low];
-    const Direction edge = between(low, mesh.vertices[uses[0].high]);
+    const Vec3d edge = way(low, mesh.vertices[uses[0].high]);
     std::vector<Blade> blades;
     blades.reserve(uses.size());
-    Direction u, v;
+    Vec3d u{}, v{};
     bool framed = false;
     for (const EdgeUse& use : uses) {
         const Index3& facet = mesh.facets[use.facet()];
-        const Direction arm = between(low, mesh.vertices[facet[(use.corner() + 2) % 3]]);
-        const Direction across =
+        const Vec3d arm = way(low, mesh.vertices[facet[(use.corner() + 2) % 3]]);
+        const Vec3d across =
             cross(edge, arm);  // perpendicular to the edge, a quarter turn ahead of the facet
         double angle = 0;      // a facet without area lies anywhere: with the first
         if (dot(across, across) > 0) {
@@ -73,8 +63,8 @@ void pair_around_edge(Mesh& mesh, std::span<const EdgeUse> uses) {
                 framed = true;
                 // Both to unit length, so that the angle is one.
                 const double lu = std::sqrt(dot(u, u)), lv = std::sqrt(dot(v, v));
-                u = {u.x / lu, u.y / lu, u.z / lu};
-                v = {v.x / lv, v.y / lv, v.z / lv};
+                u = {u[0] / lu, u[1] / lu, u[2] / lu};
+                v = {v[0] / lv, v[1] / lv, v[2] / lv};
             }
             // The arm's own direction is `across` turned back by a quarter.
             angle = diamond_angle(dot(across, v), -dot(across, u));

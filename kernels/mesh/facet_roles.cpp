@@ -13,6 +13,7 @@
 #include <numeric>
 #include <vector>
 
+#include "kernels/geometry/wide.h"
 #include "kernels/mesh/clusters.h"
 #include "kernels/mesh/morton.h"
 #include "kernels/mesh/windings.h"
@@ -30,29 +31,20 @@ constexpr double kBeside = 2e-6;  // mm: how far from a patch the winding number
 constexpr double kFolded = 1e-4;  // short of 1, the cosine between facets beside each other of which one is
                                   // folded back onto the other: less than a degree
 
-struct Point {
-    double x = 0, y = 0, z = 0;
-};
-Point operator-(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Point operator+(const Point& a, const Point& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-Point operator*(double s, const Point& a) { return {s * a.x, s * a.y, s * a.z}; }
-Point cross(const Point& a, const Point& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Point point(const Vec3f& v) { return {v.x, v.y, v.z}; }
-
-using Corners = std::array<Point, 3>;
+using Corners = std::array<Vec3d, 3>;
 Corners corners(MeshView mesh, std::uint32_t f) {
     const Index3& facet = mesh.facets[f];
-    return {point(mesh.vertices[facet[0]]), point(mesh.vertices[facet[1]]), point(mesh.vertices[facet[2]])};
+    return {to_double(mesh.vertices[facet[0]]), to_double(mesh.vertices[facet[1]]),
+            to_double(mesh.vertices[facet[2]])};
 }
-Point normal(const Corners& p) { return cross(p[1] - p[0], p[2] - p[0]); }
+Vec3d normal(const Corners& p) { return cross(minus(p[1], p[0]), minus(p[2], p[0])); }
+
+Vec3d centroid(const Corners& p) { return scaled(1.0 / 3, plus(plus(p[0], p[1]), p[2])); }
 
 bool collapsed(const Index3& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
 /// Whether the two stand at least `gap` apart along an axis; false for one that is no direction.
-bool apart_along(const Corners& a, const Corners& b, const Point& axis, double gap) {
+bool apart_along(const Corners& a, const Corners& b, const Vec3d& axis, double gap) {
     const double length2 = dot(axis, axis);
     if (!(length2 > 0)) return false;
     const auto [a0, a1] = std::minmax({dot(axis, a[0]), dot(axis, a[1]), dot(axis, a[2])});
@@ -64,16 +56,22 @@ bool apart_along(const Corners& a, const Corners& b, const Point& axis, double g
 bool apart(const Corners& a, Corners b, double gap) {
     // From one of the corners, so that no digits are lost far from the origin.
     Corners p;
-    const Point origin = a[0];
-    for (std::size_t k = 0; k < 3; ++k) p[k] = a[k] - origin, b[k] = b[k] - origin;
-    const Point m = normal(p), n = normal(b);
+    const Vec3d origin = a[0];
+    for (std::size_t k = 0; k < 3; ++k) {
+        p[k] = minus(a[k], origin);
+        b[k] = minus(b[k], origin);
+    }
+    const Vec3d m = normal(p), n = normal(b);
     if (apart_along(p, b, m, gap) || apart_along(p, b, n, gap)) return true;
-    std::array<Point, 3> e, f;
-    for (std::size_t k = 0; k < 3; ++k) e[k] = p[(k + 1) % 3] - p[k], f[k] = b[(k + 1) % 3] - b[k];
+    std::array<Vec3d, 3> e, f;
+    for (std::size_t k = 0; k < 3; ++k) {
+        e[k] = minus(p[(k + 1) % 3], p[k]);
+        f[k] = minus(b[(k + 1) % 3], b[k]);
+    }
     for (std::size_t k = 0; k < 3; ++k)
         if (apart_along(p, b, cross(m, e[k]), gap) || apart_along(p, b, cross(n, f[k]), gap)) return true;
-    for (const Point& u : e)
-        for (const Point& v : f)
+    for (const Vec3d& u : e)
+        for (const Vec3d& v : f)
             if (apart_along(p, b, cross(u, v), gap)) return true;
     return false;
 }
@@ -93,8 +91,8 @@ bool meet(MeshView mesh, std::uint32_t f, std::uint32_t g) {
     std::size_t i = 0, j = 0;  // the corners that they do not share
     while (s[i] == t[0] || s[i] == t[1] || s[i] == t[2]) ++i;
     while (t[j] == s[0] || t[j] == s[1] || t[j] == s[2]) ++j;
-    const Point edge = a[(i + 2) % 3] - a[(i + 1) % 3];
-    const Point u = cross(edge, a[i] - a[(i + 1) % 3]), v = cross(edge, b[j] - a[(i + 1) % 3]);
+    const Vec3d edge = minus(a[(i + 2) % 3], a[(i + 1) % 3]);
+    const Vec3d u = cross(edge, minus(a[i], a[(i + 1) % 3])), v = cross(edge, minus(b[j], a[(i + 1) % 3]));
     return dot(u, v) > (1 - kFolded) * std::sqrt(dot(u, u) * dot(v, v));
 }
 
@@ -124,11 +122,9 @@ Box child(const Boxes& boxes, std::size_t i) {
 }
 /// A bit for each of the eight that a box meets.
 unsigned meeting(const Boxes& boxes, const Box& box) {
-    using Floats [[gnu::vector_size(kTogether * sizeof(float))]] = float;
-    using Bits [[gnu::vector_size(kTogether * sizeof(float))]] = std::int32_t;
-    Bits all{1, 2, 4, 8, 16, 32, 64, 128};
+    Ints8 all{1, 2, 4, 8, 16, 32, 64, 128};
     for (std::size_t k = 0; k < 3; ++k) {
-        Floats low, high;
+        Floats8 low, high;
         std::memcpy(&low, boxes.low[k].data(), sizeof low);
         std::memcpy(&high, boxes.high[k].data(), sizeof high);
         all &= (low <= box.high[k]) & (high >= box.low[k]);
@@ -154,8 +150,8 @@ BoxTree box_tree(Context& context, MeshView mesh) {
     parallel_for(context, mesh.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end; ++f) {
             const Corners p = corners(mesh, static_cast<std::uint32_t>(f));
-            const Point middle = (1.0 / 3) * (p[0] + p[1] + p[2]);
-            keys[f] = {grid.code(middle.x, middle.y, middle.z), static_cast<std::uint32_t>(f)};
+            const Vec3d middle = centroid(p);
+            keys[f] = {grid.code(middle[0], middle[1], middle[2]), static_cast<std::uint32_t>(f)};
         }
     });
     parallel_sort(context, keys.begin(), keys.end(), [](const Key& a, const Key& b) {
@@ -299,19 +295,20 @@ BulkVector<FacetRole> facet_roles(Context& context, MeshView mesh) {
             largest.emplace_back();
         }
         patch[f] = root;
-        const Point n = normal(corners(mesh, f));
+        const Vec3d n = normal(corners(mesh, f));
         if (const double area2 = dot(n, n); area2 > largest[number[root]].area2)
             largest[number[root]] = {area2, f};
     }
     std::vector<std::array<double, 3>> places;
     for (const Largest& l : largest) {
-        Point middle, away;
+        Vec3d middle{}, away{};
         if (l.facet != kNoFacet) {
             const Corners c = corners(mesh, l.facet);
-            middle = (1.0 / 3) * (c[0] + c[1] + c[2]);
-            away = (kBeside / std::sqrt(l.area2)) * normal(c);
+            middle = centroid(c);
+            away = scaled(kBeside / std::sqrt(l.area2), normal(c));
         }
-        for (const Point& p : {middle + away, middle - away}) places.push_back({p.x, p.y, p.z});
+        places.push_back(plus(middle, away));
+        places.push_back(minus(middle, away));
     }
     const std::vector<int> winding = windings_at(context, mesh, places);
     BulkVector<FacetRole> roles(mesh.size());

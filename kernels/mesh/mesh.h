@@ -6,17 +6,12 @@
 #include <cstdint>
 #include <span>
 
+#include "kernels/geometry/vectors.h"
 #include "kernels/mesh/bulk_memory.h"
 
 namespace slabwright {
 
 class Context;
-
-/// A point in millimetres, frame `pattern-base` (z = 0 at the pattern's bottom).
-struct Vec3f {
-    float x = 0, y = 0, z = 0;
-    friend bool operator==(const Vec3f&, const Vec3f&) = default;
-};
 
 /// Three vertex (or facet) indices.
 using Index3 = std::array<std::uint32_t, 3>;
@@ -34,7 +29,7 @@ enum class FacetRole : std::uint8_t {
 
 /// Borrowed arrays of a mesh. Facets are counter-clockwise seen from outside.
 struct MeshView {
-    std::span<const Vec3f> vertices;
+    std::span<const Vec3f> vertices;  ///< mm, frame `pattern-base` (z = 0 at the pattern's bottom)
     std::span<const Index3> facets;
     /// neighbours[f][k] is the facet across the edge (facets[f][k], facets[f][(k + 1) % 3]), or kNoFacet.
     std::span<const Index3> neighbours;

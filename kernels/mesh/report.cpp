@@ -15,17 +15,6 @@ namespace {
 
 constexpr std::size_t kGrain = std::size_t{1} << 15;
 
-struct Point {
-    double x = 0, y = 0, z = 0;
-};
-
-Point operator-(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Point cross(const Point& a, const Point& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Point point(const Vec3f& v) { return {v.x, v.y, v.z}; }
-
 void note(Finding& finding, std::uint32_t facet, std::uint64_t count = 1) {
     if (count == 0) return;
     finding.count += count;
@@ -40,9 +29,9 @@ bool collapsed(const Index3& facet) {
 
 /// Twice the vector area. Differences and products of float32 coordinates of like size are exact in double,
 /// so three points on a line give exactly zero.
-Point twice_area(MeshView mesh, const Index3& facet) {
-    const Point a = point(mesh.vertices[facet[0]]);
-    return cross(point(mesh.vertices[facet[1]]) - a, point(mesh.vertices[facet[2]]) - a);
+Vec3d twice_area(MeshView mesh, const Index3& facet) {
+    const Vec3d a = to_double(mesh.vertices[facet[0]]);
+    return cross(minus(to_double(mesh.vertices[facet[1]]), a), minus(to_double(mesh.vertices[facet[2]]), a));
 }
 
 struct EdgeFindings {
@@ -117,18 +106,18 @@ struct Sums {
 
 /// A point of a component of which it is asked how much material of the other components surrounds it.
 struct Query {
-    Point p;
+    Vec3d p{};
     std::uint32_t component;
 };
 
 /// Whether the step from a to b crosses the ray from q towards +x in the plane, and in which direction. The
 /// side is computed from the lower end, so that two facets that share the edge agree to the last bit.
-int crossing(const Point& a, const Point& b, const Point& q) {
-    if ((a.y <= q.y) == (b.y <= q.y)) return 0;
-    const bool up = a.y <= q.y;
-    const Point& low = up ? a : b;
-    const Point& high = up ? b : a;
-    const double side = (high.x - low.x) * (q.y - low.y) - (high.y - low.y) * (q.x - low.x);
+int crossing(const Vec3d& a, const Vec3d& b, const Vec3d& q) {
+    if ((a[1] <= q[1]) == (b[1] <= q[1])) return 0;
+    const bool up = a[1] <= q[1];
+    const Vec3d& low = up ? a : b;
+    const Vec3d& high = up ? b : a;
+    const double side = (high[0] - low[0]) * (q[1] - low[1]) - (high[1] - low[1]) * (q[0] - low[0]);
     if (!(side > 0)) return 0;
     return up ? 1 : -1;
 }
@@ -141,31 +130,31 @@ std::vector<int> material_around(Context& context, MeshView mesh, std::span<cons
     std::vector<std::size_t> by_x(queries.size());
     for (std::size_t i = 0; i < by_x.size(); ++i) by_x[i] = i;
     std::sort(by_x.begin(), by_x.end(), [&](std::size_t a, std::size_t b) {
-        return queries[a].p.x != queries[b].p.x ? queries[a].p.x < queries[b].p.x : a < b;
+        return queries[a].p[0] != queries[b].p[0] ? queries[a].p[0] < queries[b].p[0] : a < b;
     });
     std::vector<std::atomic<int>> winding(queries.size());
     parallel_for(context, mesh.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end; ++f) {
             const Index3& facet = mesh.facets[f];
-            const Point a = point(mesh.vertices[facet[0]]), b = point(mesh.vertices[facet[1]]),
-                        c = point(mesh.vertices[facet[2]]);
-            const auto [x0, x1] = std::minmax({a.x, b.x, c.x});
-            const auto [y0, y1] = std::minmax({a.y, b.y, c.y});
+            const Vec3d a = to_double(mesh.vertices[facet[0]]), b = to_double(mesh.vertices[facet[1]]),
+                        c = to_double(mesh.vertices[facet[2]]);
+            const auto [x0, x1] = std::minmax({a[0], b[0], c[0]});
+            const auto [y0, y1] = std::minmax({a[1], b[1], c[1]});
             auto at = std::lower_bound(by_x.begin(), by_x.end(), x0,
-                                       [&](std::size_t i, double x) { return queries[i].p.x < x; });
-            for (; at != by_x.end() && queries[*at].p.x <= x1; ++at) {
+                                       [&](std::size_t i, double x) { return queries[i].p[0] < x; });
+            for (; at != by_x.end() && queries[*at].p[0] <= x1; ++at) {
                 const Query& query = queries[*at];
-                const Point& q = query.p;
-                if (q.y < y0 || q.y > y1 || query.component == component_of[f]) continue;
+                const Vec3d& q = query.p;
+                if (q[1] < y0 || q[1] > y1 || query.component == component_of[f]) continue;
                 const int turns = crossing(a, b, q) + crossing(b, c, q) + crossing(c, a, q);
                 if (turns == 0) continue;
-                const Point normal = cross(b - a, c - a);
-                const auto [z0, z1] = std::minmax({a.z, b.z, c.z});
+                const Vec3d normal = cross(minus(b, a), minus(c, a));
+                const auto [z0, z1] = std::minmax({a[2], b[2], c[2]});
                 double z = z1;
-                if (normal.z != 0)
-                    z = std::clamp(a.z - ((q.x - a.x) * normal.x + (q.y - a.y) * normal.y) / normal.z, z0,
-                                   z1);
-                if (z > q.z) winding[*at].fetch_add(turns, std::memory_order_relaxed);
+                if (normal[2] != 0)
+                    z = std::clamp(a[2] - ((q[0] - a[0]) * normal[0] + (q[1] - a[1]) * normal[1]) / normal[2],
+                                   z0, z1);
+                if (z > q[2]) winding[*at].fetch_add(turns, std::memory_order_relaxed);
             }
         }
     });
@@ -231,7 +220,7 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
 
     // Volume is summed from tetrahedra to the middle of the base: exact for a mesh that is open in its base
     // plane only, and without loss of digits for a mesh far from the origin.
-    const Point origin{(double(report.box.min.x) + report.box.max.x) / 2,
+    const Vec3d origin{(double(report.box.min.x) + report.box.max.x) / 2,
                        (double(report.box.min.y) + report.box.max.y) / 2, base};
     const Sums sums = parallel_reduce(
         context, n, kGrain, Sums{},
@@ -240,11 +229,11 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
             for (std::size_t f = begin; f < end; ++f) {
                 const Index3& facet = mesh.facets[f];
                 const std::uint32_t mine = report.component_of[f];
-                const Point area = twice_area(mesh, facet);
+                const Vec3d area = twice_area(mesh, facet);
                 const double squared = dot(area, area);
                 if (collapsed(facet) || squared == 0) note(part.degenerate, static_cast<std::uint32_t>(f));
                 part.area += std::sqrt(squared) / 2;
-                const double volume = dot(area, point(mesh.vertices[facet[0]]) - origin) / 6;
+                const double volume = dot(area, minus(to_double(mesh.vertices[facet[0]]), origin)) / 6;
                 if (part.runs.empty() || part.runs.back().component != mine) part.runs.push_back({mine, 0});
                 part.runs.back().volume += volume;
                 for (int k = 0; k < 3; ++k) {
@@ -282,14 +271,14 @@ MeshReport report_mesh(Context& context, MeshView mesh, const std::vector<std::u
         for (std::size_t f = 0; f < n; ++f) {
             const std::uint32_t c = report.component_of[f];
             if (asked[c] == 0) continue;
-            const Point area = twice_area(mesh, mesh.facets[f]);
+            const Vec3d area = twice_area(mesh, mesh.facets[f]);
             if (dot(area, area) == 0) continue;
             asked[c] = 0;
             Query query{{}, c};
             for (const std::uint32_t v : mesh.facets[f]) {
-                query.p.x += mesh.vertices[v].x / 3.0;
-                query.p.y += mesh.vertices[v].y / 3.0;
-                query.p.z += mesh.vertices[v].z / 3.0;
+                query.p[0] += mesh.vertices[v].x / 3.0;
+                query.p[1] += mesh.vertices[v].y / 3.0;
+                query.p[2] += mesh.vertices[v].z / 3.0;
             }
             queries.push_back(query);
             first_facets.push_back(static_cast<std::uint32_t>(f));

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "kernels/errors.h"
+#include "kernels/geometry/wide.h"
 #include "kernels/mesh/raw_array.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/parallel/deal.h"
@@ -28,8 +29,6 @@ namespace {
 // called in this file alone.
 #pragma GCC diagnostic ignored "-Wpsabi"
 constexpr std::size_t kLanes = 4;
-using Four [[gnu::vector_size(kLanes * sizeof(double))]] = double;
-using Signs [[gnu::vector_size(kLanes * sizeof(double))]] = std::int64_t;
 
 template <class Real>
 struct Space {
@@ -37,7 +36,7 @@ struct Space {
     friend Space operator-(const Space& a, const Space& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 };
 using Place = Space<double>;
-using Places = Space<Four>;
+using Places = Space<Doubles4>;
 
 constexpr std::size_t kBlockFacets = 1 << 15;  // that a block has on the average
 constexpr int kMostAround = 16;                // a vertex with more facets around it stays
@@ -66,16 +65,18 @@ Space<Real> cross(const Space<Real>& a, const Space<Real>& b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, turn(a, b)};
 }
 
-Four larger(const Four& a, const Four& b) { return a < b ? b : a; }
-Four smaller(const Four& a, const Four& b) { return b < a ? b : a; }
-double smallest(const Four& a) { return std::min(std::min(a[0], a[1]), std::min(a[2], a[3])); }
-Four root(const Four& a) { return Four{std::sqrt(a[0]), std::sqrt(a[1]), std::sqrt(a[2]), std::sqrt(a[3])}; }
-std::uint64_t joined_bits(const Signs& s) { return static_cast<std::uint64_t>(s[0] | s[1] | s[2] | s[3]); }
-constexpr Signs kOwn{1, 2, 4, 8};  // bits
-unsigned bits(const Signs& s) { return static_cast<unsigned>(joined_bits(s & kOwn)); }
+Doubles4 larger(const Doubles4& a, const Doubles4& b) { return a < b ? b : a; }
+Doubles4 smaller(const Doubles4& a, const Doubles4& b) { return b < a ? b : a; }
+double smallest(const Doubles4& a) { return std::min(std::min(a[0], a[1]), std::min(a[2], a[3])); }
+Doubles4 root(const Doubles4& a) {
+    return Doubles4{std::sqrt(a[0]), std::sqrt(a[1]), std::sqrt(a[2]), std::sqrt(a[3])};
+}
+std::uint64_t joined_bits(const Longs4& s) { return static_cast<std::uint64_t>(s[0] | s[1] | s[2] | s[3]); }
+constexpr Longs4 kOwn{1, 2, 4, 8};  // bits
+unsigned bits(const Longs4& s) { return static_cast<unsigned>(joined_bits(s & kOwn)); }
 
 /// Heights of facets with one corner at the origin over their longest edges.
-Four heights(const Places& p, const Places& q, const Four& square) {
+Doubles4 heights(const Places& p, const Places& q, const Doubles4& square) {
     const Places third = q - p;
     return root(square) / root(larger(larger(dot(p, p), dot(q, q)), dot(third, third)));
 }
@@ -240,13 +241,12 @@ private:
         }
         // A bit for each facet that begins where this one ends. Two in a fan that visits all are at the same
         // vertex where a facet is degenerate: then there is no such fan.
-        using Eight [[gnu::vector_size(32)]] = std::uint32_t;
         std::array<std::uint32_t, kMostAround> follow;
         for (std::size_t half = 0; half < static_cast<std::size_t>(n); half += 8) {
-            Eight ends, bits{};
+            Words8 ends, bits{};
             std::memcpy(&ends, &to[half], sizeof(ends));
             for (int j = 0; j < n; ++j)
-                bits |= static_cast<Eight>(ends == from[static_cast<std::size_t>(j)]) & (1u << j);
+                bits |= static_cast<Words8>(ends == from[static_cast<std::size_t>(j)]) & (1u << j);
             std::memcpy(&follow[half], &bits, sizeof(bits));
         }
         n_ = n;
@@ -302,10 +302,10 @@ private:
             high_ = std::max(high_, faces_[fan_[a]].high);
         }
         arm_.repeat(count(), count() + kLanes + 1);
-        Signs no_area{};
+        Longs4 no_area{};
         for (std::size_t a = 0; a < count(); a += kLanes) {
             const Places n = cross(arm_.at(a), arm_.at(a + 1));
-            const Four square = dot(n, n);
+            const Doubles4 square = dot(n, n);
             normal_.put(a, n);
             put(square_, a, square);
             no_area |= square == 0;
@@ -317,9 +317,9 @@ private:
         const double length = std::sqrt(dot(sum, sum));
         if (length == 0) return false;
         const Place w{sum.x / length, sum.y / length, sum.z / length};
-        Signs turned{};
+        Longs4 turned{};
         for (std::size_t a = 0; a < count(); a += kLanes) {
-            const Four along = dot(normal_.at(a), w);
+            const Doubles4 along = dot(normal_.at(a), w);
             turned |= (along <= 0) | (along * along < kLeastFacing * kLeastFacing * four(square_, a));
         }
         if (joined_bits(turned) != 0) return false;
@@ -342,7 +342,7 @@ private:
     void look_at_old_facets() {
         if (old_facets_known_) return;
         old_facets_known_ = true;
-        Four least = Four{} + kLeastHeight;
+        Doubles4 least = Doubles4{} + kLeastHeight;
         for (std::size_t a = 0; a < count(); a += kLanes) {
             least = smaller(least, heights(arm_.at(a), arm_.at(a + 1), four(square_, a)));
             const Places n = cross(flat_.at(a), flat_.at(a + 1));
@@ -374,7 +374,7 @@ private:
     bool may_go_to(std::uint32_t v, int k) {
         const std::size_t n = count(), start = static_cast<std::size_t>(k);
         const Place a = flat_.get(start);
-        const Places fours_a{Four{} + a.x, Four{} + a.y, Four{} + a.z};
+        const Places fours_a{Doubles4{} + a.x, Doubles4{} + a.y, Doubles4{} + a.z};
         auto from_a = [&](std::size_t i) { return flat_.at(start + i) - fours_a; };
         // How far what was there stands over what follows.
         double low = 0, high = 0;
@@ -389,10 +389,10 @@ private:
         };
         // On which side of the way to a each vertex lies (bits from 0 on, from 16 on the other), and which
         // new facets are upright (from 32 on).
-        Signs found{}, own = kOwn;
+        Longs4 found{}, own = kOwn;
         for (std::size_t i = 0; i < n; i += kLanes, own <<= kLanes) {
             const Places p = from_a(i), q = from_a(i + 1);
-            const Four side = turn(fours_a, p), area2 = turn(p, q);
+            const Doubles4 side = turn(fours_a, p), area2 = turn(p, q);
             put(side_, i, side);
             put(area2_, i, area2);
             found |= ((side >= 0) & own) | ((side <= 0) & own << 16) | ((area2 > 0) & own << 32);
@@ -424,9 +424,9 @@ private:
             for (std::size_t j = first; j < last; j += kLanes) {
                 const Places r = flat_.at(start + j);
                 // a + s·d = t·r with s and t between 0 and 1
-                const Four det = turn(r, d), of_s = turn(fours_a, r);
-                const Four t = of_t / det, s = of_s / det;
-                const Four gap = t * r.z - (a.z + s * d.z);
+                const Doubles4 det = turn(r, d), of_s = turn(fours_a, r);
+                const Doubles4 t = of_t / det, s = of_s / det;
+                const Doubles4 gap = t * r.z - (a.z + s * d.z);
                 unsigned crossing = bits((of_t * det > 0) & (of_s * det > 0) & (t < 1) & (s < 1));
                 crossing &= (1u << std::min(kLanes, last - j)) - 1;
                 if (i - j < kLanes) crossing &= ~(1u << (i - j));
@@ -435,23 +435,23 @@ private:
             }
         }
         look_at_old_facets();
-        Four least = Four{} + kNever;
+        Doubles4 least = Doubles4{} + kNever;
         std::array<Places, kMostAround / kLanes> normal;
-        std::array<Four, kMostAround / kLanes> square;
+        std::array<Doubles4, kMostAround / kLanes> square;
         for (std::size_t i = 1; i + 1 < n; i += kLanes) {
             const Places p = from_a(i), q = from_a(i + 1);
             normal[i / kLanes] = cross(p, q);
             square[i / kLanes] = dot(normal[i / kLanes], normal[i / kLanes]);
-            const Four height = heights(p, q, square[i / kLanes]);
+            const Doubles4 height = heights(p, q, square[i / kLanes]);
             const auto beyond = static_cast<std::int64_t>(n - 1 - i);
-            least = smaller(least, Signs{0, 1, 2, 3} < beyond ? height : least);
+            least = smaller(least, Longs4{0, 1, 2, 3} < beyond ? height : least);
         }
         new_height_ = smallest(least);
         if (new_height_ < least_height_ * (1 - 1e-9) || new_height_ <= best_height_) return false;
         for (std::size_t i = 1; i + 1 < n; i += kLanes) {
-            Signs same = Signs{0, 1, 2, 3} >= static_cast<std::int64_t>(n - 1 - i);
+            Longs4 same = Longs4{0, 1, 2, 3} >= static_cast<std::int64_t>(n - 1 - i);
             for (std::size_t j = 0; j < n; ++j) {
-                const Four along = dot(normal[i / kLanes], flat_normal_.get(j));
+                const Doubles4 along = dot(normal[i / kLanes], flat_normal_.get(j));
                 same |= (along > 0) & (along * along >= same_facing2_[j] * square[i / kLanes]);
                 if (bits(same) == 15) break;
             }
@@ -528,12 +528,12 @@ private:
     // Around the vertex in work.
     template <class T, std::size_t times = 1>
     using Around = std::array<T, times * kMostAround + 2 * kLanes>;
-    static Four four(const auto& from, std::size_t i) {
-        Four values;
+    static Doubles4 four(const auto& from, std::size_t i) {
+        Doubles4 values;
         std::memcpy(&values, &from[i], sizeof(values));
         return values;
     }
-    static void put(auto& to, std::size_t i, const Four& values) {
+    static void put(auto& to, std::size_t i, const Doubles4& values) {
         std::memcpy(&to[i], &values, sizeof(values));
     }
     // Once and again from the start, so that four in a row may be asked anywhere.

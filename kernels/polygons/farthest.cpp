@@ -3,15 +3,13 @@
 #include <cstdint>
 #include <cstring>
 
-#include "kernels/wide.h"
+#include "kernels/geometry/wide.h"
 
 namespace slabwright {
 
 namespace {
 
 constexpr std::size_t kLanes = 8;
-using Doubles [[gnu::vector_size(kLanes * sizeof(double))]] = double;
-using WideBits [[gnu::vector_size(kLanes * sizeof(std::int64_t))]] = std::int64_t;
 
 struct Segment {
     double ax, ay, az, dx, dy, dz, l2;
@@ -39,16 +37,16 @@ template <class T>
 
 SLABWRIGHT_WIDE Farthest by_eights(const PointRows& p, const Segment& s, std::size_t first,
                                    std::size_t last) {
-    constexpr WideBits lane{0, 1, 2, 3, 4, 5, 6, 7};
-    Doubles most = Doubles{} - 1.0;
-    WideBits at{};
+    constexpr Longs8 lane{0, 1, 2, 3, 4, 5, 6, 7};
+    Doubles8 most = Doubles8{} - 1.0;
+    Longs8 at{};
     std::size_t i = first;
     for (; i + kLanes <= last; i += kLanes) {
-        Doubles x, y, z, d2;
+        Doubles8 x, y, z, d2;
         std::memcpy(&x, p.x.data() + i, sizeof x), std::memcpy(&y, p.y.data() + i, sizeof y),
             std::memcpy(&z, p.z.data() + i, sizeof z);
         distance2(s, x, y, z, d2);
-        const WideBits farther = d2 > most, here = lane + static_cast<std::int64_t>(i);
+        const Longs8 farther = d2 > most, here = lane + static_cast<std::int64_t>(i);
         most = farther ? d2 : most;
         at = farther ? here : at;
     }

@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "kernels/geometry/vectors.h"
 #include "kernels/mesh/clusters.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/repair/duplicates.h"
@@ -117,7 +118,7 @@ private:
     }
 
     bool merge(std::span<const EdgeUse> uses, double reach) {
-        constexpr double any = 1e300;
+        constexpr double any = kUnbounded;
         std::vector<double> room(soup_.vertices.size(), any);
         std::vector<std::uint32_t> ends;
         for_each_edge(uses, [&](std::span<const EdgeUse> edge) {

@@ -4,7 +4,7 @@
 #include <bit>
 #include <limits>
 
-#include "kernels/wide.h"
+#include "kernels/geometry/wide.h"
 
 namespace slabwright {
 

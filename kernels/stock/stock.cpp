@@ -3,7 +3,8 @@
 #include <cstring>
 #include <functional>
 
-#include "kernels/wide.h"
+#include "kernels/geometry/vectors.h"
+#include "kernels/geometry/wide.h"
 
 namespace slabwright {
 
@@ -11,8 +12,6 @@ namespace {
 
 constexpr int kLanes = 8;
 constexpr int kBlockCells = 16;  // a side
-using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
-using Doubles [[gnu::vector_size(kLanes * sizeof(double))]] = double;
 
 int blocks_of(int cells) { return (cells + kBlockCells - 1) / kBlockCells; }
 
@@ -35,7 +34,7 @@ namespace {
 // does not matter.
 struct Losses {
     std::array<double, kLanes> removed{}, most{}, highest{}, lowest{}, deepest{}, deep{};
-    Losses() { highest.fill(-1e300), lowest.fill(1e300); }
+    Losses() { highest.fill(-kUnbounded), lowest.fill(kUnbounded); }
 };
 
 // Lowers n cells, whole eights of them, to `left` over a slab's bottom where they stand higher. `first` is
@@ -100,7 +99,7 @@ SLABWRIGHT_WIDE bool lower_level(float* __restrict height, int n, float left, do
     float most = 0;
     int i = 0;
     if (n >= kLanes) {
-        Floats all{}, h;
+        Floats8 all{}, h;
         for (; i + kLanes <= n; i += kLanes) {
             std::memcpy(&h, height + i, sizeof h);
             all = h > all ? h : all;
@@ -134,15 +133,15 @@ SLABWRIGHT_WIDE float keep_over(const float* height, std::size_t nx, float left,
 
 // Lowers n cells to one height; how much they lost together.
 SLABWRIGHT_WIDE double lower_run(float* __restrict height, int n, float left, double bottom) {
-    Doubles lost{};
+    Doubles8 lost{};
     const double after = bottom + static_cast<double>(left);
     int i = 0;
     for (; i + kLanes <= n; i += kLanes) {
-        Floats h;
+        Floats8 h;
         std::memcpy(&h, height + i, sizeof h);
-        const Doubles stood = __builtin_convertvector(h, Doubles), none{};
+        const Doubles8 stood = __builtin_convertvector(h, Doubles8), none{};
         lost += stood > static_cast<double>(left) ? (bottom + stood) - after : none;
-        h = h > left ? Floats{} + left : h;
+        h = h > left ? Floats8{} + left : h;
         std::memcpy(height + i, &h, sizeof h);
     }
     double sum = 0;
@@ -251,7 +250,7 @@ public:
     /// The topmost slab's surface decides: a cutter that stays above it takes nothing there, nor of what lies
     /// below.
     [[nodiscard]] StandingHeights standing() const {
-        if (stock_.slabs_.empty()) return {stock_.board_.data(), 1e300};
+        if (stock_.slabs_.empty()) return {stock_.board_.data(), kUnbounded};
         return {stock_.slabs_.back().height.data(), stock_.slabs_.back().bottom};
     }
 
@@ -281,7 +280,7 @@ private:
         if (deep > 0) count_deep(first, static_cast<std::uint64_t>(deep));
         if (!(most > effect_.deepest)) return;
         // Of cells that lost as much the first.
-        double deepest = 1e300;
+        double deepest = kUnbounded;
         for (std::size_t k = 0; k < kLanes; ++k)
             if (losses.most[k] == most) deepest = std::min(deepest, losses.deepest[k]);
         effect_.deepest = most, deepest_cell_ = first + static_cast<std::size_t>(deepest);
@@ -370,7 +369,7 @@ bool Stock::clear(double x0, double x1, double y0, double y1, double z) {
 }
 
 double Stock::highest() const {
-    double most = -1e300;
+    double most = -kUnbounded;
     if (!slabs_.empty()) {
         const float top = highest_of(slabs_.back().height.data(), 0, static_cast<int>(grid_.count()), 1);
         if (top > 0) {

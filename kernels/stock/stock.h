@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "kernels/geometry/vectors.h"
 #include "kernels/stock/level_region.h"
 #include "kernels/stock/sweep.h"
 
@@ -15,8 +16,8 @@ namespace slabwright {
 struct CutEffect {
     double removed = 0;             ///< mm of height summed over cells: times cell² it is a volume
     double deepest = 0;             ///< mm that one cell lost, at most
-    double highest = -1e300;        ///< z of the highest stock that the motion took, before it was taken
-    double lowest = 1e300;          ///< z of the lowest point cut
+    double highest = -kUnbounded;   ///< z of the highest stock that the motion took, before it was taken
+    double lowest = kUnbounded;     ///< z of the lowest point cut
     std::array<double, 2> where{};  ///< the cell that lost most
     std::uint64_t deep_cells = 0;   ///< cells that lost more than `deep`
     double deep_across = 0;  ///< how many cells wide they lie on average: their number over the longer of
@@ -26,7 +27,7 @@ struct CutEffect {
 /// What a region cut to one height lost.
 struct LevelEffect {
     double removed = 0, deepest = 0;  ///< as in CutEffect
-    double lowest = 1e300;            ///< z of what was cut
+    double lowest = kUnbounded;       ///< z of what was cut
 };
 
 /// The stock over a rectangle of cells. Slabs are added from below; a column that is cut through a slab's
@@ -42,9 +43,9 @@ public:
     /// Takes away what the cutter meets on its way. Cells that lose more than `deep` mm are counted. @param
     /// chain as for sweep_above: what another motion of the chain gets as low or lower is left to that one
     CutEffect cut(const CutterEnd& end, const std::array<double, 3>& from, const std::array<double, 3>& to,
-                  double deep = 1e300, const ChainedSweep& chain = {});
+                  double deep = kUnbounded, const ChainedSweep& chain = {});
     /// The same along a level arc.
-    CutEffect cut(const CutterEnd& end, const LevelArc& arc, double deep = 1e300);
+    CutEffect cut(const CutterEnd& end, const LevelArc& arc, double deep = kUnbounded);
     /// The same down to z in a whole region of this stock's grid, at once; nothing at all where a cell would
     /// lose more than `most` mm, or more than the topmost slab.
     std::optional<LevelEffect> cut(LevelRegion& region, double z, double most);

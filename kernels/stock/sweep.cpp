@@ -4,18 +4,14 @@
 #include <cmath>
 #include <cstring>
 
-#include "kernels/wide.h"
+#include "kernels/geometry/vectors.h"
+#include "kernels/geometry/wide.h"
 
 namespace slabwright {
 
 namespace {
 
 constexpr int kLanes = 8;
-using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
-using Bits [[gnu::vector_size(kLanes * sizeof(std::int32_t))]] = std::int32_t;
-using Bytes [[gnu::vector_size(kLanes)]] = std::uint8_t;
-using Doubles [[gnu::vector_size(kLanes * sizeof(double))]] = double;
-using WideBits [[gnu::vector_size(kLanes * sizeof(std::int64_t))]] = std::int64_t;
 
 // (Vectors are handed on by reference: how one is passed by value depends on the instruction set.)
 template <class T, class Vector>
@@ -26,11 +22,11 @@ template <class T, class Vector>
 // Calls eight(first, stands) for n cells, eight at a time; past the last nothing stands.
 template <class Eight>
 [[gnu::always_inline]] inline void each_eight(const float* stands, int n, Eight&& eight) {
-    Floats f;
+    Floats8 f;
     int k = 0;
     for (; k + kLanes <= n; k += kLanes) {
         load(stands + k, f);
-        eight(k, __builtin_convertvector(f, Doubles));
+        eight(k, __builtin_convertvector(f, Doubles8));
     }
     if (k == n) return;
     std::array<float, kLanes> rest;
@@ -38,10 +34,10 @@ template <class Eight>
         rest[static_cast<std::size_t>(i)] =
             k + i < n ? stands[k + i] : -std::numeric_limits<float>::infinity();
     load(rest.data(), f);
-    eight(k, __builtin_convertvector(f, Doubles));
+    eight(k, __builtin_convertvector(f, Doubles8));
 }
 
-[[gnu::always_inline]] inline bool any_of(const WideBits& bits) {
+[[gnu::always_inline]] inline bool any_of(const Longs8& bits) {
     std::array<std::uint64_t, kLanes> words;
     std::memcpy(words.data(), &bits, sizeof bits);
     return (words[0] | words[1] | words[2] | words[3] | words[4] | words[5] | words[6] | words[7]) != 0;
@@ -60,36 +56,36 @@ SLABWRIGHT_WIDE void ball_row(double a, double b, double c, double r2, double q,
 namespace {
 
 [[gnu::always_inline]] inline bool some_over(const float* stands, double bottom, int n, double level) {
-    WideBits over{};
-    each_eight(stands, n, [&](int, const Doubles& f) { over |= bottom + f > level; });
+    Longs8 over{};
+    each_eight(stands, n, [&](int, const Doubles8& f) { over |= bottom + f > level; });
     return any_of(over);
 }
 
 [[gnu::always_inline]] inline bool some_lower(const float* __restrict stands, double bottom, int n,
                                               double* __restrict h) {
-    WideBits any{};
-    each_eight(stands, n, [&](int k, const Doubles& f) {
-        Doubles height;
+    Longs8 any{};
+    each_eight(stands, n, [&](int k, const Doubles8& f) {
+        Doubles8 height;
         load(h + k, height);
-        const WideBits lower = bottom + f > height;
-        height = lower ? height : Doubles{} + kUncovered;
+        const Longs8 lower = bottom + f > height;
+        height = lower ? height : Doubles8{} + kUncovered;
         std::memcpy(h + k, &height, sizeof height);
         any |= lower;
     });
     return any_of(any);
 }
 
-// Bits of those of n cells that stand at least `least` over max(floor, h).
+// Ints8 of those of n cells that stand at least `least` over max(floor, h).
 template <class Left>
 [[gnu::always_inline]] inline std::uint64_t bits_over(const float* stands, int n, double floor, double least,
                                                       Left&& left) {
-    constexpr WideBits lane{1, 2, 4, 8, 16, 32, 64, 128};
+    constexpr Longs8 lane{1, 2, 4, 8, 16, 32, 64, 128};
     std::uint64_t over = 0;
-    each_eight(stands, n, [&](int k, const Doubles& f) {
-        Doubles h;
+    each_eight(stands, n, [&](int k, const Doubles8& f) {
+        Doubles8 h;
         left(k, h);
-        h = h > floor ? h : Doubles{} + floor;
-        const WideBits bits = (f - h >= least) & lane;
+        h = h > floor ? h : Doubles8{} + floor;
+        const Longs8 bits = (f - h >= least) & lane;
         std::array<std::uint64_t, kLanes> words;
         std::memcpy(words.data(), &bits, sizeof bits);
         over |= (words[0] | words[1] | words[2] | words[3] | words[4] | words[5] | words[6] | words[7]) << k;
@@ -101,10 +97,10 @@ template <class Left>
 
 SLABWRIGHT_WIDE std::uint64_t cells_over(const float* stands, int n, const double* h, double floor,
                                          double least) {
-    return bits_over(stands, n, floor, least, [&](int k, Doubles& left) { load(h + k, left); });
+    return bits_over(stands, n, floor, least, [&](int k, Doubles8& left) { load(h + k, left); });
 }
 SLABWRIGHT_WIDE std::uint64_t cells_over(const float* stands, int n, double h, double least) {
-    return bits_over(stands, n, h, least, [&](int, Doubles& left) { left = Doubles{} + h; });
+    return bits_over(stands, n, h, least, [&](int, Doubles8& left) { left = Doubles8{} + h; });
 }
 
 SLABWRIGHT_WIDE bool any_over(const float* stands, double bottom, int n, double level) {
@@ -126,14 +122,14 @@ SLABWRIGHT_WIDE std::uint64_t cells_left(const float* __restrict stands, const f
 }
 
 SLABWRIGHT_WIDE float most_left(const float* stands, const float* surface, const std::uint8_t* nz, int n) {
-    Floats most{};
+    Floats8 most{};
     float of_rest = 0;
     int k = 0;
     for (; k + kLanes <= n; k += kLanes) {
-        Floats high, low;
-        Bytes share;
+        Floats8 high, low;
+        Bytes8 share;
         load(stands + k, high), load(surface + k, low), load(nz + k, share);
-        const Floats left = (high - low) * (__builtin_convertvector(share, Floats) / 255.0F);
+        const Floats8 left = (high - low) * (__builtin_convertvector(share, Floats8) / 255.0F);
         most = left > most ? left : most;
     }
     for (; k < n; ++k)
@@ -170,7 +166,7 @@ SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows
                                    const std::array<double, 2>& from, const std::array<double, 2>& to,
                                    double radius, bool been, RowSpans& spans) {
     constexpr int lanes = 8;
-    const double inf = 1e300, r2 = radius * radius, nx = grid.nx, per_mm = 1 / grid.cell;
+    const double inf = kUnbounded, r2 = radius * radius, nx = grid.nx, per_mm = 1 / grid.cell;
     const double fx = from[0], fy = from[1], tx = to[0], ty = to[1];
     double dx = tx - fx, dy = ty - fy;
     const double run = std::sqrt(dx * dx + dy * dy), rise = dy;
@@ -214,41 +210,41 @@ SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows
 namespace {
 
 // Narrows [low, high] of eight lines to a strip, as Strip does.
-[[gnu::always_inline]] inline void narrow(const Strip& strip, const Doubles& value, Doubles& low,
-                                          Doubles& high) {
+[[gnu::always_inline]] inline void narrow(const Strip& strip, const Doubles8& value, Doubles8& low,
+                                          Doubles8& high) {
     if (strip.everywhere_or_nowhere()) {
-        high = (value >= strip.least) & (value <= strip.most) ? high : Doubles{} - 1e300;
+        high = (value >= strip.least) & (value <= strip.most) ? high : Doubles8{} - kUnbounded;
         return;
     }
-    const Doubles a = (strip.least - value) * strip.inverse, b = (strip.most - value) * strip.inverse;
-    const Doubles from = b < a ? b : a, to = a < b ? b : a;
+    const Doubles8 a = (strip.least - value) * strip.inverse, b = (strip.most - value) * strip.inverse;
+    const Doubles8 from = b < a ? b : a, to = a < b ? b : a;
     low = low < from ? from : low, high = to < high ? to : high;
 }
-[[gnu::always_inline]] inline void narrow(const CrossedStrips& strips, const Doubles& py, Doubles& low,
-                                          Doubles& high) {
+[[gnu::always_inline]] inline void narrow(const CrossedStrips& strips, const Doubles8& py, Doubles8& low,
+                                          Doubles8& high) {
     narrow(strips.a, py * strips.a_rise, low, high);
     narrow(strips.b, py * strips.b_rise, low, high);
 }
 
 // The whole numbers next to those of what an int holds.
-[[gnu::always_inline]] inline void whole(Doubles& v, bool up) {
-    const Doubles cut = __builtin_convertvector(__builtin_convertvector(v, Bits), Doubles);
-    const Doubles one = Doubles{} + 1.0;
+[[gnu::always_inline]] inline void whole(Doubles8& v, bool up) {
+    const Doubles8 cut = __builtin_convertvector(__builtin_convertvector(v, Ints8), Doubles8);
+    const Doubles8 one = Doubles8{} + 1.0;
     v = up ? (cut < v ? cut + one : cut) : (cut > v ? cut - one : cut);
 }
 
 // The cells between low and high of eight rows, mm from fx; none where low > high.
-[[gnu::always_inline]] inline void cells_between(const CellGrid& grid, double fx, const Doubles& low,
-                                                 const Doubles& high, std::int32_t* first,
+[[gnu::always_inline]] inline void cells_between(const CellGrid& grid, double fx, const Doubles8& low,
+                                                 const Doubles8& high, std::int32_t* first,
                                                  std::int32_t* last) {
     const double per_mm = 1 / grid.cell, beyond = grid.nx + 1.0, most = grid.nx - 1.0;
-    Doubles a = (low + fx - grid.x0) * per_mm, b = (high + fx - grid.x0) * per_mm;
-    a = a < -1.0 ? Doubles{} - 1.0 : a > beyond ? Doubles{} + beyond : a;
-    b = b < -1.0 ? Doubles{} - 1.0 : b > beyond ? Doubles{} + beyond : b;
+    Doubles8 a = (low + fx - grid.x0) * per_mm, b = (high + fx - grid.x0) * per_mm;
+    a = a < -1.0 ? Doubles8{} - 1.0 : a > beyond ? Doubles8{} + beyond : a;
+    b = b < -1.0 ? Doubles8{} - 1.0 : b > beyond ? Doubles8{} + beyond : b;
     whole(a, true), whole(b, false);
-    a = a > 0.0 ? a : Doubles{};
-    b = low <= high ? (b < most ? b : Doubles{} + most) : Doubles{} - 1.0;
-    const Bits i0 = __builtin_convertvector(a, Bits), i1 = __builtin_convertvector(b, Bits);
+    a = a > 0.0 ? a : Doubles8{};
+    b = low <= high ? (b < most ? b : Doubles8{} + most) : Doubles8{} - 1.0;
+    const Ints8 i0 = __builtin_convertvector(a, Ints8), i1 = __builtin_convertvector(b, Ints8);
     std::memcpy(first, &i0, sizeof i0), std::memcpy(last, &i1, sizeof i1);
 }
 
@@ -258,23 +254,23 @@ SLABWRIGHT_WIDE void strips_of_rows(const CellGrid& grid, int first_row, int row
                                     const std::array<double, 2>& from, const CrossedStrips& strips,
                                     double low, double high, const CrossedStrips* near, double radius,
                                     RowSpans& spans) {
-    constexpr Doubles lane{0, 1, 2, 3, 4, 5, 6, 7};
+    constexpr Doubles8 lane{0, 1, 2, 3, 4, 5, 6, 7};
     const double r2 = radius * radius;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rows); k += kLanes) {
-        const Doubles py = grid.y0 + (first_row + static_cast<double>(k) + lane) * grid.cell - from[1];
-        Doubles from_x = Doubles{} + low, to_x = Doubles{} + high;
+        const Doubles8 py = grid.y0 + (first_row + static_cast<double>(k) + lane) * grid.cell - from[1];
+        Doubles8 from_x = Doubles8{} + low, to_x = Doubles8{} + high;
         narrow(strips, py, from_x, to_x);
         cells_between(grid, from[0], from_x, to_x, spans.low.data() + k, spans.left.data() + k);
         if (near == nullptr) {
             for (std::size_t i = k; i < k + kLanes; ++i) spans.right[i] = 0, spans.high[i] = -1;
             continue;
         }
-        const Doubles w2 = r2 - py * py;
+        const Doubles8 w2 = r2 - py * py;
         std::array<double, kLanes> w;
         std::memcpy(w.data(), &w2, sizeof w2);
         for (double& v : w) v = std::sqrt(v > 0 ? v : 0.0);
         load(w.data(), to_x);
-        from_x = -to_x, to_x = w2 < 0.0 ? Doubles{} - 1e300 : to_x;
+        from_x = -to_x, to_x = w2 < 0.0 ? Doubles8{} - kUnbounded : to_x;
         narrow(*near, py, from_x, to_x);
         cells_between(grid, from[0], from_x, to_x, spans.right.data() + k, spans.high.data() + k);
     }
@@ -309,12 +305,12 @@ namespace {
 template <class Eight, class One>
 [[gnu::always_inline]] inline void by_eights(std::int32_t first, std::int32_t last, Eight&& eight,
                                              One&& one) {
-    constexpr Bits lane{0, 1, 2, 3, 4, 5, 6, 7};
+    constexpr Ints8 lane{0, 1, 2, 3, 4, 5, 6, 7};
     if (first > last) return;
     const std::int32_t end = last + 1 - kLanes;
     if (first <= end) {
-        for (std::int32_t i = first; i < end; i += kLanes) eight(i, Bits{} == Bits{});
-        eight(end, Bits{} == Bits{});
+        for (std::int32_t i = first; i < end; i += kLanes) eight(i, Ints8{} == Ints8{});
+        eight(end, Ints8{} == Ints8{});
     } else if (end >= 0) {
         eight(end, lane >= first - end);
     } else {
@@ -324,12 +320,12 @@ template <class Eight, class One>
 
 [[gnu::always_inline]] inline bool over_in(const float* row, std::int32_t first, std::int32_t last,
                                            float level) {
-    Bits over{};
+    Ints8 over{};
     bool any = false;
     by_eights(
         first, last,
-        [&](std::int32_t i, const Bits& mask) {
-            Floats h;
+        [&](std::int32_t i, const Ints8& mask) {
+            Floats8 h;
             load(row + i, h);
             over |= (h > level) & mask;
         },
@@ -342,10 +338,10 @@ template <class Eight, class One>
 [[gnu::always_inline]] inline void lower_in(float* row, std::int32_t first, std::int32_t last, float level) {
     by_eights(
         first, last,
-        [&](std::int32_t i, const Bits& mask) {
-            Floats h;
+        [&](std::int32_t i, const Ints8& mask) {
+            Floats8 h;
             load(row + i, h);
-            const Floats lowered = ((h > level) & mask) ? Floats{} + level : h;
+            const Floats8 lowered = ((h > level) & mask) ? Floats8{} + level : h;
             std::memcpy(row + i, &lowered, sizeof lowered);
         },
         [&](std::int32_t i) { row[i] = level < row[i] ? level : row[i]; });
@@ -365,14 +361,14 @@ SLABWRIGHT_WIDE OverSpans spans_over(const float* height, std::size_t nx, int ro
 
 SLABWRIGHT_WIDE float highest_in(const float* height, std::size_t nx, int rows, const RowSpans& spans) {
     constexpr float none = -std::numeric_limits<float>::infinity();
-    Floats most = Floats{} + none;
+    Floats8 most = Floats8{} + none;
     float of_rest = none;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k, height += nx) {
         const auto in_span = [&](std::int32_t first, std::int32_t last) {
             by_eights(
                 first, last,
-                [&](std::int32_t i, const Bits& mask) {
-                    Floats h;
+                [&](std::int32_t i, const Ints8& mask) {
+                    Floats8 h;
                     load(height + i, h);
                     most = ((h > most) & mask) ? h : most;
                 },
@@ -411,12 +407,12 @@ SLABWRIGHT_WIDE void lower_to(float* height, int n, double z) {
 }
 
 SLABWRIGHT_WIDE float highest_of(const float* height, std::size_t nx, int n, int rows) {
-    Floats most{};
+    Floats8 most{};
     float of_rest = 0;
     for (int row = 0; row < rows; ++row, height += nx) {
         int k = 0;
         for (; k + kLanes <= n; k += kLanes) {
-            Floats h;
+            Floats8 h;
             load(height + k, h);
             most = h > most ? h : most;
         }
@@ -429,14 +425,14 @@ SLABWRIGHT_WIDE float highest_of(const float* height, std::size_t nx, int n, int
 SLABWRIGHT_WIDE void add_lost(const float* before, const float* now, const std::uint8_t* share, int n,
                               float least, Lost& lost) {
     constexpr float whole = 255;
-    Floats most{}, sum{};
-    Bits cells{};
+    Floats8 most{}, sum{};
+    Ints8 cells{};
     int k = 0;
     for (; k + kLanes <= n; k += kLanes) {
-        Floats b, a;
-        Bytes s;
+        Floats8 b, a;
+        Bytes8 s;
         load(before + k, b), load(now + k, a), std::memcpy(&s, share + k, sizeof s);
-        const Floats off = b - a, along = off * (__builtin_convertvector(s, Floats) / whole);
+        const Floats8 off = b - a, along = off * (__builtin_convertvector(s, Floats8) / whole);
         most = along > most ? along : most;
         sum += along;
         cells -= off > least;  // true is -1

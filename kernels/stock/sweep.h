@@ -13,6 +13,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "kernels/geometry/vectors.h"
+
 namespace slabwright {
 
 /// Cells of one size; cell (i, j) stands for the point at its centre, (x0 + i·cell, y0 + j·cell), mm.
@@ -236,7 +238,7 @@ struct Strip {
     /// Narrows [low, high] to them, on a line whose value is `value` at 0; to nothing where there are none.
     void narrow(double value, double& low, double& high) const {
         if (everywhere_or_nowhere()) {
-            if (!(value >= least && value <= most)) high = -1e300;
+            if (!(value >= least && value <= most)) high = -kUnbounded;
             return;
         }
         const double a = (least - value) * inverse, b = (most - value) * inverse;

@@ -10,6 +10,7 @@
 #include "engine/paths/runs/leads.h"
 #include "engine/paths/runs/tolerances.h"
 #include "engine/paths/runs/zigzag.h"
+#include "kernels/geometry/vectors.h"
 
 namespace slabwright {
 
@@ -28,7 +29,7 @@ Operation finish_floors(const LayerCut& cut) {
     op.stepover = tool.stepover * tool.diameter;
     for (std::size_t i = 0; i < heights.size(); ++i) {
         const std::vector<SolidFacet> facets = floor_facets(cut, heights[i]);
-        double y_low = 1e300, y_high = -1e300;
+        double y_low = kUnbounded, y_high = -kUnbounded;
         for (const SolidFacet& f : facets)
             for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
         if (facets.empty()) continue;

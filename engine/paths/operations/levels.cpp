@@ -15,6 +15,7 @@
 #include "engine/paths/runs/level_runs.h"
 #include "engine/paths/runs/tolerances.h"
 #include "kernels/cutting/cusp.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -39,7 +40,7 @@ Operation finish_walls(const LayerCut& cut) {
     const Tool& tool = cut.layer.tools.rough;
     Operation op = cut.operation(OperationKind::finish, "vertical walls", tool);
     const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, vertical = vertical_nz(cut);
-    double low = 1e300, high = -1e300;  // of the vertical facets
+    double low = kUnbounded, high = -kUnbounded;  // of the vertical facets
     for (const SolidFacet& f : cut.solid.facets) {
         if (f.nz > vertical || f.z_max <= cut.layer.z_bottom ||
             (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0))
@@ -136,7 +137,7 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const FinishSlopes slopes = finish_slopes(cut.job.cutting);
     const double split = slopes.levels_from;
     if (split > std::numbers::pi / 2) return op;
-    double low = 1e300, high = -1e300;
+    double low = kUnbounded, high = -kUnbounded;
     bool any_vertical = false;
     for (const SolidFacet& f : cut.solid.facets) {
         if (f.nz > std::cos(split) || f.z_max <= cut.layer.z_bottom ||

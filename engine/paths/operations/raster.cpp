@@ -19,6 +19,7 @@
 #include "engine/paths/runs/layer_cut.h"
 #include "engine/paths/runs/tolerances.h"
 #include "kernels/cutting/cusp.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -54,7 +55,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
 
     // How far the shallow facets face along y, by strips of y: that decides the step-over of the passes over
     // them.
-    double y_low = 1e300, y_high = -1e300;
+    double y_low = kUnbounded, y_high = -kUnbounded;
     for (const SolidFacet& f : shallow)
         for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
     constexpr double strip = 0.5;

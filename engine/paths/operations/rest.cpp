@@ -21,6 +21,7 @@
 #include "engine/paths/runs/rings.h"
 #include "engine/paths/runs/tolerances.h"
 #include "kernels/cutting/drop.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -706,7 +707,7 @@ private:
     [[nodiscard]] double stood(std::int32_t ux, std::int32_t uy) const {
         const CellGrid& grid = stock_.grid();
         const double x = to_mm(ux), y = to_mm(uy);
-        double top = -1e300;
+        double top = -kUnbounded;
         sweep(grid, {CutterEnd::Form::flat, r_, 0}, {x, y, 0}, {x, y, 0},
               [&](std::size_t c, double) { top = std::max(top, static_cast<double>(stock_.height(c))); });
         return top + stock_.z_bottom();
@@ -725,7 +726,7 @@ private:
         }
         // Level by level from the layer's top, so that beside the cutter nothing stands by more than a step.
         std::vector<std::vector<double>> stood_at(runs.size());
-        std::vector<double> tops(runs.size(), -1e300);
+        std::vector<double> tops(runs.size(), -kUnbounded);
         double lowest = cut_.layer.z_top;
         for (std::size_t r = 0; r < runs.size(); ++r) {
             cut_.context.throw_if_cancelled();

@@ -12,6 +12,7 @@
 #include "engine/paths/runs/feet.h"
 #include "engine/paths/runs/rings.h"
 #include "engine/paths/runs/tolerances.h"
+#include "kernels/geometry/vectors.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -375,10 +376,9 @@ public:
 
 private:
     struct Level {
-        double
-            tip = 0,
-            over =
-                -1e300;  // mm: what lies over a surface that is no higher than `over` is left to other levels
+        double tip = 0,
+               over = -kUnbounded;  // mm: what lies over a surface that is no higher than `over` is left to
+                                    // other levels
     };
     // In the order in which they are cut. A flat end mill's lie on floors too. Between two of a ball's lie
     // others, for the waste that does not reach down to the next.

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "kernels/cutting/cusp.h"
+#include "kernels/geometry/vectors.h"
 
 namespace slabwright {
 
@@ -48,7 +49,7 @@ namespace {
 
 // A box in the plane, mm.
 struct Box2 {
-    std::array<double, 2> low{1e300, 1e300}, high{-1e300, -1e300};
+    std::array<double, 2> low{kUnbounded, kUnbounded}, high{-kUnbounded, -kUnbounded};
     void add(const Box2& other) {
         for (std::size_t k = 0; k < 2; ++k)
             low[k] = std::min(low[k], other.low[k]), high[k] = std::max(high[k], other.high[k]);

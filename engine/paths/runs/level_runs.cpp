@@ -7,6 +7,7 @@
 #include "engine/moves/order.h"
 #include "engine/paths/runs/leads.h"
 #include "engine/paths/runs/tolerances.h"
+#include "kernels/geometry/vectors.h"
 
 namespace slabwright {
 
@@ -87,7 +88,7 @@ void cut_level(PathBuilder& path, const LayerCut& cut, const DropIndex& part, do
             beginnings.push_back({{points[0].x, points[0].y}, {points.back().x, points.back().y}, i, 0});
             continue;
         }
-        double since = 1e300;
+        double since = kUnbounded;
         for (std::uint32_t p = 0; p + 1 < points.size(); ++p) {
             if (p > 0)
                 since += std::hypot(static_cast<double>(points[p].x) - points[p - 1].x,

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <optional>
 
+#include "kernels/geometry/vectors.h"
 #include "kernels/polygons/runs_inside.h"
 
 namespace slabwright {
@@ -65,7 +66,7 @@ struct Bound {
 };
 
 void note_box(RingPlan::Piece& piece) {
-    piece.box = {1e300, 1e300, -1e300, -1e300};
+    piece.box = {kUnbounded, kUnbounded, -kUnbounded, -kUnbounded};
     for (const PathPoint& p : piece.points)
         piece.box = {std::min<double>(piece.box[0], p.x), std::min<double>(piece.box[1], p.y),
                      std::max<double>(piece.box[2], p.x), std::max<double>(piece.box[3], p.y)};
@@ -115,7 +116,7 @@ PathPoint between(const PathPoint& a, const PathPoint& b, double t) {
 
 // Where a piece may begin.
 struct Start {
-    double way = 1e300;  // 0.1 µm, from where the tool is
+    double way = kUnbounded;  // 0.1 µm, from where the tool is
     std::size_t segment = 0;
     PathPoint at;
     bool reversed = false;
@@ -365,7 +366,7 @@ std::vector<std::array<double, 4>> frames_around(const LayerCut& cut, double r, 
         if (cut.low(axis, out) > cut.layer.stock_min[axis] - out ||
             cut.high(axis, out) < cut.layer.stock_max[axis] + out)
             return frames;
-    std::array<double, 4> keep{1e300, 1e300, -1e300, -1e300};
+    std::array<double, 4> keep{kUnbounded, kUnbounded, -kUnbounded, -kUnbounded};
     for (const Point2 p : forbidden.points)
         keep = {std::min(keep[0], to_mm(p.x)), std::min(keep[1], to_mm(p.y)), std::max(keep[2], to_mm(p.x)),
                 std::max(keep[3], to_mm(p.y))};
@@ -642,7 +643,7 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
             if (inner.pieces.empty()) continue;
             const PathPoint& p =
                 plan.pieces[inner.pieces.front()].points[plan.pieces[inner.pieces.front()].points.size() / 2];
-            double least = 1e300;
+            double least = kUnbounded;
             for (std::size_t m = 0; m < nearer_free.size(); ++m) {
                 if (nearer_region[m] == SIZE_MAX || !within(nearer_boxes[m], p)) continue;
                 Loops one;
@@ -807,7 +808,7 @@ private:
     [[nodiscard]] const std::vector<Box>& boxes_of_parts(const RingPlan::Piece& piece) {
         std::vector<Box>& boxes = boxes_[static_cast<std::size_t>(&piece - plan_.pieces.data())];
         for (std::size_t first = boxes.size() * kPart; first + 1 < piece.points.size(); first += kPart) {
-            Box& box = boxes.emplace_back(Box{1e300, 1e300, -1e300, -1e300});
+            Box& box = boxes.emplace_back(Box{kUnbounded, kUnbounded, -kUnbounded, -kUnbounded});
             for (std::size_t k = first; k <= std::min(first + kPart, piece.points.size() - 1); ++k) {
                 const PathPoint& p = piece.points[k];
                 box = {std::min<double>(box[0], p.x), std::min<double>(box[1], p.y),
@@ -867,7 +868,7 @@ void begin_beside(const Turns& turns, std::size_t chosen, Point2 at, RingPlan::P
         if (way < start.way && turns.beside_cut(chosen, piece.points[k]))
             start = {way, k, piece.points[k], false};
     }
-    if (start.way == 1e300)
+    if (start.way == kUnbounded)
         (void)nearer(piece, at, false, start);  // only a place between two points lies beside one
 }
 

@@ -1,11 +1,9 @@
-// The two questions about a facet that the trees of this folder ask: its nearest point, and its crossing with
-// a vertical line.
+// A triangle's nearest point, and its crossing with a vertical line.
 #pragma once
 
 #include <array>
 
-#include "kernels/access/standing_part.h"
-#include "kernels/mesh/mesh.h"
+#include "kernels/geometry/vectors.h"
 
 namespace slabwright {
 
@@ -16,6 +14,11 @@ using Triangle = std::array<Point3, 3>;
 
 /// The nearest point of a triangle; of a degenerate one, the nearest of its edges.
 [[nodiscard]] Point3 closest_on_triangle(const Point3& point, const Triangle& triangle);
+
+/// Square of the distance to a triangle, and its nearest point, by the regions of its corners, edges and
+/// face: one pass, in which the face of a sliver may be decided by rounding. Where a gouge is judged, take
+/// closest_on_triangle.
+[[nodiscard]] double squared_distance(const Point3& point, const Triangle& triangle, Point3& nearest);
 
 /// Winding number of a facet's outline around (x, y), seen from above: +1 facing up, −1 facing down, 0 beside
 /// it. Half-open, so over a closed mesh the sum is 0 everywhere, on edges and vertices too.

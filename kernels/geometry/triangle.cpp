@@ -1,4 +1,4 @@
-#include "kernels/access/triangle.h"
+#include "kernels/geometry/triangle.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,15 +6,6 @@
 namespace slabwright {
 
 namespace {
-
-Point3 sub(const Point3& a, const Point3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Point3 cross(const Point3& a, const Point3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Point3 between(const Point3& a, const Point3& b, double t) {
-    return {a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t};
-}
 
 /// Which side of the line through two corners of a facet a point lies on. Both facets of an edge evaluate it
 /// from the same end, so that they cannot both claim or both miss a point.
@@ -29,20 +20,20 @@ double side(const Vec3f& a, const Vec3f& b, double x, double y) {
 }  // namespace
 
 Point3 closest_on_segment(const Point3& c, const Point3& a, const Point3& b) {
-    const Point3 d = sub(b, a);
+    const Point3 d = minus(b, a);
     const double l = dot(d, d);
-    return l > 0 ? between(a, b, std::clamp(dot(sub(c, a), d) / l, 0.0, 1.0)) : a;
+    return l > 0 ? between(a, b, std::clamp(dot(minus(c, a), d) / l, 0.0, 1.0)) : a;
 }
 
 Point3 closest_on_triangle(const Point3& c, const Triangle& t) {
-    const Point3 n = cross(sub(t[1], t[0]), sub(t[2], t[0]));
+    const Point3 n = cross(minus(t[1], t[0]), minus(t[2], t[0]));
     const double nn = dot(n, n);
     if (nn > 0) {
         bool inside = true;
         for (int i = 0; i < 3 && inside; ++i)
-            inside = dot(cross(sub(t[(i + 1) % 3], t[i]), sub(c, t[i])), n) >= 0;
+            inside = dot(cross(minus(t[(i + 1) % 3], t[i]), minus(c, t[i])), n) >= 0;
         if (inside) {
-            const double h = dot(sub(c, t[0]), n) / nn;
+            const double h = dot(minus(c, t[0]), n) / nn;
             const Point3 q{c[0] - h * n[0], c[1] - h * n[1], c[2] - h * n[2]};
             // The signs of a sliver may be rounding: a foot outside the triangle's box is none.
             bool in_box = true;
@@ -53,13 +44,45 @@ Point3 closest_on_triangle(const Point3& c, const Triangle& t) {
         }
     }
     Point3 best = closest_on_segment(c, t[0], t[1]);
-    double d = dot(sub(c, best), sub(c, best));
+    double d = dot(minus(c, best), minus(c, best));
     for (int i = 1; i < 3; ++i) {
         const Point3 q = closest_on_segment(c, t[i], t[(i + 1) % 3]);
-        const double e = dot(sub(c, q), sub(c, q));
+        const double e = dot(minus(c, q), minus(c, q));
         if (e < d) d = e, best = q;
     }
     return best;
+}
+
+double squared_distance(const Point3& p, const Triangle& t, Point3& q) {
+    const Point3 ab = minus(t[1], t[0]), ac = minus(t[2], t[0]), ap = minus(p, t[0]);
+    auto from = [&](double v, double w) {
+        q = {t[0][0] + v * ab[0] + w * ac[0], t[0][1] + v * ab[1] + w * ac[1],
+             t[0][2] + v * ab[2] + w * ac[2]};
+        return squared_distance(p, q);
+    };
+    const double d1 = dot(ab, ap), d2 = dot(ac, ap);
+    if (d1 <= 0 && d2 <= 0) return from(0, 0);
+    const Point3 bp = minus(p, t[1]);
+    const double d3 = dot(ab, bp), d4 = dot(ac, bp);
+    if (d3 >= 0 && d4 <= d3) return from(1, 0);
+    const double vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return from(d1 / (d1 - d3), 0);
+    const Point3 cp = minus(p, t[2]);
+    const double d5 = dot(ab, cp), d6 = dot(ac, cp);
+    if (d6 >= 0 && d5 <= d6) return from(0, 1);
+    const double vb = d5 * d2 - d1 * d6;
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return from(0, d2 / (d2 - d6));
+    const double va = d3 * d6 - d5 * d4;
+    if (va <= 0 && d4 >= d3 && d5 >= d6) {
+        const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return from(1 - w, w);
+    }
+    const double all = va + vb + vc;
+    if (!(all > 0)) {  // a triangle without area
+        q = closest_on_triangle(p, t);
+        return squared_distance(p, q);
+    }
+    return from(vb / all, vc / all);
 }
 
 // A point on the line counts as left of it where the edge rises, in both of its facets alike.
