@@ -2,9 +2,9 @@
 // run.
 //     build/release/load_bench --benchmark_counters_tabular=true
 // The generated pattern (metre_pattern) is written to a temporary folder, in the order it is made and
-// shuffled, and removed at the end. `read_mesh` is what other programs' loaders do too; `read_stl` adds the
-// SHA-256 of the file and the report of all that is wrong. A file that does not load, or not with all of its
-// facets, stops the program.
+// shuffled, and removed at the end. `read_mesh` is what other programs' loaders do too; `read_pattern_mesh`
+// adds the SHA-256 of the file and the report of all that is wrong. A file that does not load, or not with
+// all of its facets, stops the program.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "bench/peak_memory.h"
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 #include "tests/data/models.h"
@@ -135,7 +135,7 @@ void measure(benchmark::State& state, Load&& load) {
 
 void read_whole(benchmark::State& state) {
     measure(state, [](Context& context, const std::string& path) {
-        const StlMesh stl = read_stl(context, path);
+        const PatternMesh stl = read_pattern_mesh(context, path);
         if (stl.report.open_edges.count != 0) stop(path + " is not closed");
         return static_cast<std::uint64_t>(stl.mesh.facets.size());
     });
@@ -159,7 +159,7 @@ void sizes(benchmark::internal::Benchmark* bench) {
             for (const std::int64_t threads : {1, 2}) bench->Args({facets, threads, shuffled});
 }
 BENCHMARK(read_only)->Name("read_mesh")->Apply(sizes);
-BENCHMARK(read_whole)->Name("read_stl")->Apply(sizes);
+BENCHMARK(read_whole)->Name("read_pattern_mesh")->Apply(sizes);
 
 }  // namespace
 }  // namespace slabwright

@@ -19,7 +19,7 @@
 #include "engine/simulate/reach.h"
 #include "engine/simulate/replay.h"
 #include "io/read/input_file.h"
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "io/report_template.h"
 #include "io/text/base64.h"
 #include "io/text/job_keys.h"
@@ -692,14 +692,14 @@ std::string report_html(Context& context, const std::string& directory, const Re
         fs::exists(out / "verify.json") ? read_json(out / "verify.json", "report.verify") : Json();
     const std::shared_ptr<Pattern> pattern =
         verified ? std::move(verified->pattern)
-                 : read_pattern(
+                 : read_planned_pattern(
                        context, directory,
                        understood(out / "plan.json", "report.plan", [&] { return planned_pattern(folder); }),
-                       options.stl, "report");
+                       options.source, "report");
     std::vector<Program> programs;
     if (verified) programs = std::move(verified->input.programs);
     verified.reset();
-    const MeshView mesh = pattern->stl.mesh.view();
+    const MeshView mesh = pattern->read.mesh.view();
 
     std::uint64_t moves = 0;
     for (const Program& program : programs) moves += program.steps.size();

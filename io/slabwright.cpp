@@ -22,9 +22,10 @@
 #include "io/read/input_file.h"
 #include "io/read/job_toml.h"
 #include "io/read/pattern.h"
+#include "io/read/pattern_mesh.h"
 #include "io/read/repair.h"
-#include "io/read/stl.h"
 #include "io/report_html.h"
+#include "io/text/json_text.h"
 #include "io/verify.h"
 #include "io/write/access_ply.h"
 #include "io/write/inspect_json.h"
@@ -35,6 +36,7 @@
 #include "io/write/sections_json.h"
 #include "io/write/sections_svg.h"
 #include "io/write/sequence_json.h"
+#include "io/write/stl_writer.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/slicing/slicing.h"
 
@@ -73,6 +75,10 @@ Job read_job(const std::string& path) {
     });
 }
 
+Job job_from_toml(std::string_view toml, const std::string& name, const Job& base) {
+    return guarded([&] { return parse_job(toml, name, base); });
+}
+
 std::string default_job_toml(std::string_view library) {
     return guarded([&] {
         Job job;
@@ -84,42 +90,42 @@ std::string default_job_toml(std::string_view library) {
     });
 }
 
-std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& stl_path, const Job& job) {
+std::shared_ptr<Pattern> read_pattern(Context& context, const PatternSource& source, const Job& job) {
     return guarded([&] {
         validate(job);
-        const StlOptions reading{job.units, job.tolerances.weld, job.input.repair};
+        const ReadingOptions reading = reading_options(job);
         return std::make_shared<Pattern>(
-            Pattern{stl_path, reading, read_stl(context, stl_path, reading), {}});
+            Pattern{source.name(), reading, read_pattern_mesh(context, source, reading), {}});
     });
 }
 
-Plan plan(Context& context, const std::string& stl_path, const Job& job) {
-    return plan(context, *read_pattern(context, stl_path, job), job);
+Plan plan(Context& context, const PatternSource& source, const Job& job) {
+    return plan(context, *read_pattern(context, source, job), job);
 }
 
 Plan plan(Context& context, const Pattern& pattern, const Job& job) {
     return guarded([&] {
         validate(job);
-        const StlMesh& stl = pattern.stl;
-        const std::string& stl_path = pattern.path;
-        if (pattern.reading != StlOptions{job.units, job.tolerances.weld, job.input.repair})
+        const PatternMesh& read = pattern.read;
+        const std::string& place = pattern.place;
+        if (pattern.reading != reading_options(job))
             throw Error(
                 ErrorKind::usage, "plan.reading",
                 "was read with other units, another tolerance of welding or another repair than the job's",
-                stl_path, "read the pattern with the job that it is planned with");
-        require_solid(context, stl, stl_path);
+                place, "read the pattern with the job that it is planned with");
+        require_solid(context, read, place);
         const auto planned = [&] {
             try {
-                return make_plan(context, stl.mesh, stl.input, job);
+                return make_plan(context, read.mesh, read.input, job);
             } catch (const Error& error) {  // the engine knows no file; the user wants to hear of it
                 if (error.kind() != ErrorKind::no_plan) throw;
                 throw Error(error.kind(), error.code(), error.message(),
-                            error.place().empty() ? stl_path : stl_path + ", " + error.place(),
-                            error.remedy());
+                            error.place().empty() ? place : place + ", " + error.place(), error.remedy());
             }
         };
         Plan result = planned();
-        result.diagnostics.insert(result.diagnostics.begin(), stl.diagnostics.begin(), stl.diagnostics.end());
+        result.diagnostics.insert(result.diagnostics.begin(), read.diagnostics.begin(),
+                                  read.diagnostics.end());
         if (!reports_are_built())
             result.diagnostics.push_back({Severity::note, "report.not_built",
                                           "this build of slabwright writes no report.html", std::nullopt});
@@ -209,11 +215,23 @@ void check_cell(double cell_mm) {
 
 }  // namespace
 
-void write(Context& context, const Plan& plan, const std::string& directory, const std::string& stl_path) {
+void require_replaceable(const std::string& directory) {
+    guarded([&] { const OutputFolder probe(directory); });
+}
+
+std::string plan_document(const Plan& plan) {
+    return guarded([&] { return plan_json(plan); });
+}
+
+std::string program_document(const Plan& plan, const Layer& layer, const Operation& operation) {
+    return guarded([&] { return program_text(plan, layer, operation); });
+}
+
+void write(Context& context, const Plan& plan, const std::string& directory, const PatternSource& source) {
     guarded([&] {
         OutputFolder out(directory);
         fill(context, plan, out);
-        if (!stl_path.empty() && reports_are_built()) write_report(context, out.path().string(), {stl_path});
+        if (!source.empty() && reports_are_built()) write_report(context, out.path().string(), {source});
         context.throw_if_cancelled();
         out.commit();
     });
@@ -233,7 +251,7 @@ VerifyResult write_and_verify(Context& context, const Plan& plan, const std::str
         Verification found = verify_folder(context, out.path().string(), options);
         VerifyResult result = verdict(found);
         context.share_progress(verified, 1);
-        if (reports) write_report(context, out.path().string(), {options.stl}, std::move(found));
+        if (reports) write_report(context, out.path().string(), {options.source}, std::move(found));
         context.throw_if_cancelled();
         out.commit();
         return result;
@@ -243,58 +261,72 @@ VerifyResult write_and_verify(Context& context, const Plan& plan, const std::str
 }  // namespace
 
 VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
-                            const std::string& stl_path, double cell_mm) {
-    return write_and_verify(context, plan, directory, {.stl = stl_path, .cell = cell_mm});
+                            const PatternSource& source, double cell_mm) {
+    return write_and_verify(context, plan, directory, {.source = source, .cell = cell_mm});
 }
 
 VerifyResult write_verified(Context& context, const Plan& plan, const std::string& directory,
                             const std::shared_ptr<Pattern>& pattern, double cell_mm) {
     return write_and_verify(context, plan, directory,
-                            {.stl = pattern->path, .pattern = pattern, .cell = cell_mm});
+                            {.source = pattern->place, .pattern = pattern, .cell = cell_mm});
 }
 
-void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path,
+void write_access_maps(Context& context, const Plan& plan, const PatternSource& source,
                        const std::string& directory) {
     guarded([&] {
-        const StlMesh stl =
-            read_stl(context, stl_path, {plan.job.units, plan.job.tolerances.weld, plan.job.input.repair});
-        if (stl.input.sha256 != plan.input.sha256)
-            throw Error(ErrorKind::input, "access_maps.stl", "is not the pattern that was planned", stl_path,
-                        "give the STL of the plan");
+        const PatternMesh pattern = read_pattern_mesh(context, source, reading_options(plan.job));
+        if (pattern.input.sha256 != plan.input.sha256)
+            throw Error(ErrorKind::input, "access_maps.stl", "is not the pattern that was planned",
+                        source.name(), "give the STL of the plan");
         make_output_directory(directory);
         context.begin_phase("access maps", 1, 1);
-        access_maps(context, stl.mesh.view(), plan, [&](const AccessMap& map) {
+        access_maps(context, pattern.mesh.view(), plan, [&](const AccessMap& map) {
             const Accessibility& a = map.accessibility;
             const std::string comment = fmt::format(
                 "{}: layer {}, tool {} reaches {:.4f} of the surface to be machined; mm, z = 0 at the bottom",
                 plan.input.sha256.substr(0, 12), map.layer, map.tool, a.ratio());
             write_file_in(directory, fmt::format("layer_{:02}_tool_{:02}.ply", map.layer, map.tool),
-                          access_ply(stl.mesh.view(), a.share, comment));
+                          access_ply(pattern.mesh.view(), a.share, comment));
         });
     });
 }
 
-void report(Context& context, const std::string& directory, const std::string& stl_path, bool three_d,
+void report(Context& context, const std::string& directory, const PatternSource& source, bool three_d,
             double size_limit_mb) {
-    guarded([&] { write_report(context, directory, {stl_path, three_d, size_limit_mb}); });
+    guarded([&] { write_report(context, directory, {source, three_d, size_limit_mb}); });
 }
 
-VerifyResult verify(Context& context, const std::string& directory, const std::string& stl_path,
+void refresh_report(Context& context, const std::string& directory, const PatternSource& source) {
+    // The page's own parts lie in its first half megabyte, what it shows behind them.
+    std::string head;
+    try {
+        const InputFile file(std::filesystem::path(directory) / "report.html",
+                             {ErrorKind::input, "report.page", kMostProgramBytes});
+        head.resize(std::min<std::uint64_t>(file.size(), kMebibyte));
+        file.read(0, head.data(), head.size());
+    } catch (const Error&) {
+        return;
+    }
+    report(context, directory, source, head.find("<section id=\"view\"") != std::string::npos);
+}
+
+VerifyResult verify(Context& context, const std::string& directory, const PatternSource& source,
                     const std::string& maps_directory, double cell_mm) {
     return guarded([&] {
         check_cell(cell_mm);
         VerifyOptions options;
-        options.stl = stl_path;
+        options.source = source;
         options.cell = cell_mm;
         options.maps_directory = maps_directory;
         return verdict(verify_folder(context, directory, options));
     });
 }
 
-std::string inspect(Context& context, const std::string& stl_path, const Job& job) {
+std::string inspect(Context& context, const PatternSource& source, const Job& job, InspectionForm form) {
     return guarded([&] {
         validate(job);
-        return inspection_json(inspect_stl(context, stl_path, job));
+        const Inspection found = inspect_pattern(context, source, job);
+        return form == InspectionForm::json ? inspection_json(found) : inspection_text(found);
     });
 }
 
@@ -318,17 +350,20 @@ void copy_file(Context& context, const std::string& from, const std::string& to)
 
 }  // namespace
 
-RepairResult repair(Context& context, const std::string& stl_path, const std::string& out, const Job& job) {
+RepairResult repair(Context& context, const PatternSource& source, const std::string& out, const Job& job) {
     return guarded([&] {
         validate(job);
-        StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld, Repair::none});
+        ReadingOptions reading = reading_options(job);
+        reading.repair = Repair::none;
+        PatternMesh stl = read_pattern_mesh(context, source, reading);
         context.begin_phase("repair", 0.05, 0.95);
         const Repair how = job.input.repair == Repair::none ? Repair::mend : job.input.repair;
-        Repaired repaired = repair_mesh(context, stl.mesh.view(), stl.report, how, stl_path);
+        Repaired repaired = repair_mesh(context, stl.mesh.view(), stl.report, how, source.name());
         RepairResult result{std::move(repaired.told), std::move(repaired.diagnostics), stl.report.volume_mm3};
         const bool needed = result.repair.how != "none";
-        if (!needed && job.tolerances.weld == 0) {
-            copy_file(context, stl_path, out);
+        const bool is_file = source.kind() == PatternSource::Kind::file;
+        if (!needed && job.tolerances.weld == 0 && is_file && stl.family == "stl") {
+            copy_file(context, source.name(), out);
             return result;
         }
         Mesh mesh = std::move(needed ? repaired.mesh : stl.mesh);
@@ -343,7 +378,7 @@ RepairResult repair(Context& context, const std::string& stl_path, const std::st
     });
 }
 
-void slice_to_file(Context& context, const std::string& stl_path, const Job& job, double every_mm,
+void slice_to_file(Context& context, const PatternSource& source, const Job& job, double every_mm,
                    const std::string& out) {
     guarded([&] {
         validate(job);
@@ -357,7 +392,7 @@ void slice_to_file(Context& context, const std::string& stl_path, const Job& job
             throw Error(ErrorKind::usage, "slice.format",
                         fmt::format("no format has the ending \"{}\"", ending), out,
                         "end the name in .svg, .dxf or .json");
-        const StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld, job.input.repair});
+        const PatternMesh stl = read_pattern_mesh(context, source, reading_options(job));
         const double height = bounds(stl.mesh.view()).max.z;
         const double number = std::ceil(height / every_mm) - 1;  // multiples of every_mm inside (0, height)
         constexpr double most = 1e6;
@@ -383,6 +418,14 @@ void slice_to_file(Context& context, const std::string& stl_path, const Job& job
         context.throw_if_cancelled();
         write_file_whole(out, text);
     });
+}
+
+std::string terminal_text(std::string_view text, bool one_line) { return printable(text, one_line); }
+
+std::string number_text(double value, int decimals) {
+    std::string text;
+    append_rounded(text, value, decimals);
+    return text;
 }
 
 }  // namespace slabwright

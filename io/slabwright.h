@@ -5,11 +5,15 @@
 //     slabwright::Plan plan = slabwright::plan(context, "pattern.stl", job);
 //     slabwright::write(context, plan, "out");
 //
+// A pattern is named by its path, or given as bytes or as a mesh (PatternSource); a plan is written to a
+// folder, or asked for as text (plan_document, program_document).
+//
 // Everything throws slabwright::Error and nothing else; context.cancel() from any thread stops it. The
 // library writes nothing to stderr, sets no signal handler and never exits; several plans may run at once,
 // each on its own Context.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -17,6 +21,7 @@
 
 #include "engine/job.h"
 #include "engine/plan.h"
+#include "io/read/pattern_source.h"
 #include "kernels/errors.h"
 #include "kernels/export.h"
 #include "kernels/parallel/context.h"
@@ -29,51 +34,69 @@ namespace slabwright {
 /// Reads a job file (TOML). @throws Error(usage) with file, line and the nearest known key
 [[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path);
 
+/// A job with the keys that a text in TOML states, the others as in `base`. @param name of the text, for
+/// errors
+/// @throws as read_job()
+[[nodiscard]] SLABWRIGHT_API Job job_from_toml(std::string_view toml, const std::string& name,
+                                               const Job& base = {});
+
 /// All keys with their defaults and comments, as a job file. @param library "default", or "luo" for the tools
 /// of LUO table 5.4
 [[nodiscard]] SLABWRIGHT_API std::string default_job_toml(std::string_view library = "default");
 
-/// Reads the STL and plans the build. @throws Error(input | no_plan | cancelled | usage)
-[[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const std::string& stl_path, const Job& job);
+/// Reads the pattern and plans the build. @throws Error(input | no_plan | cancelled | usage)
+[[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const PatternSource& source, const Job& job);
 
-/// A pattern that was read, for whoever plans it and verifies the plan: its file is then read once. What it
-/// holds is this library's.
+/// A pattern that was read, for whoever plans it and verifies the plan: it is then read once. What it holds
+/// is this library's.
 struct Pattern;
 
-/// Reads the STL as `job` says. @throws Error(input | cancelled | usage)
+/// Reads the pattern as `job` says. @throws Error(input | cancelled | usage)
 [[nodiscard]] SLABWRIGHT_API std::shared_ptr<Pattern> read_pattern(Context& context,
-                                                                   const std::string& stl_path,
+                                                                   const PatternSource& source,
                                                                    const Job& job);
 
-/// Plans the build of a pattern that was read with the same units and tolerance of welding. @throws as plan()
-/// of an STL, and Error(usage) when it was read otherwise
+/// Plans the build of a pattern that was read as this job says. @throws as plan() of a source, and
+/// Error(usage) when it was read otherwise
 [[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const Pattern& pattern, const Job& job);
+
+/// What plan.json holds. @throws Error(no_plan) where a number is not finite
+[[nodiscard]] SLABWRIGHT_API std::string plan_document(const Plan& plan);
+
+/// The program of one operation of a layer of the plan, as the job's machine reads it.
+/// @throws Error(no_plan, "program.unsafe")
+[[nodiscard]] SLABWRIGHT_API std::string program_document(const Plan& plan, const Layer& layer,
+                                                          const Operation& operation);
+
+/// Makes sure, before hours of planning, that write() can put a plan at `directory`.
+/// @throws Error(input) that names what stands against it
+SLABWRIGHT_API void require_replaceable(const std::string& directory);
 
 /// Writes plan.json, nc/, tool.tbl and sequence.json into `directory`, all or nothing: a fresh folder beside
 /// it is filled and then takes its place; an existing folder is replaced only if it holds a plan.json of ours
 /// or is empty.
-/// @param stl_path the pattern that was planned: with it report.html is written too, where this library can
+/// @param source the pattern that was planned: with it report.html is written too, where this library can
 /// (plan() notes when it cannot)
 /// @throws Error(input) when the place cannot be written
 SLABWRIGHT_API void write(Context& context, const Plan& plan, const std::string& directory,
-                          const std::string& stl_path = {});
+                          const PatternSource& source = {});
 
 /// Writes what tools reach into `directory`, for viewers of meshes: layer_01_tool_02.ply and so on, the
 /// facets of layer 1 that are to be machined with the share of each that tool 2 reaches
 /// (io/write/access_ply.h), pattern-base. Of the flat and ball end mills that were looked at for a layer or
 /// cut it.
-/// @param stl_path the pattern that was planned
+/// @param source the pattern that was planned
 /// @throws Error(input) when the place cannot be written or the STL is another one, Error(cancelled)
-SLABWRIGHT_API void write_access_maps(Context& context, const Plan& plan, const std::string& stl_path,
+SLABWRIGHT_API void write_access_maps(Context& context, const Plan& plan, const PatternSource& source,
                                       const std::string& directory);
 
 /// Makes report.html of a folder again, from what lies in it (verify.json among it) and the pattern.
-/// @param stl_path as verify's. @param three_d false: a light page without model and paths
+/// @param source as verify's. @param three_d false: a light page without model and paths
 /// @param size_limit_mb the page is made no larger, by showing less detail; it says how much
 /// @throws Error(usage) when the library was built without the page or the limit cannot be kept, Error(input)
 /// when the folder cannot be
 ///         understood, the STL is missing or another one, or the place cannot be written
-SLABWRIGHT_API void report(Context& context, const std::string& directory, const std::string& stl_path = {},
+SLABWRIGHT_API void report(Context& context, const std::string& directory, const PatternSource& source = {},
                            bool three_d = true, double size_limit_mb = 10);
 
 /// Of the time that plan() and write_verified() take together, that of plan() and of the writing: 0.55 to
@@ -104,11 +127,11 @@ struct VerifyResult {
 /// Writes as write() does, and verifies what it wrote before it takes its place: `directory` then holds
 /// verify.json too, also when the programs do not make the part. Cancelled or refused, it is as it was
 /// before.
-/// @param stl_path the pattern that was planned. @param cell_mm as verify's
+/// @param source the pattern that was planned. @param cell_mm as verify's
 /// @throws Error as write() and verify()
 [[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan,
                                                          const std::string& directory,
-                                                         const std::string& stl_path, double cell_mm = 0);
+                                                         const PatternSource& source, double cell_mm = 0);
 /// The same of a pattern that plan() was given. What the programs say is read from their text all the same.
 /// Not from two threads at once with one pattern, which keeps what verification makes of it.
 [[nodiscard]] SLABWRIGHT_API VerifyResult write_verified(Context& context, const Plan& plan,
@@ -118,7 +141,7 @@ struct VerifyResult {
 
 /// Simulates the programs in `directory` against the pattern, from the folder's text alone, and writes
 /// verify.json into it.
-/// @param stl_path the pattern; "" looks for the file that plan.json names: in the folder, beside it, where
+/// @param source the pattern; none looks for the file that plan.json names: in the folder, beside it, where
 /// the caller stands
 /// @param maps_directory where a picture of each layer is written, layer_01.ppm and so on: what is left over,
 /// missed, unreachable or
@@ -131,12 +154,22 @@ struct VerifyResult {
 /// another one, Error(usage)
 ///         on another cell
 [[nodiscard]] SLABWRIGHT_API VerifyResult verify(Context& context, const std::string& directory,
-                                                 const std::string& stl_path = {},
+                                                 const PatternSource& source = {},
                                                  const std::string& maps_directory = {}, double cell_mm = 0);
 
-/// Mesh report, features and undercuts of a file as JSON (schema slabwright.inspect/1).
-[[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const std::string& stl_path,
-                                                 const Job& job);
+/// Makes the report.html that lies in a folder again, as light or as full as it was; a folder without one is
+/// left as it is. @throws as report()
+SLABWRIGHT_API void refresh_report(Context& context, const std::string& directory,
+                                   const PatternSource& source = {});
+
+enum class InspectionForm : std::uint8_t {
+    json,  ///< schema slabwright.inspect/1
+    text,  ///< a few lines for people
+};
+
+/// Mesh report, features and undercuts of a pattern.
+[[nodiscard]] SLABWRIGHT_API std::string inspect(Context& context, const PatternSource& source,
+                                                 const Job& job, InspectionForm form = InspectionForm::json);
 
 /// What a repair did.
 struct RepairResult {
@@ -150,12 +183,30 @@ struct RepairResult {
 /// with the bytes of its file, unless the job welds within a tolerance.
 /// @throws Error(input) when the file cannot be read or repaired or the place cannot be written,
 /// Error(usage), Error(no_plan) when memory does not suffice, Error(cancelled)
-SLABWRIGHT_API RepairResult repair(Context& context, const std::string& stl_path, const std::string& out,
+SLABWRIGHT_API RepairResult repair(Context& context, const PatternSource& source, const std::string& out,
                                    const Job& job);
+
+/// Results and errors as JSON, for programs that call the command or serve its answers: an error on one line;
+/// what a plan in `directory` holds and, where it was verified, what was found; what a repair did that wrote
+/// `out`; what the report is called.
+[[nodiscard]] SLABWRIGHT_API std::string error_json(const Error& error);
+[[nodiscard]] SLABWRIGHT_API std::string plan_summary_json(const Plan& plan, const std::string& directory,
+                                                           const VerifyResult* found);
+[[nodiscard]] SLABWRIGHT_API std::string repair_summary_json(const RepairResult& result,
+                                                             const std::string& out);
+[[nodiscard]] SLABWRIGHT_API std::string report_summary_json(const std::string& directory);
+
+/// Text that a terminal may be given, whatever names it holds: control characters become spaces, bytes that
+/// are no UTF-8 question marks. @param one_line line breaks too
+[[nodiscard]] SLABWRIGHT_API std::string terminal_text(std::string_view text, bool one_line);
+
+/// `value` rounded to `decimals` (0 … 9) places, trailing zeros cut; never "-0", whatever the locale.
+/// @throws Error(no_plan, "number.not_finite")
+[[nodiscard]] SLABWRIGHT_API std::string number_text(double value, int decimals);
 
 /// Sections every `every_mm` (at its multiples above the bottom) written by the ending of `out`: .svg, .dxf
 /// or .json.
-SLABWRIGHT_API void slice_to_file(Context& context, const std::string& stl_path, const Job& job,
+SLABWRIGHT_API void slice_to_file(Context& context, const PatternSource& source, const Job& job,
                                   double every_mm, const std::string& out);
 
 }  // namespace slabwright

@@ -449,11 +449,12 @@ Verification verify_folder(Context& context, const std::string& directory, const
     const PlannedPattern planned_pattern{plan["input"]["file"].text(),
                                          plan["input"]["sha256"].text(),
                                          {part.job.units, part.job.tolerances.weld, part.job.input.repair}};
-    result.pattern = options.pattern && options.pattern->is(planned_pattern)
-                         ? options.pattern
-                         : read_pattern(context, directory, planned_pattern, options.stl, "verify");
+    result.pattern =
+        options.pattern && options.pattern->is(planned_pattern)
+            ? options.pattern
+            : read_planned_pattern(context, directory, planned_pattern, options.source, "verify");
     Pattern& pattern = *result.pattern;
-    input.mesh = pattern.stl.mesh.view();
+    input.mesh = pattern.read.mesh.view();
     if (!pattern.part) pattern.part.emplace(context, input.mesh);
 
     SimulationOptions simulation;
@@ -473,7 +474,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     result.report = simulate(context, input, *pattern.part, simulation);
     input.mesh = {};
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
-    result.json = verify_json(input, result.report, simulation, fs::path(pattern.path).filename().string(),
+    result.json = verify_json(input, result.report, simulation, fs::path(pattern.place).filename().string(),
                               part.stated);
 
     if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);

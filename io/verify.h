@@ -11,8 +11,8 @@
 namespace slabwright {
 
 struct VerifyOptions {
-    std::string stl;  ///< the pattern; "" looks for the file that plan.json names: in OUT, beside OUT, in the
-                      ///< working folder
+    PatternSource source;  ///< the pattern; none looks for the file that plan.json names: in OUT, beside OUT,
+                           ///< in the working folder
     /// The pattern where it has been read already: it is not read again if it is the one that plan.json
     /// names.
     std::shared_ptr<Pattern> pattern{};

@@ -194,7 +194,7 @@ TEST_P(FlaskPlan, IsMadeAndStays) {
     for (const Diagnostic& d : made.diagnostics) EXPECT_NE(d.code, "joint.tips");
     write(context, made, out);
     VerifyOptions options;
-    options.stl = stl;
+    options.source = stl;
     Verification v = verify_folder(context, out, options);
     for (const Violation& violation : v.report.violations)
         ADD_FAILURE() << violation.code << ' ' << violation.message << ' ' << violation.file;

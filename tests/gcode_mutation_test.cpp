@@ -21,9 +21,10 @@
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table.h"
 #include "io/posts/tool_table_check.h"
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
+#include "io/write/stl_writer.h"
 #include "kernels/errors.h"
 #include "tests/support/canon_motions.h"
 #include "tests/support/files.h"
@@ -138,9 +139,11 @@ struct Planned {
         support::spit(path, text);
         std::string found;
         try {
-            const Verification v = verify_folder(
-                context, out(),
-                {.stl = folder / "hill.stl", .pattern = pattern, .cell = kCell, .write = false});
+            const Verification v = verify_folder(context, out(),
+                                                 {.source = (folder / "hill.stl").string(),
+                                                  .pattern = pattern,
+                                                  .cell = kCell,
+                                                  .write = false});
             for (const Violation& w : v.report.violations) found += w.code + " ";
         } catch (const Error& e) {
             found = e.code();

@@ -21,7 +21,7 @@
 #include "engine/planner/planner.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/schedule.h"
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "io/write/sequence_json.h"
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
@@ -686,7 +686,7 @@ TEST(Joints, StrayFacetsWithoutAreaLiftNothing) {
         }
         file.close();
         Context context;
-        return read_stl(context, path);
+        return read_pattern_mesh(context, path);
     };
     const std::vector<std::array<Vec3f, 3>> strays{
         {Vec3f{5, 5, -7}, Vec3f{5, 5, -7}, Vec3f{5, 5, -7}},         // a point
@@ -699,7 +699,7 @@ TEST(Joints, StrayFacetsWithoutAreaLiftNothing) {
         for (std::size_t k = 0; k < strays.size(); ++k)
             if (k == s || s == strays.size())
                 facets.insert(facets.begin() + static_cast<std::ptrdiff_t>(k), strays[k]);
-        const StlMesh stl = read(facets);
+        const PatternMesh stl = read(facets);
         const Box3 box = bounds(stl.mesh.view());
         EXPECT_EQ(box.min, (Vec3f{0, 0, 0}));
         EXPECT_EQ(box.max, (Vec3f{60, 40, 30}));

@@ -1,5 +1,6 @@
 // What plan, verify and report may touch on the disk, and what is left when they fail.
 #include "io/write/output_folder.h"
+#include "io/slabwright.h"
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -13,7 +14,6 @@
 #include <string>
 #include <vector>
 
-#include "io/slabwright.h"
 #include "io/write/output_file.h"
 #include "kernels/errors.h"
 #include "tests/support/command.h"

@@ -282,7 +282,7 @@ TEST(Planner, APatternIsReadOnceForPlanAndVerification) {
     const std::shared_ptr<Pattern> pattern = read_pattern(context, stl, job);
     const Plan planned = plan(context, *pattern, job);
     std::size_t reads = 0;
-    Context counting({.progress = [&](const Progress& p) { reads += p.phase == "read STL"; }});
+    Context counting({.progress = [&](const Progress& p) { reads += p.phase == "read"; }});
     (void)write_verified(counting, planned, folder / "once", pattern);
     EXPECT_EQ(reads, 0u);
     for (const char* file : {"/plan.json", "/verify.json"})

@@ -11,9 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "io/read/pattern_mesh.h"
 #include "io/read/repair.h"
-#include "io/read/stl.h"
 #include "io/slabwright.h"
+#include "io/write/stl_writer.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/repair/repair.h"
 #include "tests/mesh_shapes.h"
@@ -59,10 +60,10 @@ const Diagnostic* find(const std::vector<Diagnostic>& all, const std::string& co
     return nullptr;
 }
 
-Error refusal(const std::string& path, const StlOptions& options = {}) {
+Error refusal(const std::string& path, const ReadingOptions& options = {}) {
     Context context({.threads = 1});
     try {
-        require_solid(context, read_stl(context, path, options), path);
+        require_solid(context, read_pattern_mesh(context, path, options), path);
     } catch (const Error& error) {
         return error;
     }
@@ -95,7 +96,7 @@ TEST(RepairInput, WhatIsMendedIsTold) {
     const TemporaryFolder folder;
     save(folder / "cracked.stl", cracked());
     Context context({.threads = 2});
-    const StlMesh stl = read_stl(context, folder / "cracked.stl", {.repair = Repair::mend});
+    const PatternMesh stl = read_pattern_mesh(context, folder / "cracked.stl", {.repair = Repair::mend});
     require_solid(context, stl, "cracked.stl");
     ASSERT_TRUE(stl.input.repair.has_value());
     EXPECT_EQ(stl.input.repair->how, "mend");
@@ -110,7 +111,7 @@ TEST(RepairInput, WhatIsMendedIsTold) {
     EXPECT_TRUE(crack->where.has_value());
     EXPECT_EQ(find(stl.diagnostics, "mesh.open"), nullptr) << "what is mended is no fault any more";
     save(folder / "good.stl", shapes::box({0, 0, 0}, {10, 10, 10}));
-    const StlMesh good = read_stl(context, folder / "good.stl", {.repair = Repair::mend});
+    const PatternMesh good = read_pattern_mesh(context, folder / "good.stl", {.repair = Repair::mend});
     ASSERT_TRUE(good.input.repair.has_value());
     EXPECT_EQ(good.input.repair->how, "none");
     EXPECT_TRUE(good.input.repair->defects.empty());
@@ -140,7 +141,7 @@ TEST(RepairInput, ASolidIsWrittenInTheUnitAndPlaceOfItsFile) {
         const RepairResult result = repair(context, folder / "cracked.stl", folder / "out.stl", job);
         EXPECT_EQ(result.repair.how, "mend");
         EXPECT_NE(find(result.diagnostics, "repair.crack"), nullptr);
-        const StlMesh stl = read_stl(context, folder / "out.stl", {.units = units});
+        const PatternMesh stl = read_pattern_mesh(context, folder / "out.stl", {.units = units});
         require_solid(context, stl, "out.stl");
         const double inch = units == LengthUnit::inch ? kInch : 1;
         EXPECT_NEAR(stl.input.min[0], 10 * inch, 1e-3);
@@ -173,7 +174,7 @@ TEST(RepairInput, RebuildingTellsItsCellAndDeviation) {
     const TemporaryFolder folder;
     save(folder / "open.stl", open_torus());
     Context context({.threads = 2});
-    const StlMesh stl = read_stl(context, folder / "open.stl", {.repair = Repair::rebuild});
+    const PatternMesh stl = read_pattern_mesh(context, folder / "open.stl", {.repair = Repair::rebuild});
     require_solid(context, stl, "open.stl");
     ASSERT_TRUE(stl.input.repair.has_value());
     EXPECT_EQ(stl.input.repair->how, "rebuild");
@@ -183,8 +184,9 @@ TEST(RepairInput, RebuildingTellsItsCellAndDeviation) {
     EXPECT_NE(find(stl.diagnostics, "repair.rebuilt"), nullptr);
     // Where mending is enough, nothing is rebuilt.
     save(folder / "cracked.stl", cracked());
-    EXPECT_EQ(read_stl(context, folder / "cracked.stl", {.repair = Repair::rebuild}).input.repair->how,
-              "mend");
+    EXPECT_EQ(
+        read_pattern_mesh(context, folder / "cracked.stl", {.repair = Repair::rebuild}).input.repair->how,
+        "mend");
     // A soup encloses nothing.
     Facets soup;
     for (int i = 0; i < 40; ++i) {
@@ -193,7 +195,7 @@ TEST(RepairInput, RebuildingTellsItsCellAndDeviation) {
     }
     save(folder / "soup.stl", soup);
     try {
-        (void)read_stl(context, folder / "soup.stl", {.repair = Repair::rebuild});
+        (void)read_pattern_mesh(context, folder / "soup.stl", {.repair = Repair::rebuild});
         FAIL();
     } catch (const Error& error) {
         EXPECT_EQ(error.code(), "repair.nothing") << error.what();
@@ -248,7 +250,7 @@ TEST(RepairInput, RefusedMeshesOfTheCorpusAreMended) {
         if (!std::filesystem::exists(file)) continue;
         SCOPED_TRACE(file);
         Context context({.threads = 2});
-        const StlMesh stl = read_stl(context, file);
+        const PatternMesh stl = read_pattern_mesh(context, file);
         if (is_solid(stl.report)) continue;
         ++refused;
         try {

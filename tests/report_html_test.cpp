@@ -9,7 +9,7 @@
 #include <random>
 
 #include "engine/simulate/replay.h"
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "io/slabwright.h"
 #include "io/text/base64.h"
 #include "io/write/thinned_path.h"
@@ -97,7 +97,7 @@ TEST(ThinnedPath, EveryPointLeftOutLiesNearTheWayThatReplacesIt) {
 
 TEST(Replay, AStraightSlotIsAsDeepAndAsWideAsItIs) {
     Context context;
-    const StlMesh stl = read_stl(context, kStl);
+    const PatternMesh stl = read_pattern_mesh(context, kStl);
     SimulationInput input;
     input.mesh = stl.mesh.view();
     input.stock_min = {-80, -80}, input.stock_max = {80, 80};

@@ -31,7 +31,7 @@ std::vector<LayerFindings> findings_of(const std::vector<Facet>& facets, const J
     const std::string stl = folder / "part.stl";
     std::ofstream(stl, std::ios::binary) << stl_bytes("part", facets);
     write(context, plan(context, stl, job), folder / "out");
-    return verify_folder(context, folder / "out", {.stl = stl, .write = false}).report.layers;
+    return verify_folder(context, folder / "out", {.source = stl, .write = false}).report.layers;
 }
 
 // A block with drafted sides, one layer on another: the lowest level of the upper one must touch the wall

@@ -15,7 +15,7 @@
 #include <set>
 #include <sstream>
 
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/part.h"
 #include "kernels/slicing/slicing.h"
@@ -727,9 +727,9 @@ TEST(Slicing, CorpusIsClosedAtEveryHeight) {
         for (std::string field; std::getline(columns, field, '\t');) fields.push_back(field);
         ASSERT_GE(fields.size(), 7u) << line;
         if (fields[6] != "yes") continue;
-        StlMesh stl;
+        PatternMesh stl;
         try {
-            stl = read_stl(context, std::string(corpus) + "/" + fields[0]);
+            stl = read_pattern_mesh(context, std::string(corpus) + "/" + fields[0]);
         } catch (const Error& error) {
             if (error.kind() != ErrorKind::input) throw;
             std::printf("%s is refused: %s\n", fields[0].c_str(), error.what());

@@ -12,8 +12,9 @@
 #include <vector>
 
 #include "engine/job.h"
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "io/slabwright.h"
+#include "io/write/stl_writer.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
 #include "tests/support/compositions.h"

@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "kernels/errors.h"
 #include "tests/support/temporary_folder.h"
 
@@ -110,9 +110,9 @@ TEST(StlCorpus, EveryFileIsAsItsManifestSays) {
         SCOPED_TRACE(entry.file);
         Context context({.threads = 2});
         const std::string path = folder + "/" + entry.file;
-        StlMesh stl;
+        PatternMesh stl;
         try {
-            stl = read_stl(context, path);
+            stl = read_pattern_mesh(context, path);
         } catch (const Error& error) {
             const auto expected = kRefused.find(entry.file);
             ASSERT_NE(expected, kRefused.end()) << error.what();
@@ -164,10 +164,10 @@ TEST(StlCorpus, SameBytesOnAnyNumberOfThreads) {
     for (const Entry& entry : manifest(folder)) {
         if (kRefused.count(entry.file) != 0) continue;
         SCOPED_TRACE(entry.file);
-        StlMesh first;
+        PatternMesh first;
         for (const int threads : {1, 2, 4}) {
             Context context({.threads = threads});
-            StlMesh stl = read_stl(context, folder + "/" + entry.file);
+            PatternMesh stl = read_pattern_mesh(context, folder + "/" + entry.file);
             if (threads == 1) {
                 first = std::move(stl);
                 continue;
@@ -197,16 +197,16 @@ TEST(StlCorpus, CracksCloseUnderTheWeldThatIsNamed) {
         SCOPED_TRACE(file);
         Context context({.threads = 2});
         const std::string lying = folder + "/" + file, path = stood_up / "up.stl";
-        require_solid(context, read_stl(context, lying), lying);
+        require_solid(context, read_pattern_mesh(context, lying), lying);
         stand_up(lying, path);
         std::string remedy;
         try {
-            require_solid(context, read_stl(context, path), path);
+            require_solid(context, read_pattern_mesh(context, path), path);
         } catch (const Error& error) {
             remedy = error.remedy();
         }
         ASSERT_EQ(remedy.rfind("--weld ", 0), 0u) << remedy;
-        const StlMesh welded = read_stl(context, path, {.weld_mm = std::stod(remedy.substr(7))});
+        const PatternMesh welded = read_pattern_mesh(context, path, {.weld_mm = std::stod(remedy.substr(7))});
         require_solid(context, welded, path);
         EXPECT_EQ(welded.report.open_edges_off_base.count, 0u);
     }

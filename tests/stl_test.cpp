@@ -1,5 +1,6 @@
 // STL in and out: both forms, every refusal, units, and files damaged at random.
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
+#include "io/write/stl_writer.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -108,10 +109,10 @@ std::string ascii(const Facets& facets, const AsciiStyle& style = {}) {
     return text;
 }
 
-Error refusal(const std::string& path, const StlOptions& options = {}, int threads = 2) {
+Error refusal(const std::string& path, const ReadingOptions& options = {}, int threads = 2) {
     Context context({.threads = threads});
     try {
-        static_cast<void>(read_stl(context, path, options));
+        static_cast<void>(read_pattern_mesh(context, path, options));
     } catch (const Error& error) {
         EXPECT_EQ(error.kind(), ErrorKind::input) << error.what();
         EXPECT_FALSE(error.message().empty());
@@ -135,7 +136,7 @@ const Diagnostic* find(const std::vector<Diagnostic>& diagnostics, const std::st
 
 const Facets kBox = shapes::box({10, 20, 30}, {20, 40, 60});
 
-void expect_box(const StlMesh& stl) {
+void expect_box(const PatternMesh& stl) {
     EXPECT_EQ(stl.mesh.vertices.size(), 8u);
     EXPECT_EQ(stl.mesh.facets.size(), 12u);
     EXPECT_EQ(stl.input.triangles, 12u);
@@ -153,7 +154,7 @@ void expect_box(const StlMesh& stl) {
 TEST_F(Stl, Binary) {
     Context context({.threads = 2});
     const std::string bytes = binary(kBox), path = save("box.stl", bytes);
-    const StlMesh stl = read_stl(context, path);
+    const PatternMesh stl = read_pattern_mesh(context, path);
     expect_box(stl);
     EXPECT_EQ(stl.input.file, "box.stl");
     EXPECT_EQ(stl.input.sha256, sha256(std::as_bytes(std::span(bytes))));
@@ -162,33 +163,35 @@ TEST_F(Stl, Binary) {
 
 TEST_F(Stl, SolidInABinaryHeaderIsNoProofOfAscii) {
     Context context({.threads = 2});
-    expect_box(read_stl(context, save("a.stl", binary(kBox, "solid box"))));
-    expect_box(read_stl(
+    expect_box(read_pattern_mesh(context, save("a.stl", binary(kBox, "solid box"))));
+    expect_box(read_pattern_mesh(
         context,
         save("b.stl", binary(kBox, "solid box\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex "))));
 }
 
 TEST_F(Stl, AsciiInManyStyles) {
     Context context({.threads = 2});
-    expect_box(read_stl(context, save("a.stl", ascii(kBox))));
-    expect_box(read_stl(
+    expect_box(read_pattern_mesh(context, save("a.stl", ascii(kBox))));
+    expect_box(read_pattern_mesh(
         context,
         save("b.stl",
              ascii(kBox, {.line = "\r\n", .upper = true, .normal = "NaN nan -nan(ind)", .plus = "+"}))));
-    expect_box(read_stl(context, save("c.stl", ascii(kBox, {.line = "\r", .name = ""}))));
-    expect_box(read_stl(context, save("d.stl", "\xEF\xBB\xBF  \n" + ascii(kBox))));
-    expect_box(read_stl(context, save("e.stl", ascii(kBox, {.normal = ""}))));
-    expect_box(read_stl(context, save("f.stl", ascii(kBox, {.name = "facet normal 1 2 3 endsolid"}))));
+    expect_box(read_pattern_mesh(context, save("c.stl", ascii(kBox, {.line = "\r", .name = ""}))));
+    expect_box(read_pattern_mesh(context, save("d.stl", "\xEF\xBB\xBF  \n" + ascii(kBox))));
+    expect_box(read_pattern_mesh(context, save("e.stl", ascii(kBox, {.normal = ""}))));
+    expect_box(
+        read_pattern_mesh(context, save("f.stl", ascii(kBox, {.name = "facet normal 1 2 3 endsolid"}))));
     std::string last = ascii(kBox);
     while (last.back() == '\n') last.pop_back();
-    expect_box(read_stl(context, save("g.stl", last)));
+    expect_box(read_pattern_mesh(context, save("g.stl", last)));
 }
 
 TEST_F(Stl, SeveralSolidsInOneFile) {
     Context context({.threads = 2});
-    const StlMesh stl = read_stl(context, save("two.stl", ascii(shapes::box({0, 0, 0}, {9, 9, 9})) + "\n" +
-                                                              ascii(shapes::box({20, 0, 0}, {29, 9, 9}),
-                                                                    {.upper = true, .name = "second one"})));
+    const PatternMesh stl = read_pattern_mesh(
+        context, save("two.stl",
+                      ascii(shapes::box({0, 0, 0}, {9, 9, 9})) + "\n" +
+                          ascii(shapes::box({20, 0, 0}, {29, 9, 9}), {.upper = true, .name = "second one"})));
     EXPECT_EQ(stl.report.components, 2u);
     EXPECT_EQ(stl.input.triangles, 24u);
 }
@@ -198,7 +201,7 @@ TEST_F(Stl, NumbersInEverySpelling) {
     const std::string text =
         "solid s\nfacet normal 0 0 1 outer loop\nvertex 1e1 +2.5E+00 -.5\nvertex 0010.0 1e-999 .25e1\nvertex "
         "-0 7. 5\nendloop endfacet\nendsolid";
-    const StlMesh stl = read_stl(context, save("n.stl", text));
+    const PatternMesh stl = read_pattern_mesh(context, save("n.stl", text));
     ASSERT_EQ(stl.mesh.vertices.size(), 3u);
     EXPECT_EQ(stl.mesh.vertices[0], (Vec3f{10, 2.5f, 0}));
     EXPECT_EQ(stl.mesh.vertices[1], (Vec3f{10, 0, 3}));
@@ -218,12 +221,12 @@ TEST_F(Stl, TheLocaleDoesNotMatter) {
     for (const char* name : {"de_DE.UTF-8", "de_DE", "fr_FR.UTF-8"})
         if (std::setlocale(LC_ALL, name) != nullptr) break;
     Context context({.threads = 2});
-    const StlMesh stl = read_stl(context, path);
+    const PatternMesh stl = read_pattern_mesh(context, path);
     EXPECT_EQ(stl.report.box.min, (Vec3f{0.5f, 0.25f, 0}));
     EXPECT_EQ(stl.report.box.max, (Vec3f{10.5f, 20.5f, 30.375f}));
     std::string message;
     try {
-        require_solid(context, read_stl(context, open), open);
+        require_solid(context, read_pattern_mesh(context, open), open);
     } catch (const Error& error) {
         message = error.what();
     }
@@ -236,7 +239,8 @@ TEST_F(Stl, TheLocaleDoesNotMatter) {
 TEST_F(Stl, InchesAreScaledInDoubleAndRoundedOnce) {
     Context context({.threads = 2});
     const Facets box = shapes::box({0.1f, 0.2f, -7.3f}, {12.3f, 6.1f, 9.7f});
-    const StlMesh stl = read_stl(context, save("in.stl", binary(box)), {.units = LengthUnit::inch});
+    const PatternMesh stl =
+        read_pattern_mesh(context, save("in.stl", binary(box)), {.units = LengthUnit::inch});
     EXPECT_EQ(stl.input.min[0], static_cast<double>(0.1f) * 25.4);
     EXPECT_EQ(stl.input.max[2], static_cast<double>(9.7f) * 25.4);
     EXPECT_EQ(stl.report.box.min.x, static_cast<float>(static_cast<double>(0.1f) * 25.4));
@@ -256,8 +260,8 @@ TEST_F(Stl, UnitsThatLookWrongAreRemarkedOnNotGuessed) {
          {Case{4.9f, LengthUnit::mm, "inches"}, Case{5001, LengthUnit::mm, "inches"},
           Case{4.9f, LengthUnit::inch, "millimetres"}, Case{5001, LengthUnit::inch, "millimetres"},
           Case{5, LengthUnit::mm, nullptr}, Case{5000, LengthUnit::inch, nullptr}}) {
-        const StlMesh stl = read_stl(context, save("u.stl", binary(shapes::box({0, 0, 0}, {c.size, 1, 1}))),
-                                     {.units = c.unit});
+        const PatternMesh stl = read_pattern_mesh(
+            context, save("u.stl", binary(shapes::box({0, 0, 0}, {c.size, 1, 1}))), {.units = c.unit});
         const Diagnostic* remark = find(stl.diagnostics, "units.suspicious");
         ASSERT_EQ(remark != nullptr, c.names != nullptr) << c.size;
         if (remark == nullptr) continue;
@@ -273,11 +277,11 @@ TEST_F(Stl, LargeAsciiEqualsItsBinaryOnAnyNumberOfThreads) {
                       binary_path = save("b.stl", binary(torus));
     ASSERT_GT(text.size(), std::size_t{3} << 20);
     Context one({.threads = 1});
-    const StlMesh expected = read_stl(one, binary_path);
+    const PatternMesh expected = read_pattern_mesh(one, binary_path);
     EXPECT_EQ(expected.report.open_edges.count, 0u);
     for (const int threads : {1, 2, 4}) {
         Context context({.threads = threads});
-        const StlMesh stl = read_stl(context, text_path);
+        const PatternMesh stl = read_pattern_mesh(context, text_path);
         ASSERT_EQ(stl.mesh.facets, expected.mesh.facets) << threads;
         ASSERT_EQ(stl.mesh.vertices, expected.mesh.vertices);
         ASSERT_EQ(stl.mesh.neighbours, expected.mesh.neighbours);
@@ -418,7 +422,7 @@ TEST_F(Stl, MemoryAndCancel) {
     for (const std::string& file : {path, text}) {
         Context small({.threads = 2, .memory_bytes = 100000});
         try {
-            static_cast<void>(read_stl(small, file));
+            static_cast<void>(read_pattern_mesh(small, file));
             FAIL() << "over the limit";
         } catch (const Error& error) {
             EXPECT_EQ(error.code(), "memory.limit");
@@ -426,7 +430,7 @@ TEST_F(Stl, MemoryAndCancel) {
         Context cancelled({.threads = 2});
         cancelled.cancel();
         try {
-            static_cast<void>(read_stl(cancelled, file));
+            static_cast<void>(read_pattern_mesh(cancelled, file));
             FAIL() << "cancelled";
         } catch (const Error& error) {
             EXPECT_EQ(error.kind(), ErrorKind::cancelled);
@@ -451,7 +455,7 @@ TEST_F(Stl, AFileThatIsWrittenWhileItIsReadIsAnErrorNotASignal) {
     Context context({.threads = 2});
     for (int i = 0; i < 100'000 && (outcomes["read"] < 20 || outcomes["stl.changed"] < 5); ++i) {
         try {
-            EXPECT_EQ(read_stl(context, path).mesh.facets.size(), torus.size());
+            EXPECT_EQ(read_pattern_mesh(context, path).mesh.facets.size(), torus.size());
             ++outcomes["read"];
         } catch (const Error& error) {
             EXPECT_EQ(error.kind(), ErrorKind::input) << error.what();
@@ -474,14 +478,14 @@ TEST_F(Stl, WhatIsTooLargeForTheMemoryIsToldBeforeItIsRead) {
     ASSERT_EQ(::truncate(zeros.c_str(), off_t{10'000'000'000}), 0);
     Context context({.threads = 2, .memory_bytes = std::uint64_t{12} << 30});
     try {
-        static_cast<void>(read_stl(context, path));
+        static_cast<void>(read_pattern_mesh(context, path));
         FAIL() << "over the limit";
     } catch (const Error& error) {
         EXPECT_EQ(error.code(), "memory.limit");
         EXPECT_NE(error.message().find("sparse.stl"), std::string::npos);
     }
     try {
-        static_cast<void>(read_stl(context, zeros));
+        static_cast<void>(read_pattern_mesh(context, zeros));
         FAIL() << "no STL";
     } catch (const Error& error) {
         EXPECT_EQ(error.code(), "stl.facet_count");
@@ -496,7 +500,7 @@ TEST_F(Stl, WhatIsTooLargeForTheMemoryIsToldBeforeItIsRead) {
 Error not_solid(const Facets& facets, const std::string& path) {
     std::ofstream(path, std::ios::binary) << binary(facets);
     Context context({.threads = 2});
-    const StlMesh stl = read_stl(context, path);
+    const PatternMesh stl = read_pattern_mesh(context, path);
     try {
         require_solid(context, stl, path);
     } catch (const Error& error) {
@@ -534,7 +538,7 @@ TEST_F(Stl, RequireSolidAcceptsAnOpenBaseCavitiesAndBlemishes) {
     Facets facets = kBox;
     facets.erase(facets.begin(), facets.begin() + 2);  // the bottom
     const std::string path = save("p.stl", binary(facets));
-    StlMesh stl = read_stl(context, path);
+    PatternMesh stl = read_pattern_mesh(context, path);
     require_solid(context, stl, path);
     const Diagnostic* remark = find(stl.diagnostics, "mesh.open_base");
     ASSERT_NE(remark, nullptr);
@@ -548,7 +552,7 @@ TEST_F(Stl, RequireSolidAcceptsAnOpenBaseCavitiesAndBlemishes) {
     facets.push_back(facets[3]);  // twice, and once more reversed
     facets.push_back({facets[3][0], facets[3][2], facets[3][1]});
     save("p.stl", binary(facets));
-    stl = read_stl(context, path);
+    stl = read_pattern_mesh(context, path);
     require_solid(context, stl, path);
     EXPECT_NE(find(stl.diagnostics, "mesh.degenerate"), nullptr);
     EXPECT_NE(find(stl.diagnostics, "mesh.duplicate"), nullptr);
@@ -572,7 +576,7 @@ TEST_F(Stl, TheWeldThatIsNamedCloses) {
         ASSERT_EQ(error.remedy().rfind("--weld ", 0), 0u) << error.remedy();
         const double tolerance = std::stod(error.remedy().substr(7));
         Context context({.threads = 2});
-        const StlMesh welded = read_stl(context, path, {.weld_mm = tolerance});
+        const PatternMesh welded = read_pattern_mesh(context, path, {.weld_mm = tolerance});
         require_solid(context, welded, path);
         EXPECT_EQ(welded.report.open_edges.count, 0u);
         EXPECT_EQ(welded.report.box.min.z, 0.0f) << "still set on z = 0";
@@ -587,7 +591,7 @@ TEST_F(Stl, WeldingEverythingAwayIsRefused) {
     Context context({.threads = 1});
     const std::string path = save("p.stl", binary(kBox));
     EXPECT_EQ(refusal(path, {.weld_mm = 1000}).code(), "stl.no_facets");
-    EXPECT_THROW(static_cast<void>(read_stl(context, path, {.weld_mm = -1})), Error);
+    EXPECT_THROW(static_cast<void>(read_pattern_mesh(context, path, {.weld_mm = -1})), Error);
 }
 
 // ------------------------------------------------------------------------------------------------- writing
@@ -600,8 +604,8 @@ TEST_F(Stl, ShuffledFacetsAreReadAsOrderedOnes) {
     Facets shuffled = facets;
     std::shuffle(shuffled.begin(), shuffled.end(), random);
     Context context({.threads = 2});
-    const StlMesh ordered = read_stl(context, save("ordered.stl", binary(facets))),
-                  mixed = read_stl(context, save("mixed.stl", binary(shuffled)));
+    const PatternMesh ordered = read_pattern_mesh(context, save("ordered.stl", binary(facets))),
+                      mixed = read_pattern_mesh(context, save("mixed.stl", binary(shuffled)));
     EXPECT_EQ(mixed.mesh.vertices.size(), ordered.mesh.vertices.size());
     EXPECT_EQ(mixed.report.open_edges.count, 0U);
     EXPECT_EQ(mixed.report.components, 1U);
@@ -613,7 +617,7 @@ TEST_F(Stl, ShuffledFacetsAreReadAsOrderedOnes) {
     EXPECT_TRUE(neighbours_follow({reinterpret_cast<const char*>(together.data()), together.size()}));
 
     shuffled[12345] = {shuffled[12345][0], shuffled[12345][0], shuffled[12345][1]};
-    const StlMesh broken = read_stl(context, save("broken.stl", binary(shuffled)));
+    const PatternMesh broken = read_pattern_mesh(context, save("broken.stl", binary(shuffled)));
     EXPECT_EQ(broken.report.degenerate_facets.count, 1U);
     EXPECT_EQ(broken.report.degenerate_facets.first_facet, 12345U);
     EXPECT_EQ(broken.report.open_edges.count, 3U);
@@ -632,7 +636,7 @@ TEST_F(Stl, WrittenAndReadBackIsTheSame) {
     bytes << std::ifstream(path, std::ios::binary).rdbuf();
     EXPECT_EQ(bytes.str().size(), 84 + 50 * mesh.facets.size());
     EXPECT_NE(bytes.str().substr(0, 5), "solid");
-    const StlMesh back = read_stl(context, path);
+    const PatternMesh back = read_pattern_mesh(context, path);
     EXPECT_EQ(back.mesh.facets, mesh.facets);
     ASSERT_EQ(back.mesh.vertices.size(), mesh.vertices.size());
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
@@ -670,7 +674,7 @@ TEST_F(Stl, WritingWhereNothingCanBeWritten) {
 void survive(const std::string& path) {
     Context context({.threads = 1});
     try {
-        const StlMesh stl = read_stl(context, path);
+        const PatternMesh stl = read_pattern_mesh(context, path);
         EXPECT_EQ(stl.mesh.facets.size(), stl.input.triangles);
         require_solid(context, stl, path);
     } catch (const Error& error) {

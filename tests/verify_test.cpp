@@ -11,9 +11,10 @@
 #include <sstream>
 #include <string>
 
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
+#include "io/write/stl_writer.h"
 
 using namespace slabwright;
 namespace fs = std::filesystem;
@@ -68,7 +69,7 @@ void write_block_sequence(const fs::path& out, const std::string& sha256, bool l
 void write_block(const fs::path& out) {
     write_stl((out / "block.stl").string(), block());
     Context context;
-    const StlMesh stl = read_stl(context, (out / "block.stl").string());
+    const PatternMesh stl = read_pattern_mesh(context, (out / "block.stl").string());
     spill(out / "plan.json", R"({"schema": "slabwright.plan/1", "units": "mm", "frame": "pattern-base",
  "input": {"file": "block.stl", "sha256": ")" +
                                  stl.input.sha256 + R"("},
@@ -123,7 +124,7 @@ void write_block_sequence(const fs::path& out, const std::string& sha256, bool l
 std::string verdict(const fs::path& out, double cell = 0.5) {
     Context context;
     try {
-        const Verification v = verify_folder(context, out.string(), {.stl = {}, .cell = cell});
+        const Verification v = verify_folder(context, out.string(), {.source = {}, .cell = cell});
         std::string codes;
         for (const Violation& w : v.report.violations)
             if (codes.find(w.code) == std::string::npos) codes += (codes.empty() ? "" : " ") + w.code;
@@ -185,7 +186,7 @@ TEST(Verify, MapsShowEachLayer) {
     Context context;
     const Verification v =
         verify_folder(context, f.path.string(),
-                      {.stl = {}, .cell = 0.5, .maps_directory = (f.path / "pictures/of").string()});
+                      {.source = {}, .cell = 0.5, .maps_directory = (f.path / "pictures/of").string()});
     const std::string text = slurp(f.path / "pictures/of/layer_01.ppm"), start = "P6\n80 80\n255\n";
     ASSERT_EQ(text.size(), start.size() + 80 * 80 * 3);
     EXPECT_EQ(text.substr(0, start.size()), start);
@@ -206,7 +207,7 @@ TEST(Verify, MapsShowEachLayer) {
     spill(f.path / "file", "");
     try {
         (void)verify_folder(context, f.path.string(),
-                            {.stl = {}, .cell = 0.5, .maps_directory = (f.path / "file").string()});
+                            {.source = {}, .cell = 0.5, .maps_directory = (f.path / "file").string()});
         FAIL() << "a file is no folder";
     } catch (const Error& e) {
         EXPECT_EQ(e.code(), "out.unwritable");
@@ -413,8 +414,8 @@ TEST(Verify, PlannedHalfSphere) {
         spill(nc, text);
         std::string codes;
         try {
-            const Verification v =
-                verify_folder(context, (f.path / "out").string(), {.stl = stl, .cell = 0.4, .write = false});
+            const Verification v = verify_folder(context, (f.path / "out").string(),
+                                                 {.source = stl, .cell = 0.4, .write = false});
             for (const Violation& w : v.report.violations) codes += (codes.empty() ? "" : " ") + w.code;
         } catch (const Error& e) {
             codes = "error " + e.code();

@@ -18,13 +18,7 @@
 #include <string>
 #include <string_view>
 
-#include "io/read/input_file.h"
 #include "io/slabwright.h"
-#include "io/text/job_keys.h"
-#include "io/text/json_text.h"
-#include "io/write/inspect_json.h"
-#include "io/write/output_folder.h"
-#include "io/write/plan_json.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
 
@@ -80,35 +74,10 @@ private:
     bool drawn_ = false;
 };
 
-const char* kind_name(ErrorKind kind) {
-    switch (kind) {
-        case ErrorKind::usage:
-            return "usage";
-        case ErrorKind::input:
-            return "input";
-        case ErrorKind::no_plan:
-            return "no_plan";
-        case ErrorKind::verification:
-            return "verification";
-        case ErrorKind::cancelled:
-            return "cancelled";
-    }
-    return "";
-}
-
 int complain(const Error& error, bool as_json) {
-    std::string line;
-    if (as_json) {
-        JsonText json;
-        json.begin_object(JsonText::Shape::line).key("error").begin_object();
-        json.key("kind").string(kind_name(error.kind())).key("exit").integer(static_cast<int>(error.kind()));
-        json.key("code").string(error.code()).key("message").string(error.message());
-        json.key("place").string(error.place()).key("remedy").string(error.remedy()).end().end();
-        line = json.take();
-    } else {
-        // One error, one line, whatever a file name or a parser's message holds.
-        line = printable(fmt::format("slabwright: {}", error.what()), true) + '\n';
-    }
+    // One error, one line, whatever a file name or a parser's message holds.
+    const std::string line =
+        as_json ? error_json(error) : terminal_text(fmt::format("slabwright: {}", error.what()), true) + '\n';
     std::fwrite(line.data(), 1, line.size(), stderr);
     return static_cast<int>(error.kind());
 }
@@ -122,16 +91,12 @@ void require_told(bool arrived) {
 }
 
 void print(std::string_view text) {
-    const std::string shown = printable(text, false);
+    const std::string shown = terminal_text(text, false);
     const bool written = std::fwrite(shown.data(), 1, shown.size(), stdout) == shown.size();
     require_told(written && std::fflush(stdout) == 0);
 }
 
-std::string number(double value, int decimals) {
-    std::string text;
-    append_rounded(text, value, decimals);
-    return text;
-}
+std::string number(double value, int decimals) { return number_text(value, decimals); }
 
 std::string duration(double minutes) {
     if (minutes < 1) return fmt::format("{:.0f} s", minutes * 60);
@@ -220,38 +185,24 @@ std::string verdict(const VerifyResult& result, const std::string& out) {
     return text;
 }
 
-std::string summary_json(const Plan& plan, const std::string& out, const VerifyResult* found) {
-    JsonText json;
-    json.begin_object();
-    json.key("plan").string(out + "/plan.json");
-    json.key("layers").integer(plan.totals.layers).key("operations").integer(plan.totals.operations);
-    json.key("build_minutes").rounded(plan.totals.build_minutes, 4);
-    json.key("diagnostics");
-    put_diagnostics(json, plan.diagnostics);
-    if (found) {
-        json.key("verified").boolean(found->passed).key("whole").boolean(found->is_whole());
-        json.key("unmade_mm3").rounded(found->unmade_mm3, 0);
-        json.key("unreachable_mm2").rounded(found->unreachable_mm2, 1).key("violations");
-        put_diagnostics(json, found->violations);
-    }
-    json.end();
-    return json.take();
-}
-
 Job job_of(const Options& options) {
-    Job job = options.job_file.empty() ? Job{} : read_job(options.job_file);
-    const auto take = [](const std::string& given, const auto& words, auto& value) {
-        for (const auto& word : words)
-            if (given == word.text) value = word.value;
+    const Job job = options.job_file.empty() ? Job{} : read_job(options.job_file);
+    // An option is a key of the job, and says so in TOML. The words are checked already.
+    std::string keys;
+    const auto put = [&](std::string_view key, const std::string& value) {
+        if (!value.empty()) keys += fmt::format("{} = {}\n", key, value);
     };
-    take(options.units, kUnitWords, job.units);
-    take(options.repair, kRepairWords, job.input.repair);
-    take(options.strategy, kStrategyWords, job.layers.strategy);
-    take(options.finder, kFinderWords, job.layers.finder);
-    if (options.allow_undercut) job.allow_undercut = true;
-    if (options.accept_weak) job.bonding.accept_weak = true;
-    if (options.weld_given) job.tolerances.weld = options.weld;
-    return job;
+    const auto word = [&](std::string_view key, const std::string& value) {
+        if (!value.empty()) put(key, '"' + value + '"');
+    };
+    word("units", options.units);
+    put("allow_undercut", options.allow_undercut ? "true" : "");
+    word("input.repair", options.repair);
+    put("bonding.accept_weak", options.accept_weak ? "true" : "");
+    word("layers.strategy", options.strategy);
+    word("layers.finder", options.finder);
+    put("tolerances.weld", options.weld_given ? fmt::format("{}", options.weld) : "");
+    return keys.empty() ? job : job_from_toml(keys, "command line", job);
 }
 
 /// Runs a body with a context that Ctrl-C cancels and whose progress a terminal sees.
@@ -302,11 +253,12 @@ bool run_plan(const Options& options) {
         if (options.no_verify) {
             pattern.reset();
             write(context, result, options.out, options.stl);
-            return options.json ? summary_json(result, options.out, nullptr) : summary(result, options.out);
+            return options.json ? plan_summary_json(result, options.out, nullptr)
+                                : summary(result, options.out);
         }
         const VerifyResult found = write_verified(context, result, options.out, pattern, options.cell);
         passed = found.passed;
-        return options.json ? summary_json(result, options.out, &found)
+        return options.json ? plan_summary_json(result, options.out, &found)
                             : summary(result, options.out) + verdict(found, options.out);
     });
     return passed;
@@ -314,23 +266,13 @@ bool run_plan(const Options& options) {
 
 /// A report that lies in the folder is made again, as light or as full as it was, so that it tells what the
 /// simulation found. What keeps it from being made is told, and changes no verdict. Empty when all went well.
-std::string refresh_report(Context& context, const Options& options) {
-    const std::string page = options.out + "/report.html";
-    // The page's own parts lie in its first half megabyte, what it shows behind them.
-    std::string head;
+std::string renew_report(Context& context, const Options& options) {
     try {
-        const InputFile file(page, {ErrorKind::input, "report.page", kMostProgramBytes});
-        head.resize(std::min<std::uint64_t>(file.size(), kMebibyte));
-        file.read(0, head.data(), head.size());
-    } catch (const Error&) {
-        return {};
-    }
-    try {
-        report(context, options.out, options.stl, head.find("<section id=\"view\"") != std::string::npos);
+        refresh_report(context, options.out, options.stl);
         return {};
     } catch (const Error& error) {
         if (error.kind() == ErrorKind::cancelled) throw;
-        return fmt::format("{} could not be brought up to date: {}\n", page, error.what());
+        return fmt::format("{}/report.html could not be brought up to date: {}\n", options.out, error.what());
     }
 }
 
@@ -339,7 +281,7 @@ bool run_verify(const Options& options) {
     with_context(options, [&](Context& context) {
         const VerifyResult result = verify(context, options.out, options.stl, options.maps, options.cell);
         passed = result.passed;
-        return verdict(result, options.out) + refresh_report(context, options);
+        return verdict(result, options.out) + renew_report(context, options);
     });
     return passed;
 }
@@ -347,20 +289,14 @@ bool run_verify(const Options& options) {
 void run_report(const Options& options) {
     with_context(options, [&](Context& context) {
         report(context, options.out, options.stl, !options.no_3d, options.size_limit_mb);
-        const std::string page = options.out + "/report.html";
-        if (!options.json) return page + "\n";
-        JsonText json;
-        json.begin_object().key("report").string(page).end();
-        return json.take();
+        return options.json ? report_summary_json(options.out) : options.out + "/report.html\n";
     });
 }
 
 void run_inspect(const Options& options) {
     const Job job = job_of(options);
-    validate(job);
     with_context(options, [&](Context& context) {
-        if (options.json) return inspect(context, options.stl, job);
-        return inspection_text(inspect_stl(context, options.stl, job));
+        return inspect(context, options.stl, job, options.json ? InspectionForm::json : InspectionForm::text);
     });
 }
 
@@ -369,15 +305,7 @@ void run_repair(const Options& options) {
     job.input.repair = options.rebuild ? Repair::rebuild : Repair::mend;
     with_context(options, [&](Context& context) {
         const RepairResult result = repair(context, options.stl, options.out, job);
-        if (options.json) {
-            JsonText json;
-            json.begin_object().key("stl").string(options.out).key("repair");
-            put_repair(json, result.repair);
-            json.key("diagnostics");
-            put_diagnostics(json, result.diagnostics);
-            json.end();
-            return json.take();
-        }
+        if (options.json) return repair_summary_json(result, options.out);
         std::string text;
         for (const Diagnostic& d : result.diagnostics) text += told(d);
         return text + fmt::format("{}: {}, {} facets, {} cm3\n", options.out,

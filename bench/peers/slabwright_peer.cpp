@@ -8,7 +8,7 @@
 #include <ctime>
 #include <vector>
 
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "kernels/errors.h"
 #include "kernels/slicing/slicing.h"
 

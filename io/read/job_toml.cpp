@@ -366,7 +366,7 @@ struct Printer {
 
 }  // namespace
 
-Job parse_job(std::string_view text, const std::string& file) {
+Job parse_job(std::string_view text, const std::string& file, const Job& base) {
     require_shallow_keys(text, file);
     toml::table root;
     try {
@@ -376,7 +376,7 @@ Job parse_job(std::string_view text, const std::string& file) {
                     fmt::format("{}:{}", file, error.source().begin.line),
                     "`slabwright job --defaults` prints a job file that is right");
     }
-    Job job;
+    Job job = base;
     JobReader reader(root, file);
     const KeyNames known = all_keys();
     refuse_unknown(root, "", known, reader);

@@ -11,9 +11,7 @@ namespace fs = std::filesystem;
 namespace {
 
 /// Where the pattern lies: as named, or where plan.json's file name leads.
-fs::path find_pattern(const fs::path& directory, const std::string& file, const std::string& given,
-                      const std::string& asker) {
-    if (!given.empty()) return given;
+fs::path find_pattern(const fs::path& directory, const std::string& file, const std::string& asker) {
     const auto refuse = [&](const std::string& message) -> fs::path {
         throw Error(ErrorKind::input, asker + ".no_pattern", message, directory.string(),
                     "name the STL with --stl");
@@ -30,19 +28,20 @@ fs::path find_pattern(const fs::path& directory, const std::string& file, const 
 }  // namespace
 
 bool Pattern::is(const PlannedPattern& planned) const {
-    return stl.input.sha256 == planned.sha256 && reading == planned.reading;
+    return read.input.sha256 == planned.sha256 && reading == planned.reading;
 }
 
-std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory,
-                                      const PlannedPattern& planned, const std::string& given,
-                                      const std::string& asker) {
-    const std::string path = find_pattern(directory, planned.file, given, asker).string();
+std::shared_ptr<Pattern> read_planned_pattern(Context& context, const std::string& directory,
+                                              const PlannedPattern& planned, const PatternSource& given,
+                                              const std::string& asker) {
+    const PatternSource source =
+        given.empty() ? PatternSource(find_pattern(directory, planned.file, asker).string()) : given;
     auto pattern = std::make_shared<Pattern>(
-        Pattern{path, planned.reading, read_stl(context, path, planned.reading), {}});
+        Pattern{source.name(), planned.reading, read_pattern_mesh(context, source, planned.reading), {}});
     if (!pattern->is(planned))
         throw Error(ErrorKind::input, asker + ".other_pattern",
-                    "is not the pattern that was planned: its SHA-256 is " + pattern->stl.input.sha256, path,
-                    "name the planned STL with --stl, or plan again");
+                    "is not the pattern that was planned: its SHA-256 is " + pattern->read.input.sha256,
+                    source.name(), "name the planned STL with --stl, or plan again");
     return pattern;
 }
 

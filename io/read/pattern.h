@@ -1,4 +1,5 @@
-// The pattern that a folder OUT was planned for: found, read, and known to be the one.
+// The pattern that a plan is made of, and the one that a folder OUT was planned for: found, read, and known
+// to be the one.
 #pragma once
 
 #include <memory>
@@ -6,7 +7,7 @@
 #include <string>
 
 #include "engine/job.h"
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "kernels/access/standing_part.h"
 
 namespace slabwright {
@@ -14,13 +15,13 @@ namespace slabwright {
 /// What plan.json says of its pattern.
 struct PlannedPattern {
     std::string file, sha256;
-    StlOptions reading;  ///< units, tolerance and repair that it was planned with
+    ReadingOptions reading;  ///< as it was read for the plan
 };
 
 struct Pattern {
-    std::string path;
-    StlOptions reading;
-    StlMesh stl;
+    std::string place;  ///< the path of its file, or the name of what was in memory
+    ReadingOptions reading;
+    PatternMesh read;
     std::optional<StandingPart> part;  ///< of the mesh, once somebody needs it
 
     /// Whether it is what was planned, read alike.
@@ -28,11 +29,14 @@ struct Pattern {
 };
 
 /// @param directory OUT
-/// @param given the STL; "" looks for the file that the plan names: in OUT, beside OUT, in the working folder
+/// @param given the pattern; none looks for the file that the plan names: in OUT, beside OUT, in the working
+/// folder
 /// @param asker "verify" or "report", the family of the errors' codes
-/// @throws Error(input) when the STL is missing, unreadable, or not the one that was planned (by its SHA-256)
-[[nodiscard]] std::shared_ptr<Pattern> read_pattern(Context& context, const std::string& directory,
-                                                    const PlannedPattern& planned, const std::string& given,
-                                                    const std::string& asker);
+/// @throws Error(input) when the pattern is missing, unreadable, or not the one that was planned (by its
+/// SHA-256)
+[[nodiscard]] std::shared_ptr<Pattern> read_planned_pattern(Context& context, const std::string& directory,
+                                                            const PlannedPattern& planned,
+                                                            const PatternSource& given,
+                                                            const std::string& asker);
 
 }  // namespace slabwright

@@ -39,13 +39,13 @@ std::string mm(double value, int decimals = 3) {
 
 }  // namespace
 
-Inspection inspect_stl(Context& context, const std::string& stl_path, const Job& job) {
+Inspection inspect_pattern(Context& context, const PatternSource& source, const Job& job) {
     Inspection result;
-    StlMesh stl = read_stl(context, stl_path, {job.units, job.tolerances.weld, job.input.repair});
-    result.input = stl.input;
-    result.diagnostics = stl.diagnostics;
+    PatternMesh pattern = read_pattern_mesh(context, source, reading_options(job));
+    result.input = pattern.input;
+    result.diagnostics = pattern.diagnostics;
     try {
-        require_solid(context, stl, stl_path);
+        require_solid(context, pattern, source.name());
         result.solid = true;
     } catch (const Error& error) {
         if (error.kind() != ErrorKind::input) throw;
@@ -54,14 +54,14 @@ Inspection inspect_stl(Context& context, const std::string& stl_path, const Job&
     if (result.solid) {
         const FeatureOptions options = feature_options(job);
         context.begin_phase("features", 0.3, 0.7);
-        FeatureSet found = find_features(context, stl.mesh.view(), options);
+        FeatureSet found = find_features(context, pattern.mesh.view(), options);
         result.features = std::move(found.features);
         result.disagreements = std::move(found.disagreements);
         context.begin_phase("undercuts", 0.7, 1.0);
-        const double tops[] = {double{bounds(stl.mesh.view()).max.z}};
-        result.undercuts = measure_undercuts(context, stl.mesh.view(), tops, options);
+        const double tops[] = {double{bounds(pattern.mesh.view()).max.z}};
+        result.undercuts = measure_undercuts(context, pattern.mesh.view(), tops, options);
     }
-    result.report = std::move(stl.report);
+    result.report = std::move(pattern.report);
     return result;
 }
 

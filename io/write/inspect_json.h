@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "kernels/features/features.h"
 
 namespace slabwright {
@@ -22,9 +22,9 @@ struct Inspection {
     std::vector<UnmadeUndercut> undercuts;
 };
 
-/// Reads the file and looks at it. @throws Error(input | usage | cancelled) as read_stl; a mesh that is read
-/// but not solid is a finding
-[[nodiscard]] Inspection inspect_stl(Context& context, const std::string& stl_path, const Job& job);
+/// Reads the file and looks at it. @throws Error(input | usage | cancelled) as read_pattern_mesh; a mesh that
+/// is read but not solid is a finding
+[[nodiscard]] Inspection inspect_pattern(Context& context, const PatternSource& source, const Job& job);
 
 /// Schema slabwright.inspect/1.
 [[nodiscard]] std::string inspection_json(const Inspection& inspection);

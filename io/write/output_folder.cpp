@@ -250,8 +250,6 @@ void remove_leftovers(const fs::path& target) {
 
 }  // namespace
 
-void require_replaceable(const std::string& directory) { const OutputFolder probe(directory); }
-
 OutputFolder::OutputFolder(const std::string& directory) {
     require_target(directory);
     target_ = resolved(directory);

@@ -7,19 +7,15 @@
 
 namespace slabwright {
 
-/// Makes sure, before hours of planning, that `directory` can become a plan folder: it does not exist, is an
-/// empty folder, or is a folder that holds a plan of ours and nothing that such a folder cannot hold; and a
-/// folder can be made beside it and take its place. Takes away what dead processes left beside it.
-/// @throws Error(input) that names what stands against it
-void require_replaceable(const std::string& directory);
-
 /// A folder under way. If commit() is not reached, the destructor takes it away again, with the parent
 /// folders that were made for it. While it lives it holds a lock on its folder, by which others know that it
 /// is not a dead process's.
 class OutputFolder {
 public:
-    /// Makes the fresh folder. @throws Error(input) as require_replaceable, or when the place cannot be
-    /// written
+    /// Makes the fresh folder, beside the target, and makes sure that it can take the target's place: that
+    /// does not exist, is an empty folder, or is a folder that holds a plan of ours and nothing that such a
+    /// folder cannot hold. Takes away what dead processes left beside it.
+    /// @throws Error(input) that names what stands against it
     explicit OutputFolder(const std::string& directory);
     ~OutputFolder();
     OutputFolder(const OutputFolder&) = delete;

@@ -16,7 +16,7 @@
 #include <sstream>
 
 #include "io/posts/gcode_reader.h"
-#include "io/read/stl.h"
+#include "io/read/pattern_mesh.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/rs274.h"
@@ -179,7 +179,7 @@ INSTANTIATE_TEST_SUITE_P(Real, PlanCorpus,
 // and scaled so that its longer side is `side` mm (0: as it is).
 void write_turned(const fs::path& from, const fs::path& to, double side) {
     Context context;
-    const StlMesh stl = read_stl(context, from.string(), {LengthUnit::mm, 0});
+    const PatternMesh stl = read_pattern_mesh(context, from.string(), {LengthUnit::mm, 0});
     constexpr double turn = 33 * std::numbers::pi / 180;
     std::vector<std::array<double, 3>> points;
     double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
