@@ -76,6 +76,18 @@ bool apart(const Corners& a, Corners b, double gap) {
     return false;
 }
 
+/// Of two facets that share the corner s[i] = t[j], whether the sector of one may pass through that of the
+/// other: where it crosses the other's plane, it does so along a ray that lies within the other.
+bool may_cross_at_corner(const Corners& a, std::size_t i, const Corners& b, std::size_t j) {
+    const Point u = a[(i + 1) % 3] - a[i], v = a[(i + 2) % 3] - a[i], p = b[(j + 1) % 3] - b[j],
+                q = b[(j + 2) % 3] - b[j], n = cross(u, v);
+    const double over_p = dot(n, p), over_q = dot(n, q);
+    if ((over_p > 0 && over_q > 0) || (over_p < 0 && over_q < 0)) return false;
+    if (over_p == 0 && over_q == 0) return true;
+    const Point ray = std::abs(over_q) * p + std::abs(over_p) * q;
+    return dot(n, cross(u, ray)) >= 0 && dot(n, cross(ray, v)) >= 0;
+}
+
 /// Whether two facets meet elsewhere than in the corners that they share.
 bool meet(MeshView mesh, std::uint32_t f, std::uint32_t g) {
     const Index3 &s = mesh.facets[f], &t = mesh.facets[g];
@@ -84,10 +96,14 @@ bool meet(MeshView mesh, std::uint32_t f, std::uint32_t g) {
     if (shared == 3) return true;
     const Corners a = corners(mesh, f), b = corners(mesh, g);
     if (shared == 0) return !apart(a, b, kApart);
-    // Around a corner facets that face alike go once around, mostly all of them: nothing is folded there.
-    if (dot(normal(a), normal(b)) > 0) return false;
-    if (shared == 1) return !apart(a, b, -kTouch);
+    if (shared == 1) {
+        std::size_t i = 0, j = 0;
+        while (s[i] != t[0] && s[i] != t[1] && s[i] != t[2]) ++i;
+        while (t[j] != s[i]) ++j;
+        return may_cross_at_corner(a, i, b, j) && !apart(a, b, -kTouch);
+    }
     // Along an edge they are apart unless one is folded back onto the other.
+    if (dot(normal(a), normal(b)) > 0) return false;
     std::size_t i = 0, j = 0;  // the corners that they do not share
     while (s[i] == t[0] || s[i] == t[1] || s[i] == t[2]) ++i;
     while (t[j] == s[0] || t[j] == s[1] || t[j] == s[2]) ++j;
