@@ -144,6 +144,23 @@ std::vector<PathPoint> random_run(std::mt19937& random) {
     return run;
 }
 
+// As places on the surface follow each other in a corner: level, then a little down, again and again, in
+// steps that each seem to meet next to nothing.
+std::vector<PathPoint> random_stairs(std::mt19937& random) {
+    std::uniform_real_distribution<double> unit(0, 1);
+    const double step = 0.1 + 0.5 * unit(random), fall = 0.02 + 0.17 * unit(random),
+                 turn = 2 * std::numbers::pi * unit(random);
+    double x = 320 * unit(random) - 160, y = 320 * unit(random) - 160, z = 6 + 9 * unit(random);
+    std::vector<PathPoint> run{{to_units(x), to_units(y), to_units(z)}};
+    for (int k = 0; k < 30 && z > 1; ++k) {
+        x += step * std::cos(turn), y += step * std::sin(turn);
+        run.push_back({to_units(x), to_units(y), to_units(z)});
+        z -= fall;
+        run.push_back({to_units(x), to_units(y), to_units(z)});
+    }
+    return run;
+}
+
 TEST(Plunge, NoRunIsEnteredOnItsCore) {
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> unit(0, 1);
@@ -161,8 +178,8 @@ TEST(Plunge, NoRunIsEnteredOnItsCore) {
             Surroundings around = bench.cut.around(tool, &bench.part);
             around.from_side = tool.kind == ToolKind::face && round % 2 == 0;
             path.know(around);
-            for (int k = 0; k < 12; ++k) {
-                const std::vector<PathPoint> run = random_run(random);
+            for (int k = 0; k < 13; ++k) {
+                const std::vector<PathPoint> run = k == 3 ? random_stairs(random) : random_run(random);
                 bool free = true;
                 for (std::size_t p = 1; p < run.size() && free; ++p) free = bench.free(run[p - 1], run[p]);
                 if (!free) continue;

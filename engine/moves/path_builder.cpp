@@ -150,7 +150,7 @@ void PathBuilder::learn() {
             to{to_mm(moves[i].x), to_mm(moves[i].y), to_mm(moves[i].z)};
         since += std::hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
         if (since < around_.standing->cell() && i + 1 < moves.size() && moves[i + 1].feed > 0) continue;
-        around_.standing->cut(around_.cutter, from, to);
+        around_.standing->cut(around_.cutter, from, to, core_);
         since = 0;
     }
     learnt_ = moves.size();
@@ -235,12 +235,14 @@ void PathBuilder::descend(const PathPoint& to) {
 }
 
 // From above the start of a run down to it. A slice along a wall is no plunge: only what stands under the
-// middle of the cutter asks for a helix or a ramp. Says whether there was a way in.
+// middle of the cutter asks for a helix or a ramp; of a short way down, what no edge has passed over on the ways
+// before it. Says whether there was a way in.
 bool PathBuilder::enter(std::span<const PathPoint> run) {
     const PathPoint& first = run.front();
     descend(first);
     const double most = plunges_ ? kPlunge : kScrape;
-    if (to_mm(z_ - first.z) > most && standing_middle({first.x, first.y}) > to_mm(first.z) + most) {
+    const bool far = to_mm(z_ - first.z) > most;
+    if (far ? standing_middle({first.x, first.y}) > to_mm(first.z) + most : comes_down_on_stock(first)) {
         if (!enter_on_helix(run) && !enter_on_ramp(run) && !plunges_ && !enter_from_side(first)) return false;
     }
     plunge(first.z);

@@ -83,7 +83,42 @@ void Standing::rows(double radius, const std::array<double, 2>& a, const std::ar
     });
 }
 
-void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to) {
+// Calls row(j, first, last) for the cells whose centres lie within `radius` of a and of b.
+template <class Row>
+void Standing::rows_in_both(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b,
+                            Row&& row) const {
+    const auto cell_from = [&](double at, double first, int n) {
+        return static_cast<int>(std::clamp(std::ceil((at - first) / cell_), 0.0, static_cast<double>(n)));
+    };
+    const int j0 = cell_from(std::max(a[1], b[1]) - radius, y0_, ny_),
+              j1 = cell_from(std::min(a[1], b[1]) + radius, y0_, ny_);
+    for (int j = j0; j < j1; ++j) {
+        const double y = y0_ + j * cell_;
+        const double wa = std::sqrt(std::max(0.0, radius * radius - (y - a[1]) * (y - a[1]))),
+                     wb = std::sqrt(std::max(0.0, radius * radius - (y - b[1]) * (y - b[1])));
+        const int i0 = cell_from(std::max(a[0] - wa, b[0] - wb), x0_, nx_),
+                  i1 = cell_from(std::min(a[0] + wa, b[0] + wb), x0_, nx_);
+        if (i0 < i1) row(j, i0, i1 - 1);
+    }
+}
+
+// Lowers the cells whose centres lie within `radius` of a, but not of b.
+void Standing::lower_in_first(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b,
+                              float z) {
+    rows_in_both(radius, a, a, [&](int j, int first, int last) {
+        float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
+        const double y = y0_ + j * cell_, w2 = radius * radius - (y - b[1]) * (y - b[1]),
+                     w = w2 > 0 ? std::sqrt(w2) : -1;
+        const int from = static_cast<int>(std::clamp(std::ceil((b[0] - w - x0_) / cell_), -1.0, nx_ + 1.0)),
+                  to = static_cast<int>(std::clamp(std::floor((b[0] + w - x0_) / cell_), -1.0, nx_ + 1.0));
+        const bool parted = w >= 0 && from <= to;
+        for (int i = first; i <= (parted ? std::min(last, from - 1) : last); ++i) h[i] = std::min(h[i], z);
+        for (int i = parted ? std::max(first, to + 1) : last + 1; i <= last; ++i) h[i] = std::min(h[i], z);
+    });
+}
+
+void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to,
+                   double core) {
     const std::array<double, 2> a{from[0], from[1]}, b{to[0], to[1]};
     const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
     const double low = std::min(from[2], to[2]), high = std::max(from[2], to[2]);
@@ -92,10 +127,27 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
         // Each covered cell was covered at some place of the way, and no place is higher than its higher end.
         const auto z = static_cast<float>((l2 > 0 ? high : low) - top_ + kRounding);
         const bool level = from[2] == to[2], been = level && from == last_ && cutter.radius == last_radius_;
+        // Where it has been its core has been too, and has not cleared what is no longer under it.
+        const double under = core > 0 ? core + d_ : 0;
+        if (under > 0 && been) lower_in_first(under, a, b, z);
+        under_core_.clear();
+        if (under > 0 && !been)
+            rows_in_both(under, a, b, [&](int j, int first, int last) {
+                const auto row = height_.begin() + static_cast<std::ptrdiff_t>(j) * nx_;
+                under_core_.insert(under_core_.end(), row + first, row + last + 1);
+            });
         each_spans(cutter.radius - d_, a, b, been, [&](int j, int together, const RowSpans& spans) {
             lower_spans(height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_),
                         static_cast<std::size_t>(nx_), together, spans, z);
         });
+        if (!under_core_.empty()) {
+            auto kept = under_core_.cbegin();
+            rows_in_both(under, a, b, [&](int j, int first, int last) {
+                const std::ptrdiff_t n = last + 1 - first;
+                std::copy_n(kept, n, height_.begin() + static_cast<std::ptrdiff_t>(j) * nx_ + first);
+                kept += n;
+            });
+        }
         if (level) last_ = to, last_radius_ = cutter.radius;
         return;
     }

@@ -25,7 +25,10 @@ public:
     Standing(std::array<double, 2> min, std::array<double, 2> max, double top);
 
     /// The cutter goes straight from `from` to `to`, tips in mm.
-    void cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to);
+    /// @param core radius of a flat cutter's middle that has no edge, mm: what it covers at both ends, and so
+    /// all along the way, no edge has passed over
+    void cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to,
+             double core = 0);
 
     /// Nothing over the disc of `radius` that goes straight from a to b exceeds this; −infinity beside the
     /// stock.
@@ -60,12 +63,17 @@ private:
                     Spans&& take) const;
     template <class Row>
     void rows(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, Row&& row) const;
+    template <class Row>
+    void rows_in_both(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b,
+                      Row&& row) const;
+    void lower_in_first(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b, float z);
 
     double cell_, d_, x0_, y0_;  // x0_, y0_: the centre of cell (0, 0)
     double top_;                 // heights are kept relative to it
     int nx_, ny_;
     std::vector<float> height_;
     mutable std::vector<BallTable> tables_;
+    std::vector<float> under_core_;  // heights that a cut does not change
     // Where a flat cutter went last, level: what it covers there is no higher.
     std::array<double, 3> last_{kUnbounded, kUnbounded, kUnbounded};
     double last_radius_ = 0;
