@@ -119,8 +119,8 @@ TEST(Command, KeepsMemoryWithinWhatMayBeUsed) {
     write_metre_pattern(stl, {.size_mm = 290, .height_mm = 29, .facets = 600'000});
     const auto peak = [&](const char* gib) {
         const CommandResult made =
-            slabwright_command({"plan", stl, "-o", folder / "out", "--allow-undercut", "--accept-weak-joints",
-                                "--no-verify", "--quiet", "--threads", "2", "--memory", gib});
+            slabwright_command({"plan", stl, "-o", folder / "out", "--allow-undercut", "--no-verify",
+                                "--quiet", "--threads", "2", "--memory", gib});
         EXPECT_EQ(made.exit, 0) << made.err;
         return made.peak_bytes;
     };
@@ -318,8 +318,8 @@ TEST(Command, PlansPassTheirOwnVerification) {
     TemporaryFolder folder;
     for (const MetrePattern& pattern : patterns) {
         write_metre_pattern(folder / "pattern.stl", pattern);
-        const CommandResult result = slabwright_command({"plan", folder / "pattern.stl", "-o", folder / "out",
-                                                         "--allow-undercut", "--accept-weak-joints"});
+        const CommandResult result =
+            slabwright_command({"plan", folder / "pattern.stl", "-o", folder / "out", "--allow-undercut"});
         const std::string which =
             std::to_string(pattern.size_mm) + " mm, seed " + std::to_string(pattern.seed);
         EXPECT_EQ(result.exit, 0) << which << ": " << result.out << result.err;
@@ -446,7 +446,7 @@ TEST(Command, AHangUpCancels) {
     const std::string line = "exec timeout -s HUP 2 \"$@\"";
     CommandResult result =
         run_command({"/bin/sh", "-c", line, "sh", SLABWRIGHT_COMMAND, "plan", folder / "big.stl", "-o",
-                     folder / "place/a/out", "--allow-undercut", "--accept-weak-joints", "--no-verify"});
+                     folder / "place/a/out", "--allow-undercut", "--no-verify"});
     EXPECT_NE(result.err.find("cancelled"), std::string::npos) << result.err;
     EXPECT_TRUE(fs::is_empty(folder.path / "place")) << "nothing half-written stays";
     // Under nohup it goes on.

@@ -92,7 +92,6 @@ TEST(Planner, APartThatFillsTheSlabStaysWithinTheTravel) {
     const Box3 size = bounds(mesh.view());
     ASSERT_NEAR(size.max.x - size.min.x, 1160, 0.01);
     Job job;
-    job.bonding.accept_weak = true;  // slabs of this pattern lie on single bosses
     const Plan plan = make_plan(context, mesh, {}, job);
     EXPECT_NEAR(plan.stock_max[0] - plan.stock_min[0], 1160, 0.01);
     const double cx = 0.5 * (plan.stock_min[0] + plan.stock_max[0]),
@@ -233,7 +232,6 @@ TEST(Planner, NoProgramTouchesTheOwnModels) {
         Context context;
         Job job;
         job.allow_undercut = true;
-        job.bonding.accept_weak = true;  // the slab of luo-layer-sample's uppermost layer tips
         const std::string stl = std::string(SLABWRIGHT_SOURCE_DIR "/tests/data/") + name + ".stl";
         const support::TemporaryFolder folder;
         const std::string out = folder / "out";

@@ -360,7 +360,6 @@ TEST(RestContours, SlotsHardlyWiderAreFound) {
         }
         Context context;
         Job job;
-        job.bonding.accept_weak = true;  // slabs of a pattern like this lie on single bosses
         write(context, plan(context, stl, job), folder / "out");
         const Verification v = verify_folder(context, folder / "out", {.source = stl, .write = false});
         for (const Violation& violation : v.report.violations)

@@ -335,11 +335,11 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
     check_travel(plan);
 }
 
-// Joints that cannot hold are warned of where the job accepts them; else the first is a refusal.
+// The first joint that cannot hold is a refusal, unless the job accepts it; all others are warned of.
 void settle_joints(Plan& plan, const std::vector<std::vector<WeakJoint>>& found) {
     for (const std::vector<WeakJoint>& of_layer : found)
         for (const WeakJoint& weak : of_layer) {
-            if (!plan.job.bonding.accept_weak)
+            if (weak.refused && !plan.job.bonding.accept_weak)
                 throw refusal(
                     weak.code.c_str(), weak.message,
                     fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", weak.where[0], weak.where[1], weak.where[2]),
@@ -357,6 +357,7 @@ void bond_layers(Context& context, Plan& plan, const std::vector<std::vector<Joi
     for (const std::vector<Diagnostic>& found : notes)
         plan.diagnostics.insert(plan.diagnostics.end(), found.begin(), found.end());
     settle_joints(plan, weak);
+    settle_joints(plan, slabs_that_tip(plan, joints, plan.diagnostics));
 }
 
 // Whether the joints bear the programs' forces.

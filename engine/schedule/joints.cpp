@@ -7,8 +7,11 @@
 #include <utility>
 
 #include "engine/flask/flask.h"
+#include "engine/forces/cuts.h"
 #include "engine/layers/layers.h"
+#include "engine/moves/path_builder.h"
 #include "engine/moves/thinning.h"
+#include "engine/schedule/footing.h"
 #include "engine/stock/loose.h"
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/parallel/parallel.h"
@@ -21,63 +24,6 @@ namespace slabwright {
 namespace {
 
 constexpr double kNoContact = 1e-3;  // mm²
-
-/// Area, centroid and second moments about the centroid of a plane region, by Green's theorem over its loops,
-/// and how far it reaches from the centroid. Millimetres.
-struct AreaMoments {
-    double area = 0, x = 0, y = 0;
-    double ix = 0, iy = 0;            ///< ∫(x − cx)² dA and ∫(y − cy)² dA
-    double reach_x = 0, reach_y = 0;  ///< largest |x − cx| and |y − cy|
-};
-
-AreaMoments moments(const Loops& loops) {
-    AreaMoments m;
-    if (loops.points.empty()) return m;
-    // Coordinates count from the first point: far from the origin the second moments would cancel otherwise.
-    const double ox = to_mm(loops.points[0].x), oy = to_mm(loops.points[0].y);
-    double a2 = 0, sx = 0, sy = 0, sxx = 0, syy = 0;
-    for (std::size_t l = 0; l < loops.size(); ++l) {
-        const auto loop = loops.loop(l);
-        for (std::size_t i = 0; i < loop.size(); ++i) {
-            const Point2 p = loop[i], q = loop[i + 1 < loop.size() ? i + 1 : 0];
-            const double x0 = to_mm(p.x) - ox, y0 = to_mm(p.y) - oy, x1 = to_mm(q.x) - ox,
-                         y1 = to_mm(q.y) - oy;
-            const double cross = x0 * y1 - x1 * y0;
-            a2 += cross;
-            sx += cross * (x0 + x1);
-            sy += cross * (y0 + y1);
-            sxx += cross * (x0 * x0 + x0 * x1 + x1 * x1);
-            syy += cross * (y0 * y0 + y0 * y1 + y1 * y1);
-        }
-    }
-    if (!(a2 > 0)) return m;
-    m.area = a2 / 2;
-    const double cx = sx / 6 / m.area, cy = sy / 6 / m.area;
-    m.x = cx + ox;
-    m.y = cy + oy;
-    m.ix = std::max(0.0, sxx / 12 - m.area * cx * cx);
-    m.iy = std::max(0.0, syy / 12 - m.area * cy * cy);
-    for (const Point2 p : loops.points) {
-        m.reach_x = std::max(m.reach_x, std::fabs(to_mm(p.x) - m.x));
-        m.reach_y = std::max(m.reach_y, std::fabs(to_mm(p.y) - m.y));
-    }
-    return m;
-}
-
-/// How far (x, y) lies outside a convex polygon, mm; 0 inside.
-double outside_by(const std::vector<Point2>& hull, double x, double y) {
-    double nearest = INFINITY;
-    bool inside = hull.size() >= 3;
-    for (std::size_t i = 0; i < hull.size(); ++i) {
-        const Point2 a = hull[i], b = hull[i + 1 < hull.size() ? i + 1 : 0];
-        const double ax = to_mm(a.x), ay = to_mm(a.y), dx = to_mm(b.x) - ax, dy = to_mm(b.y) - ay;
-        const double length2 = dx * dx + dy * dy;
-        if (dx * (y - ay) - dy * (x - ax) < 0) inside = false;
-        const double t = length2 > 0 ? std::clamp(((x - ax) * dx + (y - ay) * dy) / length2, 0.0, 1.0) : 0.0;
-        nearest = std::min(nearest, std::hypot(x - ax - t * dx, y - ay - t * dy));
-    }
-    return inside ? 0 : nearest;
-}
 
 /// The least distance from a point inside a convex polygon to its edges, mm.
 double depth_in(const std::vector<Point2>& hull, double x, double y) {
@@ -302,13 +248,17 @@ std::string words_of(const Layer& layer, const JointWood& wood) {
 constexpr const char* kOtherJoint =
     "choose other boundaries (layers.strategy, slabs.thicknesses), turn or split the pattern";
 
+/// Pieces that are no more than this share of what stands of their layer may be lost without the build: a
+/// pattern maker glues or dowels them on again.
+constexpr double kFewPieces = 0.5;
+
 /// What stands of a layer piece by piece: every piece has to be held by glue of its own. Pieces smaller than
 /// chips (kChip) are only remarked on.
 void rate_pieces(const Layer& layer, const JointWood& wood, const Joint& joint, std::vector<WeakJoint>& weak,
                  std::vector<Diagnostic>& diagnostics) {
     const Pieces pieces(wood.above), contact(wood.both), glued(joint.glue);
     struct Worst {
-        double area = 0;
+        double area = 0, sum = 0;
         std::size_t piece = 0, count = 0;
     };
     Worst floating, bare;
@@ -323,19 +273,22 @@ void rate_pieces(const Layer& layer, const JointWood& wood, const Joint& joint, 
         }
         Worst& worst = area(contact.within(region, pieces.boxes[p])) > kNoContact ? bare : floating;
         ++worst.count;
+        worst.sum += size;
         if (size > worst.area) worst.area = size, worst.piece = p;
     }
-    const auto report = [&](const char* code, const char* what, const Worst& worst) {
+    const double standing = area(wood.above);
+    const auto report = [&](const char* code, const char* what, const Worst& worst, bool refused) {
         if (worst.count == 0) return;
         const Box2& box = pieces.boxes[worst.piece];
         weak.push_back({code,
                         fmt::format("{}: {} piece{} of the layer {}, the largest of {}",
                                     words_of(layer, wood), worst.count, worst.count == 1 ? "" : "s", what,
                                     size_of(pieces.regions[worst.piece], box)),
-                        middle_of(box, wood.z), std::string(kOtherJoint) + ", fasten it with dowels"});
+                        middle_of(box, wood.z), std::string(kOtherJoint) + ", fasten it with dowels",
+                        refused});
     };
-    report("joint.floating", "with nothing under it", floating);
-    report("joint.no_glue", "on wood too narrow for glue", bare);
+    report("joint.floating", "with nothing under it", floating, true);
+    report("joint.no_glue", "on wood too narrow for glue", bare, bare.sum > kFewPieces * standing);
     if (chips > 0)
         diagnostics.push_back({Severity::note, "joint.chips",
                                fmt::format("{}: {} piece{} of less than {} mm2 get no glue",
@@ -343,97 +296,277 @@ void rate_pieces(const Layer& layer, const JointWood& wood, const Joint& joint, 
                                middle_of(pieces.boxes[chip], wood.z)});
 }
 
-/// Glue, force and pressure of one joint.
-struct PressedJoint {
+// Table and platen stay parallel (RPM: four ball screws), so the pressure is even over the glue, and its
+// resultant acts in the glue's centroid. Off the table's middle the nearest screw bears more than a quarter
+// of it, (1 + |ex|/a)·(1 + |ey|/b) times that, a and b half the table; none may bear more than a quarter of
+// the press's force.
+Joint pressed(double z, Loops glue, const Plan& plan) {
     Joint joint;
-    double off_middle = 0;  ///< mm, of the glue's centroid from the slab's middle
-    double uneven = 0;      ///< the pressure at the most loaded edge over the mean, less 1
-};
-
-// The platen presses on the whole slab, so its resultant acts in the slab's middle, off the glue's centroid
-// by (ex, ey). On a rigid slab the pressure in the joint is then linear: p = F/A · (1 + ex·x·A/Ix +
-// ey·y·A/Iy). The allowed pressure holds at the most loaded edge, and where p would turn negative at the far
-// edge (the resultant has left the joint's kern, for a rectangle its middle third) the joint gapes there.
-PressedJoint pressed(double z, Loops glue, double middle_x, double middle_y, const Bonding& bonding) {
-    PressedJoint p;
-    const AreaMoments m = moments(glue);
-    p.joint.z = z;
-    p.joint.glue = std::move(glue);
-    p.joint.area_mm2 = m.area;
-    p.joint.centroid = {middle_x, middle_y};
-    if (!(m.area > 0)) return p;
-    p.joint.centroid = {m.x, m.y};
-    const double ex = middle_x - m.x, ey = middle_y - m.y;
-    p.off_middle = std::hypot(ex, ey);
-    p.uneven = (m.ix > 0 ? std::fabs(ex) * m.reach_x * m.area / m.ix : 0) +
-               (m.iy > 0 ? std::fabs(ey) * m.reach_y * m.area / m.iy : 0);
-    p.joint.force_n = std::min(bonding.press_force, m.area * bonding.max_pressure_mpa / (1 + p.uneven));
-    p.joint.pressure_mpa = p.joint.force_n / m.area;
-    return p;
-}
-
-void rate_press(const Layer& layer, const JointWood& wood, const PressedJoint& p, const Plan& plan,
-                std::vector<WeakJoint>& weak, std::vector<Diagnostic>& diagnostics) {
     const double x = (plan.stock_min[0] + plan.stock_max[0]) / 2,
                  y = (plan.stock_min[1] + plan.stock_max[1]) / 2;
-    const Joint& joint = p.joint;
-    const double overhang = outside_by(convex_hull(wood.below.points), x, y);
-    if (overhang > 0)
-        weak.push_back(
-            {"joint.tips",
-             fmt::format("{}: the slab's middle overhangs the {:.0f} mm2 that it lies on by {:.1f} "
-                         "mm, so it tips under the press",
-                         words_of(layer, wood), area(wood.below), overhang),
-             {x, y, wood.z},
-             std::string("carry the slab with a flask (flask.enabled), ") + kOtherJoint});
-    if (joint.pressure_mpa < plan.job.bonding.min_pressure_mpa)
-        weak.push_back(
-            {"joint.pressure",
-             fmt::format(
-                 "{}: {:.0f} N on {:.0f} mm2 of glue press with {:.4f} MPa, less than the {} MPa that "
-                 "close it; the glue lies {:.1f} mm off the slab's middle",
-                 words_of(layer, wood), joint.force_n, joint.area_mm2, joint.pressure_mpa,
-                 plan.job.bonding.min_pressure_mpa, p.off_middle),
-             {joint.centroid[0], joint.centroid[1], wood.z},
-             std::string("use a stronger press or a flask, ") + kOtherJoint});
-    else if (p.uneven > 1 && overhang == 0)
-        diagnostics.push_back(
-            {Severity::warning, "joint.uneven_press",
-             fmt::format("{}: the glue's centroid lies {:.1f} mm off the slab's middle, outside the part of "
-                         "the joint where the press closes it everywhere; the press is held to {:.0f} N",
-                         words_of(layer, wood), p.off_middle, joint.force_n),
-             std::array<double, 3>{joint.centroid[0], joint.centroid[1], wood.z}});
+    const AreaMoments m = area_moments(glue);
+    joint.z = z;
+    joint.glue = std::move(glue);
+    joint.area_mm2 = m.area;
+    joint.centroid = {x, y};
+    if (!(m.area > 0)) return joint;
+    joint.centroid = {m.x, m.y};
+    const Machine& machine = plan.job.machine;
+    const double a = std::max(machine.travel_x, plan.stock_max[0] - plan.stock_min[0]) / 2,
+                 b = std::max(machine.travel_y, plan.stock_max[1] - plan.stock_min[1]) / 2;
+    const double uneven = (1 + std::fabs(m.x - x) / a) * (1 + std::fabs(m.y - y) / b);
+    joint.force_n =
+        std::min(plan.job.bonding.press_force / uneven, m.area * plan.job.bonding.max_pressure_mpa);
+    joint.pressure_mpa = joint.force_n / joint.area_mm2;
+    return joint;
+}
+
+void rate_press(const Layer& layer, const JointWood& wood, const Joint& joint, const Plan& plan,
+                std::vector<WeakJoint>& weak) {
+    if (joint.pressure_mpa >= plan.job.bonding.min_pressure_mpa) return;
+    weak.push_back({"joint.pressure",
+                    fmt::format("{}: {:.0f} N on {:.0f} mm2 of glue press with {:.4f} MPa, less than the {} "
+                                "MPa that close it",
+                                words_of(layer, wood), joint.force_n, joint.area_mm2, joint.pressure_mpa,
+                                plan.job.bonding.min_pressure_mpa),
+                    {joint.centroid[0], joint.centroid[1], wood.z},
+                    std::string("use a stronger press or smaller slabs, ") + kOtherJoint});
 }
 
 }  // namespace
 
 std::vector<WeakJoint> bond_layer(Layer& layer, std::span<const JointWood> wood, const Plan& plan,
                                   std::vector<Diagnostic>& diagnostics) {
-    const Bonding& bonding = plan.job.bonding;
-    const double middle_x = (plan.stock_min[0] + plan.stock_max[0]) / 2,
-                 middle_y = (plan.stock_min[1] + plan.stock_max[1]) / 2;
     std::vector<WeakJoint> weak;
     layer.joints.clear();
     for (std::size_t k = 0; k < wood.size(); ++k) {
         // Between whole slabs glue goes everywhere, so that no piece of the waste above a joint comes loose.
-        PressedJoint p =
-            pressed(wood[k].z, k == 0 ? glue_within(wood[k].both, bonding.edge_setback) : wood[k].below,
-                    middle_x, middle_y, bonding);
-        p.joint.standing_mm2 = area(wood[k].both);
+        Joint joint =
+            pressed(wood[k].z,
+                    k == 0 ? glue_within(wood[k].both, plan.job.bonding.edge_setback) : wood[k].below, plan);
+        joint.standing_mm2 = area(wood[k].both);
         // Every press goes through the joint under the layer.
-        if (k > 0 && p.joint.area_mm2 > 0) {
-            p.joint.force_n = std::min(p.joint.force_n, layer.joints.front().force_n);
-            p.joint.pressure_mpa = p.joint.force_n / p.joint.area_mm2;
+        if (k > 0 && joint.area_mm2 > 0) {
+            joint.force_n = std::min(joint.force_n, layer.joints.front().force_n);
+            joint.pressure_mpa = joint.force_n / joint.area_mm2;
         }
         const std::size_t found = weak.size();
-        rate_pieces(layer, wood[k], p.joint, weak, diagnostics);
-        if (p.joint.area_mm2 > 0) rate_press(layer, wood[k], p, plan, weak, diagnostics);
+        rate_pieces(layer, wood[k], joint, weak, diagnostics);
+        if (joint.area_mm2 > 0) rate_press(layer, wood[k], joint, plan, weak);
         else if (weak.size() == found)
             weak.push_back({"joint.no_glue",
                             fmt::format("{}: nothing of the slab is glued", words_of(layer, wood[k])),
-                            {middle_x, middle_y, wood[k].z},
+                            {joint.centroid[0], joint.centroid[1], wood[k].z},
                             kOtherJoint});
-        layer.joints.push_back(std::move(p.joint));
+        layer.joints.push_back(std::move(joint));
+    }
+    return weak;
+}
+
+namespace {
+
+/// What cutting does to a slab that is whole: the hardest of facing and roughing.
+struct SlabCut {
+    double side_n = 0;  ///< along the joint
+    double push_n = 0;  ///< across it, up or down, wherever the slab ends
+};
+
+SlabCut hardest_on_slab(const Job& job) {
+    const auto is_face = [](const Tool& tool) { return tool.kind == ToolKind::face; };
+    const bool faced = std::any_of(job.tools.begin(), job.tools.end(), is_face);
+    SlabCut most;
+    for (const Tool& tool : job.tools) {
+        if (!is_face(tool) && tool.kind != ToolKind::flat) continue;
+        const double depth = is_face(tool) ? job.cutting.face_depth : tool.stepdown_max;
+        if (!(depth > 0)) continue;
+        CutSegment cut = slot_cut(job, tool, std::min(depth, tool.flute_length));
+        cut.arc = engagement_arc(cut.radius_mm, tool.diameter * job.cutting.max_engagement, MillingSense::up);
+        const CutForce force = peak_force(cut);
+        most.side_n = std::max(most.side_n, force.peak_in_plane_n);
+        // The face mill takes the waste that lies open; an end mill works beside the pattern.
+        if (is_face(tool) || !faced || !job.cutting.open_waste)
+            most.push_n = std::max(most.push_n, force.peak_axial_n);
+    }
+    return most;
+}
+
+constexpr double kGravity = 9.81;  // m/s²
+
+/// A slab, or a piece of one, as it is laid: its corners, mm.
+struct LaidSlab {
+    std::array<double, 2> min{}, max{};
+    [[nodiscard]] double mm2() const { return (max[0] - min[0]) * (max[1] - min[1]); }
+};
+
+/// A slab needs to reach no farther than this past what its layer keeps, mm: programs pass the rest in air.
+constexpr double kPieceMargin = 15;
+
+LaidSlab piece_for(const JointWood& wood, const LaidSlab& stock) {
+    Box2 box;
+    for (const Loops* region : {&wood.above, &wood.both})
+        for (const Point2 p : region->points) box.grow(p);
+    const auto clip = [](double v, double low, double high) { return std::clamp(v, low, high); };
+    if (box.min.x > box.max.x) return stock;
+    return {{clip(to_mm(box.min.x) - kPieceMargin, stock.min[0], stock.max[0]),
+             clip(to_mm(box.min.y) - kPieceMargin, stock.min[1], stock.max[1])},
+            {clip(to_mm(box.max.x) + kPieceMargin, stock.min[0], stock.max[0]),
+             clip(to_mm(box.max.y) + kPieceMargin, stock.min[1], stock.max[1])}};
+}
+
+/// The hardest that a joint has to bear, and when.
+struct HardestTime {
+    double turning = 0;         ///< Footing::turning
+    double pull_mpa = 0;        ///< Footing::pull_mpa
+    double glue_mm2 = 0;        ///< that holds then
+    double kg = 0, off_mm = 0;  ///< what it carries then, and how far that lies outside the wood under it
+    std::size_t layer = 0;      ///< that is cut
+    double x = 0, y = 0;        ///< the middle of the glue, mm
+    void take(const HardestTime& other) {
+        if (other.turning > turning || (other.turning == turning && other.pull_mpa > pull_mpa)) *this = other;
+    }
+};
+
+void rate_footing(const Layer& layer, const JointWood& wood, const Layer& cut, const HardestTime& worst,
+                  double bears, std::vector<WeakJoint>& weak, std::vector<Diagnostic>& diagnostics) {
+    const std::array<double, 3> where{worst.x, worst.y, wood.z};
+    const std::string carries =
+        fmt::format("{}: while layer {} is cut, {:.0f} mm2 of glue carry {:.1f} kg{}", words_of(layer, wood),
+                    cut.index, worst.glue_mm2, worst.kg,
+                    worst.off_mm > 0
+                        ? fmt::format(", whose middle overhangs the wood under it by {:.1f} mm", worst.off_mm)
+                        : "");
+    if (worst.turning > 1)
+        weak.push_back(
+            {"joint.tips",
+             fmt::format("{}: weight and cutter are {:.1f} times what glue of {} MPa holds", carries,
+                         worst.turning, bears),
+             where,
+             std::string("leave supports (layers.supports) or a flask (flask.enabled), ") + kOtherJoint});
+    else if (worst.pull_mpa > bears)
+        diagnostics.push_back({Severity::warning, "joint.overhang",
+                               fmt::format("{}: the glue is pulled with up to {:.2f} MPa, over {} MPa; prop "
+                                           "the free side while it is cut",
+                                           carries, worst.pull_mpa, bears),
+                               where});
+    else if (worst.off_mm > 0 && cut.index == layer.index)
+        diagnostics.push_back({Severity::note, "joint.overhang",
+                               fmt::format("{}: hold the slab until the glue has set; then it is pulled with "
+                                           "up to {:.2f} MPa",
+                                           carries, worst.pull_mpa),
+                               where});
+}
+
+/// Two weights as one.
+DownForce together(const DownForce& a, const DownForce& b) {
+    const double n = a.n + b.n;
+    if (!(n > 0)) return {};
+    return {n, (a.n * a.x + b.n * b.x) / n, (a.n * a.y + b.n * b.y) / n};
+}
+
+// Of a layer that is done its wood stands: between what it keeps at its bottom and a quarter below its top,
+// by the middle of the two.
+DownForce weight_of(const Layer& layer, const Loops& bottom, const Loops& top, double density_kg_m3) {
+    const double newton_mm2 = (layer.z_top - layer.z_bottom) * 1e-9 * density_kg_m3 * kGravity / 2;
+    const AreaMoments low = area_moments(bottom), high = area_moments(top);
+    return together({low.area * newton_mm2, low.x, low.y}, {high.area * newton_mm2, high.x, high.y});
+}
+
+}  // namespace
+
+std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const std::vector<JointWood>> wood,
+                                                   std::vector<Diagnostic>& diagnostics) {
+    const std::size_t n = plan.layers.size();
+    const double bears = plan.job.bonding.max_pressure_mpa, density = plan.job.material.density_kg_m3;
+    const SlabCut cut = hardest_on_slab(plan.job);
+    const LaidSlab stock{plan.stock_min, plan.stock_max};
+    // What of the wood is the pattern's: nothing ties it to the flask once its layer is cut.
+    std::vector<Footing> footings;
+    std::vector<DownForce> standing;
+    for (std::size_t i = 0; i < n; ++i) {
+        const JointWood& under = wood[i].front();
+        const Loops& glue = plan.layers[i].joints.front().glue;
+        const Loops frame = plan.flask ? flask_frame(*plan.flask, i) : Loops{};
+        const auto of_pattern = [&](const Loops& r) { return frame.empty() ? r : subtract(r, frame); };
+        footings.emplace_back(of_pattern(glue), of_pattern(under.both));
+        standing.push_back(
+            weight_of(plan.layers[i], of_pattern(under.above), of_pattern(under.higher.back()), density));
+    }
+    std::vector<LaidSlab> laid(n, stock);
+    // Joint i while layer c is cut: `weight` of what stands of the layers between, and the slab of c whole,
+    // or what stands of it where a flask holds the slab.
+    const auto at = [&](const Footing& footing, std::size_t i, std::size_t c, DownForce weight) {
+        const Layer& layer = plan.layers[c];
+        const LaidSlab& s = laid[c];
+        const DownForce slab{s.mm2() * layer.slab_thickness * 1e-9 * density * kGravity,
+                             (s.min[0] + s.max[0]) / 2, (s.min[1] + s.max[1]) / 2};
+        weight = together(weight, plan.flask ? standing[c] : slab);
+        const std::array<std::array<double, 2>, 4> corners{
+            {{s.min[0], s.min[1]}, {s.max[0], s.min[1]}, {s.max[0], s.max[1]}, {s.min[0], s.max[1]}}};
+        const FootingLoad load{{weight},
+                               plan.flask ? 0 : cut.push_n,
+                               corners,
+                               cut.side_n * (layer.z_top - plan.layers[i].z_bottom)};
+        return HardestTime{.turning = footing.turning(load, bears),
+                           .pull_mpa = footing.pull_mpa(load),
+                           .glue_mm2 = footing.glue().area,
+                           .kg = weight.n / kGravity,
+                           .off_mm = footing.outside_by(weight.x, weight.y),
+                           .layer = c,
+                           .x = footing.glue().x,
+                           .y = footing.glue().y};
+    };
+    // A pattern maker lays a piece of a slab where a whole one would break off.
+    const auto with_piece = [&](const Footing& footing, std::size_t i, std::size_t c,
+                                const DownForce& weight) {
+        const HardestTime whole = at(footing, i, c, weight);
+        if (whole.pull_mpa <= bears || plan.flask || laid[c].mm2() < stock.mm2()) return whole;
+        laid[c] = piece_for(wood[c].front(), stock);
+        const HardestTime piece = at(footing, i, c, weight);
+        if (laid[c].mm2() < 0.8 * stock.mm2() &&
+            (whole.turning > 1 ? piece.turning <= 1 : piece.pull_mpa <= bears))
+            return piece;
+        laid[c] = stock;
+        return whole;
+    };
+    std::vector<HardestTime> worst(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        Joint& joint = plan.layers[i].joints.front();
+        if (!(joint.area_mm2 > 0)) continue;  // said by bond_layer
+        if (i > 0) {
+            worst[i] = with_piece(footings[i], i, i, {});
+        } else if (worst[i] = at(footings[i], i, i, {}); worst[i].pull_mpa > bears) {
+            // The board is sacrificial: what the pattern's foot cannot hold, glue all over it does.
+            diagnostics.push_back(
+                {Severity::note,
+                 "joint.board",
+                 fmt::format("layer 1 is glued all over the board: the {:.0f} mm2 under the pattern alone "
+                             "would not hold the slab while it is cut",
+                             joint.area_mm2),
+                 {}});
+            const double standing_mm2 = joint.standing_mm2;
+            joint = pressed(joint.z, wood[i].front().below, plan);
+            joint.standing_mm2 = standing_mm2;
+            worst[i] = at(Footing(joint.glue, wood[i].front().below), i, i, {});
+        }
+        DownForce weight;
+        for (std::size_t c = i + 1; c < n; ++c)
+            worst[i].take(with_piece(footings[i], i, c, weight = together(weight, standing[c - 1])));
+    }
+    std::vector<std::vector<WeakJoint>> weak(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        const Layer& layer = plan.layers[i];
+        const Joint& joint = layer.joints.front();
+        if (laid[i].mm2() < stock.mm2())
+            diagnostics.push_back(
+                {Severity::warning, "joint.small_slab",
+                 fmt::format("layer {}: lay a piece of {:.0f} x {:.0f} mm, from x {:.0f} y {:.0f} mm on, not "
+                             "the whole slab, which would break off; programs pass the rest in air",
+                             layer.index, laid[i].max[0] - laid[i].min[0], laid[i].max[1] - laid[i].min[1],
+                             laid[i].min[0], laid[i].min[1]),
+                 std::array<double, 3>{joint.centroid[0], joint.centroid[1], joint.z}});
+        if (joint.area_mm2 > 0)
+            rate_footing(layer, wood[i].front(), plan.layers[worst[i].layer], worst[i], bears, weak[i],
+                         diagnostics);
     }
     return weak;
 }
@@ -479,11 +612,11 @@ std::vector<WeakJoint> joints_under_load(const Layer& layer, std::span<const Joi
     std::vector<WeakJoint> weak;
     for (std::size_t k = 0; k < wood.size() && k < layer.joints.size(); ++k) {
         const Pieces pieces(wood[k].above), contact(wood[k].both), glued(layer.joints[k].glue);
-        double worst = bears, worst_area = 0;
+        double worst = bears, worst_area = 0, sum = 0;
         std::size_t which = pieces.size(), count = 0;
         for (std::size_t p = 0; p < pieces.size(); ++p) {
             const Loops& piece = pieces.regions[p];
-            const AreaMoments glue = moments(glued.within(piece, pieces.boxes[p]));
+            const AreaMoments glue = area_moments(glued.within(piece, pieces.boxes[p]));
             if (!(glue.area > 0) || area(piece) < kChip) continue;  // said by bond_layer
             const SideLoad load = side_load(layer, height_of(wood[k], piece, layer.z_top - wood[k].z));
             const double lever =
@@ -492,6 +625,7 @@ std::vector<WeakJoint> joints_under_load(const Layer& layer, std::span<const Joi
                                            load.force_n / glue.area);
             if (stress <= bears) continue;
             ++count;
+            sum += area(piece);
             if (stress > worst) {
                 worst = stress;
                 which = p;
@@ -507,7 +641,8 @@ std::vector<WeakJoint> joints_under_load(const Layer& layer, std::span<const Joi
                  words_of(layer, wood[k]), count, count == 1 ? "" : "s",
                  size_of(pieces.regions[which], pieces.boxes[which]), worst_area, worst, bears),
              middle_of(pieces.boxes[which], wood[k].z),
-             std::string("fasten it with dowels, cut it with less force (smaller tools), ") + kOtherJoint});
+             std::string("fasten it with dowels, cut it with less force (smaller tools), ") + kOtherJoint,
+             sum > kFewPieces * area(wood[k].above)});
     }
     return weak;
 }

@@ -50,16 +50,27 @@ struct WeakJoint {
     std::string code, message;
     std::array<double, 3> where{};
     std::string remedy;
+    bool refused = true;  ///< false: it deserves care, and the build goes on
 };
 
-/// Fills layer.joints: glue, force and pressure of each. The force is the press's own unless the glued area
-/// would see more than its allowed pressure, at its most loaded edge when the slab's middle (of
-/// plan.stock_min … stock_max) lies off the glue's centroid; no joint within the layer is pressed harder than
-/// the one under it bears. Notes go to `diagnostics`.
+/// Fills layer.joints: glue, force and pressure of each. The force is the press's own, less where the glue
+/// lies off the table's middle, unless the glued area would see more than its allowed pressure; no joint
+/// within the layer is pressed harder than the one under it bears. Notes go to `diagnostics`.
 /// @param wood of this layer, from wood_at_joints
-/// @return what cannot hold, whatever is cut: joint.floating, joint.no_glue, joint.tips, joint.pressure
+/// @return what cannot hold, whatever is cut: joint.floating, joint.no_glue, joint.pressure
 std::vector<WeakJoint> bond_layer(Layer& layer, std::span<const JointWood> wood, const Plan& plan,
                                   std::vector<Diagnostic>& diagnostics);
+
+/// Whether each layer's joint bears what stands on it, from when its slab is whole until the last layer is
+/// cut: weights, and the hardest push of the face mill and the flat end mills at the stock's corners. While
+/// glue sets, the press holds the slab. A first layer that the pattern's foot would not hold is glued all
+/// over the board; where a whole slab would break off, a piece of one is laid.
+/// @param plan its layers bonded; the first one's joint may change
+/// @param wood of every layer
+/// @return layer by layer what no distribution of the glue's stress can bear: joint.tips. What deserves care
+/// (joint.overhang, joint.board, joint.small_slab) goes to `diagnostics`.
+std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const std::vector<JointWood>> wood,
+                                                   std::vector<Diagnostic>& diagnostics);
 
 /// Whether the glue bears the cutters, every piece of the layer by itself: once it stands free of its slab,
 /// at its own height.

@@ -110,12 +110,10 @@ void plan_or_refuse(const fs::path& file, bool nasty) {
     // What can be accepted is planned once it is: an undercut by the flag, hairline cracks by the weld it
     // names.
     std::string accept;
-    // A joint is looked at once the undercuts are settled.
-    if (code == "undercut.unmade" && !nasty) accept = "--allow-undercut --accept-weak-joints";
-    if (code.starts_with("joint.") && !nasty) accept = "--accept-weak-joints";
+    if (code == "undercut.unmade" && !nasty) accept = "--allow-undercut";
     if (const std::size_t at = remedy.find("--weld "); at != std::string::npos && !nasty) {
         const std::string number = remedy.substr(at + 7);
-        accept = "--allow-undercut --accept-weak-joints --weld " + number.substr(0, number.find(' '));
+        accept = "--allow-undercut --weld " + number.substr(0, number.find(' '));
     }
     if (accept.empty()) return;
     outcome = run_command("plan '" + file.string() + "' -o '" + out.string() + "' --json " + accept,

@@ -23,11 +23,11 @@ const patterns = [];
 execFileSync(makeModels, ['metre', `${work}/metre.stl`, '--facets', '60000', '--height', '30'], {stdio: 'pipe'});
 // One thick slab, and passes as wide as they may be: the test is of the page.
 writeFileSync(`${work}/metre.toml`, '[slabs]\nthicknesses = [38.0]\n[tolerances]\ncusp = 0.4\n');
-patterns.push([`${work}/metre.stl`, ['--job', `${work}/metre.toml`, '--allow-undercut', '--accept-weak-joints', '--no-verify']]);
+patterns.push([`${work}/metre.stl`, ['--job', `${work}/metre.toml`, '--allow-undercut', '--no-verify']]);
 if (process.env.SLABWRIGHT_CORPUS) {
     for (const name of ['castings/mold_cavity_ktool.stl', 'castings/midget_crankcase_front_pattern.stl', 'castings/bearing_block.stl']) {
         copyFileSync(`${process.env.SLABWRIGHT_CORPUS}/${name}`, `${work}/${basename(name)}`);
-        patterns.push([`${work}/${basename(name)}`, name.includes('ktool') ? [] : ['--allow-undercut', '--accept-weak-joints', '--no-verify']]);
+        patterns.push([`${work}/${basename(name)}`, name.includes('ktool') ? [] : ['--allow-undercut', '--no-verify']]);
     }
 } else {
     console.log('skipped: SLABWRIGHT_CORPUS is not set');
