@@ -392,6 +392,12 @@ SlabCut hardest_on_slab(const Job& job) {
 
 constexpr double kGravity = 9.81;  // m/s²
 
+/// To which share of its force a cut can be taken down by feed and depth: what breaks even then is refused.
+constexpr double kGentle = 0.25;
+
+/// What stands on a joint may be lost without the build where it is no more than this share of the pattern.
+constexpr double kSmallTop = 0.05;
+
 /// A slab, or a piece of one, as it is laid: its corners, mm.
 struct LaidSlab {
     std::array<double, 2> min{}, max{};
@@ -415,8 +421,8 @@ LaidSlab piece_for(const JointWood& wood, const LaidSlab& stock) {
 
 /// The hardest that a joint has to bear, and when.
 struct HardestTime {
-    double turning = 0;         ///< Footing::turning
-    double pull_mpa = 0;        ///< Footing::pull_mpa
+    double turning = 0;         ///< Footing::turning under gentle cuts
+    double pull_mpa = 0;        ///< Footing::pull_mpa under the hardest
     double glue_mm2 = 0;        ///< that holds then
     double kg = 0, off_mm = 0;  ///< what it carries then, and how far that lies outside the wood under it
     std::size_t layer = 0;      ///< that is cut
@@ -427,7 +433,8 @@ struct HardestTime {
 };
 
 void rate_footing(const Layer& layer, const JointWood& wood, const Layer& cut, const HardestTime& worst,
-                  double bears, std::vector<WeakJoint>& weak, std::vector<Diagnostic>& diagnostics) {
+                  double bears, bool small_top, std::vector<WeakJoint>& weak,
+                  std::vector<Diagnostic>& diagnostics) {
     const std::array<double, 3> where{worst.x, worst.y, wood.z};
     const std::string carries =
         fmt::format("{}: while layer {} is cut, {:.0f} mm2 of glue carry {:.1f} kg{}", words_of(layer, wood),
@@ -438,14 +445,14 @@ void rate_footing(const Layer& layer, const JointWood& wood, const Layer& cut, c
     if (worst.turning > 1)
         weak.push_back(
             {"joint.tips",
-             fmt::format("{}: weight and cutter are {:.1f} times what glue of {} MPa holds", carries,
-                         worst.turning, bears),
+             fmt::format("{}: weight and the gentlest cut are {:.1f} times what glue of {} MPa holds",
+                         carries, worst.turning, bears),
              where,
              std::string("leave supports (layers.supports) or a flask (flask.enabled), ") + kOtherJoint});
     else if (worst.pull_mpa > bears)
         diagnostics.push_back({Severity::warning, "joint.overhang",
                                fmt::format("{}: the glue is pulled with up to {:.2f} MPa, over {} MPa; prop "
-                                           "the free side while it is cut",
+                                           "the free side, cut gently or fasten it with dowels",
                                            carries, worst.pull_mpa, bears),
                                where});
     else if (worst.off_mm > 0 && cut.index == layer.index)
@@ -506,7 +513,10 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
                                plan.flask ? 0 : cut.push_n,
                                corners,
                                cut.side_n * (layer.z_top - plan.layers[i].z_bottom)};
-        return HardestTime{.turning = footing.turning(load, bears),
+        FootingLoad gentle = load;
+        gentle.push_n *= kGentle;
+        gentle.side_bending_nmm *= kGentle;
+        return HardestTime{.turning = footing.turning(gentle, bears),
                            .pull_mpa = footing.pull_mpa(load),
                            .glue_mm2 = footing.glue().area,
                            .kg = weight.n / kGravity,
@@ -523,7 +533,7 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
         laid[c] = piece_for(wood[c].front(), stock);
         const HardestTime piece = at(footing, i, c, weight);
         if (laid[c].mm2() < 0.8 * stock.mm2() &&
-            (whole.turning > 1 ? piece.turning <= 1 : piece.pull_mpa <= bears))
+            (whole.turning > 1 ? piece.turning < 0.8 * whole.turning : piece.pull_mpa <= bears))
             return piece;
         laid[c] = stock;
         return whole;
@@ -552,6 +562,8 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
         for (std::size_t c = i + 1; c < n; ++c)
             worst[i].take(with_piece(footings[i], i, c, weight = together(weight, standing[c - 1])));
     }
+    std::vector<double> above(n);  // N
+    for (std::size_t i = n; i-- > 0;) above[i] = standing[i].n + (i + 1 < n ? above[i + 1] : 0);
     std::vector<std::vector<WeakJoint>> weak(n);
     for (std::size_t i = 0; i < n; ++i) {
         const Layer& layer = plan.layers[i];
@@ -565,8 +577,8 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
                              laid[i].min[0], laid[i].min[1]),
                  std::array<double, 3>{joint.centroid[0], joint.centroid[1], joint.z}});
         if (joint.area_mm2 > 0)
-            rate_footing(layer, wood[i].front(), plan.layers[worst[i].layer], worst[i], bears, weak[i],
-                         diagnostics);
+            rate_footing(layer, wood[i].front(), plan.layers[worst[i].layer], worst[i], bears,
+                         above[i] <= kSmallTop * above[0], weak[i], diagnostics);
     }
     return weak;
 }

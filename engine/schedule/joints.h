@@ -62,9 +62,9 @@ std::vector<WeakJoint> bond_layer(Layer& layer, std::span<const JointWood> wood,
                                   std::vector<Diagnostic>& diagnostics);
 
 /// Whether each layer's joint bears what stands on it, from when its slab is whole until the last layer is
-/// cut: weights, and the hardest push of the face mill and the flat end mills at the stock's corners. While
-/// glue sets, the press holds the slab. A first layer that the pattern's foot would not hold is glued all
-/// over the board; where a whole slab would break off, a piece of one is laid.
+/// cut: weights, and the hardest cut of the face mill and the flat end mills; a quarter of it for refusals.
+/// While glue sets, the press holds the slab. A first layer that the pattern's foot would not hold is glued
+/// all over the board; where a whole slab would break off, a piece of one is laid.
 /// @param plan its layers bonded; the first one's joint may change
 /// @param wood of every layer
 /// @return layer by layer what no distribution of the glue's stress can bear: joint.tips. What deserves care
