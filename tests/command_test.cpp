@@ -385,7 +385,7 @@ TEST(Command, InspectTellsPeopleAndPrograms) {
     spit(folder.path / "mushroom.stl", stl_bytes("mushroom", mushroom()));
     const json undercut = json::parse(slabwright_command({"inspect", folder / "mushroom.stl", "--json"}).out);
     ASSERT_EQ(undercut["undercuts"].size(), 1u);
-    EXPECT_GT(undercut["undercuts"][0]["depth"].get<double>(), 1);
+    EXPECT_GT(undercut["undercuts"][0]["height"].get<double>(), 1);
 }
 
 TEST(Command, WhatDoesNotReachStdoutIsAnError) {

@@ -12,11 +12,13 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <random>
 #include <set>
 
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
+#include "kernels/mesh/facet_roles.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/slicing/slicing.h"
 #include "tests/support/seed.h"
@@ -424,7 +426,9 @@ TEST(Undercuts, AFlatIsMadeByItsBoundaryAndOtherwiseLeavesItsHeight) {
         const auto u = unmade(t, c.tops);
         ASSERT_EQ(u.size(), 1u);
         EXPECT_EQ(u[0].type, FeatureType::down_flat);
-        EXPECT_NEAR(u[0].depth_mm, c.depth, 1e-6);
+        EXPECT_NEAR(u[0].height_mm, c.depth, 1e-6);
+        EXPECT_NEAR(u[0].thickness_mm, c.depth, 1e-6);
+        EXPECT_NEAR(u[0].volume_mm3, 80 * c.depth, 2 * c.depth);
         EXPECT_NEAR(u[0].area_mm2, 80, 1e-3);
         EXPECT_NEAR(u[0].z, 10, 1e-6);
         EXPECT_EQ(u[0].facets.size(), 2u);
@@ -438,12 +442,14 @@ TEST(Undercuts, SolidBelowEndsTheDepth) {
     ASSERT_EQ(u.size(), 1u);
     // Nothing stands under the flat's rim: there the layer's bottom ends it, 10 mm down; over the block it
     // would be 3.
-    EXPECT_NEAR(u[0].depth_mm, 10, 1e-6);
+    EXPECT_NEAR(u[0].height_mm, 10, 1e-6);
+    EXPECT_NEAR(u[0].volume_mm3, 80 * 10 - 36 * 7, 15);
     Facets full = bridge();
     box(full, {10, 0, 0}, {20, 8, 7});
     const auto v = unmade(full, {15});
     ASSERT_EQ(v.size(), 1u);
-    EXPECT_NEAR(v[0].depth_mm, 3, 1e-6);
+    EXPECT_NEAR(v[0].height_mm, 3, 1e-6);
+    EXPECT_NEAR(v[0].volume_mm3, 80 * 3, 5);
 }
 
 TEST(Undercuts, AFlatInsideAnotherShellIsNone) {
@@ -470,21 +476,23 @@ Facets leaning(float lean, float height) {
 TEST(Undercuts, NearVerticalWallsAreAsDeepAsTheyLean) {
     const auto thin = unmade(leaning(0.01f, 1000), {1000});
     ASSERT_EQ(thin.size(), 1u);
-    EXPECT_LE(thin[0].depth_mm, 0.0101);
-    EXPECT_GE(thin[0].depth_mm, 0.009);
+    EXPECT_LE(thin[0].thickness_mm, 0.0101);
+    EXPECT_GE(thin[0].thickness_mm, 0.009);
     EXPECT_NEAR(thin[0].area_mm2, 20000, 1);
     // Layers cut the lean: each can only be as deep as its own share.
     std::vector<double> tops;
     for (int i = 1; i <= 50; ++i) tops.push_back(20.0 * i);
     const auto cut = unmade(leaning(1.0f, 1000), tops);
     ASSERT_EQ(cut.size(), 1u);
-    EXPECT_LE(cut[0].depth_mm, 0.0201);
-    EXPECT_GE(cut[0].depth_mm, 0.018);
+    EXPECT_LE(cut[0].thickness_mm, 0.0201);
+    EXPECT_GE(cut[0].thickness_mm, 0.018);
     EXPECT_TRUE(unmade(leaning(0.01f, 1000), tops).empty());  // a fifth of a micrometre a layer
     // 45°: along the normal from the middle of the wall both ways out are height / √2 long.
     const auto steep = unmade(leaning(10, 10), {10});
     ASSERT_EQ(steep.size(), 1u);
-    EXPECT_NEAR(steep[0].depth_mm, 10 / std::sqrt(2.0), 0.15);
+    EXPECT_NEAR(steep[0].thickness_mm, 10 / std::sqrt(2.0), 0.15);
+    EXPECT_NEAR(steep[0].height_mm, 10, 0.15);
+    EXPECT_NEAR(steep[0].volume_mm3, 20 * 50, 5);
 }
 
 TEST(Undercuts, TopsMustAscend) {
@@ -535,7 +543,7 @@ TEST(Undercuts, AgreesWithCellsOnRandomBoxes) {
                                      whole.begin() + 2 * static_cast<long>(side) + 2);
                 }
         const int split = 1 + static_cast<int>(random() % (n - 1));
-        double deepest = 0, area = 0;
+        double deepest = 0, area = 0, volume = 0;
         int height = 0;
         for (int x = 0; x < n; ++x)
             for (int y = 0; y < n; ++y)
@@ -551,17 +559,120 @@ TEST(Undercuts, AgreesWithCellsOnRandomBoxes) {
                     if (depth == 0) continue;
                     deepest = std::max<double>(deepest, depth);
                     area += 1;
+                    volume += depth;
                 }
         std::vector<double> tops;
         if (split < height) tops.push_back(split);
         tops.push_back(height);
-        double found_deepest = 0, found_area = 0;
+        double found_highest = 0, found_thickest = 0, found_area = 0, found_volume = 0;
         for (const UnmadeUndercut& u : unmade(t, tops)) {
-            found_deepest = std::max(found_deepest, u.depth_mm);
+            found_highest = std::max(found_highest, u.height_mm);
+            found_thickest = std::max(found_thickest, u.thickness_mm);
             found_area += u.area_mm2;
+            found_volume += u.volume_mm3;
         }
-        ASSERT_NEAR(found_deepest, deepest, 1e-6) << "round " << round;
+        ASSERT_NEAR(found_highest, deepest, 1e-6) << "round " << round;
+        ASSERT_NEAR(found_thickest, deepest, 1e-6) << "round " << round;
+        ASSERT_NEAR(found_volume, volume, 0.01 * volume + 0.05) << "round " << round;
         ASSERT_NEAR(found_area, area, 1e-6) << "round " << round;
+    }
+}
+
+// A box turned about all axes: what of an upright line lies in it follows from its six planes.
+struct TurnedBox {
+    Facets facets;
+    std::array<std::array<double, 4>, 6> planes{};  // n·p ≤ d
+
+    // The height of the box over (x, y), or nothing.
+    [[nodiscard]] std::optional<std::array<double, 2>> over(double x, double y) const {
+        double low = -HUGE_VAL, high = HUGE_VAL;
+        for (const auto& [a, b, c, d] : planes) {
+            const double left = d - a * x - b * y;
+            if (c > 1e-12) high = std::min(high, left / c);
+            else if (c < -1e-12) low = std::max(low, left / c);
+            else if (left < 0) return {};
+        }
+        if (low >= high) return {};
+        return std::array{low, high};
+    }
+};
+
+TurnedBox turned_box(std::mt19937& random, double side) {
+    std::uniform_real_distribution<double> unit(0, 1);
+    const double a = 6.2832 * unit(random), b = 1.5 * unit(random), w = 4 + 16 * unit(random),
+                 d = 4 + 16 * unit(random), h = 3 + 6 * unit(random);
+    const std::array<std::array<double, 3>, 3> axes{
+        {{std::cos(a) * std::cos(b), std::sin(a) * std::cos(b), std::sin(b)},
+         {-std::sin(a), std::cos(a), 0},
+         {-std::cos(a) * std::sin(b), -std::sin(a) * std::sin(b), std::cos(b)}}};
+    const std::array<double, 3> size{w, d, h}, at{side * unit(random), side * unit(random), 30 * unit(random)};
+    TurnedBox made;
+    box(made.facets, {0, 0, 0}, {1, 1, 1});
+    for (auto& facet : made.facets)
+        for (Vec3f& v : facet) {
+            const std::array<double, 3> u{v.x * w, v.y * d, v.z * h};
+            std::array<double, 3> p = at;
+            for (std::size_t k = 0; k < 3; ++k)
+                for (std::size_t c = 0; c < 3; ++c) p[c] += u[k] * axes[k][c];
+            v = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+        }
+    for (std::size_t k = 0; k < 3; ++k) {
+        const double from = at[0] * axes[k][0] + at[1] * axes[k][1] + at[2] * axes[k][2];
+        made.planes[2 * k] = {axes[k][0], axes[k][1], axes[k][2], from + size[k]};
+        made.planes[2 * k + 1] = {-axes[k][0], -axes[k][1], -axes[k][2], -from};
+    }
+    return made;
+}
+
+// Brute force: upright lines through a union of turned boxes on a plate, known from the boxes' planes.
+TEST(Undercuts, HeightAndVolumeAgreeWithLinesThroughTurnedBoxes) {
+    const unsigned seed = test::seed();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    constexpr double side = 40;
+    for (int round = 0; round < 12; ++round) {
+        Facets t;
+        box(t, {-30, -30, -40}, {side + 30, side + 30, -30});
+        std::vector<TurnedBox> boxes;
+        for (int k = 0; k < 3 + round % 4; ++k) {
+            boxes.push_back(turned_box(random, side));
+            t.insert(t.end(), boxes.back().facets.begin(), boxes.back().facets.end());
+        }
+        Context context;
+        Mesh mesh = weld(context, t);
+        mesh.roles = facet_roles(context, mesh.view());
+        const double top = bounds(mesh.view()).max.z;
+        const std::vector<double> tops{-30, -12.34, 3.21, 17.77, top};
+        double highest = 0, volume = 0;
+        constexpr double cell = 0.2;
+        for (double x = -30 + cell / 2; x < side + 30; x += cell)
+            for (double y = -30 + cell / 2; y < side + 30; y += cell) {
+                std::vector<std::array<double, 2>> solid{{-40, -30}};
+                for (const TurnedBox& b : boxes)
+                    if (const auto over = b.over(x, y)) solid.push_back(*over);
+                std::sort(solid.begin(), solid.end());
+                double reached = -30;
+                for (const auto& [low, high] : solid) {
+                    // Air between `reached` and `low`: of the layer that the roof lies in.
+                    if (low > reached) {
+                        double bottom = -40;
+                        for (std::size_t l = 0; l + 1 < tops.size(); ++l)
+                            if (tops[l] <= low) bottom = tops[l];
+                        const double air = low - std::max(bottom, reached);
+                        highest = std::max(highest, air);
+                        volume += air * cell * cell;
+                    }
+                    reached = std::max(reached, high);
+                }
+            }
+        double found_highest = 0, found_volume = 0;
+        for (const UnmadeUndercut& u : measure_undercuts(context, mesh.view(), tops)) {
+            found_volume += u.volume_mm3;
+            found_highest = std::max(found_highest, u.height_mm);
+            EXPECT_LE(u.thickness_mm, u.height_mm + 1e-9);
+        }
+        EXPECT_NEAR(found_highest, highest, 1.5) << "round " << round;
+        EXPECT_NEAR(found_volume, volume, 0.02 * volume + 1) << "round " << round;
     }
 }
 
@@ -593,7 +704,8 @@ TEST(Undercuts, HundredThousandFacetsAreQuick) {
     const auto u = measure_undercuts(context, mesh.view(), std::array{18.0, 36.0, 80.0});
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     ASSERT_FALSE(u.empty());
-    EXPECT_GT(u[0].depth_mm, 5);
+    EXPECT_GT(u[0].thickness_mm, 5);
+    EXPECT_LT(u[0].height_mm, 70);
     EXPECT_LT(seconds, 20);  // a fraction of a second when optimised; the bound leaves room for sanitizers
 }
 
@@ -649,7 +761,11 @@ TEST(FeaturesCorpus, RealPartsAreFoundQuicklyAndMeasured) {
         const auto u = measure_undercuts(context, mesh.view(), tops);
         const bool relief = std::strncmp(file, "relief", 6) == 0;
         EXPECT_EQ(u.empty(), relief);
-        for (const UnmadeUndercut& patch : u) EXPECT_GT(patch.depth_mm, 0);
+        for (const UnmadeUndercut& patch : u) {
+            EXPECT_GT(patch.thickness_mm, 0);
+            EXPECT_GE(patch.height_mm, patch.thickness_mm);
+            EXPECT_LE(patch.height_mm, double{box3.max.z} - box3.min.z);
+        }
     }
 }
 

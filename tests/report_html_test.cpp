@@ -131,9 +131,11 @@ TEST(Replay, AStraightSlotIsAsDeepAndAsWideAsItIs) {
     for (const ReplayPiece& piece : again.pieces) EXPECT_EQ(piece.force_n, 0);
     // What is left stands over the layer's bottom beside the pattern: where the slot went 47.5, elsewhere the
     // slab's top.
-    std::vector<float> left;
-    replay.left_over(StandingPart(context, input.mesh), [&](std::size_t layer, const std::vector<float>& of) {
-        if (layer == 0) left = of;
+    std::vector<float> left, surface;
+    replay.finished(StandingPart(context, input.mesh), [&](std::size_t layer, const ReplayedLayer& of) {
+        if (layer != 0) return;
+        left = of.left;
+        surface = of.surface;
     });
     const auto at = [&](double x, double y) {
         const auto i = static_cast<std::size_t>(std::lround((x - replay.first()[0]) / options.cell)),
@@ -142,6 +144,9 @@ TEST(Replay, AStraightSlotIsAsDeepAndAsWideAsItIs) {
     };
     EXPECT_NEAR(at(60, 70), 47.5, 17.5);  // never more than stands there, and no nearer than the sphere is
     EXPECT_LT(at(0, 70), at(0, 78) + 3);
+    // Wood as cut: the slab's top but in the slot.
+    EXPECT_NEAR(*std::min_element(surface.begin(), surface.end()), 47.5, 1e-4);
+    EXPECT_NEAR(surface.front(), 50.5, 1e-4);
     EXPECT_THROW(Replay(context, input, {.cell = 0, .material = {}}), Error);
 }
 

@@ -283,7 +283,7 @@ TEST(Undercuts, NoiseInTheVerticesMakesNone) {
         }
         mesh.roles = facet_roles(context, mesh.view());
         for (const UnmadeUndercut& u : measure_undercuts(context, mesh.view(), tops, {}))
-            EXPECT_LT(u.depth_mm, 0.01) << trial << " at " << u.x << ' ' << u.y << ' ' << u.z;
+            EXPECT_LT(u.thickness_mm, 0.01) << trial << " at " << u.x << ' ' << u.y << ' ' << u.z;
     }
 }
 

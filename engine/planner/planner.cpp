@@ -178,6 +178,11 @@ std::vector<Layer> layers_between(const Job& job, const std::vector<Boundary>& b
     return layers;
 }
 
+// 1 cm³ is a cube as large as a thumbnail: less is told in mm³.
+std::string volume_words(double mm3) {
+    return mm3 < 1000 ? fmt::format("{:.0f} mm³", std::max(1.0, mm3)) : fmt::format("{:.1f} cm³", mm3 / 1000);
+}
+
 // Says which undercuts stay filled with these layers, and refuses those that the job does not accept.
 void settle_undercuts(Context& context, Plan& plan, MeshView mesh) {
     const Job& job = plan.job;
@@ -185,35 +190,39 @@ void settle_undercuts(Context& context, Plan& plan, MeshView mesh) {
     for (const Layer& layer : plan.layers) tops.push_back(layer.z_top);
     const std::vector<UnmadeUndercut> unmade = measure_undercuts(context, mesh, tops, feature_options(job));
     if (unmade.empty()) return;
-    const UnmadeUndercut& deepest = *std::max_element(
+    // The thickest comes first; the tallest is what a pattern maker would measure.
+    const UnmadeUndercut& tallest = *std::max_element(
         unmade.begin(), unmade.end(),
-        [](const UnmadeUndercut& a, const UnmadeUndercut& b) { return a.depth_mm < b.depth_mm; });
-    if (deepest.depth_mm <= job.tolerances.undercut) {
-        double total = 0;
-        for (const UnmadeUndercut& u : unmade) total += u.area_mm2;
+        [](const UnmadeUndercut& a, const UnmadeUndercut& b) { return a.height_mm < b.height_mm; });
+    double area = 0, volume = 0;
+    std::size_t count = 0;
+    for (const UnmadeUndercut& u : unmade) {
+        area += u.area_mm2;
+        volume += u.volume_mm3;
+        if (u.thickness_mm > job.tolerances.undercut) ++count;
+    }
+    if (count == 0) {
         plan.diagnostics.push_back(
             {Severity::note, "undercut.shallow",
-             fmt::format("{} undercut patches ({:.1f} mm²) stay filled, at most {:.3f} mm deep",
-                         unmade.size(), total, deepest.depth_mm),
-             std::array{deepest.x, deepest.y, deepest.z}});
+             fmt::format("{} undercut patch{} of {:.1f} mm² stay{} filled, at most {:.3f} mm thick",
+                         unmade.size(), unmade.size() == 1 ? "" : "es", area, unmade.size() == 1 ? "s" : "",
+                         unmade.front().thickness_mm),
+             std::array{unmade.front().x, unmade.front().y, unmade.front().z}});
         return;
     }
-    std::size_t count = 0;
     for (const UnmadeUndercut& u : unmade)
-        if (u.depth_mm > job.tolerances.undercut) {
-            ++count;
+        if (u.thickness_mm > job.tolerances.undercut)
             plan.diagnostics.push_back(
                 {job.allow_undercut ? Severity::warning : Severity::error, "undercut.unmade",
-                 fmt::format("an undercut of {:.1f} mm² stays filled up to {:.2f} mm deep", u.area_mm2,
-                             u.depth_mm),
+                 fmt::format("under an overhang of {:.1f} mm² {} stay filled, up to {:.2f} mm high", u.area_mm2,
+                             volume_words(u.volume_mm3), u.height_mm),
                  std::array{u.x, u.y, u.z}});
-        }
     if (!job.allow_undercut)
         throw refusal("undercut.unmade",
-                      fmt::format("{} undercut{} cannot be milled from above; the deepest, of {:.1f} mm², "
-                                  "would stay filled {:.2f} mm deep",
-                                  count, count == 1 ? "" : "s", deepest.area_mm2, deepest.depth_mm),
-                      fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", deepest.x, deepest.y, deepest.z),
+                      fmt::format("{} undercut{} cannot be milled from above; {} would stay filled, up to "
+                                  "{:.2f} mm high",
+                                  count, count == 1 ? "" : "s", volume_words(volume), tallest.height_mm),
+                      fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", tallest.x, tallest.y, tallest.z),
                       "turn or split the pattern, or accept it with --allow-undercut");
 }
 

@@ -196,8 +196,8 @@ ReplayedProgram Replay::run(const Program& program) {
     return result;
 }
 
-void Replay::left_over(const StandingPart& part,
-                       const std::function<void(std::size_t, const std::vector<float>&)>& fn) const {
+void Replay::finished(const StandingPart& part,
+                      const std::function<void(std::size_t, const ReplayedLayer&)>& fn) const {
     Impl& r = *impl_;
     r.add_slabs(r.input.layers.size() - 1);
     std::vector<std::unique_ptr<RisingEnvelope>> envelopes(r.bands.size());
@@ -205,7 +205,9 @@ void Replay::left_over(const StandingPart& part,
         const CellGrid& g = r.bands[b].grid();
         envelopes[b] = std::make_unique<RisingEnvelope>(part, g.x0, g.y0, g.cell, g.nx, g.ny);
     });
-    std::vector<float> left(r.grid.count());
+    ReplayedLayer found;
+    found.left.resize(r.grid.count());
+    found.surface.resize(r.grid.count());
     for (std::size_t layer = 0; layer < r.input.layers.size(); ++layer) {
         const SimulatedLayer& l = r.input.layers[layer];
         parallel_each(r.context, r.bands.size(), [&](std::size_t b) {
@@ -213,12 +215,14 @@ void Replay::left_over(const StandingPart& part,
             const CellGrid& g = stock.grid();
             std::vector<float> envelope(g.count());
             envelopes[b]->at(l.z_top, std::numeric_limits<float>::lowest(), envelope.data());
-            float* out =
-                left.data() + b * static_cast<std::size_t>(kBandRows) * static_cast<std::size_t>(g.nx);
+            const std::size_t first =
+                b * static_cast<std::size_t>(kBandRows) * static_cast<std::size_t>(g.nx);
+            float *out = found.left.data() + first, *surface = found.surface.data() + first;
             for (int j = 0; j < g.ny; ++j)
                 for (int i = 0; i < g.nx; ++i) {
                     const std::size_t c = g.index(i, j);
                     const double x = g.x(i), y = g.y(j), z = stock.surface(layer, c);
+                    surface[c] = static_cast<float>(z);
                     if (!l.flask.empty() && winding(l.flask, {to_units(x), to_units(y)}) > 0) {
                         out[c] = std::numeric_limits<float>::quiet_NaN();
                         continue;
@@ -231,7 +235,7 @@ void Replay::left_over(const StandingPart& part,
                     out[c] = static_cast<float>(over);
                 }
         });
-        fn(layer, left);
+        fn(layer, found);
     }
 }
 

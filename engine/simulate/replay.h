@@ -33,6 +33,14 @@ struct ReplayedProgram {
     std::vector<ReplayPiece> pieces;
 };
 
+/// One layer when everything has been cut, row after row from the least y, mm.
+struct ReplayedLayer {
+    /// What stands over the finished surface, along the normal (negative: cut into the part); NaN where the
+    /// flask stays.
+    std::vector<float> left;
+    std::vector<float> surface;  ///< z of the wood's upper end; the layer's bottom where none is left
+};
+
 /// Programs are given in the order of execution, layers ascending; memory grows with the stock, not with the
 /// programs.
 class Replay {
@@ -47,11 +55,9 @@ public:
     /// Cuts. A program whose tool the input does not hold cuts nothing.
     ReplayedProgram run(const Program& program);
 
-    /// Calls fn(layer, left) for every layer, from the lowest: what stands over its finished surface, row
-    /// after row from the least y, mm along the normal (negative: cut into the part); NaN where the flask
-    /// stays. @param part of the input's mesh
-    void left_over(const StandingPart& part,
-                   const std::function<void(std::size_t, const std::vector<float>&)>& fn) const;
+    /// Calls fn(layer, what is there) for every layer, from the lowest. @param part of the input's mesh
+    void finished(const StandingPart& part,
+                  const std::function<void(std::size_t, const ReplayedLayer&)>& fn) const;
 
     [[nodiscard]] int nx() const;
     [[nodiscard]] int ny() const;

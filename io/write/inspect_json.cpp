@@ -109,7 +109,8 @@ std::string inspection_json(const Inspection& inspection) {
     for (const UnmadeUndercut& u : inspection.undercuts) {
         json.begin_object(Shape::line).key("type").string(name(u.type));
         json.key("z").begin_array().rounded(u.z_low, 6).rounded(u.z_high, 6).end();
-        json.key("area").rounded(u.area_mm2, 3).key("depth").rounded(u.depth_mm, 4);
+        json.key("area").rounded(u.area_mm2, 3).key("height").rounded(u.height_mm, 4);
+        json.key("thickness").rounded(u.thickness_mm, 4).key("volume").rounded(u.volume_mm3, 1);
         json.key("where").begin_array().rounded(u.x, 4).rounded(u.y, 4).rounded(u.z, 4).end().end();
     }
     json.end();
@@ -154,8 +155,9 @@ std::string inspection_text(const Inspection& inspection) {
     text += inspection.undercuts.empty() && inspection.solid ? "  undercuts   none\n" : "";
     for (std::size_t i = 0; i < std::min(shown, inspection.undercuts.size()); ++i) {
         const UnmadeUndercut& u = inspection.undercuts[i];
-        text += fmt::format("  undercut    {} mm2, {} mm deep at x {} y {} z {} if milled as one layer\n",
-                            mm(u.area_mm2, 1), mm(u.depth_mm), mm(u.x, 2), mm(u.y, 2), mm(u.z, 2));
+        text += fmt::format(
+            "  undercut    {} mm2, {} mm3 filled, {} mm high at x {} y {} z {} if milled as one layer\n",
+            mm(u.area_mm2, 1), mm(u.volume_mm3, 0), mm(u.height_mm), mm(u.x, 2), mm(u.y, 2), mm(u.z, 2));
     }
     if (inspection.undercuts.size() > shown)
         text += fmt::format("  and {} more undercuts\n", inspection.undercuts.size() - shown);

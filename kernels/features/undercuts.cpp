@@ -7,11 +7,15 @@
 // of linear inequalities in t: three for the edges of g in plan, one for the height of g above q, one for g
 // being under the layer's top. Each facet thus covers one interval of t; the leftover reaches as far as
 // intervals join on to t = 0. Facets are found through plan bins, a cell's width of the path at a time.
+//
+// That is the thickness. Height and volume of the air that stays filled come from columns (filled_columns.h).
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 
 #include "kernels/errors.h"
+#include "kernels/features/filled_columns.h"
 #include "kernels/features/finders.h"
 #include "kernels/features/plan_bins.h"
 #include "kernels/parallel/parallel.h"
@@ -110,6 +114,14 @@ public:
             if (reached + kJoin < to) return reached;
         }
         return std::min(reached, path.length);
+    }
+
+    // How much air is straight under a place of a roof, down to solid or to the bottom of its layer.
+    [[nodiscard]] double height_under(const Vec3d& roof, std::span<const double> borders) const {
+        const auto above = std::upper_bound(borders.begin(), borders.end(), roof[2]);
+        if (above == borders.begin() || above == borders.end()) return 0;
+        std::vector<Interval> intervals;
+        return covered({roof, {0, 0, -1}, roof[2] - *(above - 1)}, *above - kAtBoundary, intervals);
     }
 
     // True when q lies in the solid: facets above it, each counted by the winding of its projection around q.
@@ -218,11 +230,11 @@ struct FacetUnmade {
     Depth deepest;
 };
 
-// The facet, cut to each layer it reaches into, measured at its corners, edge middles and centroid. Corners
-// and middles are drawn in by a fiftieth: on an outline the path leaves the shadow at once, a little within
-// it does not.
+// The facet, cut to each layer it reaches into, measured at its corners, edge middles and centroid, and under
+// its tallest column. Corners and middles are drawn in by a fiftieth: on an outline the path leaves the shadow
+// at once, a little within it does not.
 FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f,
-                          std::span<const double> borders, bool horizontal) {
+                          std::span<const double> borders, bool horizontal, const FilledUnder& tallest) {
     FacetUnmade unmade;
     Vec3d n = area_normal(mesh, f);
     const double length = std::sqrt(dot(n, n));
@@ -273,6 +285,7 @@ FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f
             sample(point(in / 2, 1 - in, in / 2));
             sample(point(in / 2, in / 2, 1 - in));
         }
+        if (tallest.height_mm > 0 && borders[tallest.layer] == bottom) sample({tallest.x, tallest.y, tallest.z});
         if (deepest.mm <= kLeastDepth) continue;
         unmade.area += area;
         if (deepest.mm > unmade.deepest.mm) unmade.deepest = deepest;
@@ -308,11 +321,13 @@ std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh,
     std::vector<std::uint32_t> all(mesh.size());
     std::iota(all.begin(), all.end(), 0U);
     const Measure measure(context, mesh, all);
+    const std::vector<FilledUnder> columns = filled_under(context, mesh, borders, filled_cell(mesh));
     std::vector<FacetUnmade> unmade(down.size());
     parallel_for(context, down.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
             unmade[i] =
-                measure_facet(measure, mesh, down[i], borders, classes.of[down[i]] == FacetClass::down_flat);
+                measure_facet(measure, mesh, down[i], borders, classes.of[down[i]] == FacetClass::down_flat,
+                              columns[down[i]]);
     });
 
     // Facets that leave something, joined across their edges, each patch from its lowest facet.
@@ -328,6 +343,7 @@ std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh,
         patch.z_low = HUGE_VAL;
         patch.z_high = -HUGE_VAL;
         std::vector<std::uint32_t> slots;
+        Depth thickest;
         stack.assign(1, seed);
         slots.push_back(slot[seed]);
         slot[seed] = kNoFacet;
@@ -347,21 +363,32 @@ std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh,
             patch.facets.push_back(f);
             patch.area_mm2 += unmade[i].area;
             if (classes.of[f] == FacetClass::undercut) patch.type = FeatureType::undercut;
-            if (unmade[i].deepest.mm > patch.depth_mm) {
-                patch.depth_mm = unmade[i].deepest.mm;
-                patch.x = unmade[i].deepest.at[0];
-                patch.y = unmade[i].deepest.at[1];
-                patch.z = unmade[i].deepest.at[2];
+            patch.volume_mm3 += columns[f].volume_mm3;
+            if (columns[f].height_mm > patch.height_mm) {
+                patch.height_mm = columns[f].height_mm;
+                patch.x = columns[f].x;
+                patch.y = columns[f].y;
+                patch.z = columns[f].z;
             }
+            if (unmade[i].deepest.mm > thickest.mm) thickest = unmade[i].deepest;
             for (const std::uint32_t v : mesh.facets[f]) {
                 patch.z_low = std::min<double>(patch.z_low, mesh.vertices[v].z);
                 patch.z_high = std::max<double>(patch.z_high, mesh.vertices[v].z);
             }
         }
+        if (patch.height_mm == 0) {
+            // Too narrow for columns: what stands under the thickest place counts.
+            patch.x = thickest.at[0];
+            patch.y = thickest.at[1];
+            patch.z = thickest.at[2];
+            patch.height_mm = measure.height_under(thickest.at, borders);
+        }
+        patch.thickness_mm = std::min(thickest.mm, patch.height_mm);
         patches.push_back(std::move(patch));
     }
     std::sort(patches.begin(), patches.end(), [](const UnmadeUndercut& a, const UnmadeUndercut& b) {
-        return a.depth_mm != b.depth_mm ? a.depth_mm > b.depth_mm : a.facets.front() < b.facets.front();
+        return std::tie(b.thickness_mm, b.volume_mm3, a.facets.front()) <
+               std::tie(a.thickness_mm, a.volume_mm3, b.facets.front());
     });
     return patches;
 }

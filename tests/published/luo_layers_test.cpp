@@ -183,7 +183,7 @@ TEST_F(LuoLayers, WithPrintsLayersNothingStaysUnmade) {
     const auto unmade = measure_undercuts(context, mesh.view(), whole);
     ASSERT_EQ(unmade.size(), 1u);
     EXPECT_EQ(unmade[0].type, FeatureType::down_flat);
-    EXPECT_NEAR(unmade[0].depth_mm, .5 * kInch, 1e-3);  // down to the flat at .700
+    EXPECT_NEAR(unmade[0].height_mm, .5 * kInch, 1e-3);  // down to the flat at .700
     EXPECT_NEAR(unmade[0].area_mm2, .4 * 2.0 * kInch * kInch, 0.1);
 }
 
