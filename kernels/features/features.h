@@ -68,24 +68,26 @@ struct FeatureSet {
 struct UnmadeUndercut {
     FeatureType type{};  ///< down_flat when all its facets are horizontal (a flat that no boundary meets),
                          ///< else undercut
-    double z_low = 0, z_high = 0;       ///< mm, range of what stays unmade's facets
-    double area_mm2 = 0;                ///< of the facets, cut to the layers, under which something stays
-    double height_mm = 0;               ///< the tallest air that stays filled, straight down from the facets
-    double volume_mm3 = 0;              ///< of the air that stays filled under the facets
-    double x = 0, y = 0, z = 0;         ///< where it is tallest, z on the facets
-    /// The thickest that stays, along a facet's outward normal: what a tolerance limits. Never over the height.
+    double z_low = 0, z_high = 0;  ///< mm, range of what stays unmade's facets
+    double area_mm2 = 0;           ///< of the facets, cut to the layers, under which something stays
+    double height_mm = 0;          ///< the tallest air that stays filled, straight down from the facets
+    double volume_mm3 = 0;         ///< of the air that stays filled under the facets
+    double x = 0, y = 0, z = 0;    ///< where it is tallest, z on the facets
+    /// The thickest that stays, along a facet's outward normal: what a tolerance limits. Never over the
+    /// height.
     double thickness_mm = 0;
-    std::vector<std::uint32_t> facets;  ///< connected, ascending
+    std::vector<std::uint32_t> facets;  ///< ascending
 };
 
-/// Measures what given boundaries leave unmade, in connected patches, the thickest first (ties: the larger
-/// volume, then the lowest facet). Height and volume come from half a million upright lines over the part
-/// (filled_columns.h): a height may be short by what roof and floor rise over the distance of two lines.
-/// The thickness is found in closed form at corners, edge middles and centroid of every facet as the layers
-/// cut it: how far its outward normal runs before no down-facing facet of the layer lies straight above, or
-/// solid or the layer's bottom is met. A wall that leans out by rounding is as thick as it leans, however
-/// tall; where nothing is wide enough for columns, its height is that under its thickest place.
-/// Thicknesses under 1 µm are left out, and so are facets inside the solid (of another shell).
+/// Measures what given boundaries leave unmade, in patches (facets that are joined, and walls under their
+/// ceiling), the thickest first (ties: the larger volume, then the lowest facet). Height and volume come from
+/// half a million upright lines over the part (filled_columns.h): a height may be short by what roof and
+/// floor rise over the distance of two lines. The thickness is found in closed form at corners, edge middles
+/// and centroid of every facet as the layers cut it: how far its outward normal runs before no down-facing
+/// facet of the layer lies straight above, or solid or the layer's bottom is met. A wall that leans out by
+/// rounding is as thick as it leans, however tall; where nothing is wide enough for columns, its height is
+/// that under its thickest place. Thicknesses under 1 µm are left out, and so are facets inside the solid (of
+/// another shell).
 /// @param layer_tops mm, ascending, in the mesh's own z; the first layer begins at the mesh's lowest z
 /// @throws Error(usage, "features.layer_tops") when the tops do not ascend or are not finite
 [[nodiscard]] std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh,

@@ -34,7 +34,8 @@ public:
     void gaps(std::size_t row, std::vector<Crossing>& crossings, std::vector<FilledGap>& found) const {
         crossings.clear();
         const std::size_t band = row / kBandRows;
-        for (std::size_t e = starts_[band]; e < starts_[band + 1]; ++e) cross(entries_[e], grid_.y0 + static_cast<double>(row) * grid_.cell, crossings);
+        for (std::size_t e = starts_[band]; e < starts_[band + 1]; ++e)
+            cross(entries_[e], grid_.y0 + static_cast<double>(row) * grid_.cell, crossings);
         std::sort(crossings.begin(), crossings.end(), [](const Crossing& a, const Crossing& b) {
             return std::tie(a.column, b.z, a.facet) < std::tie(b.column, a.z, b.facet);
         });
@@ -84,8 +85,7 @@ private:
 
     [[nodiscard]] std::size_t band_of(double y) const {
         const double row = (y - grid_.y0) / grid_.cell + 1;  // one more, for rounding
-        return static_cast<std::size_t>(
-            std::clamp(row / kBandRows, 0.0, static_cast<double>(bands_ - 1)));
+        return static_cast<std::size_t>(std::clamp(row / kBandRows, 0.0, static_cast<double>(bands_ - 1)));
     }
 
     // Corners decide by y alone and both facets of an edge compute one crossing with the row, so no column is
@@ -169,7 +169,7 @@ std::vector<FilledUnder> filled_under(Context& context, MeshView mesh, std::span
     const std::vector<FilledGap> none;
     for (std::size_t row = 0; row < rows.size(); ++row) {
         const std::vector<FilledGap>&before = row > 0 ? rows[row - 1] : none,
-                               &after = row + 1 < rows.size() ? rows[row + 1] : none;
+              &after = row + 1 < rows.size() ? rows[row + 1] : none;
         for (const FilledGap& gap : rows[row]) {
             FilledUnder& under = found[gap.facet];
             const double height = gap.high - gap.low;

@@ -24,9 +24,9 @@ struct FilledGap {
     double low = 0, high = 0;
 };
 
-/// Lines are cut with all facets, the winding number telling solid from air. Air of a layer stays filled where
-/// the layer has solid above it. What is under a micrometre tall is left out: faces of two bodies this near
-/// are one joint.
+/// Lines are cut with all facets, the winding number telling solid from air. Air of a layer stays filled
+/// where the layer has solid above it. What is under a micrometre tall is left out: faces of two bodies this
+/// near are one joint.
 /// @param borders mm, ascending: the layers' bottoms and the last one's top, which may be infinite
 /// @return row after row; in each by column, from above
 /// @throws Error(no_plan, "memory.limit"), Error(cancelled)

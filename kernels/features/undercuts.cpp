@@ -56,7 +56,7 @@ struct Path {
 
 struct Depth {
     double mm = 0;
-    Vec3d at{};
+    Vec3d at{}, middle{};  // on the facet, and half as deep
 };
 
 class Measure {
@@ -122,6 +122,26 @@ public:
         if (above == borders.begin() || above == borders.end()) return 0;
         std::vector<Interval> intervals;
         return covered({roof, {0, 0, -1}, roof[2] - *(above - 1)}, *above - kAtBoundary, intervals);
+    }
+
+    // The facet straight above q that is nearest; kNoFacet when there is none.
+    [[nodiscard]] std::uint32_t facet_over(const Vec3d& q) const {
+        std::uint32_t nearest = kNoFacet;
+        double height = HUGE_VAL;
+        bins_.visit(q[0], q[1], q[0], q[1], [&](std::uint32_t f) {
+            if (spans_[f].high < q[2] || f == nearest) return;
+            std::vector<Interval> shadow;
+            const Vec3d n = area_normal(mesh_, f);
+            if (!(n[2] < 0)) return;
+            const Vec3d a = to_double(mesh_.vertices[mesh_.facets[f][0]]);
+            const double z = a[2] - (n[0] * (q[0] - a[0]) + n[1] * (q[1] - a[1])) / n[2];
+            if (z < q[2] || z > height || (z == height && f > nearest)) return;
+            cover(f, n, {q, {0, 0, -1}, kJoin}, HUGE_VAL, 0, shadow);
+            if (shadow.empty()) return;
+            nearest = f;
+            height = z;
+        });
+        return nearest;
     }
 
     // True when q lies in the solid: facets above it, each counted by the winding of its projection around q.
@@ -231,8 +251,8 @@ struct FacetUnmade {
 };
 
 // The facet, cut to each layer it reaches into, measured at its corners, edge middles and centroid, and under
-// its tallest column. Corners and middles are drawn in by a fiftieth: on an outline the path leaves the shadow
-// at once, a little within it does not.
+// its tallest column. Corners and middles are drawn in by a fiftieth: on an outline the path leaves the
+// shadow at once, a little within it does not.
 FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f,
                           std::span<const double> borders, bool horizontal, const FilledUnder& tallest) {
     FacetUnmade unmade;
@@ -264,7 +284,7 @@ FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f
             const double half = depth / 2;
             const Vec3d middle{s[0] + half * n[0], s[1] + half * n[1], s[2] + half * n[2]};
             if (measure.inside_solid(middle)) return;
-            deepest = {depth, s};
+            deepest = {depth, s, middle};
         };
         for (std::size_t i = 1; i + 1 < piece.size(); ++i) {
             const std::array<Vec3d, 3> corner{piece[0], piece[i], piece[i + 1]};
@@ -285,12 +305,108 @@ FacetUnmade measure_facet(const Measure& measure, MeshView mesh, std::uint32_t f
             sample(point(in / 2, 1 - in, in / 2));
             sample(point(in / 2, in / 2, 1 - in));
         }
-        if (tallest.height_mm > 0 && borders[tallest.layer] == bottom) sample({tallest.x, tallest.y, tallest.z});
+        if (tallest.height_mm > 0 && borders[tallest.layer] == bottom)
+            sample({tallest.x, tallest.y, tallest.z});
         if (deepest.mm <= kLeastDepth) continue;
         unmade.area += area;
         if (deepest.mm > unmade.deepest.mm) unmade.deepest = deepest;
     }
     return unmade;
+}
+
+struct UnmadePatches {
+    std::vector<UnmadeUndercut> patches;
+    std::vector<Depth> thickest;    ///< of each patch
+    std::vector<std::uint32_t> of;  ///< the patch of each facet, or kNoFacet
+};
+
+// Facets that leave something, joined across their edges, each patch from its lowest facet.
+// @param down facets that face down; unmade belongs to them, columns to all facets
+UnmadePatches joined(MeshView mesh, const FacetClasses& classes, std::span<const std::uint32_t> down,
+                     std::span<const FacetUnmade> unmade, std::span<const FilledUnder> columns) {
+    UnmadePatches found;
+    found.of.assign(mesh.size(), kNoFacet);
+    std::vector<std::uint32_t> slot(mesh.size(), kNoFacet), stack;
+    for (std::uint32_t i = 0; i < down.size(); ++i)
+        if (unmade[i].deepest.mm > 0) slot[down[i]] = i;
+    for (const std::uint32_t seed : down) {
+        if (slot[seed] == kNoFacet) continue;
+        UnmadeUndercut& patch = found.patches.emplace_back();
+        Depth& thickest = found.thickest.emplace_back();
+        patch.type = FeatureType::down_flat;
+        patch.z_low = HUGE_VAL;
+        patch.z_high = -HUGE_VAL;
+        std::vector<std::uint32_t> slots{slot[seed]};
+        stack.assign(1, seed);
+        slot[seed] = kNoFacet;
+        while (!stack.empty()) {
+            const std::uint32_t f = stack.back();
+            stack.pop_back();
+            for (const std::uint32_t g : mesh.neighbours[f]) {
+                if (g == kNoFacet || slot[g] == kNoFacet) continue;
+                slots.push_back(slot[g]);
+                slot[g] = kNoFacet;
+                stack.push_back(g);
+            }
+        }
+        std::sort(slots.begin(), slots.end());
+        for (const std::uint32_t i : slots) {
+            const std::uint32_t f = down[i];
+            found.of[f] = static_cast<std::uint32_t>(found.patches.size() - 1);
+            patch.facets.push_back(f);
+            patch.area_mm2 += unmade[i].area;
+            if (classes.of[f] == FacetClass::undercut) patch.type = FeatureType::undercut;
+            patch.volume_mm3 += columns[f].volume_mm3;
+            if (columns[f].height_mm > patch.height_mm) {
+                patch.height_mm = columns[f].height_mm;
+                patch.x = columns[f].x;
+                patch.y = columns[f].y;
+                patch.z = columns[f].z;
+            }
+            if (unmade[i].deepest.mm > thickest.mm) thickest = unmade[i].deepest;
+            for (const std::uint32_t v : mesh.facets[f]) {
+                patch.z_low = std::min<double>(patch.z_low, mesh.vertices[v].z);
+                patch.z_high = std::max<double>(patch.z_high, mesh.vertices[v].z);
+            }
+        }
+    }
+    return found;
+}
+
+// Walls that lean in under a ceiling have no column of their own: the air is the ceiling's, told once.
+std::vector<UnmadeUndercut> told_once(const Measure& measure, std::span<const double> borders,
+                                      UnmadePatches found) {
+    auto& [patches, thickest, of] = found;
+    std::vector<char> told(patches.size(), 1);
+    for (std::size_t k = 0; k < patches.size(); ++k) {
+        UnmadeUndercut& patch = patches[k];
+        if (patch.height_mm > 0) continue;
+        const std::uint32_t roof = measure.facet_over(thickest[k].middle);
+        const std::uint32_t owner = roof == kNoFacet ? kNoFacet : of[roof];
+        if (owner != kNoFacet && owner != k && patches[owner].height_mm > 0) {
+            UnmadeUndercut& ceiling = patches[owner];
+            ceiling.area_mm2 += patch.area_mm2;
+            ceiling.z_low = std::min(ceiling.z_low, patch.z_low);
+            ceiling.z_high = std::max(ceiling.z_high, patch.z_high);
+            ceiling.facets.insert(ceiling.facets.end(), patch.facets.begin(), patch.facets.end());
+            if (thickest[k].mm > thickest[owner].mm) thickest[owner] = thickest[k];
+            told[k] = 0;
+            continue;
+        }
+        // Too narrow for columns: what stands under the thickest place counts.
+        patch.x = thickest[k].at[0];
+        patch.y = thickest[k].at[1];
+        patch.z = thickest[k].at[2];
+        patch.height_mm = measure.height_under(thickest[k].at, borders);
+    }
+    std::vector<UnmadeUndercut> list;
+    for (std::size_t k = 0; k < patches.size(); ++k) {
+        if (!told[k]) continue;
+        patches[k].thickness_mm = std::min(thickest[k].mm, patches[k].height_mm);
+        std::sort(patches[k].facets.begin(), patches[k].facets.end());
+        list.push_back(std::move(patches[k]));
+    }
+    return list;
 }
 
 }  // namespace
@@ -325,67 +441,12 @@ std::vector<UnmadeUndercut> measure_undercuts(Context& context, MeshView mesh,
     std::vector<FacetUnmade> unmade(down.size());
     parallel_for(context, down.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
-            unmade[i] =
-                measure_facet(measure, mesh, down[i], borders, classes.of[down[i]] == FacetClass::down_flat,
-                              columns[down[i]]);
+            unmade[i] = measure_facet(measure, mesh, down[i], borders,
+                                      classes.of[down[i]] == FacetClass::down_flat, columns[down[i]]);
     });
 
-    // Facets that leave something, joined across their edges, each patch from its lowest facet.
-    std::vector<std::uint32_t> slot(mesh.size(), kNoFacet);
-    for (std::uint32_t i = 0; i < down.size(); ++i)
-        if (unmade[i].deepest.mm > 0) slot[down[i]] = i;
-    std::vector<UnmadeUndercut> patches;
-    std::vector<std::uint32_t> stack;
-    for (const std::uint32_t seed : down) {
-        if (slot[seed] == kNoFacet) continue;
-        UnmadeUndercut patch;
-        patch.type = FeatureType::down_flat;
-        patch.z_low = HUGE_VAL;
-        patch.z_high = -HUGE_VAL;
-        std::vector<std::uint32_t> slots;
-        Depth thickest;
-        stack.assign(1, seed);
-        slots.push_back(slot[seed]);
-        slot[seed] = kNoFacet;
-        while (!stack.empty()) {
-            const std::uint32_t f = stack.back();
-            stack.pop_back();
-            for (const std::uint32_t g : mesh.neighbours[f]) {
-                if (g == kNoFacet || slot[g] == kNoFacet) continue;
-                slots.push_back(slot[g]);
-                slot[g] = kNoFacet;
-                stack.push_back(g);
-            }
-        }
-        std::sort(slots.begin(), slots.end());
-        for (const std::uint32_t i : slots) {
-            const std::uint32_t f = down[i];
-            patch.facets.push_back(f);
-            patch.area_mm2 += unmade[i].area;
-            if (classes.of[f] == FacetClass::undercut) patch.type = FeatureType::undercut;
-            patch.volume_mm3 += columns[f].volume_mm3;
-            if (columns[f].height_mm > patch.height_mm) {
-                patch.height_mm = columns[f].height_mm;
-                patch.x = columns[f].x;
-                patch.y = columns[f].y;
-                patch.z = columns[f].z;
-            }
-            if (unmade[i].deepest.mm > thickest.mm) thickest = unmade[i].deepest;
-            for (const std::uint32_t v : mesh.facets[f]) {
-                patch.z_low = std::min<double>(patch.z_low, mesh.vertices[v].z);
-                patch.z_high = std::max<double>(patch.z_high, mesh.vertices[v].z);
-            }
-        }
-        if (patch.height_mm == 0) {
-            // Too narrow for columns: what stands under the thickest place counts.
-            patch.x = thickest.at[0];
-            patch.y = thickest.at[1];
-            patch.z = thickest.at[2];
-            patch.height_mm = measure.height_under(thickest.at, borders);
-        }
-        patch.thickness_mm = std::min(thickest.mm, patch.height_mm);
-        patches.push_back(std::move(patch));
-    }
+    UnmadePatches found = joined(mesh, classes, down, unmade, columns);
+    std::vector<UnmadeUndercut> patches = told_once(measure, borders, std::move(found));
     std::sort(patches.begin(), patches.end(), [](const UnmadeUndercut& a, const UnmadeUndercut& b) {
         return std::tie(b.thickness_mm, b.volume_mm3, a.facets.front()) <
                std::tie(a.thickness_mm, a.volume_mm3, b.facets.front());
