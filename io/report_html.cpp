@@ -24,6 +24,7 @@
 #include "io/text/base64.h"
 #include "io/text/job_keys.h"
 #include "io/write/output_file.h"
+#include "io/write/report_as_built.h"
 #include "io/write/thinned_path.h"
 #include "kernels/access/deviation.h"
 #include "kernels/errors.h"
@@ -298,7 +299,9 @@ struct DrawnPaths {
 struct Figures {
     Json data;
     DrawnPaths drawn;
-    Json replay;  ///< the stock's cells, left-over maps
+    Json replay;                 ///< the stock's cells, left-over maps
+    Json wood;                   ///< what stands of each layer in the end
+    Json feeds = Json::array();  ///< of each program
 };
 
 double stock_cell(const SimulationInput& input) {
@@ -334,6 +337,24 @@ Program read_program(const fs::path& out, const PlanFolder& folder, const Named&
     }
 }
 
+/// Between which feeds a program cuts, mm/min, in the plane and straight down; null where it never does.
+Json feeds_json(const Program& program) {
+    double low = HUGE_VAL, high = 0, plunge = 0;
+    for (std::size_t k = 1; k < program.steps.size(); ++k) {
+        const ProgramStep &from = program.steps[k - 1], &to = program.steps[k];
+        if (to.rapid() || !from.known() || !to.known()) continue;
+        if (from.x != to.x || from.y != to.y) {
+            low = std::min(low, to.feed);
+            high = std::max(high, to.feed);
+        } else if (to.z < from.z) {
+            plunge = std::max(plunge, to.feed);
+        }
+    }
+    return {{"low", high > 0 ? Json(rounded(low, 0)) : Json()},
+            {"high", high > 0 ? Json(rounded(high, 0)) : Json()},
+            {"plunge", plunge > 0 ? Json(rounded(plunge, 0)) : Json()}};
+}
+
 /// What stands over in the end takes up to a fifth of the time of the replay: so many programs' steps.
 std::size_t left_over_steps(const PlanFolder& folder) { return 1 + folder.programs.size() / 8; }
 
@@ -366,6 +387,7 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
             figures.drawn.paths[begin + i] = path_of(of_layer[i], input.machine.rapid_feed, kPathTolerance);
         });
         for (std::size_t i = 0; i < of_layer.size(); ++i) {
+            figures.feeds.push_back(feeds_json(of_layer[i]));
             figures.drawn.error = std::max(figures.drawn.error, kPathTolerance + of_layer[i].chord_error);
             const ReplayedProgram found = replay.run(of_layer[i]);
             Json depth = Json::array(), width = Json::array(), force = Json::array(),
@@ -385,6 +407,7 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
         begin = end;
     }
     figures.data["engagement"] = std::move(engagement);
+    figures.data["feeds"] = std::move(figures.feeds);
     figures.data["stock"] = {{"cell_mm", options.cell},
                              {"nx", replay.nx()},
                              {"ny", replay.ny()},
@@ -392,12 +415,16 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
                              {"y0", replay.first()[1]}};
     if (part == nullptr) return;
     figures.replay = Json::array();
-    replay.left_over(*part, [&](std::size_t, const std::vector<float>& left_over) {
+    figures.wood = Json::array();
+    replay.finished(*part, [&](std::size_t layer, const ReplayedLayer& found) {
         std::string codes;
-        for (const float left : left_over)
+        for (const float left : found.left)
             codes += static_cast<char>(left_over_code(left, folder.tolerances.gouge));
         figures.replay.push_back(base64(codes));
+        figures.wood.push_back(wood_json(input.layers[layer], found.surface));
     });
+    figures.data["filled"] = filled_json(context, input.mesh, input.layers, replay.first(), options.cell,
+                                         replay.nx(), replay.ny());
     context.advance(left_over_steps(folder));
 }
 
@@ -753,6 +780,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
         return text;
     }
     figures.data["left_over"] = {{"layers", figures.replay}};
+    figures.data["wood"] = {{"layers", figures.wood}};
     context.begin_phase("report's model and paths", replayed, 1.0, 3);
     Json model, paths;
     parallel_each(context, 2, [&](std::size_t i) {

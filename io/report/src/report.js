@@ -45,6 +45,14 @@ export function layerMinutes() {
     return rows;
 }
 
+// Minutes in words that add up to the total in words: rounded down, and what is missing given to the largest parts.
+export function sharedMinutes(list, total) {
+    const whole = list.map(m => m < 1 ? m : Math.floor(m)), missing = Math.round(total) - Math.round(whole.reduce((a, b) => a + b, 0));
+    const order = list.map((m, i) => [m - whole[i], i]).filter(([, i]) => list[i] >= 1).sort(([a, i], [b, j]) => b - a || i - j);
+    for (let k = 0; k < missing && k < order.length; ++k) ++whole[order[k][1]];
+    return whole.map(m => duration(m));
+}
+
 export function toolOf(number) {
     return plan.tools.find(tool => tool.number === number);
 }
@@ -70,7 +78,7 @@ function notMade() {
     const totals = verify?.totals ?? {};
     const missing = [];
     if (totals.unmade_mm3 >= 1)
-        missing.push(`${totals.unmade_mm3 < 1000 ? `${totals.unmade_mm3.toFixed(0)} mm³` : `${(totals.unmade_mm3 / 1000).toFixed(0)} cm³`} that stay filled under overhangs (up to ${totals.unmade_height_mm.toFixed(2)} mm high)`);
+        missing.push(`${totals.unmade_mm3 < 1000 ? `${totals.unmade_mm3.toFixed(0)} mm³` : `${(totals.unmade_mm3 / 1000).toFixed(0)} cm³`} that stay filled under overhangs (up to ${totals.unmade_height_mm.toFixed(1)} mm high, red in the pictures)`);
     if (totals.unreachable_mm2 > 0.01 * totals.pattern_mm2)
         missing.push(`${totals.unreachable_mm2.toFixed(0)} mm² that no tool reaches (${(100 * totals.unreachable_of_pattern_share).toFixed(1)} % of the pattern seen from above, up to ${totals.unreachable_max_mm.toFixed(2)} mm)`);
     return missing;

@@ -1,90 +1,167 @@
-// One printed page for each layer: what the operator needs at the machine.
+// What hangs at the machine: a cover with what to load and how long it takes, and one printed page for each layer.
 
-import {duration, figure, make, words} from './dom.js';
-import {data, flaskRings, layerMinutes, operations, phases, plan, toolOf, verify} from './report.js';
+import {duration, figure, make, plural, words} from './dom.js';
+import {planView, sideView, stackView} from './drawing.js';
+import {data, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
+import {filledVolume} from './wood.js';
+import {tableHeight, zeroOf} from './zero.js';
 
-function pathOf(loops) {
-    const unit = data.outlines.unit_mm;
-    return loops.map(points => {
-        let d = '';
-        for (let i = 0; i < points.length; i += 2) d += `${i ? 'L' : 'M'}${(points[i] * unit).toFixed(2)} ${(points[i + 1] * unit).toFixed(2)}`;
-        return d + 'Z';
-    }).join('');
+const cubic = mm3 => mm3 < 1000 ? `${figure(mm3, 0)} mm³` : `${figure(mm3 / 1000, 1)} cm³`;
+
+// A box that can be ticked on paper and on a screen, where the browser keeps it for this plan.
+function tick(key, text, hidden = false) {
+    const name = `slabwright:${plan.input.sha256.slice(0, 12)}:${figure(plan.totals.build_minutes, 3)}:${key}`;
+    const box = make('input', {type: 'checkbox', 'aria-label': hidden ? text : null});
+    // A page that lies in a folder may have no memory.
+    try { box.checked = globalThis.localStorage?.getItem(name) === '1'; } catch { /* then it forgets */ }
+    box.addEventListener('change', () => {
+        try { box.checked ? globalThis.localStorage?.setItem(name, '1') : globalThis.localStorage?.removeItem(name); } catch { /* then it forgets */ }
+    });
+    return hidden ? box : make('label', {class: 'check'}, box, make('span', {}, text));
 }
 
-// The slab from above: its outline, the pattern's section at the layer's bottom and top, where glue goes, the zero point.
-function picture(l) {
-    const [x0, y0] = plan.stock.min, [x1, y1] = plan.stock.max, width = x1 - x0, depth = y1 - y0, edge = Math.max(width, depth) / 30;
-    const {bottom, top, glue} = data.outlines.layers[l], layer = plan.layers[l];
-    const thin = Math.max(width, depth) / 500;
-    const loops = glue, bare = loops.length === 0;
-    const flask = flaskRings(l);
-    return make('svg', {viewBox: `${x0 - edge} ${-y1 - edge} ${width + 2 * edge} ${depth + 2 * edge}`, role: 'img',
-        'aria-label': `Slab of layer ${layer.index} from above, ${figure(width, 1)} by ${figure(depth, 1)} mm; glue on ${figure(layer.glue_area_mm2 / 100, 1)} square centimetres`},
-    make('g', {transform: 'scale(1 -1)'},
-        make('rect', {x: x0, y: y0, width, height: depth, fill: '#f1e6d3', stroke: '#8a6a3a', 'stroke-width': 2 * thin}),
-        flask.map(ring => make('path', {d: `M${ring.map(p => p.join(' ')).join('L')}Z`, fill: 'none', stroke: '#8a6a3a', 'stroke-width': thin})),
-        bare ? null : make('path', {d: pathOf(loops), fill: '#e8b23c', 'fill-rule': 'evenodd', stroke: '#a06f00', 'stroke-width': thin}),
-        make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: 'none', 'fill-rule': 'evenodd', stroke: '#1f252b', 'stroke-width': 1.6 * thin}),
-        make('path', {d: pathOf(top.map(loop => loop.points)), fill: 'none', 'fill-rule': 'evenodd', stroke: '#17636b', 'stroke-width': 1.2 * thin, 'stroke-dasharray': `${6 * thin} ${4 * thin}`}),
-        make('path', {d: `M${-edge} 0H${edge}M0 ${-edge}V${edge}`, stroke: '#a3202c', 'stroke-width': 2 * thin, fill: 'none'}),
-        make('circle', {cx: 0, cy: 0, r: edge / 2, fill: 'none', stroke: '#a3202c', 'stroke-width': 2 * thin})));
+// The layer that a remark is about, or −1 where it is about the whole build.
+function layerOf(remark) {
+    const said = /\bL0*(\d+)_/.exec(remark.message) ?? /\blayer (\d+)\b/.exec(remark.message);
+    if (said) return plan.layers.findIndex(layer => layer.index === Number(said[1]));
+    if (!remark.where) return -1;
+    return plan.layers.findIndex(layer => remark.where[2] <= layer.z_top + 1e-6);
 }
 
-// Where the build table stands, and by how much the control's zero has moved with it or without it.
-function tableHeight(l) {
-    const {table, base_board_thickness: board} = plan.job.machine, moves = table === 'moving', layer = plan.layers[l];
-    const risen = layer.z_top - plan.layers[0].z_top, offset = plan.frame === 'layer-top' ? (moves ? 0 : risen) : (moves ? -risen : 0);
-    const standing = moves ? `sunk to ${figure(board + layer.z_top, 2)} mm below this layer’s top` : 'fixed';
-    return offset === 0 ? standing : `${standing}; the work offset’s Z is ${figure(Math.abs(offset), 2)} mm ${offset > 0 ? 'above' : 'below'} that of layer 1`;
+// Warnings and errors of layer l (−1: of the whole build), those of one kind together.
+function warningsOf(l) {
+    const groups = new Map();
+    for (const remark of remarks) {
+        if (remark.severity === 'note' || layerOf(remark) !== l) continue;
+        if (!groups.has(remark.code)) groups.set(remark.code, []);
+        groups.get(remark.code).push(remark.message);
+    }
+    return [...groups.values()].map(([first, ...others]) => others.length ? `${first} (and ${others.length} more like it)` : first);
+}
+
+function warningBox(list, most) {
+    if (list.length === 0) return null;
+    const shown = list.slice(0, most);
+    if (list.length > most) shown.push(`and ${plural(list.length - most, 'more kind', 'more kinds')}, in the table of remarks`);
+    return make('div', {class: 'warnings'}, make('strong', {}, shown.length === 1 ? 'Warning' : 'Warnings'), make('ul', {}, shown.map(text => make('li', {}, text))));
+}
+
+const span = (values, unit) => {
+    const known = values.filter(v => v !== null && v !== undefined);
+    if (known.length === 0) return '–';
+    const low = Math.min(...known), high = Math.max(...known);
+    return `${low === high ? figure(high, 0) : `${figure(low, 0)}–${figure(high, 0)}`}${unit}`;
+};
+const feedsOf = list => span(list.flatMap(o => [data.feeds?.[o.index]?.low, data.feeds?.[o.index]?.high]), '');
+
+function table(head, rows, numeric = []) {
+    const tone = i => numeric.includes(i) ? 'n' : null;
+    return make('table', {}, make('thead', {}, make('tr', {}, head.map((h, i) => make('th', {scope: 'col', class: tone(i)}, h)))),
+        make('tbody', {}, rows.map(row => make('tr', {}, row.map((cell, i) => make('td', {class: tone(i), 'data-label': tone(i) && cell !== '' ? head[i] : null}, cell))))));
+}
+
+function toolRows(uses, key) {
+    const numbers = [...new Set(uses.map(o => o.tool))].sort((a, b) => a - b);
+    return numbers.map(number => ({number, tool: toolOf(number), list: uses.filter(o => o.tool === number)})).filter(r => r.tool).map(({number, tool, list}) => [
+        tick(`${key}:T${number}`, `T${number} loaded and measured`, true), make('strong', {}, `T${number}`), tool.name, figure(tool.diameter, 3), make('strong', {}, figure(tool.holder.stickout, 1)),
+        figure(tool.flute_length, 1), span(list.map(o => o.spindle_rpm), ''), feedsOf(list)]);
+}
+const toolHead = ['', 'Place', 'Tool', 'Ø mm', 'Stick-out mm', 'Flutes mm', 'rpm', 'Feed mm/min'];
+
+function fact(name, ...content) {
+    return make('div', {class: 'fact'}, make('h4', {}, name), content);
+}
+
+function foundIn(l) {
+    return verify?.layers?.find(f => f.index === plan.layers[l].index) ?? verify?.layers?.[l];
+}
+
+// What the simulation says of the layer, each figure with what it is of.
+function simulated(l) {
+    const found = foundIn(l);
+    if (!found) return ['not simulated: run “slabwright verify” before cutting'];
+    const lines = [`deepest gouge ${figure(found.gouge.mm, 4)} mm; left over where a tool reaches at most ${figure(found.missed?.mm > 0 ? found.missed.mm : verify.limits.left_over_mm, 3)} mm`];
+    if (found.unreachable_mm2 >= 0.5) lines.push(`out of every tool’s reach ${figure(found.unreachable_mm2, 1)} mm², up to ${figure(found.unreachable?.mm, 2)} mm`);
+    return lines;
 }
 
 function sheet(l, minutes) {
-    const layer = plan.layers[l], above = plan.frame === 'layer-top', programs = operations.filter(operation => operation.layer === l);
-    const tools = [...new Set(layer.operations.map(operation => operation.tool))].sort((a, b) => a - b).map(number => toolOf(number)).filter(Boolean);
-    const times = phases.filter(phase => minutes[phase.key] > 0);
-    const total = times.reduce((sum, phase) => sum + minutes[phase.key], 0);
-    const term = (name, value) => [make('dt', {}, name), make('dd', {}, value)];
-    const found = verify?.layers?.find(f => f.index === layer.index) ?? verify?.layers?.[l];
-    const many = programs.length > 14;
-    const listed = many ? programs.slice(0, 13) : programs;
+    const layer = plan.layers[l], programs = operations.filter(operation => operation.layer === l), zero = zeroOf(l), filled = filledVolume(l);
+    const off = layer.z_bottom + layer.slab_thickness - layer.z_top, first = programs[0]?.name, final = programs[programs.length - 1]?.name;
+    const warnings = [...zero.warnings, ...(filled >= 1 ? [`${cubic(filled)} under overhangs stay filled in this layer (red in the drawing).`] : []), ...warningsOf(l)];
+    const glued = layer.glue_area_mm2 > 0;
     return make('article', {class: 'sheet', 'aria-label': `Setup sheet of layer ${layer.index}`},
-        make('div', {class: 'top'}, make('h3', {}, `Layer ${layer.index} of ${plan.layers.length}`), make('span', {}, plan.input.file), make('span', {}, duration(total))),
-        make('div', {class: 'cols'},
-            make('div', {},
-                make('dl', {},
-                    term('Slab', `${figure(plan.stock.max[0] - plan.stock.min[0], 1)} × ${figure(plan.stock.max[1] - plan.stock.min[1], 1)} × ${figure(layer.slab_thickness, 3)} mm ${plan.job.material.name}`),
-                    term('Lies from', `z ${figure(layer.z_bottom, 3)} mm`),
-                    term('Face to', `z ${figure(layer.z_top, 3)} mm (${figure(layer.z_bottom + layer.slab_thickness - layer.z_top, 3)} mm off)`),
-                    term('Boundary', layer.reason),
-                    term('Zero point', `x 0, y 0 as in the STL; z 0 at ${above ? 'this layer’s top' : 'the pattern’s bottom (top of the base board)'}`),
-                    term('Table', tableHeight(l)),
-                    term('Slab corner', `x ${figure(plan.stock.min[0], 2)}, y ${figure(plan.stock.min[1], 2)} mm`),
-                    term('Glue', `${plan.job.bonding.glue}, ${figure(layer.glue_area_mm2 / 100, 1)} cm²`),
-                    term('Press', `${figure(layer.press_force_n, 0)} N for ${figure(plan.job.bonding.press_time_s, 0)} s`)),
-                make('h4', {}, 'Time'),
-                make('dl', {}, times.map(phase => term(phase.name, duration(minutes[phase.key]))))),
-            make('div', {}, picture(l), make('p', {class: 'note'}, 'From above. Yellow: glue. Black: section at the bottom; dashed: at the top. Red: zero point.'))),
-        make('h4', {}, 'Tools'),
-        make('table', {}, make('thead', {}, make('tr', {}, ['Place', 'Tool', 'Diameter', 'Flutes', 'Stick-out'].map(h => make('th', {scope: 'col'}, h)))),
-            make('tbody', {}, tools.map(tool => make('tr', {}, [`T${tool.number}`, tool.name, `${figure(tool.diameter, 3)} mm`, `${figure(tool.flute_length, 1)} mm`, `${figure(tool.holder.stickout, 1)} mm`].map(c => make('td', {}, c)))))),
-        make('h4', {}, 'Programs'),
-        make('table', {}, make('thead', {}, make('tr', {}, ['Done', 'Program', 'Work', 'Tool', 'Time'].map(h => make('th', {scope: 'col'}, h)))),
-            make('tbody', {}, listed.map(operation => make('tr', {}, ['☐', operation.name, `${words(operation.kind)}: ${operation.purpose}`, `T${operation.tool}`, duration(operation.minutes)].map(c => make('td', {}, c)))),
-                many ? make('tr', {}, make('td', {colspan: 5}, `and ${programs.length - 13} more, in the order of their names`)) : null)),
+        make('div', {class: 'top'},
+            make('h3', {}, `Layer ${layer.index}`, make('small', {}, ` of ${plan.layers.length}`)),
+            make('p', {}, make('strong', {}, plan.input.file), make('br'), programs.length ? make('code', {}, first === final ? first : `${first} … ${final}`) : 'no programs'),
+            make('p', {class: 'clock'}, make('strong', {}, duration(minutes)))),
+        warningBox(warnings, 5),
+        make('div', {class: 'drawings'}, planView(l, [132, 92]), sideView(l, [58, 92])),
+        make('p', {class: 'key'}, make('i', {class: 'glue'}), ' glue ', make('i', {class: 'solid'}), ' pattern at the bottom ', make('i', {class: 'dash'}), ' at the top ',
+            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
+        make('div', {class: 'facts'},
+            fact('Zero', make('p', {}, zero.place), make('p', {}, make('strong', {}, 'XY: '), zero.xy, zero.after ? `; ${zero.after}` : null), make('p', {}, make('strong', {}, 'Z: '), zero.z), make('p', {}, make('strong', {}, 'Table: '), tableHeight(l))),
+            fact('Slab', make('p', {}, make('strong', {}, `${figure(plan.stock.max[0] - plan.stock.min[0], 1)} × ${figure(plan.stock.max[1] - plan.stock.min[1], 1)} × ${figure(layer.slab_thickness, 2)} mm`), ` ${plan.job.material.name}`),
+                make('p', {}, `pattern z ${figure(layer.z_bottom, 3)} to ${figure(layer.z_top, 3)}; facing takes ${figure(off, 2)} mm`), make('p', {class: 'soft'}, layer.reason)),
+            fact(glued ? 'Glue and press' : 'No glue', glued
+                ? [make('p', {}, make('strong', {}, `${figure(layer.glue_area_mm2 / 100, 1)} cm²`), ` ${plan.job.bonding.glue}, on the yellow`),
+                    make('p', {}, make('strong', {}, `${figure(layer.press_force_n, 0)} N`), ` for ${figure(plan.job.bonding.press_time_s, 0)} s`)]
+                : make('p', {}, 'clamp the slab'))),
+        make('div', {class: 'lists'},
+            make('div', {}, make('h4', {}, 'Tools'), table(toolHead, toolRows(programs, `L${l}`), [3, 4, 5, 6, 7])),
+            make('div', {}, make('h4', {}, 'Programs, in this order'), table(['', 'Program', 'Work', 'Tool', 'rpm', 'Feed mm/min', 'Time'], programs.map(o => [
+                tick(`L${l}:${o.name}`, `${o.name} done`, true), make('code', {}, o.name), `${words(o.kind)}: ${o.purpose}`, make('strong', {}, `T${o.tool}`), figure(o.spindle_rpm, 0), feedsOf([o]), duration(o.minutes)]), [4, 5, 6]))),
         make('h4', {}, 'Checks'),
-        make('ul', {}, [
-            l === 0 ? `base board ${figure(plan.job.machine.base_board_thickness, 1)} mm mounted and level` : `layer ${plan.layers[l - 1].index} clean of dust where the glue goes`,
-            `slab at least ${figure(layer.slab_thickness, 2)} mm thick all over`,
-            'tools measured, magazine as listed', 'touch-off at the zero point agrees',
-            `face height z ${figure(layer.z_top, 2)} mm measured after facing`,
-            found ? `simulated: deepest gouge ${figure(found.gouge?.mm, 4)} mm, left over at most ${figure(found.left_over?.mm, 3)} mm` : 'programs simulated with “slabwright verify” before cutting',
-        ].map(check => make('li', {}, check))));
+        make('div', {class: 'checks'}, [
+            l === 0 ? `base board ${figure(plan.job.machine.base_board_thickness, 1)} mm mounted and level` : `layer ${plan.layers[l - 1].index} faced, free of dust where the glue goes`,
+            `slab at least ${figure(layer.slab_thickness, 2)} mm thick all over, no warp`,
+            ...(glued ? [`glue on, pressed ${figure(plan.job.bonding.press_time_s, 0)} s`] : []),
+            'XY and Z touched off as above', 'dust extraction on',
+            `after facing: top measured at z ${figure(plan.frame === 'layer-top' ? 0 : layer.z_top, 2)}`,
+        ].map((text, i) => tick(`L${l}:check${i}`, text))),
+        make('p', {class: 'proof'}, make('strong', {}, 'Simulated: '), simulated(l).join('; ')));
+}
+
+function cover(minutes) {
+    const stack = stackView([112, 84]);
+    const t = totals(), answer = verdict(), whole = warningsOf(-1), shown = sharedMinutes(minutes, plan.totals.build_minutes);
+    const wide = `${figure(plan.stock.max[0] - plan.stock.min[0], 1)} × ${figure(plan.stock.max[1] - plan.stock.min[1], 1)} mm`;
+    const used = toolUse().filter(({uses}) => uses.length > 0);
+    const perLayer = plan.layers.map((_, l) => warningsOf(l).length + zeroOf(l).warnings.length);
+    return make('article', {class: 'sheet cover', 'aria-label': 'Cover sheet of the build'},
+        make('div', {class: 'top'}, make('h3', {}, plan.input.file), make('p', {class: 'clock'}, make('strong', {}, duration(plan.totals.build_minutes)), make('br'), plural(plan.layers.length, 'layer'), ', ', plural(operations.length, 'program'))),
+        make('p', {class: `answer ${answer.kind}`}, make('strong', {}, `${answer.title}. `), answer.text),
+        warningBox(whole, 5),
+        make('div', {class: 'cols'},
+            make('div', {}, stack.svg, make('p', {class: 'key'}, make('i', {class: 'wood'}), ' pattern ', make('i', {class: 'glue'}), ' glue ', make('i', {class: 'air'}), ' stays filled',
+                stack.taller > 1.01 ? `; heights drawn ${figure(stack.taller, 1)} times` : null)),
+            fact('Lay out', make('div', {class: 'checks one'}, [
+                `base board ${wide} × ${figure(plan.job.machine.base_board_thickness, 1)} mm`,
+                ...t.slabs.map(s => `${plural(s.count, 'slab')} ${plan.job.material.name}, ${wide} × ${figure(s.thickness, 2)} mm`),
+                `${plan.job.bonding.glue} for ${figure(t.glue_mm2 / 100, 0)} cm²`,
+                `${plural(used.length, 'tool')} as below, programs of nc/ on the control`,
+                `press up to ${figure(Math.max(...plan.layers.map(layer => layer.press_force_n)), 0)} N, ${figure(plan.job.bonding.press_time_s, 0)} s a joint`,
+                `machine carries ${figure(t.stack_mass_kg, 0)} kg`,
+            ].map((text, i) => tick(`cover:${i}`, text))))),
+        make('h4', {}, 'Tools'),
+        table(toolHead, toolRows(operations, 'cover'), [3, 4, 5, 6, 7]),
+        make('h4', {}, 'Layers, from below'),
+        table(['', 'Layer', 'Slab mm', 'From z', 'Face to z', 'Glue cm²', 'Press N', 'Programs', 'Warnings', 'Time'], [
+            ...plan.layers.map((layer, l) => [tick(`cover:L${l}`, `layer ${layer.index} done`, true), make('strong', {}, String(layer.index)), figure(layer.slab_thickness, 2), figure(layer.z_bottom, 2), figure(layer.z_top, 2),
+                figure(layer.glue_area_mm2 / 100, 1), figure(layer.press_force_n, 0), String(layer.operations.length), perLayer[l] ? String(perLayer[l]) : '–', shown[l]]),
+            ['', make('strong', {}, 'All'), '', '', '', figure(t.glue_mm2 / 100, 1), '', String(operations.length), '', make('strong', {}, duration(plan.totals.build_minutes))]], [2, 3, 4, 5, 6, 7, 8, 9]),
+        make('h4', {}, 'Every layer goes'),
+        make('ol', {class: 'steps'}, ['Clean the joint, spread the glue, lay the slab, press.', 'Set the table, touch off as the layer’s sheet says.', 'Run its programs in the order of their names; the first faces the slab.', 'Measure the faced top, tick the sheet, go on to the next.'].map(s => make('li', {}, s))));
 }
 
 export function buildSheets(section) {
-    const minutes = layerMinutes();
-    section.append(make('p', {class: 'note'}, 'Printing this page gives these sheets, one A4 page for each layer. ',
+    const minutes = layerMinutes().map(row => phases.reduce((sum, phase) => sum + row[phase.key], 0));
+    section.append(make('p', {class: 'note'}, 'Printing this page gives these sheets: a cover, and a page for each layer. Boxes that you tick stay ticked in this browser. ',
         make('button', {class: 'act', type: 'button', onclick: () => window.print()}, 'Print')),
-    ...plan.layers.map((_, l) => sheet(l, minutes[l])));
+    make('nav', {class: 'jump', 'aria-label': 'Setup sheets'}, plan.layers.map((layer, l) => make('a', {href: `#sheet-${l + 1}`}, `Layer ${layer.index}`))),
+    cover(minutes), ...plan.layers.map((_, l) => {
+        const made = sheet(l, minutes[l]);
+        made.id = `sheet-${l + 1}`;
+        return made;
+    }));
 }

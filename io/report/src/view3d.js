@@ -6,8 +6,9 @@ import {bytesOf, figure, make} from './dom.js';
 import {pathOf} from './paths.js';
 import {data, featureKinds, flaskRings, featureRange, layerName, operationName, operations, plan, toolOf} from './report.js';
 import {Run, StockField} from './stock.js';
+import {filledBoxes, woodHeights, woodTop} from './wood.js';
 
-const layerColors = ['#b9c7cc', '#d9c49a'], cutColor = '#c98f4a';
+const layerColors = ['#b9c7cc', '#d9c49a'], cutColor = '#c98f4a', woodColors = ['#d3b27c', '#dfc190'], filledColor = '#d3202f', glueColor = '#eab431';
 const surfaces = [
     {name: 'Flat, facing up', color: '#4f86c6'}, {name: 'Shallow slope', color: '#6aa84f'}, {name: 'Slope', color: '#d8c690'}, {name: 'Steep', color: '#c9ced2'},
     {name: 'Upright', color: '#98a3ab'}, {name: 'Flat, facing down', color: '#a64d79'}, {name: 'Undercut', color: '#e03131'},
@@ -82,13 +83,14 @@ class View {
         renderer.setClearColor(0, 0);
         this.controls = new OrbitControls(this.camera, canvas);
         this.controls.addEventListener('change', () => this.draw());
-        this.state = {explode: 0, axis: 'none', section: 0.5, mode: 'layers', operation: -1, share: 0, play: false};
+        this.state = {explode: 0, axis: 'none', section: 0.5, shape: 'pattern', mode: 'layers', operation: -1, share: 0, play: false};
         this.model = readModel();
         this.sectionPlane = new THREE.Plane();
         this.buildLayers();
         this.buildFeatures();
         this.buildBoundaries();
         this.buildMachine();
+        this.buildJoints();
         this.pin = new THREE.Mesh(new THREE.TorusGeometry(this.size / 60, this.size / 300, 12, 40), new THREE.MeshBasicMaterial({color: '#d97500', depthTest: false}));
         this.pin.renderOrder = 10;
         this.pin.visible = false;
@@ -186,6 +188,40 @@ class View {
         });
         this.pinLabel = make('span', {class: 'pin', hidden: ''});
         this.labels.append(this.pinLabel);
+    }
+
+    // What stays filled under overhangs, in red, and where glue goes at each joint.
+    buildJoints() {
+        this.layers.forEach((entry, l) => {
+            const boxes = filledBoxes(l);
+            if (boxes.length) {
+                const materials = [new THREE.MeshLambertMaterial({color: filledColor, clippingPlanes: []}),
+                    // Seen through the wood that hides it.
+                    new THREE.MeshBasicMaterial({color: filledColor, clippingPlanes: [], transparent: true, opacity: 0.22, depthTest: false, depthWrite: false})];
+                const geometry = boxGeometry(boxes, data.stock.cell_mm * 0.02);
+                entry.filled = new THREE.Group();
+                for (const material of materials) entry.filled.add(new THREE.Mesh(geometry, material));
+                entry.filledMaterials = materials;
+                entry.group.add(entry.filled);
+            }
+            const glue = capOf(data.outlines.layers[l].glue.map((points, i, all) => ({points, parent: parentOf(i, all)})), true);
+            if (glue) {
+                const material = new THREE.MeshBasicMaterial({color: glueColor, side: THREE.DoubleSide, clippingPlanes: [], polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -4});
+                entry.glue = new THREE.Mesh(glue, material);
+                entry.glue.position.z = plan.layers[l].z_bottom;
+                entry.group.add(entry.glue);
+            }
+        });
+    }
+
+    // The wood of every layer as the simulated programs leave it, made when it is first asked for.
+    buildWood() {
+        this.layers.forEach((entry, l) => {
+            if (entry.wood || !woodHeights(l)) return;
+            const material = new THREE.MeshLambertMaterial({color: woodColors[l % woodColors.length], side: THREE.DoubleSide, flatShading: true, clippingPlanes: []});
+            entry.wood = new THREE.Mesh(woodGeometry(l), material);
+            entry.group.add(entry.wood);
+        });
     }
 
     // The cutter, the way and the slab of the chosen operation.
@@ -336,7 +372,21 @@ class View {
             for (const material of entry.materials) material.clippingPlanes = [...entry.planes, ...cut];
             for (const material of entry.caps) material.clippingPlanes = cut;
             // While a layer is milled its slab stands in the place of the pattern, and what comes later is not there.
-            entry.piece.visible = this.ticks.pattern.checked && (milled < 0 || !this.ticks.stock.checked || l < milled);
+            const there = this.ticks.pattern.checked && (milled < 0 || !this.ticks.stock.checked || l < milled), built = this.state.shape === 'built' && Boolean(entry.wood);
+            entry.piece.visible = there && !built;
+            if (entry.wood) {
+                entry.wood.visible = there && built;
+                entry.wood.material.clippingPlanes = cut;
+            }
+            if (entry.filled) {
+                entry.filled.visible = this.ticks.filled.checked && there;
+                for (const material of entry.filledMaterials) material.clippingPlanes = cut;
+            }
+            if (entry.glue) {
+                // Between layers that lie on one another it would only shimmer through.
+                entry.glue.visible = this.ticks.glue.checked && there && (this.state.explode > 0 || axis !== 'none');
+                entry.glue.material.clippingPlanes = cut;
+            }
             this.boundaries[l].lines.visible = this.ticks.boundaries.checked;
         });
         this.machine.position.z = milled >= 0 ? this.shift(milled) : 0;
@@ -383,6 +433,7 @@ class View {
         const list = entries => make('ul', {class: 'legend'}, entries.map(e => make('li', {}, make('i', {style: `background:${e.color}`}), e.name)));
         const bar = (ramp, from, to) => [make('div', {class: 'ramp', style: `background:linear-gradient(90deg,${ramp.join(',')})`}), make('div', {}, make('span', {}, from), make('span', {}, to))];
         const content = {
+            wood: () => [list([{name: 'wood as cut', color: woodColors[0]}]), make('p', {class: 'note'}, `After all programs, from a stock with ${figure(data.stock.cell_mm, 2)} mm between its points; under overhangs it stands where air should be.`)],
             layers: () => list([{name: 'odd layers', color: layerColors[0]}, {name: 'even layers', color: layerColors[1]}, {name: 'cut face', color: cutColor}]),
             surfaces: () => list(surfaces),
             slope: () => [bar(slopeRamp, '0° flat', '90° upright'), list([{name: 'faces down', color: '#8b8b8b'}])],
@@ -390,8 +441,9 @@ class View {
                 make('p', {class: 'note'}, `Asked ${figure(data.model.reach_mm, 2)} mm off the surface, once in each cell of ${figure(data.model.reach_cell_mm, 1)} mm for each way it faces, in its own layer, holder included.`)],
             left: () => [bar(leftRamp, '0', `${figure(this.leftTop(), 2)} mm and more`), list([{name: 'cut into the part', color: '#3557d6'}, {name: 'faces down, steeper than 80° or flask', color: '#b9bdc0'}]),
                 make('p', {class: 'note'}, `After all programs, from a stock with ${figure(data.stock.cell_mm, 2)} mm between its points; verify.json measures finer.`)],
-        }[this.state.mode]();
+        }[this.state.shape === 'built' ? 'wood' : this.state.mode]();
         this.legendBox.replaceChildren(...[content].flat(2));
+        if (this.ticks.filled.checked) this.legendBox.append(list([{name: 'stays filled', color: filledColor}]));
         if (this.ticks.features.checked) this.legendBox.append(list(Object.entries(featureKinds).filter(([type]) => plan.features.some(f => f.type === type)).map(([, kind]) => kind)));
     }
 
@@ -419,12 +471,24 @@ class View {
         this.sectionReadout = make('output');
         const [mode, modeSelect] = choice('Colour by', 'mode', [['layers', 'layer'], ['surfaces', 'features and undercuts'], ['slope', 'slope (α)'], ['reach', 'accessibility'], ['left', 'left-over']], value => { this.state.mode = value; this.color(); });
         this.modeSelect = modeSelect;
+        const [shape, shapeSelect] = choice('Shape', 'shape', [['pattern', 'pattern as drawn'], ['built', 'wood as cut']], value => {
+            this.state.shape = value;
+            if (value === 'built') this.buildWood();
+            this.modeSelect.disabled = value === 'built';
+            this.legend();
+            this.place();
+        });
+        this.shapeSelect = shapeSelect;
         const [patternTick, pattern] = tick('Pattern', true, () => this.place());
+        const anyFilled = this.layers.some(entry => entry.filled);
+        const [filledTick, filled] = tick('What stays filled', anyFilled, () => { this.place(); this.legend(); });
+        filled.disabled = !anyFilled;
+        const [glueTick, glue] = tick('Glue, where layers are apart', true, () => this.place());
         const [boundaryTick, boundaries] = tick('Boundaries and reasons', true, () => this.place());
         const [featureTick, features] = tick(`Features (${plan.features.length})`, plan.features.length <= 80, () => { this.place(); this.legend(); });
         const [stockTick, stock] = tick('Stock as simulated', true, () => this.place());
         const [wayTick, way] = tick('Tool path', true, () => this.place());
-        this.ticks = {pattern, boundaries, features, stock, way};
+        this.ticks = {pattern, boundaries, features, stock, way, filled, glue};
         this.legendBox = make('div', {id: 'legend'});
         const [operation, select] = choice('Operation', 'operation', [['-1', 'none'], ...operations.map(o => [String(o.index), operationName(o)])], value => this.chooseOperation(Number(value)));
         this.select = select;
@@ -437,7 +501,7 @@ class View {
                 button('Fit', () => this.fit()), button('Top', () => this.look(0, -1e-4, 1)), button('Front', () => this.look(0, -1, 0)), button('Side', () => this.look(1, 0, 0)),
                 button('+', () => this.zoom(0.8), {'aria-label': 'Nearer'}), button('−', () => this.zoom(1.25), {'aria-label': 'Farther'}))),
             make('fieldset', {}, make('legend', {}, 'Layers'), explode, axis, section, this.sectionReadout),
-            make('fieldset', {}, make('legend', {}, 'Show'), mode, patternTick, boundaryTick, featureTick, this.legendBox),
+            make('fieldset', {}, make('legend', {}, 'Show'), shape, mode, patternTick, filledTick, glueTick, boundaryTick, featureTick, this.legendBox),
             make('fieldset', {}, make('legend', {}, 'Cutting'), operation, time, make('div', {class: 'row'}, this.playButton), this.readout, make('div', {class: 'row ticks'}, stockTick, wayTick),
                 make('p', {class: 'note'}, `The stock has ${figure(data.stock.cell_mm, 2)} mm between its points; ways are drawn within ${figure(data.paths.tolerance_mm, 3)} mm, time by feed.`)),
             make('details', {}, make('summary', {}, 'Keys and mouse'), make('p', {class: 'note'},
@@ -640,6 +704,91 @@ function capOf(loops, up) {
         }
     });
     if (position.length === 0) return null;
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.Float32BufferAttribute(position, 3));
+    geometry.computeVertexNormals();
+    return geometry;
+}
+
+// The loop around loop i, of loops that come without saying: the smallest that holds its first point.
+function parentOf(i, loops) {
+    const [px, py] = loops[i];
+    let best = -1, least = Infinity;
+    loops.forEach((points, k) => {
+        if (k === i) return;
+        let inside = false, area = 0;
+        for (let a = points.length - 2, b = 0; b < points.length; a = b, b += 2) {
+            area += points[a] * points[b + 1] - points[b] * points[a + 1];
+            if ((points[a + 1] > py) !== (points[b + 1] > py) && px < (points[b] - points[a]) * (py - points[a + 1]) / (points[b + 1] - points[a + 1]) + points[a]) inside = !inside;
+        }
+        if (inside && Math.abs(area) < least) { least = Math.abs(area); best = k; }
+    });
+    return best;
+}
+
+// Boxes as one body, each larger by `more` to all sides, so that what they fill does not shimmer through.
+function boxGeometry(boxes, more) {
+    const position = new Float32Array(24 * boxes.length), index = new Uint32Array(36 * boxes.length);
+    const faces = [0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5];
+    boxes.forEach((b, i) => {
+        for (let k = 0; k < 8; ++k) position.set([k & 1 ? b.x1 + more : b.x0 - more, k & 2 ? b.y1 + more : b.y0 - more, k & 4 ? b.z1 : b.z0], 24 * i + 3 * k);
+        for (let k = 0; k < 36; ++k) index[36 * i + k] = 8 * i + faces[k];
+    });
+    const indexed = new THREE.BufferGeometry();
+    indexed.setAttribute('position', new THREE.BufferAttribute(position, 3));
+    indexed.setIndex(new THREE.BufferAttribute(index, 1));
+    const geometry = indexed.toNonIndexed();
+    geometry.computeVertexNormals();
+    return geometry;
+}
+
+const mostPlates = 30000;
+function plates(heights, nx) {
+    let count = 0;
+    for (let c = 0; c < heights.length; ++c) if (heights[c] > 0 && (c % nx === 0 || heights[c] !== heights[c - 1])) ++count;
+    return count;
+}
+
+// The wood of layer l: its upper side, walls where it ends, and its underside. Cells with nothing are left out.
+function woodGeometry(l) {
+    const {nx, ny, x0, y0, cell_mm: cell} = data.stock, bottom = plan.layers[l].z_bottom;
+    // A relief has another height in every cell: then heights a little apart are one.
+    let heights = woodHeights(l);
+    for (let step = 2; step <= 8 && plates(heights, nx) > mostPlates; step *= 2) heights = heights.map(h => h === 0 || h === 255 ? h : Math.min(254, Math.max(1, Math.round(h / step) * step)));
+    const position = [], at = (i, j) => i >= 0 && j >= 0 && i < nx && j < ny ? heights[j * nx + i] : 0;
+    const quad = (a, b, c, d) => position.push(...a, ...b, ...c, ...a, ...c, ...d);
+    const half = cell / 2;
+    // Neighbours in a row that are equally high are one plate.
+    for (let j = 0; j < ny; ++j)
+        for (let i = 0; i < nx;) {
+            const h = at(i, j);
+            let end = i + 1;
+            while (end < nx && at(end, j) === h) ++end;
+            if (h > 0) {
+                const z = woodTop(l, h), xa = x0 + i * cell - half, xb = x0 + (end - 1) * cell + half, ya = y0 + j * cell - half, yb = ya + cell;
+                quad([xa, ya, z], [xb, ya, z], [xb, yb, z], [xa, yb, z]);
+                quad([xa, ya, bottom], [xa, yb, bottom], [xb, yb, bottom], [xb, ya, bottom]);
+                const low = other => other > 0 ? woodTop(l, other) : bottom;
+                if (at(i - 1, j) < h) quad([xa, yb, z], [xa, yb, low(at(i - 1, j))], [xa, ya, low(at(i - 1, j))], [xa, ya, z]);
+                if (at(end, j) < h) quad([xb, ya, z], [xb, ya, low(at(end, j))], [xb, yb, low(at(end, j))], [xb, yb, z]);
+            }
+            i = end;
+        }
+    // Walls to the rows before and behind, joined while both heights stay the same.
+    for (let j = 0; j <= ny; ++j) {
+        const y = y0 + j * cell - half;
+        for (let i = 0; i < nx;) {
+            const a = at(i, j - 1), b = at(i, j);
+            let end = i + 1;
+            while (end < nx && at(end, j - 1) === a && at(end, j) === b) ++end;
+            if (a !== b) {
+                const xa = x0 + i * cell - half, xb = x0 + (end - 1) * cell + half, top = woodTop(l, Math.max(a, b)), foot = Math.min(a, b) > 0 ? woodTop(l, Math.min(a, b)) : bottom;
+                if (b > a) quad([xa, y, foot], [xb, y, foot], [xb, y, top], [xa, y, top]);
+                else quad([xb, y, foot], [xa, y, foot], [xa, y, top], [xb, y, top]);
+            }
+            i = end;
+        }
+    }
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.Float32BufferAttribute(position, 3));
     geometry.computeVertexNormals();

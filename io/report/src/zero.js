@@ -1,0 +1,56 @@
+// Where the programs' zero lies in each layer, what it can be touched off with, and whether there is wood to touch.
+
+import {figure} from './dom.js';
+import {data, plan} from './report.js';
+import {woodHeights} from './wood.js';
+
+const least = 0.005; // mm; nearer is the same place
+
+// The raw slab's top, the face and the layer's bottom as the control shows them, mm.
+export function shownHeights(l) {
+    const layer = plan.layers[l], down = plan.frame === 'layer-top' ? layer.z_top : 0;
+    return {raw: layer.z_bottom + layer.slab_thickness - down, face: layer.z_top - down, bottom: layer.z_bottom - down, base: -down};
+}
+
+// How far x 0, y 0 lies outside the slab, in words; '' where the slab covers it.
+function outside() {
+    const [x0, y0] = plan.stock.min, [x1, y1] = plan.stock.max, parts = [];
+    if (x0 > least) parts.push(`${figure(x0, 2)} mm left of`);
+    if (x1 < -least) parts.push(`${figure(-x1, 2)} mm right of`);
+    if (y0 > least) parts.push(`${figure(y0, 2)} mm in front of`);
+    if (y1 < -least) parts.push(`${figure(-y1, 2)} mm behind`);
+    return parts.join(' and ');
+}
+
+// Whether wood stands at x 0, y 0 when layer l has been milled; null where the page does not know.
+function woodAfter(l) {
+    const heights = woodHeights(l);
+    if (!heights) return null;
+    const {nx, ny, cell_mm: cell, x0, y0} = data.stock, i = Math.round(-x0 / cell), j = Math.round(-y0 / cell);
+    if (i < 0 || j < 0 || i >= nx || j >= ny) return null;
+    return heights[j * nx + i] > 0;
+}
+
+const millimetres = value => `${value < 0 ? '−' : ''}${figure(Math.abs(value), 2)}`;
+
+// {place, xy, z, after, warnings}: sentences for the sheet of layer l.
+export function zeroOf(l) {
+    const [x0, y0] = plan.stock.min, above = plan.frame === 'layer-top', layer = plan.layers[l], at = shownHeights(l), warnings = [];
+    const off = outside();
+    const place = above ? 'x 0, y 0 of the STL; z 0 at this layer’s finished top' : 'x 0, y 0 of the STL; z 0 at the pattern’s bottom, the base board’s top';
+    const xy = `slab’s left edge is x ${millimetres(x0)}, its front edge y ${millimetres(y0)}`;
+    const raw = `raw slab top is z ${millimetres(at.raw)} if the slab is ${figure(layer.slab_thickness, 2)} mm thick: measure it`;
+    const z = !above && l === 0 ? `the base board’s top before the slab is laid is z 0; after that the ${raw}` : raw;
+    if (off) warnings.push(`Zero x 0, y 0 lies in the air, ${off} the slab: there is no wood to touch. Touch off the slab’s edges.`);
+    if (!above && l > 0) warnings.push(`Z 0 lies ${figure(layer.z_bottom, 2)} mm under this slab, inside the stack: it cannot be touched.`);
+    const after = off ? '' : woodAfter(l) === false ? 'the raw slab covers x 0, y 0; milled, it is in the air there' : 'the slab covers x 0, y 0';
+    return {place, xy, z, after, warnings};
+}
+
+// How the control's zero has moved since the first layer, with the table or without it.
+export function tableHeight(l) {
+    const {table, base_board_thickness: board} = plan.job.machine, moves = table === 'moving', layer = plan.layers[l];
+    const risen = layer.z_top - plan.layers[0].z_top, offset = plan.frame === 'layer-top' ? (moves ? 0 : risen) : (moves ? -risen : 0);
+    const standing = moves ? `sunk to ${figure(board + layer.z_top, 2)} mm below this layer’s top` : 'fixed';
+    return offset === 0 ? standing : `${standing}; the work offset’s Z is ${figure(Math.abs(offset), 2)} mm ${offset > 0 ? 'above' : 'below'} that of layer 1`;
+}
