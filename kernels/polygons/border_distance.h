@@ -1,0 +1,31 @@
+// How far points are from the border of a region.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/polygons/loops.h"
+
+namespace slabwright {
+
+/// Answers "how far is the nearest edge of these loops" from any thread, in about the time that the edges of
+/// a few grid cells take. Keeps a view of the loops. Memory: some 16 bytes an edge.
+class BorderDistance {
+public:
+    explicit BorderDistance(const Loops& loops);
+    /// mm; infinite where there are no loops.
+    [[nodiscard]] double operator()(Point2 p) const;
+
+private:
+    [[nodiscard]] double nearest_in(std::int64_t column, std::int64_t row, Point2 p) const;
+    const Loops& loops_;
+    std::vector<std::uint32_t> ends_;  ///< of each edge, the index of its second point
+    std::int64_t x0_ = 0, y0_ = 0, cell_ = 1, columns_ = 0, rows_ = 0;
+    std::vector<std::uint32_t> starts_, edges_;  ///< of each cell, the edges whose boxes meet it
+};
+
+/// The greatest distance of the border of `from` from the border of `to`, mm: at its points, and at points
+/// between them no farther apart than `step_mm`. 0 where `from` is empty, infinite where only `to` is.
+[[nodiscard]] double farthest_from_border(const Loops& from, const BorderDistance& to, double step_mm);
+
+}  // namespace slabwright
