@@ -79,12 +79,13 @@ bool apart(const Corners& a, Corners b, double gap) {
 /// Of two facets that share the corner s[i] = t[j], whether the sector of one may pass through that of the
 /// other: where it crosses the other's plane, it does so along a ray that lies within the other.
 bool may_cross_at_corner(const Corners& a, std::size_t i, const Corners& b, std::size_t j) {
-    const Point u = a[(i + 1) % 3] - a[i], v = a[(i + 2) % 3] - a[i], p = b[(j + 1) % 3] - b[j],
-                q = b[(j + 2) % 3] - b[j], n = cross(u, v);
+    const Vec3d u = minus(a[(i + 1) % 3], a[i]), v = minus(a[(i + 2) % 3], a[i]);
+    const Vec3d p = minus(b[(j + 1) % 3], b[j]), q = minus(b[(j + 2) % 3], b[j]);
+    const Vec3d n = cross(u, v);
     const double over_p = dot(n, p), over_q = dot(n, q);
     if ((over_p > 0 && over_q > 0) || (over_p < 0 && over_q < 0)) return false;
     if (over_p == 0 && over_q == 0) return true;
-    const Point ray = std::abs(over_q) * p + std::abs(over_p) * q;
+    const Vec3d ray = plus(scaled(std::abs(over_q), p), scaled(std::abs(over_p), q));
     return dot(n, cross(u, ray)) >= 0 && dot(n, cross(ray, v)) >= 0;
 }
 
