@@ -271,9 +271,9 @@ void check_sequence(const fs::path& path, const BuildPlan& build, std::vector<Vi
         violations.push_back({"sequence.no_file", "there is none, or none that can be read", file, 0, {}, 0});
         return;
     }
+    const std::string text = read_file(path, "verify.sequence_file", kLargestSequence);
     try {
-        const std::vector<Violation> found =
-            replay_build(build, read_sequence(read_file(path, "verify.sequence", kLargestSequence)));
+        const std::vector<Violation> found = replay_build(build, read_sequence(text));
         violations.insert(violations.end(), found.begin(), found.end());
     } catch (const Error& e) {
         if (e.code() != "verify.sequence") throw;

@@ -224,6 +224,7 @@ void with_context(const Options& options, Body&& body) {
     std::signal(SIGTERM, on_signal);
     // Whoever runs it under nohup wants it to go on when the terminal is closed.
     if (std::signal(SIGHUP, on_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);  // a file beyond the user's limit is then an error of the write
     struct Done {
         ProgressBar& bar;
         ~Done() {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "io/read/stl.h"
+#include "io/write/stl_writer.h"
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/command.h"
@@ -220,6 +220,7 @@ TEST(Faults, AKilledPlanLeavesTheOldOneOrTheNewOne) {
         const Bench fresh;  // beside another OUT, so that what remains is this process's
         std::filesystem::copy(old.out, fresh.out, std::filesystem::copy_options::recursive);
         const CommandResult killed = run(fresh.plan(), "kill " + std::to_string(n));
+        if (killed.exit == 0) continue;  // it was done before
         EXPECT_EQ(killed.signal, SIGKILL) << n;
         const Tree now = support::tree(fresh.out);
         EXPECT_TRUE(now == before || now == after) << "killed at change " << n;
@@ -227,5 +228,25 @@ TEST(Faults, AKilledPlanLeavesTheOldOneOrTheNewOne) {
         EXPECT_EQ(again.exit, 0) << n << ": " << again.err;
         EXPECT_TRUE(support::tree(fresh.out) == after) << n;
         EXPECT_EQ(fresh.strangers(), "") << "after a kill at change " << n;
+    }
+}
+
+TEST(Faults, LimitsOfTheSystemAreKeptOrTold) {
+    const Bench bench;
+    ASSERT_EQ(run(bench.plan(), "none").exit, 0);
+    const Tree whole = support::tree(bench.out);
+    for (const char* limit :
+         {"ulimit -n 16", "ulimit -v 524288", "ulimit -f 10", "ulimit -s 256", "unset HOME PATH TMPDIR"}) {
+        const Bench fresh;
+        std::vector<std::string> command = {"/bin/bash", "-c", std::string(limit) + "; exec \"$0\" \"$@\""};
+        for (const std::string& word : fresh.plan()) command.push_back(word);
+        const CommandResult result = support::run_command(command);
+        EXPECT_EQ(fresh.strangers(), "") << limit;
+        if (result.exit == 0) {
+            EXPECT_TRUE(support::tree(fresh.out) == whole) << limit;
+        } else {
+            expect_one_clear_line(result, limit);
+            EXPECT_TRUE(support::tree(fresh.out).empty()) << limit;
+        }
     }
 }

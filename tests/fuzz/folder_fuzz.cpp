@@ -4,9 +4,9 @@
 #include <array>
 #include <string>
 
-#include "io/read/stl.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
+#include "io/write/stl_writer.h"
 #include "kernels/mesh/weld.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/mesh_shapes.h"
@@ -62,7 +62,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::expect_clear_error([&] {
         const Verification verdict = verify_folder(
             planned.context, planned.folder / "out",
-            {.stl = planned.folder / "part.stl", .pattern = planned.pattern, .cell = 2, .write = false});
+            {.source = planned.folder / "part.stl", .pattern = planned.pattern, .cell = 2, .write = false});
         for (const Violation& v : verdict.report.violations)
             fuzz::require(!v.code.empty(), "a violation without a code");
     });

@@ -3,8 +3,8 @@
 #include <random>
 #include <string>
 
-#include "io/read/stl.h"
 #include "io/slabwright.h"
+#include "io/write/stl_writer.h"
 #include "kernels/mesh/weld.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/support/compositions.h"
