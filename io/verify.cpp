@@ -460,6 +460,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     SimulationOptions simulation;
     simulation.cell = options.cell;
     simulation.maps = options.maps || !options.maps_directory.empty();
+    simulation.faults = options.faults;
     simulation.gouge = part.job.tolerances.gouge;
     simulation.cusp = part.job.tolerances.cusp;
     simulation.board_cut = part.job.machine.base_board_cut;
@@ -471,7 +472,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
                 simulation.board_cut = std::max(simulation.board_cut, tool.diameter / 2);
     }
     simulation.board_cut = std::min(simulation.board_cut, part.job.machine.base_board_thickness);
-    result.report = simulate(context, input, *pattern.part, simulation);
+    result.report = simulate(context, input, *pattern.part, simulation, options.memory);
     input.mesh = {};
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
     result.json = verify_json(input, result.report, simulation, fs::path(pattern.place).filename().string(),

@@ -20,6 +20,8 @@ struct VerifyOptions {
     bool maps = false;             ///< keep the maps in the report
     std::string maps_directory{};  ///< "": none; write layer_01.ppm and so on there (write_maps())
     bool write = true;             ///< write OUT/verify.json
+    SimulationMemory* memory = nullptr;  ///< of the verification before of the same folder (simulate())
+    bool faults = false;  ///< list every faulty motion in the report (SimulationOptions::faults)
 };
 
 /// What was found, and what was read to find it.

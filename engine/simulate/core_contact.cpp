@@ -115,6 +115,9 @@ void CoreContact::follow_cell(const Way& way, std::size_t cell, double stands, d
             if (told_.empty()) told_.assign(grid_.count(), 0);
             findings_.cells += told_[cell] == 0;
             told_[cell] = 1;
+            if (findings_.lines.empty() || findings_.lines.back().first != way.line)
+                findings_.lines.emplace_back(way.line, over);
+            else findings_.lines.back().second = std::max(findings_.lines.back().second, over);
             if (over > findings_.deepest) {
                 findings_.deepest = over;
                 findings_.where = {grid_.x(i), grid_.y(j)};

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "engine/job.h"
@@ -32,6 +33,8 @@ public:
         double z = 0;                   ///< of the tip there
         std::uint32_t line = 0;         ///< of the deepest
         std::uint64_t cells = 0;        ///< over which more stood than may, at least once
+        /// The lines over which more stood than may, in their order, each with the most, mm.
+        std::vector<std::pair<std::uint32_t, double>> lines{};
     };
 
     /// @param grid of the stock that motions are followed over

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <span>
 
 #include "kernels/parallel/parallel.h"
 
@@ -11,6 +12,11 @@ namespace slabwright {
 namespace {
 
 constexpr std::size_t kTogether = 1024;  // steps
+
+void add_lines(std::vector<std::uint32_t>& lines, std::span<const std::uint32_t> more) {
+    for (const std::uint32_t line : more)
+        if (lines.empty() || lines.back() != line) lines.push_back(line);
+}
 
 GougeReport join(GougeReport a, const GougeReport& b) {
     auto deeper = [](GougePlace& x, const GougePlace& y) {
@@ -23,6 +29,8 @@ GougeReport join(GougeReport a, const GougeReport& b) {
     a.contacts += b.contacts;
     a.motions += b.motions;
     a.length_mm += b.length_mm;
+    add_lines(a.gouge_lines, b.gouge_lines);
+    add_lines(a.contact_lines, b.contact_lines);
     return a;
 }
 
@@ -87,9 +95,16 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 return std::move(found.beyond);
             };
             const bool ball = tool.kind == ToolKind::ball;
-            r.gouges = check(ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter,
-                             ball ? &deepest : nullptr)
-                           .size();
+            const auto lines_of = [&](std::span<const std::uint32_t> found) {
+                std::vector<std::uint32_t> of;
+                for (const std::uint32_t motion : found) of.push_back(lines[motion]);
+                return of;
+            };
+            const std::vector<std::uint32_t> gouges =
+                check(ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter,
+                      ball ? &deepest : nullptr);
+            r.gouges = gouges.size();
+            add_lines(r.gouge_lines, lines_of(gouges));
             std::vector<std::uint32_t> touched;
             double raised = 0;
             auto follow = [&](GougePlace& place, double thick, double above) {
@@ -102,8 +117,9 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
             if (shank > radius) follow(r.shank, shank, tool.flute_length);
             if (nose > radius) follow(r.holder, nose, tool.stickout);
             std::sort(touched.begin(), touched.end());
-            r.contacts =
-                static_cast<std::uint64_t>(std::unique(touched.begin(), touched.end()) - touched.begin());
+            touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+            r.contacts = touched.size();
+            add_lines(r.contact_lines, lines_of(touched));
             return r;
         },
         join);

@@ -26,6 +26,8 @@ struct GougeReport {
     std::uint64_t contacts = 0;  ///< motions whose shank or holder is
     std::uint64_t motions = 0;   ///< looked at
     double length_mm = 0;        ///< of them
+    /// Lines of these gouges and contacts, ascending, each once.
+    std::vector<std::uint32_t> gouge_lines, contact_lines;
 };
 
 struct GougeOptions {

@@ -84,11 +84,21 @@ bool Reach::reachable(const Point3& point) {
         const double R = tool.diameter / 2 + kCovered, dx = point[0] - c[0], dy = point[1] - c[1];
         const double dz = tool.kind == ToolKind::ball ? std::max(0.0, c[2] - point[2]) : 0;
         if (tool.kind != ToolKind::ball && point[2] < c[2]) continue;
-        if (dx * dx + dy * dy + dz * dz <= R * R) return true;
+        if (dx * dx + dy * dy + dz * dz > R * R) continue;
+        found_ = place;
+        return true;
     }
     for (std::size_t tool = 0; tool < tools_.size(); ++tool)
         if (by(tool, point)) return true;
     return false;
+}
+
+std::optional<Reach::Covering> Reach::covering(const Point3& point) {
+    if (!reachable(point)) return std::nullopt;
+    const Tool& tool = tools_[found_.tool];
+    Point3 tip = found_.centre;
+    if (tool.kind == ToolKind::ball) tip[2] -= tool.diameter / 2;
+    return Covering{tool.number, tip};
 }
 
 void Reach::remember(const Point3& obstacle) {
@@ -138,6 +148,7 @@ bool Reach::by(std::size_t index, const Point3& point) {
     };
     auto takes = [&](const Point3& c) {
         if (!holder_free(tool, {c[0], c[1], ball ? c[2] - R : c[2]})) return false;
+        found_ = {index, c};
         if (places_.size() < kPlaces) places_.push_back({index, c});
         else places_[next_place_++ % kPlaces] = {index, c};
         return true;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "engine/job.h"
@@ -27,6 +28,14 @@ public:
     Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_bottom, double z_top,
           double lowest);
 
+    /// A tool with a place of its tip, mm, where it covers a point.
+    struct Covering {
+        int tool = 0;  ///< Tool::number
+        Point3 tip{};
+    };
+    /// A tool and a place that cover the point; none where no tool does. As exact as reachable().
+    [[nodiscard]] std::optional<Covering> covering(const Point3& point);
+
     /// Whether a tool covers the point. Exact but for kResolution and kTouch: a branch and bound over all of
     /// the tool's places.
     [[nodiscard]] bool reachable(const Point3& point);
@@ -44,6 +53,7 @@ private:
     std::vector<Tool> tools_;  ///< smallest first
     double z_bottom_, z_top_, lowest_;
     std::vector<Place> places_;      ///< free ones, found lately
+    Place found_{};                  ///< by which the last point asked for is reachable
     std::vector<Point3> obstacles_;  ///< points with part at or above them, met lately
     std::size_t next_place_ = 0, next_obstacle_ = 0;
 };

@@ -10,6 +10,7 @@
 
 #include "engine/simulate/core_contact.h"
 #include "engine/simulate/reach.h"
+#include "engine/simulate/simulation_memory.h"
 #include "engine/simulate/work.h"
 #include "kernels/errors.h"
 #include "kernels/geometry/vectors.h"
@@ -30,38 +31,6 @@ constexpr double kAbreast = 3;            // fewer cells than this side by side 
 constexpr double kStanding = 0.01;        // mm by which shank or holder must reach into stock to be reported
 
 constexpr double kArcError = 0.001;  // mm: more than rounding may add to Program::chord_error
-
-/// The least box over some motions, widened by nothing yet.
-struct StepBox {
-    double x0 = kUnbounded, y0 = kUnbounded, x1 = -kUnbounded, y1 = -kUnbounded, z0 = kUnbounded,
-           z1 = -kUnbounded;
-    void add(const ProgramStep& s) {
-        x0 = std::min(x0, s.x), x1 = std::max(x1, s.x);
-        y0 = std::min(y0, s.y), y1 = std::max(y1, s.y);
-        z0 = std::min(z0, s.z), z1 = std::max(z1, s.z);
-    }
-    /// A level arc goes farthest where it crosses the axes through its centre.
-    void add(const ProgramArc& a) {
-        constexpr double quarter = std::numbers::pi / 2;
-        const double low = std::min(a.arc.start, a.arc.start + a.arc.turn),
-                     high = std::max(a.arc.start, a.arc.start + a.arc.turn);
-        for (double k = std::ceil(low / quarter); k * quarter <= high; ++k) {
-            const double x = a.arc.x + a.arc.radius * std::cos(k * quarter),
-                         y = a.arc.y + a.arc.radius * std::sin(k * quarter);
-            x0 = std::min(x0, x), x1 = std::max(x1, x);
-            y0 = std::min(y0, y), y1 = std::max(y1, y);
-        }
-    }
-    void add(const StepBox& b) {
-        x0 = std::min(x0, b.x0), x1 = std::max(x1, b.x1);
-        y0 = std::min(y0, b.y0), y1 = std::max(y1, b.y1);
-        z0 = std::min(z0, b.z0), z1 = std::max(z1, b.z1);
-    }
-    [[nodiscard]] bool meets(const CellGrid& g, double margin, double top) const {
-        return z0 < top && x0 - margin <= g.x(g.nx - 1) && g.x0 <= x1 + margin &&
-               y0 - margin <= g.y(g.ny - 1) && g.y0 <= y1 + margin;
-    }
-};
 
 StepBox box_of(const ProgramStep& a, const ProgramStep& b) {
     StepBox box;
@@ -90,27 +59,6 @@ CutterEnd cutter_end(const Tool& tool) {
             return {CutterEnd::Form::flat, tool.diameter / 2, 0};
     }
 }
-
-/// What one tile contributes to a program's and a layer's findings.
-struct TileProgram {
-    double removed = 0;
-    double lowest = kUnbounded, stock_top = -kUnbounded;
-    Extreme rapid, over_flute, deepest, shank, holder;
-    std::uint32_t rapid_line = 0, over_flute_line = 0, deepest_line = 0, shank_line = 0, holder_line = 0;
-    double most = 0;  // mm that any cell lost
-    CoreContact::Findings core;
-};
-struct TileLayer {
-    LayerFindings findings;
-    double squares = 0;
-};
-struct TileResult {
-    std::vector<TileProgram> programs;
-    std::vector<TileLayer> layers;
-    double board_cut = 0;
-    std::uint64_t pattern_cells = 0;  // that have part at any height
-    Extreme flask;
-};
 
 /// The walls of a layer's flask and of the one below it, into which a cutter dips at a joint. Walls alone:
 /// what is cut far inside the flask shows in the stock.
@@ -145,8 +93,8 @@ void raise(Extreme& a, std::uint32_t& line, const Extreme& b, std::uint32_t b_li
 class Simulation {
 public:
     Simulation(Context& context, const SimulationInput& input, const StandingPart& part,
-               const SimulationOptions& options)
-        : context_(context), input_(input), options_(options), part_(part) {}
+               const SimulationOptions& options, SimulationMemory* memory)
+        : context_(context), input_(input), options_(options), part_(part), memory_(memory) {}
 
     SimulationReport run() {
         check();
@@ -158,6 +106,8 @@ public:
         report.nx = nx_ = std::max(1, static_cast<int>(std::ceil(width / cell_ - 1e-9)));
         report.ny = ny_ = std::max(1, static_cast<int>(std::ceil(depth / cell_ - 1e-9)));
         place_flasks();
+        if (memory_ != nullptr && is_of(*memory_, input_, options_, cell_))
+            changes_.emplace(memory_->programs, input_.programs);
         check_stack(report);
         prepare(report);
         constexpr double kReading =
@@ -174,6 +124,39 @@ public:
     }
 
 private:
+    /// For the simulation after this one.
+    void remember(std::vector<TileResult> tiles) {
+        if (memory_ == nullptr) return;
+        memory_->programs.clear();
+        memory_->stage.layers = input_.layers, memory_->stage.tools = input_.tools;
+        memory_->stage.stock_min = input_.stock_min, memory_->stage.stock_max = input_.stock_max;
+        memory_->options = options_;
+        memory_->cell = cell_;
+        memory_->checked = std::move(checked_programs_);
+        memory_->tiles = std::move(tiles);
+    }
+
+    /// A tile's findings where no program has changed near it; none where it has to be run.
+    [[nodiscard]] std::optional<TileResult> known_tile(std::size_t tile, const CellGrid& grid) const {
+        if (!changes_ || tile >= memory_->tiles.size()) return std::nullopt;
+        double widest = 0;
+        for (const Tool& t : input_.tools)
+            widest = std::max({widest, t.diameter, t.shank_diameter, t.holder_diameter});
+        const TileResult& before = memory_->tiles[tile];
+        if (changes_->touch(grid, widest / 2 + cell_, before)) return std::nullopt;
+        std::optional<TileResult> known = changes_->translated(before);
+        for (std::size_t i = 0; known && i < prepared_.size(); ++i) {
+            if (changes_->before(i)) continue;
+            const int layer = input_.programs[i].layer;  // it meets nothing here
+            const SimulatedLayer& of = input_.layers[static_cast<std::size_t>(layer)];
+            TileProgram& p = known->programs[i];
+            p.stock_top = p.top_after = i > 0 && input_.programs[i - 1].layer == layer
+                                            ? known->programs[i - 1].top_after
+                                            : of.z_bottom + of.slab_thickness;
+        }
+        return known;
+    }
+
     void check() const {
         auto bad = [](const std::string& what) {
             throw Error(ErrorKind::usage, "simulate.input", what, {}, "plan again");
@@ -268,8 +251,9 @@ private:
     }
 
     void violate(SimulationReport& report, const std::string& code, const std::string& message,
-                 const Program* program, std::uint32_t line, std::optional<Point3> where, double size) const {
-        report.violations.push_back({code, message, program ? program->file : "", line, where, size});
+                 const Program* program, std::uint32_t line, std::optional<Point3> where, double size,
+                 std::optional<std::size_t> layer = {}) const {
+        report.violations.push_back({code, message, program ? program->file : "", line, where, size, layer});
     }
 
     void prepare(SimulationReport& report) {
@@ -321,10 +305,19 @@ private:
         }
         std::vector<StepBox> boxes(input_.programs.size());
         parallel_each(context_, input_.programs.size(), [&](std::size_t i) {
-            boxes[i] = check_program(i, walls[static_cast<std::size_t>(input_.programs[i].layer)],
-                                     report.programs[i]);
+            ProgramFindings& f = report.programs[i];
+            if (changes_ && changes_->is_same(i)) {
+                const CheckedProgram& known = memory_->checked[*changes_->before(i)];
+                f = known.findings, boxes[i] = known.box;
+                f.seconds = seconds_of(i);
+            } else {
+                boxes[i] = check_program(i, walls[static_cast<std::size_t>(input_.programs[i].layer)], f);
+            }
             context_.advance(input_.programs[i].steps.size());
         });
+        if (memory_ != nullptr)
+            for (std::size_t i = 0; i < input_.programs.size(); ++i)
+                checked_programs_.push_back({report.programs[i], boxes[i]});
         for (std::size_t i = 0; i < input_.programs.size(); ++i) {
             const Program& program = input_.programs[i];
             const ProgramFindings& f = report.programs[i];
@@ -352,13 +345,17 @@ private:
         }
     }
 
+    [[nodiscard]] double seconds_of(std::size_t i) const {
+        return program_seconds(input_.programs[i], input_.machine, i > 0 ? &input_.programs[i - 1] : nullptr);
+    }
+
     /// One program's findings. @return what its steps reach over, as far as known
     StepBox check_program(std::size_t i, const std::optional<StandingPart>& walls, ProgramFindings& f) const {
         const Program& program = input_.programs[i];
         const SimulatedLayer& layer = input_.layers[static_cast<std::size_t>(program.layer)];
         f.lowest = layer.z_top;
         f.stock_top = -kUnbounded;
-        f.seconds = program_seconds(program, input_.machine, i > 0 ? &input_.programs[i - 1] : nullptr);
+        f.seconds = seconds_of(i);
         StepBox box;
         for (const ProgramArc& a : program.arcs) {
             box.add(a);
@@ -419,8 +416,11 @@ private:
         parallel_each(context_, tiles, [&](std::size_t t) {
             const int i0 = static_cast<int>(t % static_cast<std::size_t>(tx)) * kTileCells,
                       j0 = static_cast<int>(t / static_cast<std::size_t>(tx)) * kTileCells;
-            results[t] =
-                run_tile(i0, j0, std::min(kTileCells, nx_ - i0), std::min(kTileCells, ny_ - j0), report);
+            const CellGrid grid{input_.stock_min[0] + (i0 + 0.5) * cell_,
+                                input_.stock_min[1] + (j0 + 0.5) * cell_, cell_,
+                                std::min(kTileCells, nx_ - i0), std::min(kTileCells, ny_ - j0)};
+            if (std::optional<TileResult> known = known_tile(t, grid)) results[t] = std::move(*known);
+            else results[t] = run_tile(i0, j0, grid, report);
             context_.advance();
         });
         taken_.assign(prepared_.size(), 0);
@@ -441,6 +441,7 @@ private:
                 raise(f.crushed, f.crushed_line,
                       {p.core.deepest, {p.core.where[0], p.core.where[1], p.core.z}}, p.core.line);
                 f.crushed_mm2 += static_cast<double>(p.core.cells) * cell_ * cell_;
+                f.faults.insert(f.faults.end(), p.faults.begin(), p.faults.end());
             }
             for (std::size_t i = 0; i < r.layers.size(); ++i) {
                 const LayerFindings& l = r.layers[i].findings;
@@ -454,6 +455,7 @@ private:
                 raise(f.left, l.left.size, l.left.where);
                 raise(f.unreachable_left, l.unreachable_left.size, l.unreachable_left.where);
                 raise(f.missed_left, l.missed_left.size, l.missed_left.where);
+                f.missed_places.insert(f.missed_places.end(), l.missed_places.begin(), l.missed_places.end());
                 squares[i] += r.layers[i].squares;
             }
             report.board_cut = std::max(report.board_cut, r.board_cut);
@@ -462,20 +464,34 @@ private:
         }
         for (std::size_t i = 0; i < report.layers.size(); ++i) {
             LayerFindings& f = report.layers[i];
+            f.lowest_tip = lowest_tip(i);
             f.left_rms = f.cells > 0 ? std::sqrt(squares[i] / static_cast<double>(f.cells)) : 0;
             const std::uint64_t reachable = f.cells - f.unreachable;
             f.within_share =
                 reachable > 0 ? 1 - static_cast<double>(f.missed) / static_cast<double>(reachable) : 1;
         }
-        for (const ProgramFindings& f : report.programs) report.removed_mm3 += f.removed_mm3;
+        for (ProgramFindings& f : report.programs) {
+            report.removed_mm3 += f.removed_mm3;
+            keep_worst(f.faults);
+        }
+        remember(std::move(results));
     }
 
-    TileResult run_tile(int i0, int j0, int nx, int ny, SimulationReport& report) const {
+    /// Sorts by fault and line; of a line that has a fault in several tiles the most stays.
+    static void keep_worst(std::vector<FaultyMotion>& faults) {
+        std::sort(faults.begin(), faults.end());
+        std::vector<FaultyMotion> worst;
+        for (const FaultyMotion& f : faults)
+            if (!worst.empty() && worst.back().fault == f.fault && worst.back().line == f.line)
+                worst.back() = f;
+            else worst.push_back(f);
+        faults = std::move(worst);
+    }
+
+    TileResult run_tile(int i0, int j0, const CellGrid& grid, SimulationReport& report) const {
         TileResult result;
         result.programs.resize(prepared_.size());
         result.layers.resize(input_.layers.size());
-        const CellGrid grid{input_.stock_min[0] + (i0 + 0.5) * cell_,
-                            input_.stock_min[1] + (j0 + 0.5) * cell_, cell_, nx, ny};
         Stock stock(grid);
         LevelMotions level(grid);
         std::size_t next = 0;
@@ -489,6 +505,7 @@ private:
                 if (prepared_[next].tool &&
                     run_program(prepared_[next], stock, top, level, result.programs[next]))
                     top = stock.highest();
+                result.programs[next].top_after = top;
             }
         }
         for (std::size_t c = 0; c < grid.count(); ++c)
@@ -582,12 +599,20 @@ private:
             out.lowest = std::min(out.lowest, e.lowest);
             out.most = std::max(out.most, e.deepest);
             const Point3 where{e.where[0], e.where[1], low};
+            const auto fault = [&](FaultyMotion::Fault what, double size) {
+                if (options_.faults) out.faults.push_back({what, b.line, size});
+            };
+            if (b.rapid() && e.deepest > kTaken) fault(FaultyMotion::Fault::rapid, e.deepest);
             if (b.rapid() && e.deepest > kTaken && e.deepest > out.rapid.size)
                 out.rapid = {e.deepest, where}, out.rapid_line = b.line;
-            if (e.deepest > out.deepest.size && static_cast<double>(e.deep_cells) * cell_ * cell_ > wide &&
-                e.deep_across >= kAbreast)
+            const bool is_deep =
+                static_cast<double>(e.deep_cells) * cell_ * cell_ > wide && e.deep_across >= kAbreast;
+            if (is_deep && e.deepest > deep) fault(FaultyMotion::Fault::too_deep, e.deepest);
+            if (is_deep && e.deepest > out.deepest.size)
                 out.deepest = {e.deepest, where}, out.deepest_line = b.line;
             const double over = e.highest - low - tool.flute_length;
+            if (tool.flute_length > 0 && over > kStanding)
+                fault(FaultyMotion::Fault::too_deep, e.highest - low);
             if (tool.flute_length > 0 && over > kStanding && over > out.over_flute.size)
                 out.over_flute = {over, where}, out.over_flute_line = b.line;
         };
@@ -673,6 +698,8 @@ private:
                 std::array<double, 2> where{};
                 const double reach =
                     stock.reach(thick, {a.x, a.y, a.z + above}, {b.x, b.y, b.z + above}, where);
+                if (options_.faults && reach > kStanding)
+                    out.faults.push_back({FaultyMotion::Fault::in_standing, b.line, reach});
                 if (reach > kStanding && reach > extreme.size)
                     extreme = {reach, {where[0], where[1], low + above}}, line = b.line;
             };
@@ -691,6 +718,9 @@ private:
         }
         cut_level();
         out.core = core.findings();
+        if (options_.faults)
+            for (const auto& [line, over] : out.core.lines)
+                out.faults.push_back({FaultyMotion::Fault::crush, line, over});
         return any;
     }
 
@@ -723,6 +753,12 @@ private:
         return static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i);
     }
 
+    /// Below which no tool goes in a layer, mm.
+    [[nodiscard]] double lowest_tip(std::size_t l) const {
+        return l == 0 && options_.board_cut >= 0 ? input_.layers[l].z_bottom - options_.board_cut
+                                                 : -std::numeric_limits<double>::infinity();
+    }
+
     /// Compares one layer's stock with the part's envelope, when all programs of all layers have run.
     void measure_layer(std::size_t l, const Stock& stock, const std::vector<float>& envelope,
                        TileResult& result, int i0, int j0, SimulationReport& report) const {
@@ -732,8 +768,7 @@ private:
         TileLayer& out = result.layers[l];
         LayerFindings& f = out.findings;
         const double limit = options_.cusp + options_.slack;
-        const double lowest = l == 0 && options_.board_cut >= 0 ? layer.z_bottom - options_.board_cut
-                                                                : -std::numeric_limits<double>::infinity();
+        const double lowest = lowest_tip(l);
         Reach reach(part_, input_.tools, layer.z_bottom, layer.z_top, lowest);
         const StandingHeights surface = stock.standing(l);
         const auto covered =
@@ -858,6 +893,7 @@ private:
             return CellKind::unreachable;
         }
         ++f.missed;
+        if (options_.faults) f.missed_places.push_back({s, over, height});
         // Only the most matters, so a cell that cannot exceed it is not asked.
         if (over > f.missed_left.size) {
             double low = limit, high = over;
@@ -964,7 +1000,7 @@ private:
                                     "deeper than {:.4f} mm",
                                     l + 1, f.gouge.size, static_cast<double>(f.gouge_cells) * cell_ * cell_,
                                     options_.gouge),
-                        nullptr, 0, f.gouge.where, f.gouge.size);
+                        nullptr, 0, f.gouge.where, f.gouge.size, l);
         }
         for (std::size_t l = 0; l < report.layers.size(); ++l) {
             const LayerFindings& f = report.layers[l];
@@ -974,12 +1010,12 @@ private:
                                     "mm3 of it waste beside the pattern)",
                                     l + 1, f.missed_left.size, static_cast<double>(f.missed) * cell_ * cell_,
                                     f.waste_mm3),
-                        nullptr, 0, f.missed_left.where, f.missed_left.size);
+                        nullptr, 0, f.missed_left.where, f.missed_left.size, l);
             if (f.within_share < options_.leftover_share)
                 violate(report, "left.missed",
                         fmt::format("layer {}: only {:.3f} % of what tools reach is within {:.3f} mm", l + 1,
                                     100 * f.within_share, options_.cusp + options_.slack),
-                        nullptr, 0, f.missed_left.where, f.missed_left.size);
+                        nullptr, 0, f.missed_left.where, f.missed_left.size, l);
         }
     }
 
@@ -1006,6 +1042,9 @@ private:
     const SimulationInput& input_;
     SimulationOptions options_;
     const StandingPart& part_;
+    SimulationMemory* memory_;                      // may be null
+    std::optional<ProgramChanges> changes_;         // against the memory, where that is of this stage
+    std::vector<CheckedProgram> checked_programs_;  // for the memory
     double cell_ = 1;
     double checked_ = 0;  // of the progress, when all moves have been checked
     int nx_ = 0, ny_ = 0;
@@ -1054,8 +1093,8 @@ double simulation_cell(const std::vector<Tool>& tools, double cusp) {
 }
 
 SimulationReport simulate(Context& context, const SimulationInput& input, const StandingPart& part,
-                          const SimulationOptions& options) {
-    return Simulation(context, input, part, options).run();
+                          const SimulationOptions& options, SimulationMemory* memory) {
+    return Simulation(context, input, part, options, memory).run();
 }
 
 }  // namespace slabwright

@@ -44,6 +44,7 @@ struct SimulationOptions {
     double leftover_limit = 0.5;    ///< mm that nothing reachable may exceed
     double leftover_share = 0.999;  ///< of the surface must be within cusp + slack, of what is reachable
     double board_cut = -1;          ///< mm allowed into the base board; negative: not limited
+    bool faults = false;            ///< list every faulty motion and every place where something is left
     bool maps = false;  ///< keep left-over, gouge and kind of every point, LayerFindings::map and kinds
 };
 
@@ -67,6 +68,7 @@ struct Violation {
     std::uint32_t line = 0;
     std::optional<Point3> where;
     double size = 0;  ///< mm, or a count where the message says so
+    std::optional<std::size_t> layer{};  ///< 0 …, where it shows in the stock of one
 };
 
 /// What a point of the stock is, when everything has been cut.
@@ -78,6 +80,26 @@ enum class CellKind : std::uint8_t {
     unreachable,  ///< more than that, and none can
     gouge,        ///< deeper than the tolerance in the part
     flask
+};
+
+/// A motion that does what it must not, for whoever mends the program.
+struct FaultyMotion {
+    enum class Fault : std::uint8_t {
+        crush,       ///< the core comes down on stock
+        rapid,       ///< a rapid takes stock
+        too_deep,    ///< takes more at once than its flutes are long, or more than is planned
+        in_standing  ///< shank or holder run into standing stock
+    } fault{};
+    std::uint32_t line = 0;
+    double size = 0;  ///< mm: what stood there, or the whole depth of the cut
+    friend auto operator<=>(const FaultyMotion&, const FaultyMotion&) = default;
+};
+
+/// A point of the finished stock over which a tool could have taken more.
+struct MissedPlace {
+    Point3 surface{};   ///< of the stock, mm
+    double left = 0;    ///< mm along the normal
+    double height = 0;  ///< mm straight down to the part's surface or the layer's bottom
 };
 
 /// One layer when everything has been cut. Points are the stock's cells; shares are of all the slab's.
@@ -104,6 +126,9 @@ struct LayerFindings {
     /// normal.
     std::vector<float> map;
     std::vector<CellKind> kinds;  ///< the same points
+    /// With SimulationOptions::faults: what `missed` counts, by tile.
+    std::vector<MissedPlace> missed_places;
+    double lowest_tip = 0;  ///< mm: no tool goes deeper in this layer; −∞ where the part alone limits it
 };
 
 /// One program.
@@ -128,7 +153,11 @@ struct ProgramFindings {
     double lowest = 0;     ///< z of the lowest point cut; the layer's top if none
     double stock_top = 0;  ///< z of the highest stock when the program starts
     std::uint32_t spindle_off_line = 0;
+    /// With SimulationOptions::faults: by fault and line, each line once with the most of all tiles.
+    std::vector<FaultyMotion> faults;
 };
+
+struct SimulationMemory;
 
 struct SimulationReport {
     double cell = 0;
@@ -158,10 +187,14 @@ struct SimulationReport {
 /// Runs everything. Stock at the cells' centres is exact, not sampled, so a gouge or left-over is what stands
 /// there; between the centres the exact check of every motion decides about gouges.
 /// @param part of the input's mesh
+/// @param memory of an earlier simulation, or an empty one (engine/simulate/simulation_memory.h): what has
+/// not changed since is not simulated again, and the report is the same. It then holds what the next one
+/// needs, but for the programs, which the caller gives it.
 /// @throws Error(usage) on layers or stock that make no sense, Error(no_plan, "memory.limit"),
 /// Error(cancelled)
 [[nodiscard]] SimulationReport simulate(Context& context, const SimulationInput& input,
-                                        const StandingPart& part, const SimulationOptions& options = {});
+                                        const StandingPart& part, const SimulationOptions& options = {},
+                                        SimulationMemory* memory = nullptr);
 
 /// Time of a program in seconds, by the rules of Travel (engine/moves/motion_time.h), its dwell included.
 /// @param before the program that the machine ran before: from its end the spindle comes, and its tool need
