@@ -142,6 +142,7 @@ struct Layer {
     std::string reason;  ///< why z_top lies where it lies, in words
     std::vector<Operation> operations;
     std::optional<LayerSelection> selection;  ///< none where there was nothing to select
+    int rounds = 0;             ///< how often a proof had it planned again (engine/planner/replan.h)
     std::vector<Joint> joints;  ///< upwards: under its lowest slab, on the board or the layer below; then
                                 ///< between its slabs
 };

@@ -12,13 +12,18 @@
 #include <filesystem>
 #include <fstream>
 #include <new>
+#include <optional>
+#include <set>
 
 #include "engine/planner/planner.h"
+#include "engine/planner/replan.h"
+#include "engine/simulate/simulation_memory.h"
 #include "engine/simulate/work.h"
 #include "engine/tool_choice/access_map.h"
 #include "engine/tools/tools.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/tool_table.h"
+#include "io/proof.h"
 #include "io/read/input_file.h"
 #include "io/read/job_toml.h"
 #include "io/read/pattern.h"
@@ -103,6 +108,22 @@ Plan plan(Context& context, const PatternSource& source, const Job& job) {
     return plan(context, *read_pattern(context, source, job), job);
 }
 
+namespace {
+
+/// The engine knows no file; the user wants to hear of it.
+template <class Body>
+auto naming_file(const std::string& path, Body&& body) -> decltype(body()) {
+    try {
+        return body();
+    } catch (const Error& error) {
+        if (error.kind() != ErrorKind::no_plan) throw;
+        throw Error(error.kind(), error.code(), error.message(),
+                    error.place().empty() ? path : path + ", " + error.place(), error.remedy());
+    }
+}
+
+}  // namespace
+
 Plan plan(Context& context, const Pattern& pattern, const Job& job) {
     return guarded([&] {
         validate(job);
@@ -114,16 +135,7 @@ Plan plan(Context& context, const Pattern& pattern, const Job& job) {
                 "was read with other units, another tolerance of welding or another repair than the job's",
                 place, "read the pattern with the job that it is planned with");
         require_solid(context, read, place);
-        const auto planned = [&] {
-            try {
-                return make_plan(context, read.mesh, read.input, job);
-            } catch (const Error& error) {  // the engine knows no file; the user wants to hear of it
-                if (error.kind() != ErrorKind::no_plan) throw;
-                throw Error(error.kind(), error.code(), error.message(),
-                            error.place().empty() ? place : place + ", " + error.place(), error.remedy());
-            }
-        };
-        Plan result = planned();
+        Plan result = naming_file(place, [&] { return make_plan(context, read.mesh, read.input, job); });
         result.diagnostics.insert(result.diagnostics.begin(), read.diagnostics.begin(),
                                   read.diagnostics.end());
         if (!reports_are_built())
@@ -136,17 +148,24 @@ Plan plan(Context& context, const Pattern& pattern, const Job& job) {
 namespace {
 
 // All of a plan but what is found about it, into a folder under way.
-void fill(Context& context, const Plan& plan, const OutputFolder& out) {
+// @param other for each layer whether its programs are other than those that the folder holds; empty: all are
+void fill(Context& context, const Plan& plan, const OutputFolder& out, const std::vector<bool>& other = {}) {
     struct PlannedProgram {
         const Layer* layer;
         const Operation* operation;
     };
     std::vector<PlannedProgram> programs;
-    for (const Layer& layer : plan.layers)
-        for (const Operation& operation : layer.operations) programs.push_back({&layer, &operation});
-    context.begin_phase("writing", 0.985, 1.0, programs.size() + 1);
     const std::filesystem::path programs_folder = out.path() / "nc";
     std::filesystem::create_directory(programs_folder);
+    std::set<std::string> stale;  // what the folder holds and the plan does not name
+    for (const auto& entry : std::filesystem::directory_iterator(programs_folder))
+        stale.insert(entry.path().filename().string());
+    for (std::size_t l = 0; l < plan.layers.size(); ++l)
+        for (const Operation& operation : plan.layers[l].operations)
+            if (stale.erase(operation.file) == 0 || other.empty() || other[l])
+                programs.push_back({&plan.layers[l], &operation});
+    for (const std::string& file : stale) std::filesystem::remove(programs_folder / file);
+    context.begin_phase("writing", 0.985, 1.0, programs.size() + 1);
     // Each program is a file of its own, so threads cannot mix their texts.
     parallel_each(context, programs.size(), [&](std::size_t i) {
         OutputFile file(programs_folder, programs[i].operation->file);
@@ -269,6 +288,50 @@ VerifyResult write_verified(Context& context, const Plan& plan, const std::strin
                             const std::shared_ptr<Pattern>& pattern, double cell_mm) {
     return write_and_verify(context, plan, directory,
                             {.source = pattern->place, .pattern = pattern, .cell = cell_mm});
+}
+
+VerifyResult write_proven(Context& context, Plan& plan, const std::string& directory,
+                          const std::shared_ptr<Pattern>& pattern, bool keep_failed, double cell_mm) {
+    return guarded([&] {
+        check_cell(cell_mm);
+        VerifyOptions options{.source = pattern->place, .pattern = pattern, .cell = cell_mm};
+        options.faults = true;
+        SimulationMemory memory;  // what a round does not change is not simulated again
+        options.memory = &memory;
+        OutputFolder out(directory);
+        fill(context, plan, out);
+        const bool reports = reports_are_built();
+        const double verified = reports ? verifying_share(plan, cell_mm) : 1;
+        context.share_progress(kPlanningShare, verified);
+        Verification found = verify_folder(context, out.path().string(), options);
+        // What did not pass goes back into the layers that it was found in. The text is the judge every time.
+        std::optional<Replanner> replanner;
+        for (int round = 1; round <= kProofRounds && !found.report.passed() && is_of_the_part(found.report);
+             ++round) {
+            context.share_progress(verified, verified);
+            if (!replanner) replanner.emplace(context, found.pattern->read.mesh.view(), *found.pattern->part);
+            const std::vector<LayerFaults> faults = faults_of(plan, found);
+            if (faults.empty()) break;
+            const std::vector<bool> other =
+                naming_file(pattern->place, [&] { return replanner->mend(plan, faults, round); });
+            fill(context, plan, out, other.empty() ? std::vector<bool>(plan.layers.size()) : other);
+            if (other.empty()) break;
+            memory.programs = std::move(found.input.programs);
+            found = {};
+            found = verify_folder(context, out.path().string(), options);
+        }
+        VerifyResult result = verdict(found);
+        if (!result.passed && !keep_failed && is_of_the_part(found.report)) {
+            result.written = false;
+            result.refusals = refusals_of(found.report, pattern->place);
+            return result;
+        }
+        context.share_progress(verified, 1);
+        if (reports) write_report(context, out.path().string(), {options.source}, std::move(found));
+        context.throw_if_cancelled();
+        out.commit();
+        return result;
+    });
 }
 
 void write_access_maps(Context& context, const Plan& plan, const PatternSource& source,

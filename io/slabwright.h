@@ -15,6 +15,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -121,7 +122,10 @@ struct VerifyResult {
     double cell_mm = 0;   ///< between the points of the simulated stock
     double minutes = 0;   ///< of all programs on the plan's machine
     std::vector<Diagnostic>
-        violations;  ///< what must not be, with program, line and place; empty when passed
+        violations;       ///< what must not be, with program, line and place; empty when passed
+    bool written = true;  ///< false: write_proven() has written nothing
+    /// Why not: for each violation an error of kind no_plan with its place and what may help.
+    std::vector<Error> refusals;
 };
 
 /// Writes as write() does, and verifies what it wrote before it takes its place: `directory` then holds
@@ -138,6 +142,18 @@ struct VerifyResult {
                                                          const std::string& directory,
                                                          const std::shared_ptr<Pattern>& pattern,
                                                          double cell_mm = 0);
+
+/// Writes as write_verified() does, but what the simulation finds wrong goes back into the plan first: the
+/// layers that it was found in get other programs and are simulated again, four times at most. `plan` is then
+/// what was written; each layer's Layer::rounds says how often that was, and diagnostics "proof.round" why.
+/// Where that does not help, nothing is written and the result holds refusals.
+/// @param plan of plan(), of this pattern
+/// @param keep_failed also writes programs that do not make the part; the result then has not passed
+/// @throws as write_verified(), and as plan() of what the other programs make of joints, travel and mass
+[[nodiscard]] SLABWRIGHT_API VerifyResult write_proven(Context& context, Plan& plan,
+                                                       const std::string& directory,
+                                                       const std::shared_ptr<Pattern>& pattern,
+                                                       bool keep_failed = false, double cell_mm = 0);
 
 /// Simulates the programs in `directory` against the pattern, from the folder's text alone, and writes
 /// verify.json into it.
@@ -189,7 +205,7 @@ SLABWRIGHT_API RepairResult repair(Context& context, const PatternSource& source
 /// Results and errors as JSON, for programs that call the command or serve its answers: an error on one line;
 /// what a plan in `directory` holds and, where it was verified, what was found; what a repair did that wrote
 /// `out`; what the report is called.
-[[nodiscard]] SLABWRIGHT_API std::string error_json(const Error& error);
+[[nodiscard]] SLABWRIGHT_API std::string error_json(const Error& error, std::span<const Error> also = {});
 [[nodiscard]] SLABWRIGHT_API std::string plan_summary_json(const Plan& plan, const std::string& directory,
                                                            const VerifyResult* found);
 [[nodiscard]] SLABWRIGHT_API std::string repair_summary_json(const RepairResult& result,

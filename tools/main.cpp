@@ -15,6 +15,7 @@
 #include <iostream>
 #include <map>
 #include <new>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -38,8 +39,8 @@ struct Options {
     std::string repair, stl, out, maps, access_maps, job_file, units, strategy, finder, device, library;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
-    bool allow_undercut = false, accept_weak = false, no_verify = false, json = false, quiet = false,
-         defaults = false, weld_given = false, no_3d = false, rebuild = false;
+    bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
+         quiet = false, defaults = false, weld_given = false, no_3d = false, rebuild = false;
 };
 
 /// A bar with phase and time left, redrawn at most ten times a second on a terminal's last line.
@@ -74,10 +75,12 @@ private:
     bool drawn_ = false;
 };
 
-int complain(const Error& error, bool as_json) {
+/// @param also further errors of the same kind, which JSON names in the same object
+int complain(const Error& error, bool as_json, std::span<const Error> also = {}) {
     // One error, one line, whatever a file name or a parser's message holds.
-    const std::string line =
-        as_json ? error_json(error) : terminal_text(fmt::format("slabwright: {}", error.what()), true) + '\n';
+    const std::string line = as_json
+                                 ? error_json(error, also)
+                                 : terminal_text(fmt::format("slabwright: {}", error.what()), true) + '\n';
     std::fwrite(line.data(), 1, line.size(), stderr);
     return static_cast<int>(error.kind());
 }
@@ -240,15 +243,16 @@ void with_context(const Options& options, Body&& body) {
     if (!options.quiet) print(output);
 }
 
-/// Returns whether the programs make the part, as far as that was asked.
-bool run_plan(const Options& options) {
+/// Returns the exit code: whether the programs make the part, as far as that was asked.
+int run_plan(const Options& options) {
     const Job job = job_of(options);
     require_replaceable(options.out);  // before an hour of planning, not after it
-    bool passed = true;
+    VerifyResult found;
+    found.passed = true;
     with_context(options, [&](Context& context) {
         if (!options.no_verify) context.share_progress(0, kPlanningShare);
         std::shared_ptr<Pattern> pattern = read_pattern(context, options.stl, job);
-        const Plan result = plan(context, *pattern, job);
+        Plan result = plan(context, *pattern, job);
         if (!options.access_maps.empty())
             write_access_maps(context, result, options.stl, options.access_maps);
         if (options.no_verify) {
@@ -257,12 +261,18 @@ bool run_plan(const Options& options) {
             return options.json ? plan_summary_json(result, options.out, nullptr)
                                 : summary(result, options.out);
         }
-        const VerifyResult found = write_verified(context, result, options.out, pattern, options.cell);
-        passed = found.passed;
+        found = write_proven(context, result, options.out, pattern, options.keep_failed, options.cell);
+        if (!found.written) return std::string();
         return options.json ? plan_summary_json(result, options.out, &found)
                             : summary(result, options.out) + verdict(found, options.out);
     });
-    return passed;
+    const std::span<const Error> refusals(found.refusals);
+    if (options.json && !refusals.empty()) return complain(refusals[0], true, refusals.subspan(1));
+    constexpr std::size_t shown = 20;  // one line each
+    for (const Error& e : refusals.first(std::min(shown, refusals.size()))) complain(e, false);
+    if (refusals.size() > shown) std::fprintf(stderr, "slabwright: %zu more\n", refusals.size() - shown);
+    if (!found.written) return static_cast<int>(ErrorKind::no_plan);
+    return found.passed ? 0 : static_cast<int>(ErrorKind::verification);
 }
 
 /// A report that lies in the folder is made again, as light or as full as it was, so that it tells what the
@@ -398,6 +408,8 @@ int command(int argc, char** argv) {
 
     plan_command->add_option("--access-maps", options.access_maps,
                              "folder for what each tool reaches of each layer's facets, as PLY");
+    plan_command->add_flag("--keep-failed", options.keep_failed,
+                           "write the programs also where they do not make the part (exit code 5)");
     plan_command->add_flag("--no-verify", options.no_verify,
                            "write the plan without simulating its programs");
 
@@ -479,7 +491,7 @@ int command(int argc, char** argv) {
                         json_wanted);
     }
     try {
-        if (*plan_command) return run_plan(options) ? 0 : static_cast<int>(ErrorKind::verification);
+        if (*plan_command) return run_plan(options);
         else if (*verify_command) return run_verify(options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*report_command) run_report(options);
         else if (*inspect_command) run_inspect(options);

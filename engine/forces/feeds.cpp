@@ -451,7 +451,7 @@ double bending_limit(const Operation& operation, const Job& job) {
 }
 
 LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const OverhangMap* overhang,
-                      std::vector<Diagnostic>& diagnostics, KnownCuts* known_cuts) {
+                      std::vector<Diagnostic>& diagnostics, KnownCuts* known_cuts, FeedChange change) {
     const Job& job = plan.job;
     StandingSlab slab(plan.stock_min, plan.stock_max, layer.z_bottom, layer.z_bottom + layer.slab_thickness,
                       StandingSlab::cell_for(job, plan.stock_min, plan.stock_max));
@@ -475,6 +475,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                         op.purpose, "give the tool a speed");
         BentCutter cutting(job, op, tool, known_cuts);
         const double limit = bending_limit(op, job);
+        const bool never_faster = roughs(op.kind) || change == FeedChange::lower;
         std::size_t looked_at = 0;
         const auto cutter_share = [&](const Bent& bent) {
             const double wall = bent.wall_mm / limit;
@@ -515,7 +516,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             const auto [it, fresh] = known.try_emplace(key);
             if (fresh) {
                 // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
-                const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
+                const double most = never_faster || planned <= tool.plunge_feed ? planned : fastest;
                 const double chip =
                     std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.coarse)));
                 std::vector<FeedStep>& steps = it->second.steps;
@@ -557,7 +558,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         const auto choose = [&](Seen& s) {
             const std::uint32_t planned = op.moves[s.last].feed;
             if (!s.cuts) {
-                const double most = roughs(op.kind) || planned <= tool.plunge_feed ? planned : fastest;
+                const double most = never_faster || planned <= tool.plunge_feed ? planned : fastest;
                 s.feed = job.cutting.adapt_feed ? static_cast<std::uint32_t>(most) : planned;
                 return;
             }

@@ -1,6 +1,7 @@
 // The forces of every stretch of a layer's programs, and feeds that fit them (METHOD.md sections 8 and 9).
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 
@@ -48,6 +49,12 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
+/// What adapt_layer may do to the feeds, where the job adapts them.
+enum class FeedChange : std::uint8_t {
+    any,
+    lower  ///< of a layer whose feeds have been adapted before: faster than that they were found too fast
+};
+
 /// Runs a layer's operations, in their order, through a standing slab. Three things are looked at for every
 /// stretch: what the bending cutter leaves on a wall against the operation's limit, the cutter's stress
 /// against its strength where the job states one, and, where the slab hangs over, the wood against what the
@@ -71,7 +78,7 @@ private:
 /// "forces.segment"); Error(cancelled)
 [[nodiscard]] LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan,
                                     const OverhangMap* overhang, std::vector<Diagnostic>& diagnostics,
-                                    KnownCuts* known = nullptr);
+                                    KnownCuts* known = nullptr, FeedChange change = FeedChange::any);
 
 /// Sets of every operation peak_force_n (resultant), deflection_mm (of the tip, in the plane), wall_error_mm
 /// (normal to the way), peak_at and peak_move, from the closed form or the double reference; many cuts are

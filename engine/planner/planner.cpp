@@ -16,6 +16,7 @@
 #include "engine/layers/layers.h"
 #include "engine/moves/motion_time.h"
 #include "engine/planner/layer_plan.h"
+#include "engine/planner/rating.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
@@ -249,39 +250,6 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
                at_once;
 }
 
-// Lengths and times of an operation; its forces too where the job takes cuts as nominal.
-void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnostic>& diagnostics) {
-    const MotionTime time = motion_time(op.moves, job.machine, op.blend);
-    op.cutting_mm = time.cutting_mm;
-    op.rapid_mm = time.rapid_mm;
-    op.minutes = time.minutes + job.machine.spindle_dwell_s / 60;
-    if (job.cutting.engagement == Engagement::simulated) return;
-    const auto tool =
-        std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
-    rate_operation(op, *tool, job);
-    const double allowance = bending_limit(op, job);
-    if (op.kind == OperationKind::rough && op.deflection_mm > allowance)
-        diagnostics.push_back({Severity::warning,
-                               "rough.deflection",
-                               fmt::format("layer {}: the roughing cutter may bend by {:.3f} mm, more than "
-                                           "the {:.3f} mm it leaves for finishing",
-                                           layer.index, op.deflection_mm, allowance),
-                               {}});
-}
-
-// Every program begins where the one before has ended.
-void add_approaches(Plan& plan) {
-    const Move* end = nullptr;
-    for (Layer& layer : plan.layers)
-        for (Operation& op : layer.operations) {
-            if (op.moves.empty()) continue;
-            if (end)
-                op.minutes +=
-                    approach_seconds(place_of(*end), place_of(op.moves.front()), plan.job.machine) / 60;
-            end = &op.moves.back();
-        }
-}
-
 // The programs of all layers, with their diagnostics.
 // @param joints what each layer lies on is that of its first
 void cut_layers(Context& context, Plan& plan, MeshView pattern,
@@ -342,19 +310,6 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
                     [](const Layer& layer) { return layer.operations.empty(); }))
         throw refusal("plan.empty", "nothing would be cut", plan.input.file, "check the units and the slabs");
     check_travel(plan);
-}
-
-// The first joint that cannot hold is a refusal, unless the job accepts it; all others are warned of.
-void settle_joints(Plan& plan, const std::vector<std::vector<WeakJoint>>& found) {
-    for (const std::vector<WeakJoint>& of_layer : found)
-        for (const WeakJoint& weak : of_layer) {
-            if (weak.refused && !plan.job.bonding.accept_weak)
-                throw refusal(
-                    weak.code.c_str(), weak.message,
-                    fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", weak.where[0], weak.where[1], weak.where[2]),
-                    weak.remedy + ", or accept it with --accept-weak-joints");
-            plan.diagnostics.push_back({Severity::warning, weak.code, weak.message, weak.where});
-        }
 }
 
 // Glue and press of every joint.

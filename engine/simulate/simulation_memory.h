@@ -10,12 +10,14 @@
 
 #include "engine/simulate/core_contact.h"
 #include "engine/simulate/simulate.h"
+#include "kernels/geometry/vectors.h"
 
 namespace slabwright {
 
 /// The least box over some places, mm.
 struct StepBox {
-    double x0 = kUnbounded, y0 = kUnbounded, x1 = -kUnbounded, y1 = -kUnbounded, z0 = kUnbounded, z1 = -kUnbounded;
+    double x0 = kUnbounded, y0 = kUnbounded, x1 = -kUnbounded, y1 = -kUnbounded, z0 = kUnbounded,
+           z1 = -kUnbounded;
     void add(const ProgramStep& s) {
         x0 = std::min(x0, s.x), x1 = std::max(x1, s.x);
         y0 = std::min(y0, s.y), y1 = std::max(y1, s.y);

@@ -128,8 +128,9 @@ std::string comment_text(std::string_view text) {
 namespace {
 
 // As write_program; stops before the first line after move `until`, with a piece that ends there.
+// @param lines gets the line of each move, 0 where it has none; may be null
 void write_until(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink,
-                 std::size_t until) {
+                 std::size_t until, std::vector<std::uint32_t>* lines = nullptr) {
     const std::vector<Tool>& tools = plan.job.tools;
     const auto tool =
         std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == operation.tool; });
@@ -159,11 +160,20 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
     const std::int32_t clearance = to_units(operation.clearance_z);
     MotionText motion(text, layer_top ? to_units(layer.z_top) : 0);
     motion.rapid_z(clearance);
+    auto line = static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
+    if (lines != nullptr) lines->assign(moves.size(), 0);
+    const auto write = [&](std::size_t i) {
+        const std::size_t size = text.size();
+        motion.move(moves[i]);
+        if (text.size() == size) return;
+        ++line;
+        if (lines != nullptr) (*lines)[i] = line;
+    };
     // The first move's x and y are where the program's work starts. The next move goes there by itself when
     // it is a rapid at clearance height; else the tool is brought over that place before it may go down.
-    if (moves[1].feed != 0 || moves[1].z != clearance) motion.move(moves[0]);
+    if (moves[1].feed != 0 || moves[1].z != clearance) write(0);
     for (std::size_t i = 1; i + 1 < moves.size(); ++i) {
-        motion.move(moves[i]);
+        write(i);
         if (text.size() >= kPiece || i == until) {
             sink(text);
             text.clear();
@@ -195,6 +205,13 @@ std::size_t program_line(const Plan& plan, const Layer& layer, const Operation& 
     };
     const std::size_t line = lines(move);
     return move == 1 || lines(move - 1) < line ? line : 0;
+}
+
+std::vector<std::uint32_t> move_lines(const Plan& plan, const Layer& layer, const Operation& operation) {
+    std::vector<std::uint32_t> lines;
+    write_until(
+        plan, layer, operation, [](std::string_view) {}, operation.moves.size(), &lines);
+    return lines;
 }
 
 std::string program_text(const Plan& plan, const Layer& layer, const Operation& operation) {

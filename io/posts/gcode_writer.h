@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "engine/plan.h"
 
@@ -26,6 +28,11 @@ using TextSink = std::function<void(std::string_view)>;
 ///         the last one Z-only, has no tool of the job's library, or an arc is none (Move); nothing has been
 ///         given to the sink then
 void write_program(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink);
+
+/// Of each move of an operation the line of its program (1 …) that makes it; 0 where none does.
+/// @throws as write_program
+[[nodiscard]] std::vector<std::uint32_t> move_lines(const Plan& plan, const Layer& layer,
+                                                    const Operation& operation);
 
 /// The same text as one string.
 [[nodiscard]] std::string program_text(const Plan& plan, const Layer& layer, const Operation& operation);

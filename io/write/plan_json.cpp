@@ -208,6 +208,7 @@ void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     json.key("slab_thickness").exact(layer.slab_thickness);
     json.key("slabs").integer(layer.slabs);
     json.key("reason").string(layer.reason);
+    json.key("rounds").integer(layer.rounds);
     json.key("selection");
     put_selection(json, layer.selection);
     const Joint own = layer.joints.empty() ? Joint{} : layer.joints.front();

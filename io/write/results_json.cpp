@@ -25,12 +25,25 @@ const char* kind_name(ErrorKind kind) {
 
 }  // namespace
 
-std::string error_json(const Error& error) {
+std::string error_json(const Error& error, std::span<const Error> also) {
     JsonText json;
+    const auto put = [&](const Error& e) {
+        json.key("code").string(e.code()).key("message").string(e.message());
+        json.key("place").string(e.place()).key("remedy").string(e.remedy());
+    };
     json.begin_object(JsonText::Shape::line).key("error").begin_object();
     json.key("kind").string(kind_name(error.kind())).key("exit").integer(static_cast<int>(error.kind()));
-    json.key("code").string(error.code()).key("message").string(error.message());
-    json.key("place").string(error.place()).key("remedy").string(error.remedy()).end().end();
+    put(error);
+    if (!also.empty()) {
+        json.key("also").begin_array(JsonText::Shape::line);
+        for (const Error& e : also) {
+            json.begin_object(JsonText::Shape::line);
+            put(e);
+            json.end();
+        }
+        json.end();
+    }
+    json.end().end();
     return json.take();
 }
 

@@ -1,0 +1,60 @@
+#include "engine/planner/rating.h"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include "engine/forces/feeds.h"
+#include "engine/forces/op_forces.h"
+#include "engine/moves/motion_time.h"
+#include "engine/schedule/fit.h"
+
+namespace slabwright {
+
+void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnostic>& diagnostics) {
+    const MotionTime time = motion_time(op.moves, job.machine, op.blend);
+    op.cutting_mm = time.cutting_mm;
+    op.rapid_mm = time.rapid_mm;
+    op.minutes = time.minutes + job.machine.spindle_dwell_s / 60;
+    if (job.cutting.engagement == Engagement::simulated) return;
+    const auto tool =
+        std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+    rate_operation(op, *tool, job);
+    const double allowance = bending_limit(op, job);
+    if (op.kind == OperationKind::rough && op.deflection_mm > allowance)
+        diagnostics.push_back({Severity::warning,
+                               "rough.deflection",
+                               fmt::format("layer {}: the roughing cutter may bend by {:.3f} mm, more than "
+                                           "the {:.3f} mm it leaves for finishing",
+                                           layer.index, op.deflection_mm, allowance),
+                               {}});
+}
+
+void add_approaches(Plan& plan, const std::vector<bool>& rated) {
+    const Move* end = nullptr;
+    for (std::size_t l = 0; l < plan.layers.size(); ++l)
+        for (Operation& op : plan.layers[l].operations) {
+            if (op.moves.empty()) continue;
+            if (end && (rated.empty() || rated[l]))
+                op.minutes +=
+                    approach_seconds(place_of(*end), place_of(op.moves.front()), plan.job.machine) / 60;
+            end = &op.moves.back();
+        }
+}
+
+void settle_joints(Plan& plan, const std::vector<std::vector<WeakJoint>>& found) {
+    for (const std::vector<WeakJoint>& of_layer : found)
+        for (const WeakJoint& weak : of_layer) {
+            if (weak.refused && !plan.job.bonding.accept_weak)
+                throw refusal(
+                    weak.code.c_str(), weak.message,
+                    fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", weak.where[0], weak.where[1], weak.where[2]),
+                    weak.remedy + ", or accept it with --accept-weak-joints");
+            Diagnostic told{Severity::warning, weak.code, weak.message, weak.where};
+            if (std::find(plan.diagnostics.begin(), plan.diagnostics.end(), told) == plan.diagnostics.end())
+                plan.diagnostics.push_back(std::move(told));
+        }
+}
+
+}  // namespace slabwright
