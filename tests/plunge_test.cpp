@@ -179,7 +179,7 @@ TEST(Plunge, NoRunIsEnteredOnItsCore) {
             around.from_side = tool.kind == ToolKind::face && round % 2 == 0;
             path.know(around);
             for (int k = 0; k < 13; ++k) {
-                const std::vector<PathPoint> run = k == 3 ? random_stairs(random) : random_run(random);
+                const std::vector<PathPoint> run = k == 3 && round % 3 == 0 ? random_stairs(random) : random_run(random);
                 bool free = true;
                 for (std::size_t p = 1; p < run.size() && free; ++p) free = bench.free(run[p - 1], run[p]);
                 if (!free) continue;
@@ -200,6 +200,48 @@ TEST(Plunge, NoRunIsEnteredOnItsCore) {
     EXPECT_GT(followed, 500U);
     EXPECT_LT(left_out, followed / 2) << "most have room for a helix or a ramp";
     EXPECT_GT(sloping, 1000U);
+}
+
+// Where a level above found no way in, more stands than a run may cut at once: it comes down in steps, or stays
+// away.
+TEST(Plunge, NoRunCutsDeeperThanItMay) {
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> unit(0, 1);
+    std::size_t cuts = 0;
+    for (int round = 0; round < 30; ++round) {
+        const Tool& tool = cored_tools()[1];
+        Bench bench(tool);
+        PathBuilder path(bench.operation, tool, 3000, kTop + 10, kTop + 2);
+        Surroundings around = bench.cut.around(tool, &bench.part);
+        around.deepest = 3.5;
+        path.know(around);
+        for (int k = 0; k < 4; ++k) {
+            // Rings about as wide as the cutter: some have room for a ramp.
+            const double x = 60 + 60 * unit(random), y = 200 * unit(random) - 100, r = 0.5 + 8 * unit(random);
+            std::vector<PathPoint> ring;
+            for (int a = 0; a <= 24; ++a) {
+                const double turn = 2 * std::numbers::pi * (a % 24) / 24;
+                ring.push_back({to_units(x + r * std::cos(turn)), to_units(y + r * std::sin(turn)),
+                                to_units(2 + 2.5 * k)});
+            }
+            path.follow(ring);
+        }
+        path.finish();
+        const std::vector<Move>& moves = bench.operation.moves;
+        for (std::size_t k = 1; k < moves.size(); ++k) {
+            const Move &a = moves[k - 1], &b = moves[k];
+            const std::array<double, 3> from{to_mm(a.x), to_mm(a.y), to_mm(a.z)},
+                to{to_mm(b.x), to_mm(b.y), to_mm(b.z)};
+            const CellGrid& grid = bench.stock.grid();
+            double deepest = 0;
+            sweep(grid, {CutterEnd::Form::flat, tool.diameter / 2 - 1.5, 0}, from, to,
+                  [&](std::size_t cell, double z) { deepest = std::max(deepest, bench.stock.top(cell) - z); });
+            EXPECT_LE(deepest, around.deepest + PathBuilder::kBite + 0.05) << round << " move " << k;
+            cuts += deepest > 0.5;
+            bench.stock.cut({CutterEnd::Form::flat, tool.diameter / 2, 0}, from, to);
+        }
+    }
+    EXPECT_GT(cuts, 1000U);
 }
 
 // A run too short for the core is left out, and said to be; one as long as the core is wide is not.

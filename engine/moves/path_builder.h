@@ -27,6 +27,7 @@ struct Surroundings {
     std::array<double, 2> reach_min{-1e9, -1e9};  ///< mm: where the machine's travel takes the tip
     std::array<double, 2> reach_max{1e9, 1e9};
     double lowest_rapid = -1e9;  ///< mm: rapids go no deeper
+    double deepest = 0;          ///< mm that a run may cut at once; 0: any
     bool from_side =
         false;  ///< comes from beside a run where that is possible, rather than on a helix or a ramp
     /// Gets where a run begins that was left out: neither helix nor ramp has room, and the tool does not cut
@@ -57,6 +58,8 @@ public:
     /// Helices and ramps of a tool with a core are so gentle that nothing stands higher under it than its
     /// recess (core_recess), and end on a level turn or leg that clears the rest. Where a run goes down
     /// steeply on standing stock, such a tool enters anew.
+    /// Where more stands than may be cut at once (Surroundings::deepest), since an earlier level found no way in,
+    /// the run is first followed higher up; where that has no way in either, it is left out.
     /// Every point of the run must be free, and so must be what lies straight above it (as of a drop or a
     /// level contour).
     void follow(std::span<const PathPoint> run);
@@ -112,7 +115,9 @@ private:
     [[nodiscard]] double slope_under_core(double way) const;
     [[nodiscard]] double slope_to_and_fro(std::span<const PathPoint> line) const;
     [[nodiscard]] bool comes_down_on_stock(const PathPoint& to);
+    void follow_at_once(std::span<const PathPoint> run);
     [[nodiscard]] std::size_t follow_part(std::span<const PathPoint> run);
+    [[nodiscard]] std::size_t stretch_at_once(std::span<const PathPoint> run, double& top);
     [[nodiscard]] bool straight_is_free(Point2 to, std::int32_t z);
     void descend(const PathPoint& to);
     void land(std::int32_t z);

@@ -246,7 +246,11 @@ std::vector<Operation> rough_layer(const LayerCut& cut) {
     PathBuilder path(op, tool, std::min(tool.max_feed, cut.job.machine.max_feed), clearance,
                      cut.layer.z_top + 2);
     const DropIndex part(cut.solid, cutter);
-    path.know(cut.around(tool, &part));
+    Surroundings around = cut.around(tool, &part);
+    for (std::size_t i = 0; i < steps.size(); ++i)
+        if (!cuts[i].rings.pieces.empty() || !cuts[i].free.empty())
+            around.deepest = std::max(around.deepest, steps[i].above - steps[i].level.tip);
+    path.know(around);
     for (std::size_t i = 0; i < steps.size(); ++i) {
         const double above = steps[i].above, tip = steps[i].level.tip;
         if (!cuts[i].rings.pieces.empty()) {
