@@ -143,8 +143,12 @@ struct Tolerances {
                             ///< the paths; 0: the facets as they are
 };
 
+/// Whether columns of stock stay under what nothing of the pattern carries (engine/schedule/supports).
+enum class SupportRule : std::uint8_t { none, automatic };
+
 struct LayerPlanning {
     LayerStrategy strategy = LayerStrategy::optimal;
+    SupportRule supports = SupportRule::automatic;
     Finder finder = Finder::exact;
     double min_layer = 3.0;          ///< thinnest layer that is not reported
     double alpha = 0.7, beta = 0.3;  ///< Q = α·DT + β·A in inch units, as printed

@@ -170,6 +170,16 @@ struct Flask {
     double opening_mm3 = 0;    ///< of what it encloses, the pattern's volume included
 };
 
+/// A square column of stock, left standing under what nothing of the pattern carries, to be sawn off by hand
+/// (engine/schedule/supports). Millimetres.
+struct Support {
+    int layer = 0;                 ///< the first layer that it carries
+    double x = 0, y = 0;           ///< its middle
+    double width = 0;              ///< its side, along x and y
+    double z_low = 0, z_high = 0;  ///< with what reaches into the wood under and over it
+    friend bool operator==(const Support&, const Support&) = default;
+};
+
 struct Totals {
     int layers = 0, operations = 0, tool_changes = 0;
     double cutting_mm = 0, rapid_mm = 0;
@@ -211,6 +221,7 @@ struct Plan {
     Job job;
     std::array<double, 2> stock_min{}, stock_max{};
     std::optional<Flask> flask;
+    std::vector<Support> supports;
     std::vector<Feature> features;
     std::vector<Layer> layers;
     std::vector<SequenceStep> sequence;

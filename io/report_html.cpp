@@ -199,9 +199,15 @@ PlanFolder read_plan_folder(const fs::path& out) {
 
 PlannedPattern planned_pattern(const PlanFolder& folder) {
     const Json& input = folder.plan.at("input");
+    std::vector<Support> supports;
+    for (const Json& s : folder.plan.value("supports", Json::array()))
+        supports.push_back({s.at("layer").get<int>(), s.at("x").get<double>(), s.at("y").get<double>(),
+                            s.at("width").get<double>(), s.at("z_low").get<double>(),
+                            s.at("z_high").get<double>()});
     return {input.at("file").get<std::string>(),
             input.value("sha256", ""),
-            {folder.units, folder.tolerances.weld, folder.repair}};
+            {folder.units, folder.tolerances.weld, folder.repair},
+            std::move(supports)};
 }
 
 /// Douglas and Peucker on a closed loop, from its first point and the one farthest from that.

@@ -100,7 +100,7 @@ std::shared_ptr<Pattern> read_pattern(Context& context, const PatternSource& sou
         validate(job);
         const ReadingOptions reading = reading_options(job);
         return std::make_shared<Pattern>(
-            Pattern{source.name(), reading, read_pattern_mesh(context, source, reading), {}});
+            Pattern{source.name(), reading, read_pattern_mesh(context, source, reading), {}, {}});
     });
 }
 

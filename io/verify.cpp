@@ -175,6 +175,22 @@ JobPart read_job_part(const Field& plan) {
     return part;
 }
 
+std::vector<Support> read_supports(const Field& plan) {
+    std::vector<Support> supports;
+    if (!plan.has("supports")) return supports;
+    const Field all = plan["supports"];
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        const Field s = all[i];
+        supports.push_back({s["layer"].whole(), s["x"].number(), s["y"].number(), s["width"].number(),
+                            s["z_low"].number(), s["z_high"].number()});
+        const Support& read = supports.back();
+        for (const double v : {read.x, read.y, read.width, read.z_low, read.z_high})
+            if (std::abs(v) > 200000) s.fail("reaches beyond 200 m");
+        if (!(read.width > 0) || !(read.z_high > read.z_low) || read.z_low < 0) s.fail("is no column");
+    }
+    return supports;
+}
+
 /// What an operation of plan.json says of its program.
 ProgramPlan read_program_plan(const Field& op) {
     ProgramPlan planned;
@@ -448,10 +464,11 @@ Verification verify_folder(Context& context, const std::string& directory, const
 
     const PlannedPattern planned_pattern{plan["input"]["file"].text(),
                                          plan["input"]["sha256"].text(),
-                                         {part.job.units, part.job.tolerances.weld, part.job.input.repair}};
+                                         {part.job.units, part.job.tolerances.weld, part.job.input.repair},
+                                         read_supports(plan)};
     result.pattern =
         options.pattern && options.pattern->is(planned_pattern)
-            ? options.pattern
+            ? propped(context, options.pattern, planned_pattern.supports)
             : read_planned_pattern(context, directory, planned_pattern, options.source, "verify");
     Pattern& pattern = *result.pattern;
     input.mesh = pattern.read.mesh.view();

@@ -22,10 +22,13 @@
 #include "engine/schedule/fit.h"
 #include "engine/schedule/footing.h"
 #include "engine/schedule/schedule.h"
+#include "engine/schedule/supports.h"
 #include "io/read/pattern_mesh.h"
+#include "io/read/stl.h"
 #include "io/write/sequence_json.h"
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
+#include "kernels/mesh/facet_roles.h"
 #include "kernels/mesh/weld.h"
 #include "tests/mesh_shapes.h"
 #include "tests/support/seed.h"
@@ -863,12 +866,53 @@ TEST(Joints, StrayFacetsWithoutAreaLiftNothing) {
     }
 }
 
+// A boss that hangs from a plate, over air and over a step: columns under it, from the board and from the
+// step.
+TEST(Joints, SupportsStandUnderWhatNothingCarries) {
+    shapes::Facets facets = shapes::box({0, 0, 0}, {200, 60, 15});
+    shapes::append(facets, shapes::box({0, 0, 14}, {40, 60, 60}));
+    shapes::append(facets, shapes::box({10, 10, 59}, {190, 150, 75}));
+    shapes::append(facets, shapes::box({140, 20, 40}, {170, 50, 60}));    // over the step
+    shapes::append(facets, shapes::box({140, 100, 40}, {170, 130, 60}));  // over the board
+    Context context;
+    Mesh mesh = weld(context, facets);
+    mesh.roles = facet_roles(context, mesh.view());
+    Plan plan = layers_of(context, mesh.view(), Job{});
+    std::vector<std::vector<JointWood>> wood = wood_at_joints(context, mesh.view(), plan);
+    const auto floats = [&] {
+        std::vector<Diagnostic> notes;
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < plan.layers.size(); ++i)
+            for (const WeakJoint& w : bond_layer(plan.layers[i], wood[i], plan, notes))
+                count += w.code == "joint.floating" ? 1 : 0;
+        return count;
+    };
+    EXPECT_EQ(floats(), 1u);
+    plan.supports = place_supports(plan, wood);
+    const auto under = [&](double y) {
+        return std::find_if(plan.supports.begin(), plan.supports.end(), [&](const Support& s) {
+            return s.x > 140 && s.x < 170 && s.y > y && s.y < y + 30 && std::abs(s.z_high - 40) < 0.5;
+        });
+    };
+    ASSERT_NE(under(20), plan.supports.end());
+    ASSERT_NE(under(100), plan.supports.end());
+    EXPECT_NEAR(under(20)->z_low, 15, 0.5);
+    EXPECT_EQ(under(100)->z_low, 0);
+    EXPECT_NEAR(under(100)->width, 20, 0.5);
+    const Mesh propped = with_supports(context, mesh.view(), plan.supports);
+    EXPECT_EQ(propped.facets.size(), mesh.facets.size() + 12 * plan.supports.size());
+    wood = wood_at_joints(context, propped.view(), plan);
+    EXPECT_EQ(floats(), 0u);
+    EXPECT_TRUE(place_supports(plan, wood).empty());
+}
+
 TEST(Joints, APlanWithAJointThatCannotHoldIsRefusedUnlessAccepted) {
     shapes::Facets facets = shapes::box({56, 56, 0}, {64, 64, 12});
     shapes::append(facets, shapes::box({0, 0, 12}, {160, 140, 45}));
     Context context;
     const Mesh mesh = weld(context, facets);
     Job job;
+    job.layers.supports = SupportRule::none;
     try {
         (void)make_plan(context, mesh, {}, job);
         FAIL() << "half a kilogram on a pin of 8 mm";
@@ -879,6 +923,20 @@ TEST(Joints, APlanWithAJointThatCannotHoldIsRefusedUnlessAccepted) {
         EXPECT_TRUE(e.place().starts_with("x 60.00 y 60.00 z ")) << e.place();
         EXPECT_NE(e.remedy().find("--accept-weak-joints"), std::string::npos);
     }
+    // Columns of stock under the plate carry it.
+    job.layers.supports = SupportRule::automatic;
+    const Plan propped = make_plan(context, mesh, {}, job);
+    ASSERT_GE(propped.supports.size(), 2u);
+    for (const Support& s : propped.supports) {
+        EXPECT_EQ(s.z_low, 0);
+        EXPECT_NEAR(s.z_high, 12, 0.5);
+        EXPECT_TRUE(s.x - s.width / 2 >= 0 && s.x + s.width / 2 <= 160) << s.x;
+        EXPECT_TRUE(s.y - s.width / 2 >= 0 && s.y + s.width / 2 <= 140) << s.y;
+    }
+    EXPECT_EQ(std::count_if(propped.diagnostics.begin(), propped.diagnostics.end(),
+                            [](const Diagnostic& d) { return d.code == "support.stands"; }),
+              static_cast<std::ptrdiff_t>(propped.supports.size()));
+    job.layers.supports = SupportRule::none;
     // A flask carries slabs, but not the pattern once that is cut out of them.
     job.flask.enabled = true;
     EXPECT_THROW((void)make_plan(context, mesh, {}, job), Error);

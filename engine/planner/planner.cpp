@@ -21,6 +21,7 @@
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
 #include "engine/schedule/schedule.h"
+#include "engine/schedule/supports.h"
 #include "engine/stock/layer_stock.h"
 #include "engine/stock/standing.h"
 #include "engine/tool_choice/select.h"
@@ -332,6 +333,32 @@ void load_joints(Context& context, Plan& plan, const std::vector<std::vector<Joi
     settle_joints(plan, weak);
 }
 
+// Places supports where joints cannot hold, until they do or no more can be done.
+// @param joints of the pattern; with its supports when it returns
+// @return the pattern with them; none where it needs none
+std::optional<Mesh> prop(Context& context, Plan& plan, MeshView pattern,
+                         std::vector<std::vector<JointWood>>& joints) {
+    std::optional<Mesh> propped;
+    constexpr int kRounds = 3;
+    for (int round = 0; round < kRounds && plan.job.layers.supports == SupportRule::automatic; ++round) {
+        const std::vector<Support> more = place_supports(plan, joints);
+        if (more.empty()) break;
+        plan.supports.insert(plan.supports.end(), more.begin(), more.end());
+        propped = with_supports(context, pattern, plan.supports);
+        joints = wood_at_joints(context, propped->view(), plan);
+    }
+    for (const Support& s : plan.supports)
+        plan.diagnostics.push_back(
+            {Severity::warning, "support.stands",
+             fmt::format(
+                 "layer {}: a column of stock, {:.1f} x {:.1f} mm, stands under it from {:.2f} to {:.2f} "
+                 "mm; saw it off when the pattern is done",
+                 s.layer, s.width, s.width, s.z_low,
+                 plan.layers[static_cast<std::size_t>(s.layer - 1)].z_bottom),
+             std::array<double, 3>{s.x, s.y, s.z_low}});
+    return propped;
+}
+
 // From layers on. `begun` is a plan with its stock and features.
 Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request,
                  const LayerPlacement& placement, ProgressShare share) {
@@ -343,7 +370,9 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     check_chambers(plan);
     settle_undercuts(context, plan, pattern);
     if (plan.job.flask.enabled) plan.flask = place_flask(context, pattern, plan);
-    const std::vector<std::vector<JointWood>> joints = wood_at_joints(context, pattern, plan);
+    std::vector<std::vector<JointWood>> joints = wood_at_joints(context, pattern, plan);
+    const std::optional<Mesh> propped = prop(context, plan, pattern, joints);
+    if (propped) pattern = propped->view();
     bond_layers(context, plan, joints);
     cut_layers(context, plan, pattern, joints, share);
 

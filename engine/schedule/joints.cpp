@@ -16,14 +16,13 @@
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/hull.h"
+#include "kernels/polygons/pieces.h"
 #include "kernels/slicing/silhouette.h"
 #include "kernels/slicing/slicing.h"
 
 namespace slabwright {
 
 namespace {
-
-constexpr double kNoContact = 1e-3;  // mm²
 
 /// The least distance from a point inside a convex polygon to its edges, mm.
 double depth_in(const std::vector<Point2>& hull, double x, double y) {
@@ -35,65 +34,6 @@ double depth_in(const std::vector<Point2>& hull, double x, double y) {
     }
     return std::max(0.0, least);
 }
-
-struct Box2 {
-    Point2 min{INT32_MAX, INT32_MAX}, max{INT32_MIN, INT32_MIN};
-    void grow(Point2 p) {
-        min = {std::min(min.x, p.x), std::min(min.y, p.y)};
-        max = {std::max(max.x, p.x), std::max(max.y, p.y)};
-    }
-    [[nodiscard]] bool meets(const Box2& o) const {
-        return min.x <= o.max.x && o.min.x <= max.x && min.y <= o.max.y && o.min.y <= max.y;
-    }
-};
-
-Box2 box_of(std::span<const Point2> points) {
-    Box2 box;
-    for (const Point2 p : points) box.grow(p);
-    return box;
-}
-
-/// Loops of a region, each outer one with its holes.
-struct Pieces {
-    std::vector<Loops> regions;
-    std::vector<Box2> boxes;
-
-    explicit Pieces(const Loops& region) {
-        Loops nested = region;
-        if (nested.parents.size() != nested.size()) nest(nested);
-        std::vector<std::size_t> piece_of(nested.size(), 0);
-        for (std::size_t i = 0; i < nested.size(); ++i)
-            if (signed_area(nested.loop(i)) > 0) {
-                piece_of[i] = regions.size();
-                regions.emplace_back();
-                boxes.push_back(box_of(nested.loop(i)));
-                append(nested.loop(i), regions.back());
-            }
-        for (std::size_t i = 0; i < nested.size(); ++i)
-            if (signed_area(nested.loop(i)) < 0 && nested.parents[i] >= 0)
-                append(nested.loop(i), regions[piece_of[static_cast<std::size_t>(nested.parents[i])]]);
-    }
-    [[nodiscard]] std::size_t size() const { return regions.size(); }
-
-    /// What of them lies in a region whose box is given.
-    [[nodiscard]] Loops within(const Loops& region, const Box2& box) const {
-        Loops near;
-        for (std::size_t i = 0; i < size(); ++i)
-            if (boxes[i].meets(box))
-                for (std::size_t l = 0; l < regions[i].size(); ++l) append(regions[i].loop(l), near);
-        return near.empty() ? near : intersect(near, region);
-    }
-
-    static void append(const Loops& loops, Loops& to) {
-        for (std::size_t i = 0; i < loops.size(); ++i) append(loops.loop(i), to);
-    }
-
-private:
-    static void append(std::span<const Point2> loop, Loops& to) {
-        to.points.insert(to.points.end(), loop.begin(), loop.end());
-        to.close_loop();
-    }
-};
 
 Loops rectangle(const std::array<double, 2>& low, const std::array<double, 2>& high) {
     Loops loops;
@@ -220,7 +160,7 @@ Loops glue_within(const Loops& region, double setback_mm) {
         double setback = setback_mm / 2;
         for (int k = kHalvings - 1; k >= 0 && area(of_piece) < half; --k, setback /= 2)
             of_piece = held_back(piece, setback, k);
-        Pieces::append(of_piece, glue);
+        append_loops(of_piece, glue);
     }
     nest(glue);
     return glue;
@@ -251,6 +191,9 @@ constexpr const char* kOtherJoint =
 /// Pieces that are no more than this share of what stands of their layer may be lost without the build: a
 /// pattern maker glues or dowels them on again.
 constexpr double kFewPieces = 0.5;
+
+/// Pieces with nothing under them fall off; no more than this share of their layer is made again by hand.
+constexpr double kCrumbs = 0.02;
 
 /// What stands of a layer piece by piece: every piece has to be held by glue of its own. Pieces smaller than
 /// chips (kChip) are only remarked on.
@@ -287,7 +230,7 @@ void rate_pieces(const Layer& layer, const JointWood& wood, const Joint& joint, 
                         middle_of(box, wood.z), std::string(kOtherJoint) + ", fasten it with dowels",
                         refused});
     };
-    report("joint.floating", "with nothing under it", floating, true);
+    report("joint.floating", "with nothing under it", floating, floating.sum > kCrumbs * standing);
     report("joint.no_glue", "on wood too narrow for glue", bare, bare.sum > kFewPieces * standing);
     if (chips > 0)
         diagnostics.push_back({Severity::note, "joint.chips",
@@ -442,7 +385,7 @@ void rate_footing(const Layer& layer, const JointWood& wood, const Layer& cut, c
                     worst.off_mm > 0
                         ? fmt::format(", whose middle overhangs the wood under it by {:.1f} mm", worst.off_mm)
                         : "");
-    if (worst.turning > 1)
+    if (worst.turning > 1 && !small_top)
         weak.push_back(
             {"joint.tips",
              fmt::format("{}: weight and the gentlest cut are {:.1f} times what glue of {} MPa holds",

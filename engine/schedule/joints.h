@@ -33,6 +33,9 @@ struct JointWood {
 /// Far less than what cutters leave, far more than the last digit of a coordinate.
 inline constexpr double kBesideJoint = 0.06;
 
+/// Less wood on both sides than this is none, mm².
+inline constexpr double kNoContact = 1e-3;
+
 /// The joints of every layer, upwards, each layer's own first and then those between the slabs that are
 /// bonded into it; those above its top are faced off with what lies over them, and left out.
 /// @param plan its stock, flask and layers' heights and slabs

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "engine/schedule/supports.h"
 #include "kernels/errors.h"
 
 namespace slabwright {
@@ -28,7 +29,17 @@ fs::path find_pattern(const fs::path& directory, const std::string& file, const 
 }  // namespace
 
 bool Pattern::is(const PlannedPattern& planned) const {
-    return read.input.sha256 == planned.sha256 && reading == planned.reading;
+    return read.input.sha256 == planned.sha256 && reading == planned.reading &&
+           (supports.empty() || supports == planned.supports);
+}
+
+std::shared_ptr<Pattern> propped(Context& context, std::shared_ptr<Pattern> pattern,
+                                 const std::vector<Support>& supports) {
+    if (pattern->supports == supports) return pattern;
+    auto more =
+        std::make_shared<Pattern>(Pattern{pattern->place, pattern->reading, pattern->read, {}, supports});
+    more->read.mesh = with_supports(context, pattern->read.mesh.view(), supports);
+    return more;
 }
 
 std::shared_ptr<Pattern> read_planned_pattern(Context& context, const std::string& directory,
@@ -37,12 +48,12 @@ std::shared_ptr<Pattern> read_planned_pattern(Context& context, const std::strin
     const PatternSource source =
         given.empty() ? PatternSource(find_pattern(directory, planned.file, asker).string()) : given;
     auto pattern = std::make_shared<Pattern>(
-        Pattern{source.name(), planned.reading, read_pattern_mesh(context, source, planned.reading), {}});
+        Pattern{source.name(), planned.reading, read_pattern_mesh(context, source, planned.reading), {}, {}});
     if (!pattern->is(planned))
         throw Error(ErrorKind::input, asker + ".other_pattern",
                     "is not the pattern that was planned: its SHA-256 is " + pattern->read.input.sha256,
                     source.name(), "name the planned STL with --stl, or plan again");
-    return pattern;
+    return propped(context, std::move(pattern), planned.supports);
 }
 
 }  // namespace slabwright

@@ -5,8 +5,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "engine/job.h"
+#include "engine/plan.h"
 #include "io/read/pattern_mesh.h"
 #include "kernels/access/standing_part.h"
 
@@ -16,6 +18,7 @@ namespace slabwright {
 struct PlannedPattern {
     std::string file, sha256;
     ReadingOptions reading;  ///< as it was read for the plan
+    std::vector<Support> supports{};
 };
 
 struct Pattern {
@@ -23,10 +26,15 @@ struct Pattern {
     ReadingOptions reading;
     PatternMesh read;
     std::optional<StandingPart> part;  ///< of the mesh, once somebody needs it
+    std::vector<Support> supports{};   ///< that the mesh holds as further bodies
 
-    /// Whether it is what was planned, read alike.
+    /// Whether it is what was planned, read alike; its supports may be missing yet.
     [[nodiscard]] bool is(const PlannedPattern& planned) const;
 };
+
+/// The pattern with the supports that stand under it; the same where it has them.
+[[nodiscard]] std::shared_ptr<Pattern> propped(Context& context, std::shared_ptr<Pattern> pattern,
+                                               const std::vector<Support>& supports);
 
 /// @param directory OUT
 /// @param given the pattern; none looks for the file that the plan names: in OUT, beside OUT, in the working

@@ -19,6 +19,8 @@ inline constexpr Word<Repair> kRepairWords[] = {
 inline constexpr Word<LayerStrategy> kStrategyWords[] = {{"printed", LayerStrategy::printed},
                                                          {"optimal", LayerStrategy::optimal},
                                                          {"combined", LayerStrategy::combined}};
+inline constexpr Word<SupportRule> kSupportWords[] = {{"none", SupportRule::none},
+                                                      {"auto", SupportRule::automatic}};
 inline constexpr Word<Finder> kFinderWords[] = {
     {"halving", Finder::halving}, {"exact", Finder::exact}, {"both", Finder::both}};
 inline constexpr Word<FinishStrategy> kFinishWords[] = {{"split", FinishStrategy::split},
@@ -193,6 +195,9 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.word("strategy", job.layers.strategy, kStrategyWords,
                "optimal, printed (LUO 4.2.5), or combined: slabs bonded to any thickness, whatever is built "
                "fastest (LUO 6.4.2)");
+    visit.word(
+        "supports", job.layers.supports, kSupportWords,
+        "auto: columns of stock stay under what nothing of the pattern carries, to be sawn off; or none");
     visit.word("finder", job.layers.finder, kFinderWords, "of features: exact, halving or both");
     visit.key("min_layer", job.layers.min_layer, "mm: thinner layers are reported");
     visit.key("alpha", job.layers.alpha, "per inch, in Q = alpha DT + beta A (LUO 4.2.4)");

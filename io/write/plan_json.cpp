@@ -372,6 +372,18 @@ std::string plan_json(const Plan& plan) {
     json.end();
     json.key("flask");
     put_flask(json, plan);
+    json.key("supports").begin_array();
+    for (const Support& s : plan.supports) {
+        json.begin_object();
+        json.key("layer").integer(s.layer);
+        json.key("x").exact(s.x);
+        json.key("y").exact(s.y);
+        json.key("width").exact(s.width);
+        json.key("z_low").exact(s.z_low);
+        json.key("z_high").exact(s.z_high);
+        json.end();
+    }
+    json.end();
     json.key("tools").begin_array();
     for (const Tool& tool : plan.job.tools) put_tool(json, plan, tool);
     json.end();
