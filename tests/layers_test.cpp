@@ -193,6 +193,32 @@ TEST(Layers, TypeTwoSplitsARegion) {
     EXPECT_TRUE(has(p, "layers.type1"));
 }
 
+// A foot .02 mm over the lowest point stands on the board, and flats a tenth apart share a boundary, where a
+// sheet as thin as that may stay under them.
+TEST(Layers, NoLayerIsAsThinAsTheWoodThatMayStayUnderAFlat) {
+    LayerRequest r = request(30, {level(FeatureType::down_flat, 0.02), level(FeatureType::down_flat, 0.2),
+                                  level(FeatureType::down_flat, 15), level(FeatureType::down_flat, 15.1),
+                                  level(FeatureType::down_flat, 15.4)});
+    const auto tops = [](const LayerPlacement& placement) {
+        std::vector<double> heights;
+        for (const Boundary& b : placement.boundaries) heights.push_back(b.z);
+        return heights;
+    };
+    const auto has = [](const std::vector<double>& heights, double z) {
+        return std::any_of(heights.begin(), heights.end(), [&](double h) { return std::abs(h - z) < 1e-6; });
+    };
+    EXPECT_TRUE(has(tops(place_layers_optimal(r)), 0.02));
+    r.filled_underside = 0.25;
+    for (const LayerPlacement& placement : {place_layers_printed(r), place_layers_optimal(r)}) {
+        const std::vector<double> heights = tops(placement);
+        EXPECT_GT(heights.front(), 0.25);
+        EXPECT_TRUE(has(heights, 15));
+        EXPECT_FALSE(has(heights, 15.1));
+        EXPECT_TRUE(has(heights, 15.4)) << "what would stay under it matters";
+        EXPECT_EQ(placement.cost.broken_type2, 0);
+    }
+}
+
 // A casting has down-facing flats that differ by what its drawing was rounded to: one boundary, at the
 // lowest, makes them all, and no layer is thinner than a cutter could tell.
 TEST(Layers, FlatsOfNextToOneHeightAreMadeByOneBoundary) {

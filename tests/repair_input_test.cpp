@@ -9,6 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/read/pattern_mesh.h"
@@ -229,6 +230,32 @@ TEST(RepairInput, TheCommandRefusesMendsAndTells) {
     save(folder / "open.stl", open_torus());
     EXPECT_EQ(run({"repair", folder / "open.stl", "-o", folder / "never.stl"}).exit, 3);
     EXPECT_FALSE(std::filesystem::exists(folder / "never.stl"));
+}
+
+// Whether borders that hang together loosely close must not hang on how the part is turned and scaled.
+TEST(RepairInput, AMeshThatIsMendedIsMendedTurnedAndScaledToo) {
+    const char* folder = std::getenv("SLABWRIGHT_CORPUS");
+    const std::string file = std::string(folder == nullptr ? "" : folder) + "/pool/yaskawa_13.stl";
+    if (folder == nullptr || !std::filesystem::exists(file)) {
+        std::printf("skipped: SLABWRIGHT_CORPUS is not set\n");
+        return;
+    }
+    Context context({.threads = 2});
+    const PatternMesh stl = read_pattern_mesh(context, file);
+    for (const auto& [degrees, scale] : {std::pair{95.26, 1.0609}, {48.37, 1.0609}, {84.98, 0.4042}}) {
+        SCOPED_TRACE(degrees);
+        Mesh mesh = stl.mesh;
+        mesh.roles.clear();
+        const double c = std::cos(degrees * 3.14159265358979 / 180),
+                     s = std::sin(degrees * 3.14159265358979 / 180);
+        for (Vec3f& v : mesh.vertices)
+            v = {static_cast<float>(scale * (c * v.x - s * v.y)),
+                 static_cast<float>(scale * (s * v.x + c * v.y)), static_cast<float>(scale * v.z)};
+        const MeshReport report = report_mesh(context, mesh.view());
+        const Mended mended = mend(context, mesh.view(), report);
+        EXPECT_TRUE(mended.solid) << mended.left.holes << " holes of " << mended.left.hole_mm << " mm";
+        EXPECT_LE(mended.moved_mm, 2 * kMostStitch);
+    }
 }
 
 TEST(RepairInput, RefusedMeshesOfTheCorpusAreMended) {

@@ -139,7 +139,8 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
     min_layer_ = to_ticks(request.min_layer);
     min_material_ = to_ticks(request.min_material);
     std::vector<Level> down;
-    const Ticks base = to_ticks(kBaseFlatness);
+    const Ticks base = to_ticks(kBaseFlatness),
+                one_joint = std::max(kOneJoint, to_ticks(request.filled_underside));
     for (std::size_t i = 0; i < request.features.size(); ++i) {
         const Feature& f = request.features[i];
         const Ticks low = to_ticks(f.z_low), high = to_ticks(f.z_high);
@@ -156,7 +157,7 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
                     up_flats_.push_back({low, std::llround(f.area * kAreaUnits), i});
                 break;
             case FeatureType::down_flat:
-                if (low > std::max(base, kOneJoint) && low < height_ - kSame)
+                if (low > std::max(base, one_joint) && low < height_ - kSame)
                     down.push_back({low, weight_of(f), i});
                 break;
             case FeatureType::shallow:
@@ -173,10 +174,10 @@ LayerRules::LayerRules(const LayerRequest& request) : request_(request) {
     std::sort(type1_.begin(), type1_.end(), by_height);
     std::sort(up_flats_.begin(), up_flats_.end(), by_height);
     std::sort(down.begin(), down.end(), by_height);
-    // One boundary makes all flats of one height, at the lowest of them: under those that are higher by less
-    // than a layer could be cut, the wood of the layer above stays.
+    // One boundary makes all flats of about one height, at the lowest of them, and the board those just above
+    // the base: under those that are higher a sheet of wood stays, too thin to matter.
     for (const Level& l : down)
-        if (type2_.empty() || l.z - type2_.back().z > kOneJoint) type2_.push_back(l);
+        if (type2_.empty() || l.z - type2_.back().z > one_joint) type2_.push_back(l);
         else type2_.back().weight += l.weight;
     std::sort(type3_.begin(), type3_.end(), [](const Range& a, const Range& b) {
         return a.low != b.low ? a.low < b.low : a.high != b.high ? a.high < b.high : a.feature < b.feature;

@@ -27,6 +27,8 @@ struct LayerRequest {
     std::vector<double> slab_thicknesses;  ///< in stock; empty: slabs made to fit max_layer
     double facing_allowance = 0;
     bool saddles_constrain = false;
+    double filled_underside = 0;  ///< mm of wood that may stay under a down-facing flat, so that flats this
+                                  ///< near to each other, or to the base, share a boundary
     std::vector<Feature> features;
     /// Section area in mm² just above z. Must be a pure function. `printed` asks for every candidate inside
     /// regions taller than a layer, `optimal` for candidates that tie in all but Q: see SectionAreas, which

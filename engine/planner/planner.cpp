@@ -458,6 +458,7 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     request.slab_thicknesses = job.slabs.thicknesses;
     request.facing_allowance = job.slabs.facing_allowance;
     request.saddles_constrain = job.layers.saddles_constrain;
+    request.filled_underside = job.tolerances.undercut;
     request.features = plan.features;
     request.section_area = SectionAreas(context, view);
     if (job.layers.strategy == LayerStrategy::combined) {

@@ -1,6 +1,7 @@
 #include "kernels/repair/repair.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "kernels/mesh/weld.h"
@@ -18,6 +19,11 @@ namespace {
 
 constexpr double kStitchShare = 1e-3;  // of the diagonal
 constexpr double kHoleShare = 0.05;    // likewise
+
+// A mesh of many loose borders closes or not by which of them meet first, so a turned or scaled copy of one
+// that closes may not. Other distances are tried where the first leaves it open, as shares of that.
+constexpr std::array<double, 4> kOtherStitches{0.4, 1.6, 2.0, 0.1};
+constexpr std::size_t kMostTriedAgain = 2'000'000;  // facets
 constexpr double kThinOfStitch = 4;    // a slit may be so many times as wide as a crack
 
 double diagonal(const Box3& box) {
@@ -75,20 +81,13 @@ bool is_solid(const MeshReport& report) {
            report.inverted_components.count == 0;
 }
 
-Mended mend(Context& context, MeshView mesh, const MeshReport& report, const MendOptions& options) {
+namespace {
+
+/// @param stitch_mm how far borders may lie apart to be brought together
+Mended mend_within(Context& context, MeshView mesh, const MeshReport& report, const MendOptions& options,
+                   double stitch_mm) {
     Mended mended;
-    if (is_solid(report)) {
-        mended.needed = false;
-        mended.solid = true;
-        mended.mesh.vertices.assign(mesh.vertices.begin(), mesh.vertices.end());
-        mended.mesh.facets.assign(mesh.facets.begin(), mesh.facets.end());
-        mended.mesh.neighbours.assign(mesh.neighbours.begin(), mesh.neighbours.end());
-        mended.report = report;
-        return mended;
-    }
     const double size = diagonal(report.box);
-    const double stitch_mm =
-        options.stitch_mm > 0 ? options.stitch_mm : std::min(kMostStitch, kStitchShare * size);
     const MemoryCharge charge(context, mesh.facets.size() * 40, "the mesh under repair");
     FacetSoup soup;
     soup.vertices.assign(mesh.vertices.begin(), mesh.vertices.end());
@@ -138,6 +137,31 @@ Mended mend(Context& context, MeshView mesh, const MeshReport& report, const Men
     mended.solid = !mended.mesh.facets.empty() && is_solid(mended.report);
     note_left(mended, filled, turned);
     return mended;
+}
+
+}  // namespace
+
+Mended mend(Context& context, MeshView mesh, const MeshReport& report, const MendOptions& options) {
+    if (is_solid(report)) {
+        Mended mended;
+        mended.needed = false;
+        mended.solid = true;
+        mended.mesh.vertices.assign(mesh.vertices.begin(), mesh.vertices.end());
+        mended.mesh.facets.assign(mesh.facets.begin(), mesh.facets.end());
+        mended.mesh.neighbours.assign(mesh.neighbours.begin(), mesh.neighbours.end());
+        mended.report = report;
+        return mended;
+    }
+    if (options.stitch_mm > 0) return mend_within(context, mesh, report, options, options.stitch_mm);
+    const double stitch_mm = std::min(kMostStitch, kStitchShare * diagonal(report.box));
+    Mended first = mend_within(context, mesh, report, options, stitch_mm);
+    if (mesh.size() > kMostTriedAgain) return first;
+    for (const double share : kOtherStitches) {
+        if (first.solid) break;
+        if (Mended other = mend_within(context, mesh, report, options, share * stitch_mm); other.solid)
+            return other;
+    }
+    return first;
 }
 
 }  // namespace slabwright

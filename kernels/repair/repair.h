@@ -49,7 +49,8 @@ struct LeftDefects {
 
 struct MendOptions {
     /// How far borders may lie apart to be brought together, mm; 0: a thousandth of the part's diagonal, and
-    /// kMostStitch at most.
+    /// kMostStitch at most; where that leaves it open, .4, 1.6, 2 and .1 times that, the first that closes
+    /// it.
     double stitch_mm = 0;
     /// Diagonal up to which a hole that is neither flat nor thin is closed, mm; 0: a twentieth of the part's.
     double hole_mm = 0;
