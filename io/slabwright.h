@@ -113,6 +113,8 @@ struct VerifyResult {
     double unreachable_mm = 0;   ///< the most that is left there, along the normal
     double unmade_mm3 = 0;       ///< what stays filled under part of the same layer: undercuts
     double unmade_mm = 0;        ///< its greatest height
+    /// Tools that would reach what no tool of the library does, code "tool.missing", the most useful first.
+    std::vector<Diagnostic> advice{};
     /// Whether the pattern comes out whole: passed, less than a cubic millimetre unmade, at most a hundredth
     /// of it out of reach.
     [[nodiscard]] bool is_whole() const {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <numbers>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -490,10 +491,18 @@ Verification verify_folder(Context& context, const std::string& directory, const
     }
     simulation.board_cut = std::min(simulation.board_cut, part.job.machine.base_board_thickness);
     result.report = simulate(context, input, *pattern.part, simulation, options.memory);
+    MissingToolOptions asked{part.job.units == LengthUnit::inch, simulation.cusp + simulation.slack,
+                             simulation.board_cut};
+    asked.cusp = asked.bends = simulation.cusp;
+    if (part.stated && plan["job"].has("cutting")) {
+        asked.holder_clearance = plan["job"]["cutting"]["holder_clearance"].number();
+        asked.vertical_rad = plan["job"]["cutting"]["vertical_deg"].number() * std::numbers::pi / 180;
+    }
+    result.missing = missing_tools(context, input, result.report, *pattern.part, asked);
     input.mesh = {};
     result.report.violations.insert(result.report.violations.begin(), violations.begin(), violations.end());
     result.json = verify_json(input, result.report, simulation, fs::path(pattern.place).filename().string(),
-                              part.stated);
+                              part.stated, result.missing);
 
     if (!options.maps_directory.empty()) write_maps(result.report, options.maps_directory);
     if (options.write) write_file_in(out, "verify.json", result.json);

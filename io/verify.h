@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "engine/simulate/missing_tools.h"
 #include "engine/simulate/simulate.h"
 #include "io/posts/gcode_reader.h"
 #include "io/read/pattern.h"
@@ -29,6 +30,7 @@ struct Verification {
     std::shared_ptr<Pattern> pattern;  ///< with its part
     SimulationInput input;             ///< its mesh is not set: pattern has it
     SimulationReport report;
+    std::vector<MissingTool> missing;  ///< tools that would reach what is out of reach
     std::string json;  ///< what verify.json holds (schema slabwright.verify/1)
 };
 

@@ -178,13 +178,15 @@ std::string makes(const VerifyResult& result) {
 
 /// What the simulation of the programs says.
 std::string verdict(const VerifyResult& result, const std::string& out) {
-    std::string text = fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, {}\n", out,
+    std::string text = fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, programs run {}\n", out,
                                    makes(result), result.gouge_mm, result.cell_mm, duration(result.minutes));
     constexpr std::size_t shown = 20;  // verify.json holds them all
     for (std::size_t i = 0; i < std::min(shown, result.violations.size()); ++i)
         text += fmt::format("{}: {}\n", result.violations[i].code, result.violations[i].message);
     if (result.violations.size() > shown)
         text += fmt::format("{} more in verify.json\n", result.violations.size() - shown);
+    constexpr std::size_t few = 3;
+    for (std::size_t i = 0; i < std::min(few, result.advice.size()); ++i) text += told(result.advice[i]);
     return text;
 }
 

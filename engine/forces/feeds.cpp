@@ -35,6 +35,7 @@ constexpr double kAccuracy =
     0.01;  // of peaks that feeds are chosen by, as a share: far finer than the classes are
 constexpr double kClassSlack =
     0.9;  // a coarse class that bears less than this share of a limit stands for all its cuts
+constexpr double kHolds = 1 - kAccuracy;  // of a limit, when the peaks are as rough as that
 constexpr double kLeastShare = 0.125;     // of the planned feed: slower, a cutter rubs
 constexpr double kLeastRun = 20;          // mm that a faster feed must last
 constexpr int kMostPasses = 4;            // into which a cut is divided at once
@@ -142,6 +143,7 @@ struct Seen {
     const Bent* bent =
         nullptr;           ///< what it bears at that feed, of its coarse class; null where nothing is cut
     double wood_load = 0;  ///< and the wood, as a share of what there is
+    double stated = 0;     ///< the cutter's load as a plan states it, where feed alone does not settle it
     [[nodiscard]] std::array<double, 3> place() const { return {at[0], at[1], at[2]}; }
 };
 
@@ -490,7 +492,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         };
         // Of a cut whose feed is chosen.
         const auto load = [&](const Seen& s, int passes) {
-            if (passes == 1) return Load{cutter_share(*s.bent), s.wood_load};
+            if (passes == 1) return Load{std::max(cutter_share(*s.bent), s.stated), s.wood_load};
             Seen lowest = s;
             const float off = s.depth * static_cast<float>(passes - 1) / static_cast<float>(passes);
             lowest.coarse = shallower(s.coarse, passes);
@@ -552,7 +554,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         const auto as_stated = [&](const Seen& s, std::vector<FeedStep>& steps, FeedStep* step) {
             const double bears = cutter_share(bent_at(s, *step));
             if (bears < kClassSlack || bears > 1) return step;
-            while (cutter_share(cutting.stated(s.fine, step->feed)) > 1 && step != &steps.back()) ++step;
+            while (cutter_share(cutting.stated(s.fine, step->feed)) > kHolds && step != &steps.back()) ++step;
             return step;
         };
         const auto choose = [&](Seen& s) {
@@ -571,6 +573,10 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                 if (!(s.overhang > 0)) of.chosen = step;
                 step = as_stated(s, of.steps, step);
                 s.feed = step->feed, s.bent = &bent_at(s, *step);
+                // At its slowest it may still pass the limit by what its coarse class hides.
+                if (const double bears = cutter_share(*s.bent);
+                    step == &of.steps.back() && bears > kClassSlack && bears <= 1)
+                    s.stated = cutter_share(cutting.stated(s.fine, s.feed)) / kHolds;
             }
             s.wood_load = wood_load(s, *s.bent);
         };

@@ -30,6 +30,8 @@ constexpr double kDeeper = 0.05;          // mm by which a roughing cut may pass
 constexpr double kAbreast = 3;            // fewer cells than this side by side do not tell how wide a cut is
 constexpr double kStanding = 0.01;        // mm by which shank or holder must reach into stock to be reported
 
+constexpr std::size_t kTileUnreached = 256;  // places of a tile and layer that are kept of what is out of reach
+
 constexpr double kArcError = 0.001;  // mm: more than rounding may add to Program::chord_error
 
 StepBox box_of(const ProgramStep& a, const ProgramStep& b) {
@@ -448,6 +450,7 @@ private:
                 LayerFindings& f = report.layers[i];
                 f.cells += l.cells, f.gouge_cells += l.gouge_cells, f.over += l.over,
                     f.unreachable += l.unreachable, f.missed += l.missed, f.waste += l.waste;
+                f.unreached.insert(f.unreached.end(), l.unreached.begin(), l.unreached.end());
                 f.waste_mm3 += l.waste_mm3;
                 f.unmade_mm3 += l.unmade_mm3;
                 raise(f.unmade, l.unmade.size, l.unmade.where);
@@ -517,12 +520,25 @@ private:
             context_.throw_if_cancelled();
             envelope.at(input_.layers[l].z_top, nothing, heights.data());
             measure_layer(l, stock, heights, result, i0, j0, report);
+            thin(result.layers[l].findings.unreached);
             envelope.covered_air(input_.layers[l].z_bottom, air.data());
             measure_unmade(grid, air, input_.layers[l].z_bottom, result.layers[l].findings);
         }
         result.pattern_cells = static_cast<std::uint64_t>(
             std::count_if(heights.begin(), heights.end(), [](float z) { return z != nothing; }));
         return result;
+    }
+
+    /// Keeps the middles of equal shares, each for all of its own.
+    static void thin(std::vector<UnreachedCell>& cells) {
+        if (cells.size() <= kTileUnreached) return;
+        const double share = static_cast<double>(cells.size()) / kTileUnreached;
+        for (std::size_t k = 0; k < kTileUnreached; ++k) {
+            cells[k] = cells[static_cast<std::size_t>((static_cast<double>(k) + 0.5) * share)];
+            cells[k].cells = static_cast<float>(share);
+        }
+        cells.resize(kTileUnreached);
+        cells.shrink_to_fit();
     }
 
     /// Sums the air that stays filled in one layer. A column at the rim of it does not count: a wall that
@@ -889,6 +905,7 @@ private:
         ++f.over;
         if (!could_take(limit)) {
             ++f.unreachable;
+            f.unreached.push_back({s, over, 1});
             raise(f.unreachable_left, over, s);
             return CellKind::unreachable;
         }

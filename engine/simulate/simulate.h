@@ -102,6 +102,13 @@ struct MissedPlace {
     double height = 0;  ///< mm straight down to the part's surface or the layer's bottom
 };
 
+/// A place of the stock's surface under which more is left than the limit, because no tool gets there.
+struct UnreachedCell {
+    Point3 place{};
+    double left = 0;  ///< mm along the normal
+    float cells = 1;  ///< as many cells as it stands for
+};
+
 /// One layer when everything has been cut. Points are the stock's cells; shares are of all the slab's.
 struct LayerFindings {
     std::uint64_t cells = 0;
@@ -122,6 +129,8 @@ struct LayerFindings {
     Extreme unmade;           ///< its greatest height in one column, and there the layer's bottom
     std::uint64_t waste = 0;  ///< cells beside the pattern (no part of it in the layer) that were missed
     double waste_mm3 = 0;
+    /// Of what is unreachable some places, that stand for all of it.
+    std::vector<UnreachedCell> unreached;
     /// With SimulationOptions::maps, row after row: left-over (positive) or gouge (negative) along the
     /// normal.
     std::vector<float> map;

@@ -60,6 +60,8 @@ std::string plan_summary_json(const Plan& plan, const std::string& out, const Ve
         json.key("unmade_mm3").rounded(found->unmade_mm3, 0);
         json.key("unreachable_mm2").rounded(found->unreachable_mm2, 1).key("violations");
         put_diagnostics(json, found->violations);
+        json.key("advice");
+        put_diagnostics(json, found->advice);
     }
     json.end();
     return json.take();

@@ -23,10 +23,30 @@ void put_extreme(JsonText& text, const char* key, const Extreme& e) {
     text.end();
 }
 
+void put_missing(JsonText& text, const std::vector<MissingTool>& missing) {
+    text.key("missing_tools").begin_array();
+    for (const MissingTool& m : missing) {
+        text.begin_object(JsonText::Shape::line);
+        text.key("name").string(m.tool.name);
+        text.key("kind").string(m.tool.kind == ToolKind::ball ? "ball" : "flat");
+        text.key("diameter_mm").rounded(m.tool.diameter, 4);
+        text.key("flute_length_mm").rounded(m.tool.flute_length, 3);
+        text.key("stickout_mm").rounded(m.tool.stickout, 3);
+        text.key("gain_mm2").rounded(m.gain_mm2, 1).key("depth_mm").rounded(m.depth_mm, 4).key("where");
+        put_point(text, m.where);
+        text.key("minutes").rounded(m.minutes, 1).key("reason").string(name(m.reason));
+        text.key("layers").begin_array();
+        for (const int layer : m.layers) text.integer(layer + 1);
+        text.end().end();
+    }
+    text.end();
+}
+
 }  // namespace
 
 std::string verify_json(const SimulationInput& input, const SimulationReport& r,
-                        const SimulationOptions& options, const std::string& pattern, bool job_stated) {
+                        const SimulationOptions& options, const std::string& pattern, bool job_stated,
+                        const std::vector<MissingTool>& missing) {
     JsonText text;
     text.begin_object();
     text.key("schema").string("slabwright.verify/1");
@@ -98,6 +118,7 @@ std::string verify_json(const SimulationInput& input, const SimulationReport& r,
         text.key("size").rounded(v.size, 5).end();
     }
     text.end();
+    put_missing(text, missing);
     text.key("layers").begin_array();
     for (std::size_t l = 0; l < r.layers.size(); ++l) {
         const LayerFindings& f = r.layers[l];

@@ -15,7 +15,7 @@ constexpr double kColumns = 500'000;
 constexpr double kFinest = 0.05;       // mm between columns
 constexpr double kAtBoundary = 1e-3;   // mm: a roof this near a boundary is made by it
 constexpr double kLeastHeight = 1e-3;  // mm: faces of two bodies this near are one joint
-constexpr std::size_t kBandRows = 8;   // of columns, with one list of facets
+constexpr std::size_t kRows = 8;       // that one task looks at
 
 struct Crossing {
     std::uint32_t column, facet;
@@ -26,15 +26,14 @@ struct Crossing {
 class Columns {
 public:
     Columns(MeshView mesh, std::span<const double> borders, const ColumnGrid& grid)
-        : mesh_(mesh), borders_(borders), grid_(grid), bands_((grid.rows + kBandRows - 1) / kBandRows) {
-        band_facets();
+        : mesh_(mesh), borders_(borders), grid_(grid) {
+        list_facets();
     }
 
     /// Gaps of a row by column, and from above in each.
     void gaps(std::size_t row, std::vector<Crossing>& crossings, std::vector<FilledGap>& found) const {
         crossings.clear();
-        const std::size_t band = row / kBandRows;
-        for (std::size_t e = starts_[band]; e < starts_[band + 1]; ++e)
+        for (std::size_t e = starts_[row]; e < starts_[row + 1]; ++e)
             cross(entries_[e], grid_.y0 + static_cast<double>(row) * grid_.cell, crossings);
         std::sort(crossings.begin(), crossings.end(), [](const Crossing& a, const Crossing& b) {
             return std::tie(a.column, b.z, a.facet) < std::tie(b.column, a.z, b.facet);
@@ -61,31 +60,31 @@ public:
     }
 
 private:
-    // Facets in the order of their index, in the bands that their corners span.
-    void band_facets() {
+    // Facets in the order of their index, for each row that they may cross: small ones cross none.
+    void list_facets() {
         const auto spans = [&](auto&& visit) {
+            constexpr double slack = 1e-6;  // rows
             for (std::uint32_t f = 0; f < mesh_.size(); ++f) {
                 const Index3 t = mesh_.facets[f];
                 const auto [low, high] =
                     std::minmax({mesh_.vertices[t[0]].y, mesh_.vertices[t[1]].y, mesh_.vertices[t[2]].y});
-                visit(f, band_of(low - 2 * grid_.cell), band_of(high));
+                const double first = std::ceil((low - grid_.y0) / grid_.cell - slack),
+                             last = std::floor((high - grid_.y0) / grid_.cell + slack);
+                if (last < 0 || last < first || first >= static_cast<double>(grid_.rows)) continue;
+                visit(f, static_cast<std::size_t>(std::max(0.0, first)),
+                      std::min(grid_.rows - 1, static_cast<std::size_t>(last)));
             }
         };
-        starts_.assign(bands_ + 1, 0);
+        starts_.assign(grid_.rows + 1, 0);
         spans([&](std::uint32_t, std::size_t first, std::size_t last) {
-            for (std::size_t b = first; b <= last; ++b) ++starts_[b + 1];
+            for (std::size_t r = first; r <= last; ++r) ++starts_[r + 1];
         });
-        for (std::size_t b = 0; b < bands_; ++b) starts_[b + 1] += starts_[b];
+        for (std::size_t r = 0; r < grid_.rows; ++r) starts_[r + 1] += starts_[r];
         entries_.resize(starts_.back());
         std::vector<std::size_t> next(starts_.begin(), starts_.end() - 1);
         spans([&](std::uint32_t f, std::size_t first, std::size_t last) {
-            for (std::size_t b = first; b <= last; ++b) entries_[next[b]++] = f;
+            for (std::size_t r = first; r <= last; ++r) entries_[next[r]++] = f;
         });
-    }
-
-    [[nodiscard]] std::size_t band_of(double y) const {
-        const double row = (y - grid_.y0) / grid_.cell + 1;  // one more, for rounding
-        return static_cast<std::size_t>(std::clamp(row / kBandRows, 0.0, static_cast<double>(bands_ - 1)));
     }
 
     // Corners decide by y alone and both facets of an edge compute one crossing with the row, so no column is
@@ -121,8 +120,7 @@ private:
     MeshView mesh_;
     std::span<const double> borders_;
     ColumnGrid grid_;
-    std::size_t bands_;
-    std::vector<std::size_t> starts_;  ///< of each band in entries_
+    std::vector<std::size_t> starts_;  ///< of each row in entries_
     std::vector<std::uint32_t> entries_;
 };
 
@@ -148,7 +146,7 @@ std::vector<std::vector<FilledGap>> filled_gaps(Context& context, MeshView mesh,
     if (mesh.size() == 0 || grid.rows == 0 || borders.size() < 2) return rows;
     const MemoryCharge charge(context, mesh.size() * 16 + 4'000'000, "measuring undercuts");
     const Columns columns(mesh, borders, grid);
-    parallel_for(context, rows.size(), kBandRows, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, rows.size(), kRows, [&](std::size_t begin, std::size_t end) {
         std::vector<Crossing> crossings;
         for (std::size_t row = begin; row < end; ++row) columns.gaps(row, crossings, rows[row]);
     });

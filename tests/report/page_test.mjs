@@ -74,6 +74,57 @@ const numbers = text => text.split(',').map(Number);
     });
 }
 
+// The sheets say what the plan says, once.
+{
+    const clock = minutes => { const m = Math.round(minutes); return m < 60 ? `${m} min` : `${Math.floor(m / 60)} h ${String(m % 60).padStart(2, '0')} min`; };
+    const minutesOf = text => { const [, h, m] = /(?:(\d+) h )?(\d+) min/.exec(text); return 60 * Number(h ?? 0) + Number(m); };
+    const cover = page.locator('.sheet.cover');
+    check.that('cover: the build time', (await cover.locator('.clock').textContent()).includes(clock(plan.totals.build_minutes)));
+    const times = await cover.locator('table').last().locator('tbody tr td:last-child').allTextContents();
+    check.equal('cover: the layers’ times add up', times.slice(0, -1).reduce((sum, t) => sum + minutesOf(t), 0), minutesOf(times[times.length - 1]));
+    for (let l = 0; l < layers; ++l) {
+        const sheet = page.locator('.sheet').nth(l + 1), text = await sheet.textContent(), layer = plan.layers[l];
+        check.that(`sheet ${l + 1}: every program`, layer.operations.every(o => text.includes(o.file.replace('nc/', ''))));
+        check.that(`sheet ${l + 1}: speeds and stick-outs`, layer.operations.every(o => {
+            const tool = plan.tools.find(t => t.number === o.tool);
+            return text.includes(String(o.spindle_rpm).replace(/(\d)(?=(\d{3})$)/, '$1 ')) && text.includes(String(tool.holder.stickout));
+        }));
+        const down = plan.frame === 'layer-top' ? layer.z_top : 0, shown = v => `${v < -0.004 ? '−' : ''}${Number(Math.abs(v).toFixed(2))}`;
+        check.that(`sheet ${l + 1}: heights as the control shows them`, (await sheet.locator('.side-view').getAttribute('aria-label')).includes(`raw slab top at z ${Number((layer.z_bottom + layer.slab_thickness - down).toFixed(2))},`)
+            && (await sheet.locator('.side-view').textContent()).includes(`z ${shown(layer.z_bottom - down)}`));
+        check.that(`sheet ${l + 1}: the slab’s measures`, (await sheet.locator('.plan-view').textContent()).includes(`slab ${Number((plan.stock.max[0] - plan.stock.min[0]).toFixed(1))}`));
+    }
+    // Feeds are those of the programs.
+    const {feeds} = await page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent));
+    plan.layers.flatMap(layer => layer.operations).forEach((operation, i) => {
+        const said = new Set([...readFileSync(`${out}/${operation.file}`, 'utf8').matchAll(/\bF([\d.]+)/g)].map(([, f]) => Math.round(Number(f))));
+        check.that(`feeds of ${operation.file}`, said.has(feeds[i].low) && said.has(feeds[i].high) && feeds[i].high === Math.max(...said), JSON.stringify(feeds[i]));
+    });
+    const box = page.locator('.sheet').nth(1).locator('input[type=checkbox]').first();
+    await box.check();
+    check.that('sheet: a check can be ticked', await box.isChecked());
+    await box.uncheck();
+}
+
+// The stack as it is cut: another picture than the pattern, and no wood in the air.
+{
+    await page.locator('#view').scrollIntoViewIfNeeded();
+    await page.waitForTimeout(60);
+    const drawn = (await page.locator('#canvas').screenshot()).toString('base64');
+    await change('#shape', 'built');
+    await page.waitForTimeout(60);
+    check.that('view: wood as cut', (await page.locator('#canvas').screenshot()).toString('base64') !== drawn);
+    await change('#shape', 'pattern');
+    const {wood, stock} = await page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent));
+    check.equal('data: wood of every layer', wood.layers.length, layers);
+    for (const [l, {rle, data}] of wood.layers.entries()) {
+        const bytes = Buffer.from(data, 'base64');
+        let points = 0;
+        if (rle) for (let i = 0; i < bytes.length; i += 2) points += bytes[i];
+        check.equal(`data: points of layer ${l + 1}`, rle ? points : bytes.length, stock.nx * stock.ny);
+    }
+}
+
 // The slider moves layers.
 {
     const before = numbers(await stage('layers'));
@@ -218,7 +269,7 @@ check.equal('axe: no violations when narrow', await violations(page), []);
 check.that('narrow: no sideways scrolling', await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth + 1), await page.evaluate(() => document.documentElement.scrollWidth));
 await page.setViewportSize({width: 1280, height: 900});
 
-check.equal('print: one page for each layer', pdfPages(await page.pdf({preferCSSPageSize: true})), layers);
+check.equal('print: a cover and one page for each layer', pdfPages(await page.pdf({preferCSSPageSize: true})), layers + 1);
 check.equal('no complaints', complaints, []);
 check.equal('no request leaves the page', requests, []);
 check.that('size', statSync(file).size < 10e6);
@@ -230,7 +281,7 @@ execFileSync(command, ['report', out, '--quiet', '--no-3d']);
     const light = await open(started, file);
     check.that('light: smaller', statSync(file).size < 1e6, statSync(file).size);
     check.equal('light: no view', await light.page.locator('canvas').count(), 0);
-    check.equal('light: sheets', await light.page.locator('.sheet').count(), layers);
+    check.equal('light: a cover and sheets', await light.page.locator('.sheet').count(), layers + 1);
     check.equal('light: no complaints', light.complaints, []);
     check.equal('light: axe', await violations(light.page), []);
     await light.page.close();

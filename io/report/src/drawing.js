@@ -108,7 +108,9 @@ export function sideView(l, paper) {
 
 // The finished stack seen along y: slabs, what is milled of them, glue as it lies, and in red what stays filled. A low stack is drawn taller
 // than it is, so that every layer has room for its number; `taller` says by how much.
+let stacks = 0;
 export function stackView(paper) {
+    const air = `air-stack-${++stacks}`;
     const [x0] = plan.stock.min, [x1] = plan.stock.max, width = x1 - x0, last = plan.layers[plan.layers.length - 1];
     const board = plan.job.machine.base_board_thickness, top = last.z_bottom + last.slab_thickness, height = top + board;
     const room = paper[1] - 6, thinnest = Math.min(...plan.layers.map(layer => layer.z_top - layer.z_bottom));
@@ -128,11 +130,11 @@ export function stackView(paper) {
     });
     const filled = plan.layers.flatMap((_, l) => filledBoxes(l));
     const svg = make('svg', {class: 'stack-view', viewBox: `${x0 - u} 0 ${width + 28 * u} ${height * taller + 6 * u}`, role: 'img', 'aria-label': `The stack from the front: ${plan.layers.length} layers on the base board`},
-        make('defs', {}, stripes('air-stack', red, '#f4c3c3', u, -45)),
+        make('defs', {}, stripes(air, red, '#f4c3c3', u, -45)),
         make('path', {d: box(x0, x1, -board, 0), fill: '#dedbd3', stroke: '#8a8375', 'stroke-width': 0.3 * u}),
         plan.layers.map((layer, i) => make('path', {d: box(x0, x1, layer.z_bottom, layer.z_top), fill: i % 2 ? '#f3ead9' : '#f8f2e6', stroke: '#b59b6a', 'stroke-width': 0.3 * u})),
         make('path', {d: rows, fill: cutWood}),
-        filled.length ? make('path', {d: filled.map(b => box(b.x0, b.x1, b.z0, b.z1)).join(''), fill: 'url(#air-stack)'}) : null,
+        filled.length ? make('path', {d: filled.map(b => box(b.x0, b.x1, b.z0, b.z1)).join(''), fill: `url(#${air})`}) : null,
         plan.layers.map((layer, l) => glueSpans(l).map(([a, b]) => make('path', {d: `M${a} ${y(layer.z_bottom)}H${b}`, stroke: '#d69a1e', 'stroke-width': 0.7 * u}))),
         plan.layers.map(layer => [
             label(x1 + 2 * u, (y(layer.z_top) + y(layer.z_bottom)) / 2 + 1.2 * u, String(layer.index), 3.6 * u, {'font-weight': 700}),

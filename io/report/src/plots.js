@@ -2,6 +2,7 @@
 
 import * as Plot from '@observablehq/plot';
 import {figure, make} from './dom.js';
+import {filledBoxes} from './wood.js';
 import {data, featureKinds, featureRange, layerMinutes, nonDeposition, operationName, operations, phases, plan, size} from './report.js';
 
 const style = {fontFamily: 'inherit', fontSize: '12px', color: '#1f252b', background: 'transparent'};
@@ -42,6 +43,11 @@ function stack(k) {
     const marks = plan.features.filter(f => f.type !== 'shallow').map(f => ({x: points[0] + (points[1] - points[0]) * ((f.xy[k] - s0) / width), z: featureRange(f)[0], type: featureKinds[f.type]?.name ?? f.type}));
     const names = Object.values(featureKinds).filter(kind => marks.some(m => m.type === kind.name));
     const above = height * 1.03;
+    // Glue as it lies, not over air.
+    const joints = plan.layers.flatMap((layer, l) => data.outlines.layers[l].glue.map(points => {
+        const along = points.filter((_, i) => i % 2 === k).map(v => v * data.outlines.unit_mm);
+        return {a: Math.min(...along), b: Math.max(...along), z: layer.z_bottom};
+    }));
     return Plot.plot({
         width: 1180, height: 470, marginLeft: 55, marginTop: 26, style,
         x: {label: null, domain: [s0, end], axis: null}, y: {label: 'z, mm', domain: [0, height * 1.06], grid: false},
@@ -51,7 +57,9 @@ function stack(k) {
             Plot.rect(plan.layers, {x1: s0, x2: s1, y1: l => l.z_top, y2: l => l.z_bottom + l.slab_thickness, fill: '#efe3cd', stroke: '#c9b48c', strokeDasharray: '3,3'}),
             Plot.rect(plan.layers, {x1: s0, x2: s1, y1: 'z_bottom', y2: 'z_top', fill: (_, i) => i % 2 ? '#f3ead9' : '#f8f2e6', stroke: '#c9b48c'}),
             Plot.rect(rows, {x1: 'x1', x2: 'x2', y1: 'y1', y2: 'y2', fill: '#93a1ac', insetTop: -0.4, insetBottom: -0.4}),
-            Plot.ruleY(plan.layers, {x1: s0, x2: end, y: 'z_top', stroke: '#17636b', strokeWidth: 1.4}),
+            Plot.rect(plan.layers.flatMap((_, l) => filledBoxes(l)), {x1: b => k === 0 ? b.x0 : b.y0, x2: b => k === 0 ? b.x1 : b.y1, y1: 'z0', y2: 'z1', fill: '#d3202f'}),
+            Plot.ruleY(plan.layers, {x1: s0, x2: end, y: 'z_top', stroke: '#17636b', strokeWidth: 0.8, strokeDasharray: '4,3'}),
+            Plot.ruleY(joints, {x1: 'a', x2: 'b', y: 'z', stroke: '#d69a1e', strokeWidth: 3}),
             Plot.text(plan.layers, {x: s0, y: l => (l.z_bottom + l.z_top) / 2, text: l => String(l.index), textAnchor: 'start', dx: 6, fill: '#1f252b', fontWeight: 600}),
             Plot.rect(nonDeposition(), {x1: none[0], x2: none[1], y1: d => d[0], y2: d => d[1], fill: '#c65d5d', fillOpacity: 0.75}),
             Plot.rect(plan.features.filter(f => f.type === 'shallow'), {x1: shallow[0], x2: shallow[1], y1: f => featureRange(f)[0], y2: f => featureRange(f)[1], fill: '#3b7d3a', fillOpacity: 0.25, stroke: '#3b7d3a', strokeOpacity: 0.5}),
@@ -158,7 +166,7 @@ function stacks(height) {
             : 'no heights without boundaries, since the job leaves the least thickness to the forces and plan.json does not state it';
         const k = Number(select.value), [right, seen] = k === 0 ? ['x', 'y'] : ['y', 'x'];
         box.replaceChildren(framed('Layer stack', `Layers beside the silhouette of the pattern, seen along ${seen}: ${plan.layers.length} layers over ${figure(height, 1)} mm`,
-            `Grey: the pattern seen along ${seen}, ${right} to the right, mm. Lines: boundaries. Dashed: what facing takes off. Beside: ${least}, shallow slopes under ${figure(plan.job.material.shallow_limit_deg, 1)}°, and features by height (left to right as they lie in ${right}).`,
+            `Grey: the pattern seen along ${seen}, ${right} to the right, mm. Red: what stays filled. Yellow: glue. Dashed lines: boundaries, and what facing takes off. Beside: ${least}, shallow slopes under ${figure(plan.job.material.shallow_limit_deg, 1)}°, and features by height (left to right as they lie in ${right}).`,
             () => stack(k), true));
         box.querySelector('h3').after(make('p', {}, make('label', {for: 'stack-side'}, 'Seen '), select));
     }

@@ -95,15 +95,17 @@ export function verdict() {
             text: 'The programs have not been simulated yet: run “slabwright verify” on this folder, then “slabwright report”.',
         };
     }
+    const kinds = new Set(remarks.filter(r => r.severity === 'warning').map(r => r.code)).size;
+    const toRead = warnings > kinds ? `${plural(warnings, 'warning')} of ${plural(kinds, 'kind')} to read first.` : `${plural(warnings, 'warning')} to read first.`;
     const missing = notMade();
     if (missing.length) {
         return {
             kind: 'remarks', title: 'All but a part of it',
             text: `The simulated programs make the pattern but for ${missing.join(' and ')}.`
-                + (warnings ? ` ${plural(warnings, 'remark')} to read first.` : ''),
+                + (warnings ? ` ${toRead}` : ''),
         };
     }
-    if (warnings) return {kind: 'remarks', title: 'Yes, with remarks', text: `The simulated programs make the part; ${plural(warnings, 'remark')} to read first.`};
+    if (warnings) return {kind: 'remarks', title: 'Yes, with remarks', text: `The simulated programs make the part. ${toRead}`};
     return {kind: 'yes', title: 'Yes', text: 'The simulated programs make the part.'};
 }
 
