@@ -94,7 +94,6 @@ void validate_tool(const Tool& tool, std::size_t position) {
 
 // A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the
 // bottom.
-bool reaches_down(const Tool& tool) { return tool.kind == ToolKind::flat || tool.kind == ToolKind::ball; }
 
 }  // namespace
 
@@ -109,7 +108,7 @@ double max_layer_of(const Job& job, const Tool& tool) {
 double max_bonded_layer_thickness(const Job& job) {
     double thickness = 1e6;
     for (const Tool& tool : job.tools)
-        if (reaches_down(tool)) thickness = std::min(thickness, max_layer_of(job, tool));
+        if (is_end_mill(tool.kind)) thickness = std::min(thickness, max_layer_of(job, tool));
     return thickness;
 }
 
@@ -126,7 +125,7 @@ Job with_tools_for(const Job& job, double height) {
     Job fitted = job;
     constexpr double same = 1e-3;  // mm; layers keep to their limits within less
     std::erase_if(fitted.tools, [&](const Tool& tool) {
-        return reaches_down(tool) && max_layer_of(job, tool) < height - same;
+        return is_end_mill(tool.kind) && max_layer_of(job, tool) < height - same;
     });
     return fitted;
 }
@@ -156,8 +155,7 @@ double least_flask_gap(const Job& job) {
     constexpr double kRoom = 2.5;  // mm: the leads of finish passes swing out by 2
     double widest = 0;
     for (const Tool& tool : job.tools)
-        if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball)
-            widest = std::max(widest, tool.diameter);
+        if (is_end_mill(tool.kind)) widest = std::max(widest, tool.diameter);
     return widest + job.cutting.wall_allowance + kRoom;
 }
 
@@ -172,7 +170,55 @@ FeatureOptions feature_options(const Job& job) {
     return options;
 }
 
-bool plunges_by_default(ToolKind kind) { return kind == ToolKind::ball || kind == ToolKind::drill; }
+bool plunges_by_default(ToolKind kind) {
+    switch (kind) {
+        case ToolKind::ball:
+        case ToolKind::drill:
+            return true;
+        case ToolKind::flat:
+        case ToolKind::face:
+            break;
+    }
+    return false;
+}
+
+CutterShape cutter_shape(const Tool& tool) {
+    const double radius = tool.diameter / 2;
+    switch (tool.kind) {
+        case ToolKind::flat:
+        case ToolKind::face:
+            break;
+        case ToolKind::ball:
+            return {radius, radius, 0};
+        case ToolKind::drill:
+            return {radius, 0, 59 * std::numbers::pi / 180};
+    }
+    return {radius, 0, 0};
+}
+
+bool is_end_mill(ToolKind kind) {
+    switch (kind) {
+        case ToolKind::flat:
+        case ToolKind::ball:
+            return true;
+        case ToolKind::face:
+        case ToolKind::drill:
+            break;
+    }
+    return false;
+}
+
+bool mills(ToolKind kind) {
+    switch (kind) {
+        case ToolKind::flat:
+        case ToolKind::ball:
+        case ToolKind::face:
+            return true;
+        case ToolKind::drill:
+            break;
+    }
+    return false;
+}
 
 double core_diameter_of(const Tool& tool) {
     constexpr double kFlatShare = 0.3, kFaceShare = 0.8;

@@ -10,6 +10,7 @@
 
 #include "kernels/features/features.h"
 #include "kernels/forces/forces.h"
+#include "kernels/geometry/cutter_shape.h"
 
 namespace slabwright {
 
@@ -279,6 +280,12 @@ struct Job {
 /// Whether tools of a kind mill straight down unless the job says otherwise: ball end mills and drills do;
 /// the edges of a face mill do not reach its middle, nor do those of many flat end mills.
 [[nodiscard]] bool plunges_by_default(ToolKind kind);
+/// The lower end of a tool; a drill's is a point of 118°.
+[[nodiscard]] CutterShape cutter_shape(const Tool& tool);
+/// Whether it roughs and finishes: flat and ball end mills.
+[[nodiscard]] bool is_end_mill(ToolKind kind);
+/// Whether it cuts sideways: all but drills.
+[[nodiscard]] bool mills(ToolKind kind);
 
 /// The diameter within which a flat end mill or a face mill has no edge, mm. Tool::core_diameter where that
 /// is given; else 0.3 of an end mill's diameter and 0.8 of a face mill's. 0 of all others and of what

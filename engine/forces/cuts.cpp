@@ -12,7 +12,7 @@ ForceCoefficients coefficients_of(const Material& material, double helix_rad) {
 
 CutSegment idle_cut(const Job& job, const Tool& tool) {
     CutSegment cut;
-    cut.profile = tool.kind == ToolKind::ball ? CutterProfile::ball : CutterProfile::flat;
+    cut.profile = cutter_profile(cutter_shape(tool));
     cut.flutes = tool.flutes;
     cut.radius_mm = tool.diameter / 2;
     cut.helix_rad = tool.helix_rad;

@@ -471,7 +471,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         result.starts.push_back(result.cuts.size());
         const Tool& tool = *std::find_if(job.tools.begin(), job.tools.end(),
                                          [&](const Tool& t) { return t.number == op.tool; });
-        if (tool.kind == ToolKind::drill) continue;
+        if (!mills(tool.kind)) continue;
         if (!(op.spindle_rpm > 0))
             throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest",
                         op.purpose, "give the tool a speed");

@@ -119,7 +119,7 @@ OverhangMap overhang_map(std::span<const Loops* const> regions, const std::array
 double least_material(const Job& job, double overhang_mm) {
     double least = 0;
     for (const Tool& tool : job.tools) {
-        if (tool.kind != ToolKind::flat && tool.kind != ToolKind::ball) continue;
+        if (!is_end_mill(tool.kind)) continue;
         double high = thickness_at(job, tool, tool.stepdown_max, overhang_mm).least_mm;
         if (high < tool.stepdown_max) {
             // Slabs thinner than the step are cut through at once, with less force: the thinnest that bears

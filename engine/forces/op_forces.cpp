@@ -24,10 +24,11 @@ double fastest_feed(const Operation& operation) {
 }  // namespace
 
 CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job& job) {
+    if (!mills(tool.kind)) return {};
     CutSegment s = idle_cut(job, tool);
     s.spindle_rpm = operation.spindle_rpm;
     const double feed = fastest_feed(operation);
-    if (feed == 0 || tool.kind == ToolKind::drill) return s;
+    if (feed == 0) return s;
     if (!(operation.spindle_rpm > 0))
         throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest",
                     operation.purpose, "give the tool a speed");

@@ -20,7 +20,6 @@ constexpr int kRounds = 30;                 // of settling
 constexpr double kStuck = 0.99;             // of the round before: settling has ended
 constexpr std::size_t kMostPatches = 20000;  // of one tool and point; a dozen to some hundreds are usual
 
-
 /// All places of a tool that may be worth trying for one point: for a ball its centre on the upper half
 /// sphere about the point (lower ones are more in the way, higher ones do not cover it); for a flat end mill
 /// the middle of its floor on the disc about the point, at the point's height. A patch is a range of the
@@ -71,7 +70,7 @@ Reach::Reach(const StandingPart& part, const std::vector<Tool>& tools, double z_
              double lowest)
     : part_(part), z_bottom_(z_bottom), z_top_(z_top), lowest_(lowest) {
     for (const Tool& tool : tools)
-        if (tool.kind == ToolKind::flat || tool.kind == ToolKind::ball) tools_.push_back(tool);
+        if (is_end_mill(tool.kind)) tools_.push_back(tool);
     std::stable_sort(tools_.begin(), tools_.end(),
                      [](const Tool& a, const Tool& b) { return a.diameter < b.diameter; });
 }

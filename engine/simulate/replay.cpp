@@ -23,14 +23,6 @@ constexpr double kLeastVolume = 1e-6;  // mm³ that a piece must take to count a
 constexpr double kForceShare =
     1e-4;  // of a piece's force that it may be wrong by: it is drawn, and read to a hundredth of a newton
 
-CutterEnd cutter_end(const Tool& tool) {
-    const double radius = tool.diameter / 2;
-    if (tool.kind == ToolKind::ball) return {CutterEnd::Form::ball, radius, 0};
-    if (tool.kind == ToolKind::drill)
-        return {CutterEnd::Form::cone, radius, std::tan(31 * std::numbers::pi / 180)};  // a point of 118°
-    return {CutterEnd::Form::flat, radius, 0};
-}
-
 /// What one piece took, before it is a depth and a width.
 struct Taken {
     double volume = 0, deepest = 0;
@@ -38,10 +30,10 @@ struct Taken {
 
 /// The forces of a cut as deep and as wide as a piece shows it.
 void rate(ReplayPiece& piece, const Tool& tool, const Material& m, double feed, double rpm) {
-    if (!(rpm > 0) || !(feed > 0) || tool.kind == ToolKind::drill) return;
+    if (!(rpm > 0) || !(feed > 0) || !mills(tool.kind)) return;
     CutSegment s;
     const double radius = tool.diameter / 2;
-    s.profile = tool.kind == ToolKind::ball ? CutterProfile::ball : CutterProfile::flat;
+    s.profile = cutter_profile(cutter_shape(tool));
     s.flutes = tool.flutes;
     s.radius_mm = radius;
     s.helix_rad = tool.helix_rad;
@@ -136,7 +128,7 @@ ReplayedProgram Replay::run(const Program& program) {
         const double middle = (ends[k - 1] + ends[k]) / 2;
         return std::min(pieces - 1, static_cast<std::size_t>(middle / now * static_cast<double>(pieces)));
     };
-    const CutterEnd end = cutter_end(*tool);
+    const CutterEnd end = cutter_end(cutter_shape(*tool));
     const double top = r.input.layers[layer].z_bottom + r.input.layers[layer].slab_thickness;
     std::vector<std::vector<Taken>> taken(r.bands.size());
     std::vector<std::vector<char>> cuts(r.bands.size());

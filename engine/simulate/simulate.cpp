@@ -50,18 +50,6 @@ struct PreparedProgram {
     std::vector<StepBox> blocks, parts;
 };
 
-CutterEnd cutter_end(const Tool& tool) {
-    switch (tool.kind) {
-        case ToolKind::ball:
-            return {CutterEnd::Form::ball, tool.diameter / 2, 0};
-        case ToolKind::drill:
-            return {CutterEnd::Form::cone, tool.diameter / 2,
-                    std::tan(31 * std::numbers::pi / 180)};  // a point of 118°
-        default:
-            return {CutterEnd::Form::flat, tool.diameter / 2, 0};
-    }
-}
-
 /// The walls of a layer's flask and of the one below it, into which a cutter dips at a joint. Walls alone:
 /// what is cut far inside the flask shows in the stock.
 Mesh flask_walls(const std::vector<SimulatedLayer>& layers, std::size_t layer) {
@@ -272,7 +260,7 @@ private:
                         fmt::format("loads tool {} where the plan names tool {}", program.tool,
                                     program.planned_tool),
                         &program, 0, {}, 0);
-            if (p.tool) p.end = cutter_end(*p.tool);
+            if (p.tool) p.end = cutter_end(cutter_shape(*p.tool));
             prepared_.push_back(std::move(p));
         }
         parallel_each(context_, prepared_.size(), [&](std::size_t i) {

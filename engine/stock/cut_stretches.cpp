@@ -75,11 +75,6 @@ struct Meeting {
     }
 };
 
-CutterEnd end_of(const Tool& tool) {
-    return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2,
-            0};
-}
-
 // Smallest x and y, largest x and y of a move and the cutter on it, mm.
 std::array<double, 4> box_of(const Move& from, const Move& move, double radius) {
     std::array<double, 4> box{to_mm(std::min(from.x, move.x)), to_mm(std::min(from.y, move.y)),
@@ -163,7 +158,7 @@ void StandingSlab::run_parts(const Operation& operation, const Tool& tool, std::
 
 void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<const MoveRange> parts,
                        bool all, const std::function<void(const CutStretch&)>& stretch) {
-    const CutterEnd end = end_of(tool);
+    const CutterEnd end = cutter_end(cutter_shape(tool));
     std::optional<Surrounded> around;
     if (!all) around.emplace(grid_, operation, parts, end.radius);
     bool told = all;

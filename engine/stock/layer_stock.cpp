@@ -219,11 +219,6 @@ std::uint64_t LayerStock::bytes(const Job& job, double plane_mm2) {
     return static_cast<std::uint64_t>(13 * plane_mm2 / (cell * cell));
 }
 
-CutterEnd cutter_end(const Tool& tool) {
-    return {tool.kind == ToolKind::ball ? CutterEnd::Form::ball : CutterEnd::Form::flat, tool.diameter / 2,
-            0};
-}
-
 LayerStock::LayerStock(Context& context, const LayerJob& layer, const LayerSolid& solid, double cell,
                        StockMemory memory)
     : z_bottom_(layer.z_bottom), z_top_(layer.z_top), memory_(std::move(memory)) {
@@ -326,7 +321,7 @@ LayerStock::LayerStock(Context& context, const LayerJob& layer, const LayerSolid
 Taken LayerStock::cut(Context& context, const Operation& operation, const Tool& tool) {
     const std::vector<Move>& moves = operation.moves;
     if (moves.size() < 2) return {};
-    const CutterEnd end = cutter_end(tool);
+    const CutterEnd end = cutter_end(cutter_shape(tool));
     const double r = end.radius, top = z_top_, cell_mm2 = grid_.cell * grid_.cell;
     auto over_bottom = [&](const Move& m) {
         return std::array<double, 3>{to_mm(m.x), to_mm(m.y), to_mm(m.z) - z_bottom_};

@@ -190,6 +190,6 @@ private:
 inline constexpr double kStockCells = 8e6;
 [[nodiscard]] double stock_cell(const LayerJob& layer);
 
-[[nodiscard]] CutterEnd cutter_end(const Tool& tool);
+[[nodiscard]] inline CutterEnd cutter_end(const Tool& tool) { return cutter_end(cutter_shape(tool)); }
 
 }  // namespace slabwright

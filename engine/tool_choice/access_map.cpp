@@ -19,9 +19,7 @@ void access_maps(Context& context, MeshView mesh, const Plan& plan,
         for (const int number : numbers) {
             const auto tool = std::find_if(plan.job.tools.begin(), plan.job.tools.end(),
                                            [&](const Tool& t) { return t.number == number; });
-            if (tool == plan.job.tools.end() ||
-                (tool->kind != ToolKind::flat && tool->kind != ToolKind::ball))
-                continue;
+            if (tool == plan.job.tools.end() || !is_end_mill(tool->kind)) continue;
             AccessOptions options =
                 access_options(plan.job, layer.z_bottom - (layer.index > 1 ? overrun.below : overrun.board));
             options.shares = true;

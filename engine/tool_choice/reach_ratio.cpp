@@ -8,9 +8,7 @@
 namespace slabwright {
 
 ToolShape shape_of(const Tool& tool) {
-    ToolShape shape;
-    shape.profile = tool.kind == ToolKind::ball ? ToolShape::Profile::ball : ToolShape::Profile::flat;
-    shape.radius = tool.diameter / 2;
+    ToolShape shape = tool_shape(cutter_shape(tool));
     shape.flute_length = tool.flute_length;
     shape.shank_radius = tool.shank_diameter / 2;
     shape.stickout = tool.stickout;

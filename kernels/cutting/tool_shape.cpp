@@ -10,6 +10,30 @@
 
 namespace slabwright {
 
+ToolShape tool_shape(const CutterShape& cutter) {
+    ToolShape tool;
+    tool.radius = cutter.radius;
+    switch (cutter.form()) {
+        case CutterForm::flat:
+            return tool;
+        case CutterForm::ball:
+            tool.profile = ToolShape::Profile::ball;
+            return tool;
+        case CutterForm::bull_nose:
+            tool.profile = ToolShape::Profile::bull_nose;
+            tool.corner_radius = cutter.corner;
+            return tool;
+        case CutterForm::tapered_ball:
+            tool.profile = ToolShape::Profile::tapered_ball;
+            tool.corner_radius = cutter.corner;
+            tool.taper_rad = cutter.taper_rad;
+            return tool;
+        case CutterForm::cone:
+            break;
+    }
+    refuse_form(cutter.form(), "what it reaches");
+}
+
 void check_tool_shape(const ToolShape& tool) {
     auto require = [](bool good, const char* what) {
         if (!good)

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "kernels/geometry/cutter_shape.h"
+
 namespace slabwright {
 
 /// An end mill about a vertical axis; its position is that of its tip.
@@ -22,6 +24,10 @@ struct ToolShape {
     double stickout = 0;       ///< mm, from the tip to the holder's nose; 0: there is no holder
     double holder_radius = 0;  ///< mm
 };
+
+/// A cutter alone, without an end, shank or holder.
+/// @throws Error(usage, "tool.shape") for a cone
+[[nodiscard]] ToolShape tool_shape(const CutterShape& cutter);
 
 /// @throws Error(usage, "tool.shape") for a length that is negative or not finite, a radius of 0, a corner
 /// larger than the cutter, a

@@ -7,6 +7,20 @@
 
 namespace slabwright {
 
+CutterProfile cutter_profile(const CutterShape& shape) {
+    switch (shape.form()) {
+        case CutterForm::flat:
+            return CutterProfile::flat;
+        case CutterForm::ball:
+            return CutterProfile::ball;
+        case CutterForm::bull_nose:
+        case CutterForm::tapered_ball:
+        case CutterForm::cone:
+            break;
+    }
+    refuse_form(shape.form(), "the force");
+}
+
 ForceCoefficients resolve_coefficients(const OrthogonalForces& k, double helix,
                                        CoefficientTransform transform) {
     const double c = std::cos(helix), s = std::sin(helix);

@@ -27,11 +27,14 @@
 #include <string>
 #include <vector>
 
+#include "kernels/geometry/cutter_shape.h"
 #include "kernels/parallel/context.h"
 
 namespace slabwright {
 
 enum class CutterProfile : std::uint8_t { flat, ball };
+/// @throws Error(usage, "tool.shape") for what is neither flat nor a ball
+[[nodiscard]] CutterProfile cutter_profile(const CutterShape& shape);
 
 /// What a material gives in orthogonal cutting: c, per area of chip, N/mm²; e, per length of edge, N/mm.
 struct OrthogonalForces {

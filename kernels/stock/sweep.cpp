@@ -3,11 +3,27 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 
 #include "kernels/geometry/vectors.h"
 #include "kernels/geometry/wide.h"
 
 namespace slabwright {
+
+CutterEnd cutter_end(const CutterShape& shape) {
+    switch (shape.form()) {
+        case CutterForm::flat:
+            return {CutterEnd::Form::flat, shape.radius, 0};
+        case CutterForm::ball:
+            return {CutterEnd::Form::ball, shape.radius, 0};
+        case CutterForm::cone:
+            return {CutterEnd::Form::cone, shape.radius, std::tan(std::numbers::pi / 2 - shape.taper_rad)};
+        case CutterForm::bull_nose:
+        case CutterForm::tapered_ball:
+            break;
+    }
+    refuse_form(shape.form(), "what it takes off the stock");
+}
 
 namespace {
 

@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "kernels/geometry/cutter_shape.h"
 #include "kernels/geometry/vectors.h"
 
 namespace slabwright {
@@ -39,6 +40,9 @@ struct CutterEnd {
     double radius = 0;  ///< mm
     double slope = 0;   ///< of the cone
 };
+
+/// @throws Error(usage, "tool.shape") for a bull-nose or a tapered ball
+[[nodiscard]] CutterEnd cutter_end(const CutterShape& shape);
 
 /// A part of a circle at one height that the tip runs along, mm and radians: from the angle `start` (from +x,
 /// counter-clockwise) on over `turn`, negative for clockwise, a whole circle at most.

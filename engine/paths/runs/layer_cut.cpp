@@ -51,8 +51,7 @@ const DropIndex& LayerCut::drops(const Cutter& cutter) const {
 }
 
 Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
-    const Cutter cutter{tool.kind == ToolKind::ball ? Cutter::Profile::ball : Cutter::Profile::flat,
-                        tool.diameter / 2};
+    const Cutter cutter = cutter_of(cutter_shape(tool));
     Surroundings around{standing, part, cutter};
     // Where the places are those of a wider cutter, half of what it is wider by may go.
     const double wider = part != nullptr ? part->cutter().radius - cutter.radius : 0;
