@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/paths/runs/rings.h"
+#include "engine/paths/runs/flask_room.h"
 #include "engine/paths/runs/tolerances.h"
 #include "kernels/slicing/slicing.h"
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "engine/paths/runs/flask_room.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "kernels/polygons/loops.h"
 
@@ -12,18 +13,6 @@ namespace slabwright {
 
 /// The places from which a tool touches the solid, as a region, from level contours at one height.
 [[nodiscard]] Loops forbidden_region(const Contours& contours);
-
-/// The places that a layer's flask leaves to the middle of a cutter of radius `r` mm: the opening, shrunk.
-/// Straight walls are exact, round ones keep the cutter off by up to 0.02 mm. Only with a flask.
-[[nodiscard]] Loops flask_room(const LayerCut& cut, double r);
-
-/// The rest of the plane, as far as it matters: what lies outside `room`, up to well past the stock.
-[[nodiscard]] Loops beyond_room(const LayerCut& cut, double r, const Loops& room);
-
-/// A level's forbidden stretches with the flask's added: whatever lies outside `room`. Unchanged where there
-/// is no flask.
-[[nodiscard]] Fibres beside_flask(const LayerCut& cut, const Loops& room, Fibres forbidden, Axis axis,
-                                  std::span<const std::int32_t> lines);
 
 /// Cuts once around a closed ring (its first point is repeated at the end), entered at its start from `above`
 /// down a ramp along the ring itself; the stretch of the ramp is cut again. A ring in which the tool's core
