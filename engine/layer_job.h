@@ -13,7 +13,7 @@
 namespace slabwright {
 
 template <class T>
-class Spares;
+class ScratchPool;
 struct StockMemory;
 
 /// Of a layer's time, its paths; the forces that follow take the rest.
@@ -44,7 +44,7 @@ struct LayerJob {
                                                                     ///< than this, the layer is given up
     double last_steps =
         0;  ///< mm that the last two levels of roughing may go down, for the wood's sake; 0: any step
-    Spares<StockMemory>* stock_memory =
+    ScratchPool<StockMemory>* stock_memory =
         nullptr;  ///< which layers leave to each other; null: this one has its own
 };
 

@@ -63,7 +63,7 @@ struct Bench {
     }
     PathBuilder builder() {
         PathBuilder path(operation, tool, 3000, kClearance, kLink);
-        path.know(cut.around(tool, &part));
+        path.set_surroundings(cut.around(tool, &part));
         return path;
     }
     [[nodiscard]] double highest(std::size_t from, std::size_t to) const {
@@ -265,7 +265,7 @@ TEST(Links, ABallKeepsItsAllowanceOverWhatLiesFlat) {
         bench.tool.kind = ToolKind::ball;
         const DropIndex wider(bench.cut.solid, {Cutter::Profile::ball, 5 + kAllowance});
         PathBuilder path(bench.operation, bench.tool, 3000, kClearance, kLink);
-        path.know(bench.cut.around(bench.tool, &wider));
+        path.set_surroundings(bench.cut.around(bench.tool, &wider));
         path.follow(line(-9, 10, -8, 10, kTop + over));
         const std::size_t before = bench.operation.moves.size();
         path.follow(line(28, 11, 29, 12, kTop + over));
@@ -290,7 +290,7 @@ TEST(Links, ARunWithoutRoomIsLeftByAToolThatDoesNotPlunge) {
         room.close_loop();
         around.room = std::make_shared<const Loops>(room);
         PathBuilder path(bench.operation, bench.tool, 3000, kClearance, kLink);
-        path.know(around);
+        path.set_surroundings(around);
         path.follow(line(-20, -20, -19.5, -20, 10));
         double lowest = 1e9;
         for (const Move& m : bench.operation.moves) lowest = std::min(lowest, to_mm(m.z));

@@ -177,7 +177,7 @@ TEST(Plunge, NoRunIsEnteredOnItsCore) {
             PathBuilder path(bench.operation, tool, 3000, kTop + 10, kTop + 2);
             Surroundings around = bench.cut.around(tool, &bench.part);
             around.from_side = tool.kind == ToolKind::face && round % 2 == 0;
-            path.know(around);
+            path.set_surroundings(around);
             for (int k = 0; k < 13; ++k) {
                 const std::vector<PathPoint> run = k == 3 && round % 3 == 0 ? random_stairs(random) : random_run(random);
                 bool free = true;
@@ -257,7 +257,7 @@ TEST(Plunge, ARampAsLongAsTheCoreIsWide) {
                        {to_units(-101), to_units(101)}};
         room.close_loop();
         around.room = std::make_shared<const Loops>(room);
-        path.know(around);
+        path.set_surroundings(around);
         path.follow(std::vector<PathPoint>{{to_units(-100), to_units(100), to_units(11)},
                                            {to_units(-100 + length), to_units(100), to_units(11)}});
         path.finish();

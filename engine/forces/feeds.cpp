@@ -24,7 +24,7 @@
 #include "kernels/forces/hardest.h"
 #include "kernels/mesh/raw_array.h"
 #include "kernels/parallel/parallel.h"
-#include "kernels/parallel/spares.h"
+#include "kernels/parallel/scratch_pool.h"
 
 namespace slabwright {
 
@@ -164,8 +164,8 @@ struct KnownCuts::Impl {
     };
     std::shared_mutex mutex;
     std::map<Of, ByClassAndFeed<Bent>> known;
-    Spares<SeenMemory> memory;  // which layers leave to each other: to fill it is little against what new
-                                // memory of that size costs
+    ScratchPool<SeenMemory> memory;  // which layers leave to each other: to fill it is little against what
+                                     // new memory of that size costs
 
     std::optional<Bent> find(const Of& of, const ClassAndFeed& key) {
         const std::shared_lock lock(mutex);
@@ -461,7 +461,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
     LayerCuts result;
     // What one operation leaves to the next, for its memory only.
     StandingSlab before = slab, again = slab;
-    const Lent<SeenMemory> lent(known_cuts != nullptr ? &known_cuts->impl().memory : nullptr);
+    const PooledScratch<SeenMemory> lent(known_cuts != nullptr ? &known_cuts->impl().memory : nullptr);
     auto& [seen, anew, all] = *lent;
     for (Operation& op : layer.operations) {
         context.throw_if_cancelled();

@@ -134,7 +134,7 @@ void PathBuilder::add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint3
     started_ = true;
 }
 
-void PathBuilder::know(const Surroundings& around) {
+void PathBuilder::set_surroundings(const Surroundings& around) {
     around_ = around;
     learnt_ = operation_.moves.size();
 }
@@ -235,8 +235,8 @@ void PathBuilder::descend(const PathPoint& to) {
 }
 
 // From above the start of a run down to it. A slice along a wall is no plunge: only what stands under the
-// middle of the cutter asks for a helix or a ramp; of a short way down, what no edge has passed over on the ways
-// before it. Says whether there was a way in.
+// middle of the cutter asks for a helix or a ramp; of a short way down, what no edge has passed over on the
+// ways before it. Says whether there was a way in.
 bool PathBuilder::enter(std::span<const PathPoint> run) {
     const PathPoint& first = run.front();
     descend(first);

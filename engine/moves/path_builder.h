@@ -42,7 +42,7 @@ public:
     PathBuilder(Operation& operation, const Tool& tool, double feed, double clearance_z, double link_z);
 
     /// From now on links are as low as what stands allows. Before this, rapids run at the link height.
-    void know(const Surroundings& around);
+    void set_surroundings(const Surroundings& around);
 
     /// Rapid to above (x, y), if not there already (0.1 µm): as low as is proven to be air on the way and
     /// over the target, else at the link height.

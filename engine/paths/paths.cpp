@@ -198,17 +198,17 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         // finishes, and after it the corners that the ball leaves, by the flat end mill, and what is left of
         // the cusps' limit anywhere.
         const LayerTools& tools = layer.tools;
-        Spares<StockMemory> own;
-        Spares<StockMemory>& spares = layer.stock_memory != nullptr ? *layer.stock_memory : own;
-        auto memory = spares.take([] { return std::make_unique<StockMemory>(); });
+        ScratchPool<StockMemory> own;
+        ScratchPool<StockMemory>& pool = layer.stock_memory != nullptr ? *layer.stock_memory : own;
+        auto memory = pool.take([] { return std::make_unique<StockMemory>(); });
         LayerStock stock(cut.context, cut.layer, cut.solid, stock_cell(cut.layer), std::move(*memory));
         // Left to the next layer, however this one ends.
         struct Leaving {
-            Spares<StockMemory>& spares;
+            ScratchPool<StockMemory>& pool;
             std::unique_ptr<StockMemory> memory;
             LayerStock& stock;
-            ~Leaving() { *memory = std::move(stock).release(), spares.give(std::move(memory)); }
-        } const leaving{spares, std::move(memory), stock};
+            ~Leaving() { *memory = std::move(stock).release(), pool.give(std::move(memory)); }
+        } const leaving{pool, std::move(memory), stock};
         std::vector<Operation> useful;
         for (Operation& op : result.operations) {
             const Tool& tool =

@@ -20,7 +20,7 @@ struct LayerGround {
     const AccessScene* scene = nullptr;  ///< of the mesh; needed where tools are chosen by the exact rule
     const Loops* carried_by =
         nullptr;  ///< what stays of the slab below the layer's joint; null: it lies on the board
-    Spares<StockMemory>* stock_memory =
+    ScratchPool<StockMemory>* stock_memory =
         nullptr;                      ///< which layers leave to each other; null: each has its own
     KnownCuts* known_cuts = nullptr;  ///< which layers tell each other; null: each finds its own
 };

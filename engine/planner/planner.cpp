@@ -216,8 +216,8 @@ void settle_undercuts(Context& context, Plan& plan, MeshView mesh) {
         if (u.thickness_mm > job.tolerances.undercut)
             plan.diagnostics.push_back(
                 {job.allow_undercut ? Severity::warning : Severity::error, "undercut.unmade",
-                 fmt::format("under an overhang of {:.1f} mm² {} stay filled, up to {:.2f} mm high", u.area_mm2,
-                             volume_words(u.volume_mm3), u.height_mm),
+                 fmt::format("under an overhang of {:.1f} mm² {} stay filled, up to {:.2f} mm high",
+                             u.area_mm2, volume_words(u.volume_mm3), u.height_mm),
                  std::array{u.x, u.y, u.z}});
     if (!job.allow_undercut)
         throw refusal("undercut.unmade",
@@ -275,7 +275,7 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
     std::stable_sort(largest_first.begin(), largest_first.end(),
                      [&](std::size_t a, std::size_t b) { return steps[a] > steps[b]; });
     const std::size_t half = (plan.layers.size() + 1) / 2;
-    Spares<StockMemory> stock_memory;
+    ScratchPool<StockMemory> stock_memory;
     KnownCuts known_cuts;
     SolverAhead solver(context);
     parallel_each(context, plan.layers.size(), [&](std::size_t task) {

@@ -13,7 +13,7 @@
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/mesh/bulk_memory.h"
 #include "kernels/parallel/context.h"
-#include "kernels/parallel/spares.h"
+#include "kernels/parallel/scratch_pool.h"
 #include "kernels/stock/sweep.h"
 
 namespace slabwright {

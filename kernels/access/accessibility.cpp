@@ -44,7 +44,7 @@ constexpr double kShared =
     1.5;  // of a point's distance from the corner: within it other pieces' points are hoped to be
 constexpr int kMostLevels = 40;      // of halving
 constexpr std::size_t kMissed = 64;  // balls without a reached point remembered
-constexpr int kHope = 8;             // pieces in a row that may fail to be proven at once, until only
+constexpr int kEarlyOutCredit = 8;   // pieces in a row that may fail to be proven at once, until only
 constexpr unsigned kTryAgain = 16;   // every so many is tried
 constexpr std::size_t kPiecesAtOnce = 128;
 
@@ -573,9 +573,9 @@ public:
     }
 
     /// Looks whether a whole piece is missed, if others have been of late.
-    void hope_missed(const Point3& middle, const Point3& n, double around) {
-        if (hope_ <= 0 && ++despaired_ % kTryAgain != 0) return;
-        hope_ = prove_missed(middle, n, around) ? kHope : hope_ - 1;
+    void try_proving_missed(const Point3& middle, const Point3& n, double around) {
+        if (early_out_credit_ <= 0 && ++skipped_ % kTryAgain != 0) return;
+        early_out_credit_ = prove_missed(middle, n, around) ? kEarlyOutCredit : early_out_credit_ - 1;
     }
 
     Counts counts;
@@ -825,8 +825,8 @@ private:
     std::vector<Point3> met_;  ///< obstacles of the last place
     Obstacles known_;
     MissedBalls missed_;
-    int hope_ = kHope;  ///< that whole pieces are proven to be missed
-    unsigned despaired_ = 0;
+    int early_out_credit_ = kEarlyOutCredit;  ///< that whole pieces are proven to be missed
+    unsigned skipped_ = 0;
     std::array<Proof, 2 * Obstacles::kMost> proofs_;  ///< of the obstacles known, about the patch in hand
     std::size_t proven_ = 0;
     std::vector<Patch> stack_;
@@ -1019,7 +1019,7 @@ Areas measure(Searcher& searcher, const Question& q, const Piece& piece, const P
     if (!q.overhangs && tally.reached == 0) {
         double around2 = 0;
         for (const Point3& corner : piece.t) around2 = std::max(around2, squared_distance(corner, middle));
-        searcher.hope_missed(middle, n, std::sqrt(around2));
+        searcher.try_proving_missed(middle, n, std::sqrt(around2));
     }
     for (int k = 0; k < 3; ++k) {
         std::array<double, 3> w{kInset / 2, kInset / 2, kInset / 2};

@@ -19,7 +19,7 @@
 #include "kernels/mesh/weld.h"
 #include "kernels/parallel/deal.h"
 #include "kernels/parallel/parallel.h"
-#include "kernels/parallel/spares.h"
+#include "kernels/parallel/scratch_pool.h"
 
 namespace slabwright {
 
@@ -626,7 +626,7 @@ template <class T, class EachFace, class FaceOf, class Keep>
 Sparse<T> pass(const Task& task, const Cells& cells, std::size_t faces, std::size_t n, std::size_t grain,
                EachFace&& each_face, FaceOf&& face_of, Keep&& keep) {
     Sparse<T> out(faces, cells.count());
-    Spares<Block> blocks;
+    ScratchPool<Block> blocks;
     RawArray<std::uint32_t> numbers;
     std::optional<MemoryCharge> charge;
     std::size_t before = 0;  // faces dealt in earlier rounds

@@ -25,7 +25,7 @@
 #include "kernels/errors.h"
 #include "kernels/mesh/bulk_memory.h"
 #include "kernels/parallel/parallel.h"
-#include "kernels/parallel/spares.h"
+#include "kernels/parallel/scratch_pool.h"
 
 namespace slabwright {
 
@@ -418,7 +418,7 @@ std::vector<Section> slice(Context& context, MeshView mesh, std::span<const Plan
     });
     rank = {};
 
-    Spares<Scratch> pool;  // clean ones
+    ScratchPool<Scratch> pool;  // clean ones
     const auto clean = [facets] {
         auto scratch = std::make_unique<Scratch>();
         scratch->pending.assign((facets + 63) / 64, 0);

@@ -33,7 +33,7 @@ Operation face_layer(const LayerCut& cut) {
     if (!beside) {
         Surroundings around{&standing, nullptr, {Cutter::Profile::flat, r}};
         around.ramp_deg = cut.job.cutting.ramp_deg;
-        path.know(around);
+        path.set_surroundings(around);
     }
     for (int step = 1; step <= steps; ++step) {
         const std::int32_t z = to_units(step == steps ? cut.layer.z_top : cut.stock_top - op.stepdown * step);

@@ -25,7 +25,7 @@ Operation finish_floors(const LayerCut& cut) {
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     const DropIndex& part = cut.drops(cutter);
-    path.know(cut.around(tool, &part));
+    path.set_surroundings(cut.around(tool, &part));
     op.stepover = tool.stepover * tool.diameter;
     for (std::size_t i = 0; i < heights.size(); ++i) {
         const std::vector<SolidFacet> facets = floor_facets(cut, heights[i]);

@@ -73,7 +73,7 @@ Operation finish_walls(const LayerCut& cut) {
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     const DropIndex& part = cut.drops(cutter);
-    path.know(cut.around(tool, &part));
+    path.set_surroundings(cut.around(tool, &part));
     std::vector<std::vector<LevelRun>> runs(tips.size());
     for (std::size_t i = 0; i < tips.size(); ++i)
         for (std::size_t c = 0; c < contours[i].size(); ++c) {
@@ -268,7 +268,7 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     const DropIndex& part = cut.drops(cutter);
-    path.know(cut.around(tool, &part));
+    path.set_surroundings(cut.around(tool, &part));
     cut_levels(path, cut, tool, part, runs, true);
     path.finish();
     return op;

@@ -98,7 +98,7 @@ std::size_t cut_open_levels(const LayerCut& cut, const Tool& face, std::span<con
                      cut.layer.z_top + 2);
     Surroundings around = cut.around(face, &part);
     around.from_side = true;
-    path.know(around);
+    path.set_surroundings(around);
     const std::size_t no_ways = cut.no_way_in.size();
     for (std::size_t l = 0; l < levels.size(); ++l) {
         const OpenLevel& level = levels[l];

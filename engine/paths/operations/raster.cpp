@@ -420,7 +420,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
 
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
-    path.know(cut.around(tool, &ball));
+    path.set_surroundings(cut.around(tool, &ball));
     follow_nearest(path, chained(std::move(runs), slide));
     path.finish();
     return op;

@@ -716,7 +716,7 @@ private:
     void emit(Operation& op, const std::vector<std::vector<PathPoint>>& runs) const {
         PathBuilder path(op, tool_, std::min(cut_.job.cutting.finish_feed, cut_.job.machine.max_feed),
                          cut_.layer.z_top + cut_.job.machine.clearance, cut_.layer.z_top + 2);
-        path.know(cut_.around(tool_, index_));
+        path.set_surroundings(cut_.around(tool_, index_));
         const Slide slide{index_, ball_, chord_, cut_.layer.z_top, kBridge, under_};
         if (!pass_.in_steps) {
             cut_.context.throw_if_cancelled();

@@ -250,7 +250,7 @@ std::vector<Operation> rough_layer(const LayerCut& cut) {
     for (std::size_t i = 0; i < steps.size(); ++i)
         if (!cuts[i].rings.pieces.empty() || !cuts[i].free.empty())
             around.deepest = std::max(around.deepest, steps[i].above - steps[i].level.tip);
-    path.know(around);
+    path.set_surroundings(around);
     for (std::size_t i = 0; i < steps.size(); ++i) {
         const double above = steps[i].above, tip = steps[i].level.tip;
         if (!cuts[i].rings.pieces.empty()) {

@@ -560,7 +560,7 @@ private:
                          cut_.layer.z_top + 2);
         const DropIndex& part = cut_.drops(ball_ ? Cutter{Cutter::Profile::ball, r_ + pass_.allowance}
                                                  : Cutter{Cutter::Profile::flat, r_});
-        path.know(cut_.around(tool_, &part));
+        path.set_surroundings(cut_.around(tool_, &part));
         cut_levels(path, cut_, tool_, part, runs, false);
         path.finish();
     }
