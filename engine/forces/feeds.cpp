@@ -292,10 +292,13 @@ void run_through(Context& context, StandingSlab& slab, const Operation& op, cons
     const auto see = [&](const CutStretch& s) {
         if (seen.size() % 1024 == 0) context.throw_if_cancelled();
         Seen now;
-        now.first = s.first, now.last = s.last, now.cuts = s.cuts();
+        now.first = s.first;
+        now.last = s.last;
+        now.cuts = s.cuts();
         for (std::size_t i = 0; i < 3; ++i) now.at[i] = static_cast<float>(s.at[i]);
         if (now.cuts) {
-            now.coarse = class_of(s, tool, kCoarse), now.fine = class_of(s, tool, kFine);
+            now.coarse = class_of(s, tool, kCoarse);
+            now.fine = class_of(s, tool, kFine);
             now.depth = static_cast<float>(s.high);
             now.height = static_cast<float>(std::max(0.0, s.at[2] - layer.z_bottom + (s.low + s.high) / 2));
             // Roughing is carried by the slab that stands, floors by what stays under them. Thinner than the
@@ -357,7 +360,8 @@ void replaced(const std::vector<Seen>& seen, std::span<const DeepRun> runs, std:
         while (r < runs.size() && runs[r].last < s.first) take();
         if (r < runs.size() && s.first >= runs[r].first) continue;
         const std::uint32_t more = r == 0 ? 0 : parts[r - 1].last - runs[r - 1].last;
-        s.first += more, s.last += more;
+        s.first += more;
+        s.last += more;
         all.push_back(s);
     }
     while (r < runs.size()) take();
@@ -405,8 +409,8 @@ std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& o
         if (passes == 0) continue;
         if (!runs.empty() && s.first <= runs.back().last + 1) {
             DeepRun& run = runs.back();
-            run.last = std::max(run.last, s.last),
-            run.depth_mm = std::max(run.depth_mm, static_cast<double>(s.depth)),
+            run.last = std::max(run.last, s.last);
+            run.depth_mm = std::max(run.depth_mm, static_cast<double>(s.depth));
             run.passes = std::max(run.passes, passes);
         } else {
             runs.push_back({s.first, s.last, s.depth, passes});
@@ -496,7 +500,8 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             Seen lowest = s;
             const float off = s.depth * static_cast<float>(passes - 1) / static_cast<float>(passes);
             lowest.coarse = shallower(s.coarse, passes);
-            lowest.wood -= off, lowest.height = std::max(0.F, lowest.height - off / 2);
+            lowest.wood -= off;
+            lowest.height = std::max(0.F, lowest.height - off / 2);
             return load_of(lowest, cutting.at(lowest.coarse, s.feed));
         };
 
@@ -533,7 +538,8 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                 std::sort(steps.begin(), steps.end(),
                           [](const FeedStep& x, const FeedStep& y) { return x.feed > y.feed; });
             }
-            last_key = key, last = &it->second;
+            last_key = key;
+            last = &it->second;
             return *last;
         };
         const auto bent_at = [&](const Seen& s, FeedStep& step) -> const Bent& {
@@ -565,14 +571,16 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                 return;
             }
             if (!job.cutting.adapt_feed) {
-                s.feed = planned, s.bent = &cutting.at(s.coarse, planned);
+                s.feed = planned;
+                s.bent = &cutting.at(s.coarse, planned);
             } else {
                 ClassFeeds& of = feeds_of(s, planned);
                 FeedStep* step = of.chosen;
                 if (s.overhang > 0 || step == nullptr) step = slow_enough(s, of.steps);
                 if (!(s.overhang > 0)) of.chosen = step;
                 step = as_stated(s, of.steps, step);
-                s.feed = step->feed, s.bent = &bent_at(s, *step);
+                s.feed = step->feed;
+                s.bent = &bent_at(s, *step);
                 // At its slowest it may still pass the limit by what its coarse class hides.
                 if (const double bears = cutter_share(*s.bent);
                     step == &of.steps.back() && bears > kClassSlack && bears <= 1)
@@ -601,7 +609,8 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                 ++divided;
                 divided_way += way_of(op, run.first, run.last);
                 if (run.depth_mm > deepest) {
-                    deepest = run.depth_mm, passes = run.passes;
+                    deepest = run.depth_mm;
+                    passes = run.passes;
                     const Move& end = op.moves[run.last];
                     divided_at = {to_mm(end.x), to_mm(end.y), to_mm(end.z)};
                 }

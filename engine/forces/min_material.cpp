@@ -85,7 +85,10 @@ OverhangMap overhang_map(std::span<const Loops* const> regions, const std::array
     const double cell = std::max(high[0] - low[0], high[1] - low[1]) / kCells;
     const int nx = std::max(1, static_cast<int>(std::ceil((high[0] - low[0]) / cell))),
               ny = std::max(1, static_cast<int>(std::ceil((high[1] - low[1]) / cell)));
-    map.low = low, map.cell = cell, map.nx = nx, map.ny = ny;
+    map.low = low;
+    map.cell = cell;
+    map.nx = nx;
+    map.ny = ny;
     std::vector<std::vector<double>> rows(static_cast<std::size_t>(ny),
                                           std::vector<double>(static_cast<std::size_t>(nx), 1e18));
     std::vector<double> scratch, bounds, column(static_cast<std::size_t>(ny));
@@ -169,7 +172,8 @@ SlabOverhang slab_overhang(Context& context, MeshView mesh, const Plan& plan) {
         // The opening at the bottom; higher up it is wider by what the draft adds.
         Plan whole;
         whole.job = plan.job;
-        whole.stock_min = plan.stock_min, whole.stock_max = plan.stock_max;
+        whole.stock_min = plan.stock_min;
+        whole.stock_max = plan.stock_max;
         whole.layers.resize(1);
         whole.layers[0].z_top = height;
         frame = flask_frame(place_flask(context, mesh, whole), 0);

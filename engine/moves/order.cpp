@@ -8,8 +8,11 @@ namespace slabwright {
 NearestRuns::NearestRuns(std::vector<Beginning> beginnings, std::size_t runs)
     : nodes_(std::move(beginnings)) {
     const std::size_t n = nodes_.size();
-    low_.assign(n, kNone), high_.assign(n, kNone), parent_.assign(n, kNone), left_.assign(n, 0),
-        gone_.assign(n, 0);
+    low_.assign(n, kNone);
+    high_.assign(n, kNone);
+    parent_.assign(n, kNone);
+    left_.assign(n, 0);
+    gone_.assign(n, 0);
     root_ = build(0, static_cast<std::uint32_t>(n), false, kNone);
     starts_.assign(runs + 1, 0);
     for (const Beginning& b : nodes_) ++starts_[b.run + 1];

@@ -124,13 +124,17 @@ void PathBuilder::add(std::int32_t x, std::int32_t y, std::int32_t z, std::uint3
             if (same && (ax > 0) == (bx > 0) && (ay > 0) == (by > 0) && (az > 0) == (bz > 0)) {
                 last = {x, y, z, feed};
                 learnt_ = std::min(learnt_, n - 1);
-                x_ = x, y_ = y, z_ = z;
+                x_ = x;
+                y_ = y;
+                z_ = z;
                 return;
             }
         }
     }
     operation_.moves.push_back({x, y, z, feed});
-    x_ = x, y_ = y, z_ = z;
+    x_ = x;
+    y_ = y;
+    z_ = z;
     started_ = true;
 }
 
@@ -258,11 +262,13 @@ bool PathBuilder::enter_on_helix(std::span<const PathPoint> run) {
     double ux = 0, uy = 0;
     for (std::size_t k = 1; k < run.size() && ux == 0 && uy == 0; ++k) {
         if (run[k].z != first.z) return false;
-        ux = static_cast<double>(run[k].x) - first.x, uy = static_cast<double>(run[k].y) - first.y;
+        ux = static_cast<double>(run[k].x) - first.x;
+        uy = static_cast<double>(run[k].y) - first.y;
     }
     const double length = std::hypot(ux, uy);
     if (length == 0) return false;
-    ux /= length, uy /= length;
+    ux /= length;
+    uy /= length;
     for (const double share : kHelixRadii) {
         const double radius = share * around_.cutter.radius, cx = to_mm(first.x) - radius * uy,
                      cy = to_mm(first.y) + radius * ux;
@@ -366,7 +372,8 @@ std::optional<Point2> PathBuilder::place_beside(const PathPoint& first) {
                 standing_middle(beside) > to_mm(first.z) + kScrape ||
                 !part_leaves_way(beside, {first.x, first.y}, first.z))
                 continue;
-            least = way, best = beside;
+            least = way;
+            best = beside;
         }
     return best;
 }

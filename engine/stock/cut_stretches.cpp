@@ -63,7 +63,8 @@ struct Meeting {
             height[first + k] = static_cast<float>(left);
             if (part[k] != p) {
                 parts[static_cast<std::size_t>(p)] = m;
-                p = part[k], m = parts[static_cast<std::size_t>(p)];
+                p = part[k];
+                m = parts[static_cast<std::size_t>(p)];
                 low = std::min(tip + rise * p, tip + rise * (p + 1));
             }
             m.volume += (stood - left) * area;
@@ -168,7 +169,8 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
     const auto finish = [&] {
         if (now.length > 0) {
             if (met.volume > 0) {
-                now.low = std::max(0.0, met.low), now.high = met.high;
+                now.low = std::max(0.0, met.low);
+                now.high = met.high;
                 now.width = std::min(tool.diameter, met.volume / (std::max(now.length, 2 * grid_.cell) *
                                                                   (now.high - now.low)));
                 now.left = met.side > 0;

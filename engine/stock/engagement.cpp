@@ -23,7 +23,8 @@ struct Way {
     std::vector<double> lengths;        // by move: of one part in the plane, mm; 0: a rapid, or straight down
 
     void add(int parts, double length) {
-        starts.push_back(static_cast<std::uint32_t>(steps.size())), lengths.push_back(length);
+        starts.push_back(static_cast<std::uint32_t>(steps.size()));
+        lengths.push_back(length);
         steps.resize(steps.size() + static_cast<std::size_t>(parts), kFeeds);
     }
     [[nodiscard]] std::size_t end(std::size_t move) const {
@@ -65,7 +66,8 @@ struct Taking {
                 const int k = std::countr_zero(over);
                 if (const std::int32_t here = part[static_cast<std::size_t>(k)]; here != p) {
                     sums[static_cast<std::size_t>(p)] = sum;
-                    p = here, sum = sums[static_cast<std::size_t>(p)];
+                    p = here;
+                    sum = sums[static_cast<std::size_t>(p)];
                 }
                 sum += static_cast<double>(row[k]) - z;
                 row[k] = level;
@@ -132,7 +134,8 @@ double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& 
     if (moves.size() < 2) return 0;
     const double window = cap.diameter / 8, slot = cap.diameter * cap.stepdown;
     Way way;
-    way.starts.reserve(moves.size()), way.lengths.reserve(moves.size());
+    way.starts.reserve(moves.size());
+    way.lengths.reserve(moves.size());
     way.add(0, 0);          // there is no way to the first
     std::size_t begun = 0;  // first part of the window
     double volume = 0, length = 0;
@@ -203,7 +206,8 @@ double cap_engagement(Context& context, std::vector<Move>& moves, EngagedStock& 
             Move m = moves[i];
             if (!last) {
                 const double t = static_cast<double>(k + 1 - first) / static_cast<double>(end - first);
-                m.x = to_units(a[0] + t * (b[0] - a[0])), m.y = to_units(a[1] + t * (b[1] - a[1])),
+                m.x = to_units(a[0] + t * (b[0] - a[0]));
+                m.y = to_units(a[1] + t * (b[1] - a[1]));
                 m.z = to_units(a[2] + t * (b[2] - a[2]));
             }
             if (steps < kFeeds) m.feed = std::max<std::uint32_t>(1, moves[i].feed * steps / kFeeds);

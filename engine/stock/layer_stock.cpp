@@ -21,13 +21,17 @@ constexpr std::size_t kPart = 16;            // of those
 struct Box {
     double x0 = kUnbounded, x1 = -kUnbounded, y0 = kUnbounded, y1 = -kUnbounded, z0 = kUnbounded;
     void add(const Move& m) {
-        x0 = std::min(x0, to_mm(m.x)), x1 = std::max(x1, to_mm(m.x));
-        y0 = std::min(y0, to_mm(m.y)), y1 = std::max(y1, to_mm(m.y));
+        x0 = std::min(x0, to_mm(m.x));
+        x1 = std::max(x1, to_mm(m.x));
+        y0 = std::min(y0, to_mm(m.y));
+        y1 = std::max(y1, to_mm(m.y));
         z0 = std::min(z0, to_mm(m.z));
     }
     void add(const Box& b) {
-        x0 = std::min(x0, b.x0), x1 = std::max(x1, b.x1);
-        y0 = std::min(y0, b.y0), y1 = std::max(y1, b.y1);
+        x0 = std::min(x0, b.x0);
+        x1 = std::max(x1, b.x1);
+        y0 = std::min(y0, b.y0);
+        y1 = std::max(y1, b.y1);
         z0 = std::min(z0, b.z0);
     }
 };
@@ -228,9 +232,12 @@ LayerStock::LayerStock(Context& context, const LayerJob& layer, const LayerSolid
              std::max(1, static_cast<int>(std::ceil((hi[1] - lo[1]) / cell - 0.5)))};
     const double top = layer.z_top - z_bottom_;
     // Cleared first, so that nothing is copied where there must be more room.
-    memory_.height.clear(), memory_.height.resize(grid_.count());
-    memory_.surface.clear(), memory_.surface.resize(grid_.count());
-    memory_.nz.clear(), memory_.nz.resize(grid_.count());
+    memory_.height.clear();
+    memory_.height.resize(grid_.count());
+    memory_.surface.clear();
+    memory_.surface.resize(grid_.count());
+    memory_.nz.clear();
+    memory_.nz.resize(grid_.count());
     float* const surface = memory_.surface.data();
     std::uint8_t* const nz = memory_.nz.data();
     words_ = static_cast<std::size_t>((grid_.nx + kWord - 1) / kWord);
@@ -276,7 +283,8 @@ LayerStock::LayerStock(Context& context, const LayerJob& layer, const LayerSolid
                     const Vec3d &a = f.p[k], &b = f.p[(k + 1) % 3];
                     if ((a[1] <= y) == (b[1] <= y)) continue;
                     const double x = a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
-                    low = std::min(low, x), high = std::max(high, x);
+                    low = std::min(low, x);
+                    high = std::max(high, x);
                 }
                 const int i0 = std::max(0, static_cast<int>(std::ceil((low - grid_.x0) / cell)));
                 const int i1 =

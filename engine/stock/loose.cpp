@@ -44,7 +44,8 @@ public:
 
     Pieces() : parent_{kHeld}, pieces_(1) {}
     [[nodiscard]] std::uint32_t make() {
-        parent_.push_back(static_cast<std::uint32_t>(parent_.size())), pieces_.emplace_back();
+        parent_.push_back(static_cast<std::uint32_t>(parent_.size()));
+        pieces_.emplace_back();
         ++hanging_;
         return parent_.back();
     }
@@ -56,9 +57,13 @@ public:
     std::uint32_t join(std::uint32_t a, std::uint32_t b) {
         if (a == b) return a;
         if (b < a) std::swap(a, b);  // what is held stays the first
-        parent_[b] = a, --hanging_;
+        parent_[b] = a;
+        --hanging_;
         Piece &to = pieces_[a], &from = pieces_[b];
-        to.cells += from.cells, to.i += from.i, to.j += from.j, to.cut_at_all &= from.cut_at_all;
+        to.cells += from.cells;
+        to.i += from.i;
+        to.j += from.j;
+        to.cut_at_all &= from.cut_at_all;
         return a;
     }
     [[nodiscard]] Piece& operator[](std::uint32_t root) { return pieces_[root]; }
@@ -156,7 +161,10 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab,
             std::fill(of.data() + row + begin, of.data() + row + i, piece);
             Pieces::Piece& p = pieces[piece];
             const std::size_t n = i - begin;
-            p.cells += n, p.i += n * (begin + i - 1) / 2, p.j += n * (row / nx), p.cut_at_all = false;
+            p.cells += n;
+            p.i += n * (begin + i - 1) / 2;
+            p.j += n * (row / nx);
+            p.cut_at_all = false;
         }
 
     // The others in the order in which they are put back: the last move's first; of one move's by number.
@@ -185,7 +193,8 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab,
         std::size_t last = first;
         const std::uint32_t now = when[order[first]];
         while (last < order.size() && when[order[last]] == now) ++last;
-        beside.clear(), before.clear();
+        beside.clear();
+        before.clear();
         for (std::size_t k = first; k < last && pieces.hanging() > 0; ++k)
             each_neighbour(order[k], order[k] % nx, [&](std::uint32_t p) {
                 if (const std::uint32_t r = pieces.root(p); r != Pieces::kHeld) beside.push_back(r);
@@ -205,7 +214,9 @@ std::vector<LoosePiece> loose_pieces(Context& context, const HeldSlab& slab,
             of[c] = piece;
             if (piece == Pieces::kHeld) continue;
             Pieces::Piece& p = pieces[piece];
-            ++p.cells, p.i += i, p.j += c / nx;
+            ++p.cells;
+            p.i += i;
+            p.j += c / nx;
         }
         for (std::size_t k = 0; k < beside.size(); ++k) {
             const Pieces::Piece& p = before[k];

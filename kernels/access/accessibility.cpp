@@ -81,7 +81,10 @@ Below below(const Triangle& t, double top) {
 struct Counts {
     std::uint64_t points = 0, queries = 0, rays = 0, undecided = 0;
     void add(const Counts& c) {
-        points += c.points, queries += c.queries, rays += c.rays, undecided += c.undecided;
+        points += c.points;
+        queries += c.queries;
+        rays += c.rays;
+        undecided += c.undecided;
     }
 };
 
@@ -116,7 +119,8 @@ Planes planes_of(const Triangle& t) {
         const double l = std::sqrt(dot(normal, normal));
         const Point3 unit{static_cast<float>(normal[0] / l), static_cast<float>(normal[1] / l),
                           static_cast<float>(normal[2] / l)};
-        planes.x[i] = static_cast<float>(unit[0]), planes.y[i] = static_cast<float>(unit[1]),
+        planes.x[i] = static_cast<float>(unit[0]);
+        planes.y[i] = static_cast<float>(unit[1]);
         planes.z[i] = static_cast<float>(unit[2]);
         planes.d[i] = static_cast<float>(-dot(unit, on));
     };
@@ -184,7 +188,8 @@ struct AccessScene::Impl {
     /// The first facet that a vertical ray meets, from z towards `limit`; its height, or `none`.
     [[nodiscard]] double first_below(double x, double y, double z, bool& leaves_solid, double none) const {
         RTCRayHit ray{};
-        ray.ray.org_x = static_cast<float>(x), ray.ray.org_y = static_cast<float>(y),
+        ray.ray.org_x = static_cast<float>(x);
+        ray.ray.org_y = static_cast<float>(y);
         ray.ray.org_z = static_cast<float>(z);
         ray.ray.dir_z = -1;
         ray.ray.tfar = std::numeric_limits<float>::infinity();
@@ -204,7 +209,8 @@ struct AccessScene::Impl {
     [[nodiscard]] bool overhung(const Point3& from, double top) const {
         if (!hanging || from[2] >= top) return false;
         RTCRay ray{};
-        ray.org_x = static_cast<float>(from[0]), ray.org_y = static_cast<float>(from[1]),
+        ray.org_x = static_cast<float>(from[0]);
+        ray.org_y = static_cast<float>(from[1]);
         ray.org_z = static_cast<float>(from[2]);
         ray.dir_z = 1;
         ray.tfar = static_cast<float>(top - from[2]);
@@ -479,7 +485,9 @@ Question ask(const Scene& scene, double z_low, double z_high, const ToolShape& t
 class MissedBalls {
 public:
     void add(const Point3& middle, double radius) {
-        x_[next_] = middle[0], y_[next_] = middle[1], z_[next_] = middle[2],
+        x_[next_] = middle[0];
+        y_[next_] = middle[1];
+        z_[next_] = middle[2];
         radius2_[next_] = radius * radius;
         next_ = (next_ + 1) % kMissed;
         used_ = std::max(used_, next_);
@@ -551,7 +559,8 @@ public:
             stack_.pop_back();
             const Verdict verdict = test(p, patch);
             if (verdict == Verdict::free) {
-                l_ = patch.l, phi_ = patch.phi;
+                l_ = patch.l;
+                phi_ = patch.phi;
                 return true;
             }
             const double sideways = q_.at(patch.l).distance * patch.dphi;
@@ -559,11 +568,13 @@ public:
             Patch a = patch, b = patch;
             if (patch.dl > sideways) {
                 a.dl = b.dl = patch.dl / 2;
-                a.l -= a.dl, b.l += b.dl;
+                a.l -= a.dl;
+                b.l += b.dl;
                 if (std::abs(a.l - l) < std::abs(b.l - l)) std::swap(a, b);
             } else {
                 a.dphi = b.dphi = patch.dphi / 2;
-                a.phi -= a.dphi, b.phi += b.dphi;
+                a.phi -= a.dphi;
+                b.phi += b.dphi;
                 if (std::cos(a.phi - phi) > std::cos(b.phi - phi)) std::swap(a, b);
             }
             stack_.push_back(a);
@@ -601,7 +612,8 @@ private:
     Places toward(const Point3& p, const Point3& u) const {
         const double across = u[2] < 0 ? q_.rounding / std::hypot(u[0], u[1]) : q_.rounding;
         Places at;
-        at.x = p[0] + across * u[0], at.y = p[1] + across * u[1],
+        at.x = p[0] + across * u[0];
+        at.y = p[1] + across * u[1];
         at.tip = p[2] - q_.tool[0].rounding + std::max(0.0, across * u[2]);
         at.tolerance = q_.options.tolerance;
         return at;
@@ -669,7 +681,9 @@ private:
         const Question::Spot spot = q_.at(patch.l);
         const double c = std::cos(patch.phi), s = std::sin(patch.phi);
         Places at;
-        at.x = p[0] + spot.distance * c, at.y = p[1] + spot.distance * s, at.tip = p[2] - spot.height;
+        at.x = p[0] + spot.distance * c;
+        at.y = p[1] + spot.distance * s;
+        at.tip = p[2] - spot.height;
         // Farther out along the profile is farther from the point, and lower.
         at.along = {spot.outwards * c, spot.outwards * s, -spot.upwards};
         at.around = {-s, c, 0};
@@ -764,7 +778,8 @@ private:
     void search(Probe& probe, RTCScene scene, double middle, double radius, bool keep) {
         ++counts.queries;
         RTCPointQuery query{};
-        query.x = static_cast<float>(probe.at->x), query.y = static_cast<float>(probe.at->y),
+        query.x = static_cast<float>(probe.at->x);
+        query.y = static_cast<float>(probe.at->y);
         query.z = static_cast<float>(probe.at->tip + middle);
         query.radius = up(radius + q_.margin);
         RTCPointQueryContext stack;

@@ -38,9 +38,14 @@ SLABWRIGHT_WIDE static bool cross_circles(const Cap& own, const double* __restri
         const double aside_x = c * (oy * z[i] - oz * y[i]), aside_y = c * (oz * x[i] - ox * z[i]),
                      aside_z = c * (ox * y[i] - oy * x[i]);
         const double none = rest >= 0 ? -kNeither : kNeither, state = square >= kParallel ? none : kNeither;
-        ux[i] = along_x + aside_x, uy[i] = along_y + aside_y, uz[i] = along_z + aside_z;
-        ux[n + i] = along_x - aside_x, uy[n + i] = along_y - aside_y, uz[n + i] = along_z - aside_z;
-        depth[i] = state, depth[n + i] = state;
+        ux[i] = along_x + aside_x;
+        uy[i] = along_y + aside_y;
+        uz[i] = along_z + aside_z;
+        ux[n + i] = along_x - aside_x;
+        uy[n + i] = along_y - aside_y;
+        uz[n + i] = along_z - aside_z;
+        depth[i] = state;
+        depth[n + i] = state;
         close += square < kClose;
     }
     return close > 0;

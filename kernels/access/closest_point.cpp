@@ -56,11 +56,11 @@ struct ClosestPoint::Impl {
         const auto& self = *static_cast<const Impl*>(args->geometryUserPtr);
         const auto v = self.facet(args->primID);
         RTCBounds& b = *args->bounds_o;
-        b.lower_x = down(std::min({v[0].x, v[1].x, v[2].x}) - self.margin),
+        b.lower_x = down(std::min({v[0].x, v[1].x, v[2].x}) - self.margin);
         b.upper_x = up(std::max({v[0].x, v[1].x, v[2].x}) + self.margin);
-        b.lower_y = down(std::min({v[0].y, v[1].y, v[2].y}) - self.margin),
+        b.lower_y = down(std::min({v[0].y, v[1].y, v[2].y}) - self.margin);
         b.upper_y = up(std::max({v[0].y, v[1].y, v[2].y}) + self.margin);
-        b.lower_z = down(std::min({v[0].z, v[1].z, v[2].z}) - self.margin),
+        b.lower_z = down(std::min({v[0].z, v[1].z, v[2].z}) - self.margin);
         b.upper_z = up(std::max({v[0].z, v[1].z, v[2].z}) + self.margin);
     }
 };
@@ -175,7 +175,8 @@ ClosestHit ClosestPoint::query_unsigned(const Point3& point, double max_radius) 
     n.margin = impl_->margin + 2 * size * kFloatMargin;
     n.hit.distance = max_radius;
     RTCPointQuery query{};
-    query.x = static_cast<float>(point[0]), query.y = static_cast<float>(point[1]),
+    query.x = static_cast<float>(point[0]);
+    query.y = static_cast<float>(point[1]);
     query.z = static_cast<float>(point[2]);
     query.time = 0;
     query.radius = up(max_radius + n.margin);
@@ -227,7 +228,8 @@ int ClosestPoint::winding(const Point3& point) const {
     column.corners = &corners_of<Impl>;
     column.point = point;
     RTCRay ray{};
-    ray.org_x = static_cast<float>(point[0]), ray.org_y = static_cast<float>(point[1]);
+    ray.org_x = static_cast<float>(point[0]);
+    ray.org_y = static_cast<float>(point[1]);
     ray.org_z = down(std::max<double>(point[2], b.min.z) - impl_->margin);
     ray.dir_z = 1;
     ray.tnear = 0;

@@ -45,8 +45,10 @@ public:
         double along0 = kInfinity, along1 = -kInfinity, across0 = kInfinity, across1 = -kInfinity;
         for (const Vec3f& p : v) {
             const double x = p.x - ax_, y = p.y - ay_, along = x * ux_ + y * uy_, across = y * ux_ - x * uy_;
-            along0 = std::min(along0, along), along1 = std::max(along1, along);
-            across0 = std::min(across0, across), across1 = std::max(across1, across);
+            along0 = std::min(along0, along);
+            along1 = std::max(along1, along);
+            across0 = std::min(across0, across);
+            across1 = std::max(across1, across);
         }
         return gaps2(along0, along1, across0, across1);
     }
@@ -105,7 +107,8 @@ void meet(const Cutter& cutter, const Piece& piece, const std::array<Vec3f, 3>& 
     if (!near(cutter, piece, facet, std::max({facet[0].z, facet[1].z, facet[2].z}), result.depth)) return;
     if (cutter.ball()) {
         Point3 a = piece.a, b = piece.b;
-        a[2] += cutter.radius, b[2] += cutter.radius;
+        a[2] += cutter.radius;
+        b[2] += cutter.radius;
         below(facet, cutter.top, [&](const Triangle& t) {
             const Closest c = piece_distance(a, b, t, cutter.radius - result.depth);
             if (cutter.radius - c.d > result.depth)
@@ -194,7 +197,8 @@ struct StandingPart::Stretch {
     std::optional<LevelWay> arc;        // along a circle
 
     void take(const Point3& a, const Point3& b) {
-        from = a, to = b;
+        from = a;
+        to = b;
         arc.reset();
         slack = 0;
         for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(a[k], b[k]), high[k] = std::max(a[k], b[k]);
@@ -202,7 +206,8 @@ struct StandingPart::Stretch {
     /// Motions [begin, end), each of which begins where the one before ends. @param flat the way is level, so
     /// that what is over it is no slack
     void take(std::span<const Motion> motions, std::size_t begin, std::size_t end, bool flat) {
-        first = begin, last = end;
+        first = begin;
+        last = end;
         take(motions[begin].from, motions[end - 1].to);
         Point3 a = from, b = to;
         if (flat) a[2] = b[2] = 0;
@@ -247,7 +252,8 @@ SLABWRIGHT_WIDE void StandingPart::around(const ManyNodes& many, const WayAround
         const Floats8 before = -along - (hx * sx + hy * sy), behind = along - w.length - (hx * sx + hy * sy),
                       beside = across - (hx * sy + hy * sx);
         Floats8 l = before > behind ? before : behind, high = z1 < top ? z1 : top, under = w.lowest - high;
-        l = l > none ? l : none, under = under > none ? under : none;
+        l = l > none ? l : none;
+        under = under > none ? under : none;
         const Floats8 c = beside > none ? beside : none, u = under * w.upwards;
         const Ints8 signs =
             within & (z0 < top) & (z1 > none + w.above) & (l * l + c * c + u * u < none + w.reach2);
@@ -329,9 +335,15 @@ bool StandingPart::gather(Search& search, Stretch& s, double depth, std::size_t 
         for (std::size_t i = 0; i < many.count; ++i)
             for_each_bit(met[i], [&](std::size_t k) {
                 const EightFacets& e = *many.eights[i];
-                close.x0[some] = e.x0[k], close.y0[some] = e.y0[k], close.z0[some] = e.z0[k];
-                close.x1[some] = e.x1[k], close.y1[some] = e.y1[k], close.z1[some] = e.z1[k];
-                close.x2[some] = e.x2[k], close.y2[some] = e.y2[k], close.z2[some] = e.z2[k];
+                close.x0[some] = e.x0[k];
+                close.y0[some] = e.y0[k];
+                close.z0[some] = e.z0[k];
+                close.x1[some] = e.x1[k];
+                close.y1[some] = e.y1[k];
+                close.z1[some] = e.z1[k];
+                close.x2[some] = e.x2[k];
+                close.y2[some] = e.y2[k];
+                close.z2[some] = e.z2[k];
                 which[some++] = first_of[i] + static_cast<std::uint32_t>(k);
                 if (some == FacetRows::kMost) look();
             });
@@ -377,7 +389,8 @@ bool StandingPart::arc_from(Search& search, Stretch& s, std::span<const Motion> 
         if (b[2] != z || (k > m && a != motions[k - 1].to)) return false;
         const double dx = b[0] - a[0], dy = b[1] - a[1], x = b[0] - arc.x, y = b[1] - arc.y,
                      r = std::sqrt(x * x + y * y);
-        nearest = std::min(nearest, r), farthest = std::max(farthest, r),
+        nearest = std::min(nearest, r);
+        farthest = std::max(farthest, r);
         longest2 = std::max(longest2, dx * dx + dy * dy);
     }
     nearest = std::sqrt(std::max(0.0, nearest * nearest - longest2 / 4));
@@ -390,7 +403,8 @@ bool StandingPart::arc_from(Search& search, Stretch& s, std::span<const Motion> 
     double before = 0, after = 0, bow = off;
     const auto extend = [&](const Point3& p) {
         const double x = p[0] - about[0], y = p[1] - about[1], along = x * tx + y * ty;
-        before = std::max(before, -along), after = std::max(after, along),
+        before = std::max(before, -along);
+        after = std::max(after, along);
         bow = std::max(bow, y * tx - x * ty + off);
     };
     for (std::size_t k = m; k < last; ++k) extend(motions[k].to);
@@ -463,7 +477,8 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
     bool last_known = false, last_covered = false;
     auto covered_at = [&](const Point3& tip) {
         if (last_known && last == tip) return last_covered;
-        last = tip, last_known = true;
+        last = tip;
+        last_known = true;
         return last_covered = covered(tip[0], tip[1], cutter.top);
     };
     auto meet_near = [&](const NearFacets& terms, const std::vector<std::uint32_t>& facets,
@@ -512,7 +527,8 @@ StandingPart::Found StandingPart::deepest(Form form, double z_top, std::span<con
         }
         p = motion_depth(cutter, from, to, floor, covered_at, look);
         if (p.found && p.depth > found.most.depth) {
-            found.most = p, found.motion = m;
+            found.most = p;
+            found.motion = m;
             if (known)
                 for (double most = known->load(std::memory_order_relaxed); p.depth > most;)
                     if (known->compare_exchange_weak(most, p.depth, std::memory_order_relaxed)) break;

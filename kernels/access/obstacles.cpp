@@ -43,14 +43,18 @@ Obstacles::Obstacles(Tool tool, double radius, double tolerance)
       reach_(radius + tolerance),
       clear2_((radius - tolerance / 2) * (radius - tolerance / 2)) {
     constexpr double nowhere = 1e12;
-    x_.fill(nowhere), y_.fill(nowhere), z_.fill(nowhere);
+    x_.fill(nowhere);
+    y_.fill(nowhere);
+    z_.fill(nowhere);
 }
 
 void Obstacles::remember(const Point3& obstacle) {
     size_ = std::min(size_ + 1, kMost);
     for (std::array<double, kMost>* row : {&x_, &y_, &z_})
         std::copy_backward(row->begin(), row->end() - 1, row->end());
-    x_[0] = obstacle[0], y_[0] = obstacle[1], z_[0] = obstacle[2];
+    x_[0] = obstacle[0];
+    y_[0] = obstacle[1];
+    z_[0] = obstacle[2];
 }
 
 void Obstacles::use(std::size_t i) {

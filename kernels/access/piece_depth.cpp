@@ -49,8 +49,10 @@ bool contains_2d(const Polygon& poly, Vec2d q) {
     // line.
     double x0 = kInfinity, x1 = -kInfinity, y0 = kInfinity, y1 = -kInfinity;
     for (int i = 0; i < poly.n; ++i) {
-        x0 = std::min(x0, poly.p[i][0]), x1 = std::max(x1, poly.p[i][0]);
-        y0 = std::min(y0, poly.p[i][1]), y1 = std::max(y1, poly.p[i][1]);
+        x0 = std::min(x0, poly.p[i][0]);
+        x1 = std::max(x1, poly.p[i][0]);
+        y0 = std::min(y0, poly.p[i][1]);
+        y1 = std::max(y1, poly.p[i][1]);
     }
     if (q.x < x0 || q.x > x1 || q.y < y0 || q.y > y1) return false;
     int turn = 0;

@@ -90,7 +90,8 @@ bool pokes(const Triangle& triangle, double x, double y, double tip_z, const Env
         if (steep > 0) {
             const double sine = steep / std::sqrt(1 + steep * steep);
             d = sine <= e.cos_taper ? std::min(r, e.core + e.rounding * sine) : r;
-            px = d * gx / steep, py = d * gy / steep;
+            px = d * gx / steep;
+            py = d * gy / steep;
         }
         bool inside = true;
         for (int k = 0; k < 3 && inside; ++k) {
@@ -135,7 +136,8 @@ double nearest_over(const Point3& point, const Triangle& t, Point3& at) {
         const double px = a[0] + s * dx, py = a[1] + s * dy, d = px * px + py * py;
         if (d < best) best = d, at = {px + point[0], py + point[1], a[2] + s * (b[2] - a[2]) + point[2]};
         const double side = a[0] * b[1] - a[1] * b[0];
-        left += side > 0, right += side < 0;
+        left += side > 0;
+        right += side < 0;
     }
     // All of it turns one way about the line: the line passes through it.
     if (n >= 3 && (left == n || right == n)) {

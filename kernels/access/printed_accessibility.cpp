@@ -32,8 +32,10 @@ public:
         double x1 = -HUGE_VAL, y1 = -HUGE_VAL, sum = 0;
         x0_ = y0_ = HUGE_VAL;
         for (const Segment& s : segments) {
-            x0_ = std::min({x0_, s.a.x, s.b.x}), x1 = std::max({x1, s.a.x, s.b.x});
-            y0_ = std::min({y0_, s.a.y, s.b.y}), y1 = std::max({y1, s.a.y, s.b.y});
+            x0_ = std::min({x0_, s.a.x, s.b.x});
+            x1 = std::max({x1, s.a.x, s.b.x});
+            y0_ = std::min({y0_, s.a.y, s.b.y});
+            y1 = std::max({y1, s.a.y, s.b.y});
             sum += length(s.b - s.a);
         }
         // About as many cells as segments, and none much smaller than a segment is long.
@@ -103,7 +105,8 @@ Interval near(Vec2d from, Vec2d along, const Segment& s, double radius) {
                 return;
             }
             const double t0 = (least - at) / rate, t1 = (most - at) / rate;
-            low = std::max(low, std::min(t0, t1)), high = std::min(high, std::max(t0, t1));
+            low = std::max(low, std::min(t0, t1));
+            high = std::min(high, std::max(t0, t1));
         };
         const Vec2d u{d.x / l, d.y / l}, w = from - s.a;
         keep(dot(w, u), dot(along, u), 0, l);

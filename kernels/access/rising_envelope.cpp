@@ -46,9 +46,11 @@ void RisingEnvelope::for_each_point(double z_low, double z_high, Fn&& fn) const 
                     if ((p.y <= y) == (q.y <= y)) continue;
                     const double x =
                         p.x + (y - p.y) / (static_cast<double>(q.y) - p.y) * (static_cast<double>(q.x) - p.x);
-                    low = std::min(low, (x - x0_) * per_cell), high = std::max(high, (x - x0_) * per_cell);
+                    low = std::min(low, (x - x0_) * per_cell);
+                    high = std::max(high, (x - x0_) * per_cell);
                 }
-                begin = first_of(low), last = last_of(high, nx_);
+                begin = first_of(low);
+                last = last_of(high, nx_);
             }
             for (int i = begin; i <= last; ++i) {
                 const double x = x0_ + i * cell_;

@@ -43,8 +43,15 @@ void StandingPart::Facets::set(std::size_t i, const Facet& facet) {
     EightFacets& e = eights_[i / 8];
     const std::size_t k = i % 8;
     const auto& [a, b, c] = facet.v;
-    e.x0[k] = a.x, e.y0[k] = a.y, e.z0[k] = a.z, e.x1[k] = b.x, e.y1[k] = b.y, e.z1[k] = b.z, e.x2[k] = c.x,
-    e.y2[k] = c.y, e.z2[k] = c.z;
+    e.x0[k] = a.x;
+    e.y0[k] = a.y;
+    e.z0[k] = a.z;
+    e.x1[k] = b.x;
+    e.y1[k] = b.y;
+    e.z1[k] = b.z;
+    e.x2[k] = c.x;
+    e.y2[k] = c.y;
+    e.z2[k] = c.z;
 }
 
 void StandingPart::Facets::end() {
@@ -98,8 +105,12 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
     });
     facets_.end();
     auto join = [](Node& a, const Node& b) {
-        a.x0 = std::min(a.x0, b.x0), a.y0 = std::min(a.y0, b.y0), a.z0 = std::min(a.z0, b.z0);
-        a.x1 = std::max(a.x1, b.x1), a.y1 = std::max(a.y1, b.y1), a.z1 = std::max(a.z1, b.z1);
+        a.x0 = std::min(a.x0, b.x0);
+        a.y0 = std::min(a.y0, b.y0);
+        a.z0 = std::min(a.z0, b.z0);
+        a.x1 = std::max(a.x1, b.x1);
+        a.y1 = std::max(a.y1, b.y1);
+        a.z1 = std::max(a.z1, b.z1);
     };
     std::size_t below_count = n;
     do {
@@ -116,8 +127,12 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
                 }
                 Nodes& eight = levels_[level][i / kFan];
                 const std::size_t k = i % kFan;
-                eight.x0[k] = node.x0, eight.y0[k] = node.y0, eight.z0[k] = node.z0;
-                eight.x1[k] = node.x1, eight.y1[k] = node.y1, eight.z1[k] = node.z1;
+                eight.x0[k] = node.x0;
+                eight.y0[k] = node.y0;
+                eight.z0[k] = node.z0;
+                eight.x1[k] = node.x1;
+                eight.y1[k] = node.y1;
+                eight.z1[k] = node.z1;
             }
         });
         below_count = count;
@@ -127,7 +142,8 @@ StandingPart::StandingPart(Context& context, MeshView mesh) {
 StandingPart::Within::Within(const Point3& from, const Point3& to) {
     constexpr float inf = std::numeric_limits<float>::infinity();
     for (std::size_t k = 0; k < 3; ++k) {
-        low[k] = static_cast<float>(from[k]), high[k] = static_cast<float>(to[k]);
+        low[k] = static_cast<float>(from[k]);
+        high[k] = static_cast<float>(to[k]);
         if (low[k] > from[k]) low[k] = std::nextafter(low[k], -inf);
         if (high[k] < to[k]) high[k] = std::nextafter(high[k], inf);
     }
@@ -169,9 +185,15 @@ SLABWRIGHT_WIDE void StandingPart::squares(const Nodes& n, const Away& from, std
         most = most > none ? most : none;
     };
     Doubles8 x0, y0, z0, x1, y1, z1, dx, dy, dz{};
-    wide(n.x0, x0), wide(n.y0, y0), wide(n.z0, z0), wide(n.x1, x1), wide(n.y1, y1), wide(n.z1, z1);
+    wide(n.x0, x0);
+    wide(n.y0, y0);
+    wide(n.z0, z0);
+    wide(n.x1, x1);
+    wide(n.y1, y1);
+    wide(n.z1, z1);
     const Doubles8 none{};
-    gap(x0 - from.point[0], from.point[0] - x1, dx), gap(y0 - from.point[1], from.point[1] - y1, dy);
+    gap(x0 - from.point[0], from.point[0] - x1, dx);
+    gap(y0 - from.point[1], from.point[1] - y1, dy);
     Doubles8 square = dx * dx + dy * dy;
     if (from.kind == Away::Kind::facets) {
         gap(z0 - from.point[2], from.point[2] - z1, dz);
@@ -195,11 +217,13 @@ SLABWRIGHT_WIDE void StandingPart::boxes(const EightFacets& f, Nodes& boxes) {
         std::memcpy(&u, a.data(), sizeof(u)), std::memcpy(&v, b.data(), sizeof(v)),
             std::memcpy(&w, c.data(), sizeof(w));
         Floats8 least = u < v ? u : v, most = u > v ? u : v;
-        least = least < w ? least : w, most = most > w ? most : w;
+        least = least < w ? least : w;
+        most = most > w ? most : w;
         std::memcpy(low.data(), &least, sizeof(least)), std::memcpy(high.data(), &most, sizeof(most));
     };
-    extent(f.x0, f.x1, f.x2, boxes.x0, boxes.x1), extent(f.y0, f.y1, f.y2, boxes.y0, boxes.y1),
-        extent(f.z0, f.z1, f.z2, boxes.z0, boxes.z1);
+    extent(f.x0, f.x1, f.x2, boxes.x0, boxes.x1);
+    extent(f.y0, f.y1, f.y2, boxes.y0, boxes.y1);
+    extent(f.z0, f.z1, f.z2, boxes.z0, boxes.z1);
 }
 
 bool StandingPart::covered(double x, double y, double z) const {

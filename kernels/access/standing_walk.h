@@ -36,7 +36,9 @@ void StandingPart::walk_leaves(Choose&& choose, Visit&& visit) const {
     ManyNodes many;
     std::array<unsigned, ManyNodes::kMost> kept;
     std::size_t level = levels_.size() - 1;
-    waiting[level].next = 0, waiting[level].end = 1, waiting[level].eights[0] = 0;
+    waiting[level].next = 0;
+    waiting[level].end = 1;
+    waiting[level].eights[0] = 0;
     while (level < levels_.size()) {
         Waiting& here = waiting[level];
         if (here.next == here.end) {

@@ -69,7 +69,8 @@ std::vector<AlphaMap::Band> AlphaMap::bands(double at_least, double same_rad, do
         const double low = z_low + static_cast<double>(b) * step, high = std::min(z_high, low + step);
         if (!(low < high)) continue;
         if (!found.empty() && std::max(most, alpha) - std::min(least, alpha) <= same_rad + rounding) {
-            least = std::min(least, alpha), most = std::max(most, alpha);
+            least = std::min(least, alpha);
+            most = std::max(most, alpha);
             found.back().z_high = high;
             found.back().alpha = least;
         } else {
@@ -99,7 +100,9 @@ AlphaMap alpha_map(Context& context, MeshView mesh, double z_low, double z_high,
         throw Error(ErrorKind::usage, "alpha_map.range",
                     "the heights of an alpha map do not ascend, or its step is not over 0");
     AlphaMap map;
-    map.z_low = z_low, map.z_high = z_high, map.step = options.step;
+    map.z_low = z_low;
+    map.z_high = z_high;
+    map.step = options.step;
     const std::size_t bins = static_cast<std::size_t>((z_high - z_low) / options.step) + 1;
     const double top = z_high - options.cut_off;
     auto bin = [&](double z) {
@@ -145,12 +148,15 @@ AlphaMap alpha_map(Context& context, MeshView mesh, double z_low, double z_high,
             if (a.seen.empty()) a.seen.swap(b.seen);
             for (std::size_t i = 0; i < b.seen.size(); ++i)
                 for (std::size_t w = 0; w < kWords; ++w) a.seen[i][w] |= b.seen[i][w];
-            a.area += b.area, a.vertical_area += b.vertical_area;
+            a.area += b.area;
+            a.vertical_area += b.vertical_area;
             a.least = std::min(a.least, b.least);
             a.least_steep = std::min(a.least_steep, b.least_steep);
             return a;
         });
-    map.area = sum.area, map.vertical_area = sum.vertical_area, map.least_slope = sum.least,
+    map.area = sum.area;
+    map.vertical_area = sum.vertical_area;
+    map.least_slope = sum.least;
     map.least_steep = sum.least_steep;
     map.slopes.resize(bins);
     for (std::size_t b = 0; b < sum.seen.size(); ++b)

@@ -70,7 +70,10 @@ PlanBins::PlanBins(Context& context, MeshView mesh, std::span<const std::uint32_
         starts_.assign(2, 0);
         return;
     }
-    x0_ = rect.x0, y0_ = rect.y0, x1_ = rect.x1, y1_ = rect.y1;
+    x0_ = rect.x0;
+    y0_ = rect.y0;
+    x1_ = rect.x1;
+    y1_ = rect.y1;
     const double width = std::max(x1_ - x0_, 1e-3), depth = std::max(y1_ - y0_, 1e-3);
     std::size_t wanted = std::clamp<std::size_t>(facets.size(), 1, std::size_t{1} << 24);
     for (;; wanted = std::max<std::size_t>(1, wanted / 4)) {

@@ -93,12 +93,22 @@ void pack(const CutSegment& s, std::size_t index, double angle, Packed& out, Seg
     auto f = [](double x) { return static_cast<float>(x); };
     const double c = s.chip_load_mm;
     const ForceCoefficients& k = s.coefficients;
-    out.radius = f(s.radius_mm), out.lag = f(t.lag_per_mm), out.entry = f(t.entry), out.exit = f(t.exit);
-    out.low = f(t.low), out.high = f(t.high), out.pitch = f(t.pitch),
+    out.radius = f(s.radius_mm);
+    out.lag = f(t.lag_per_mm);
+    out.entry = f(t.entry);
+    out.exit = f(t.exit);
+    out.low = f(t.low);
+    out.high = f(t.high);
+    out.pitch = f(t.pitch);
     out.ball = s.profile == CutterProfile::ball ? 1.0f : 0.0f;
-    out.tc = f(k.ktc * c), out.rc = f(k.krc * c), out.ac = f(k.kac * c), out.te = f(k.kte), out.re = f(k.kre),
+    out.tc = f(k.ktc * c);
+    out.rc = f(k.krc * c);
+    out.ac = f(k.kac * c);
+    out.te = f(k.kte);
+    out.re = f(k.kre);
     out.ae = f(k.kae);
-    out.pieces = t.count, out.padding = 0;
+    out.pieces = t.count;
+    out.padding = 0;
     for (int p = 0; p < t.count; ++p) {
         const forces::Turn::Piece& piece = t.pieces[static_cast<std::size_t>(p)];
         const forces::Teeth teeth = forces::teeth_in(t, piece);
@@ -111,8 +121,12 @@ void pack(const CutSegment& s, std::size_t index, double angle, Packed& out, Seg
 }
 
 void set_peaks(const float* o, const CutSegment& s, SegmentForces& f) {
-    f.peak_x_n = o[0], f.peak_y_n = o[1], f.peak_z_n = o[2], f.peak_in_plane_n = o[3],
-    f.peak_resultant_n = o[4], f.peak_torque_nmm = o[5];
+    f.peak_x_n = o[0];
+    f.peak_y_n = o[1];
+    f.peak_z_n = o[2];
+    f.peak_in_plane_n = o[3];
+    f.peak_resultant_n = o[4];
+    f.peak_torque_nmm = o[5];
     f.mean_in_plane_n = o[6];
     f.peak_power_w = f.peak_torque_nmm * forces::watts_per_nmm(s.spindle_rpm);
 }

@@ -59,7 +59,8 @@ char* take_pages(std::size_t bytes) {
         if (piece->bytes >= bytes && (best == kept_pages->end() || piece->bytes < best->bytes)) best = piece;
     if (best != kept_pages->end()) {
         char* const data = best->data;
-        best->data += bytes, best->bytes -= bytes;
+        best->data += bytes;
+        best->bytes -= bytes;
         if (best->bytes == 0) kept_pages->erase(best);
         return data;
     }

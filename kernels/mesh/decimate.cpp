@@ -45,7 +45,9 @@ struct Quadric {
         c += weight * offset * offset;
     }
     Quadric& operator+=(const Quadric& q) {
-        a += q.a, b += q.b, c += q.c;
+        a += q.a;
+        b += q.b;
+        c += q.c;
         return *this;
     }
     [[nodiscard]] double at(const Vector& x) const { return x.dot(a * x) + 2 * b.dot(x) + c; }
@@ -346,7 +348,8 @@ private:
 
     /// Whether merging keeps every facet around upright and joins no sheets.
     [[nodiscard]] bool allowed(const Edge& edge) const {
-        ring_a_.clear(), ring_b_.clear();
+        ring_a_.clear();
+        ring_b_.clear();
         int common_facets = 0;
         for (const std::uint32_t v : {edge.a, edge.b})
             for (std::uint32_t k = starts_[v]; k < starts_[v + 1]; ++k) {

@@ -53,12 +53,25 @@ inline void sort_eight(std::span<std::uint64_t, 8> k) {
         k[i] = a < b ? a : b;
         k[j] = a < b ? b : a;
     };
-    order(0, 2), order(1, 3), order(4, 6), order(5, 7);
-    order(0, 4), order(1, 5), order(2, 6), order(3, 7);
-    order(0, 1), order(2, 3), order(4, 5), order(6, 7);
-    order(2, 4), order(3, 5);
-    order(1, 4), order(3, 6);
-    order(1, 2), order(3, 4), order(5, 6);
+    order(0, 2);
+    order(1, 3);
+    order(4, 6);
+    order(5, 7);
+    order(0, 4);
+    order(1, 5);
+    order(2, 6);
+    order(3, 7);
+    order(0, 1);
+    order(2, 3);
+    order(4, 5);
+    order(6, 7);
+    order(2, 4);
+    order(3, 5);
+    order(1, 4);
+    order(3, 6);
+    order(1, 2);
+    order(3, 4);
+    order(5, 6);
 }
 
 /// Likewise sixteen: the halves, which then are merged.

@@ -19,13 +19,16 @@ public:
     explicit RawArray(std::size_t size)
         : data_(size == 0 ? nullptr : static_cast<T*>(take_bulk(size * sizeof(T)))), size_(size) {}
     RawArray(RawArray&& other) noexcept : data_(other.data_), size_(other.size_) {
-        other.data_ = nullptr, other.size_ = 0;
+        other.data_ = nullptr;
+        other.size_ = 0;
     }
     RawArray& operator=(RawArray&& other) noexcept {
         if (this != &other) {
             release();
-            data_ = other.data_, size_ = other.size_;
-            other.data_ = nullptr, other.size_ = 0;
+            data_ = other.data_;
+            size_ = other.size_;
+            other.data_ = nullptr;
+            other.size_ = 0;
         }
         return *this;
     }

@@ -272,7 +272,8 @@ private:
         for (int k = 0; k < n_; ++k)
             if (may_go_to(v, k)) best = k, best_height_ = new_height_, low = new_low_, high = new_high_;
         if (best < 0) return false;
-        new_low_ = low, new_high_ = high;
+        new_low_ = low;
+        new_high_ = high;
         go_to(v, best);
         return true;
     }

@@ -50,7 +50,8 @@ void LevelRegion::add(const std::array<double, 2>& from, const std::array<double
     if (!begun_) done_.clear(), begun_ = true;
     const auto [j0, j1] =
         rows_between(grid_, std::min(from[1], to[1]) - radius, std::max(from[1], to[1]) + radius);
-    first_row_ = std::min(first_row_, j0), last_row_ = std::max(last_row_, j1);
+    first_row_ = std::min(first_row_, j0);
+    last_row_ = std::max(last_row_, j1);
     RowSpans spans;
     for (int j = j0; j <= j1; j += RowSpans::kRows) {
         const int rows = std::min(RowSpans::kRows, j1 - j + 1);
@@ -61,7 +62,8 @@ void LevelRegion::add(const std::array<double, 2>& from, const std::array<double
             const auto k = static_cast<std::size_t>(std::countr_zero(apart)),
                        row = static_cast<std::size_t>(j) + k;
             done_.push_back({static_cast<std::int32_t>(row), low_[row], high_[row]});
-            low_[row] = spans.low[k], high_[row] = spans.left[k];
+            low_[row] = spans.low[k];
+            high_[row] = spans.left[k];
         }
     }
 }
@@ -72,9 +74,11 @@ std::vector<LevelRegion::Interval>& LevelRegion::intervals() {
     for (int j = first_row_; j <= last_row_; ++j) {
         const auto row = static_cast<std::size_t>(j);
         if (low_[row] <= high_[row]) done_.push_back({j, low_[row], high_[row]});
-        low_[row] = kNoLow, high_[row] = kNoHigh;
+        low_[row] = kNoLow;
+        high_[row] = kNoHigh;
     }
-    first_row_ = grid_.ny, last_row_ = -1;
+    first_row_ = grid_.ny;
+    last_row_ = -1;
     return done_;
 }
 

@@ -283,7 +283,8 @@ private:
         double deepest = kUnbounded;
         for (std::size_t k = 0; k < kLanes; ++k)
             if (losses.most[k] == most) deepest = std::min(deepest, losses.deepest[k]);
-        effect_.deepest = most, deepest_cell_ = first + static_cast<std::size_t>(deepest);
+        effect_.deepest = most;
+        deepest_cell_ = first + static_cast<std::size_t>(deepest);
     }
     // Of all lanes, halved and halved again.
     template <class Join>

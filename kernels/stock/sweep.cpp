@@ -144,7 +144,9 @@ SLABWRIGHT_WIDE float most_left(const float* stands, const float* surface, const
     for (; k + kLanes <= n; k += kLanes) {
         Floats8 high, low;
         Bytes8 share;
-        load(stands + k, high), load(surface + k, low), load(nz + k, share);
+        load(stands + k, high);
+        load(surface + k, low);
+        load(nz + k, share);
         const Floats8 left = (high - low) * (__builtin_convertvector(share, Floats8) / 255.0F);
         most = left > most ? left : most;
     }
@@ -206,12 +208,15 @@ SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows
         const double on_a = a2 < 0 ? inf : 0.0, on_b = b2 < 0 ? inf : 0.0;
         double low = fx - a + on_a, high = fx + a - on_a;
         const double low_b = tx - b + on_b, high_b = tx + b - on_b;
-        low = low_b < low ? low_b : low, high = high_b > high ? high_b : high;
+        low = low_b < low ? low_b : low;
+        high = high_b > high ? high_b : high;
         const double l = lx + (y - ly) * inverse, r = rx + (y - ry) * inverse;
         const double l_off = (y < l_from) | (y > l_to) ? inf : 0.0,
                      r_off = (y < r_from) | (y > r_to) ? inf : 0.0;
-        low = l + l_off < low ? l + l_off : low, high = l - l_off > high ? l - l_off : high;
-        low = r + r_off < low ? r + r_off : low, high = r - r_off > high ? r - r_off : high;
+        low = l + l_off < low ? l + l_off : low;
+        high = l - l_off > high ? l - l_off : high;
+        low = r + r_off < low ? r + r_off : low;
+        high = r - r_off > high ? r - r_off : high;
         const double off = on_a + hole;
         const double left = off > 0 ? high : fx - a, right = fx + a + off;
         const double i_low = std::ceil((low - x0) * per_mm), i_left = std::floor((left - x0) * per_mm);
@@ -234,7 +239,8 @@ namespace {
     }
     const Doubles8 a = (strip.least - value) * strip.inverse, b = (strip.most - value) * strip.inverse;
     const Doubles8 from = b < a ? b : a, to = a < b ? b : a;
-    low = low < from ? from : low, high = to < high ? to : high;
+    low = low < from ? from : low;
+    high = to < high ? to : high;
 }
 [[gnu::always_inline]] inline void narrow(const CrossedStrips& strips, const Doubles8& py, Doubles8& low,
                                           Doubles8& high) {
@@ -257,7 +263,8 @@ namespace {
     Doubles8 a = (low + fx - grid.x0) * per_mm, b = (high + fx - grid.x0) * per_mm;
     a = a < -1.0 ? Doubles8{} - 1.0 : a > beyond ? Doubles8{} + beyond : a;
     b = b < -1.0 ? Doubles8{} - 1.0 : b > beyond ? Doubles8{} + beyond : b;
-    whole(a, true), whole(b, false);
+    whole(a, true);
+    whole(b, false);
     a = a > 0.0 ? a : Doubles8{};
     b = low <= high ? (b < most ? b : Doubles8{} + most) : Doubles8{} - 1.0;
     const Ints8 i0 = __builtin_convertvector(a, Ints8), i1 = __builtin_convertvector(b, Ints8);
@@ -286,7 +293,8 @@ SLABWRIGHT_WIDE void strips_of_rows(const CellGrid& grid, int first_row, int row
         std::memcpy(w.data(), &w2, sizeof w2);
         for (double& v : w) v = std::sqrt(v > 0 ? v : 0.0);
         load(w.data(), to_x);
-        from_x = -to_x, to_x = w2 < 0.0 ? Doubles8{} - kUnbounded : to_x;
+        from_x = -to_x;
+        to_x = w2 < 0.0 ? Doubles8{} - kUnbounded : to_x;
         narrow(*near, py, from_x, to_x);
         cells_between(grid, from[0], from_x, to_x, spans.right.data() + k, spans.high.data() + k);
     }
@@ -455,7 +463,8 @@ SLABWRIGHT_WIDE void add_lost(const float* before, const float* now, const std::
     }
     for (; k < n; ++k) {
         const float off = before[k] - now[k], along = off * (static_cast<float>(share[k]) / whole);
-        lost.most = std::max(lost.most, along), lost.sum += static_cast<double>(along),
+        lost.most = std::max(lost.most, along);
+        lost.sum += static_cast<double>(along);
         lost.cells += off > least;
     }
     for (int i = 0; i < kLanes; ++i)

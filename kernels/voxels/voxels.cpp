@@ -379,7 +379,8 @@ RoughLeft LayerVoxels::left(Context& context, const Roughing& roughing, double s
                 for (int j = j0; j < std::min(j0 + kLeaf, box_.ny); ++j) {
                     const auto row = slot(j + border_);
                     const int at = level[static_cast<std::size_t>(k)];
-                    both.clear(), rest.clear();
+                    both.clear();
+                    rest.clear();
                     append_union(kept_[static_cast<std::size_t>(k)].row(row),
                                  at < 0 ? Spans{} : gone.at(at).row(row), both);
                     append_rest(both, border_, border_ + box_.nx - 1, rest);

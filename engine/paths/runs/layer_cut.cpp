@@ -62,7 +62,8 @@ Surroundings LayerCut::around(const Tool& tool, const DropIndex* part) const {
     around.lowest_rapid = layer.z_bottom + PathBuilder::kStop;
     for (const int axis : {0, 1}) {
         const auto a = static_cast<std::size_t>(axis);
-        around.reach_min[a] = low(axis, 1e9), around.reach_max[a] = high(axis, 1e9);
+        around.reach_min[a] = low(axis, 1e9);
+        around.reach_max[a] = high(axis, 1e9);
     }
     if (!layer.opening.empty()) around.room = std::make_shared<const Loops>(flask_room(*this, cutter.radius));
     return around;

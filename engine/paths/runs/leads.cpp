@@ -54,11 +54,13 @@ bool add_leads(PathBuilder& path, const LayerCut& cut, const DropIndex& part, do
         const PathPoint from = at_end ? run.back() : run.front();
         for (std::size_t k = 1; k < run.size(); ++k) {
             const PathPoint& to = at_end ? run[run.size() - 1 - k] : run[k];
-            tx = to_mm(std::int64_t{to.x} - from.x), ty = to_mm(std::int64_t{to.y} - from.y);
+            tx = to_mm(std::int64_t{to.x} - from.x);
+            ty = to_mm(std::int64_t{to.y} - from.y);
             const double l = std::hypot(tx, ty);
             if (l < kTangent && k + 1 < run.size()) continue;
             if (l == 0) return false;
-            tx /= l, ty /= l;
+            tx /= l;
+            ty /= l;
             return true;
         }
         return false;

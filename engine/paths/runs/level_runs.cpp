@@ -24,7 +24,8 @@ std::vector<std::uint32_t> regions(const std::vector<std::vector<LevelRun>>& lev
         return k;
     };
     auto join = [&](std::uint32_t a, std::uint32_t b) {
-        a = root(a), b = root(b);
+        a = root(a);
+        b = root(b);
         parent[std::max(a, b)] = std::min(a, b);
     };
     struct Visit {

@@ -173,7 +173,9 @@ private:
     // Pieces that lie beside each other, on one ring or on the next.
     void find_neighbours() {
         const std::size_t n = plan_.pieces.size();
-        waiting_.resize(n), boxes_.resize(n), state_.assign(n, State::waits);
+        waiting_.resize(n);
+        boxes_.resize(n);
+        state_.assign(n, State::waits);
         for (std::size_t k = 0; k < n; ++k)
             for (std::size_t m = k + 1; m < n && plan_.pieces[m].ring <= plan_.pieces[k].ring + 1; ++m)
                 if (beside(plan_.pieces[k], plan_.pieces[m]))
@@ -205,7 +207,9 @@ private:
 
     void wait_for_neighbours() {
         const std::size_t n = plan_.pieces.size();
-        waits_for_.assign(n, 0), waiting_.resize(n), boxes_.resize(n);
+        waits_for_.assign(n, 0);
+        waiting_.resize(n);
+        boxes_.resize(n);
         auto ring = [&](std::size_t k) { return plan_.pieces[k].ring; };
         for (std::size_t first = 0, farther = 0, end = 0; first < n;
              first = farther) {  // pieces lie in the order of their rings

@@ -154,7 +154,10 @@ std::size_t sharpest(std::span<const Point2> loop) {
         if (u2 > 0 && v2 > 0)
             if (const double cosine = (ux * vx + uy * vy) / std::sqrt(u2 * v2); cosine < least)
                 least = cosine, best = k;
-        b = &c, ux = vx, uy = vy, u2 = v2;
+        b = &c;
+        ux = vx;
+        uy = vy;
+        u2 = v2;
     }
     return best;
 }
