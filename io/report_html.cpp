@@ -16,13 +16,13 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/base_board.h"
 #include "engine/simulate/reach.h"
 #include "engine/simulate/replay.h"
 #include "io/read/input_file.h"
-#include "io/read/pattern_mesh.h"
+#include "io/read/planned_folder.h"
 #include "io/report_template.h"
 #include "io/text/base64.h"
-#include "io/text/job_keys.h"
 #include "io/write/output_file.h"
 #include "io/write/report_as_built.h"
 #include "io/write/thinned_path.h"
@@ -78,137 +78,8 @@ double rounded(double value, int decimals) {
     return r == 0 ? 0 : r;  // never −0
 }
 
-template <class Enum, std::size_t N>
-Enum word_value(const Word<Enum> (&words)[N], const std::string& text) {
-    for (const Word<Enum>& word : words)
-        if (text == word.text) return word.value;
-    throw Error(ErrorKind::input, "report.plan", "\"" + text + "\" is a word that this version does not know",
-                "plan.json", "plan again");
-}
-
-/// One program as plan.json names it.
-struct Named {
-    std::string file;
-    int layer = 0, tool = 0;
-    double minutes = 0;
-};
-
-/// What plan.json says, as far as figures are made from it. The page itself shows the document.
-struct PlanFolder {
-    Json plan;
-    SimulationInput input;  ///< without mesh and programs
-    Material material;
-    Tolerances tolerances;
-    LengthUnit units = LengthUnit::mm;
-    Repair repair = Repair::none;
-    Frame frame = Frame::pattern_base;
-    double base_board_cut = -1;
-    std::vector<Named> programs;
-};
-
-Tool read_tool(const Json& t) {
-    Tool tool;
-    tool.number = t.at("number").get<int>();
-    tool.kind = word_value(kToolWords, t.at("kind").get<std::string>());
-    tool.diameter = t.at("diameter").get<double>();
-    tool.flute_length = t.at("flute_length").get<double>();
-    tool.shank_diameter = t.at("shank_diameter").get<double>();
-    tool.holder_diameter = t.at("holder").at("diameter").get<double>();
-    tool.stickout = t.at("holder").at("stickout").get<double>();
-    tool.flutes = t.at("flutes").get<int>();
-    tool.helix_rad = t.at("helix_deg").get<double>() * std::numbers::pi / 180;
-    return tool;
-}
-
-void add_polygon(Loops& loops, const Json& polygon) {
-    for (const Json& p : polygon)
-        loops.points.push_back({to_units(p.at(0).get<double>()), to_units(p.at(1).get<double>())});
-    loops.close_loop();
-}
-
-PlanFolder read_plan_folder(const fs::path& out) {
-    PlanFolder folder;
-    const fs::path path = out / "plan.json";
-    folder.plan = read_json(path, "report.plan");
-    understood(path, "report.plan", [&] {
-        const Json& plan = folder.plan;
-        if (plan.at("schema") != "slabwright.plan/1")
-            throw Error(ErrorKind::input, "report.plan", "is not of schema slabwright.plan/1", path.string(),
-                        "plan again");
-        folder.frame = word_value(kFrameWords, plan.at("frame").get<std::string>());
-        const Json &job = plan.at("job"), &material = job.at("material"), &machine = job.at("machine"),
-                   &tolerances = job.at("tolerances");
-        folder.units = word_value(kUnitWords, job.at("units").get<std::string>());
-        if (job.contains("input"))
-            folder.repair = word_value(kRepairWords, job.at("input").at("repair").get<std::string>());
-        for (const auto& [key, to] : {std::pair{"ktc", &folder.material.ktc},
-                                      {"kte", &folder.material.kte},
-                                      {"kfc", &folder.material.kfc},
-                                      {"kfe", &folder.material.kfe}})
-            *to = material.at(key).get<double>();
-        folder.material.transform = word_value(kTransformWords, material.at("transform").get<std::string>());
-        folder.tolerances.cusp = tolerances.at("cusp").get<double>();
-        folder.tolerances.gouge = tolerances.at("gouge").get<double>();
-        folder.tolerances.weld = tolerances.at("weld").get<double>();
-        folder.base_board_cut = machine.at("base_board_cut").get<double>();
-        SimulationInput& input = folder.input;
-        input.machine.rapid_feed = machine.at("rapid_feed").get<double>();
-        if (!(input.machine.rapid_feed > 0))
-            throw Error(ErrorKind::input, "report.plan", "states a machine that does not move", path.string(),
-                        "plan again");
-        for (std::size_t k = 0; k < 2; ++k) {
-            input.stock_min[k] = plan.at("stock").at("min").at(k).get<double>();
-            input.stock_max[k] = plan.at("stock").at("max").at(k).get<double>();
-            if (!(input.stock_max[k] > input.stock_min[k]))
-                throw Error(ErrorKind::input, "report.plan", "states a stock of no size", path.string(),
-                            "plan again");
-        }
-        for (const Json& tool : plan.at("tools")) input.tools.push_back(read_tool(tool));
-        const Json flask = plan.value("flask", Json());
-        for (const Json& layer : plan.at("layers")) {
-            input.layers.push_back({layer.at("z_bottom").get<double>(),
-                                    layer.at("z_top").get<double>(),
-                                    layer.at("slab_thickness").get<double>(),
-                                    {}});
-            if (flask.is_object()) {
-                Loops outer, inner;
-                add_polygon(outer, flask.at("outer"));
-                add_polygon(inner, flask.contains("inner_by_layer")
-                                       ? flask.at("inner_by_layer").at(input.layers.size() - 1)
-                                       : flask.at("inner"));
-                input.layers.back().flask = subtract(outer, inner);
-            }
-            for (const Json& operation : layer.at("operations")) {
-                Named named{operation.at("file").get<std::string>(),
-                            static_cast<int>(input.layers.size()) - 1, operation.at("tool").get<int>(),
-                            operation.at("minutes").get<double>()};
-                if (named.file.rfind("nc/", 0) != 0 || named.file.find("..") != std::string::npos ||
-                    named.file.find('/', 3) != std::string::npos)
-                    throw Error(ErrorKind::input, "report.plan",
-                                "names a program that is no file of nc/: " + named.file, path.string(),
-                                "plan again");
-                folder.programs.push_back(std::move(named));
-            }
-        }
-        if (input.layers.empty())
-            throw Error(ErrorKind::input, "report.plan", "has no layers", path.string(), "plan again");
-        return 0;
-    });
-    return folder;
-}
-
-PlannedPattern planned_pattern(const PlanFolder& folder) {
-    const Json& input = folder.plan.at("input");
-    std::vector<Support> supports;
-    for (const Json& s : folder.plan.value("supports", Json::array()))
-        supports.push_back({s.at("layer").get<int>(), s.at("x").get<double>(), s.at("y").get<double>(),
-                            s.at("width").get<double>(), s.at("z_low").get<double>(),
-                            s.at("z_high").get<double>()});
-    return {input.at("file").get<std::string>(),
-            input.value("sha256", ""),
-            {folder.units, folder.tolerances.weld, folder.repair},
-            std::move(supports)};
-}
+/// What a report is refused with.
+const FolderRefusal kRefusal{ErrorKind::input, "report.plan", "report.program"};
 
 /// Douglas and Peucker on a closed loop, from its first point and the one farthest from that.
 std::vector<Point2> thinned_loop(std::span<const Point2> loop, double tolerance_mm) {
@@ -326,18 +197,9 @@ std::uint8_t left_over_code(float left, double gouge) {
 }
 
 /// Reads a program of OUT.
-Program read_program(const fs::path& out, const PlanFolder& folder, const Named& named) {
-    const std::string text =
-        read_whole(out / named.file, {ErrorKind::input, "report.program", kMostProgramBytes, "plan again"});
+Program read_program(const PlannedFolder& folder, std::size_t i) {
     try {
-        Program program = read_gcode(text, named.file, gcode_limits(folder.tolerances));
-        program.layer = named.layer;
-        if (folder.frame == Frame::layer_top) {
-            const double up = folder.input.layers[static_cast<std::size_t>(named.layer)].z_top;
-            for (ProgramStep& s : program.steps) s.z += up;
-            for (ProgramArc& a : program.arcs) a.arc.z += up;
-        }
-        return program;
+        return folder.read_program(i, kRefusal);
     } catch (const Error& e) {
         throw Error(ErrorKind::input, "report.program", e.message(), e.place(), e.remedy());
     }
@@ -362,33 +224,32 @@ Json feeds_json(const Program& program) {
 }
 
 /// What stands over in the end takes up to a fifth of the time of the replay: so many programs' steps.
-std::size_t left_over_steps(const PlanFolder& folder) { return 1 + folder.programs.size() / 8; }
+std::size_t left_over_steps(const PlannedFolder& folder) { return 1 + folder.build.programs.size() / 8; }
 
 /// Runs every program, one layer's after the other's. The replay's figures go into the page with a light page
 /// too; its maps only with the model.
 /// @param programs those that have been read already; each is let go when it has run, the others are read
 /// @param part of the input's mesh; none with a light page
-void replay_programs(Context& context, const fs::path& out, const PlanFolder& folder,
-                     const SimulationInput& input, std::vector<Program> programs, const StandingPart* part,
-                     Figures& figures) {
+void replay_programs(Context& context, const PlannedFolder& folder, const SimulationInput& input,
+                     std::vector<Program> programs, const StandingPart* part, Figures& figures) {
     ReplayOptions options;
     options.cell = stock_cell(input);
-    options.cusp = folder.tolerances.cusp;
-    options.material = folder.material;
+    options.cusp = folder.build.job.tolerances.cusp;
+    options.material = folder.build.job.material;
     Replay replay(context, input, options);
     std::map<std::string, Program*> read;
     for (Program& program : programs) read.emplace("nc/" + program.file, &program);
     Json engagement = Json::array();
-    figures.drawn.paths.resize(folder.programs.size());
-    for (std::size_t begin = 0; begin < folder.programs.size();) {
+    figures.drawn.paths.resize(folder.build.programs.size());
+    for (std::size_t begin = 0; begin < folder.build.programs.size();) {
         std::size_t end = begin;
-        while (end < folder.programs.size() && folder.programs[end].layer == folder.programs[begin].layer)
+        while (end < folder.build.programs.size() &&
+               folder.build.programs[end].layer == folder.build.programs[begin].layer)
             ++end;
         std::vector<Program> of_layer(end - begin);
         parallel_each(context, of_layer.size(), [&](std::size_t i) {
-            const Named& named = folder.programs[begin + i];
-            const auto known = read.find(named.file);
-            of_layer[i] = known != read.end() ? std::move(*known->second) : read_program(out, folder, named);
+            const auto known = read.find(folder.build.programs[begin + i].file);
+            of_layer[i] = known != read.end() ? std::move(*known->second) : read_program(folder, begin + i);
             if (part == nullptr) return;
             figures.drawn.paths[begin + i] = path_of(of_layer[i], input.machine.rapid_feed, kPathTolerance);
         });
@@ -403,7 +264,7 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
                 force.push_back(rounded(piece.force_n, 2)),
                     deflection.push_back(rounded(piece.deflection_mm, 5));
             }
-            engagement.push_back({{"file", folder.programs[begin + i].file},
+            engagement.push_back({{"file", folder.build.programs[begin + i].file},
                                   {"depth_mm", depth},
                                   {"width_mm", width},
                                   {"force_n", force},
@@ -425,7 +286,7 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
     replay.finished(*part, [&](std::size_t layer, const ReplayedLayer& found) {
         std::string codes;
         for (const float left : found.left)
-            codes += static_cast<char>(left_over_code(left, folder.tolerances.gouge));
+            codes += static_cast<char>(left_over_code(left, folder.build.job.tolerances.gouge));
         figures.replay.push_back(base64(codes));
         figures.wood.push_back(wood_json(input.layers[layer], found.surface));
     });
@@ -435,9 +296,9 @@ void replay_programs(Context& context, const fs::path& out, const PlanFolder& fo
 }
 
 /// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
-void draw_figures(Context& context, MeshView mesh, const PlanFolder& folder, const Json& sequence,
+void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, const Json& sequence,
                   Json& data) {
-    const SimulationInput& input = folder.input;
+    const SimulationInput& input = folder.simulation;
     const Box3 box = bounds(context, mesh);
     std::vector<Plane> planes;
     for (const SimulatedLayer& layer : input.layers) {
@@ -496,12 +357,9 @@ struct ReachMap {
     std::string codes;
     double cell_mm = 0;
 };
-ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder& folder, MeshView model) {
-    const SimulationInput& input = folder.input;
-    double board = std::max(0.0, folder.base_board_cut);
-    if (folder.base_board_cut < 0)
-        for (const Tool& tool : input.tools)
-            if (tool.kind == ToolKind::ball) board = std::max(board, tool.diameter / 2);
+ReachMap reach_map(Context& context, const StandingPart& part, const PlannedFolder& folder, MeshView model) {
+    const SimulationInput& input = folder.simulation;
+    const double board = board_cut_limit(folder.build.job.machine, input.tools);
     const auto reach_of = [&](std::size_t l) {
         const SimulatedLayer& layer = input.layers[l];
         return std::make_unique<Reach>(part, input.tools, layer.z_bottom, layer.z_top,
@@ -567,7 +425,7 @@ ReachMap reach_map(Context& context, const StandingPart& part, const PlanFolder&
 /// The pattern for the 3D view: places as 16-bit shares of its box.
 /// @param model of the mesh, decimated
 Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart& part,
-                const PlanFolder& folder) {
+                const PlannedFolder& folder) {
     const Box3 box = bounds(context, mesh);
     const float low[3] = {box.min.x, box.min.y, box.min.z}, high[3] = {box.max.x, box.max.y, box.max.z};
     std::string vertices, indices;
@@ -605,7 +463,7 @@ Json model_json(Context& context, MeshView mesh, Mesh model, const StandingPart&
 /// All paths within a number of points: the tolerance is doubled until they fit, then the longest are left
 /// out.
 /// @param drawn thinned further where that is needed: fewer points come from where more ended
-Json paths_json(Context& context, DrawnPaths& drawn, const PlanFolder& folder, std::size_t most) {
+Json paths_json(Context& context, DrawnPaths& drawn, const PlannedFolder& folder, std::size_t most) {
     const auto sizes_now = [&] {
         std::vector<std::size_t> sizes;
         for (const auto& path : drawn.paths) sizes.push_back(path.size());
@@ -658,7 +516,7 @@ Json paths_json(Context& context, DrawnPaths& drawn, const PlanFolder& folder, s
             append_little_endian(bytes,
                                  static_cast<std::uint16_t>(share << 1 | static_cast<unsigned>(p.rapid)));
         }
-        programs.push_back({{"file", folder.programs[i].file},
+        programs.push_back({{"file", folder.build.programs[i].file},
                             {"points", path.size()},
                             {"left_out", left_out[i] != 0},
                             {"data", base64(bytes)}});
@@ -718,17 +576,15 @@ std::string report_html(Context& context, const std::string& directory, const Re
         throw Error(ErrorKind::usage, "report.size_limit", "a page of no size is none", "--size-limit",
                     "give megabytes");
     const fs::path out(directory);
-    const PlanFolder folder = read_plan_folder(out);
+    const PlannedFolder folder = read_planned_folder(out, kRefusal);
+    const Json plan = Json::parse(folder.document);
     const Json sequence =
         fs::exists(out / "sequence.json") ? read_json(out / "sequence.json", "report.sequence") : Json();
     const Json verify =
         fs::exists(out / "verify.json") ? read_json(out / "verify.json", "report.verify") : Json();
     const std::shared_ptr<Pattern> pattern =
         verified ? std::move(verified->pattern)
-                 : read_planned_pattern(
-                       context, directory,
-                       understood(out / "plan.json", "report.plan", [&] { return planned_pattern(folder); }),
-                       options.source, "report");
+                 : read_planned_pattern(context, directory, folder.pattern, options.source, "report");
     std::vector<Program> programs;
     if (verified) programs = std::move(verified->input.programs);
     verified.reset();
@@ -738,12 +594,10 @@ std::string report_html(Context& context, const std::string& directory, const Re
     for (const Program& program : programs) moves += program.steps.size();
     const ReportWork work = report_work(moves, mesh.facets.size());
     const double replayed = options.three_d ? 0.02 + 0.98 * work.replay / (work.replay + work.page) : 1.0;
-    context.begin_phase("report", 0.02, replayed, folder.programs.size() + left_over_steps(folder));
+    context.begin_phase("report", 0.02, replayed, folder.build.programs.size() + left_over_steps(folder));
     Figures figures;
-    figures.data = {{"schema", "slabwright.report/1"},
-                    {"three_d", options.three_d},
-                    {"plan", folder.plan},
-                    {"verify", verify}};
+    figures.data = {
+        {"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", plan}, {"verify", verify}};
     const auto draw = [&] {
         Json steps = Json::array();
         if (sequence.is_object())
@@ -755,7 +609,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
         draw_figures(context, mesh, folder, sequence, figures.data);
         return 0;
     };
-    SimulationInput input = folder.input;
+    SimulationInput input = folder.simulation;
     input.mesh = mesh;
     if (options.three_d && !pattern->part) pattern->part.emplace(context, mesh);
     // The model needs nothing of the figures, and its rounds keep one thread busy.
@@ -767,7 +621,7 @@ std::string report_html(Context& context, const std::string& directory, const Re
             return;
         }
         understood(out / "sequence.json", "report.sequence", draw);
-        replay_programs(context, out, folder, input, std::move(programs),
+        replay_programs(context, folder, input, std::move(programs),
                         options.three_d ? &*pattern->part : nullptr, figures);
     });
     context.throw_if_cancelled();

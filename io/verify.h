@@ -6,7 +6,6 @@
 
 #include "engine/simulate/missing_tools.h"
 #include "engine/simulate/simulate.h"
-#include "io/posts/gcode_reader.h"
 #include "io/read/pattern.h"
 
 namespace slabwright {
@@ -33,10 +32,6 @@ struct Verification {
     std::vector<MissingTool> missing;  ///< tools that would reach what is out of reach
     std::string json;  ///< what verify.json holds (schema slabwright.verify/1)
 };
-
-/// How a plan's programs are read: chords that stand for an arc take next to nothing of the gouge tolerance
-/// that the paths were made for.
-[[nodiscard]] GcodeLimits gcode_limits(const Tolerances& tolerances);
 
 /// Reads plan.json, every program of nc/, tool.tbl, sequence.json and, if it is not given, the pattern,
 /// replays the sequence, simulates the programs, and writes OUT/verify.json (a whole file or none). The

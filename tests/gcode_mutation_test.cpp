@@ -22,6 +22,7 @@
 #include "io/posts/tool_table.h"
 #include "io/posts/tool_table_check.h"
 #include "io/read/pattern_mesh.h"
+#include "io/read/planned_folder.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
 #include "io/write/stl_writer.h"
@@ -139,11 +140,9 @@ struct Planned {
         support::spit(path, text);
         std::string found;
         try {
-            const Verification v = verify_folder(context, out(),
-                                                 {.source = (folder / "hill.stl").string(),
-                                                  .pattern = pattern,
-                                                  .cell = kCell,
-                                                  .write = false});
+            const Verification v = verify_folder(
+                context, out(),
+                {.source = folder / "hill.stl", .pattern = pattern, .cell = kCell, .write = false});
             for (const Violation& w : v.report.violations) found += w.code + " ";
         } catch (const Error& e) {
             found = e.code();

@@ -1,5 +1,7 @@
 #include "engine/tool_choice/select.h"
 
+#include "engine/base_board.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -391,8 +393,8 @@ Overrun overrun_of(const Job& job) {
         for (const Tool& tool : job.tools)
             if (tool.kind == ToolKind::ball) overrun.below = std::max(overrun.below, tool.diameter / 2);
     const Machine& machine = job.machine;
-    overrun.board = std::min(machine.base_board_cut >= 0 ? machine.base_board_cut : overrun.below,
-                             machine.base_board_thickness);
+    overrun.board = board_cut_limit(machine, job.tools);
+    if (machine.base_board_cut < 0) overrun.board = std::min(overrun.board, overrun.below);
     return overrun;
 }
 

@@ -1,0 +1,362 @@
+#include "io/read/planned_folder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+
+#include "io/read/input_file.h"
+#include "io/text/job_keys.h"
+
+namespace slabwright {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+constexpr double kArcShare = 0.05;       // of the gouge tolerance, by which an arc may miss its chords
+constexpr double kLevelArcError = 0.01;  // mm: what must be nearer to a level arc takes the arc itself
+
+struct Refuse {
+    const FolderRefusal& how;
+    const std::string& file;
+    [[noreturn]] void because(const std::string& what) const {
+        throw Error(how.kind, how.plan, what, file, "plan again");
+    }
+};
+
+/// A value of plan.json with the way to it, so that what is missing can be named.
+class Field {
+public:
+    Field(const json& value, std::string way, const Refuse& refuse)
+        : value_(value), way_(std::move(way)), refuse_(refuse) {}
+
+    [[nodiscard]] Field operator[](const char* key) const {
+        if (!value_.is_object() || !value_.contains(key)) fail(way_ + "." + key, "is missing");
+        return {value_.at(key), way_ + "." + key, refuse_};
+    }
+    [[nodiscard]] bool has(const char* key) const {
+        return value_.is_object() && value_.contains(key) && !value_.at(key).is_null();
+    }
+    [[nodiscard]] Field operator[](std::size_t i) const {
+        if (!value_.is_array() || i >= value_.size())
+            fail(way_ + "[" + std::to_string(i) + "]", "is missing");
+        return {value_.at(i), way_ + "[" + std::to_string(i) + "]", refuse_};
+    }
+    [[nodiscard]] std::size_t size() const {
+        if (!value_.is_array()) fail(way_, "is no list");
+        return value_.size();
+    }
+    [[nodiscard]] double number() const {
+        if (!value_.is_number()) fail(way_, "is no number");
+        const double v = value_.get<double>();
+        if (!std::isfinite(v)) fail(way_, "is not finite");
+        return v;
+    }
+    [[nodiscard]] int whole() const {
+        if (!value_.is_number_integer() || std::abs(number()) > 1e9) fail(way_, "is no whole number");
+        return value_.get<int>();
+    }
+    [[nodiscard]] bool boolean() const {
+        if (!value_.is_boolean()) fail(way_, "is neither true nor false");
+        return value_.get<bool>();
+    }
+    [[nodiscard]] std::string text() const {
+        if (!value_.is_string()) fail(way_, "is no text");
+        return value_.get<std::string>();
+    }
+    [[noreturn]] void fail(const std::string& way, const std::string& what) const {
+        refuse_.because(way + " " + what);
+    }
+    [[noreturn]] void fail(const std::string& what) const { fail(way_, what); }
+
+private:
+    const json& value_;
+    std::string way_;
+    const Refuse& refuse_;
+};
+
+template <class Enum, std::size_t N>
+Enum enumerator(const Word<Enum> (&words)[N], const Field& field) {
+    const std::string text = field.text();
+    for (const Word<Enum>& word : words)
+        if (text == word.text) return word.value;
+    field.fail("says \"" + text + "\", which is none of its words");
+}
+
+OperationKind operation_kind(const Field& field) {
+    const std::string text = field.text();
+    for (const OperationKind kind :
+         {OperationKind::face, OperationKind::rough, OperationKind::semi_rough, OperationKind::finish,
+          OperationKind::corner, OperationKind::drill, OperationKind::edge})
+        if (text == name(kind)) return kind;
+    field.fail("says \"" + text + "\", which is no kind of operation");
+}
+
+Tool read_tool(const Field& t) {
+    Tool tool;
+    tool.number = t["number"].whole();
+    tool.kind = enumerator(kToolWords, t["kind"]);
+    tool.diameter = t["diameter"].number();
+    tool.flute_length = t["flute_length"].number();
+    tool.shank_diameter = t["shank_diameter"].number();
+    tool.holder_diameter = t["holder"]["diameter"].number();
+    tool.stickout = t["holder"]["stickout"].number();
+    if (!(tool.diameter > 0)) t["diameter"].fail("is no diameter");
+    if (t.has("name")) tool.name = t["name"].text();
+    if (t.has("flutes")) tool.flutes = t["flutes"].whole();
+    if (t.has("helix_deg")) tool.helix_rad = t["helix_deg"].number() * std::numbers::pi / 180;
+    if (t.has("max_rpm")) tool.max_rpm = t["max_rpm"].number();
+    if (t.has("max_feed")) tool.max_feed = t["max_feed"].number();
+    tool.plunges = t.has("plunges") ? t["plunges"].boolean() : plunges_by_default(tool.kind);
+    if (t.has("core_diameter")) tool.core_diameter = t["core_diameter"].number();
+    if (t.has("ramp_deg")) tool.ramp_deg = t["ramp_deg"].number();
+    if (tool.core_diameter >= tool.diameter) t["core_diameter"].fail("is no less than the diameter");
+    if (tool.ramp_deg > 90) t["ramp_deg"].fail("is no slope");
+    return tool;
+}
+
+/// Takes the keys of one table of the job that plan.json states; the others keep their default.
+class StatedKeys {
+public:
+    explicit StatedKeys(const Field& job) : job_(job), table_(job) {}
+    void table(const char* name, const char*) {
+        stated_ = job_.has(name);
+        if (stated_) table_.emplace(job_[name]);
+    }
+    void required() {}
+    void key(const char* name, double& value, const char*) {
+        if (has(name)) value = (*table_)[name].number();
+    }
+    void key(const char* name, int& value, const char*) {
+        if (has(name)) value = (*table_)[name].whole();
+    }
+    void key(const char* name, bool& value, const char*) {
+        if (has(name)) value = (*table_)[name].boolean();
+    }
+    void key(const char* name, std::string& value, const char*) {
+        if (has(name)) value = (*table_)[name].text();
+    }
+    void key(const char* name, std::vector<double>& values, const char*) {
+        if (!has(name)) return;
+        const Field list = (*table_)[name];
+        values.clear();
+        for (std::size_t i = 0; i < list.size(); ++i) values.push_back(list[i].number());
+    }
+    void degrees(const char* name, double& radians, const char*) {
+        if (has(name)) radians = (*table_)[name].number() * std::numbers::pi / 180;
+    }
+    template <class Enum, std::size_t N>
+    void word(const char* name, Enum& value, const Word<Enum> (&words)[N], const char*) {
+        if (has(name)) value = enumerator(words, (*table_)[name]);
+    }
+
+private:
+    [[nodiscard]] bool has(const char* name) const { return stated_ && table_->has(name); }
+    const Field& job_;
+    std::optional<Field> table_;
+    bool stated_ = true;
+};
+
+/// The job that a plan states. What the proof cannot do without must be there.
+void read_job(const Field& job, BuildPlan& build) {
+    build.job_stated = true;
+    StatedKeys keys(job);
+    visit_job_keys(build.job, keys);
+    (void)job["units"];
+    for (const char* key :
+         {"travel_x", "travel_y", "travel_z", "max_feed", "rapid_feed", "acceleration", "max_rpm",
+          "spindle_dwell_s", "tool_change_s", "table_speed", "build_height", "build_mass_kg", "feed_height",
+          "feed_mass_kg", "base_board_thickness", "base_board_cut", "table"})
+        (void)job["machine"][key];
+    for (const char* key : {"name", "density_kg_m3"}) (void)job["material"][key];
+    for (const char* key :
+         {"glue", "press_force", "press_time_s", "edge_setback", "handling_s", "glue_s_per_m2"})
+        (void)job["bonding"][key];
+    for (const char* key : {"gouge", "cusp", "weld"}) (void)job["tolerances"][key];
+    const Machine& m = build.job.machine;
+    if (!(m.acceleration > 0) || !(m.rapid_feed > 0) || !(m.max_feed > 0))
+        job["machine"].fail("states a machine that does not move");
+}
+
+std::vector<Support> read_supports(const Field& plan) {
+    std::vector<Support> supports;
+    if (!plan.has("supports")) return supports;
+    const Field all = plan["supports"];
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        const Field s = all[i];
+        supports.push_back({s["layer"].whole(), s["x"].number(), s["y"].number(), s["width"].number(),
+                            s["z_low"].number(), s["z_high"].number()});
+        const Support& read = supports.back();
+        for (const double v : {read.x, read.y, read.width, read.z_low, read.z_high})
+            if (std::abs(v) > 200000) s.fail("reaches beyond 200 m");
+        if (!(read.width > 0) || !(read.z_high > read.z_low) || read.z_low < 0) s.fail("is no column");
+    }
+    return supports;
+}
+
+/// What an operation of plan.json says of its program.
+ProgramPlan read_program_plan(const Field& op) {
+    ProgramPlan planned;
+    if (op.has("spindle_rpm")) planned.spindle_rpm = op["spindle_rpm"].number();
+    if (op.has("blend")) planned.blend = op["blend"].number();
+    if (op.has("feeds")) {
+        const Field feeds = op["feeds"];
+        planned.feeds.emplace();
+        for (std::size_t i = 0; i < feeds.size(); ++i) {
+            FeedLength f{feeds[i]["feed"].number(), feeds[i]["mm"].number(), {}};
+            for (std::size_t k = 0; k < 3; ++k) f.moment[k] = f.mm * feeds[i]["centre"][k].number();
+            add_length(*planned.feeds, f);
+        }
+    }
+    return planned;
+}
+
+/// Closed polygons as plan.json writes them.
+void add_polygon(Loops& loops, const Field& polygon) {
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+        const double x = polygon[i][std::size_t{0}].number(), y = polygon[i][std::size_t{1}].number();
+        if (std::abs(x) > 200000 || std::abs(y) > 200000) polygon.fail("reaches beyond 200 m");
+        loops.points.push_back({to_units(x), to_units(y)});
+    }
+    loops.close_loop();
+}
+
+void read_flask(const Field& plan, PlannedFolder& folder) {
+    BuildPlan& build = folder.build;
+    build.flask = plan.has("flask");
+    if (!build.flask) return;
+    const Field flask = plan["flask"];
+    Loops outer;
+    add_polygon(outer, flask["outer"]);
+    std::vector<SimulatedLayer>& layers = folder.simulation.layers;
+    for (std::size_t l = 0; l < layers.size(); ++l) {
+        Loops inner;
+        add_polygon(inner, flask.has("inner_by_layer") ? flask["inner_by_layer"][l] : flask["inner"]);
+        layers[l].flask = subtract(outer, inner);
+    }
+    if (flask.has("mass_kg")) build.flask_mass_kg = flask["mass_kg"].number();
+    if (!plan.has("totals")) return;
+    const double slab = (build.stock_max[0] - build.stock_min[0]) * (build.stock_max[1] - build.stock_min[1]);
+    double opening = 0;
+    for (const SimulatedLayer& layer : layers)
+        opening += (slab - area(layer.flask)) * (layer.z_top - layer.z_bottom);
+    build.sand_litres = std::max(0.0, opening - plan["totals"]["part_volume_mm3"].number()) * 1e-6;
+}
+
+PlannedJoint read_joint(const Field& joint) {
+    PlannedJoint planned;
+    if (joint.has("glue_area_mm2")) planned.glue_area_mm2 = joint["glue_area_mm2"].number();
+    if (joint.has("press_force_n")) planned.press_force_n = joint["press_force_n"].number();
+    return planned;
+}
+
+void read_operation(const Field& op, std::size_t layer, std::set<std::string>& named, PlannedFolder& folder) {
+    PlannedProgram& program = folder.build.programs.emplace_back();
+    program.file = op["file"].text();
+    if (!program.file.starts_with("nc/")) program.file.insert(0, "nc/");
+    if (program.file.size() == 3 || program.file.find('/', 3) != std::string::npos ||
+        program.file.find("..") != std::string::npos)
+        op["file"].fail("is no file of nc/");
+    if (!named.insert(program.file).second) op["file"].fail("names a program a second time");
+    program.layer = layer;
+    program.kind = operation_kind(op["kind"]);
+    program.tool = op["tool"].whole();
+    if (op.has("purpose")) program.purpose = op["purpose"].text();
+    if (op.has("minutes")) program.minutes = op["minutes"].number();
+    folder.sayings.push_back(read_program_plan(op));
+    folder.stepdowns.push_back(op.has("stepdown") ? std::optional(op["stepdown"].number()) : std::nullopt);
+}
+
+void read_layers(const Field& layers, PlannedFolder& folder) {
+    std::set<std::string> named;
+    if (layers.size() == 0) layers.fail("has no layer");
+    for (std::size_t l = 0; l < layers.size(); ++l) {
+        const Field from = layers[l];
+        LayerToBuild& layer = folder.build.layers.emplace_back();
+        layer.index = from["index"].whole();
+        layer.z_bottom = from["z_bottom"].number();
+        layer.z_top = from["z_top"].number();
+        layer.slab_thickness = from["slab_thickness"].number();
+        folder.simulation.layers.push_back({layer.z_bottom, layer.z_top, layer.slab_thickness, {}});
+        if (from.has("slabs")) layer.slabs = from["slabs"].whole();
+        if (layer.slabs < 1 || layer.slabs > 1000) from["slabs"].fail("is no count of slabs");
+        if (from.has("joints"))
+            for (std::size_t k = 0; k < from["joints"].size(); ++k)
+                layer.joints.push_back(read_joint(from["joints"][k]));
+        const Field operations = from["operations"];
+        for (std::size_t o = 0; o < operations.size(); ++o) read_operation(operations[o], l, named, folder);
+    }
+}
+
+}  // namespace
+
+GcodeLimits gcode_limits(const Tolerances& tolerances) {
+    GcodeLimits limits;
+    // Beside kSheet, by which depths may be short, half of that does no harm; twice as near would need 1.4
+    // times the chords.
+    limits.arc_error = std::clamp(kArcShare * tolerances.gouge, 1e-5, StandingPart::kSheet / 2);
+    limits.level_arc_error = kLevelArcError;
+    return limits;
+}
+
+PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refusal) {
+    const std::string file = (out / "plan.json").string();
+    const Refuse refuse{refusal, file};
+    PlannedFolder folder;
+    folder.path = out;
+    folder.document = read_document(file, refusal.kind, refusal.plan, "plan again");
+    json document;
+    try {
+        document = json::parse(folder.document);
+    } catch (const json::exception& e) {
+        refuse.because(std::string("is no JSON: ") + e.what());
+    }
+    const Field plan(document, "plan", refuse);
+    if (plan["schema"].text() != "slabwright.plan/1") plan["schema"].fail("is not slabwright.plan/1");
+    if (plan["units"].text() != "mm") plan["units"].fail("is not mm");
+    BuildPlan& build = folder.build;
+    build.frame = enumerator(kFrameWords, plan["frame"]);
+    if (build.frame == Frame::automatic) plan["frame"].fail("names no frame");
+    if (plan.has("job")) read_job(plan["job"], build);
+    build.pattern = plan["input"]["file"].text();
+    build.sha256 = plan["input"]["sha256"].text();
+    folder.pattern = {build.pattern, build.sha256, reading_options(build.job), read_supports(plan)};
+    for (std::size_t k = 0; k < 2; ++k) {
+        build.stock_min[k] = plan["stock"]["min"][k].number();
+        build.stock_max[k] = plan["stock"]["max"][k].number();
+        if (!(build.stock_max[k] > build.stock_min[k])) plan["stock"].fail("is of no size");
+    }
+    const Field tools = plan["tools"];
+    for (std::size_t i = 0; i < tools.size(); ++i) build.tools.push_back(read_tool(tools[i]));
+    read_layers(plan["layers"], folder);
+    SimulationInput& input = folder.simulation;
+    input.machine = build.job.machine;
+    input.stock_min = build.stock_min;
+    input.stock_max = build.stock_max;
+    input.tools = build.tools;
+    read_flask(plan, folder);
+    return folder;
+}
+
+Program PlannedFolder::read_program(std::size_t i, const FolderRefusal& refusal) const {
+    const PlannedProgram& planned = build.programs[i];
+    const std::string text =
+        read_whole(path / planned.file, {refusal.kind, refusal.program, kMostProgramBytes, "plan again"});
+    Program program = read_gcode(text, planned.file, gcode_limits(build.job.tolerances));
+    // Programs count from the top in whole 0.1 µm, as they were written.
+    const double up =
+        build.frame == Frame::layer_top ? to_mm(to_units(simulation.layers[planned.layer].z_top)) : 0;
+    for (ProgramStep& s : program.steps) s.z += up;
+    for (ProgramArc& a : program.arcs) a.arc.z += up;
+    program.file = planned.file.substr(3);
+    program.layer = static_cast<int>(planned.layer);
+    program.kind = planned.kind;
+    program.planned_tool = planned.tool;
+    if (stepdowns[i]) program.planned_stepdown = *stepdowns[i];
+    return program;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,49 @@
+// What a folder OUT says of its plan, read once for whoever judges or shows it.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/simulate/build_replay.h"
+#include "engine/simulate/simulate.h"
+#include "io/posts/gcode_reader.h"
+#include "io/posts/program_check.h"
+#include "io/read/pattern.h"
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+/// How what lies in OUT is refused.
+struct FolderRefusal {
+    ErrorKind kind = ErrorKind::verification;
+    std::string plan = "verify.plan", program = "verify.program";  ///< codes
+};
+
+/// plan.json as far as figures are made from it. A job that it does not state is the default one.
+struct PlannedFolder {
+    std::filesystem::path path;
+    std::string document;  ///< the text of plan.json
+    PlannedPattern pattern;
+    BuildPlan build;             ///< its job, layers and programs; of these low and high are not set
+    SimulationInput simulation;  ///< stock, layers with what of the flask stands in them, tools, machine;
+                                 ///< neither mesh nor programs
+    std::vector<ProgramPlan> sayings;              ///< what the plan says of each of build.programs
+    std::vector<std::optional<double>> stepdowns;  ///< mm, of each of build.programs
+
+    /// Reads the program of build.programs[i]: file (without nc/), layer, kind, planned tool and stepdown
+    /// set, heights from the pattern's bottom. @throws Error as `refusal` says, and as read_gcode()
+    [[nodiscard]] Program read_program(std::size_t i, const FolderRefusal& refusal) const;
+};
+
+/// Reads OUT/plan.json. @throws Error as `refusal` says, with the first key that is missing or wrong: no
+/// file, no JSON, another schema than slabwright.plan/1, a value that no plan can have
+[[nodiscard]] PlannedFolder read_planned_folder(const std::filesystem::path& out,
+                                                const FolderRefusal& refusal);
+
+/// How a plan's programs are read: chords that stand for an arc take next to nothing of the gouge tolerance
+/// that the paths were made for.
+[[nodiscard]] GcodeLimits gcode_limits(const Tolerances& tolerances);
+
+}  // namespace slabwright
