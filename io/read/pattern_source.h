@@ -8,11 +8,13 @@
 #include <string_view>
 #include <utility>
 
+#include "kernels/export.h"
+
 namespace slabwright {
 
 /// One of three places from which a pattern is read. What memory it names is borrowed: it must live until the
 /// function that is given it returns.
-class PatternSource {
+class SLABWRIGHT_API PatternSource {
 public:
     using Vertex = std::array<double, 3>;
     using Facet = std::array<std::uint32_t, 3>;  ///< counter-clockwise seen from outside

@@ -1,19 +1,50 @@
-# Installs a build into a fresh prefix, builds the consumer against nothing but that prefix, and runs it.
+# Installs a build into a fresh prefix, by component and whole, builds the consumer against nothing but that prefix, and runs it.
 # cmake -D BUILD=… -D WORK=… -D SOURCE=… -D STL=… -D GENERATOR=… -P run.cmake
+cmake_minimum_required(VERSION 3.25)
 foreach(name BUILD WORK SOURCE STL GENERATOR)
   if(NOT DEFINED ${name})
     message(FATAL_ERROR "run.cmake: -D ${name}=… is missing")
   endif()
 endforeach()
 file(REMOVE_RECURSE ${WORK})
-foreach(step
-    "${CMAKE_COMMAND};--install;${BUILD};--prefix;${WORK}/prefix"
-    "${CMAKE_COMMAND};-S;${SOURCE};-B;${WORK}/build;-G;${GENERATOR};-DCMAKE_PREFIX_PATH=${WORK}/prefix;-DCMAKE_BUILD_TYPE=Release"
-    "${CMAKE_COMMAND};--build;${WORK}/build"
-    "${WORK}/build/consumer;${STL}"
-    "${WORK}/prefix/bin/slabwright;--version")
-  execute_process(COMMAND ${step} RESULT_VARIABLE result COMMAND_ECHO STDOUT)
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result COMMAND_ECHO STDOUT)
   if(NOT result EQUAL 0)
-    message(FATAL_ERROR "failed with ${result}: ${step}")
+    message(FATAL_ERROR "failed with ${result}: ${ARGN}")
+  endif()
+endfunction()
+
+# Each component is what its name says.
+foreach(component command library headers)
+  run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/${component} --component ${component})
+endforeach()
+foreach(expected command/bin/slabwright headers/include/slabwright/io/slabwright.h)
+  if(NOT EXISTS ${WORK}/${expected})
+    message(FATAL_ERROR "${expected} was not installed")
   endif()
 endforeach()
+if(EXISTS ${WORK}/command/include OR EXISTS ${WORK}/library/bin OR EXISTS ${WORK}/library/include OR EXISTS ${WORK}/headers/bin)
+  message(FATAL_ERROR "a component installs what is another's")
+endif()
+
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
+# The include path of an embedder gains one folder, and every header names others by their place in it.
+file(GLOB entries RELATIVE ${WORK}/prefix/include ${WORK}/prefix/include/*)
+if(NOT entries STREQUAL "slabwright")
+  message(FATAL_ERROR "include/ holds ${entries}, not slabwright alone")
+endif()
+file(GLOB_RECURSE headers ${WORK}/prefix/include/*.h)
+foreach(header IN LISTS headers)
+  file(STRINGS ${header} includes REGEX "^#include \"")
+  foreach(include IN LISTS includes)
+    if(NOT include MATCHES "^#include \"slabwright/")
+      message(FATAL_ERROR "${header}: ${include}")
+    endif()
+  endforeach()
+endforeach()
+
+run(${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/build -G ${GENERATOR} -DCMAKE_PREFIX_PATH=${WORK}/prefix -DCMAKE_BUILD_TYPE=Release)
+run(${CMAKE_COMMAND} --build ${WORK}/build)
+run(${WORK}/build/consumer ${STL})
+run(${WORK}/build/all_symbols)
+run(${WORK}/prefix/bin/slabwright --version)
