@@ -26,6 +26,7 @@
 #include "io/proof.h"
 #include "io/read/input_file.h"
 #include "io/read/job_toml.h"
+#include "io/read/mesh_format.h"
 #include "io/read/pattern.h"
 #include "io/read/pattern_mesh.h"
 #include "io/read/repair.h"
@@ -71,6 +72,16 @@ auto guarded(Body&& body) -> decltype(body()) {
 }  // namespace
 
 std::string version() { return SLABWRIGHT_VERSION; }
+
+std::string pattern_formats() {
+    std::string built, missing;
+    for (const MeshFormat* format : mesh_formats()) {
+        std::string& list = format->built ? built : missing;
+        list += list.empty() ? "" : ", ";
+        list += format->name;
+    }
+    return missing.empty() ? built : built + "; not built: " + missing;
+}
 
 Job read_job(const std::string& path) {
     return guarded([&] {

@@ -32,6 +32,10 @@ namespace slabwright {
 /// "major.minor.patch"
 [[nodiscard]] SLABWRIGHT_API std::string version();
 
+/// The formats of patterns that this build reads, "STL, 3MF, PLY, OBJ", and those that it was built without,
+/// "; not built: STEP".
+[[nodiscard]] SLABWRIGHT_API std::string pattern_formats();
+
 /// Reads a job file (TOML). @throws Error(usage) with file, line and the nearest known key
 [[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path);
 

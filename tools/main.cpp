@@ -388,10 +388,11 @@ int command(int argc, char** argv) {
 #endif
     Options options;
     CLI::App app(
-        "Plans Rapid Pattern Manufacturing: from the STL of a foundry pattern to layers, tool paths, G-code "
+        "Plans Rapid Pattern Manufacturing: from the model of a foundry pattern to layers, tool paths, "
+        "G-code "
         "and the build sequence.",
         "slabwright");
-    app.set_version_flag("--version", "slabwright " + version());
+    app.set_version_flag("--version", "slabwright " + version() + "\nreads " + pattern_formats());
     app.require_subcommand(1);
 
     CLI::App* plan_command =

@@ -11,11 +11,11 @@
 namespace slabwright {
 
 // One line for each format; each is defined in the .cpp of its name.
-extern const MeshFormat kStlFormat;
+extern const MeshFormat kStlFormat, kPlyFormat, kObjFormat, kThreeMfFormat, kStepFormat;
 
 namespace {
 
-constexpr std::array kFormats{&kStlFormat};
+constexpr std::array kFormats{&kStlFormat, &kThreeMfFormat, &kPlyFormat, &kStepFormat, &kObjFormat};
 
 bool ends_in(std::string_view name, std::string_view ending) {
     return !ending.empty() && name.size() >= ending.size() &&

@@ -69,6 +69,7 @@ struct MeshFormat {
     std::string_view name;                    ///< as people write it: "STL"
     std::string_view family;                  ///< its errors' codes begin with it and a point: "stl"
     std::array<std::string_view, 2> endings;  ///< of file names, lower case, with the point; "": none
+    bool built;                               ///< false: this build recognises its files and refuses them
     /// Whether a file is of this format, by its first bytes (kHead or all) and its length. @param name of the
     /// file, for formats whose text has no beginning of its own
     bool (*recognise)(std::string_view head, std::uint64_t size, std::string_view name);

@@ -14,6 +14,7 @@
 
 #include "io/read/input_file.h"
 #include "io/read/mesh_format.h"
+#include "io/read/placed_corners.h"
 #include "io/read/repair.h"
 #include "io/text/sha256.h"
 #include "kernels/errors.h"
@@ -145,108 +146,6 @@ std::string hash_of(Context& context, const PatternSource& source, std::string_v
     return hash.hex();
 }
 
-// ---- from what a format says to corners in millimetres on z = 0
-
-/// Facets, set on z = 0 in millimetres, and where they lie in the file.
-struct Corners {
-    FacetRecords facets;  ///< of the file's bytes, or of `placed`
-    RawArray<std::array<Vec3f, 3>> placed;
-    std::array<double, 3> min{}, max{};  ///< mm, as in the file
-};
-
-/// Calls body(f, corners) for facets [begin, end) of one run of what a format says.
-struct DecodedRuns {
-    const DecodedMesh& decoded;
-    std::vector<std::size_t> firsts;  ///< the first facet of each piece
-
-    explicit DecodedRuns(const DecodedMesh& mesh) : decoded(mesh) {
-        for (const std::vector<FileFacet>& piece : mesh.pieces) {
-            firsts.push_back(count);
-            count += piece.size();
-        }
-        count += mesh.records.count + mesh.facets.size();
-    }
-    std::size_t count = 0;
-
-    template <class Body>
-    void each(std::size_t begin, std::size_t end, Body&& body) const {
-        if (decoded.records.count > 0) {
-            for (std::size_t f = begin; f < end; ++f) {
-                std::array<FileVertex, 3> corners;
-                for (std::size_t c = 0; c < 3; ++c) {
-                    const Vec3f p = decoded.records.corner(f, c);
-                    corners[c] = {p.x, p.y, p.z};
-                }
-                body(f, corners);
-            }
-        } else if (!decoded.pieces.empty()) {
-            std::size_t piece = static_cast<std::size_t>(
-                std::upper_bound(firsts.begin(), firsts.end(), begin) - firsts.begin() - 1);
-            for (std::size_t f = begin; f < end; ++f) {
-                while (f - firsts[piece] >= decoded.pieces[piece].size()) ++piece;
-                const FileFacet& p = decoded.pieces[piece][f - firsts[piece]];
-                body(f,
-                     std::array<FileVertex, 3>{{{p[0], p[1], p[2]}, {p[3], p[4], p[5]}, {p[6], p[7], p[8]}}});
-            }
-        } else {
-            for (std::size_t f = begin; f < end; ++f) {
-                const Index3& i = decoded.facets[f];
-                body(f, std::array<FileVertex, 3>{
-                            {decoded.vertices[i[0]], decoded.vertices[i[1]], decoded.vertices[i[2]]}});
-            }
-        }
-    }
-};
-
-constexpr std::size_t kPlaceGrain = std::size_t{1} << 15;
-
-/// The one rounding a coordinate suffers: scaled and lowered in double, then to float32 (as FacetRecords do
-/// with binary ones).
-Corners place_corners(Context& context, const DecodedMesh& decoded, double mm_per_unit) {
-    const DecodedRuns runs(decoded);
-    Extent box = Extent::none();
-    if (decoded.box) {
-        box = *decoded.box;
-    } else {
-        box = parallel_reduce(
-            context, runs.count, kPlaceGrain, Extent::none(),
-            [&](std::size_t begin, std::size_t end) {
-                Extent part = Extent::none();
-                runs.each(begin, end, [&](std::size_t, const std::array<FileVertex, 3>& corners) {
-                    for (const FileVertex& p : corners) part.add(p);
-                });
-                return part;
-            },
-            [](Extent a, const Extent& b) {
-                a.merge(b);
-                return a;
-            });
-    }
-    Corners corners;
-    for (std::size_t k = 0; k < 3; ++k) {
-        corners.min[k] = box.min[k] * mm_per_unit;
-        corners.max[k] = box.max[k] * mm_per_unit;
-    }
-    const double lowest = corners.min[2];
-    if (decoded.records.count > 0) {
-        corners.facets = decoded.records;
-        corners.facets.mm_per_unit = mm_per_unit;
-        corners.facets.lowest_mm = lowest;
-        return corners;
-    }
-    corners.placed = RawArray<std::array<Vec3f, 3>>(runs.count);
-    parallel_for(context, runs.count, kPlaceGrain, [&](std::size_t begin, std::size_t end) {
-        runs.each(begin, end, [&](std::size_t f, const std::array<FileVertex, 3>& from) {
-            for (std::size_t c = 0; c < 3; ++c)
-                corners.placed[f][c] = {static_cast<float>(from[c][0] * mm_per_unit),
-                                        static_cast<float>(from[c][1] * mm_per_unit),
-                                        static_cast<float>(from[c][2] * mm_per_unit - lowest)};
-        });
-    });
-    corners.facets = {reinterpret_cast<const char*>(corners.placed.data()), runs.count};
-    return corners;
-}
-
 // ---- diagnostics
 
 std::array<double, 3> facet_centre(const Mesh& mesh, std::uint32_t facet) {
@@ -372,19 +271,28 @@ enum class FacetOrder : std::uint8_t {
 
 constexpr std::size_t kFewFacets = 50'000;  // fewer lie in the caches in any order
 
-/// Decodes and welds a source; sets the input's count and box. @param order set to that of the mesh
+/// Decodes and welds a source; sets the input's count and box. @param question set where the unit is the
+/// job's and not the file's. @param order set to that of the mesh
 Mesh load_mesh(Context& context, const SourceData& data, const ReadingOptions& options,
                const std::string& place, InputInfo& input, std::vector<Diagnostic>& diagnostics,
-               std::vector<std::uint32_t>* odd, FacetOrder& order) {
+               bool& question, std::vector<std::uint32_t>* odd, FacetOrder& order) {
     // 30 bytes a facet for the mesh; a text has fewer facets than its length could hold in binary.
     const MemoryCharge charge(context, data.size() / kRecordBytes * 30, "reading " + place);
-    const Corners corners = [&] {
-        DecodedMesh decoded = data.decode(context, {unit_of(options.units)});
+    const PlacedCorners corners = [&] {
+        DecodedMesh decoded = data.decode(context, {unit_of(options.units), options.deviation_mm});
         const std::size_t numbers = decoded.vertices.size() * sizeof(FileVertex) +
                                     decoded.facets.size() * sizeof(Index3) +
                                     (decoded.records.count > 0 ? 0 : data.size() / 3);
         const MemoryCharge spelt(context, numbers, "the numbers of " + place);
         diagnostics = std::move(decoded.diagnostics);
+        if (decoded.mm_per_unit && *decoded.mm_per_unit != unit_of(options.units))
+            diagnostics.push_back(
+                {Severity::note, "units.stated",
+                 fmt::format("the file states its unit, {:g} mm: what the job says of units "
+                             "was not asked",
+                             *decoded.mm_per_unit),
+                 std::nullopt});
+        if (!decoded.mm_per_unit) question = true;
         return place_corners(context, decoded, decoded.mm_per_unit.value_or(unit_of(options.units)));
     }();
     const MemoryCharge placed(context, corners.placed.size() * sizeof(corners.placed[0]),
@@ -419,15 +327,18 @@ bool names_a_facet(const MeshReport& r) {
 
 }  // namespace
 
-ReadingOptions reading_options(const Job& job) { return {job.units, job.tolerances.weld, job.input.repair}; }
+ReadingOptions reading_options(const Job& job) {
+    return {job.units, job.tolerances.weld, job.input.repair, 0.01};
+}
 
 Mesh read_mesh(Context& context, const PatternSource& source, LengthUnit units) {
     context.begin_phase("read", 0.0, 0.05, 2);
     const SourceData data(context, source);
     InputInfo ignored;
     std::vector<Diagnostic> unheard;
+    bool question = false;
     FacetOrder order = FacetOrder::near;
-    Mesh mesh = load_mesh(context, data, {units}, source.name(), ignored, unheard, nullptr, order);
+    Mesh mesh = load_mesh(context, data, {units}, source.name(), ignored, unheard, question, nullptr, order);
     context.advance();
     return mesh;
 }
@@ -500,19 +411,20 @@ PatternMesh read_pattern_mesh(Context& context, const PatternSource& source, con
     pattern.family = data.family();
     pattern.input.file = std::filesystem::path(place).filename().string();
     std::vector<std::uint32_t> odd;
+    bool question = false;
     FacetOrder order = FacetOrder::near;
     // The digest is one long chain, so it takes one thread while the others decode and weld.
     parallel_each(context, 2, [&](std::size_t task) {
         if (task == 0) {
             pattern.input.sha256 = hash_of(context, source, data.bytes());
         } else {
-            pattern.mesh =
-                load_mesh(context, data, options, place, pattern.input, pattern.diagnostics, &odd, order);
+            pattern.mesh = load_mesh(context, data, options, place, pattern.input, pattern.diagnostics,
+                                     question, &odd, order);
             context.advance();
         }
     });
     data.let_go();
-    question_units(pattern.input, options.units, pattern.diagnostics);
+    if (question) question_units(pattern.input, options.units, pattern.diagnostics);
     context.advance();
     std::optional<Diagnostic> note = weld_and_report(context, pattern, options, place, odd);
     if (order == FacetOrder::near && names_a_facet(pattern.report)) {
@@ -521,7 +433,8 @@ PatternMesh read_pattern_mesh(Context& context, const PatternSource& source, con
         pattern.mesh = {};
         data.load(context);
         std::vector<Diagnostic> told_already;
-        pattern.mesh = load_mesh(context, data, options, place, pattern.input, told_already, &odd, order);
+        pattern.mesh =
+            load_mesh(context, data, options, place, pattern.input, told_already, question, &odd, order);
         data.let_go();
         note = weld_and_report(context, pattern, options, place, odd);
     }

@@ -16,6 +16,7 @@ struct ReadingOptions {
     LengthUnit units = LengthUnit::mm;  ///< of files that do not state theirs
     double weld_mm = 0;                 ///< 0: bit-exact only
     Repair repair = Repair::none;       ///< of a mesh that is no solid, once it is welded
+    double deviation_mm = 0.01;         ///< of facets from the surfaces of a format that has such (STEP)
     friend bool operator==(const ReadingOptions&, const ReadingOptions&) = default;
 };
 
@@ -40,10 +41,10 @@ struct PatternMesh {
 ///         of STL: stl.missing, directory, unreadable, changed, empty, not_stl, no_facets, facet_count,
 ///         truncated, unparsable, non_finite, absurd, flat (of no height)
 /// Facets without area that hang together with no body bound nothing and are left out of box and base
-/// (mesh.stray). Diagnostics: units.suspicious, mesh.welded, mesh.stray, and mesh.open, open_base,
-/// misoriented, inverted, non_manifold, duplicate, degenerate, each with its count and the centre of its
-/// first facet. Where a repair was asked for, they are of what it left, and what it did is told as
-/// repair_mesh() does. @throws as that
+/// (mesh.stray). Diagnostics: units.suspicious, units.stated (the file's own unit is not the job's),
+/// mesh.welded, mesh.stray, and mesh.open, open_base, misoriented, inverted, non_manifold, duplicate,
+/// degenerate, each with its count and the centre of its first facet. Where a repair was asked for, they are
+/// of what it left, and what it did is told as repair_mesh() does. @throws as that
 [[nodiscard]] PatternMesh read_pattern_mesh(Context& context, const PatternSource& source,
                                             const ReadingOptions& options = {});
 

@@ -316,6 +316,6 @@ bool recognise_stl(std::string_view head, std::uint64_t size, std::string_view) 
 }  // namespace
 
 extern const MeshFormat kStlFormat;
-const MeshFormat kStlFormat{"STL", "stl", {".stl", ""}, recognise_stl, require_format, decode_stl};
+const MeshFormat kStlFormat{"STL", "stl", {".stl", ""}, true, recognise_stl, require_format, decode_stl};
 
 }  // namespace slabwright

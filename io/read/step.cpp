@@ -1,0 +1,364 @@
+// STEP: the faces of its shapes, cut into facets by OCCT within a stated deviation. The file states its unit.
+//
+// OCCT 7.6 follows null pointers where a file is damaged. So it reads in a process of its own (a fork, which
+// runs nothing but OCCT and ends without running anything of ours), bounded in memory and time: what happens
+// to that one is an error here.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "io/read/mesh_format.h"
+#include "kernels/errors.h"
+#include "kernels/parallel/context.h"
+
+#ifdef SLABWRIGHT_OCCT
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <BRepMesh_IncrementalMesh.hxx>
+#include <BRep_Tool.hxx>
+#include <IFSelect_ReturnStatus.hxx>
+#include <Interface_Static.hxx>
+#include <Message.hxx>
+#include <Message_Messenger.hxx>
+#include <NCollection_DataMap.hxx>
+#include <Poly_PolygonOnTriangulation.hxx>
+#include <Poly_Triangulation.hxx>
+#include <STEPControl_Reader.hxx>
+#include <Standard_Failure.hxx>
+#include <Standard_Version.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopTools_ShapeMapHasher.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Face.hxx>
+#include <TopoDS_Shape.hxx>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <mutex>
+#include <sstream>
+#endif
+
+namespace slabwright {
+
+namespace {
+
+constexpr std::string_view kFamily = "step";
+constexpr std::string_view kBeginning = "ISO-10303-21";
+
+bool recognise(std::string_view head, std::uint64_t, std::string_view) {
+    const std::size_t begin = head.find_first_not_of(" \t\r\n");
+    return begin != std::string_view::npos && head.substr(begin, kBeginning.size()) == kBeginning;
+}
+
+void require(std::string_view head, std::uint64_t size, const std::string& place) {
+#ifndef SLABWRIGHT_OCCT
+    refuse_mesh(kFamily, "not_built", "this build of slabwright reads no STEP", place,
+                "install libocct-data-exchange-dev and build again, or export it as STL");
+#endif
+    if (!recognise(head, size, {}))
+        refuse_mesh(kFamily, "not_step", "does not begin with 'ISO-10303-21'", place + ", line 1",
+                    "name a STEP file");
+}
+
+#ifdef SLABWRIGHT_OCCT
+
+/// OCCT keeps its readers' settings, and the units of what it reads, in one place for all: one at a time.
+std::mutex& turn() {
+    static std::mutex mutex;
+    return mutex;
+}
+
+/// The facets of faces, whose nodes on an edge are those of the faces beside it.
+class FacetCollector {
+public:
+    FacetCollector(Context& context, DecodedMesh& decoded, const std::string& place)
+        : context_(context), decoded_(decoded), place_(place) {}
+
+    void add(const TopoDS_Face& face) {
+        context_.throw_if_cancelled();
+        TopLoc_Location location;
+        const Handle(Poly_Triangulation) triangles = BRep_Tool::Triangulation(face, location);
+        if (triangles.IsNull() || triangles->NbTriangles() == 0) {
+            ++missing_;
+            return;
+        }
+        std::vector<std::uint32_t> of_node(static_cast<std::size_t>(triangles->NbNodes()) + 1, kNone);
+        for (TopExp_Explorer edges(face, TopAbs_EDGE); edges.More(); edges.Next())
+            join(TopoDS::Edge(edges.Current()), triangles, location, of_node);
+        for (int n = 1; n <= triangles->NbNodes(); ++n)
+            if (std::uint32_t& v = of_node[static_cast<std::size_t>(n)]; v == kNone)
+                v = vertex(triangles->Node(n).Transformed(location.Transformation()));
+        const bool turned = (face.Orientation() == TopAbs_REVERSED) !=
+                            (location.Transformation().VectorialPart().Determinant() < 0);
+        for (int t = 1; t <= triangles->NbTriangles(); ++t) {
+            int a = 0, b = 0, c = 0;
+            triangles->Triangle(t).Get(a, b, c);
+            const auto at = [&](int n) { return of_node[static_cast<std::size_t>(n)]; };
+            const Index3 facet{at(a), at(turned ? c : b), at(turned ? b : c)};
+            if (facet[0] != facet[1] && facet[1] != facet[2] && facet[2] != facet[0])
+                decoded_.facets.push_back(facet);
+        }
+    }
+    [[nodiscard]] std::size_t missing() const { return missing_; }
+
+private:
+    static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+    std::uint32_t vertex(const gp_Pnt& p) {
+        const FileVertex at{p.X(), p.Y(), p.Z()};
+        for (const double value : at)
+            if (is_absurd(value, 1)) refuse_coordinate(kFamily, value, 1, place_);
+        decoded_.vertices.push_back(at);
+        return static_cast<std::uint32_t>(decoded_.vertices.size() - 1);
+    }
+    /// Faces beside an edge cut it at the same parameters: their nodes there become one.
+    void join(const TopoDS_Edge& edge, const Handle(Poly_Triangulation) & triangles,
+              const TopLoc_Location& location, std::vector<std::uint32_t>& of_node) {
+        const Handle(Poly_PolygonOnTriangulation) polygon =
+            BRep_Tool::PolygonOnTriangulation(edge, triangles, location);
+        if (polygon.IsNull()) return;
+        const int count = polygon->NbNodes();
+        std::vector<std::uint32_t>* shared = edges_.ChangeSeek(edge);
+        if (shared == nullptr) shared = edges_.Bound(edge, {});
+        const bool first = shared->empty();
+        if (!first && shared->size() != static_cast<std::size_t>(count)) return;
+        for (int i = 1; i <= count; ++i) {
+            std::uint32_t& here = of_node[static_cast<std::size_t>(polygon->Nodes()(i))];
+            if (first) {
+                if (here == kNone)
+                    here =
+                        vertex(triangles->Node(polygon->Nodes()(i)).Transformed(location.Transformation()));
+                shared->push_back(here);
+            } else if (here == kNone) {
+                here = (*shared)[static_cast<std::size_t>(i - 1)];
+            } else if (here != (*shared)[static_cast<std::size_t>(i - 1)]) {
+                // A corner, met by way of two edges: one place, which rounding keeps one.
+                decoded_.vertices[here] = decoded_.vertices[(*shared)[static_cast<std::size_t>(i - 1)]];
+            }
+        }
+    }
+
+    Context& context_;
+    DecodedMesh& decoded_;
+    const std::string& place_;
+    NCollection_DataMap<TopoDS_Shape, std::vector<std::uint32_t>, TopTools_ShapeMapHasher> edges_;
+    std::size_t missing_ = 0;
+};
+
+DecodedMesh read(Context& context, std::string_view bytes, double deviation_mm, const std::string& place) {
+    Message::DefaultMessenger()->ChangePrinters().Clear();  // a library writes nothing to the terminal
+    DecodedMesh decoded;
+    decoded.mm_per_unit = 1;  // OCCT scales to millimetres, whatever unit the file states
+    try {
+        Interface_Static::SetCVal("xstep.cascade.unit", "MM");
+        std::istringstream text{std::string(bytes)};
+        STEPControl_Reader reader;
+        if (reader.ReadStream(place.c_str(), text) != IFSelect_RetDone)
+            refuse_mesh(kFamily, "unreadable", "OCCT cannot read it as STEP", place, kExportAgain);
+        context.throw_if_cancelled();
+        reader.TransferRoots();
+        const TopoDS_Shape shape = reader.OneShape();
+        if (shape.IsNull())
+            refuse_mesh(kFamily, "no_facets", "it holds no shape", place,
+                        "export the solid, not its drawing");
+        context.throw_if_cancelled();
+        constexpr double angle_rad = 0.5;  // between facets of a curve, which else is bound by the deviation
+        const BRepMesh_IncrementalMesh meshed(shape, deviation_mm, false, angle_rad, false);
+        FacetCollector collector(context, decoded, place);
+        for (TopExp_Explorer faces(shape, TopAbs_FACE); faces.More(); faces.Next())
+            collector.add(TopoDS::Face(faces.Current()));
+        if (collector.missing() > 0)
+            decoded.diagnostics.push_back(
+                {Severity::warning, "step.face",
+                 fmt::format("{} faces could not be cut into facets: the mesh may be open",
+                             collector.missing()),
+                 std::nullopt});
+    } catch (const Standard_Failure& failure) {
+        refuse_mesh(kFamily, "unreadable", fmt::format("OCCT cannot read it: {}", failure.GetMessageString()),
+                    place, kExportAgain);
+    }
+    if (decoded.facets.empty())
+        refuse_mesh(kFamily, "no_facets", "its shapes have no faces", place,
+                    "export the solid, not its wires");
+    return decoded;
+}
+
+/// What the process that reads hands over, before the arrays or the texts of an error.
+struct Outcome {
+    std::uint64_t vertices = 0, facets = 0, warnings = 0;
+    std::array<std::uint32_t, 4> texts{};  ///< lengths of an error's code, message, place and remedy; 0: none
+};
+
+void write_all(int file, const void* data, std::size_t bytes) {
+    const char* at = static_cast<const char*>(data);
+    while (bytes > 0) {
+        const ssize_t done = ::write(file, at, bytes);
+        if (done < 0 && errno == EINTR) continue;
+        if (done <= 0) ::_exit(1);
+        at += done;
+        bytes -= static_cast<std::size_t>(done);
+    }
+}
+
+/// The reading process: never returns.
+[[noreturn]] void read_and_tell(int file, Context& context, std::string_view bytes, double deviation_mm,
+                                const std::string& place, std::uint64_t memory_bytes) {
+    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL, SIGPIPE, SIGINT, SIGTERM, SIGHUP})
+        ::signal(signal, SIG_DFL);
+    const rlimit no_core{0, 0}, data{memory_bytes, memory_bytes};
+    (void)::setrlimit(RLIMIT_CORE, &no_core);
+    (void)::setrlimit(RLIMIT_DATA, &data);
+    Outcome outcome;
+    try {
+        const DecodedMesh decoded = read(context, bytes, deviation_mm, place);
+        outcome.vertices = decoded.vertices.size();
+        outcome.facets = decoded.facets.size();
+        outcome.warnings = decoded.diagnostics.size();
+        write_all(file, &outcome, sizeof outcome);
+        write_all(file, decoded.vertices.data(), decoded.vertices.size() * sizeof(FileVertex));
+        write_all(file, decoded.facets.data(), decoded.facets.size() * sizeof(Index3));
+    } catch (const Error& error) {
+        const std::array<const std::string*, 4> texts{&error.code(), &error.message(), &error.place(),
+                                                      &error.remedy()};
+        for (std::size_t i = 0; i < texts.size(); ++i)
+            outcome.texts[i] = static_cast<std::uint32_t>(texts[i]->size());
+        write_all(file, &outcome, sizeof outcome);
+        for (const std::string* text : texts) write_all(file, text->data(), text->size());
+    } catch (...) {
+        ::_exit(1);
+    }
+    ::_exit(0);
+}
+
+/// The reading process, seen from outside: what it writes, until it ends or is no longer wanted.
+class ReadingProcess {
+public:
+    ReadingProcess(Context& context, std::string_view bytes, double deviation_mm, const std::string& place)
+        : context_(context), place_(place) {
+        std::array<int, 2> ends{};
+        if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail("no pipe can be made");
+        const std::uint64_t memory =
+            context.memory_limit() - std::min(context.memory_limit(), context.memory_charged());
+        process_ = ::fork();
+        if (process_ == 0) {
+            ::close(ends[0]);
+            read_and_tell(ends[1], context, bytes, deviation_mm, place, memory + kOwnBytes);
+        }
+        ::close(ends[1]);
+        file_ = ends[0];
+        if (process_ < 0) fail("no process can be made");
+        // OCCT reads some megabytes a second; a hundredth of that is a hang.
+        constexpr std::uint64_t slowest_bytes_s = 20'000, least_s = 30;
+        deadline_ =
+            std::chrono::steady_clock::now() + std::chrono::seconds(least_s + bytes.size() / slowest_bytes_s);
+    }
+    ~ReadingProcess() {
+        if (file_ >= 0) ::close(file_);
+        if (process_ <= 0) return;
+        ::kill(process_, SIGKILL);
+        while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {}
+    }
+    ReadingProcess(const ReadingProcess&) = delete;
+    ReadingProcess& operator=(const ReadingProcess&) = delete;
+
+    /// @throws Error(input, "step.damaged") where it ended before it wrote so much, Error(cancelled)
+    void take(void* data, std::size_t bytes) {
+        char* at = static_cast<char*>(data);
+        while (bytes > 0) {
+            context_.throw_if_cancelled();
+            pollfd waiting{file_, POLLIN, 0};
+            constexpr int glance_ms = 50;
+            const int ready = ::poll(&waiting, 1, glance_ms);
+            if (ready <= 0) {
+                if (std::chrono::steady_clock::now() > deadline_) fail("OCCT did not come to an end with it");
+                continue;
+            }
+            const ssize_t done = ::read(file_, at, bytes);
+            if (done < 0 && errno == EINTR) continue;
+            if (done <= 0) fail("OCCT broke down over it, or ran out of memory");
+            at += done;
+            bytes -= static_cast<std::size_t>(done);
+        }
+    }
+
+private:
+    static constexpr std::uint64_t kOwnBytes = std::uint64_t{1} << 28;  ///< data of the process as it begins
+    [[noreturn]] void fail(const std::string& what) const {
+        refuse_mesh(kFamily, "damaged", what, place_, "export the file again, or as STL");
+    }
+    Context& context_;
+    const std::string& place_;
+    pid_t process_ = -1;
+    int file_ = -1;
+    std::chrono::steady_clock::time_point deadline_{};
+};
+
+DecodedMesh read_apart(Context& context, std::string_view bytes, double deviation_mm,
+                       const std::string& place) {
+    const std::lock_guard lock(turn());
+    ReadingProcess process(context, bytes, deviation_mm, place);
+    Outcome outcome;
+    process.take(&outcome, sizeof outcome);
+    if (outcome.texts[0] > 0) {
+        std::array<std::string, 4> texts;
+        for (std::size_t i = 0; i < texts.size(); ++i) {
+            texts[i].resize(outcome.texts[i]);
+            process.take(texts[i].data(), texts[i].size());
+        }
+        throw Error(ErrorKind::input, texts[0], texts[1], texts[2], texts[3]);
+    }
+    DecodedMesh decoded;
+    decoded.mm_per_unit = 1;
+    decoded.vertices.resize(outcome.vertices);
+    decoded.facets.resize(outcome.facets);
+    process.take(decoded.vertices.data(), outcome.vertices * sizeof(FileVertex));
+    process.take(decoded.facets.data(), outcome.facets * sizeof(Index3));
+    if (outcome.warnings > 0)
+        decoded.diagnostics.push_back({Severity::warning, "step.face",
+                                       "faces could not be cut into facets: the mesh may be open",
+                                       std::nullopt});
+    decoded.diagnostics.push_back(
+        {Severity::note, "step.tessellated",
+         fmt::format("its surfaces were cut into {} facets, which lie within {:g} mm "
+                     "of them",
+                     decoded.facets.size(), deviation_mm),
+         std::nullopt});
+    return decoded;
+}
+
+#endif
+
+DecodedMesh decode(Context& context, std::string_view bytes, const DecodeOptions& options,
+                   const std::string& place) {
+#ifdef SLABWRIGHT_OCCT
+    // Entities take some ten times their text.
+    const MemoryCharge charge(context, bytes.size() * 12, "the shapes of " + place);
+    return read_apart(context, bytes, options.deviation_mm, place);
+#else
+    (void)context;
+    (void)bytes;
+    (void)options;
+    require({}, 0, place);
+    return {};
+#endif
+}
+
+#ifdef SLABWRIGHT_OCCT
+constexpr bool kBuilt = true;
+#else
+constexpr bool kBuilt = false;
+#endif
+
+}  // namespace
+
+extern const MeshFormat kStepFormat;
+const MeshFormat kStepFormat{"STEP", kFamily, {".step", ".stp"}, kBuilt, recognise, require, decode};
+
+}  // namespace slabwright
