@@ -48,7 +48,7 @@ void write_ribs(const fs::path& path, const std::vector<float>& gaps) {
 Verification planned_and_verified(const std::string& stl, const Job& job, const fs::path& out) {
     Context context({.threads = 1});
     write(context, plan(context, stl, job), out.string());
-    return verify_folder(context, out.string(), {.stl = stl, .write = false});
+    return verify_folder(context, out.string(), {.source = stl, .write = false});
 }
 
 /// The tool with all that a job says of one.
