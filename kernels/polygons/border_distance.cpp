@@ -8,12 +8,14 @@ namespace slabwright {
 
 namespace {
 
-double to_edge(Point2 p, Point2 a, Point2 b) {
+/// The square of the distance from p to an edge, in units.
+double to_edge2(Point2 p, Point2 a, Point2 b) {
     const double dx = double(b.x) - a.x, dy = double(b.y) - a.y, px = double(p.x) - a.x,
                  py = double(p.y) - a.y;
     const double length2 = dx * dx + dy * dy;
     const double t = length2 > 0 ? std::clamp((px * dx + py * dy) / length2, 0.0, 1.0) : 0;
-    return std::hypot(px - t * dx, py - t * dy);
+    const double x = px - t * dx, y = py - t * dy;
+    return x * x + y * y;
 }
 
 }  // namespace
@@ -48,7 +50,8 @@ BorderDistance::BorderDistance(const Loops& loops) : loops_(loops) {
                 if (c1 > c0 && r1 > r0) {
                     const Point2 middle{static_cast<std::int32_t>(x0_ + c * cell_ + cell_ / 2),
                                         static_cast<std::int32_t>(y0_ + r * cell_ + cell_ / 2)};
-                    if (to_edge(middle, a, b) > 0.8 * double(cell_) + 2) continue;
+                    const double far = 0.8 * double(cell_) + 2;
+                    if (to_edge2(middle, a, b) > far * far) continue;
                 }
                 use(static_cast<std::size_t>(r * columns_ + c));
             }
@@ -65,7 +68,7 @@ double BorderDistance::nearest_in(std::int64_t column, std::int64_t row, Point2 
     double nearest = std::numeric_limits<double>::infinity();
     const auto cell = static_cast<std::size_t>(row * columns_ + column);
     for (std::uint32_t i = starts_[cell]; i < starts_[cell + 1]; ++i)
-        nearest = std::min(nearest, to_edge(p, loops_.points[edges_[i]], loops_.points[ends_[edges_[i]]]));
+        nearest = std::min(nearest, to_edge2(p, loops_.points[edges_[i]], loops_.points[ends_[edges_[i]]]));
     return nearest;
 }
 
@@ -81,7 +84,8 @@ double BorderDistance::operator()(Point2 p) const {
     const std::int64_t last = std::max(
         {std::abs(column), std::abs(column - (columns_ - 1)), std::abs(row), std::abs(row - (rows_ - 1))});
     for (std::int64_t ring = first; ring <= last; ++ring) {
-        if (nearest <= double(ring - 1) * double(cell_)) break;
+        const double seen = double(std::max<std::int64_t>(ring - 1, 0)) * double(cell_);
+        if (nearest <= seen * seen) break;
         const std::int64_t r0 = std::max<std::int64_t>(row - ring, 0), r1 = std::min(row + ring, rows_ - 1);
         for (std::int64_t r = r0; r <= r1; ++r) {
             const bool whole = r == row - ring || r == row + ring;
@@ -95,7 +99,7 @@ double BorderDistance::operator()(Point2 p) const {
             }
         }
     }
-    return nearest / kUnitsPerMm;
+    return std::sqrt(nearest) / kUnitsPerMm;
 }
 
 double farthest_from_border(const Loops& from, const BorderDistance& to, double step_mm) {

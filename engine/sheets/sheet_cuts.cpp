@@ -1,0 +1,582 @@
+#include "engine/sheets/sheet_cuts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "engine/sheets/majorant.h"
+#include "kernels/errors.h"
+#include "kernels/parallel/parallel.h"
+#include "kernels/polygons/border_distance.h"
+#include "kernels/slicing/slicing.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kArcTolerance = 0.005;  ///< mm, of round joins of upright cuts
+constexpr double kThinned = 0.002;       ///< mm by which outlines are thinned under tilted cuts
+constexpr double kLongestMitre = 6;
+
+struct Vec2 {
+    double x = 0, y = 0;
+};
+
+Vec2 to_vec(Point2 p) { return {p.x / kUnitsPerMm, p.y / kUnitsPerMm}; }
+Point2 to_point(Vec2 v) { return {to_units(v.x), to_units(v.y)}; }
+double length(Vec2 v) { return std::hypot(v.x, v.y); }
+
+/// Leaves out points nearer than kThinned to the chord of those around them (Douglas, Peucker), of a closed
+/// loop from its first and its farthest point.
+void thin_between(std::span<const Point2> loop, std::size_t first, std::size_t last,
+                  std::vector<bool>& kept) {
+    std::vector<std::pair<std::size_t, std::size_t>> open{{first, last}};
+    while (!open.empty()) {
+        const auto [a, b] = open.back();
+        open.pop_back();
+        const Vec2 p = to_vec(loop[a]), q = to_vec(loop[b % loop.size()]);
+        const double l = std::hypot(q.x - p.x, q.y - p.y);
+        double most = kThinned;
+        std::size_t at = 0;
+        for (std::size_t i = a + 1; i < b; ++i) {
+            const Vec2 v = to_vec(loop[i]);
+            const double away = l > 0 ? std::abs((v.x - p.x) * (q.y - p.y) - (v.y - p.y) * (q.x - p.x)) / l
+                                      : std::hypot(v.x - p.x, v.y - p.y);
+            if (away > most) most = away, at = i;
+        }
+        if (at == 0) continue;
+        kept[at] = true;
+        open.push_back({a, at});
+        open.push_back({at, b});
+    }
+}
+
+std::vector<Vec2> thinned(std::span<const Point2> loop) {
+    std::vector<bool> kept(loop.size(), false);
+    std::size_t far = 0;
+    double most = -1;
+    for (std::size_t i = 1; i < loop.size(); ++i) {
+        const double d = std::hypot(double(loop[i].x) - loop[0].x, double(loop[i].y) - loop[0].y);
+        if (d > most) most = d, far = i;
+    }
+    kept[0] = kept[far] = true;
+    thin_between(loop, 0, far, kept);
+    thin_between(loop, far, loop.size(), kept);
+    std::vector<Vec2> points;
+    for (std::size_t i = 0; i < loop.size(); ++i)
+        if (kept[i]) points.push_back(to_vec(loop[i]));
+    return points;
+}
+
+/// A place of the outline from which the part is looked for along `out`, inwards.
+struct Sample {
+    Vec2 at, out;               ///< mm; out is of length 1
+    double mitre = 1;           ///< along `out`, what is 1 square to the outline
+    double along = 0;           ///< mm of the outline before it
+    double turn = 0;            ///< by which the outline turns there, positive where it is convex
+    std::vector<double> reach;  ///< r of the part at each section: 0 or less
+};
+
+std::vector<Sample> samples_of(const std::vector<Vec2>& points, double step) {
+    std::vector<Sample> samples;
+    const std::size_t n = points.size();
+    double along = 0;
+    const auto direction = [&](std::size_t i) {
+        const Vec2 a = points[i % n], b = points[(i + 1) % n];
+        const double l = std::hypot(b.x - a.x, b.y - a.y);
+        return Vec2{(b.x - a.x) / l, (b.y - a.y) / l};
+    };
+    for (std::size_t i = 0; i < n; ++i) {
+        const Vec2 before = direction(i + n - 1), after = direction(i);
+        const double turn =
+            std::atan2(before.x * after.y - before.y * after.x, before.x * after.x + before.y * after.y);
+        Vec2 out{before.y + after.y, -before.x - after.x};
+        const double l = length(out);
+        if (l > 1e-9) out = {out.x / l, out.y / l};
+        else out = {after.y, -after.x};
+        const double mitre = std::min(kLongestMitre, 1 / std::max(1e-9, std::cos(turn / 2)));
+        samples.push_back({points[i], out, mitre, along, turn, {}});
+        const Vec2 a = points[i], b = points[(i + 1) % n];
+        const double edge = std::hypot(b.x - a.x, b.y - a.y);
+        const int pieces = std::max(1, static_cast<int>(std::ceil(edge / step)));
+        for (int k = 1; k < pieces; ++k) {
+            const double t = double(k) / pieces;
+            samples.push_back({{a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)},
+                               {after.y, -after.x},
+                               1,
+                               along + t * edge,
+                               0,
+                               {}});
+        }
+        along += edge;
+    }
+    return samples;
+}
+
+/// How far inwards of a sample a section begins: as far as circles about the ray that hold nothing of its
+/// border lead. Never past it. −`most` where it does not begin before that.
+double reach_of(const Sample& sample, const Loops& section, const BorderDistance& border, double most) {
+    const Point2 start = to_point(sample.at);
+    constexpr double touching = 3 / kUnitsPerMm;
+    if (border(start) <= touching || winding(section, start) > 0) return 0;
+    double travelled = 0;
+    for (int i = 0; i < 200 && travelled < most; ++i) {
+        const double free = border(
+            to_point({sample.at.x - travelled * sample.out.x, sample.at.y - travelled * sample.out.y}));
+        if (free < touching) return -travelled;
+        travelled += free - 1 / kUnitsPerMm;
+    }
+    return -std::min(travelled, most);
+}
+
+/// Places beside a convex corner whose rays pass the part are left out: the corner's own ray finds it.
+void leave_out_beside_corners(std::vector<Sample>& samples, double whole) {
+    std::vector<std::pair<double, double>> ranges;
+    for (const Sample& s : samples) {
+        if (s.turn <= 1e-6) continue;
+        const double deepest = -*std::min_element(s.reach.begin(), s.reach.end());
+        const double wide = deepest * std::sin(std::min(s.turn / 2, std::numbers::pi / 2));
+        if (wide > 1e-4) ranges.push_back({s.along - wide, s.along + wide});
+    }
+    std::erase_if(samples, [&](const Sample& s) {
+        if (s.turn != 0) return false;
+        return std::any_of(ranges.begin(), ranges.end(), [&](const auto& range) {
+            for (const double shift : {-whole, 0.0, whole})
+                if (s.along + shift > range.first && s.along + shift < range.second) return true;
+            return false;
+        });
+    });
+}
+
+/// The cuts of one loop, as many passes as `passes`, and how much they leave over the majorants.
+struct LoopPasses {
+    std::vector<std::vector<StraightCut>> cuts;  ///< of every pass, of every sample
+    double left = 0;
+};
+
+LoopPasses passes_of(const std::vector<Sample>& samples, const std::vector<double>& heights, int passes,
+                     double most_slope) {
+    LoopPasses result;
+    result.cuts.assign(static_cast<std::size_t>(passes), {});
+    const double z0 = heights.front(), height = heights.back() - z0;
+    for (const Sample& s : samples) {
+        std::vector<ProfilePoint> profile;
+        for (std::size_t k = 0; k < heights.size(); ++k) profile.push_back({heights[k], s.reach[k]});
+        const std::vector<ProfilePoint> majorant = concave_majorant(profile);
+        std::vector<StraightCut> own;
+        for (int j = 0; j < passes; ++j) {
+            own.push_back(supporting_cut(majorant, z0 + (j + 0.5) / passes * height, most_slope * s.mitre));
+            result.cuts[static_cast<std::size_t>(j)].push_back(own.back());
+        }
+        for (const double z : heights) {
+            double least = 1e300;
+            for (const StraightCut& cut : own)
+                least = std::min(least, cut.bottom + (cut.top - cut.bottom) * (z - z0) / height);
+            result.left = std::max(result.left, (least - majorant_at(majorant, z)) / s.mitre);
+        }
+    }
+    return result;
+}
+
+AxisLoop axis_loop(const std::vector<Sample>& samples, const std::vector<StraightCut>& cuts, double height,
+                   double kerf) {
+    AxisLoop loop;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const Sample& s = samples[i];
+        const double lean = (cuts[i].top - cuts[i].bottom) / s.mitre / height;
+        const double aside = kerf / 2 * std::sqrt(1 + lean * lean) * s.mitre;
+        const auto at = [&](double r) {
+            return to_point({s.at.x + (r + aside) * s.out.x, s.at.y + (r + aside) * s.out.y});
+        };
+        loop.bottom.push_back(at(cuts[i].bottom));
+        loop.top.push_back(at(cuts[i].top));
+    }
+    return loop;
+}
+
+double tilt_of(const AxisLoop& loop, double height) {
+    double most = 0;
+    for (std::size_t i = 0; i < loop.top.size(); ++i)
+        most = std::max(most, std::hypot(double(loop.top[i].x) - loop.bottom[i].x,
+                                         double(loop.top[i].y) - loop.bottom[i].y) /
+                                  kUnitsPerMm / height);
+    return std::atan(most);
+}
+
+SheetCuts upright_cuts(const Loops& outline, const SheetCutRules& rules) {
+    SheetCuts cuts;
+    const Loops axis = rules.kerf > 0 ? offset(outline, rules.kerf / 2, kArcTolerance) : outline;
+    for (const bool holes : {true, false})
+        for (std::size_t i = 0; i < axis.size(); ++i) {
+            if ((signed_area(axis.loop(i)) < 0) != holes) continue;
+            const auto loop = axis.loop(i);
+            AxisLoop way;
+            way.bottom.assign(loop.begin(), loop.end());
+            way.top = way.bottom;
+            way.loop = static_cast<int>(i);
+            way.is_hole = holes;
+            cuts.loops.push_back(std::move(way));
+        }
+    return cuts;
+}
+
+/// One sheet's surroundings: its outline and the sections at the heights that cuts are made to fit.
+struct Fitted {
+    const Loops& outline;
+    std::vector<double> heights;
+    std::vector<const Loops*> sections;
+};
+
+/// One closed way under way: the places it is made of and its cut at each.
+struct Way {
+    const std::vector<Sample>& samples;
+    std::vector<StraightCut> cuts;
+    AxisLoop axis;
+};
+
+struct Nearest {
+    std::size_t edge = 0;
+    double distance = 1e300;  ///< mm
+};
+
+Nearest nearest_edge(const std::vector<Point2>& axis, Point2 p) {
+    Nearest best;
+    for (std::size_t k = 0; k < axis.size(); ++k) {
+        const Vec2 a = to_vec(axis[k]), b = to_vec(axis[(k + 1) % axis.size()]), v = to_vec(p);
+        const double dx = b.x - a.x, dy = b.y - a.y, l2 = dx * dx + dy * dy;
+        const double t = l2 > 0 ? std::clamp(((v.x - a.x) * dx + (v.y - a.y) * dy) / l2, 0.0, 1.0) : 0;
+        const double d = std::hypot(v.x - a.x - t * dx, v.y - a.y - t * dy);
+        if (d < best.distance) best = {k, d};
+    }
+    return best;
+}
+
+/// By how much the axis leans at a place, mm aside for each mm up.
+Vec2 lean_of(const AxisLoop& axis, std::size_t i, double height) {
+    const Vec2 top = to_vec(axis.top[i]), bottom = to_vec(axis.bottom[i]);
+    return {(top.x - bottom.x) / height, (top.y - bottom.y) / height};
+}
+
+/// How far in the level the part must lie from a piece of the axis: half a kerf square to the surface that
+/// the axis sweeps there. @param level the axis' points at a height
+double need_beside(const AxisLoop& axis, const std::vector<Point2>& level, std::size_t i, double height,
+                   double kerf) {
+    const std::size_t next = (i + 1) % level.size();
+    const Vec2 a = to_vec(level[i]), b = to_vec(level[next]);
+    const double l = std::max(1e-6, std::hypot(b.x - a.x, b.y - a.y));
+    double most = 0;
+    for (const std::size_t end : {i, next}) {
+        const Vec2 lean = lean_of(axis, end, height);
+        most = std::max(most, std::abs(lean.x * (b.y - a.y) - lean.y * (b.x - a.x)) / l);
+    }
+    return kerf / 2 * std::hypot(1, most);
+}
+
+/// Of each point whether the region winds around it; those on its border count as either.
+std::vector<bool> wound_around(const Loops& region, std::span<const Point2> points) {
+    std::vector<std::size_t> order(points.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return points[a].y != points[b].y ? points[a].y < points[b].y : a < b;
+    });
+    std::vector<double> heights;
+    for (const std::size_t i : order)
+        if (heights.empty() || heights.back() != points[i].y) heights.push_back(points[i].y);
+    const std::vector<std::vector<Span>> spans = line_spans(region, heights);
+    std::vector<bool> inside(points.size(), false);
+    std::size_t row = 0;
+    for (const std::size_t i : order) {
+        while (heights[row] < points[i].y) ++row;
+        const auto& line = spans[row];
+        const auto after = std::upper_bound(line.begin(), line.end(), double(points[i].x),
+                                            [](double x, const Span& span) { return x < span.low; });
+        inside[i] = after != line.begin() && points[i].x <= std::prev(after)->high;
+    }
+    return inside;
+}
+
+/// By how much each place of a way lies too near to the part, mm square to the outline: 0 where it does not.
+/// The part's corners need not lie on the rays that found it. Two polygons are nearest, and enter each other
+/// deepest, at a corner of one of them, so corners are all that is asked.
+std::vector<double> too_near(const Way& way, const Fitted& sheet, const std::vector<BorderDistance>& borders,
+                             const std::vector<std::size_t>& owners_of_vertices, double kerf,
+                             double allowed) {
+    const double height = sheet.heights.back() - sheet.heights.front();
+    const std::size_t n = way.samples.size();
+    std::vector<double> lacks(n, 0);
+    double widest = 0;
+    for (std::size_t i = 0; i < n; ++i)
+        widest = std::max(widest, kerf / 2 * std::hypot(1, length(lean_of(way.axis, i, height))));
+    std::size_t vertex = 0;
+    for (std::size_t k = 0; k < sheet.heights.size(); ++k) {
+        Loops own;
+        own.points = axis_at(way.axis, (sheet.heights[k] - sheet.heights.front()) / height);
+        own.close_loop();
+        const BorderDistance to_axis(own);
+        Loops around = own;  // what an outline holds, what a hole takes away
+        if (way.axis.is_hole) std::reverse(around.points.begin(), around.points.end());
+        const std::vector<bool> is_around = wound_around(around, sheet.sections[k]->points);
+        const std::vector<bool> is_in_part = wound_around(*sheet.sections[k], own.points);
+        for (std::size_t v = 0; v < sheet.sections[k]->points.size(); ++v) {
+            const Point2 p = sheet.sections[k]->points[v];
+            const bool is_own = owners_of_vertices[vertex++] == static_cast<std::size_t>(way.axis.loop);
+            const bool stays = !is_own || is_around[v] != way.axis.is_hole;
+            if (stays && to_axis(p) >= widest - allowed) continue;
+            const Nearest near = nearest_edge(own.points, p);
+            const std::size_t next = (near.edge + 1) % own.points.size();
+            const double need = need_beside(way.axis, own.points, near.edge, height, kerf);
+            const double more = need + (stays ? -near.distance : near.distance);
+            if (more <= allowed) continue;
+            lacks[near.edge] = std::max(lacks[near.edge], more);
+            lacks[next] = std::max(lacks[next], more);
+        }
+        for (std::size_t i = 0; i < own.points.size(); ++i) {
+            const double distance = borders[k](own.points[i]);
+            const double need = std::max(need_beside(way.axis, own.points, i, height, kerf),
+                                         need_beside(way.axis, own.points, (i + n - 1) % n, height, kerf));
+            const double more = need + (is_in_part[i] ? distance : -distance);
+            if (more > allowed) lacks[i] = std::max(lacks[i], more);
+        }
+    }
+    return lacks;
+}
+
+/// Moves the places of a way outwards by what they lack.
+void push_out(Way& way, const std::vector<double>& lacks, double height, double kerf) {
+    for (std::size_t i = 0; i < lacks.size(); ++i) {
+        way.cuts[i].bottom += lacks[i] * way.samples[i].mitre;
+        way.cuts[i].top += lacks[i] * way.samples[i].mitre;
+    }
+    const AxisLoop fresh = axis_loop(way.samples, way.cuts, height, kerf);
+    way.axis.bottom = fresh.bottom;
+    way.axis.top = fresh.top;
+}
+
+/// Of every vertex of every section, section by section, the loop of the outline that is nearest.
+std::vector<std::size_t> nearest_loops(const Fitted& sheet) {
+    std::vector<Loops> single(sheet.outline.size());
+    std::vector<BorderDistance> borders;
+    for (std::size_t l = 0; l < single.size(); ++l) {
+        const auto loop = sheet.outline.loop(l);
+        single[l].points.assign(loop.begin(), loop.end());
+        single[l].close_loop();
+        borders.emplace_back(single[l]);
+    }
+    std::vector<std::size_t> owners;
+    for (const Loops* section : sheet.sections)
+        for (const Point2 p : section->points) {
+            std::size_t owner = 0;
+            double nearest = 1e300;
+            for (std::size_t l = 0; l < borders.size(); ++l) {
+                const double d = borders.size() == 1 ? 0 : borders[l](p);
+                if (d < nearest) nearest = d, owner = l;
+            }
+            owners.push_back(owner);
+        }
+    return owners;
+}
+
+/// The ways of one loop of the outline, one for each pass.
+std::vector<Way> ways_of(const std::vector<Sample>& samples, const Fitted& sheet, std::size_t loop,
+                         bool is_hole, const SheetCutRules& rules) {
+    const double height = sheet.heights.back() - sheet.heights.front();
+    const double most_slope = std::tan(rules.most_tilt_deg * std::numbers::pi / 180);
+    LoopPasses found;
+    for (int passes = 1; passes <= rules.most_passes; ++passes) {
+        found = passes_of(samples, sheet.heights, passes, most_slope);
+        if (found.left <= rules.leave) break;
+    }
+    std::vector<Way> ways;
+    for (std::size_t j = 0; j < found.cuts.size(); ++j) {
+        AxisLoop axis = axis_loop(samples, found.cuts[j], height, rules.kerf);
+        axis.loop = static_cast<int>(loop);
+        axis.pass = static_cast<int>(j);
+        axis.is_hole = is_hole;
+        ways.push_back({samples, std::move(found.cuts[j]), std::move(axis)});
+    }
+    return ways;
+}
+
+/// What the cuts of a sheet leave at each of the heights that were looked at.
+using LeftAtHeights = std::vector<Loops>;
+
+double deviation_of(const LeftAtHeights& left, const Fitted& sheet) {
+    double most = 0;
+    for (std::size_t k = 0; k < left.size(); k += 3) {
+        most = std::max(most, farthest_from_border(left[k], BorderDistance(*sheet.sections[k]), 1));
+        most = std::max(most, farthest_from_border(*sheet.sections[k], BorderDistance(left[k]), 1));
+    }
+    return most;
+}
+
+/// Between the axis and what it leaves lies half a kerf; a pass of every loop together bounds the part.
+LeftAtHeights left_by(const std::vector<AxisLoop>& edges, const Fitted& sheet) {
+    int passes = 0;
+    for (const AxisLoop& edge : edges) passes = std::max(passes, edge.pass + 1);
+    LeftAtHeights left;
+    const double height = sheet.heights.back() - sheet.heights.front();
+    for (const double z : sheet.heights) {
+        for (int pass = 0; pass < passes; ++pass) {
+            // A loop that has no such pass takes part with its first one.
+            Loops all;
+            for (const AxisLoop& edge : edges) {
+                const bool has = std::any_of(edges.begin(), edges.end(), [&](const AxisLoop& other) {
+                    return other.loop == edge.loop && other.pass == pass;
+                });
+                if (edge.pass != (has ? pass : 0)) continue;
+                const std::vector<Point2> points = axis_at(edge, (z - sheet.heights.front()) / height);
+                all.points.insert(all.points.end(), points.begin(), points.end());
+                all.close_loop();
+            }
+            Loops region = unite(all, {});
+            if (pass == 0) left.push_back(std::move(region));
+            else left.back() = intersect(left.back(), region);
+        }
+    }
+    return left;
+}
+
+struct Tilted {
+    SheetCuts cuts;
+    bool spares = true;  ///< no cut comes nearer to the part than it may
+};
+
+/// Pushing one place moves its neighbours' lines too, so it is done again until nothing is too near.
+Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
+    constexpr int most_pushes = 12;
+    Tilted result;
+    SheetCuts& cuts = result.cuts;
+    const double height = sheet.heights.back() - sheet.heights.front();
+    const double most_slope = std::tan(rules.most_tilt_deg * std::numbers::pi / 180);
+    std::vector<BorderDistance> borders;
+    for (const Loops* section : sheet.sections) borders.emplace_back(*section);
+    const std::vector<std::size_t> owners = nearest_loops(sheet);
+    std::vector<AxisLoop> edges;
+    for (const bool holes : {true, false})
+        for (std::size_t l = 0; l < sheet.outline.size(); ++l) {
+            if ((signed_area(sheet.outline.loop(l)) < 0) != holes) continue;
+            const std::vector<Vec2> points = thinned(sheet.outline.loop(l));
+            if (points.size() < 3) continue;
+            std::vector<Sample> samples = samples_of(points, rules.step);
+            for (Sample& s : samples)
+                for (std::size_t k = 0; k < sheet.sections.size(); ++k)
+                    s.reach.push_back(
+                        reach_of(s, *sheet.sections[k], borders[k], most_slope * height * s.mitre));
+            const double whole = samples.back().along + std::hypot(points[0].x - samples.back().at.x,
+                                                                   points[0].y - samples.back().at.y);
+            leave_out_beside_corners(samples, whole);
+            for (Way& way : ways_of(samples, sheet, l, holes, rules)) {
+                for (int i = 0; i <= most_pushes; ++i) {
+                    const double allowed = i < most_pushes ? rules.gouge / 4 : rules.gouge / 2;
+                    const std::vector<double> lacks =
+                        too_near(way, sheet, borders, owners, rules.kerf, allowed);
+                    const bool is_clear =
+                        std::all_of(lacks.begin(), lacks.end(), [](double lack) { return lack == 0; });
+                    if (is_clear) break;
+                    if (i < most_pushes) push_out(way, lacks, height, rules.kerf);
+                    else result.spares = false;
+                }
+                cuts.most_tilt_deg =
+                    std::max(cuts.most_tilt_deg, tilt_of(way.axis, height) * 180 / std::numbers::pi);
+                edges.push_back(axis_loop(samples, way.cuts, height, 0));
+                edges.back().loop = way.axis.loop;
+                edges.back().pass = way.axis.pass;
+                cuts.loops.push_back(std::move(way.axis));
+            }
+        }
+    cuts.upright = cuts.most_tilt_deg < 0.05;
+    if (result.spares) cuts.deviation = deviation_of(left_by(edges, sheet), sheet);
+    return result;
+}
+
+std::vector<std::vector<double>> heights_to_fit(MeshView mesh, const std::vector<SheetSpan>& spans) {
+    constexpr double same = 1e-3;
+    std::vector<std::vector<double>> heights(spans.size());
+    std::vector<std::vector<double>> kinks(spans.size());
+    for (const Vec3f& v : mesh.vertices) {
+        const auto above = std::upper_bound(spans.begin(), spans.end(), double{v.z},
+                                            [](double z, const SheetSpan& span) { return z < span.bottom; });
+        if (above == spans.begin()) continue;
+        const auto i = static_cast<std::size_t>(above - spans.begin()) - 1;
+        if (v.z > spans[i].top || kinks[i].size() > kMostVertexHeights) continue;
+        const auto at = std::lower_bound(kinks[i].begin(), kinks[i].end(), v.z - same);
+        if (at == kinks[i].end() || *at > v.z + same) kinks[i].insert(at, v.z);
+    }
+    for (std::size_t i = 0; i < spans.size(); ++i) {
+        const double thickness = spans[i].top - spans[i].bottom;
+        for (int k = 0; k <= kCutSections; ++k)
+            heights[i].push_back(spans[i].bottom + k * thickness / kCutSections);
+        if (kinks[i].size() > kMostVertexHeights) continue;
+        for (const double z : kinks[i])
+            if (std::none_of(heights[i].begin(), heights[i].end(),
+                             [&](double h) { return std::abs(h - z) < same; }))
+                heights[i].push_back(z);
+        std::sort(heights[i].begin(), heights[i].end());
+    }
+    return heights;
+}
+
+void require_rules(const SheetCutRules& rules) {
+    if (!(rules.kerf >= 0) || rules.kerf > 100 || !(rules.most_tilt_deg >= 0) || rules.most_tilt_deg > 80 ||
+        !(rules.leave > 0) || rules.most_passes < 1 || rules.most_passes > 100 || !(rules.gouge > 0) ||
+        !(rules.step > 0))
+        throw Error(ErrorKind::usage, "sheets.cut", "kerf, tilt, tolerances or passes are out of range", "",
+                    "kerf 0 to 100 mm, tilt 0 to 80 degrees, tolerances over 0, passes 1 to 100");
+}
+
+}  // namespace
+
+std::vector<Point2> axis_at(const AxisLoop& loop, double share) {
+    std::vector<Point2> points;
+    for (std::size_t i = 0; i < loop.top.size(); ++i) {
+        const auto between = [&](std::int32_t a, std::int32_t b) {
+            return static_cast<std::int32_t>(std::lround(a + share * (double(b) - a)));
+        };
+        points.push_back(
+            {between(loop.bottom[i].x, loop.top[i].x), between(loop.bottom[i].y, loop.top[i].y)});
+    }
+    return points;
+}
+
+std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh, const std::vector<SheetSpan>& spans,
+                               const std::vector<SheetStair>& stairs, const SheetCutRules& rules) {
+    require_rules(rules);
+    const std::vector<std::vector<double>> heights = heights_to_fit(mesh, spans);
+    const double top = bounds(mesh).max.z;
+    std::vector<Plane> planes;
+    std::vector<std::size_t> starts;
+    for (std::size_t i = 0; i < spans.size(); ++i) {
+        starts.push_back(planes.size());
+        for (const double z : heights[i])
+            planes.push_back(z >= std::min(spans[i].top, top) ? Plane{std::min(z, top), Side::below}
+                                                              : Plane{z, Side::above});
+    }
+    const std::vector<Section> sections = slice(context, mesh, planes);
+    std::vector<SheetCuts> cuts(spans.size());
+    parallel_each(context, spans.size(), [&](std::size_t i) {
+        Fitted sheet{stairs[i].outline, heights[i], {}};
+        for (std::size_t k = 0; k < heights[i].size(); ++k)
+            sheet.sections.push_back(&sections[starts[i] + k].loops);
+        if (rules.most_tilt_deg > 0) {
+            Tilted tilted = tilted_cuts(sheet, rules);
+            cuts[i].gave_up_tilt = !tilted.spares;
+            if (tilted.spares && !tilted.cuts.upright) {
+                cuts[i] = std::move(tilted.cuts);
+                return;
+            }
+        }
+        const bool gave_up = cuts[i].gave_up_tilt;
+        cuts[i] = upright_cuts(stairs[i].outline, rules);
+        cuts[i].gave_up_tilt = gave_up;
+        Loops axis;
+        for (const AxisLoop& loop : cuts[i].loops) {
+            axis.points.insert(axis.points.end(), loop.top.begin(), loop.top.end());
+            axis.close_loop();
+        }
+        const Loops left = rules.kerf > 0 ? offset(axis, -rules.kerf / 2, kArcTolerance) : axis;
+        cuts[i].deviation = deviation_of(LeftAtHeights(sheet.heights.size(), left), sheet);
+    });
+    return cuts;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,57 @@
+// How one sheet is cut: where the axis of a jet, a beam or a cutter goes through it (METHOD.md section 13).
+#pragma once
+
+#include <vector>
+
+#include "engine/sheets/sheet_slicing.h"
+#include "kernels/polygons/loops.h"
+
+namespace slabwright {
+
+struct SheetCutRules {
+    double kerf = 0.8;         ///< mm: the width of the cut, or the diameter of the cutter
+    double most_tilt_deg = 0;  ///< of the head from upright; 0: it does not tilt
+    double leave = 0.05;       ///< mm that tilted cuts may leave over a convex wall before another pass pays
+    int most_passes = 6;       ///< along one loop
+    double gouge = 0.01;       ///< mm that a cut may enter the part
+    double step = 2;           ///< mm: longest piece of a loop that is cut at one angle or between two
+};
+
+/// One closed way of the axis. Material that stays lies on its left: outlines run counter-clockwise, holes
+/// clockwise. At the i-th point the axis leaves the sheet's bottom at bottom[i] and its top at top[i];
+/// between points both ends move straight.
+struct AxisLoop {
+    std::vector<Point2> bottom, top;
+    int loop = 0;  ///< of which loop of the sheet's outline
+    int pass = 0;  ///< from 0; what stays lies on the left of all passes
+    bool is_hole = false;
+};
+
+struct SheetCuts {
+    std::vector<AxisLoop> loops;  ///< holes before outlines, passes of a loop together
+    double most_tilt_deg = 0;     ///< that is used
+    double deviation = 0;  ///< mm: the greatest distance of the part's border from what the cuts leave, over
+                           ///< the sections that were looked at
+    bool upright = true;   ///< no cut tilts
+    bool gave_up_tilt = false;  ///< tilted cuts would have entered the part, so all are upright
+};
+
+/// Tilted cuts are made to fit sections at the ends of so many even parts of a sheet, and at the heights of
+/// the mesh's vertices in it where those are no more than kMostVertexHeights.
+inline constexpr int kCutSections = 24;
+inline constexpr std::size_t kMostVertexHeights = 24;
+
+/// The cuts of sheets of a part. Upright ones run outside of the outline by half a kerf. Tilted ones follow
+/// the concave majorant of the sections in the normal plane of each piece of the outline, and none enters a
+/// section by more than rules.gouge; where one would, the sheet is cut upright.
+/// @param stairs of the same spans: stairs_of(). Tilted cuts need those of StairSide::outside
+/// @throws Error(usage, "sheets.cut") for rules out of range, and as slice()
+[[nodiscard]] std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh,
+                                             const std::vector<SheetSpan>& spans,
+                                             const std::vector<SheetStair>& stairs,
+                                             const SheetCutRules& rules);
+
+/// The axis' ways at a height: share 0 at the bottom, 1 at the top.
+[[nodiscard]] std::vector<Point2> axis_at(const AxisLoop& loop, double share);
+
+}  // namespace slabwright
