@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, report, inspect, repair, slice, bond, job. Errors are one line on
-// stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, report, inspect, repair, slice, sheets, bond, job. Errors are one
+// line on stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -22,6 +22,7 @@
 #include "io/slabwright.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
+#include "tools/sheets_command.h"
 
 namespace {
 
@@ -289,8 +290,30 @@ std::string renew_report(Context& context, const Options& options) {
     }
 }
 
+/// Returns whether the programs make the part.
+bool run_sheets(const Options& options, const SheetsOptions& asked) {
+    const Job reading = job_of(options);
+    const SheetJob job = sheet_job(asked);
+    bool passed = false;
+    with_context(options, [&](Context& context) {
+        const SheetsResult result =
+            make_sheets(context, options.stl, reading, job, options.out, {.left_over = asked.tolerance});
+        passed = result.proof.passed;
+        return sheets_summary(result, options.out, options.json);
+    });
+    return passed;
+}
+
 bool run_verify(const Options& options) {
     bool passed = false;
+    if (holds_sheets(options.out)) {
+        with_context(options, [&](Context& context) {
+            const SheetProof proof = verify_sheets(context, options.out, options.stl, {});
+            passed = proof.passed;
+            return sheets_verdict(proof, options.out);
+        });
+        return passed;
+    }
     with_context(options, [&](Context& context) {
         const VerifyResult result = verify(context, options.out, options.stl, options.maps, options.cell);
         passed = result.passed;
@@ -466,6 +489,15 @@ int command(int argc, char** argv) {
     slice_command->add_option("-o,--out", options.out, "drawing: .svg, .dxf or .json")->required();
     add_common(*slice_command, options);
 
+    SheetsOptions sheets_options;
+    CLI::App* sheets_command =
+        app.add_subcommand("sheets", "plan a part as sheets cut from stock and bonded");
+    sheets_command->add_option("STL", options.stl, "the part")->required();
+    sheets_command->add_option("-o,--out", options.out, "folder for the sheets; a plan in it is replaced")
+        ->required();
+    add_common(*sheets_command, options);
+    add_sheets_options(*sheets_command, sheets_options);
+
     BondOptions bond_options;
     CLI::App* bond_command = add_bond_command(app, bond_options);
 
@@ -500,6 +532,8 @@ int command(int argc, char** argv) {
         else if (*inspect_command) run_inspect(options);
         else if (*repair_command) run_repair(options);
         else if (*slice_command) run_slice(options);
+        else if (*sheets_command)
+            return run_sheets(options, sheets_options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*bond_command) print(run_bond(bond_options));
         else print(default_job_toml(options.library.empty() ? "default" : options.library));
         return 0;

@@ -403,6 +403,7 @@ using LeftAtHeights = std::vector<Loops>;
 double deviation_of(const LeftAtHeights& left, const Fitted& sheet) {
     double most = 0;
     for (std::size_t k = 0; k < left.size(); k += 3) {
+        if (left[k].empty() || sheet.sections[k]->empty()) continue;  // no border to be far from
         most = std::max(most, farthest_from_border(left[k], BorderDistance(*sheet.sections[k]), 1));
         most = std::max(most, farthest_from_border(*sheet.sections[k], BorderDistance(left[k]), 1));
     }

@@ -380,6 +380,7 @@ std::vector<SheetStair> stairs_of(Context& context, MeshView mesh, const std::ve
             stair.volume_mm3 = std::max(0.0, cut + part - 2 * common);
         }
         if (!with_inset) return;
+        if (stair.outline.empty()) return;
         const BorderDistance border(stair.outline);
         for (const int k : {0, kStairSamples / 2, kStairSamples - 1}) {
             const double step = 1;

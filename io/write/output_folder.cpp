@@ -34,8 +34,13 @@ constexpr const char* kRemedy = "give another folder after -o, or make room and 
 constexpr const char* kMoveAway = "move that away, or give another folder after -o";
 constexpr std::string_view kPartial = "partial", kOld = "old";
 /// The files of a plan folder beside its programs.
-constexpr std::array<std::string_view, 5> kFiles{"plan.json", "tool.tbl", "sequence.json", "report.html",
-                                                 "verify.json"};
+constexpr std::array<std::string_view, 6> kFiles{"plan.json",   "tool.tbl",    "sequence.json",
+                                                 "report.html", "verify.json", "sheets.json"};
+/// Its folders, and how the names in them end.
+struct Inner {
+    std::string_view folder, ending;
+};
+constexpr std::array<Inner, 3> kInner{Inner{"nc", ".ngc"}, Inner{"dxf", ".dxf"}, Inner{"svg", ".svg"}};
 
 [[noreturn]] void refuse(const char* code, const fs::path& place, const std::string& what,
                          const std::string& remedy = kRemedy) {
@@ -81,31 +86,52 @@ bool is_file_of_ours(const std::string& name) {
     });
 }
 
-/// Whether a name in nc/ of a folder under way is that of a program.
+/// Whether a name in an inner folder of a folder under way is that of a file of ours.
 bool is_program_name(const std::string& name) {
-    const std::size_t ending = name.rfind(".ngc");
-    return ending != std::string::npos &&
-           (name.size() == ending + 4 || maker_of(name, name.substr(1, ending + 3), kPartial));
+    return std::any_of(kInner.begin(), kInner.end(), [&](const Inner& inner) {
+        const std::size_t ending = name.rfind(inner.ending);
+        return ending != std::string::npos &&
+               (name.size() == ending + 4 || maker_of(name, name.substr(1, ending + 3), kPartial));
+    });
 }
 
-/// The first entry of a folder that a plan folder cannot hold. @param is_program of names in nc/
+/// The first entry of a folder that a plan folder cannot hold. @param is_program of names in inner folders
 template <class IsProgram>
 std::optional<Stranger> stranger_in(const fs::path& folder, IsProgram&& is_program) {
     for (const fs::directory_entry& entry : entries_of(folder)) {
         const std::string name = entry.path().filename().string();
-        const bool programs = name == "nc";
+        const bool programs = std::any_of(kInner.begin(), kInner.end(),
+                                          [&](const Inner& inner) { return name == inner.folder; });
         if (!programs && !is_file_of_ours(name)) return Stranger{name, ""};
         if (const auto what = not_a(entry, programs ? fs::file_type::directory : fs::file_type::regular))
             return Stranger{name, *what};
         if (!programs) continue;
         for (const fs::directory_entry& program : entries_of(entry.path())) {
             const fs::path inner = program.path().filename();
-            if (!is_program(inner.string())) return Stranger{"nc" / inner, ""};
+            if (!is_program(inner.string())) return Stranger{name / inner, ""};
             if (const auto what = not_a(program, fs::file_type::regular))
-                return Stranger{"nc" / inner, *what};
+                return Stranger{name / inner, *what};
         }
     }
     return std::nullopt;
+}
+
+/// The names of the files in inner folders that a sheets.json of ours names; nothing where it is none.
+std::optional<std::set<std::string>> files_of_sheets(const fs::path& sheets) {
+    using nlohmann::json;
+    try {
+        const json document = json::parse(read_document(sheets, ErrorKind::input, "out.not_ours", ""));
+        if (document.at("schema").get<std::string>().rfind("slabwright.sheets/", 0) != 0) return std::nullopt;
+        std::set<std::string> names;
+        for (const json& program : document.at("programs"))
+            for (const char* key : {"file", "dxf", "svg"})
+                names.insert(fs::path(program.at(key).get<std::string>()).filename().string());
+        return names;
+    } catch (const json::exception&) {
+        return std::nullopt;
+    } catch (const Error&) {
+        return std::nullopt;
+    }
 }
 
 /// The names in nc/ of the programs that a plan.json of ours names; nothing where it is none.
@@ -133,7 +159,9 @@ void require_ours(const fs::path& folder, const fs::path& told) {
     const fs::path plan = folder / "plan.json";
     std::error_code ignored;
     const bool is_file = fs::symlink_status(plan, ignored).type() == fs::file_type::regular;
-    const auto programs = is_file ? programs_of(plan) : std::nullopt;
+    const fs::path sheets = folder / "sheets.json";
+    const bool has_sheets = fs::symlink_status(sheets, ignored).type() == fs::file_type::regular;
+    const auto programs = is_file ? programs_of(plan) : has_sheets ? files_of_sheets(sheets) : std::nullopt;
     if (!programs)
         refuse("out.not_ours", told, "the folder is not empty and holds no plan of ours",
                "give another folder after -o");

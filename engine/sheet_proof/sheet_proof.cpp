@@ -1,0 +1,409 @@
+#include "engine/sheet_proof/sheet_proof.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "kernels/parallel/parallel.h"
+#include "kernels/polygons/border_distance.h"
+#include "kernels/polygons/loops.h"
+#include "kernels/slicing/slicing.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr int kHeights = 9;  ///< at which a sheet is looked at: the middles of equal parts
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kFinestTurn = 1.5;  ///< degrees of the head between two places that are looked at
+constexpr double kArcTolerance = 0.002;
+
+/// Where the axis is at a level, and how it leans there, mm aside for each mm down.
+struct AxisPoint {
+    double x = 0, y = 0, lean_x = 0, lean_y = 0;
+};
+
+/// The places of a way between its points too: x, y, A and C all change evenly along a move.
+std::vector<ReadHead> fine(const std::vector<ReadHead>& points) {
+    std::vector<ReadHead> all;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (i > 0) {
+            const ReadHead &p = points[i - 1], &q = points[i];
+            const double turn = std::abs(q.a - p.a) + (p.a > 0 || q.a > 0 ? std::abs(q.c - p.c) : 0);
+            const int pieces = std::clamp(static_cast<int>(std::ceil(turn / kFinestTurn)), 1, 400);
+            for (int k = 1; k < pieces; ++k) {
+                const double t = double(k) / pieces;
+                all.push_back({p.x + t * (q.x - p.x), p.y + t * (q.y - p.y), p.a + t * (q.a - p.a),
+                               p.c + t * (q.c - p.c)});
+            }
+        }
+        all.push_back(points[i]);
+    }
+    return all;
+}
+
+std::vector<AxisPoint> at_depth(const std::vector<ReadHead>& way, double depth) {
+    std::vector<AxisPoint> points;
+    for (const ReadHead& h : way) {
+        const double lean = std::tan(h.a * kDegree);
+        const double lx = lean * std::cos(h.c * kDegree), ly = lean * std::sin(h.c * kDegree);
+        points.push_back({h.x + depth * lx, h.y + depth * ly, lx, ly});
+    }
+    return points;
+}
+
+Point2 unit_point(double x, double y) { return {to_units(x), to_units(y)}; }
+
+/// What the cut takes of a level: about every piece of the axis, as far as half the kerf square to the
+/// surface that the axis sweeps. Outlines may overlap.
+Loops swept(const std::vector<AxisPoint>& axis, double kerf) {
+    Loops loops;
+    constexpr int around = 8;  // of each half circle
+    for (std::size_t i = 0; i + 1 < axis.size(); ++i) {
+        const AxisPoint &p = axis[i], &q = axis[i + 1];
+        double dx = q.x - p.x, dy = q.y - p.y;
+        const double l = std::hypot(dx, dy);
+        double half = kerf / 2;
+        if (l > 1e-6) {
+            dx /= l, dy /= l;
+            const double lean =
+                std::max(std::abs(p.lean_x * dy - p.lean_y * dx), std::abs(q.lean_x * dy - q.lean_y * dx));
+            half *= std::hypot(1, lean);
+        } else {
+            dx = 1, dy = 0;
+        }
+        const double first = std::atan2(dx, -dy);  // the left normal
+        for (int k = 0; k <= around; ++k) {
+            const double a = first + std::numbers::pi * k / around;
+            loops.points.push_back(unit_point(p.x + half * std::cos(a), p.y + half * std::sin(a)));
+        }
+        for (int k = 0; k <= around; ++k) {
+            const double a = first + std::numbers::pi * (1 + double(k) / around);
+            loops.points.push_back(unit_point(q.x + half * std::cos(a), q.y + half * std::sin(a)));
+        }
+        loops.close_loop();
+    }
+    return loops;
+}
+
+/// A way at a level as a region: what it runs around. The way in is not part of its loop.
+Loops around(const std::vector<AxisPoint>& axis, std::size_t first, bool is_hole) {
+    Loops loop;
+    for (std::size_t i = first; i + 1 < axis.size(); ++i)
+        loop.points.push_back(unit_point(axis[i].x, axis[i].y));
+    if (is_hole) std::reverse(loop.points.begin(), loop.points.end());
+    loop.close_loop();
+    return unite(loop, {});
+}
+
+ReadHead unplaced(const ReadHead& head, const ReadPiece& piece) {
+    const double x = head.x - piece.x, y = head.y - piece.y;
+    switch (((piece.turn % 360) + 360) % 360) {
+        case 90:
+            return {y, -x, head.a, head.c - 90};
+        case 180:
+            return {-x, -y, head.a, head.c - 180};
+        case 270:
+            return {-y, x, head.a, head.c - 270};
+        default:
+            return {x, y, head.a, head.c};
+    }
+}
+
+struct Box2 {
+    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300;
+    void add(double x, double y, double more) {
+        x0 = std::min(x0, x - more), y0 = std::min(y0, y - more);
+        x1 = std::max(x1, x + more), y1 = std::max(y1, y + more);
+    }
+    [[nodiscard]] bool meets(const Box2& o) const {
+        return x0 <= o.x1 && o.x0 <= x1 && y0 <= o.y1 && o.y0 <= y1;
+    }
+};
+
+/// A way of a program, with all places that are looked at.
+struct FineWay {
+    const ReadWay* read = nullptr;
+    std::vector<ReadHead> heads;
+    std::size_t loop_from = 0;  ///< index in heads where the loop begins
+    Box2 box;
+};
+
+struct PieceResult {
+    double made_mm3 = 0, gouge = 0, left_over = 0;
+    int islands = 0;
+    std::vector<Diagnostic> violations;
+};
+
+class PieceProof {
+public:
+    PieceProof(const ReadSheetProgram& program, const ReadPiece& piece, const std::vector<FineWay>& ways,
+               const SheetProofRules& rules)
+        : program_(program), piece_(piece), ways_(ways), rules_(rules) {}
+
+    PieceResult run(const std::vector<const Section*>& sections) {
+        for (int k = 0; k < kHeights; ++k) level(k, sections[static_cast<std::size_t>(k)]->loops);
+        return std::move(result_);
+    }
+
+private:
+    void violate(const char* code, std::string message) {
+        for (const Diagnostic& d : result_.violations)
+            if (d.code == code) return;  // once a piece
+        result_.violations.push_back({Severity::error,
+                                      code,
+                                      fmt::format("{}: piece {}: {}", program_.file, piece_.number, message),
+                                      {}});
+    }
+
+    /// What the loops of this piece hold together, before the kerf is taken: what lies left of all passes of
+    /// an outline, less what lies right of any pass of a hole.
+    [[nodiscard]] Loops held(double depth) const {
+        std::map<int, Loops> outlines;
+        std::vector<Loops> holes;
+        for (const FineWay& way : ways_) {
+            if (way.read->piece != piece_.number) continue;
+            const Loops region = around(at_depth(own_frame(way), depth), way.loop_from, way.read->is_hole);
+            if (way.read->is_hole) {
+                holes.push_back(region);
+            } else {
+                const auto found = outlines.find(way.read->loop);
+                if (found == outlines.end()) outlines.emplace(way.read->loop, region);
+                else found->second = intersect(found->second, region);
+            }
+        }
+        Loops all;
+        for (const auto& [loop, region] : outlines) all = unite(all, region);
+        for (const Loops& hole : holes) all = subtract(all, hole);
+        return all;
+    }
+
+    [[nodiscard]] std::vector<ReadHead> own_frame(const FineWay& way) const {
+        std::vector<ReadHead> heads;
+        for (const ReadHead& head : way.heads) heads.push_back(unplaced(head, piece_));
+        return heads;
+    }
+
+    void level(int k, const Loops& section) {
+        const double depth = program_.thickness * (1 - (k + 0.5) / kHeights);
+        const double step = program_.thickness / kHeights;
+        Loops made = held(depth);
+        for (const FineWay& way : ways_) {
+            // A cut of another piece that comes near is one of this piece too.
+            if (way.read->piece != piece_.number && !way.box.meets(box_)) continue;
+            if (program_.is_routed && way.read->deepest < depth) {
+                violate("sheets.depth",
+                        fmt::format("the cut of line {} ends {:.3f} mm above the sheet's bottom",
+                                    way.read->line, program_.thickness - way.read->deepest));
+                continue;
+            }
+            made = subtract(made, swept(at_depth(own_frame(way), depth), program_.kerf));
+        }
+        if (made.empty()) {
+            violate("sheets.nothing", "its cuts leave nothing of it");
+            return;
+        }
+        // Slivers between a lead and its loop are waste.
+        made = without_waste(made, section);
+        if (k == kHeights / 2) {
+            int parts = 0;
+            for (std::size_t i = 0; i < made.size(); ++i) parts += signed_area(made.loop(i)) > 0;
+            result_.islands = std::max(0, parts - 1);
+        }
+        result_.made_mm3 += area(made) * step;
+        const BorderDistance to_made(made), to_section(section);
+        const Loops gouged = subtract(section, made), left = subtract(made, section);
+        result_.gouge = std::max(result_.gouge, farthest_from_border(gouged, to_made, 0.5));
+        if (!section.empty())  // else there is no border to be far from; the volume tells
+            result_.left_over = std::max(result_.left_over, farthest_from_border(left, to_section, 0.5));
+        if (!rules_.part_may_lose && !subtract(section, offset(made, rules_.gouge, kArcTolerance)).empty())
+            violate("sheets.gouge",
+                    fmt::format("a cut enters the part by {:.3f} mm, {:.3f} mm below the sheet's top",
+                                farthest_from_border(gouged, to_made, 0.5), depth));
+        if (rules_.left_over > 0 && !subtract(made, offset(section, rules_.left_over, kArcTolerance)).empty())
+            violate("sheets.left_over", fmt::format("{:.3f} mm are left, {:.3f} mm below the sheet's top",
+                                                    farthest_from_border(left, to_section, 0.5), depth));
+    }
+
+    /// Of what the cuts leave, the parts that hold something of the section.
+    static Loops without_waste(const Loops& made, const Loops& section) {
+        bool has_waste = false;
+        Loops kept;
+        for (std::size_t i = 0; i < made.size(); ++i) {
+            if (signed_area(made.loop(i)) <= 0) continue;
+            Loops part;
+            const auto add = [&](std::size_t l) {
+                const auto loop = made.loop(l);
+                part.points.insert(part.points.end(), loop.begin(), loop.end());
+                part.close_loop();
+            };
+            add(i);
+            for (std::size_t h = 0; h < made.size(); ++h)
+                if (h < made.parents.size() && made.parents[h] == static_cast<std::int32_t>(i)) add(h);
+            if (intersect(part, section).empty()) {
+                has_waste = true;
+                continue;
+            }
+            kept.points.insert(kept.points.end(), part.points.begin(), part.points.end());
+            for (std::size_t l = 1; l < part.starts.size(); ++l)
+                kept.starts.push_back(kept.starts.back() + part.starts[l] - part.starts[l - 1]);
+        }
+        return has_waste ? unite(kept, {}) : made;
+    }
+
+    const ReadSheetProgram& program_;
+    const ReadPiece& piece_;
+    const std::vector<FineWay>& ways_;
+    const SheetProofRules& rules_;
+    PieceResult result_;
+
+public:
+    Box2 box_;  ///< of the piece's own cuts, on the stock
+};
+
+void require_ways(const ReadSheetProgram& program, const std::vector<FineWay>& ways,
+                  std::vector<Diagnostic>& violations) {
+    const auto violate = [&](const char* code, const ReadWay& way, const std::string& message) {
+        violations.push_back(
+            {Severity::error, code, fmt::format("{} line {}: {}", program.file, way.line, message), {}});
+    };
+    for (const FineWay& fine_way : ways) {
+        const ReadWay& way = *fine_way.read;
+        if (std::none_of(program.pieces.begin(), program.pieces.end(),
+                         [&](const ReadPiece& p) { return p.number == way.piece; }))
+            violate("sheets.piece", way,
+                    fmt::format("a cut of piece {}, which the program does not place", way.piece));
+        if (way.points.size() < 4) {
+            violate("sheets.open_way", way, "a cut that goes round nothing");
+            continue;
+        }
+        const ReadHead &first = way.points[1], &last = way.points.back();
+        if (std::hypot(first.x - last.x, first.y - last.y) > 2e-3)
+            violate("sheets.open_way", way, "a cut that does not close, so that the piece is not free");
+        const Box2& b = fine_way.box;
+        if (b.x0 < 0 || b.y0 < 0 || b.x1 > program.length || b.y1 > program.width)
+            violate("sheets.leaves_stock", way, "a cut leaves the stock");
+    }
+}
+
+void require_stack(const std::vector<ReadSheetProgram>& programs, double height, const SheetProofRules& rules,
+                   SheetProof& proof) {
+    std::vector<const ReadPiece*> pieces;
+    for (const ReadSheetProgram& program : programs)
+        for (const ReadPiece& piece : program.pieces) {
+            pieces.push_back(&piece);
+            if (std::abs(piece.high - piece.low - program.thickness) > 1e-3)
+                proof.violations.push_back(
+                    {Severity::error,
+                     "sheets.thickness",
+                     fmt::format("{}: piece {} is {:.4g} mm high, its stock {:.4g} mm", program.file,
+                                 piece.number, piece.high - piece.low, program.thickness),
+                     {}});
+        }
+    std::sort(pieces.begin(), pieces.end(), [](const auto* a, const auto* b) { return a->low < b->low; });
+    double top = 0;
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+        const double gap = pieces[i]->low - top;
+        if (gap < -1e-3 || gap > (i == 0 ? 1e-3 : rules.most_gap))
+            proof.violations.push_back(
+                {Severity::error,
+                 "sheets.stack",
+                 fmt::format("piece {} begins {:.4g} mm {} the one below ends", pieces[i]->number,
+                             std::abs(gap), gap < 0 ? "before" : "after"),
+                 {}});
+        if (pieces[i]->number != static_cast<int>(i) + 1)
+            proof.violations.push_back(
+                {Severity::error,
+                 "sheets.stack",
+                 fmt::format("piece {} is number {} from below", pieces[i]->number, i + 1),
+                 {}});
+        top = pieces[i]->high;
+    }
+    if (pieces.empty())
+        proof.violations.push_back({Severity::error, "sheets.stack", "the programs place no piece", {}});
+    double thinnest = 1e300;
+    for (const ReadSheetProgram& program : programs) thinnest = std::min(thinnest, program.thickness);
+    proof.left_on_top = std::max(0.0, height - top);
+    if (!pieces.empty() && proof.left_on_top >= thinnest - 1e-3)
+        proof.violations.push_back(
+            {Severity::error,
+             "sheets.stack",
+             fmt::format("{:.4g} mm of the part stand above the last sheet, and sheets are "
+                         "{:.4g} mm",
+                         proof.left_on_top, thinnest),
+             {}});
+    if (proof.left_on_top < 1e-3) proof.left_on_top = 0;
+}
+
+}  // namespace
+
+SheetProof prove_sheets(Context& context, MeshView mesh, const std::vector<ReadSheetProgram>& programs,
+                        const SheetProofRules& rules) {
+    SheetProof proof;
+    const double height = bounds(mesh).max.z;
+    for (const Index3& f : mesh.facets) {
+        const Vec3f &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
+        proof.part_mm3 +=
+            (a.x * (double{b.y} * c.z - double{b.z} * c.y) - a.y * (double{b.x} * c.z - double{b.z} * c.x) +
+             a.z * (double{b.x} * c.y - double{b.y} * c.x)) /
+            6;
+    }
+    require_stack(programs, height, rules, proof);
+    struct Task {
+        const ReadSheetProgram* program;
+        const ReadPiece* piece;
+        const std::vector<FineWay>* ways;
+    };
+    std::vector<std::vector<FineWay>> ways(programs.size());
+    std::vector<Task> tasks;
+    std::vector<Plane> planes;
+    for (std::size_t p = 0; p < programs.size(); ++p) {
+        const ReadSheetProgram& program = programs[p];
+        for (const ReadWay& way : program.ways) {
+            FineWay f;
+            f.read = &way;
+            f.heads = fine(way.points);
+            const std::vector<ReadHead> in(
+                way.points.begin(),
+                way.points.begin() + std::min<long>(2, static_cast<long>(way.points.size())));
+            f.loop_from = fine(in).size() - 1;
+            for (const double depth : {0.0, program.thickness})
+                for (const AxisPoint& a : at_depth(f.heads, depth))
+                    f.box.add(a.x, a.y, program.kerf / 2 * std::hypot(1, std::hypot(a.lean_x, a.lean_y)));
+            ways[p].push_back(std::move(f));
+        }
+        require_ways(program, ways[p], proof.violations);
+        for (const ReadPiece& piece : program.pieces) {
+            tasks.push_back({&program, &piece, &ways[p]});
+            for (int k = 0; k < kHeights; ++k)
+                planes.push_back(
+                    {std::min(piece.low + (k + 0.5) / kHeights * program.thickness, height), Side::above});
+        }
+    }
+    const std::vector<Section> sections = slice(context, mesh, planes);
+    std::vector<PieceResult> results(tasks.size());
+    parallel_each(context, tasks.size(), [&](std::size_t i) {
+        std::vector<const Section*> own;
+        for (int k = 0; k < kHeights; ++k)
+            own.push_back(&sections[i * kHeights + static_cast<std::size_t>(k)]);
+        PieceProof piece(*tasks[i].program, *tasks[i].piece, *tasks[i].ways, rules);
+        for (const FineWay& way : *tasks[i].ways)
+            if (way.read->piece == tasks[i].piece->number)
+                piece.box_.add(way.box.x0, way.box.y0, 0), piece.box_.add(way.box.x1, way.box.y1, 0);
+        results[i] = piece.run(own);
+    });
+    for (const PieceResult& result : results) {
+        proof.made_mm3 += result.made_mm3;
+        proof.gouge = std::max(proof.gouge, result.gouge);
+        proof.left_over = std::max(proof.left_over, result.left_over);
+        proof.islands += result.islands;
+        proof.violations.insert(proof.violations.end(), result.violations.begin(), result.violations.end());
+    }
+    proof.passed = proof.violations.empty();
+    return proof;
+}
+
+}  // namespace slabwright

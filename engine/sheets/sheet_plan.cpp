@@ -1,0 +1,256 @@
+#include "engine/sheets/sheet_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "kernels/errors.h"
+#include "kernels/polygons/border_distance.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kHeadTolerance = 0.005;  ///< mm by which the bottom of a cut may leave its line
+
+void require_job(const SheetJob& job) {
+    const auto refuse = [](const std::string& what, const char* remedy) {
+        throw Error(ErrorKind::usage, "sheets.job", what, "", remedy);
+    };
+    if (job.cutting.most_tilt_deg > 0 && job.head != SheetHead::jet)
+        refuse("only a jet's head tilts", "give --tilt 0, or --head jet");
+    if (job.cutting.most_tilt_deg > 0 && job.slicing.side != StairSide::outside)
+        refuse("tilted cuts follow the outside of the part", "give --side outside, or --tilt 0");
+    for (const double value : {job.feed, job.plunge_feed, job.stepdown, job.rpm, job.clearance})
+        if (!(value > 0) || value > 1e6) refuse("feeds, stepdown, speed and clearance must be over 0", "");
+    for (const double value : {job.lead, job.pierce_s, job.through})
+        if (!(value >= 0) || value > 1000)
+            refuse("lead, pierce and depth under the sheet must be 0 or more", "");
+    if (job.head == SheetHead::router && !(job.cutting.kerf > 0))
+        refuse("a router's cutter has a diameter", "give --kerf");
+}
+
+/// Where a way begins and from where it is led in: the first place with room for the whole lead in the waste,
+/// or for a half or a quarter of it, or on the way itself.
+struct Start {
+    std::size_t at = 0;
+    double lead = 0;
+    double nx = 0, ny = 0;  ///< towards the pierce
+};
+
+Start start_of(const AxisLoop& loop, const std::vector<const BorderDistance*>& borders,
+               const std::vector<const Loops*>& regions, double lead) {
+    const std::size_t n = loop.top.size();
+    for (const double share : {1.0, 0.5, 0.25}) {
+        const double wanted = lead * share;
+        if (wanted <= 0) break;
+        for (std::size_t i = 0; i < n; ++i) {
+            // The right of the way, where it does not turn much: halfway between its neighbours.
+            const Point2 a = loop.top[(i + n - 1) % n], b = loop.top[(i + 1) % n], p = loop.top[i];
+            const double dx = double(b.x) - a.x, dy = double(b.y) - a.y, l = std::hypot(dx, dy);
+            if (l < 1) continue;
+            const double nx = dy / l, ny = -dx / l;
+            bool has_room = true;
+            for (std::size_t k = 0; k < borders.size() && has_room; ++k) {
+                const Point2 end = k == 0 ? p : loop.bottom[i];
+                const Point2 pierce{to_units(to_mm(end.x) + wanted * nx),
+                                    to_units(to_mm(end.y) + wanted * ny)};
+                has_room = (*borders[k])(pierce) >= 0.9 * wanted && winding(*regions[k], pierce) <= 0;
+            }
+            if (has_room) return {i, wanted, nx, ny};
+        }
+    }
+    return {};
+}
+
+/// The ends of one loop's pass, and of the first pass of all others, at the sheet's bottom or top: what a
+/// lead of that pass keeps clear of. Its own other passes run through waste.
+Loops ends_of(const SheetCuts& cuts, const AxisLoop& of, bool top) {
+    Loops all;
+    for (const AxisLoop& loop : cuts.loops) {
+        if (loop.loop == of.loop ? loop.pass != of.pass : loop.pass != 0) continue;
+        const std::vector<Point2>& points = top ? loop.top : loop.bottom;
+        all.points.insert(all.points.end(), points.begin(), points.end());
+        all.close_loop();
+    }
+    return all;
+}
+
+double feed_of(const SheetJob& job, double thickness, double tilt_deg) {
+    if (job.head != SheetHead::jet) return job.feed;
+    return jet_feed(job.jet, thickness / std::cos(tilt_deg * std::numbers::pi / 180));
+}
+
+SheetWay way_of(const AxisLoop& loop, const Start& start, const NestPlace& place, double thickness) {
+    AxisLoop turned = loop;
+    std::rotate(turned.top.begin(), turned.top.begin() + static_cast<long>(start.at), turned.top.end());
+    std::rotate(turned.bottom.begin(), turned.bottom.begin() + static_cast<long>(start.at),
+                turned.bottom.end());
+    const Point2 first = turned.top[0];
+    const Point2 pierce{to_units(to_mm(first.x) + start.lead * start.nx),
+                        to_units(to_mm(first.y) + start.lead * start.ny)};
+    for (Point2& p : turned.top) p = placed(p, place);
+    for (Point2& p : turned.bottom) p = placed(p, place);
+    SheetWay way;
+    way.loop = loop.loop;
+    way.pass = loop.pass;
+    way.is_hole = loop.is_hole;
+    way.points = head_way(turned, thickness, kHeadTolerance);
+    way.pierce = placed(pierce, place);
+    return way;
+}
+
+double length_of(const SheetWay& way) {
+    double mm = std::hypot(to_mm(way.pierce.x) - to_mm(way.points[0].top.x),
+                           to_mm(way.pierce.y) - to_mm(way.points[0].top.y));
+    for (std::size_t i = 1; i < way.points.size(); ++i)
+        mm += std::hypot(to_mm(way.points[i].top.x) - to_mm(way.points[i - 1].top.x),
+                         to_mm(way.points[i].top.y) - to_mm(way.points[i - 1].top.y));
+    return mm;
+}
+
+/// What a piece takes of its stock: the outside of its cuts with their leads, holes filled.
+Loops blank_of(const SheetCuts& cuts, const SheetJob& job) {
+    Loops outside;
+    for (const bool top : {true, false})
+        for (const AxisLoop& loop : cuts.loops) {
+            if (loop.is_hole) continue;
+            const std::vector<Point2>& points = top ? loop.top : loop.bottom;
+            outside.points.insert(outside.points.end(), points.begin(), points.end());
+            outside.close_loop();
+        }
+    return offset(unite(outside, {}), job.cutting.kerf / 2 + job.lead, 0.05);
+}
+
+/// The sheets of the stack with what is known of them before they have a place.
+void add_pieces(SheetsPlan& plan, const std::vector<SheetStair>& stairs, const std::vector<SheetCuts>& cuts) {
+    const std::vector<SheetSpan>& spans = plan.stack.sheets;
+    for (std::size_t i = 0; i < spans.size(); ++i) {
+        SheetPiece piece;
+        piece.number = static_cast<int>(i) + 1;
+        piece.span = spans[i];
+        piece.islands = 0;
+        for (std::size_t l = 0; l < stairs[i].outline.size(); ++l)
+            piece.islands += signed_area(stairs[i].outline.loop(l)) > 0;
+        piece.stair_mm3 = stairs[i].volume_mm3;
+        piece.deviation = cuts[i].deviation;
+        piece.tilt_deg = cuts[i].upright ? 0 : cuts[i].most_tilt_deg;
+        piece.area_mm2 = area(stairs[i].outline);
+        if (cuts[i].loops.empty())
+            throw Error(ErrorKind::no_plan, "sheets.empty",
+                        fmt::format("sheet {} from {:.4g} to {:.4g} mm holds nothing of the part",
+                                    piece.number, piece.span.bottom, piece.span.top),
+                        "", "look at the model with `slabwright inspect`");
+        plan.pieces.push_back(piece);
+    }
+}
+
+void tell(SheetsPlan& plan, Severity severity, const char* code, std::string message) {
+    plan.diagnostics.push_back({severity, code, std::move(message), {}});
+}
+
+void tell_findings(SheetsPlan& plan, const std::vector<SheetCuts>& cuts, int on_the_way) {
+    if (plan.stack.left_on_top > 0)
+        tell(plan, Severity::warning, "sheets.left_on_top",
+             fmt::format("{:.4f} mm on top are thinner than any sheet and are not made",
+                         plan.stack.left_on_top));
+    for (std::size_t i = 0; i < plan.pieces.size(); ++i) {
+        const SheetPiece& piece = plan.pieces[i];
+        if (piece.islands > 1)
+            tell(plan, Severity::warning, "sheets.islands",
+                 fmt::format("sheet {} is of {} parts, which nothing but the glue holds in place",
+                             piece.number, piece.islands));
+        if (cuts[i].gave_up_tilt)
+            tell(plan, Severity::warning, "sheets.upright",
+                 fmt::format("sheet {} is cut upright: tilted cuts would enter the part", piece.number));
+    }
+    if (on_the_way > 0)
+        tell(plan, Severity::warning, "sheets.pierce",
+             fmt::format("{} cuts have no room for a lead and begin on the edge of the part", on_the_way));
+}
+
+}  // namespace
+
+Mesh along_axis(const Mesh& mesh, char axis) {
+    if (axis != 'x' && axis != 'y' && axis != 'z')
+        throw Error(ErrorKind::usage, "sheets.axis", "sheets are stacked along x, y or z", "",
+                    "give one of these");
+    Mesh turned = mesh;
+    for (Vec3f& v : turned.vertices)
+        v = axis == 'x' ? Vec3f{v.y, v.z, v.x} : axis == 'y' ? Vec3f{v.z, v.x, v.y} : v;
+    const float low = bounds(turned.view()).min.z;
+    if (low != 0)
+        for (Vec3f& v : turned.vertices) v.z -= low;
+    return turned;
+}
+
+SheetsPlan plan_sheets(Context& context, const Mesh& mesh, const SheetJob& job) {
+    require_job(job);
+    SheetsPlan plan;
+    plan.job = job;
+    plan.height = bounds(mesh.view()).max.z;
+    context.begin_phase("sheets", 0, 0.5);
+    plan.stack = stack_of_sheets(context, mesh.view(), job.slicing);
+    SheetRules uniform = job.slicing;
+    uniform.strategy = SheetStrategy::uniform;
+    plan.uniform_sheets = static_cast<std::size_t>((plan.height + uniform.bond + 1e-4) /
+                                                   (uniform.thicknesses.front() + uniform.bond));
+    const std::vector<SheetSpan>& spans = plan.stack.sheets;
+    const std::vector<SheetStair> stairs = stairs_of(context, mesh.view(), spans, job.slicing.side);
+    context.begin_phase("cuts", 0.5, 0.8);
+    const std::vector<SheetCuts> cuts = cuts_of(context, mesh.view(), spans, stairs, job.cutting);
+    add_pieces(plan, stairs, cuts);
+    std::vector<Loops> blanks;
+    for (const SheetCuts& own : cuts) blanks.push_back(blank_of(own, job));
+    context.begin_phase("nesting", 0.8, 1);
+    int on_the_way = 0;
+    for (std::size_t t = 0; t < job.slicing.thicknesses.size(); ++t) {
+        std::vector<std::size_t> own;
+        std::vector<Loops> own_blanks;
+        for (std::size_t i = 0; i < spans.size(); ++i)
+            if (spans[i].stock == static_cast<int>(t)) own.push_back(i), own_blanks.push_back(blanks[i]);
+        const Nest nest = nest_pieces(context, own_blanks, job.stock,
+                                      t == 0 ? job.offcuts : std::vector<StockSheet>{}, job.nesting);
+        const std::size_t first = plan.programs.size();
+        for (const StockSheet& stock : nest.stock) {
+            SheetProgram program;
+            program.thickness = job.slicing.thicknesses[t];
+            program.stock = stock;
+            plan.programs.push_back(program);
+        }
+        for (std::size_t k = 0; k < own.size(); ++k) {
+            SheetPiece& piece = plan.pieces[own[k]];
+            piece.place = nest.places[k];
+            piece.program = static_cast<int>(first) + piece.place.stock;
+            SheetProgram& program = plan.programs[static_cast<std::size_t>(piece.program)];
+            program.pieces.push_back(piece.number);
+            const SheetCuts& own_cuts = cuts[own[k]];
+            for (const AxisLoop& loop : own_cuts.loops) {
+                const Loops top = ends_of(own_cuts, loop, true), bottom = ends_of(own_cuts, loop, false);
+                const BorderDistance to_top(top), to_bottom(bottom);
+                const Start start = start_of(loop, {&to_top, &to_bottom}, {&top, &bottom}, job.lead);
+                on_the_way += start.lead == 0 && job.lead > 0;
+                SheetWay way = way_of(loop, start, piece.place, program.thickness);
+                way.piece = piece.number;
+                double tilt = 0;
+                for (const HeadPoint& p : way.points) tilt = std::max(tilt, p.a_deg);
+                way.feed = feed_of(job, program.thickness, tilt);
+                const double mm = length_of(way);
+                const double depths = job.head == SheetHead::router
+                                          ? std::ceil((program.thickness + job.through) / job.stepdown)
+                                          : 1;
+                program.cut_mm += mm * depths;
+                program.minutes +=
+                    mm * depths / way.feed + (job.head == SheetHead::router ? 0.05 : job.pierce_s / 60);
+                program.ways.push_back(std::move(way));
+            }
+            piece.label = program.ways.back().points[0].top;
+        }
+    }
+    tell_findings(plan, cuts, on_the_way);
+    return plan;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,87 @@
+// A part as sheets: stack, cuts, nests and the ways of each stock sheet's program (METHOD.md section 13).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "engine/plan.h"
+#include "engine/sheets/head.h"
+#include "engine/sheets/jet_feed.h"
+#include "engine/sheets/nesting.h"
+#include "engine/sheets/sheet_cuts.h"
+#include "engine/sheets/sheet_slicing.h"
+
+namespace slabwright {
+
+/// What cuts: a router's end mill, upright, in several depths; a laser, upright; an abrasive jet, whose head
+/// may tilt.
+enum class SheetHead : std::uint8_t { router, laser, jet };
+
+struct SheetJob {
+    SheetRules slicing;
+    SheetCutRules cutting;  ///< its kerf is the router's cutter
+    NestRules nesting;      ///< spacing is between kerfs and leads
+    StockSheet stock{1220, 1220};
+    std::vector<StockSheet> offcuts;  ///< of the first thickness
+    SheetHead head = SheetHead::router;
+    char axis = 'z';                                      ///< along which sheets are stacked
+    double lead = 3;                                      ///< mm of waste in which a cut begins
+    double pierce_s = 0.5;                                ///< jet, laser: dwell before the head moves
+    double clearance = 5;                                 ///< mm over the stock
+    double feed = 3000;                                   ///< mm/min, router and laser
+    double plunge_feed = 800, stepdown = 6, rpm = 18000;  ///< router
+    double through = 0.2;                                 ///< mm that a router cuts under the sheet
+    int tool = 1;
+    AbrasiveJet jet;
+};
+
+/// One closed cut with its lead, where it lies on the stock.
+struct SheetWay {
+    int piece = 0;  ///< from 1
+    int loop = 0, pass = 0;
+    bool is_hole = false;
+    std::vector<HeadPoint> points;  ///< the last at the place of the first
+    Point2 pierce;                  ///< at the sheet's top: in the waste, as far as there is room
+    double feed = 0;                ///< mm/min at the top of the sheet
+};
+
+/// One sheet of the stack.
+struct SheetPiece {
+    int number = 0;  ///< from 1, from below
+    SheetSpan span;
+    NestPlace place;
+    int program = 0;  ///< index of SheetsPlan::programs
+    int islands = 1;
+    double stair_mm3 = 0, deviation = 0, tilt_deg = 0, area_mm2 = 0;
+    Point2 label;  ///< a place inside, on the stock
+};
+
+/// What is cut from one stock sheet.
+struct SheetProgram {
+    double thickness = 0;  ///< mm
+    StockSheet stock;
+    std::vector<int> pieces;     ///< numbers
+    std::vector<SheetWay> ways;  ///< in order: piece by piece, holes before outlines
+    double cut_mm = 0, minutes = 0;
+};
+
+struct SheetsPlan {
+    SheetJob job;
+    double height = 0;  ///< mm of the part along the axis
+    SheetStack stack;
+    std::vector<SheetPiece> pieces;
+    std::vector<SheetProgram> programs;
+    std::vector<Diagnostic> diagnostics;
+    std::size_t uniform_sheets = 0;  ///< of the thinnest, beside it
+};
+
+/// The solid turned so that `axis` points up, on z = 0. X: (y, z, x); Y: (z, x, y). @throws
+/// Error(usage, "sheets.axis") for other letters
+[[nodiscard]] Mesh along_axis(const Mesh& mesh, char axis);
+
+/// @param mesh as along_axis() makes it, with neighbours
+/// @throws as stack_of_sheets(), cuts_of() and nest_pieces(), Error(usage, "sheets.job") for values out of
+/// range or a head that does not tilt and should
+[[nodiscard]] SheetsPlan plan_sheets(Context& context, const Mesh& mesh, const SheetJob& job);
+
+}  // namespace slabwright

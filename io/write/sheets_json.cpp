@@ -1,0 +1,98 @@
+#include "io/write/sheets_json.h"
+
+#include <fmt/format.h>
+
+#include "io/text/job_keys.h"
+#include "io/text/json_text.h"
+#include "io/write/plan_json.h"
+
+namespace slabwright {
+
+namespace {
+
+const char* name_of(SheetStrategy strategy) {
+    return strategy == SheetStrategy::uniform   ? "uniform"
+           : strategy == SheetStrategy::printed ? "printed"
+                                                : "optimal";
+}
+const char* name_of(StairSide side) {
+    return side == StairSide::outside ? "outside" : side == StairSide::inside ? "inside" : "middle";
+}
+const char* name_of(SheetHead head) {
+    return head == SheetHead::router ? "router" : head == SheetHead::laser ? "laser" : "jet";
+}
+
+}  // namespace
+
+std::string sheet_file(std::size_t index) { return fmt::format("sheet_{:02}", index + 1); }
+
+std::string sheets_json(const SheetsPlan& plan, const InputInfo& input, const ReadingOptions& reading) {
+    const SheetJob& job = plan.job;
+    JsonText json;
+    json.begin_object().key("schema").string("slabwright.sheets/1").key("units").string("mm");
+    json.key("input").begin_object();
+    json.key("file")
+        .string(input.file)
+        .key("sha256")
+        .string(input.sha256)
+        .key("triangles")
+        .count(input.triangles);
+    json.key("units").string(word_of(kUnitWords, reading.units)).key("weld").exact(reading.weld_mm);
+    json.key("repair").string(word_of(kRepairWords, reading.repair)).end();
+    json.key("axis").string(std::string(1, job.axis)).key("height").rounded(plan.height, 4);
+    json.key("strategy").string(name_of(job.slicing.strategy)).key("side").string(name_of(job.slicing.side));
+    json.key("head").string(name_of(job.head)).key("kerf").exact(job.cutting.kerf);
+    json.key("most_tilt_deg").exact(job.cutting.most_tilt_deg).key("bond").exact(job.slicing.bond);
+    json.key("thicknesses").begin_array(JsonText::Shape::line);
+    for (const double t : job.slicing.thicknesses) json.exact(t);
+    json.end();
+    json.key("pieces").begin_array();
+    for (const SheetPiece& piece : plan.pieces) {
+        json.begin_object(JsonText::Shape::line).key("number").integer(piece.number);
+        json.key("bottom").rounded(piece.span.bottom, 4).key("top").rounded(piece.span.top, 4);
+        json.key("program").string("nc/" + sheet_file(static_cast<std::size_t>(piece.program)) + ".ngc");
+        json.key("turn").integer(piece.place.turn).key("x").units(piece.place.shift.x);
+        json.key("y").units(piece.place.shift.y).key("islands").integer(piece.islands);
+        json.key("area_mm2").rounded(piece.area_mm2, 2).key("stair_mm3").rounded(piece.stair_mm3, 2);
+        json.key("deviation").rounded(piece.deviation, 4).key("tilt_deg").rounded(piece.tilt_deg, 2).end();
+    }
+    json.end().key("programs").begin_array();
+    double cut_mm = 0, minutes = 0;
+    for (std::size_t i = 0; i < plan.programs.size(); ++i) {
+        const SheetProgram& program = plan.programs[i];
+        cut_mm += program.cut_mm, minutes += program.minutes;
+        json.begin_object(JsonText::Shape::line).key("file").string("nc/" + sheet_file(i) + ".ngc");
+        json.key("dxf")
+            .string("dxf/" + sheet_file(i) + ".dxf")
+            .key("svg")
+            .string("svg/" + sheet_file(i) + ".svg");
+        json.key("thickness").exact(program.thickness).key("length").exact(program.stock.length);
+        json.key("width").exact(program.stock.width).key("pieces").begin_array(JsonText::Shape::line);
+        for (const int number : program.pieces) json.integer(number);
+        json.end().key("cut_mm").rounded(program.cut_mm, 1).key("minutes").rounded(program.minutes, 3).end();
+    }
+    json.end().key("totals").begin_object();
+    json.key("sheets").count(plan.pieces.size()).key("uniform_sheets").count(plan.uniform_sheets);
+    json.key("stock_sheets").count(plan.programs.size()).key("cut_mm").rounded(cut_mm, 1);
+    json.key("minutes").rounded(minutes, 3).key("stair_mm3").rounded(plan.stack.stair_mm3, 2);
+    json.key("left_on_top").rounded(plan.stack.left_on_top, 4).end();
+    json.key("diagnostics");
+    put_diagnostics(json, plan.diagnostics);
+    json.end();
+    return json.take();
+}
+
+std::string sheets_verify_json(const SheetProof& proof, const std::string& pattern) {
+    JsonText json;
+    json.begin_object().key("schema").string("slabwright.sheets-verify/1");
+    json.key("passed").boolean(proof.passed).key("pattern").string(pattern);
+    json.key("part_mm3").rounded(proof.part_mm3, 2).key("made_mm3").rounded(proof.made_mm3, 2);
+    json.key("gouge_mm").rounded(proof.gouge, 4).key("left_over_mm").rounded(proof.left_over, 4);
+    json.key("left_on_top_mm").rounded(proof.left_on_top, 4).key("islands").integer(proof.islands);
+    json.key("violations");
+    put_diagnostics(json, proof.violations);
+    json.end();
+    return json.take();
+}
+
+}  // namespace slabwright

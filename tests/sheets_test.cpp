@@ -1,0 +1,204 @@
+// A part as sheets, from the plan to the text of its programs and back to the part.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "engine/sheet_proof/sheet_proof.h"
+#include "engine/sheets/sheet_plan.h"
+#include "io/posts/sheet_gcode.h"
+#include "kernels/errors.h"
+#include "tests/support/files.h"
+#include "tests/support/loft.h"
+#include "tests/support/rs274.h"
+#include "tests/support/seed.h"
+
+namespace slabwright {
+namespace {
+
+using support::circle;
+using support::loft;
+using support::turned;
+
+SheetJob job_of(SheetHead head) {
+    SheetJob job;
+    job.slicing.thicknesses = {6, 12};
+    job.head = head;
+    job.stock = {300, 300};
+    if (head == SheetHead::router) {
+        job.cutting.kerf = 6;
+        job.nesting.spacing = 4;
+    } else {
+        job.cutting.kerf = 0.8;
+    }
+    if (head == SheetHead::jet) job.cutting.most_tilt_deg = 55;
+    return job;
+}
+
+std::vector<std::string> texts_of(const SheetsPlan& plan) {
+    std::vector<std::string> texts;
+    for (std::size_t i = 0; i < plan.programs.size(); ++i) texts.push_back(sheet_program_text(plan, i));
+    return texts;
+}
+
+SheetProof proof_of(Context& context, const Mesh& mesh, const std::vector<std::string>& texts) {
+    std::vector<ReadSheetProgram> programs;
+    for (std::size_t i = 0; i < texts.size(); ++i)
+        programs.push_back(read_sheet_program(texts[i], "sheet_" + std::to_string(i + 1) + ".ngc"));
+    return prove_sheets(context, mesh.view(), programs, {});
+}
+
+std::string told(const SheetProof& proof) {
+    std::string text;
+    for (const Diagnostic& d : proof.violations) text += d.code + ": " + d.message + '\n';
+    return text;
+}
+
+Mesh vase(Context& context) {
+    return turned(context, 48, 96, 120, [](double z) { return 40 + 8 * std::sin(z / 9); });
+}
+
+TEST(Sheets, ProgramsOfEveryHeadMakeThePart) {
+    Context context;
+    const Mesh mesh = vase(context);
+    double upright = 0;
+    for (const SheetHead head : {SheetHead::router, SheetHead::laser, SheetHead::jet}) {
+        const SheetsPlan plan = plan_sheets(context, mesh, job_of(head));
+        const SheetProof proof = proof_of(context, mesh, texts_of(plan));
+        EXPECT_TRUE(proof.passed) << told(proof);
+        EXPECT_LT(proof.gouge, 0.02);
+        EXPECT_GE(proof.made_mm3, proof.part_mm3);
+        std::printf("  %zu sheets, left over %.3f mm, volume %+.2f %%\n", plan.pieces.size(), proof.left_over,
+                    100 * (proof.made_mm3 / proof.part_mm3 - 1));
+        if (head == SheetHead::router) upright = proof.left_over;
+        if (head == SheetHead::jet) {
+            EXPECT_LT(proof.left_over, 0.4 * upright);
+        }
+    }
+}
+
+// Every kind of fault in the text is found in the text.
+TEST(Sheets, ProofFindsWhatIsWrongInTheText) {
+    Context context;
+    const Mesh mesh = vase(context);
+    const SheetsPlan plan = plan_sheets(context, mesh, job_of(SheetHead::router));
+    const std::vector<std::string> good = texts_of(plan);
+    const auto changed = [&](const std::string& from, const std::string& to) {
+        std::vector<std::string> texts = good;
+        const std::size_t at = texts[0].find(from);
+        EXPECT_NE(at, std::string::npos) << from;
+        if (at != std::string::npos) texts[0].replace(at, from.size(), to);
+        return texts;
+    };
+    const auto has = [&](const std::vector<std::string>& texts, const char* code) {
+        const SheetProof proof = proof_of(context, mesh, texts);
+        EXPECT_FALSE(proof.passed);
+        for (const Diagnostic& d : proof.violations)
+            if (d.code == code) return;
+        ADD_FAILURE() << code << " is missing among\n" << told(proof);
+    };
+    has(changed("kerf 6 ", "kerf 7 "), "sheets.gouge");
+    has(changed("from 0 ", "from 6 "), "sheets.thickness");
+    has(changed("stock 300 x 300", "stock 100 x 300"), "sheets.leaves_stock");
+    const std::vector<std::string> shallow = [&] {
+        std::vector<std::string> texts = good;
+        for (std::string& text : texts)
+            for (std::size_t at = text.find("G1 Z-"); at != std::string::npos;
+                 at = text.find("G1 Z-", at + 1)) {
+                const std::size_t end = text.find(' ', at + 5);
+                if (std::stod(text.substr(at + 5, end - at - 5)) > 5.9)
+                    text.replace(at, end - at, "G1 Z-5.5");
+            }
+        return texts;
+    }();
+    has(shallow, "sheets.depth");
+    // A piece that is nowhere.
+    std::vector<std::string> fewer(good.begin(), good.end() - 1);
+    if (good.size() > 1) has(fewer, "sheets.stack");
+    // A point of the last loop moved into the part.
+    std::vector<std::string> dented = good;
+    const std::size_t last = dented[0].rfind("G0 Z5\n");
+    std::size_t line = last;
+    for (int i = 0; i < 12; ++i) line = dented[0].rfind('\n', line - 1);
+    const std::size_t end = dented[0].find('\n', line + 1);
+    const ReadSheetProgram read = read_sheet_program(good[0], "x");
+    double cx = 0, cy = 0;
+    for (const ReadHead& h : read.ways.back().points) {
+        cx += h.x / static_cast<double>(read.ways.back().points.size());
+        cy += h.y / static_cast<double>(read.ways.back().points.size());
+    }
+    dented[0].replace(line + 1, end - line - 1, "X" + std::to_string(cx) + " Y" + std::to_string(cy));
+    has(dented, "sheets.gouge");
+    const auto refuses = [&](const std::string& from, const std::string& to, const char* code) {
+        try {
+            (void)proof_of(context, mesh, changed(from, to));
+            ADD_FAILURE() << code;
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code(), code);
+            EXPECT_NE(std::string(error.what()).find("sheet_1.ngc:"), std::string::npos);
+        }
+    };
+    refuses("G21 ", "", "gcode.unset");
+    refuses("G54\n", "G55\n", "gcode.unknown_word");
+    refuses("M2\n", "", "gcode.no_end");
+    refuses("X", "X1e", "gcode.number");
+    refuses("(cut of", "(cat of", "gcode.unnamed");
+    refuses("(stock ", "(stack ", "gcode.no_stock");
+}
+
+TEST(Sheets, LinuxCncReadsEveryProgram) {
+    Context context;
+    const Mesh mesh = vase(context);
+    for (const SheetHead head : {SheetHead::router, SheetHead::laser, SheetHead::jet})
+        for (const std::string& text : texts_of(plan_sheets(context, mesh, job_of(head))))
+            EXPECT_TRUE(support::interpret_rs274(text, "T1 P1 D6 Z0\n").ended);
+}
+
+TEST(Sheets, StacksAlongEveryAxis) {
+    Context context;
+    const Mesh mesh = loft(context, {circle(0, 20, 40), circle(36, 30, 40)});
+    for (const char axis : {'x', 'y', 'z'}) {
+        const Mesh up = along_axis(mesh, axis);
+        SheetJob job = job_of(SheetHead::laser);
+        job.axis = axis;
+        const SheetsPlan plan = plan_sheets(context, up, job);
+        const SheetProof proof = proof_of(context, up, texts_of(plan));
+        EXPECT_TRUE(proof.passed) << axis << told(proof);
+    }
+    EXPECT_THROW((void)along_axis(mesh, 'w'), Error);
+}
+
+TEST(Sheets, SameTextOnAnyNumberOfThreads) {
+    std::vector<std::string> first;
+    for (const int threads : {1, 2, 4}) {
+        Context context({.threads = threads});
+        const std::vector<std::string> texts =
+            texts_of(plan_sheets(context, vase(context), job_of(SheetHead::jet)));
+        if (threads == 1) first = texts;
+        EXPECT_EQ(texts, first);
+    }
+}
+
+TEST(Sheets, RandomSolidsPassTheirProof) {
+    Context context;
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> unit(-1, 1);
+    for (int round = 0; round < 3; ++round) {
+        std::vector<support::Ring> rings;
+        const int n = 8 + static_cast<int>(random() % 12);
+        double r = 30, x = 0, y = 0;
+        for (int z = 0; z <= 18; z += 3) {
+            rings.push_back(circle(z, r, n, x, y));
+            r = std::clamp(r + 3 * unit(random), 15.0, 45.0), x += unit(random), y += unit(random);
+        }
+        const Mesh mesh = loft(context, rings);
+        for (const SheetHead head : {SheetHead::router, SheetHead::jet}) {
+            const SheetsPlan plan = plan_sheets(context, mesh, job_of(head));
+            const SheetProof proof = proof_of(context, mesh, texts_of(plan));
+            EXPECT_TRUE(proof.passed) << round << told(proof);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace slabwright
