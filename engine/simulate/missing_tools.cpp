@@ -36,7 +36,7 @@ constexpr InchSize kInches[] = {{0.5, "1/2"},   {0.375, "3/8"},    {0.25, "1/4"}
                                 {0.125, "1/8"}, {0.09375, "3/32"}, {0.0625, "1/16"}, {0.03125, "1/32"}};
 // Flute lengths in diameters: standard, long, extra long, and with a relieved neck.
 constexpr double kRatios[] = {3, 4, 6, 8, 10, 12};
-constexpr double kGrip = 15;             // mm between flutes and holder's nose
+constexpr double kGrip = 3;              // mm between flutes and collet: each more bends a thin tool more
 constexpr double kFeedPerTooth = 0.012;  // of the diameter, in MDF
 constexpr double kEntry = 0.05;  // minutes for each place that a cutter goes down to: rapids, plunge, leads
 
@@ -163,45 +163,56 @@ std::vector<Sample> samples_of(const SimulationInput& input, const SimulationRep
     std::vector<Sample> samples;
     const double every = std::max(1.0, cells / kSamples);
     area_each = every * report.cell * report.cell;
-    // The middles of equal shares, in the order of layers and tiles.
-    double passed = 0, next = every / 2;
+    // One place of each equal share, in the order of layers and tiles: which one differs from share to share,
+    // or rows of cells would beat with the shares.
+    double passed = 0, share = 0, next = every * jitter(0);
     for (std::size_t l = 0; l < report.layers.size(); ++l)
         for (const UnreachedCell& c : report.layers[l].unreached) {
             passed += c.cells;
-            for (; next <= passed; next += every) {
+            while (next < passed) {
                 samples.push_back({l, c, within_limit(part, input.layers[l], c, options.limit)});
+                share += 1;
+                next = every * (share + jitter(static_cast<std::size_t>(share)));
             }
         }
     return samples;
 }
 
-/// mm down that a tool takes at once: its step, or less where its edges alone, in a full slot, would bend it
-/// by the limit (METHOD.md section 9). The planner divides cuts so often at most.
-double step_down(const Tool& tool, const Material& material, double bends) {
-    constexpr double kMostDivided = 64;
+/// How a tool goes down, METHOD.md section 9: where its edges alone, in a full slot of its step, would bend
+/// it by more than the limit, it goes down by less and slower, as far as the planner divides cuts and lowers
+/// feeds.
+struct Descent {
+    double step = 0;   ///< mm
+    double share = 1;  ///< of its feed
+};
+Descent descent_of(const Tool& tool, const Material& material, double bends) {
+    constexpr double kMostDivided = 64, kSlowest = 0.125;
     const double edges = std::hypot(material.kte, material.kfe);  // N for each mm of depth, whatever the feed
-    const double held = bends / cutter_deflection(edges, tool.stickout, tool.diameter);
-    return std::max(tool.stepdown_max / kMostDivided, std::min(tool.stepdown_max, held));
+    const double held = bends / cutter_deflection(edges, tool.stickout, tool.diameter) / tool.stepdown_max;
+    return {tool.stepdown_max * std::clamp(held, 1 / kMostDivided, 1.0), std::clamp(held, kSlowest, 1.0)};
 }
 
-/// Minutes for what a tool gains: passes over the area, as many levels as it is deep, a way in for each
-/// place, and the tool's change in each layer. Places are samples that lie more than three diameters apart.
+/// Minutes for what a tool gains: level by level down to it with its clearing step, once more over it with
+/// the finishing step, a way in for each place, and the tool's change in each layer. Places are samples that
+/// lie more than three diameters apart.
 double minutes_for(const Tool& tool, const std::vector<const Sample*>& gained, double area_each,
                    std::size_t layers, const Machine& machine, const MissingToolOptions& options) {
-    const double R = tool.diameter / 2, down = step_down(tool, options.material, options.bends);
-    const double step = tool.kind == ToolKind::ball ? 2 * std::sqrt(options.cusp * (2 * R - options.cusp))
-                                                    : tool.stepover * tool.diameter;
+    const double R = tool.diameter / 2, wide = tool.stepover * tool.diameter;
+    const double fine =
+        tool.kind == ToolKind::ball ? 2 * std::sqrt(options.cusp * (2 * R - options.cusp)) : wide;
+    const Descent down = descent_of(tool, options.material, options.bends);
     double way = 0;
     std::vector<const Sample*> places;
     for (const Sample* s : gained) {
-        way += area_each / step * std::ceil(std::max(1.0, s->cell.left / down));
+        const double levels = std::ceil((s->cell.place[2] - s->within[2]) / down.step);
+        way += area_each / fine + area_each / wide * std::max(0.0, levels - 1);
         const bool apart = std::none_of(places.begin(), places.end(), [&](const Sample* p) {
             return p->layer == s->layer && std::hypot(p->cell.place[0] - s->cell.place[0],
                                                       p->cell.place[1] - s->cell.place[1]) < 6 * R;
         });
         if (apart) places.push_back(s);
     }
-    return way / std::max(1.0, tool.max_feed) + kEntry * static_cast<double>(places.size()) +
+    return way / std::max(1.0, tool.max_feed * down.share) + kEntry * static_cast<double>(places.size()) +
            static_cast<double>(layers) * (machine.tool_change_s + machine.spindle_dwell_s) / 60;
 }
 

@@ -517,12 +517,12 @@ private:
         return result;
     }
 
-    /// Keeps the middles of equal shares, each for all of its own.
+    /// Keeps one of each equal share, which stands for all of it.
     static void thin(std::vector<UnreachedCell>& cells) {
         if (cells.size() <= kTileUnreached) return;
         const double share = static_cast<double>(cells.size()) / kTileUnreached;
         for (std::size_t k = 0; k < kTileUnreached; ++k) {
-            cells[k] = cells[static_cast<std::size_t>((static_cast<double>(k) + 0.5) * share)];
+            cells[k] = cells[static_cast<std::size_t>((static_cast<double>(k) + jitter(k)) * share)];
             cells[k].cells = static_cast<float>(share);
         }
         cells.resize(kTileUnreached);
@@ -1085,6 +1085,11 @@ Extreme SimulationReport::unmade() const {
     for (const LayerFindings& f : layers)
         if (f.unmade.size > most.size) most = f.unmade;
     return most;
+}
+
+double jitter(std::size_t k) {
+    const double steps = static_cast<double>(k) * 0.6180339887498949;
+    return steps - std::floor(steps);
 }
 
 double simulation_cell(const std::vector<Tool>& tools, double cusp) {

@@ -67,7 +67,7 @@ struct Violation {
     std::string file;     ///< the program, "" for what shows in the stock
     std::uint32_t line = 0;
     std::optional<Point3> where;
-    double size = 0;  ///< mm, or a count where the message says so
+    double size = 0;                     ///< mm, or a count where the message says so
     std::optional<std::size_t> layer{};  ///< 0 …, where it shows in the stock of one
 };
 
@@ -101,6 +101,10 @@ struct MissedPlace {
     double left = 0;    ///< mm along the normal
     double height = 0;  ///< mm straight down to the part's surface or the layer's bottom
 };
+
+/// Where in the k-th of many equal shares its sample lies, from 0 to 1: steps of the golden section, which
+/// beat with no row of cells.
+[[nodiscard]] double jitter(std::size_t k);
 
 /// A place of the stock's surface under which more is left than the limit, because no tool gets there.
 struct UnreachedCell {
