@@ -1,0 +1,85 @@
+#include "kernels/geometry/cutter_shape.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "engine/job.h"
+#include "kernels/cutting/cutter.h"
+#include "kernels/cutting/tool_shape.h"
+#include "kernels/errors.h"
+#include "kernels/forces/forces.h"
+#include "kernels/stock/sweep.h"
+
+using namespace slabwright;
+
+namespace {
+
+constexpr CutterShape kFlat{6, 0, 0}, kBall{6, 6, 0}, kBullNose{6, 1.5, 0}, kTapered{6, 1, 0.1},
+    kCone{6, 0, 1};
+
+TEST(CutterShape, FormFollowsFromRadiusCornerAndTaper) {
+    EXPECT_EQ(kFlat.form(), CutterForm::flat);
+    EXPECT_EQ(kBall.form(), CutterForm::ball);
+    EXPECT_EQ(kBullNose.form(), CutterForm::bull_nose);
+    EXPECT_EQ(kTapered.form(), CutterForm::tapered_ball);
+    EXPECT_EQ(kCone.form(), CutterForm::cone);
+}
+
+TEST(CutterShape, EachKernelTakesWhatItCanCutWithAndRefusesTheRest) {
+    EXPECT_EQ(cutter_of(kFlat).profile, Cutter::Profile::flat);
+    EXPECT_EQ(cutter_of(kBall).profile, Cutter::Profile::ball);
+    EXPECT_EQ(cutter_end(kFlat).form, CutterEnd::Form::flat);
+    EXPECT_EQ(cutter_end(kBall).form, CutterEnd::Form::ball);
+    EXPECT_EQ(cutter_end(kCone).form, CutterEnd::Form::cone);
+    EXPECT_EQ(cutter_profile(kFlat), CutterProfile::flat);
+    EXPECT_EQ(cutter_profile(kBall), CutterProfile::ball);
+    EXPECT_EQ(tool_shape(kBullNose).profile, ToolShape::Profile::bull_nose);
+    EXPECT_EQ(tool_shape(kTapered).profile, ToolShape::Profile::tapered_ball);
+    for (const CutterShape& shape : {kBullNose, kTapered, kCone}) {
+        EXPECT_THROW((void)cutter_of(shape), Error);
+        EXPECT_THROW((void)cutter_profile(shape), Error);
+    }
+    EXPECT_THROW((void)cutter_end(kBullNose), Error);
+    EXPECT_THROW((void)cutter_end(kTapered), Error);
+    EXPECT_THROW((void)tool_shape(kCone), Error);
+}
+
+// The height of a cutter's end over its tip, as each kernel has it, is one.
+TEST(CutterShape, KernelsAgreeOnTheUnderSide) {
+    for (const CutterShape& shape : {kFlat, kBall}) {
+        ToolShape tool = tool_shape(shape);
+        tool.shank_radius = shape.radius;
+        const Envelope under = envelopes(tool).front();
+        for (const double r : {0.0, 1.0, 3.0, 5.5}) {
+            const double expected = shape.form() == CutterForm::ball
+                                        ? shape.radius - std::sqrt(shape.radius * shape.radius - r * r)
+                                        : 0;
+            EXPECT_NEAR(under.height(r), expected, 1e-12);
+        }
+    }
+    EXPECT_NEAR(cutter_end(kCone).slope, 1 / std::tan(1.0), 1e-12);
+}
+
+TEST(CutterShape, OfTheToolsOfAJob) {
+    Tool tool;
+    tool.diameter = 12;
+    const auto form_of = [&](ToolKind kind) {
+        tool.kind = kind;
+        return cutter_shape(tool).form();
+    };
+    EXPECT_EQ(form_of(ToolKind::flat), CutterForm::flat);
+    EXPECT_EQ(form_of(ToolKind::face), CutterForm::flat);
+    EXPECT_EQ(form_of(ToolKind::ball), CutterForm::ball);
+    EXPECT_EQ(form_of(ToolKind::drill), CutterForm::cone);
+    EXPECT_EQ(cutter_shape(tool).radius, 6);
+    // A point of 118°.
+    EXPECT_NEAR(cutter_end(cutter_shape(tool)).slope, std::tan(31 * std::numbers::pi / 180), 1e-12);
+    for (const ToolKind kind : {ToolKind::flat, ToolKind::ball})
+        EXPECT_TRUE(is_end_mill(kind) && mills(kind));
+    EXPECT_TRUE(mills(ToolKind::face) && !is_end_mill(ToolKind::face));
+    EXPECT_FALSE(mills(ToolKind::drill) || is_end_mill(ToolKind::drill));
+}
+
+}  // namespace
