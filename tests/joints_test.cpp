@@ -24,7 +24,6 @@
 #include "engine/schedule/schedule.h"
 #include "engine/schedule/supports.h"
 #include "io/read/pattern_mesh.h"
-#include "io/read/stl.h"
 #include "io/write/sequence_json.h"
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"

@@ -214,7 +214,7 @@ TEST(Plunge, NoRunCutsDeeperThanItMay) {
         PathBuilder path(bench.operation, tool, 3000, kTop + 10, kTop + 2);
         Surroundings around = bench.cut.around(tool, &bench.part);
         around.deepest = 3.5;
-        path.know(around);
+        path.set_surroundings(around);
         for (int k = 0; k < 4; ++k) {
             // Rings about as wide as the cutter: some have room for a ramp.
             const double x = 60 + 60 * unit(random), y = 200 * unit(random) - 100, r = 0.5 + 8 * unit(random);
