@@ -1,5 +1,4 @@
 #include "io/verify.h"
-#include "engine/base_board.h"
 
 #include <fmt/format.h>
 
@@ -10,6 +9,7 @@
 #include <numbers>
 #include <set>
 
+#include "engine/base_board.h"
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table_check.h"
 #include "io/read/input_file.h"
@@ -183,7 +183,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     check_sequence(out / "sequence.json", build, violations);
 
     result.pattern = options.pattern && options.pattern->is(folder.pattern)
-                         ? options.pattern
+                         ? propped(context, options.pattern, folder.pattern.supports)
                          : read_planned_pattern(context, directory, folder.pattern, options.source, "verify");
     Pattern& pattern = *result.pattern;
     input.mesh = pattern.read.mesh.view();

@@ -1,7 +1,5 @@
 #include "engine/tool_choice/select.h"
 
-#include "engine/base_board.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -9,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/base_board.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/features/alpha_map.h"
 #include "kernels/slicing/slicing.h"

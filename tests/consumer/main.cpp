@@ -1,5 +1,5 @@
-// Plans a pattern through the installed library, from its file, from bytes and as a mesh, and checks that the plans
-// make sense and are one.
+// Plans a pattern through the installed library, from its file, from bytes and as a mesh, and checks that the
+// plans make sense and are one.
 #include <slabwright/io/slabwright.h>
 
 #include <cstdio>
@@ -33,7 +33,8 @@ struct Corners {
 bool makes_sense(const slabwright::Plan& plan) {
     double below = 0;
     for (const slabwright::Layer& layer : plan.layers) {
-        if (layer.z_bottom != below || layer.z_top <= layer.z_bottom || layer.operations.empty()) return false;
+        if (layer.z_bottom != below || layer.z_top <= layer.z_bottom || layer.operations.empty())
+            return false;
         below = layer.z_top;
     }
     return below > 49.99 && below < 50.01;
