@@ -497,7 +497,7 @@ TEST(Footings, APieceOfASlabIsLaidWhereAWholeOneWouldBreakOff) {
     EXPECT_EQ(boss.refused(), 0u);
     const Diagnostic* note = boss.note("joint.small_slab");
     ASSERT_NE(note, nullptr);
-    EXPECT_NE(note->message.find("layer 2: lay a piece of 60 x 60 mm, from x 45 y 45 mm on"),
+    EXPECT_NE(note->message.find("layer 2: lay a piece of 60 x 60 mm, 45 mm in x and 45 mm in y from"),
               std::string::npos)
         << note->message;
 }

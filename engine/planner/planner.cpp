@@ -16,6 +16,7 @@
 #include "engine/layers/layers.h"
 #include "engine/moves/motion_time.h"
 #include "engine/planner/layer_plan.h"
+#include "engine/planner/local_frame.h"
 #include "engine/planner/rating.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
@@ -185,8 +186,13 @@ std::string volume_words(double mm3) {
     return mm3 < 1000 ? fmt::format("{:.0f} mm³", std::max(1.0, mm3)) : fmt::format("{:.1f} cm³", mm3 / 1000);
 }
 
+// @param origin of the frame that the place is told in (local_frame.h)
+std::string place_text(const std::array<double, 2>& origin, double x, double y, double z) {
+    return fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", x + origin[0], y + origin[1], z);
+}
+
 // Says which undercuts stay filled with these layers, and refuses those that the job does not accept.
-void settle_undercuts(Context& context, Plan& plan, MeshView mesh) {
+void settle_undercuts(Context& context, Plan& plan, MeshView mesh, const std::array<double, 2>& origin) {
     const Job& job = plan.job;
     std::vector<double> tops;
     for (const Layer& layer : plan.layers) tops.push_back(layer.z_top);
@@ -224,7 +230,7 @@ void settle_undercuts(Context& context, Plan& plan, MeshView mesh) {
                       fmt::format("{} undercut{} cannot be milled from above; {} would stay filled, up to "
                                   "{:.2f} mm high",
                                   count, count == 1 ? "" : "s", volume_words(volume), tallest.height_mm),
-                      fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", tallest.x, tallest.y, tallest.z),
+                      place_text(origin, tallest.x, tallest.y, tallest.z),
                       "turn or split the pattern, or accept it with --allow-undercut");
 }
 
@@ -314,23 +320,25 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
 }
 
 // Glue and press of every joint.
-void bond_layers(Context& context, Plan& plan, const std::vector<std::vector<JointWood>>& joints) {
+void bond_layers(Context& context, Plan& plan, const std::vector<std::vector<JointWood>>& joints,
+                 const std::array<double, 2>& origin) {
     std::vector<std::vector<WeakJoint>> weak(plan.layers.size());
     std::vector<std::vector<Diagnostic>> notes(plan.layers.size());
     parallel_each(context, plan.layers.size(),
                   [&](std::size_t i) { weak[i] = bond_layer(plan.layers[i], joints[i], plan, notes[i]); });
     for (const std::vector<Diagnostic>& found : notes)
         plan.diagnostics.insert(plan.diagnostics.end(), found.begin(), found.end());
-    settle_joints(plan, weak);
-    settle_joints(plan, slabs_that_tip(plan, joints, plan.diagnostics));
+    settle_joints(plan, weak, origin);
+    settle_joints(plan, slabs_that_tip(plan, joints, plan.diagnostics), origin);
 }
 
 // Whether the joints bear the programs' forces.
-void load_joints(Context& context, Plan& plan, const std::vector<std::vector<JointWood>>& joints) {
+void load_joints(Context& context, Plan& plan, const std::vector<std::vector<JointWood>>& joints,
+                 const std::array<double, 2>& origin) {
     std::vector<std::vector<WeakJoint>> weak(plan.layers.size());
     parallel_each(context, plan.layers.size(),
                   [&](std::size_t i) { weak[i] = joints_under_load(plan.layers[i], joints[i], plan); });
-    settle_joints(plan, weak);
+    settle_joints(plan, weak, origin);
 }
 
 // Places supports where joints cannot hold, until they do or no more can be done.
@@ -361,23 +369,23 @@ std::optional<Mesh> prop(Context& context, Plan& plan, MeshView pattern,
 
 // From layers on. `begun` is a plan with its stock and features.
 Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request,
-                 const LayerPlacement& placement, ProgressShare share) {
+                 const LayerPlacement& placement, ProgressShare share, const std::array<double, 2>& origin) {
     Plan plan = begun;
     plan.diagnostics.insert(plan.diagnostics.end(), placement.diagnostics.begin(),
                             placement.diagnostics.end());
     warn_of_overhang(plan, request, placement.boundaries);
     plan.layers = layers_between(plan.job, placement.boundaries);
     check_chambers(plan);
-    settle_undercuts(context, plan, pattern);
+    settle_undercuts(context, plan, pattern, origin);
     if (plan.job.flask.enabled) plan.flask = place_flask(context, pattern, plan);
     std::vector<std::vector<JointWood>> joints = wood_at_joints(context, pattern, plan);
     const std::optional<Mesh> propped = prop(context, plan, pattern, joints);
     if (propped) pattern = propped->view();
-    bond_layers(context, plan, joints);
+    bond_layers(context, plan, joints, origin);
     cut_layers(context, plan, pattern, joints, share);
 
     context.begin_phase("schedule", share.at(0.99), share.at(1));
-    load_joints(context, plan, joints);
+    load_joints(context, plan, joints, origin);
     context.throw_if_cancelled();
     schedule(plan);
     check_spindle(plan);
@@ -387,7 +395,8 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
 
 // Every placement planned whole; the one that is built in the least time stays.
 Plan fastest_plan(Context& context, MeshView pattern, const Plan& begun, const LayerRequest& request,
-                  const std::vector<LayerCandidate>& tried, ProgressShare share) {
+                  const std::vector<LayerCandidate>& tried, ProgressShare share,
+                  const std::array<double, 2>& origin) {
     std::optional<Plan> best;
     std::exception_ptr refused;  // the first
     std::string words;
@@ -398,7 +407,7 @@ Plan fastest_plan(Context& context, MeshView pattern, const Plan& begun, const L
         asked.max_layer = tried[i].max_layer;
         try {
             Plan plan = plan_layers(context, pattern, begun, asked, tried[i].placement,
-                                    {share.at(at), share.at(at + step)});
+                                    {share.at(at), share.at(at + step)}, origin);
             words += fmt::format("{}{} {:.1f} min", words.empty() ? "" : ", ", tried[i].name,
                                  plan.totals.build_minutes);
             if (!best || plan.totals.build_minutes < best->totals.build_minutes)
@@ -418,24 +427,13 @@ Plan fastest_plan(Context& context, MeshView pattern, const Plan& begun, const L
     return std::move(*best);
 }
 
-}  // namespace
-
-Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const Job& job) {
-    validate(job);
-    Plan plan;
-    plan.input = input;
-    plan.totals.part_volume_mm3 = input.volume_mm3;
-    plan.job = job;
-    if (mesh.facets.empty())
-        throw refusal("input.empty", "there is nothing to make: the mesh has no facets", input.file,
-                      "export the pattern again");
-    const MeshView view = mesh.view();
+// @param view     in the frame that counts from `origin`; so is what is returned
+// @param plan     knows its input and its job
+Plan plan_from(Context& context, MeshView view, Plan plan, const std::array<double, 2>& origin) {
+    const Job& job = plan.job;
     const Box3 box = bounds(context, view);
     const double height = box.max.z;
     place_stock(plan, box);
-
-    const MemoryCharge mesh_memory(
-        context, mesh.vertices.size() * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3), "the mesh");
     context.begin_phase("features", 0.01, 0.015);
     const FeatureOptions options = feature_options(job);
     FeatureSet found = find_features(context, view, options);
@@ -464,13 +462,36 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     if (job.layers.strategy == LayerStrategy::combined) {
         const std::vector<LayerCandidate> tried = layer_candidates(context, view, job, request);
         request.section_area = {};  // nobody asks again, and it is large
-        return fastest_plan(context, view, plan, request, tried, {0.02, 0.985});
+        return fastest_plan(context, view, plan, request, tried, {0.02, 0.985}, origin);
     }
     const LayerPlacement placement = job.layers.strategy == LayerStrategy::printed
                                          ? place_layers_printed(request)
                                          : place_layers_optimal(request);
     request.section_area = {};
-    return plan_layers(context, view, plan, request, placement, {0.02, 0.985});
+    return plan_layers(context, view, plan, request, placement, {0.02, 0.985}, origin);
+}
+
+}  // namespace
+
+Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const Job& job) {
+    validate(job);
+    Plan plan;
+    plan.input = input;
+    plan.totals.part_volume_mm3 = input.volume_mm3;
+    plan.job = job;
+    if (mesh.facets.empty())
+        throw refusal("input.empty", "there is nothing to make: the mesh has no facets", input.file,
+                      "export the pattern again");
+    const MemoryCharge mesh_memory(
+        context, mesh.vertices.size() * 2 * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3),
+        "the mesh");
+    MeshView view = mesh.view();
+    const std::array<double, 2> origin = local_origin(bounds(context, view));
+    const BulkVector<Vec3f> vertices = in_local_frame(context, view, origin);
+    view.vertices = vertices;
+    plan = plan_from(context, view, std::move(plan), origin);
+    leave_local_frame(plan, origin);
+    return plan;
 }
 
 }  // namespace slabwright

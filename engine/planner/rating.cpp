@@ -43,14 +43,15 @@ void add_approaches(Plan& plan, const std::vector<bool>& rated) {
         }
 }
 
-void settle_joints(Plan& plan, const std::vector<std::vector<WeakJoint>>& found) {
+void settle_joints(Plan& plan, const std::vector<std::vector<WeakJoint>>& found,
+                   const std::array<double, 2>& origin) {
     for (const std::vector<WeakJoint>& of_layer : found)
         for (const WeakJoint& weak : of_layer) {
             if (weak.refused && !plan.job.bonding.accept_weak)
-                throw refusal(
-                    weak.code.c_str(), weak.message,
-                    fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", weak.where[0], weak.where[1], weak.where[2]),
-                    weak.remedy + ", or accept it with --accept-weak-joints");
+                throw refusal(weak.code.c_str(), weak.message,
+                              fmt::format("x {:.2f} y {:.2f} z {:.2f} mm", weak.where[0] + origin[0],
+                                          weak.where[1] + origin[1], weak.where[2]),
+                              weak.remedy + ", or accept it with --accept-weak-joints");
             Diagnostic told{Severity::warning, weak.code, weak.message, weak.where};
             if (std::find(plan.diagnostics.begin(), plan.diagnostics.end(), told) == plan.diagnostics.end())
                 plan.diagnostics.push_back(std::move(told));

@@ -1,6 +1,7 @@
 // What is settled once a layer's programs are known: their times, and whether its joints bear them.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "engine/plan.h"
@@ -18,6 +19,7 @@ void add_approaches(Plan& plan, const std::vector<bool>& rated = {});
 
 /// The first joint that cannot hold is a refusal, unless the job accepts it; all others are warned of.
 /// @param found by layer. @throws Error(no_plan) with the joint's own code
-void settle_joints(Plan& plan, const std::vector<std::vector<WeakJoint>>& found);
+void settle_joints(Plan& plan, const std::vector<std::vector<WeakJoint>>& found,
+                   const std::array<double, 2>& origin = {});
 
 }  // namespace slabwright

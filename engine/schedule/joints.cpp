@@ -514,10 +514,12 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
         if (laid[i].mm2() < stock.mm2())
             diagnostics.push_back(
                 {Severity::warning, "joint.small_slab",
-                 fmt::format("layer {}: lay a piece of {:.0f} x {:.0f} mm, from x {:.0f} y {:.0f} mm on, not "
-                             "the whole slab, which would break off; programs pass the rest in air",
-                             layer.index, laid[i].max[0] - laid[i].min[0], laid[i].max[1] - laid[i].min[1],
-                             laid[i].min[0], laid[i].min[1]),
+                 fmt::format(
+                     "layer {}: lay a piece of {:.0f} x {:.0f} mm, {:.0f} mm in x and {:.0f} mm in y from "
+                     "the whole slab's corner, not the whole slab, which would break off; programs "
+                     "pass the rest in air",
+                     layer.index, laid[i].max[0] - laid[i].min[0], laid[i].max[1] - laid[i].min[1],
+                     laid[i].min[0] - plan.stock_min[0], laid[i].min[1] - plan.stock_min[1]),
                  std::array<double, 3>{joint.centroid[0], joint.centroid[1], joint.z}});
         if (joint.area_mm2 > 0)
             rate_footing(layer, wood[i].front(), plan.layers[worst[i].layer], worst[i], bears,
