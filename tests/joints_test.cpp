@@ -895,7 +895,8 @@ TEST(Joints, SupportsStandUnderWhatNothingCarries) {
     };
     ASSERT_NE(under(20), plan.supports.end());
     ASSERT_NE(under(100), plan.supports.end());
-    EXPECT_NEAR(under(20)->z_low, 15, 0.5);
+    EXPECT_LE(under(20)->z_low, 15);  // from within the step's wood, at the layer that its top lies in
+    EXPECT_GT(under(20)->z_low, 12);
     EXPECT_EQ(under(100)->z_low, 0);
     EXPECT_NEAR(under(100)->width, 20, 0.5);
     const Mesh propped = with_supports(context, mesh.view(), plan.supports);

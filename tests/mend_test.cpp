@@ -226,7 +226,7 @@ TEST_F(ProvenPlan, WhatIsLeftIsTouchedUp) {
             return op.kind == OperationKind::corner || op.purpose == "what is left";
         });
     EXPECT_GT(dropped, 0U);
-    expect_mended("left.too_much");
+    expect_mended("left.missed");
 }
 
 TEST_F(ProvenPlan, AnOperationThatRemovesNothingIsDropped) {

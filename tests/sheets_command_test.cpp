@@ -88,7 +88,7 @@ TEST(SheetsCommand, RefusesInOneLine) {
 
 // The drawings as ezdxf, which many shops' programs are built on, sees them.
 TEST(SheetsCommand, EzdxfReadsEveryDrawingWithoutAFinding) {
-    if (std::system("python3 -c 'import ezdxf' >/dev/null 2>&1") != 0)
+    if (std::system("/usr/bin/python3 -c 'import ezdxf' >/dev/null 2>&1") != 0)
         GTEST_SKIP() << "python3-ezdxf is not installed; tools/setup does that";
     const TemporaryFolder folder;
     const std::string out = folder / "out";
@@ -103,7 +103,7 @@ TEST(SheetsCommand, EzdxfReadsEveryDrawingWithoutAFinding) {
                   "    assert {'CUT', 'HOLE', 'LABEL', 'TAB'} <= layers, layers\n"
                   "    lines = document.modelspace().query('POLYLINE')\n"
                   "    assert len(lines) > 0 and all(line.is_closed for line in lines)\n");
-    std::string line = "python3 '" + std::string(folder / "audit.py") + "'";
+    std::string line = "/usr/bin/python3 '" + std::string(folder / "audit.py") + "'";
     for (const auto& entry : std::filesystem::directory_iterator(out + "/dxf"))
         line += " '" + entry.path().string() + "'";
     EXPECT_EQ(std::system(line.c_str()), 0);

@@ -28,6 +28,7 @@ void add_sheets_options(CLI::App& command, SheetsOptions& options) {
         ->expected(1, 64);
     command.add_option("--stock", options.stock, "mm: length and width of a stock sheet; 1220 1220")
         ->expected(2)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
         ->check(over_0);
     command.add_option("--axis", options.axis, "along which sheets are stacked")
         ->check(CLI::IsMember({"x", "y", "z"}));

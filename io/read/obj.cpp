@@ -32,13 +32,15 @@ bool is_free_form(std::string_view word) {
                             "hole", "scrv", "sp", "end", "con"});
 }
 
-/// A text without zero bytes whose first statement is one of OBJ's; one without statements goes by its name.
+/// A text without zero bytes whose statements before the first vertex are OBJ's; one without a vertex goes by
+/// its name.
 bool recognise(std::string_view head, std::uint64_t, std::string_view name) {
     if (head.find('\0') != std::string_view::npos) return false;
     const bool named = name.size() >= 4 && is_word(name.substr(name.size() - 4), ".obj");
     Words words{head};
     for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
-        if (word[0] != '#') return word == "v" || says_nothing(word) || (named && is_free_form(word));
+        if (word == "v") return true;
+        if (word[0] != '#' && !says_nothing(word)) return named && is_free_form(word);
         words.skip_line();
     }
     return named;

@@ -110,10 +110,10 @@ Lengths finish_lengths(FinishStrategy strategy, Projection projection) {
     return lengths;
 }
 
-void expect_near(double measured, double integral, const char* what) {
+void expect_near(double measured, double integral, const char* what, double within = 0.02) {
     std::printf("%-34s programs %8.2f m, integral %8.2f m, %+.2f %%\n", what, measured / 1000,
                 integral / 1000, 100 * (measured / integral - 1));
-    EXPECT_NEAR(measured, integral, 0.02 * integral) << what;
+    EXPECT_NEAR(measured, integral, within * integral) << what;
 }
 
 TEST(Shaping, LengthsOfTheEmittedProgramsAreTheIntegrals) {
@@ -121,7 +121,8 @@ TEST(Shaping, LengthsOfTheEmittedProgramsAreTheIntegrals) {
     expect_near(levels.levels, levels_length(0, kStep), "levels alone");
     EXPECT_EQ(levels.projection, 0);
     const Lengths projection = finish_lengths(FinishStrategy::projection, Projection::offset);
-    expect_near(projection.projection, offsets_length(pi / 2, kStep), "projection alone");
+    // Offsets that end at the equator count in whole ones: one more or less is half a percent.
+    expect_near(projection.projection, offsets_length(pi / 2, kStep), "projection alone", 0.025);
     EXPECT_EQ(projection.levels, 0);
     const Lengths both = finish_lengths(FinishStrategy::both, Projection::offset);
     expect_near(both.levels, levels_length(0, kStep), "both: levels");

@@ -66,7 +66,7 @@ function toolRows(uses, key) {
         tick(`${key}:T${number}`, `T${number} loaded and measured`, true), make('strong', {}, `T${number}`), tool.name, figure(tool.diameter, 3), make('strong', {}, figure(tool.holder.stickout, 1)),
         figure(tool.flute_length, 1), span(list.map(o => o.spindle_rpm), ''), feedsOf(list)]);
 }
-const toolHead = ['', 'Place', 'Tool', 'Ø mm', 'Stick-out mm', 'Flutes mm', 'rpm', 'Feed mm/min'];
+const toolHead = ['✓', 'Place', 'Tool', 'Ø mm', 'Stick-out mm', 'Flutes mm', 'rpm', 'Feed mm/min'];
 
 function fact(name, ...content) {
     return make('div', {class: 'fact'}, make('h4', {}, name), content);
@@ -109,7 +109,7 @@ function sheet(l, minutes) {
                 : make('p', {}, 'clamp the slab'))),
         make('div', {class: 'lists'},
             make('div', {}, make('h4', {}, 'Tools'), table(toolHead, toolRows(programs, `L${l}`), [3, 4, 5, 6, 7])),
-            make('div', {}, make('h4', {}, 'Programs, in this order'), table(['', 'Program', 'Work', 'Tool', 'rpm', 'Feed mm/min', 'Time'], programs.map(o => [
+            make('div', {}, make('h4', {}, 'Programs, in this order'), table(['✓', 'Program', 'Work', 'Tool', 'rpm', 'Feed mm/min', 'Time'], programs.map(o => [
                 tick(`L${l}:${o.name}`, `${o.name} done`, true), make('code', {}, o.name), `${words(o.kind)}: ${o.purpose}`, make('strong', {}, `T${o.tool}`), figure(o.spindle_rpm, 0), feedsOf([o]), duration(o.minutes)]), [4, 5, 6]))),
         make('h4', {}, 'Checks'),
         make('div', {class: 'checks'}, [
@@ -146,7 +146,7 @@ function cover(minutes) {
         make('h4', {}, 'Tools'),
         table(toolHead, toolRows(operations, 'cover'), [3, 4, 5, 6, 7]),
         make('h4', {}, 'Layers, from below'),
-        table(['', 'Layer', 'Slab mm', 'From z', 'Face to z', 'Glue cm²', 'Press N', 'Programs', 'Warnings', 'Time'], [
+        table(['✓', 'Layer', 'Slab mm', 'From z', 'Face to z', 'Glue cm²', 'Press N', 'Programs', 'Warnings', 'Time'], [
             ...plan.layers.map((layer, l) => [tick(`cover:L${l}`, `layer ${layer.index} done`, true), make('strong', {}, String(layer.index)), figure(layer.slab_thickness, 2), figure(layer.z_bottom, 2), figure(layer.z_top, 2),
                 figure(layer.glue_area_mm2 / 100, 1), figure(layer.press_force_n, 0), String(layer.operations.length), perLayer[l] ? String(perLayer[l]) : '–', shown[l]]),
             ['', make('strong', {}, 'All'), '', '', '', figure(t.glue_mm2 / 100, 1), '', String(operations.length), '', make('strong', {}, duration(plan.totals.build_minutes))]], [2, 3, 4, 5, 6, 7, 8, 9]),
