@@ -15,7 +15,7 @@ namespace slabwright {
 struct ReportOptions {
     PatternSource source;  ///< the pattern; none looks for the file that plan.json names: in OUT, beside OUT,
                            ///< in the working folder
-    bool three_d = true;        ///< false: no model, no paths, no stock
+    bool three_d = true;   ///< false: no model, no paths, no stock
     double size_limit_mb = 10;  ///< 1 MB is 10⁶ bytes; the model gets fewer facets and the paths fewer points
                                 ///< until the page is no larger
 };

@@ -208,10 +208,11 @@ VerifyResult verdict(const Verification& found) {
     for (const MissingTool& m : found.missing)
         result.advice.push_back(
             {Severity::note, "tool.missing",
-             fmt::format("a {} (flutes {:g} mm, stick-out {:g} mm) would reach {:.0f} mm² of {:.0f} mm² that no "
-                         "tool reaches, up to {:.2f} mm deep, in about {:.0f} min",
-                         m.tool.name, m.tool.flute_length, m.tool.stickout, m.gain_mm2, result.unreachable_mm2,
-                         m.depth_mm, std::max(1.0, m.minutes)),
+             fmt::format(
+                 "a {} (flutes {:g} mm, stick-out {:g} mm) would reach {:.0f} mm² of {:.0f} mm² that no "
+                 "tool reaches, up to {:.2f} mm deep, in about {:.0f} min",
+                 m.tool.name, m.tool.flute_length, m.tool.stickout, m.gain_mm2, result.unreachable_mm2,
+                 m.depth_mm, std::max(1.0, m.minutes)),
              m.where});
     for (const Violation& v : found.report.violations) {
         Diagnostic d{Severity::error, v.code, v.message, v.where};

@@ -16,10 +16,10 @@ struct VerifyOptions {
     /// The pattern where it has been read already: it is not read again if it is the one that plan.json
     /// names.
     std::shared_ptr<Pattern> pattern{};
-    double cell = 0;               ///< mm, SimulationOptions::cell
-    bool maps = false;             ///< keep the maps in the report
-    std::string maps_directory{};  ///< "": none; write layer_01.ppm and so on there (write_maps())
-    bool write = true;             ///< write OUT/verify.json
+    double cell = 0;                     ///< mm, SimulationOptions::cell
+    bool maps = false;                   ///< keep the maps in the report
+    std::string maps_directory{};        ///< "": none; write layer_01.ppm and so on there (write_maps())
+    bool write = true;                   ///< write OUT/verify.json
     SimulationMemory* memory = nullptr;  ///< of the verification before of the same folder (simulate())
     bool faults = false;  ///< list every faulty motion in the report (SimulationOptions::faults)
 };
@@ -30,7 +30,7 @@ struct Verification {
     SimulationInput input;             ///< its mesh is not set: pattern has it
     SimulationReport report;
     std::vector<MissingTool> missing;  ///< tools that would reach what is out of reach
-    std::string json;  ///< what verify.json holds (schema slabwright.verify/1)
+    std::string json;                  ///< what verify.json holds (schema slabwright.verify/1)
 };
 
 /// Reads plan.json, every program of nc/, tool.tbl, sequence.json and, if it is not given, the pattern,

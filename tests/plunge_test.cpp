@@ -179,7 +179,8 @@ TEST(Plunge, NoRunIsEnteredOnItsCore) {
             around.from_side = tool.kind == ToolKind::face && round % 2 == 0;
             path.set_surroundings(around);
             for (int k = 0; k < 13; ++k) {
-                const std::vector<PathPoint> run = k == 3 && round % 3 == 0 ? random_stairs(random) : random_run(random);
+                const std::vector<PathPoint> run =
+                    k == 3 && round % 3 == 0 ? random_stairs(random) : random_run(random);
                 bool free = true;
                 for (std::size_t p = 1; p < run.size() && free; ++p) free = bench.free(run[p - 1], run[p]);
                 if (!free) continue;
@@ -202,8 +203,8 @@ TEST(Plunge, NoRunIsEnteredOnItsCore) {
     EXPECT_GT(sloping, 1000U);
 }
 
-// Where a level above found no way in, more stands than a run may cut at once: it comes down in steps, or stays
-// away.
+// Where a level above found no way in, more stands than a run may cut at once: it comes down in steps, or
+// stays away.
 TEST(Plunge, NoRunCutsDeeperThanItMay) {
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> unit(0, 1);
@@ -234,8 +235,9 @@ TEST(Plunge, NoRunCutsDeeperThanItMay) {
                 to{to_mm(b.x), to_mm(b.y), to_mm(b.z)};
             const CellGrid& grid = bench.stock.grid();
             double deepest = 0;
-            sweep(grid, {CutterEnd::Form::flat, tool.diameter / 2 - 1.5, 0}, from, to,
-                  [&](std::size_t cell, double z) { deepest = std::max(deepest, bench.stock.top(cell) - z); });
+            sweep(
+                grid, {CutterEnd::Form::flat, tool.diameter / 2 - 1.5, 0}, from, to,
+                [&](std::size_t cell, double z) { deepest = std::max(deepest, bench.stock.top(cell) - z); });
             EXPECT_LE(deepest, around.deepest + PathBuilder::kBite + 0.05) << round << " move " << k;
             cuts += deepest > 0.5;
             bench.stock.cut({CutterEnd::Form::flat, tool.diameter / 2, 0}, from, to);

@@ -179,8 +179,9 @@ std::string makes(const VerifyResult& result) {
 
 /// What the simulation of the programs says.
 std::string verdict(const VerifyResult& result, const std::string& out) {
-    std::string text = fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, programs run {}\n", out,
-                                   makes(result), result.gouge_mm, result.cell_mm, duration(result.minutes));
+    std::string text =
+        fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, programs run {}\n", out,
+                    makes(result), result.gouge_mm, result.cell_mm, duration(result.minutes));
     constexpr std::size_t shown = 20;  // verify.json holds them all
     for (std::size_t i = 0; i < std::min(shown, result.violations.size()); ++i)
         text += fmt::format("{}: {}\n", result.violations[i].code, result.violations[i].message);

@@ -410,16 +410,16 @@ bool PathBuilder::comes_down_on_stock(const PathPoint& to) {
            to_mm(to.z) + kScrape;
 }
 
-// How many points of a run may be followed at once, or, where that is none, may not; `top` then is how high there
-// stands what is too much.
+// How many points of a run may be followed at once, or, where that is none, may not; `top` then is how high
+// there stands what is too much.
 std::size_t PathBuilder::stretch_at_once(std::span<const PathPoint> run, double& top) {
     learn();
     top = -1e300;
     bool too_much = false;
     for (std::size_t k = 0; k < run.size(); ++k) {
         const PathPoint &p = run[k > 0 ? k - 1 : 0], &q = run[k];
-        const double stands = around_.standing->free_tip(around_.cutter, {to_mm(p.x), to_mm(p.y)},
-                                                         {to_mm(q.x), to_mm(q.y)});
+        const double stands =
+            around_.standing->free_tip(around_.cutter, {to_mm(p.x), to_mm(p.y)}, {to_mm(q.x), to_mm(q.y)});
         const bool here = stands > to_mm(std::min(p.z, q.z)) + around_.deepest + kBite;
         if (k == 0) too_much = here;
         else if (here != too_much) return k;

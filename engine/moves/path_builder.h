@@ -58,10 +58,9 @@ public:
     /// Helices and ramps of a tool with a core are so gentle that nothing stands higher under it than its
     /// recess (core_recess), and end on a level turn or leg that clears the rest. Where a run goes down
     /// steeply on standing stock, such a tool enters anew.
-    /// Where more stands than may be cut at once (Surroundings::deepest), since an earlier level found no way in,
-    /// the run is first followed higher up; where that has no way in either, it is left out.
-    /// Every point of the run must be free, and so must be what lies straight above it (as of a drop or a
-    /// level contour).
+    /// Where more stands than may be cut at once (Surroundings::deepest), since an earlier level found no way
+    /// in, the run is first followed higher up; where that has no way in either, it is left out. Every point
+    /// of the run must be free, and so must be what lies straight above it (as of a drop or a level contour).
     void follow(std::span<const PathPoint> run);
     /// The steepest slope on which the tool may go down round and round a closed ring (its first point is
     /// repeated at the end); 0 where the ring is so small that its core would leave a post.

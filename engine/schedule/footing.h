@@ -27,7 +27,7 @@ struct DownForce {
 /// What acts on a joint.
 struct FootingLoad {
     std::vector<DownForce> weights;
-    double push_n = 0;           ///< of a cutter, straight up or down, at the worst of `push_at`
+    double push_n = 0;  ///< of a cutter, straight up or down, at the worst of `push_at`
     std::span<const std::array<double, 2>> push_at;
     double side_bending_nmm = 0;  ///< of a cutter: its force along the joint times its height above it
 };

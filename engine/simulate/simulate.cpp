@@ -30,7 +30,8 @@ constexpr double kDeeper = 0.05;          // mm by which a roughing cut may pass
 constexpr double kAbreast = 3;            // fewer cells than this side by side do not tell how wide a cut is
 constexpr double kStanding = 0.01;        // mm by which shank or holder must reach into stock to be reported
 
-constexpr std::size_t kTileUnreached = 256;  // places of a tile and layer that are kept of what is out of reach
+constexpr std::size_t kTileUnreached =
+    256;  // places of a tile and layer that are kept of what is out of reach
 
 constexpr double kArcError = 0.001;  // mm: more than rounding may add to Program::chord_error
 

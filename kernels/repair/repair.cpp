@@ -24,7 +24,7 @@ constexpr double kHoleShare = 0.05;    // likewise
 // that closes may not. Other distances are tried where the first leaves it open, as shares of that.
 constexpr std::array<double, 4> kOtherStitches{0.4, 1.6, 2.0, 0.1};
 constexpr std::size_t kMostTriedAgain = 2'000'000;  // facets
-constexpr double kThinOfStitch = 4;    // a slit may be so many times as wide as a crack
+constexpr double kThinOfStitch = 4;                 // a slit may be so many times as wide as a crack
 
 double diagonal(const Box3& box) {
     const Xyz d = minus(xyz(box.max), xyz(box.min));
