@@ -288,10 +288,18 @@ void replay_programs(Context& context, const PlannedFolder& folder, const Simula
         for (const float left : found.left)
             codes += static_cast<char>(left_over_code(left, folder.build.job.tolerances.gouge));
         figures.replay.push_back(base64(codes));
-        figures.wood.push_back(wood_json(input.layers[layer], found.surface));
+        const PackedHeights wood = packed_wood(input.layers[layer], found.surface);
+        figures.wood.push_back({{"rle", wood.in_runs}, {"data", wood.base64}});
     });
-    figures.data["filled"] = filled_json(context, input.mesh, input.layers, replay.first(), options.cell,
-                                         replay.nx(), replay.ny());
+    const PackedFilling filled = packed_filling(context, input.mesh, input.layers, replay.first(),
+                                                options.cell, replay.nx(), replay.ny());
+    Json layers = Json::array();
+    for (const PackedFilling::Layer& l : filled.layers)
+        layers.push_back({{"boxes", l.boxes}, {"mm3", l.mm3}});
+    figures.data["filled"] = {{"z0", filled.z0},
+                              {"height", filled.height},
+                              {"tolerance_mm", filled.tolerance},
+                              {"layers", std::move(layers)}};
     context.advance(left_over_steps(folder));
 }
 

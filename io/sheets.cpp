@@ -85,7 +85,7 @@ SheetProof prove_folder(Context& context, const fs::path& directory, const Mesh&
                         const std::string& pattern, SheetProofRules rules) {
     const SheetsFolder folder = read_folder(directory);
     rules.part_may_lose = rules.part_may_lose || folder.part_may_lose;
-    const SheetProof proof = prove_sheets(context, along.view(), read_programs(directory, folder), rules);
+    SheetProof proof = prove_sheets(context, along.view(), read_programs(directory, folder), rules);
     write_file_in(directory, "verify.json", sheets_verify_json(proof, pattern));
     return proof;
 }

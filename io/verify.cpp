@@ -197,8 +197,10 @@ Verification verify_folder(Context& context, const std::string& directory, const
     simulation.cusp = job.tolerances.cusp;
     simulation.board_cut = board_cut_limit(job.machine, input.tools);
     result.report = simulate(context, input, *pattern.part, simulation, options.memory);
-    MissingToolOptions asked{job.units == LengthUnit::inch, simulation.cusp + simulation.slack,
-                             simulation.board_cut};
+    MissingToolOptions asked;
+    asked.inch = job.units == LengthUnit::inch;
+    asked.limit = simulation.cusp + simulation.slack;
+    asked.board_cut = simulation.board_cut;
     asked.cusp = simulation.cusp;
     asked.bends = simulation.cusp;
     if (folder.build.job_stated) {

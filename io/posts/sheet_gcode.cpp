@@ -283,9 +283,8 @@ private:
             way.points.resize(1);
             return;
         }
-        if (last.x != head.x || last.y != head.y || last.a != head.a || last.c != head.c)
-            way.points.push_back(head);
-        else if (way.points.size() == 1) way.points.push_back(head);
+        const bool moved = last.x != head.x || last.y != head.y || last.a != head.a || last.c != head.c;
+        if (moved || way.points.size() == 1) way.points.push_back(head);
     }
 
     void begin(double x, double y, double a, double c) {

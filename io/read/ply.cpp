@@ -238,8 +238,8 @@ private:
     std::size_t list_size(const Property& list) {
         const double count = number(*list.count);
         const std::size_t least = ascii() ? 2 : size_of(list.type);
-        if (!(count >= 0) || count != std::floor(count) ||
-            count > static_cast<double>((bytes_.size() - at_ + 1) / least))
+        const std::size_t most = (bytes_.size() - at_ + 1) / least;
+        if (!(count >= 0) || count != std::floor(count) || count > static_cast<double>(most))
             refuse_mesh(kFamily, "list", fmt::format("a list of {} numbers does not fit the file", count),
                         here(), kExportAgain);
         return static_cast<std::size_t>(count);

@@ -12,8 +12,6 @@ namespace slabwright {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr double kStands = 1e-3;            // mm: less is none
 constexpr std::size_t kMostBoxes = 40'000;  // half a megabyte in the page
 constexpr double kFirstTolerance = 0.05;    // mm
@@ -57,7 +55,7 @@ std::vector<FilledBox> boxes_of(const std::vector<std::vector<FilledGap>>& rows,
 
 }  // namespace
 
-Json wood_json(const SimulatedLayer& layer, const std::vector<float>& surface) {
+PackedHeights packed_wood(const SimulatedLayer& layer, const std::vector<float>& surface) {
     std::string bytes, runs;
     bytes.reserve(surface.size());
     const double height = layer.z_top - layer.z_bottom;
@@ -74,11 +72,11 @@ Json wood_json(const SimulatedLayer& layer, const std::vector<float>& surface) {
         begin = end;
     }
     const bool rle = runs.size() < bytes.size();
-    return {{"rle", rle}, {"data", base64(rle ? runs : bytes)}};
+    return {rle, base64(rle ? runs : bytes)};
 }
 
-Json filled_json(Context& context, MeshView mesh, std::span<const SimulatedLayer> layers,
-                 const std::array<double, 2>& first, double cell, int nx, int ny) {
+PackedFilling packed_filling(Context& context, MeshView mesh, std::span<const SimulatedLayer> layers,
+                             const std::array<double, 2>& first, double cell, int nx, int ny) {
     const Box3 box = bounds(context, mesh);
     const double z0 = box.min.z, height = std::max(1e-9, double{box.max.z} - z0);
     std::vector<double> borders{z0};
@@ -97,7 +95,7 @@ Json filled_json(Context& context, MeshView mesh, std::span<const SimulatedLayer
         }
         if (count <= kMostBoxes || tolerance > height) break;
     }
-    Json list = Json::array();
+    std::vector<PackedFilling::Layer> list;
     const auto share = [&](double z) {
         return static_cast<std::uint16_t>(std::clamp(std::round((z - z0) / height * 65535), 0.0, 65535.0));
     };
@@ -112,9 +110,9 @@ Json filled_json(Context& context, MeshView mesh, std::span<const SimulatedLayer
                  {static_cast<std::uint16_t>(b.row), static_cast<std::uint16_t>(b.column),
                   static_cast<std::uint16_t>(b.count), share(b.low), share(b.high)})
                 append(bytes, value);
-        list.push_back({{"boxes", base64(bytes)}, {"mm3", std::round(volume)}});
+        list.push_back({base64(bytes), std::round(volume)});
     }
-    return {{"z0", z0}, {"height", height}, {"tolerance_mm", tolerance}, {"layers", std::move(list)}};
+    return {z0, height, tolerance, std::move(list)};
 }
 
 }  // namespace slabwright

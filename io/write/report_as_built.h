@@ -2,8 +2,9 @@
 // layer, and what of it should be air.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <array>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/simulate/simulate.h"
@@ -15,19 +16,30 @@ namespace slabwright {
 /// Heights of a layer's wood as base64 of bytes, row after row: 0 where nothing stands, else 1 … 255 from the
 /// layer's bottom to its top (wood above the top, where there is any, counts as 255). Runs of equal bytes are
 /// written as pairs (length, byte) where that is shorter.
+struct PackedHeights {
+    bool in_runs = false;
+    std::string base64;
+};
+
 /// @param surface mm, of every point
-/// @return {"rle": bool, "data": base64}
-[[nodiscard]] nlohmann::ordered_json wood_json(const SimulatedLayer& layer,
-                                               const std::vector<float>& surface);
+[[nodiscard]] PackedHeights packed_wood(const SimulatedLayer& layer, const std::vector<float>& surface);
 
 /// What stays filled under overhangs of each layer: boxes along the grid's rows, as base64 of five 16-bit
 /// numbers each: row, column, how many columns, and between which heights, as shares of the pattern's own
 /// height. Neighbours whose heights differ by less than a tolerance share a box; it grows until there are few
 /// enough.
-/// @return {"z0": mm, "height": mm, "tolerance_mm", "layers": [{"boxes", "mm3"}]}
-[[nodiscard]] nlohmann::ordered_json filled_json(Context& context, MeshView mesh,
-                                                 std::span<const SimulatedLayer> layers,
-                                                 const std::array<double, 2>& first, double cell, int nx,
-                                                 int ny);
+struct PackedFilling {
+    struct Layer {
+        std::string boxes;  ///< base64
+        double mm3 = 0;
+    };
+    double z0 = 0, height = 0, tolerance = 0;  ///< mm
+    std::vector<Layer> layers;
+};
+
+/// @param first the grid's first point, mm, @param cell mm between its points
+[[nodiscard]] PackedFilling packed_filling(Context& context, MeshView mesh,
+                                           std::span<const SimulatedLayer> layers,
+                                           const std::array<double, 2>& first, double cell, int nx, int ny);
 
 }  // namespace slabwright

@@ -375,7 +375,7 @@ UnmadePatches joined(MeshView mesh, const FacetClasses& classes, std::span<const
 
 // Walls that lean in under a ceiling have no column of their own: the air is the ceiling's, told once.
 std::vector<UnmadeUndercut> told_once(const Measure& measure, std::span<const double> borders,
-                                      UnmadePatches found) {
+                                      UnmadePatches&& found) {
     auto& [patches, thickest, of] = found;
     std::vector<char> told(patches.size(), 1);
     for (std::size_t k = 0; k < patches.size(); ++k) {

@@ -8,7 +8,7 @@
 
 #include <cstdint>
 
-#if defined(__x86_64__) && defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && \
+#if defined(__x86_64__) && defined(__GLIBC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
 #define SLABWRIGHT_WIDE [[gnu::target_clones("avx512f", "avx2", "default")]]
 #else

@@ -211,8 +211,8 @@ SLABWRIGHT_WIDE void spans_of_rows(const CellGrid& grid, int first_row, int rows
         low = low_b < low ? low_b : low;
         high = high_b > high ? high_b : high;
         const double l = lx + (y - ly) * inverse, r = rx + (y - ry) * inverse;
-        const double l_off = (y < l_from) | (y > l_to) ? inf : 0.0,
-                     r_off = (y < r_from) | (y > r_to) ? inf : 0.0;
+        const double l_off = ((y < l_from) | (y > l_to)) ? inf : 0.0,
+                     r_off = ((y < r_from) | (y > r_to)) ? inf : 0.0;
         low = l + l_off < low ? l + l_off : low;
         high = l - l_off > high ? l - l_off : high;
         low = r + r_off < low ? r + r_off : low;
@@ -234,7 +234,7 @@ namespace {
 [[gnu::always_inline]] inline void narrow(const Strip& strip, const Doubles8& value, Doubles8& low,
                                           Doubles8& high) {
     if (strip.everywhere_or_nowhere()) {
-        high = (value >= strip.least) & (value <= strip.most) ? high : Doubles8{} - kUnbounded;
+        high = ((value >= strip.least) & (value <= strip.most)) ? high : Doubles8{} - kUnbounded;
         return;
     }
     const Doubles8 a = (strip.least - value) * strip.inverse, b = (strip.most - value) * strip.inverse;

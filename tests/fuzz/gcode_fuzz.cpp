@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const Tool* loaded = nullptr;
         for (const Tool& tool : job.tools)
             if (tool.number == program.tool) loaded = &tool;
-        (void)check_program(program, {.spindle_rpm = 12000, .blend = 0.02}, loaded, job.machine);
+        (void)check_program(program, {.spindle_rpm = 12000, .blend = 0.02, .feeds = {}}, loaded, job.machine);
     });
     return 0;
 }
