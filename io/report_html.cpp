@@ -1,4 +1,5 @@
 #include "io/report_html.h"
+#include "io/text/json_text.h"
 
 #include <fmt/format.h>
 
@@ -63,8 +64,8 @@ auto understood(const fs::path& path, const char* code, Body&& body) {
     try {
         return body();
     } catch (const nlohmann::json::exception& e) {
-        throw Error(ErrorKind::input, code, std::string("cannot be understood: ") + e.what(), path.string(),
-                    "plan again");
+        throw Error(ErrorKind::input, code, quoting_line(std::string("cannot be understood: ") + e.what()),
+                    path.string(), "plan again");
     }
 }
 

@@ -151,7 +151,7 @@ public:
     }
     [[noreturn]] void fail(const toml::node& node, const char* code, const std::string& message,
                            const std::string& remedy) const {
-        throw Error(ErrorKind::usage, code, message, place_of(node), remedy);
+        throw Error(ErrorKind::usage, code, quoting_line(message), place_of(node), remedy);
     }
     static const char* type_name(const toml::node& node) {
         switch (node.type()) {
@@ -372,7 +372,8 @@ Job parse_job(std::string_view text, const std::string& file, const Job& base) {
     try {
         root = toml::parse(text, file);
     } catch (const toml::parse_error& error) {
-        throw Error(ErrorKind::usage, "job.syntax", fmt::format("not TOML: {}", error.description()),
+        throw Error(ErrorKind::usage, "job.syntax",
+                    quoting_line(fmt::format("not TOML: {}", error.description())),
                     fmt::format("{}:{}", file, error.source().begin.line),
                     "`slabwright job --defaults` prints a job file that is right");
     }
@@ -405,7 +406,7 @@ Job parse_job(std::string_view text, const std::string& file, const Job& base) {
         // validate() names the key; the reader knows on which line it stands. A key at its default has no
         // line.
         const auto place = reader.places().find(error.place());
-        throw Error(error.kind(), error.code(), error.message(),
+        throw Error(error.kind(), error.code(), quoting_line(error.message()),
                     place != reader.places().end() ? place->second : file, error.remedy());
     }
     return job;

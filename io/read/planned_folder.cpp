@@ -8,6 +8,7 @@
 
 #include "io/read/input_file.h"
 #include "io/text/job_keys.h"
+#include "io/text/json_text.h"
 
 namespace slabwright {
 
@@ -23,7 +24,7 @@ struct Refuse {
     const FolderRefusal& how;
     const std::string& file;
     [[noreturn]] void because(const std::string& what) const {
-        throw Error(how.kind, how.plan, what, file, "plan again");
+        throw Error(how.kind, how.plan, quoting_line(what), file, "plan again");
     }
 };
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "io/text/job_keys.h"
+#include "io/text/json_text.h"
 #include "kernels/errors.h"
 
 namespace slabwright {
@@ -20,7 +21,8 @@ constexpr std::size_t kMostSteps = 2'000'000, kMostNeeds = 1000;
 constexpr double kFarthest = 200'000;  // mm: loops are in tenths of a micrometre, 32 bits
 
 [[noreturn]] void refuse(const std::string& message) {
-    throw Error(ErrorKind::verification, "verify.sequence", message, "sequence.json", "plan again");
+    throw Error(ErrorKind::verification, "verify.sequence", quoting_line(message), "sequence.json",
+                "plan again");
 }
 
 /// JSON in which a name stands twice says two things; which of them a machine does, nobody knows.

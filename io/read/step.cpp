@@ -40,7 +40,9 @@
 #include <TopoDS_Shape.hxx>
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <mutex>
 #include <sstream>
 #endif
@@ -207,12 +209,22 @@ void write_all(int file, const void* data, std::size_t bytes) {
     }
 }
 
+/// What the process holds writable and to itself, in bytes: what a limit of data counts. Under
+/// AddressSanitizer that is terabytes, of which nothing is in memory.
+std::uint64_t data_bytes_now() {
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("VmData:")) return std::strtoull(line.c_str() + 7, nullptr, 10) * 1024;
+    return 0;
+}
+
 /// The reading process: never returns.
 [[noreturn]] void read_and_tell(int file, Context& context, std::string_view bytes, double deviation_mm,
                                 const std::string& place, std::uint64_t memory_bytes) {
     for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL, SIGPIPE, SIGINT, SIGTERM, SIGHUP})
         ::signal(signal, SIG_DFL);
-    const rlimit no_core{0, 0}, data{memory_bytes, memory_bytes};
+    const std::uint64_t most = data_bytes_now() + memory_bytes;
+    const rlimit no_core{0, 0}, data{most, most};
     (void)::setrlimit(RLIMIT_CORE, &no_core);
     (void)::setrlimit(RLIMIT_DATA, &data);
     Outcome outcome;
@@ -289,7 +301,7 @@ public:
     }
 
 private:
-    static constexpr std::uint64_t kOwnBytes = std::uint64_t{1} << 28;  ///< data of the process as it begins
+    static constexpr std::uint64_t kOwnBytes = std::uint64_t{1} << 28;  ///< OCCT's tables and schemas
     [[noreturn]] void fail(const std::string& what) const {
         refuse_mesh(kFamily, "damaged", what, place_, "export the file again, or as STL");
     }

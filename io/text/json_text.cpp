@@ -57,6 +57,13 @@ std::string printable(std::string_view text, bool one_line) {
     return shown;
 }
 
+std::string quoting_line(std::string_view message) {
+    constexpr std::size_t most = 400;
+    std::string line = printable(message.substr(0, most), true);
+    if (message.size() > most) line += " …";
+    return line;
+}
+
 void append_rounded(std::string& text, double value, int decimals) {
     require_finite(value);
     char buffer[400];

@@ -17,6 +17,10 @@ namespace slabwright {
 /// are no UTF-8 question marks. @param one_line line breaks too
 [[nodiscard]] std::string printable(std::string_view text, bool one_line);
 
+/// A message that quotes a file: one printable line of at most some 400 bytes; what is longer is cut, with a
+/// mark.
+[[nodiscard]] std::string quoting_line(std::string_view message);
+
 /// Appends `value` rounded to `decimals` (0…9) places, trailing zeros cut; never "-0". @throws Error(no_plan,
 /// "number.not_finite"): no file of ours has a place for NaN or infinity
 void append_rounded(std::string& text, double value, int decimals);
