@@ -333,6 +333,41 @@ TEST(Polygons, NestWhereLoopsShareEdges) {
     EXPECT_EQ(loops.parents[6], 5);
 }
 
+/// A plate with rows of fins on it (or holes in it), every one given `times` over, in random order; and
+/// the parents that they must have: fins and holes that of the plate, copies that of the copy before.
+void nest_fins(std::mt19937_64& random, int side, int times) {
+    std::vector<int> order;
+    for (int i = 0; i < side * side * times; ++i) order.push_back(i / times);
+    std::shuffle(order.begin(), order.end(), random);
+    const std::size_t plate = random() % (order.size() + 1);
+    Loops loops;
+    std::vector<std::int32_t> expected, last(static_cast<std::size_t>(side * side), -1);
+    for (std::size_t i = 0; i <= order.size(); ++i) {
+        if (i == plate) {
+            add(loops, rectangle(-5, -5, 10 * side + 5, 10 * side + 5));
+            expected.push_back(-1);
+        }
+        if (i == order.size()) break;
+        const int x = order[i] % side * 10, y = order[i] / side * 10;
+        std::int32_t& before = last[static_cast<std::size_t>(order[i])];
+        expected.push_back(before >= 0 ? before : static_cast<std::int32_t>(plate));
+        before = static_cast<std::int32_t>(loops.size());
+        const auto fin = rectangle(x, y, x + 3, y + 8);
+        add(loops, random() % 2 == 0 ? fin : reversed(fin));
+    }
+    nest(loops);
+    ASSERT_EQ(loops.parents, expected) << side << " x " << side << ", each " << times << " times";
+}
+
+TEST(Polygons, NestOfManyFinsAndOfLoopsGivenManyTimes) {
+    std::mt19937_64 random(seed_of("nest fins"));
+    for (int round = 0; round < 40; ++round)
+        nest_fins(random, 1 + static_cast<int>(random() % 12), 1 + static_cast<int>(random() % 5));
+    // By asking every loop about every other these would take minutes.
+    nest_fins(random, 400, 1);
+    nest_fins(random, 1, 3000);
+}
+
 TEST(Polygons, NestSurvivesCrossingFlatAndEqualLoops) {
     std::mt19937_64 random(seed_of("nest crossing"));
     for (int round = 0; round < 100; ++round) {

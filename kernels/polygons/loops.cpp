@@ -169,27 +169,14 @@ int winding(const Loops& loops, Point2 p) {
     return turns;
 }
 
-// Every loop is asked for at one point: on a line half a unit above an integer height, just right of the
-// loop's leftmost crossing. No point of any loop lies on such a line, so loops that touch in points cannot
-// confuse the count, and where they share an edge "just right" decides. All arithmetic is exact. The loops
-// around that point are found by counting signed crossings to its left, over chains of edges that rise or
-// fall: a chain that lies wholly on one side costs one comparison, the others a binary search. The chains
-// that a line meets are kept up by a sweep in y.
-//
-// Only a larger loop (of two equal ones the earlier) may be a parent, so that there is no cycle even where
-// loops cross.
-void nest(Loops& loops) {
-    const std::size_t n = loops.size();
-    loops.parents.assign(n, -1);
-    if (n < 2) return;
+namespace {
 
-    std::vector<Wide> size(n);
-    std::vector<Chain> chains;
+/// A point just right of a crossing, inside each loop that has any inside; chains of all loops go to
+/// `chains`.
+std::vector<Probe> probe_loops(const Loops& loops, std::vector<Chain>& chains) {
     std::vector<Probe> probes;
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = 0; i < loops.size(); ++i) {
         const auto loop = loops.loop(i);
-        size[i] = twice_area(loop);
-        if (size[i] < 0) size[i] = -size[i];
         const std::size_t first = chains.size();
         append_chains(loop, static_cast<std::uint32_t>(i), chains);
         const std::span<const Chain> own = std::span(chains).subspan(first);
@@ -211,45 +198,121 @@ void nest(Loops& loops) {
         }
         probes.push_back(probe);
     }
+    return probes;
+}
 
-    std::sort(chains.begin(), chains.end(), [](const Chain& a, const Chain& b) { return a.y_low < b.y_low; });
-    std::sort(probes.begin(), probes.end(), [](const Probe& a, const Probe& b) { return a.y < b.y; });
+/// Which loops have an abscissa between their leftmost and their rightmost point: a segment tree over the
+/// abscissae that are ever asked for. A loop lies in O(log n) nodes, and in one at most on the way from any
+/// leaf to the root.
+class LoopsOverX {
+public:
+    explicit LoopsOverX(std::vector<std::int64_t> asked) : asked_(std::move(asked)) {
+        std::sort(asked_.begin(), asked_.end());
+        asked_.erase(std::unique(asked_.begin(), asked_.end()), asked_.end());
+        nodes_.resize(2 * asked_.size());
+    }
+    /// Adds a loop that covers low <= x < high.
+    void add(std::uint32_t loop, std::int64_t low, std::int64_t high) {
+        std::size_t begin = leaf(low), end = leaf(high);
+        for (; begin < end; begin /= 2, end /= 2) {
+            if (begin % 2 == 1) nodes_[begin++].push_back(loop);
+            if (end % 2 == 1) nodes_[--end].push_back(loop);
+        }
+    }
+    /// Calls visit(loop) for those that cover x, which was asked for, the last that were added to a node
+    /// first; drops those for which it returns false.
+    template <class Visit>
+    void at(std::int64_t x, Visit visit) {
+        for (std::size_t node = leaf(x); node > 0; node /= 2) {
+            std::vector<std::uint32_t>& held = nodes_[node];
+            // From the back; what is dropped leaves a gap that the kept ones behind it close, in order.
+            std::size_t kept = held.size();
+            for (std::size_t i = held.size(); i-- > 0;)
+                if (visit(held[i])) held[--kept] = held[i];
+            held.erase(held.begin(), held.begin() + static_cast<std::ptrdiff_t>(kept));
+        }
+    }
+
+private:
+    [[nodiscard]] std::size_t leaf(std::int64_t x) const {
+        return asked_.size() +
+               static_cast<std::size_t>(std::lower_bound(asked_.begin(), asked_.end(), x) - asked_.begin());
+    }
+    std::vector<std::int64_t> asked_;
+    std::vector<std::vector<std::uint32_t>> nodes_;  // node i has the children 2 i and 2 i + 1; 0 is none
+};
+
+}  // namespace
+
+// Every loop is asked for at one point: on a line half a unit above an integer height, just right of the
+// loop's leftmost crossing. No point of any loop lies on such a line, so loops that touch in points cannot
+// confuse the count, and where they share an edge "just right" decides. All arithmetic is exact. Whether
+// another loop holds that point is found by counting its signed crossings to the left, over chains of edges
+// that rise or fall: a chain that lies wholly on one side costs one comparison, the others a binary search.
+// A sweep in y keeps up which loops a line meets, a tree over x which of those have the point between their
+// ends: fins in a row never ask about one another.
+//
+// Only a larger loop (of two equal ones the earlier) may be a parent, so that there is no cycle even where
+// loops cross. A loop that could not better the parent found so far is not counted: loops that are given
+// many times over cost a comparison each.
+void nest(Loops& loops) {
+    const std::size_t n = loops.size();
+    loops.parents.assign(n, -1);
+    if (n < 2) return;
+
+    std::vector<Chain> chains;
+    std::vector<Probe> probes = probe_loops(loops, chains);
+    std::vector<Wide> size(n);
+    std::vector<std::int32_t> left(n, std::numeric_limits<std::int32_t>::max());
+    std::vector<std::int32_t> right(n, std::numeric_limits<std::int32_t>::min());
+    std::vector<std::int32_t> top = right;
+    for (std::size_t i = 0; i < n; ++i) {
+        size[i] = twice_area(loops.loop(i));
+        if (size[i] < 0) size[i] = -size[i];
+    }
+    for (const Chain& chain : chains) {
+        left[chain.loop] = std::min(left[chain.loop], chain.x_low);
+        right[chain.loop] = std::max(right[chain.loop], chain.x_high);
+        top[chain.loop] = std::max(top[chain.loop], chain.y_high);
+    }
     auto larger = [&](std::size_t a, std::size_t b) {
         return size[a] != size[b] ? size[a] > size[b] : a < b;
     };
+    // Of those that begin on one line the larger first, so that the smallest is met first.
+    std::sort(chains.begin(), chains.end(), [&](const Chain& a, const Chain& b) {
+        if (a.y_low != b.y_low) return a.y_low < b.y_low;
+        return a.loop != b.loop ? larger(a.loop, b.loop) : a.first < b.first;
+    });
+    std::sort(probes.begin(), probes.end(), [](const Probe& a, const Probe& b) { return a.y < b.y; });
 
-    std::vector<Chain> active;
-    std::vector<std::int32_t> turns(n, 0);
-    std::vector<std::uint32_t> met;
+    std::vector<std::int64_t> asked;
+    for (const Probe& probe : probes) asked.push_back(floor_of(probe.x));
+    LoopsOverX over(std::move(asked));
+    std::vector<std::vector<Chain>> active(n);  // of each loop, those that the line may still meet
+    std::vector<bool> added(n, false);
     std::size_t next = 0;
     for (const Probe& probe : probes) {
-        while (next < chains.size() && chains[next].y_low <= probe.y) active.push_back(chains[next++]);
+        for (; next < chains.size() && chains[next].y_low <= probe.y; ++next) {
+            const std::uint32_t loop = chains[next].loop;
+            active[loop].push_back(chains[next]);
+            if (!added[loop]) over.add(loop, left[loop], right[loop]);
+            added[loop] = true;
+        }
         const std::int64_t x = floor_of(probe.x);
-        for (std::size_t c = 0; c < active.size();) {
-            const Chain& chain = active[c];
-            if (chain.y_high <= probe.y) {
-                active[c] = active.back();
-                active.pop_back();
-                continue;
-            }
-            ++c;
-            if (chain.x_low > x || chain.loop == probe.loop)
-                continue;  // wholly right of the probe, or its own
-            if (chain.x_high <= x ||
-                less_or_equal(crossing(chain, loops.loop(chain.loop), probe.y), probe.x)) {
-                turns[chain.loop] += chain.direction;
-                met.push_back(chain.loop);
-            }
-        }
         std::int32_t parent = -1;
-        for (const std::uint32_t j : met) {
-            if (turns[j] != 0 && larger(j, probe.loop) &&
-                (parent < 0 || larger(static_cast<std::size_t>(parent), j))) {
-                parent = static_cast<std::int32_t>(j);
-            }
-        }
-        for (const std::uint32_t j : met) turns[j] = 0;
-        met.clear();
+        over.at(x, [&](std::uint32_t j) {
+            if (top[j] <= probe.y) return false;
+            if (!larger(j, probe.loop) || (parent >= 0 && !larger(static_cast<std::size_t>(parent), j)))
+                return true;
+            std::erase_if(active[j], [&](const Chain& chain) { return chain.y_high <= probe.y; });
+            std::int32_t turns = 0;
+            for (const Chain& chain : active[j])
+                if (chain.x_low <= x &&
+                    (chain.x_high <= x || less_or_equal(crossing(chain, loops.loop(j), probe.y), probe.x)))
+                    turns += chain.direction;
+            if (turns != 0) parent = static_cast<std::int32_t>(j);
+            return true;
+        });
         loops.parents[probe.loop] = parent;
     }
 }

@@ -42,7 +42,8 @@ struct Span {
 
 /// Fills `parents` by containment: the smallest larger loop around each. Loops may touch in points and along
 /// edges; where they cross (self-intersecting meshes) the answer is by one point inside each loop, and never
-/// cyclic. O(n) in points, plus for every loop the edge chains that one horizontal line meets.
+/// cyclic. O(n log n) in points, plus for every loop a comparison for each loop whose box holds one point
+/// inside it, and the edge chains that one horizontal line meets of those that may be its parent.
 void nest(Loops& loops);
 
 /// Boolean operations and offsets on regions (non-zero winding), by polyclipping. Results are nested, outer
