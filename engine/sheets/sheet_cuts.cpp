@@ -540,7 +540,8 @@ std::vector<Point2> axis_at(const AxisLoop& loop, double share) {
 }
 
 std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh, const std::vector<SheetSpan>& spans,
-                               const std::vector<SheetStair>& stairs, const SheetCutRules& rules) {
+                               const std::vector<SheetStair>& stairs, const SheetCutRules& rules,
+                               const std::vector<SheetHold>& holds, double dowel) {
     require_rules(rules);
     const std::vector<std::vector<double>> heights = heights_to_fit(mesh, spans);
     const double top = bounds(mesh).max.z;
@@ -556,8 +557,12 @@ std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh, const std::vecto
     std::vector<SheetCuts> cuts(spans.size());
     parallel_each(context, spans.size(), [&](std::size_t i) {
         Fitted sheet{stairs[i].outline, heights[i], {}};
+        std::vector<Loops> held;  // what is to stay, with its tabs and without its holes
+        if (!holds.empty())
+            for (std::size_t k = 0; k < heights[i].size(); ++k)
+                held.push_back(with_hold(sections[starts[i] + k].loops, holds[i], dowel));
         for (std::size_t k = 0; k < heights[i].size(); ++k)
-            sheet.sections.push_back(&sections[starts[i] + k].loops);
+            sheet.sections.push_back(holds.empty() ? &sections[starts[i] + k].loops : &held[k]);
         if (rules.most_tilt_deg > 0) {
             Tilted tilted = tilted_cuts(sheet, rules);
             cuts[i].gave_up_tilt = !tilted.spares;
