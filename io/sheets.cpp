@@ -8,6 +8,7 @@
 #include "io/posts/sheet_gcode.h"
 #include "io/read/input_file.h"
 #include "io/read/pattern.h"
+#include "io/sheets_html.h"
 #include "io/text/job_keys.h"
 #include "io/write/output_file.h"
 #include "io/write/output_folder.h"
@@ -85,8 +86,14 @@ SheetProof prove_folder(Context& context, const fs::path& directory, const Mesh&
                         const std::string& pattern, SheetProofRules rules) {
     const SheetsFolder folder = read_folder(directory);
     rules.part_may_lose = rules.part_may_lose || folder.part_may_lose;
-    SheetProof proof = prove_sheets(context, along.view(), read_programs(directory, folder), rules);
-    write_file_in(directory, "verify.json", sheets_verify_json(proof, pattern));
+    const std::vector<ReadSheetProgram> programs = read_programs(directory, folder);
+    SheetProof proof = prove_sheets(context, along.view(), programs, rules);
+    const std::string verdict = sheets_verify_json(proof, pattern);
+    write_file_in(directory, "verify.json", verdict);
+    const std::string page =
+        assembly_html(read_document(directory / "sheets.json", ErrorKind::verification, "sheets.json.", ""),
+                      verdict, programs);
+    if (!page.empty()) write_file_in(directory, "assembly.html", page);
     return proof;
 }
 

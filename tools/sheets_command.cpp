@@ -270,7 +270,7 @@ std::string sheets_summary(const SheetsResult& result, const std::string& out, b
         text += fmt::format("held    {} holes for dowels and rods; {} islands are held by nothing\n",
                             result.proof.dowels, result.proof.islands);
     for (const SheetCost& cost : result.costs) {
-        text += fmt::format("{:<8}", cost.way);
+        text += fmt::format("{:<9}", cost.way);
         if (!cost.why_not.empty()) {
             text += "no: " + cost.why_not + '\n';
             continue;

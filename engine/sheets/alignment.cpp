@@ -270,7 +270,8 @@ private:
     /// or a hole of the part.
     [[nodiscard]] std::optional<Point2> target(std::size_t i, std::size_t a, Point2 from) const {
         const Loops& island = islands_[i].regions[a];
-        const Loops aim = must_reach_core_ ? intersect(cores_[i], island) : island;
+        Loops aim = must_reach_core_ ? intersect(cores_[i], island) : island;
+        if (aim.empty()) aim = island;  // it ends within the sheet
         std::vector<Point2> places;
         for (std::size_t l = 0; l < aim.size(); ++l) {
             const auto loop = aim.loop(l);

@@ -33,7 +33,7 @@ struct SheetHold {
 /// all sheets hang together by such joints.
 /// @param outlines of the sheets as they are cut, upright
 /// @param cores of the sheets: what is of the part at all of their heights
-/// @param must_reach_core necks end in the core, not at the outline: where cuts tilt
+/// @param must_reach_core necks end in the core where an island has one, not at the outline: where cuts tilt
 /// @throws Error(no_plan, "sheets.hold") with the place of the lowest island that cannot be held;
 /// Error(usage, "sheets.align") for rules out of range
 [[nodiscard]] std::vector<SheetHold> holds_of(const std::vector<SheetSpan>& spans,

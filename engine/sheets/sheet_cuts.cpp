@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/sheets/fitted_heights.h"
 #include "engine/sheets/majorant.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
@@ -488,33 +489,6 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
     cuts.upright = cuts.most_tilt_deg < 0.05;
     if (result.spares) cuts.deviation = deviation_of(left_by(edges, sheet), sheet);
     return result;
-}
-
-std::vector<std::vector<double>> heights_to_fit(MeshView mesh, const std::vector<SheetSpan>& spans) {
-    constexpr double same = 1e-3;
-    std::vector<std::vector<double>> heights(spans.size());
-    std::vector<std::vector<double>> kinks(spans.size());
-    for (const Vec3f& v : mesh.vertices) {
-        const auto above = std::upper_bound(spans.begin(), spans.end(), double{v.z},
-                                            [](double z, const SheetSpan& span) { return z < span.bottom; });
-        if (above == spans.begin()) continue;
-        const auto i = static_cast<std::size_t>(above - spans.begin()) - 1;
-        if (v.z > spans[i].top || kinks[i].size() > kMostVertexHeights) continue;
-        const auto at = std::lower_bound(kinks[i].begin(), kinks[i].end(), v.z - same);
-        if (at == kinks[i].end() || *at > v.z + same) kinks[i].insert(at, v.z);
-    }
-    for (std::size_t i = 0; i < spans.size(); ++i) {
-        const double thickness = spans[i].top - spans[i].bottom;
-        for (int k = 0; k <= kCutSections; ++k)
-            heights[i].push_back(spans[i].bottom + k * thickness / kCutSections);
-        if (kinks[i].size() > kMostVertexHeights) continue;
-        for (const double z : kinks[i])
-            if (std::none_of(heights[i].begin(), heights[i].end(),
-                             [&](double h) { return std::abs(h - z) < same; }))
-                heights[i].push_back(z);
-        std::sort(heights[i].begin(), heights[i].end());
-    }
-    return heights;
 }
 
 void require_rules(const SheetCutRules& rules) {

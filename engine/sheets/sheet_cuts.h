@@ -41,6 +41,7 @@ struct SheetCuts {
 /// the mesh's vertices in it where those are no more than kMostVertexHeights.
 inline constexpr int kCutSections = 24;
 inline constexpr std::size_t kMostVertexHeights = 24;
+inline constexpr std::size_t kMostSteps = 32;  ///< heights of level facets that a sheet's cuts are fitted to
 
 /// The cuts of sheets of a part. Upright ones run outside of the outline by half a kerf. Tilted ones follow
 /// the concave majorant of the sections in the normal plane of each piece of the outline, and none enters a
