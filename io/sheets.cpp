@@ -8,6 +8,7 @@
 #include "io/posts/sheet_gcode.h"
 #include "io/read/input_file.h"
 #include "io/read/pattern.h"
+#include "io/sheets_html.h"
 #include "io/text/job_keys.h"
 #include "io/write/output_file.h"
 #include "io/write/output_folder.h"
@@ -85,15 +86,46 @@ SheetProof prove_folder(Context& context, const fs::path& directory, const Mesh&
                         const std::string& pattern, SheetProofRules rules) {
     const SheetsFolder folder = read_folder(directory);
     rules.part_may_lose = rules.part_may_lose || folder.part_may_lose;
-    SheetProof proof = prove_sheets(context, along.view(), read_programs(directory, folder), rules);
-    write_file_in(directory, "verify.json", sheets_verify_json(proof, pattern));
+    const std::vector<ReadSheetProgram> programs = read_programs(directory, folder);
+    SheetProof proof = prove_sheets(context, along.view(), programs, rules);
+    const std::string verdict = sheets_verify_json(proof, pattern);
+    write_file_in(directory, "verify.json", verdict);
+    const std::string page =
+        assembly_html(read_document(directory / "sheets.json", ErrorKind::verification, "sheets.json.", ""),
+                      verdict, programs);
+    if (!page.empty()) write_file_in(directory, "assembly.html", page);
     return proof;
+}
+
+/// @returns the names of what was written to fixture/
+std::vector<std::string> write_fixture(Context& context, const fs::path& directory, const Mesh& along,
+                                       const SheetsPlan& plan, const SheetExtras& extras) {
+    if (!extras.nest && !extras.crate) return {};
+    std::vector<FixturePiece> pieces;
+    if (extras.nest) {
+        std::vector<Loops> outlines;
+        for (const SheetStair& stair :
+             stairs_of(context, along.view(), plan.stack.sheets, plan.job.slicing.side, false))
+            outlines.push_back(stair.outline);
+        pieces = full_nest(plan.stack.sheets, outlines, extras.fixture);
+    }
+    if (extras.crate)
+        for (FixturePiece& piece : egg_crate(context, along, extras.fixture))
+            pieces.push_back(std::move(piece));
+    fs::create_directory(directory / "fixture");
+    std::vector<std::string> names;
+    for (const FixturePiece& piece : pieces) {
+        names.push_back(piece.name + ".dxf");
+        write_file_in(directory / "fixture", names.back(), loops_dxf(piece.region, piece.name));
+    }
+    return names;
 }
 
 }  // namespace
 
 SheetsResult make_sheets(Context& context, const std::string& pattern, const Job& reading,
-                         const SheetJob& job, const std::string& directory, const SheetProofRules& rules) {
+                         const SheetJob& job, const std::string& directory, const SheetProofRules& rules,
+                         const SheetExtras& extras) {
     { const OutputFolder probe(directory); }  // before the work, not after it
     context.share_progress(0, 0.3);
     const ReadingOptions options = reading_options(reading);
@@ -120,7 +152,13 @@ SheetsResult make_sheets(Context& context, const std::string& pattern, const Job
         write_file_in(out.path() / "dxf", sheet_file(i) + ".dxf", sheet_dxf(result.plan, i));
         write_file_in(out.path() / "svg", sheet_file(i) + ".svg", sheet_svg(result.plan, i));
     }
-    write_file_in(out.path(), "sheets.json", sheets_json(result.plan, read.input, options));
+    const double density = extras.material != nullptr ? extras.material->density_kg_m3 : 0;
+    if (extras.compare) result.costs = compare_costs(context, along, result.plan, density, extras.prices);
+    else result.costs = {cost_of(result.plan, "planned", density, extras.prices)};
+    std::vector<std::string> fixture = write_fixture(context, out.path(), along, result.plan, extras);
+    write_file_in(out.path(), "sheets.json",
+                  sheets_json(result.plan, read.input, options,
+                              {result.costs, extras.material, extras.bond, std::move(fixture)}));
     result.proof = prove_folder(context, out.path(), along, pattern, rules);
     out.commit();
     return result;

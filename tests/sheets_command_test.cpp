@@ -84,6 +84,59 @@ TEST(SheetsCommand, RefusesInOneLine) {
     refuses({"--head", "jet", "--tilt", "30", "--side", "middle"}, 2, "outside");
     refuses({"--head", "plasma"}, 2, "plasma");
     refuses({"--thickness", "6", "6"}, 2, "ascend");
+    refuses({"--align", "dowels", "--dowel", "40"}, 4, "an island of sheet");
+    refuses({"--align", "holes", "--dowel", "4"}, 2, "wider than a dowel");
+    refuses({"--offcut", "7", "100", "100"}, 2, "no thickness in stock");
+}
+
+TEST(SheetsCommand, HeldSheetsFixturesAndCostsStandInTheFolder) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out";
+    const CommandResult made = sheets(
+        out, {"--stock", "600",      "600",     "--thickness", "6",         "12",       "--head",    "jet",
+              "--align", "dowels",   "--dowel", "6",           "--bonding", "braze",    "--compare", "--nest",
+              "--crate", "--price",  "800",     "--material",  "aluminium", "--offcut", "6",         "150",
+              "150",     "--offcut", "6",       "140",         "140"});
+    ASSERT_EQ(made.exit, 0) << made.out << made.err;
+    for (const char* part : {"uniform ", "adaptive", "curved  ", "0 islands are held by nothing"})
+        EXPECT_NE(made.out.find(part), std::string::npos) << part << '\n' << made.out;
+    const auto document = nlohmann::json::parse(support::slurp(out + "/sheets.json"));
+    EXPECT_EQ(document["alignment"], "dowels");
+    EXPECT_EQ(document["bonding"]["kind"], "braze");
+    EXPECT_NEAR(document["bond"].get<double>(), 0.0254, 1e-12);
+    EXPECT_NEAR(document["weakest_joint"]["bears_n"].get<double>(),
+                document["weakest_joint"]["area_mm2"].get<double>() * 32.04, 20);
+    ASSERT_EQ(document["ways"].size(), 3u);
+    EXPECT_EQ(document["ways"][2]["sheets"], document["totals"]["sheets"]);
+    EXPECT_GT(document["ways"][0]["money"].get<double>(), 0);
+    for (const auto& piece : document["pieces"]) {
+        EXPECT_GE(piece["dowels"].size(), 2u);
+        ASSERT_EQ(piece["pins"].size(), 4u);
+        EXPECT_NEAR(piece["pins"][0][0].get<double>(), -piece["pins"][1][0].get<double>(), 0.02);
+    }
+    EXPECT_EQ(document["programs"][0]["length"], 150);
+    const auto verdict = nlohmann::json::parse(support::slurp(out + "/verify.json"));
+    EXPECT_EQ(verdict["islands"], 0);
+    EXPECT_GT(verdict["dowels"], 0);
+    for (const char* name : {"nest_01", "crate_x1", "crate_x3", "crate_y1", "crate_y3"})
+        EXPECT_TRUE(std::filesystem::is_regular_file(out + "/fixture/" + name + ".dxf")) << name;
+    // Written again in its place: the fixture is one of ours.
+    EXPECT_EQ(sheets(out, {"--stock", "600", "600"}).exit, 0);
+    EXPECT_FALSE(std::filesystem::exists(out + "/fixture"));
+}
+
+// FDFF equation 3, and back from a test cut.
+TEST(SheetsCommand, FeedIsTheFormulasAndATestCutFitsTheMaterial) {
+    const CommandResult feed = run_command({command, "feed", "6.35"});
+    EXPECT_EQ(feed.exit, 0) << feed.err;
+    EXPECT_NE(feed.out.find("1835.8 mm/min"), std::string::npos) << feed.out;
+    const CommandResult fitted = run_command({command, "feed", "12", "--test-cut", "500", "--json"});
+    EXPECT_EQ(fitted.exit, 0) << fitted.err;
+    const auto document = nlohmann::json::parse(fitted.out);
+    EXPECT_NEAR(document["feed_mm_min"].get<double>(), 500, 1e-3);
+    EXPECT_NEAR(document["energy_j_mm3"].get<double>(), 13.6 * 1835.75 * 6.35 / 12 / 500, 1e-2);
+    EXPECT_NE(run_command({command, "feed", "6.35", "--tilt", "60"}).out.find("917.9"), std::string::npos);
+    EXPECT_EQ(run_command({command, "feed", "0"}).exit, 2);
 }
 
 // The drawings as ezdxf, which many shops' programs are built on, sees them.
@@ -92,7 +145,10 @@ TEST(SheetsCommand, EzdxfReadsEveryDrawingWithoutAFinding) {
         GTEST_SKIP() << "python3-ezdxf is not installed; tools/setup does that";
     const TemporaryFolder folder;
     const std::string out = folder / "out";
-    ASSERT_EQ(sheets(out, {"--head", "jet", "--thickness", "6", "12"}).exit, 0);
+    ASSERT_EQ(sheets(out, {"--stock", "600", "600", "--head", "jet", "--thickness", "6", "12", "--align",
+                           "tabs", "--nest", "--crate"})
+                  .exit,
+              0);
     support::spit(folder / "audit.py",
                   "import sys, ezdxf\n"
                   "for name in sys.argv[1:]:\n"
@@ -105,6 +161,8 @@ TEST(SheetsCommand, EzdxfReadsEveryDrawingWithoutAFinding) {
                   "    assert len(lines) > 0 and all(line.is_closed for line in lines)\n");
     std::string line = "/usr/bin/python3 '" + std::string(folder / "audit.py") + "'";
     for (const auto& entry : std::filesystem::directory_iterator(out + "/dxf"))
+        line += " '" + entry.path().string() + "'";
+    for (const auto& entry : std::filesystem::directory_iterator(out + "/fixture"))
         line += " '" + entry.path().string() + "'";
     EXPECT_EQ(std::system(line.c_str()), 0);
 }

@@ -154,6 +154,21 @@ TEST(Sheets, LinuxCncReadsEveryProgram) {
             EXPECT_TRUE(support::interpret_rs274(text, "T1 P1 D6 Z0\n").ended);
 }
 
+// A step between two of the sections that cuts are fitted to, in a sheet with too many vertices to fit each:
+// the flange reaches up to the step, the neck begins there.
+TEST(Sheets, TiltedCutsSpareAStepNearASheetsTop) {
+    Context context;
+    std::vector<support::Ring> rings;
+    for (int k = 0; k <= 40; ++k) rings.push_back(circle(11.27 * k / 40, 40 - 0.1 * std::sin(k * 0.3), 64));
+    rings.push_back(circle(11.27, 33, 64));
+    for (int k = 1; k <= 30; ++k) rings.push_back(circle(11.27 + 12.73 * k / 30, 33 - 0.2 * k, 64));
+    const Mesh mesh = loft(context, rings);
+    SheetJob job = job_of(SheetHead::jet);
+    job.slicing.thicknesses = {12};
+    const SheetProof proof = proof_of(context, mesh, texts_of(plan_sheets(context, mesh, job)));
+    EXPECT_TRUE(proof.passed) << told(proof);
+}
+
 TEST(Sheets, StacksAlongEveryAxis) {
     Context context;
     const Mesh mesh = loft(context, {circle(0, 20, 40), circle(36, 30, 40)});

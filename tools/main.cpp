@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, report, inspect, repair, slice, sheets, bond, job. Errors are one
-// line on stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, report, inspect, repair, slice, sheets, feed, bond, job. Errors are
+// one line on stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -297,8 +297,8 @@ bool run_sheets(const Options& options, const SheetsOptions& asked) {
     const SheetJob job = sheet_job(asked);
     bool passed = false;
     with_context(options, [&](Context& context) {
-        const SheetsResult result =
-            make_sheets(context, options.stl, reading, job, options.out, {.left_over = asked.tolerance});
+        const SheetsResult result = make_sheets(context, options.stl, reading, job, options.out,
+                                                {.left_over = asked.tolerance}, sheet_extras(asked));
         passed = result.proof.passed;
         return sheets_summary(result, options.out, options.json);
     });
@@ -399,6 +399,16 @@ void add_common(CLI::App& command, Options& options) {
         ->check(CLI::IsMember({"none", "mend", "rebuild"}));
 }
 
+CLI::App* add_sheets_command(CLI::App& app, Options& options, SheetsOptions& asked) {
+    CLI::App* command = app.add_subcommand("sheets", "plan a part as sheets cut from stock and bonded");
+    command->add_option("STL", options.stl, "the part")->required();
+    command->add_option("-o,--out", options.out, "folder for the sheets; a plan in it is replaced")
+        ->required();
+    add_common(*command, options);
+    add_sheets_options(*command, asked);
+    return command;
+}
+
 /// Reads the command line and does what it asks for. @return the exit code
 int command(int argc, char** argv) {
 #if defined(__x86_64__) && defined(__AVX2__)
@@ -491,13 +501,9 @@ int command(int argc, char** argv) {
     add_common(*slice_command, options);
 
     SheetsOptions sheets_options;
-    CLI::App* sheets_command =
-        app.add_subcommand("sheets", "plan a part as sheets cut from stock and bonded");
-    sheets_command->add_option("STL", options.stl, "the part")->required();
-    sheets_command->add_option("-o,--out", options.out, "folder for the sheets; a plan in it is replaced")
-        ->required();
-    add_common(*sheets_command, options);
-    add_sheets_options(*sheets_command, sheets_options);
+    CLI::App* sheets_command = add_sheets_command(app, options, sheets_options);
+    FeedOptions feed_options;
+    CLI::App* feed_command = add_feed_command(app, feed_options);
 
     BondOptions bond_options;
     CLI::App* bond_command = add_bond_command(app, bond_options);
@@ -535,11 +541,12 @@ int command(int argc, char** argv) {
         else if (*slice_command) run_slice(options);
         else if (*sheets_command)
             return run_sheets(options, sheets_options) ? 0 : static_cast<int>(ErrorKind::verification);
+        else if (*feed_command) print(run_feed(feed_options));
         else if (*bond_command) print(run_bond(bond_options));
         else print(default_job_toml(options.library.empty() ? "default" : options.library));
         return 0;
     } catch (const Error& error) {
-        return complain(error, options.json || bond_options.json);
+        return complain(error, options.json || bond_options.json || feed_options.json);
     } catch (const std::exception& error) {
         return complain(
             Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"),

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <numbers>
 
 #include "io/text/json_text.h"
 #include "io/write/plan_json.h"
@@ -16,6 +18,59 @@ std::string number(double value, int decimals) {
     std::string text;
     append_rounded(text, value, decimals);
     return text;
+}
+
+void add_jet_options(CLI::App& command, SheetsOptions& options) {
+    const CLI::Range over_0(1e-6, 1e6);
+    command.add_option("--pressure", options.pressure, "MPa, jet")->check(over_0);
+    command.add_option("--orifice", options.orifice, "mm, jet")->check(over_0);
+    command.add_option("--insert", options.insert, "mm of the focusing tube, jet")->check(over_0);
+    command.add_option("--abrasive", options.abrasive, "mass of abrasive to mass of water, jet")
+        ->check(over_0);
+    command.add_option("--energy", options.energy, "J/mm3 that the material takes, jet")->check(over_0);
+}
+
+AbrasiveJet jet_of(const SheetsOptions& options) {
+    AbrasiveJet jet;
+    jet.pressure_mpa = options.pressure;
+    jet.orifice_mm = options.orifice;
+    jet.insert_mm = options.insert;
+    jet.abrasive_ratio = options.abrasive;
+    jet.specific_energy_j_mm3 = options.energy;
+    return jet;
+}
+
+void add_alignment_options(CLI::App& command, SheetsOptions& options) {
+    const CLI::Range length(0.0, 1e5), over_0(1e-6, 1e6);
+    command
+        .add_option("--align", options.align,
+                    "what holds sheets while they are bonded: none, holes, dowels, tabs")
+        ->check(CLI::IsMember({"none", "holes", "dowels", "tabs"}));
+    command.add_option("--dowel", options.dowel, "mm: diameter of dowels and rods; 8")->check(over_0);
+    command.add_option("--wall", options.wall, "mm of the part around a dowel; 4")->check(over_0);
+    command.add_option("--tab", options.tab, "mm: side of a tab; 24")->check(over_0);
+    command.add_option("--neck", options.neck, "mm: widest neck of a tab; 6")->check(over_0);
+    command.add_option("--tab-gap", options.tab_gap, "mm between tabs and part; 6")->check(length);
+    command.add_flag("--nest", options.nest, "draw the full nest around the sheets too");
+    command.add_flag("--crate", options.crate, "draw an egg crate under the part too");
+}
+
+void add_cost_options(CLI::App& command, SheetsOptions& options) {
+    const CLI::Range length(0.0, 1e5), over_0(1e-6, 1e6);
+    command.add_option("--material", options.material, "of the sheets: mdf, plywood, aluminium, steel")
+        ->check(CLI::IsMember({"mdf", "plywood", "aluminium", "steel"}));
+    command
+        .add_option("--bonding", options.bonding,
+                    "glue, solder or braze: sets --bond, tells what joints bear")
+        ->check(CLI::IsMember({"glue", "solder", "braze"}));
+    command
+        .add_option("--offcut", options.offcuts, "mm: thickness, length, width of a rest; may be given again")
+        ->expected(3)
+        ->take_all()
+        ->check(over_0);
+    command.add_option("--price", options.price, "money for a cubic metre of sheets")->check(length);
+    command.add_option("--rate", options.rate, "money for an hour of the machine")->check(length);
+    command.add_flag("--compare", options.compare, "plan uniform, adaptive and tilted cuts side by side");
 }
 
 }  // namespace
@@ -58,12 +113,9 @@ void add_sheets_options(CLI::App& command, SheetsOptions& options) {
     command.add_option("--plunge", options.plunge, "mm/min, router")->check(over_0);
     command.add_option("--rpm", options.rpm, "router")->check(over_0);
     command.add_option("--tool", options.tool, "router's tool number")->check(CLI::Range(1, 9999));
-    command.add_option("--pressure", options.pressure, "MPa, jet")->check(over_0);
-    command.add_option("--orifice", options.orifice, "mm, jet")->check(over_0);
-    command.add_option("--insert", options.insert, "mm of the focusing tube, jet")->check(over_0);
-    command.add_option("--abrasive", options.abrasive, "mass of abrasive to mass of water, jet")
-        ->check(over_0);
-    command.add_option("--energy", options.energy, "J/mm3 that the material takes, jet")->check(over_0);
+    add_jet_options(command, options);
+    add_alignment_options(command, options);
+    add_cost_options(command, options);
     command
         .add_option("--tolerance", options.tolerance,
                     "mm that the proof lets the sheets stand over the part; any if not given")
@@ -75,6 +127,9 @@ SheetJob sheet_job(const SheetsOptions& options) {
     job.slicing.thicknesses = options.thicknesses;
     std::sort(job.slicing.thicknesses.begin(), job.slicing.thicknesses.end());
     job.slicing.bond = options.bond;
+    if (const SheetBond* bond = sheet_bond(options.bonding); bond != nullptr && options.bond < 0)
+        job.slicing.bond = bond->thickness_mm;
+    if (job.slicing.bond < 0) job.slicing.bond = 0;
     job.slicing.strategy = options.strategy == "optimal"   ? SheetStrategy::optimal
                            : options.strategy == "printed" ? SheetStrategy::printed
                                                            : SheetStrategy::uniform;
@@ -108,12 +163,65 @@ SheetJob sheet_job(const SheetsOptions& options) {
     job.plunge_feed = options.plunge;
     job.rpm = options.rpm;
     job.tool = options.tool;
-    job.jet.pressure_mpa = options.pressure;
-    job.jet.orifice_mm = options.orifice;
-    job.jet.insert_mm = options.insert;
-    job.jet.abrasive_ratio = options.abrasive;
-    job.jet.specific_energy_j_mm3 = options.energy;
+    job.jet = jet_of(options);
+    job.alignment.way = options.align == "none"     ? SheetAlignment::none
+                        : options.align == "holes"  ? SheetAlignment::holes
+                        : options.align == "dowels" ? SheetAlignment::dowels
+                                                    : SheetAlignment::tabs;
+    job.alignment.dowel = options.dowel;
+    job.alignment.wall = options.wall;
+    job.alignment.tab = options.tab;
+    job.alignment.neck = options.neck;
+    job.alignment.gap = options.tab_gap;
+    for (std::size_t i = 0; i + 2 < options.offcuts.size(); i += 3)
+        job.offcuts.push_back({options.offcuts[i], {options.offcuts[i + 1], options.offcuts[i + 2]}});
     return job;
+}
+
+SheetExtras sheet_extras(const SheetsOptions& options) {
+    SheetExtras extras;
+    extras.material = sheet_material(options.material);
+    extras.bond = sheet_bond(options.bonding);
+    extras.prices = {options.price, options.rate};
+    extras.compare = options.compare;
+    extras.nest = options.nest;
+    extras.crate = options.crate;
+    extras.fixture.thickness = *std::min_element(options.thicknesses.begin(), options.thicknesses.end());
+    return extras;
+}
+
+CLI::App* add_feed_command(CLI::App& app, FeedOptions& options) {
+    CLI::App* command =
+        app.add_subcommand("feed", "how fast an abrasive jet cuts, or what a test cut says of the material");
+    const CLI::Range over_0(1e-6, 1e6);
+    command->add_option("THICKNESS", options.depth, "mm of the sheet")->required()->check(over_0);
+    command->add_option("--tilt", options.tilt, "degrees that the head leans")->check(CLI::Range(0.0, 80.0));
+    command
+        ->add_option("--test-cut", options.feed,
+                     "mm/min at which a test cut just went through: fits the material's --energy")
+        ->check(over_0);
+    add_jet_options(*command, options.jet);
+    command->add_flag("--json", options.json, "the result as JSON, errors as JSON on stderr");
+    return command;
+}
+
+std::string run_feed(const FeedOptions& options) {
+    AbrasiveJet jet = jet_of(options.jet);
+    const double depth = options.depth / std::cos(options.tilt * std::numbers::pi / 180);
+    if (options.feed > 0) jet.specific_energy_j_mm3 = fitted_energy(jet, depth, options.feed);
+    const double feed = jet_feed(jet, depth);
+    if (options.json) {
+        JsonText text;
+        text.begin_object().key("schema").string("slabwright.feed/1");
+        text.key("depth_mm").rounded(depth, 4).key("feed_mm_min").rounded(feed, 3);
+        text.key("energy_j_mm3").rounded(jet.specific_energy_j_mm3, 6).end();
+        return text.take();
+    }
+    return options.feed > 0
+               ? fmt::format("the material takes {} J/mm3: give --energy {} to slabwright sheets\n",
+                             number(jet.specific_energy_j_mm3, 4), number(jet.specific_energy_j_mm3, 4))
+               : fmt::format("{} mm/min through {} mm along the jet at {} J/mm3\n", number(feed, 1),
+                             number(depth, 3), number(jet.specific_energy_j_mm3, 3));
 }
 
 std::string sheets_verdict(const SheetProof& proof, const std::string& out) {
@@ -158,6 +266,21 @@ std::string sheets_summary(const SheetsResult& result, const std::string& out, b
     for (const auto& [thickness, counts] : stock)
         text += fmt::format("stock   {} of {} mm, for {} {}\n", counts.first, number(thickness, 3),
                             counts.second, counts.second == 1 ? "piece" : "pieces");
+    if (result.proof.dowels > 0)
+        text += fmt::format("held    {} holes for dowels and rods; {} islands are held by nothing\n",
+                            result.proof.dowels, result.proof.islands);
+    for (const SheetCost& cost : result.costs) {
+        text += fmt::format("{:<9}", cost.way);
+        if (!cost.why_not.empty()) {
+            text += "no: " + cost.why_not + '\n';
+            continue;
+        }
+        text +=
+            fmt::format("{} sheets from {} of stock, {} m, {} min, up to {} mm off, {} of {} kg", cost.sheets,
+                        cost.stock_sheets, number(cost.cut_mm / 1000, 1), number(cost.minutes, 1),
+                        number(cost.deviation, 3), number(cost.part_kg, 2), number(cost.stock_kg, 2));
+        text += cost.money > 0 ? fmt::format(", {} of money\n", number(cost.money, 2)) : "\n";
+    }
     for (const Diagnostic& d : plan.diagnostics)
         if (d.severity != Severity::note) text += fmt::format("{}: {}\n", name(d.severity), d.message);
     return text + sheets_verdict(result.proof, out);

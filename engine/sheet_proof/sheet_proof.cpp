@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "engine/sheet_proof/hold_proof.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/border_distance.h"
 #include "kernels/polygons/loops.h"
@@ -113,13 +114,13 @@ ReadHead unplaced(const ReadHead& head, const ReadPiece& piece) {
     }
 }
 
-struct Box2 {
+struct WayBox {
     double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300;
     void add(double x, double y, double more) {
         x0 = std::min(x0, x - more), y0 = std::min(y0, y - more);
         x1 = std::max(x1, x + more), y1 = std::max(y1, y + more);
     }
-    [[nodiscard]] bool meets(const Box2& o) const {
+    [[nodiscard]] bool meets(const WayBox& o) const {
         return x0 <= o.x1 && o.x0 <= x1 && y0 <= o.y1 && o.y0 <= y1;
     }
 };
@@ -129,12 +130,13 @@ struct FineWay {
     const ReadWay* read = nullptr;
     std::vector<ReadHead> heads;
     std::size_t loop_from = 0;  ///< index in heads where the loop begins
-    Box2 box;
+    WayBox box;
 };
 
 struct PieceResult {
     double made_mm3 = 0, gouge = 0, left_over = 0;
     int islands = 0;
+    PieceHold hold;
     std::vector<Diagnostic> violations;
 };
 
@@ -142,10 +144,16 @@ class PieceProof {
 public:
     PieceProof(const ReadSheetProgram& program, const ReadPiece& piece, const std::vector<FineWay>& ways,
                const SheetProofRules& rules)
-        : program_(program), piece_(piece), ways_(ways), rules_(rules) {}
+        : program_(program),
+          piece_(piece),
+          ways_(ways),
+          rules_(rules),
+          hold_(read_hold(piece)),
+          bodies_(piece) {}
 
     PieceResult run(const std::vector<const Section*>& sections) {
         for (int k = 0; k < kHeights; ++k) level(k, sections[static_cast<std::size_t>(k)]->loops);
+        result_.hold = hold_of(piece_, program_.file, bodies_);
         return std::move(result_);
     }
 
@@ -162,22 +170,28 @@ private:
     /// What the loops of this piece hold together, before the kerf is taken: what lies left of all passes of
     /// an outline, less what lies right of any pass of a hole.
     [[nodiscard]] Loops held(double depth) const {
-        std::map<int, Loops> outlines;
-        std::vector<Loops> holes;
+        struct Ring {
+            bool is_hole = false;
+            Loops region;
+        };
+        std::map<std::pair<bool, int>, Ring> rings;  // by loop
         for (const FineWay& way : ways_) {
             if (way.read->piece != piece_.number) continue;
-            const Loops region = around(at_depth(own_frame(way), depth), way.loop_from, way.read->is_hole);
-            if (way.read->is_hole) {
-                holes.push_back(region);
-            } else {
-                const auto found = outlines.find(way.read->loop);
-                if (found == outlines.end()) outlines.emplace(way.read->loop, region);
-                else found->second = intersect(found->second, region);
-            }
+            const bool is_hole = way.read->is_hole;
+            const Loops region = around(at_depth(own_frame(way), depth), way.loop_from, is_hole);
+            const auto [ring, is_new] = rings.try_emplace({is_hole, way.read->loop}, Ring{is_hole, region});
+            if (is_new) continue;
+            ring->second.region =
+                is_hole ? unite(ring->second.region, region) : intersect(ring->second.region, region);
         }
+        // From the widest to the narrowest: what stands within a hole is put back after it.
+        std::vector<std::pair<double, const Ring*>> order;
+        for (const auto& [loop, ring] : rings) order.push_back({area(ring.region), &ring});
+        std::stable_sort(order.begin(), order.end(),
+                         [](const auto& a, const auto& b) { return a.first > b.first; });
         Loops all;
-        for (const auto& [loop, region] : outlines) all = unite(all, region);
-        for (const Loops& hole : holes) all = subtract(all, hole);
+        for (const auto& [size, ring] : order)
+            all = ring->is_hole ? subtract(all, ring->region) : unite(all, ring->region);
         return all;
     }
 
@@ -213,9 +227,14 @@ private:
             for (std::size_t i = 0; i < made.size(); ++i) parts += signed_area(made.loop(i)) > 0;
             result_.islands = std::max(0, parts - 1);
         }
+        bodies_.add_level(made);
+        require_walls(section, depth);
+        // Dowels fill their holes, and tabs come off.
+        if (!hold_.holes.empty()) made = unite(made, hold_.holes);
+        if (!hold_.tabs.empty()) made = subtract(made, subtract(hold_.tabs, section));
         result_.made_mm3 += area(made) * step;
         const BorderDistance to_made(made), to_section(section);
-        const Loops gouged = subtract(section, made), left = subtract(made, section);
+        const Loops gouged = subtract(section, made), left = beside_tabs(subtract(made, section));
         result_.gouge = std::max(result_.gouge, farthest_from_border(gouged, to_made, 0.5));
         if (!section.empty())  // else there is no border to be far from; the volume tells
             result_.left_over = std::max(result_.left_over, farthest_from_border(left, to_section, 0.5));
@@ -223,7 +242,7 @@ private:
             violate("sheets.gouge",
                     fmt::format("a cut enters the part by {:.3f} mm, {:.3f} mm below the sheet's top",
                                 farthest_from_border(gouged, to_made, 0.5), depth));
-        if (rules_.left_over > 0 && !subtract(made, offset(section, rules_.left_over, kArcTolerance)).empty())
+        if (rules_.left_over > 0 && !subtract(left, offset(section, rules_.left_over, kArcTolerance)).empty())
             violate("sheets.left_over", fmt::format("{:.3f} mm are left, {:.3f} mm below the sheet's top",
                                                     farthest_from_border(left, to_section, 0.5), depth));
     }
@@ -254,14 +273,35 @@ private:
         return has_waste ? unite(kept, {}) : made;
     }
 
+    /// What is left over by more than the cutter's round corners between part and tabs.
+    [[nodiscard]] Loops beside_tabs(const Loops& left) const {
+        if (hold_.tabs.empty() || left.empty()) return left;
+        return subtract(left, offset(hold_.tabs, program_.kerf + 0.05, kArcTolerance));
+    }
+
+    /// Every hole leaves something of the part, or of its tabs, all around it.
+    void require_walls(const Loops& section, double depth) {
+        constexpr double wall = 0.3;  // mm
+        if (hold_.holes.empty()) return;
+        const Loops around = offset(hold_.holes, wall, kArcTolerance);
+        const Loops solid = hold_.tabs.empty() ? section : unite(section, hold_.tabs);
+        if (!subtract(around, solid).empty())
+            violate("sheets.hold",
+                    fmt::format("a hole for a dowel or a rod breaks through the surface, {:.3f} mm "
+                                "below the sheet's top",
+                                depth));
+    }
+
     const ReadSheetProgram& program_;
     const ReadPiece& piece_;
     const std::vector<FineWay>& ways_;
     const SheetProofRules& rules_;
+    ReadHold hold_;
+    SheetBodies bodies_;
     PieceResult result_;
 
 public:
-    Box2 box_;  ///< of the piece's own cuts, on the stock
+    WayBox box_;  ///< of the piece's own cuts, on the stock
 };
 
 void require_ways(const ReadSheetProgram& program, const std::vector<FineWay>& ways,
@@ -283,7 +323,7 @@ void require_ways(const ReadSheetProgram& program, const std::vector<FineWay>& w
         const ReadHead &first = way.points[1], &last = way.points.back();
         if (std::hypot(first.x - last.x, first.y - last.y) > 2e-3)
             violate("sheets.open_way", way, "a cut that does not close, so that the piece is not free");
-        const Box2& b = fine_way.box;
+        const WayBox& b = fine_way.box;
         if (b.x0 < 0 || b.y0 < 0 || b.x1 > program.length || b.y1 > program.width)
             violate("sheets.leaves_stock", way, "a cut leaves the stock");
     }
@@ -395,13 +435,17 @@ SheetProof prove_sheets(Context& context, MeshView mesh, const std::vector<ReadS
                 piece.box_.add(way.box.x0, way.box.y0, 0), piece.box_.add(way.box.x1, way.box.y1, 0);
         results[i] = piece.run(own);
     });
+    std::vector<PieceHold> holds;
     for (const PieceResult& result : results) {
         proof.made_mm3 += result.made_mm3;
         proof.gouge = std::max(proof.gouge, result.gouge);
         proof.left_over = std::max(proof.left_over, result.left_over);
         proof.islands += result.islands;
+        proof.dowels += static_cast<int>(result.hold.holes.size());
+        holds.push_back(result.hold);
         proof.violations.insert(proof.violations.end(), result.violations.begin(), result.violations.end());
     }
+    if (proof.dowels > 0) proof.islands = require_held(holds, proof.violations);
     proof.passed = proof.violations.empty();
     return proof;
 }

@@ -2,6 +2,7 @@
 // what their text says, with code of its own, and held against the solid.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -31,9 +32,11 @@ struct ReadWay {
 /// Where a piece of the part lies on the stock.
 struct ReadPiece {
     int number = 0;
-    double low = 0, high = 0;  ///< mm of the part along the stack
-    int turn = 0;              ///< quarters, in degrees
-    double x = 0, y = 0;       ///< mm that it was moved by after the turn
+    double low = 0, high = 0;                  ///< mm of the part along the stack
+    int turn = 0;                              ///< quarters, in degrees
+    double x = 0, y = 0;                       ///< mm that it was moved by after the turn
+    std::vector<std::array<double, 3>> holes;  ///< of dowels and rods: x, y, diameter, mm of the part
+    std::vector<std::array<double, 8>> tabs;   ///< corners of tabs and necks, which are cut off later
 };
 
 /// What one program says.
@@ -51,7 +54,9 @@ struct SheetProof {
     double gouge = 0;        ///< mm: the greatest distance of the part's border within what was cut away
     double left_over = 0;    ///< mm: the greatest distance of what was made from the part
     double left_on_top = 0;  ///< mm of the part above the last sheet
-    int islands = 0;  ///< parts of sheets beyond one for each: nothing but the glue holds them in place
+    int islands = 0;  ///< parts of sheets that nothing but the glue holds in place: where the programs tell
+                      ///< of no dowel, those beyond one for each sheet
+    int dowels = 0;  ///< holes of dowels and rods, of all sheets
     std::vector<Diagnostic> violations;
 };
 

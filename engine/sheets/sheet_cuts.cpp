@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/sheets/fitted_heights.h"
 #include "engine/sheets/majorant.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
@@ -490,33 +491,6 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
     return result;
 }
 
-std::vector<std::vector<double>> heights_to_fit(MeshView mesh, const std::vector<SheetSpan>& spans) {
-    constexpr double same = 1e-3;
-    std::vector<std::vector<double>> heights(spans.size());
-    std::vector<std::vector<double>> kinks(spans.size());
-    for (const Vec3f& v : mesh.vertices) {
-        const auto above = std::upper_bound(spans.begin(), spans.end(), double{v.z},
-                                            [](double z, const SheetSpan& span) { return z < span.bottom; });
-        if (above == spans.begin()) continue;
-        const auto i = static_cast<std::size_t>(above - spans.begin()) - 1;
-        if (v.z > spans[i].top || kinks[i].size() > kMostVertexHeights) continue;
-        const auto at = std::lower_bound(kinks[i].begin(), kinks[i].end(), v.z - same);
-        if (at == kinks[i].end() || *at > v.z + same) kinks[i].insert(at, v.z);
-    }
-    for (std::size_t i = 0; i < spans.size(); ++i) {
-        const double thickness = spans[i].top - spans[i].bottom;
-        for (int k = 0; k <= kCutSections; ++k)
-            heights[i].push_back(spans[i].bottom + k * thickness / kCutSections);
-        if (kinks[i].size() > kMostVertexHeights) continue;
-        for (const double z : kinks[i])
-            if (std::none_of(heights[i].begin(), heights[i].end(),
-                             [&](double h) { return std::abs(h - z) < same; }))
-                heights[i].push_back(z);
-        std::sort(heights[i].begin(), heights[i].end());
-    }
-    return heights;
-}
-
 void require_rules(const SheetCutRules& rules) {
     if (!(rules.kerf >= 0) || rules.kerf > 100 || !(rules.most_tilt_deg >= 0) || rules.most_tilt_deg > 80 ||
         !(rules.leave > 0) || rules.most_passes < 1 || rules.most_passes > 100 || !(rules.gouge > 0) ||
@@ -540,7 +514,8 @@ std::vector<Point2> axis_at(const AxisLoop& loop, double share) {
 }
 
 std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh, const std::vector<SheetSpan>& spans,
-                               const std::vector<SheetStair>& stairs, const SheetCutRules& rules) {
+                               const std::vector<SheetStair>& stairs, const SheetCutRules& rules,
+                               const std::vector<SheetHold>& holds, double dowel) {
     require_rules(rules);
     const std::vector<std::vector<double>> heights = heights_to_fit(mesh, spans);
     const double top = bounds(mesh).max.z;
@@ -556,8 +531,12 @@ std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh, const std::vecto
     std::vector<SheetCuts> cuts(spans.size());
     parallel_each(context, spans.size(), [&](std::size_t i) {
         Fitted sheet{stairs[i].outline, heights[i], {}};
+        std::vector<Loops> held;  // what is to stay, with its tabs and without its holes
+        if (!holds.empty())
+            for (std::size_t k = 0; k < heights[i].size(); ++k)
+                held.push_back(with_hold(sections[starts[i] + k].loops, holds[i], dowel));
         for (std::size_t k = 0; k < heights[i].size(); ++k)
-            sheet.sections.push_back(&sections[starts[i] + k].loops);
+            sheet.sections.push_back(holds.empty() ? &sections[starts[i] + k].loops : &held[k]);
         if (rules.most_tilt_deg > 0) {
             Tilted tilted = tilted_cuts(sheet, rules);
             cuts[i].gave_up_tilt = !tilted.spares;

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "engine/sheets/alignment.h"
 #include "engine/sheets/sheet_slicing.h"
 #include "kernels/polygons/loops.h"
 
@@ -40,16 +41,20 @@ struct SheetCuts {
 /// the mesh's vertices in it where those are no more than kMostVertexHeights.
 inline constexpr int kCutSections = 24;
 inline constexpr std::size_t kMostVertexHeights = 24;
+inline constexpr std::size_t kMostSteps = 32;  ///< heights of level facets that a sheet's cuts are fitted to
 
 /// The cuts of sheets of a part. Upright ones run outside of the outline by half a kerf. Tilted ones follow
 /// the concave majorant of the sections in the normal plane of each piece of the outline, and none enters a
 /// section by more than rules.gouge; where one would, the sheet is cut upright.
-/// @param stairs of the same spans: stairs_of(). Tilted cuts need those of StairSide::outside
+/// @param stairs of the same spans: stairs_of(). Tilted cuts need those of StairSide::outside; outlines hold
+/// what `holds` adds and leave out its holes
+/// @param holds of the same spans, or none; their holes are of `dowel` mm
 /// @throws Error(usage, "sheets.cut") for rules out of range, and as slice()
 [[nodiscard]] std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh,
                                              const std::vector<SheetSpan>& spans,
                                              const std::vector<SheetStair>& stairs,
-                                             const SheetCutRules& rules);
+                                             const SheetCutRules& rules,
+                                             const std::vector<SheetHold>& holds = {}, double dowel = 0);
 
 /// The axis' ways at a height: share 0 at the bottom, 1 at the top.
 [[nodiscard]] std::vector<Point2> axis_at(const AxisLoop& loop, double share);

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "kernels/errors.h"
 #include "kernels/polygons/border_distance.h"
+#include "kernels/slicing/slicing.h"
 
 namespace slabwright {
 
@@ -19,6 +21,10 @@ void require_job(const SheetJob& job) {
     const auto refuse = [](const std::string& what, const char* remedy) {
         throw Error(ErrorKind::usage, "sheets.job", what, "", remedy);
     };
+    if (job.alignment.way != SheetAlignment::none && job.head == SheetHead::router &&
+        job.alignment.dowel < job.cutting.kerf)
+        refuse("the router's cutter is wider than a dowel's hole",
+               "give a thicker --dowel, or a thinner --kerf");
     if (job.cutting.most_tilt_deg > 0 && job.head != SheetHead::jet)
         refuse("only a jet's head tilts", "give --tilt 0, or --head jet");
     if (job.cutting.most_tilt_deg > 0 && job.slicing.side != StairSide::outside)
@@ -28,6 +34,11 @@ void require_job(const SheetJob& job) {
     for (const double value : {job.lead, job.pierce_s, job.through})
         if (!(value >= 0) || value > 1000)
             refuse("lead, pierce and depth under the sheet must be 0 or more", "");
+    for (const SheetOffcut& offcut : job.offcuts)
+        if (std::none_of(job.slicing.thicknesses.begin(), job.slicing.thicknesses.end(),
+                         [&](double t) { return std::abs(t - offcut.thickness) < 1e-6; }))
+            refuse(fmt::format("an offcut of {:.4g} mm is of no thickness in stock", offcut.thickness),
+                   "give its thickness to --thickness too");
     if (job.head == SheetHead::router && !(job.cutting.kerf > 0))
         refuse("a router's cutter has a diameter", "give --kerf");
 }
@@ -158,7 +169,7 @@ void tell_findings(SheetsPlan& plan, const std::vector<SheetCuts>& cuts, int on_
                          plan.stack.left_on_top));
     for (std::size_t i = 0; i < plan.pieces.size(); ++i) {
         const SheetPiece& piece = plan.pieces[i];
-        if (piece.islands > 1)
+        if (piece.islands > 1 && plan.job.alignment.way == SheetAlignment::none)
             tell(plan, Severity::warning, "sheets.islands",
                  fmt::format("sheet {} is of {} parts, which nothing but the glue holds in place",
                              piece.number, piece.islands));
@@ -169,6 +180,115 @@ void tell_findings(SheetsPlan& plan, const std::vector<SheetCuts>& cuts, int on_
     if (on_the_way > 0)
         tell(plan, Severity::warning, "sheets.pierce",
              fmt::format("{} cuts have no room for a lead and begin on the edge of the part", on_the_way));
+}
+
+}  // namespace
+
+namespace {
+
+/// What holds the sheets; their outlines take it up. Empty where nothing is asked for.
+std::vector<SheetHold> hold_sheets(Context& context, MeshView mesh, const std::vector<SheetSpan>& spans,
+                                   const SheetJob& job, std::vector<SheetStair>& stairs) {
+    if (job.alignment.way == SheetAlignment::none) return {};
+    std::vector<Loops> outlines, cores;
+    for (const SheetStair& stair : stairs) outlines.push_back(stair.outline);
+    for (SheetStair& core : stairs_of(context, mesh, spans, StairSide::inside, false))
+        cores.push_back(std::move(core.outline));
+    std::vector<SheetHold> holds =
+        holds_of(spans, outlines, cores, job.alignment, job.cutting.most_tilt_deg > 0);
+    for (std::size_t i = 0; i < spans.size(); ++i)
+        stairs[i].outline = with_hold(stairs[i].outline, holds[i], job.alignment.dowel);
+    return holds;
+}
+
+/// Where each sheet touches the next: upright ones where their outlines cover each other, tilted ones in the
+/// part's section between them.
+std::vector<Loops> bonded_faces(Context& context, MeshView mesh, const SheetJob& job,
+                                const std::vector<SheetSpan>& spans, const std::vector<SheetStair>& stairs) {
+    std::vector<Loops> faces;
+    if (job.cutting.most_tilt_deg > 0) {
+        std::vector<Plane> planes;
+        for (std::size_t i = 0; i + 1 < spans.size(); ++i)
+            planes.push_back({(spans[i].top + spans[i + 1].bottom) / 2, Side::below});
+        for (Section& section : slice(context, mesh, planes)) faces.push_back(std::move(section.loops));
+        return faces;
+    }
+    for (std::size_t i = 0; i + 1 < stairs.size(); ++i)
+        faces.push_back(intersect(stairs[i].outline, stairs[i + 1].outline));
+    return faces;
+}
+
+/// Indices of cuts, those that more others run around first: what stands in a hole is cut free before the
+/// hole falls out.
+std::vector<std::size_t> from_inside(const SheetCuts& cuts) {
+    std::vector<int> depth(cuts.loops.size(), 0);
+    for (std::size_t i = 0; i < cuts.loops.size(); ++i)
+        for (const AxisLoop& other : cuts.loops) {
+            if (other.pass != 0 || other.loop == cuts.loops[i].loop) continue;
+            Loops ring;
+            ring.points = other.top;
+            ring.close_loop();
+            depth[i] += winding(ring, cuts.loops[i].top[0]) != 0;
+        }
+    std::vector<std::size_t> order(depth.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return depth[a] > depth[b]; });
+    return order;
+}
+
+/// Lays the pieces of one thickness on their stock, and their cuts in its programs.
+/// @returns how many cuts have no room for a lead
+int lay_pieces(Context& context, SheetsPlan& plan, std::size_t t, const std::vector<SheetCuts>& cuts,
+               const std::vector<Loops>& blanks) {
+    const SheetJob& job = plan.job;
+    const std::vector<SheetSpan>& spans = plan.stack.sheets;
+    int on_the_way = 0;
+    std::vector<std::size_t> own;
+    std::vector<Loops> own_blanks;
+    for (std::size_t i = 0; i < spans.size(); ++i)
+        if (spans[i].stock == static_cast<int>(t)) own.push_back(i), own_blanks.push_back(blanks[i]);
+    std::vector<StockSheet> offcuts;
+    for (const SheetOffcut& offcut : job.offcuts)
+        if (std::abs(offcut.thickness - job.slicing.thicknesses[t]) < 1e-6) offcuts.push_back(offcut.size);
+    const Nest nest = nest_pieces(context, own_blanks, job.stock, offcuts, job.nesting);
+    const std::size_t first = plan.programs.size();
+    for (const StockSheet& stock : nest.stock) {
+        SheetProgram program;
+        program.thickness = job.slicing.thicknesses[t];
+        program.stock = stock;
+        plan.programs.push_back(program);
+    }
+    for (std::size_t k = 0; k < own.size(); ++k) {
+        SheetPiece& piece = plan.pieces[own[k]];
+        piece.place = nest.places[k];
+        piece.program = static_cast<int>(first) + piece.place.stock;
+        SheetProgram& program = plan.programs[static_cast<std::size_t>(piece.program)];
+        program.pieces.push_back(piece.number);
+        const SheetCuts& own_cuts = cuts[own[k]];
+        for (const std::size_t l : from_inside(own_cuts)) {
+            const AxisLoop& loop = own_cuts.loops[l];
+            const Loops top = ends_of(own_cuts, loop, true), bottom = ends_of(own_cuts, loop, false);
+            const BorderDistance to_top(top), to_bottom(bottom);
+            const Start start = start_of(loop, {&to_top, &to_bottom}, {&top, &bottom}, job.lead);
+            on_the_way += start.lead == 0 && job.lead > 0;
+            SheetWay way = way_of(loop, start, piece.place, program.thickness);
+            way.piece = piece.number;
+            double tilt = 0;
+            for (const HeadPoint& p : way.points) tilt = std::max(tilt, p.a_deg);
+            way.feed = feed_of(job, program.thickness, tilt);
+            const double mm = length_of(way);
+            const double depths = job.head == SheetHead::router
+                                      ? std::ceil((program.thickness + job.through) / job.stepdown)
+                                      : 1;
+            program.cut_mm += mm * depths;
+            program.minutes +=
+                mm * depths / way.feed + (job.head == SheetHead::router ? 0.05 : job.pierce_s / 60);
+            program.ways.push_back(std::move(way));
+        }
+        piece.label = program.ways.back().points[0].top;
+    }
+    return on_the_way;
 }
 
 }  // namespace
@@ -198,57 +318,30 @@ SheetsPlan plan_sheets(Context& context, const Mesh& mesh, const SheetJob& job) 
     plan.uniform_sheets = static_cast<std::size_t>((plan.height + uniform.bond + 1e-4) /
                                                    (uniform.thicknesses.front() + uniform.bond));
     const std::vector<SheetSpan>& spans = plan.stack.sheets;
-    const std::vector<SheetStair> stairs = stairs_of(context, mesh.view(), spans, job.slicing.side);
+    std::vector<SheetStair> stairs = stairs_of(context, mesh.view(), spans, job.slicing.side);
+    std::vector<std::array<Point2, 4>> pins;
+    for (const SheetStair& stair : stairs) pins.push_back(pins_of(stair.outline));
+    const std::vector<Loops> faces = bonded_faces(context, mesh.view(), job, spans, stairs);
+    const std::vector<SheetHold> holds = hold_sheets(context, mesh.view(), spans, job, stairs);
     context.begin_phase("cuts", 0.5, 0.8);
-    const std::vector<SheetCuts> cuts = cuts_of(context, mesh.view(), spans, stairs, job.cutting);
+    const std::vector<SheetCuts> cuts =
+        cuts_of(context, mesh.view(), spans, stairs, job.cutting, holds, job.alignment.dowel);
     add_pieces(plan, stairs, cuts);
+    for (std::size_t i = 0; i < holds.size(); ++i) plan.pieces[i].hold = holds[i];
+    for (std::size_t i = 0; i < pins.size(); ++i) {
+        plan.pieces[i].pins = pins[i];
+        if (i >= faces.size()) continue;
+        Loops bonded = faces[i];
+        for (const std::size_t side : {i, i + 1})
+            if (side < holds.size()) bonded = with_hold(bonded, {{}, holds[side].holes}, job.alignment.dowel);
+        plan.pieces[i].joint_mm2 = area(bonded);
+    }
     std::vector<Loops> blanks;
     for (const SheetCuts& own : cuts) blanks.push_back(blank_of(own, job));
     context.begin_phase("nesting", 0.8, 1);
     int on_the_way = 0;
-    for (std::size_t t = 0; t < job.slicing.thicknesses.size(); ++t) {
-        std::vector<std::size_t> own;
-        std::vector<Loops> own_blanks;
-        for (std::size_t i = 0; i < spans.size(); ++i)
-            if (spans[i].stock == static_cast<int>(t)) own.push_back(i), own_blanks.push_back(blanks[i]);
-        const Nest nest = nest_pieces(context, own_blanks, job.stock,
-                                      t == 0 ? job.offcuts : std::vector<StockSheet>{}, job.nesting);
-        const std::size_t first = plan.programs.size();
-        for (const StockSheet& stock : nest.stock) {
-            SheetProgram program;
-            program.thickness = job.slicing.thicknesses[t];
-            program.stock = stock;
-            plan.programs.push_back(program);
-        }
-        for (std::size_t k = 0; k < own.size(); ++k) {
-            SheetPiece& piece = plan.pieces[own[k]];
-            piece.place = nest.places[k];
-            piece.program = static_cast<int>(first) + piece.place.stock;
-            SheetProgram& program = plan.programs[static_cast<std::size_t>(piece.program)];
-            program.pieces.push_back(piece.number);
-            const SheetCuts& own_cuts = cuts[own[k]];
-            for (const AxisLoop& loop : own_cuts.loops) {
-                const Loops top = ends_of(own_cuts, loop, true), bottom = ends_of(own_cuts, loop, false);
-                const BorderDistance to_top(top), to_bottom(bottom);
-                const Start start = start_of(loop, {&to_top, &to_bottom}, {&top, &bottom}, job.lead);
-                on_the_way += start.lead == 0 && job.lead > 0;
-                SheetWay way = way_of(loop, start, piece.place, program.thickness);
-                way.piece = piece.number;
-                double tilt = 0;
-                for (const HeadPoint& p : way.points) tilt = std::max(tilt, p.a_deg);
-                way.feed = feed_of(job, program.thickness, tilt);
-                const double mm = length_of(way);
-                const double depths = job.head == SheetHead::router
-                                          ? std::ceil((program.thickness + job.through) / job.stepdown)
-                                          : 1;
-                program.cut_mm += mm * depths;
-                program.minutes +=
-                    mm * depths / way.feed + (job.head == SheetHead::router ? 0.05 : job.pierce_s / 60);
-                program.ways.push_back(std::move(way));
-            }
-            piece.label = program.ways.back().points[0].top;
-        }
-    }
+    for (std::size_t t = 0; t < job.slicing.thicknesses.size(); ++t)
+        on_the_way += lay_pieces(context, plan, t, cuts, blanks);
     tell_findings(plan, cuts, on_the_way);
     return plan;
 }

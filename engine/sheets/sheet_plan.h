@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/plan.h"
+#include "engine/sheets/alignment.h"
 #include "engine/sheets/head.h"
 #include "engine/sheets/jet_feed.h"
 #include "engine/sheets/nesting.h"
@@ -17,12 +18,19 @@ namespace slabwright {
 /// may tilt.
 enum class SheetHead : std::uint8_t { router, laser, jet };
 
+/// A rest of an earlier sheet; it is used before whole sheets.
+struct SheetOffcut {
+    double thickness = 0;  ///< mm
+    StockSheet size;
+};
+
 struct SheetJob {
     SheetRules slicing;
     SheetCutRules cutting;  ///< its kerf is the router's cutter
-    NestRules nesting;      ///< spacing is between kerfs and leads
+    AlignmentRules alignment;
+    NestRules nesting;  ///< spacing is between kerfs and leads
     StockSheet stock{1220, 1220};
-    std::vector<StockSheet> offcuts;  ///< of the first thickness
+    std::vector<SheetOffcut> offcuts;
     SheetHead head = SheetHead::router;
     char axis = 'z';                                      ///< along which sheets are stacked
     double lead = 3;                                      ///< mm of waste in which a cut begins
@@ -52,8 +60,11 @@ struct SheetPiece {
     NestPlace place;
     int program = 0;  ///< index of SheetsPlan::programs
     int islands = 1;
+    double joint_mm2 = 0;  ///< that are bonded to the sheet above
     double stair_mm3 = 0, deviation = 0, tilt_deg = 0, area_mm2 = 0;
-    Point2 label;  ///< a place inside, on the stock
+    Point2 label;                ///< a place inside, on the stock
+    SheetHold hold;              ///< in the stack's frame
+    std::array<Point2, 4> pins;  ///< pins_of() its outline, in the stack's frame
 };
 
 /// What is cut from one stock sheet.
@@ -61,7 +72,7 @@ struct SheetProgram {
     double thickness = 0;  ///< mm
     StockSheet stock;
     std::vector<int> pieces;     ///< numbers
-    std::vector<SheetWay> ways;  ///< in order: piece by piece, holes before outlines
+    std::vector<SheetWay> ways;  ///< in order: piece by piece, in each from inside
     double cut_mm = 0, minutes = 0;
 };
 

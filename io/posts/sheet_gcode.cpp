@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -104,6 +105,24 @@ private:
     const SheetProgram& program_;
 };
 
+/// What holds a piece, in the part's frame.
+void append_hold(std::string& text, const SheetPiece& piece, double dowel) {
+    for (std::size_t l = 0; l < piece.hold.added.size(); ++l) {
+        text += fmt::format("(tab of piece {}", piece.number);
+        for (const Point2 p : piece.hold.added.loop(l)) {
+            append_mm(text += ' ', p.x);
+            append_mm(text += ' ', p.y);
+        }
+        text += ")\n";
+    }
+    for (const Point2 hole : piece.hold.holes) {
+        text += fmt::format("(dowel of piece {} at ", piece.number);
+        append_mm(text, hole.x);
+        append_mm(text += ' ', hole.y);
+        text += fmt::format(" diameter {})\n", decimal(dowel, 4));
+    }
+}
+
 }  // namespace
 
 std::string sheet_program_text(const SheetsPlan& plan, std::size_t index) {
@@ -122,6 +141,8 @@ std::string sheet_program_text(const SheetsPlan& plan, std::size_t index) {
             fmt::format("(piece {} from {} to {} turn {} at {} {})\n", number, decimal(piece.span.bottom, 4),
                         decimal(piece.span.top, 4), piece.place.turn, x, y);
     }
+    for (const int number : program.pieces)
+        append_hold(text, plan.pieces[static_cast<std::size_t>(number) - 1], job.alignment.dowel);
     text += "G21 G17 G90 G94 G40 G49 G80\nG64 P0.005\nG54\n";
     if (job.head == SheetHead::router)
         text += fmt::format("T{} M6\nG43 H{}\nS{} M3\nG4 P3\n", job.tool, job.tool, decimal(job.rpm, 0));
@@ -199,15 +220,29 @@ private:
                 fail("gcode.number", "a thickness or kerf of nothing");
         } else if (w.size() == 11 && w[0] == "piece" && w[2] == "from" && w[4] == "to" && w[6] == "turn" &&
                    w[8] == "at") {
-            ReadPiece piece{whole(1), value(3), value(5), whole(7), value(9), value(10)};
+            ReadPiece piece{whole(1), value(3), value(5), whole(7), value(9), value(10), {}, {}};
             if (piece.turn % 90 != 0) fail("gcode.number", "a turn that is no quarter");
             program_.pieces.push_back(piece);
+        } else if (w.size() == 9 && w[0] == "dowel" && w[2] == "piece" && w[4] == "at") {
+            const double diameter = value(8);
+            if (!(diameter > 0)) fail("gcode.comment", "a dowel without a diameter");
+            piece_of(whole(3)).holes.push_back({value(5), value(6), diameter});
+        } else if (w.size() == 12 && w[0] == "tab" && w[2] == "piece") {
+            std::array<double, 8> corners{};
+            for (std::size_t i = 0; i < 8; ++i) corners[i] = value(4 + i);
+            piece_of(whole(3)).tabs.push_back(corners);
         } else if (w.size() == 9 && w[0] == "cut" && w[2] == "piece" && w[4] == "loop" && w[6] == "pass") {
             if (w[8] != "hole" && w[8] != "outline")
                 fail("gcode.comment", "a cut that is neither hole nor outline");
             next_ = ReadWay{whole(3), whole(5), whole(7), w[8] == "hole", {}, 0, number_};
             named_ = true;
         }
+    }
+
+    ReadPiece& piece_of(int number) {
+        for (ReadPiece& piece : program_.pieces)
+            if (piece.number == number) return piece;
+        fail("gcode.comment", fmt::format("piece {} is not placed before it is spoken of", number));
     }
 
     void words(std::string_view text) {

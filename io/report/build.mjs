@@ -1,4 +1,4 @@
-// Bundles the page into one HTML file, and writes that as C++ string literals for io/report_template.cpp.
+// Bundles each page into one HTML file, and writes that as C++ string literals for io/report_template.cpp.
 //     node build.mjs OUT_FOLDER
 import {build} from 'esbuild';
 import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
@@ -35,25 +35,28 @@ function licences() {
     return `<!--\nThis page holds parts of:\n\n${named.join('\n\n')}\n-->`;
 }
 
-const parts = {
-    style: await bundle('style.css'),
-    model: await bundle('view3d.js'),
-    main: await bundle('main.js'),
-    licences: licences(),
-};
-let html = readFileSync(join(here, 'src', 'page.html'), 'utf8');
-for (const [name, text] of Object.entries(parts)) html = html.replace(`{{${name}}}`, () => text);
-
 // A raw string literal ends at its delimiter, and some compilers limit the length of one.
-const pieces = [];
-const bytes = Buffer.from(html, 'utf8');
-if (html.includes(')slabwright"')) throw new Error('the page holds the delimiter of its own literal');
-for (let at = 0; at < bytes.length;) {
-    let end = Math.min(at + 15000, bytes.length);
-    while (end < bytes.length && (bytes[end] & 0xc0) === 0x80) --end; // not within a character
-    pieces.push(`R"slabwright(${bytes.subarray(at, end).toString('utf8')})slabwright"`);
-    at = end;
+function write(name, html) {
+    const pieces = [];
+    const bytes = Buffer.from(html, 'utf8');
+    if (html.includes(')slabwright"')) throw new Error('the page holds the delimiter of its own literal');
+    for (let at = 0; at < bytes.length;) {
+        let end = Math.min(at + 15000, bytes.length);
+        while (end < bytes.length && (bytes[end] & 0xc0) === 0x80) --end; // not within a character
+        pieces.push(`R"slabwright(${bytes.subarray(at, end).toString('utf8')})slabwright"`);
+        at = end;
+    }
+    writeFileSync(join(out, `${name}.html`), html);
+    writeFileSync(join(out, `${name}.inc`), pieces.join('\n') + '\n');
 }
+
+function filled(template, parts) {
+    let html = readFileSync(join(here, 'src', template), 'utf8');
+    for (const [name, text] of Object.entries(parts)) html = html.replace(`{{${name}}}`, () => text);
+    return html;
+}
+
 mkdirSync(out, {recursive: true});
-writeFileSync(join(out, 'report_page.html'), html);
-writeFileSync(join(out, 'report_page.inc'), pieces.join('\n') + '\n');
+const style = await bundle('style.css');
+write('report_page', filled('page.html', {style, model: await bundle('view3d.js'), main: await bundle('main.js'), licences: licences()}));
+write('assembly_page', filled('assembly.html', {style: style + await bundle('assembly.css'), assembly: await bundle('assembly.js')}));

@@ -34,13 +34,14 @@ constexpr const char* kRemedy = "give another folder after -o, or make room and 
 constexpr const char* kMoveAway = "move that away, or give another folder after -o";
 constexpr std::string_view kPartial = "partial", kOld = "old";
 /// The files of a plan folder beside its programs.
-constexpr std::array<std::string_view, 6> kFiles{"plan.json",   "tool.tbl",    "sequence.json",
-                                                 "report.html", "verify.json", "sheets.json"};
+constexpr std::array<std::string_view, 7> kFiles{"plan.json",   "tool.tbl",    "sequence.json", "report.html",
+                                                 "verify.json", "sheets.json", "assembly.html"};
 /// Its folders, and how the names in them end.
 struct Inner {
     std::string_view folder, ending;
 };
-constexpr std::array<Inner, 3> kInner{Inner{"nc", ".ngc"}, Inner{"dxf", ".dxf"}, Inner{"svg", ".svg"}};
+constexpr std::array<Inner, 4> kInner{Inner{"nc", ".ngc"}, Inner{"dxf", ".dxf"}, Inner{"svg", ".svg"},
+                                      Inner{"fixture", ".dxf"}};
 
 [[noreturn]] void refuse(const char* code, const fs::path& place, const std::string& what,
                          const std::string& remedy = kRemedy) {
@@ -126,6 +127,8 @@ std::optional<std::set<std::string>> files_of_sheets(const fs::path& sheets) {
         for (const json& program : document.at("programs"))
             for (const char* key : {"file", "dxf", "svg"})
                 names.insert(fs::path(program.at(key).get<std::string>()).filename().string());
+        if (document.contains("fixture"))
+            for (const json& name : document.at("fixture")) names.insert(name.get<std::string>());
         return names;
     } catch (const json::exception&) {
         return std::nullopt;

@@ -4,6 +4,7 @@
 
 #include "io/text/decimal.h"
 #include "io/text/json_text.h"
+#include "kernels/polygons/pieces.h"
 
 namespace slabwright {
 
@@ -36,65 +37,78 @@ std::vector<Point2> loop_of(const SheetWay& way) {
 
 }  // namespace
 
-std::string sheet_dxf(const SheetsPlan& plan, std::size_t index) {
-    const SheetProgram& program = plan.programs[index];
-    std::string text;
-    for (const auto& [code, value] : std::initializer_list<std::pair<int, const char*>>{{0, "SECTION"},
-                                                                                        {2, "HEADER"},
-                                                                                        {9, "$ACADVER"},
-                                                                                        {1, "AC1009"},
-                                                                                        {9, "$INSUNITS"},
-                                                                                        {70, "4"},
-                                                                                        {9, "$EXTMIN"},
-                                                                                        {10, "0.0"},
-                                                                                        {20, "0.0"},
-                                                                                        {9, "$EXTMAX"}})
-        append_group(text, code, value);
-    append_group(text, 10, real_mm(to_units(program.stock.length)));
-    append_group(text, 20, real_mm(to_units(program.stock.width)));
-    for (const auto& [code, value] : std::initializer_list<std::pair<int, const char*>>{
-             {0, "ENDSEC"}, {0, "SECTION"}, {2, "TABLES"}, {0, "TABLE"}, {2, "LAYER"}, {70, "4"}})
-        append_group(text, code, value);
+namespace {
+
+void append_words(std::string& text, std::initializer_list<std::pair<int, const char*>> words) {
+    for (const auto& [code, value] : words) append_group(text, code, value);
+}
+
+void append_head(std::string& text, Point2 low, Point2 high) {
+    append_words(text, {{0, "SECTION"}, {2, "HEADER"}, {9, "$ACADVER"}, {1, "AC1009"}});
+    append_words(text, {{9, "$INSUNITS"}, {70, "4"}, {9, "$EXTMIN"}});
+    append_group(text, 10, real_mm(low.x));
+    append_group(text, 20, real_mm(low.y));
+    append_group(text, 9, "$EXTMAX");
+    append_group(text, 10, real_mm(high.x));
+    append_group(text, 20, real_mm(high.y));
+    append_words(text, {{0, "ENDSEC"}, {0, "SECTION"}, {2, "TABLES"}, {0, "TABLE"}, {2, "LAYER"}, {70, "4"}});
     int colour = 1;
     for (const char* layer : {"CUT", "HOLE", "LABEL", "TAB"}) {
-        append_group(text, 0, "LAYER");
-        append_group(text, 2, layer);
-        append_group(text, 70, "0");
+        append_words(text, {{0, "LAYER"}, {2, layer}, {70, "0"}});
         append_group(text, 62, std::to_string(colour++));
         append_group(text, 6, "CONTINUOUS");
     }
-    for (const auto& [code, value] : std::initializer_list<std::pair<int, const char*>>{
-             {0, "ENDTAB"}, {0, "ENDSEC"}, {0, "SECTION"}, {2, "ENTITIES"}})
-        append_group(text, code, value);
-    for (const SheetWay& way : program.ways) {
-        const char* layer = way.is_hole ? "HOLE" : "CUT";
-        append_group(text, 0, "POLYLINE");
-        append_group(text, 8, layer);
-        append_group(text, 66, "1");
-        for (const int code : {10, 20, 30}) append_group(text, code, "0.0");
-        append_group(text, 70, "1");
-        for (const Point2 p : loop_of(way)) {
-            append_group(text, 0, "VERTEX");
-            append_group(text, 8, layer);
-            append_group(text, 10, real_mm(p.x));
-            append_group(text, 20, real_mm(p.y));
-            append_group(text, 30, "0.0");
-        }
-        append_group(text, 0, "SEQEND");
-        append_group(text, 8, layer);
+    append_words(text, {{0, "ENDTAB"}, {0, "ENDSEC"}, {0, "SECTION"}, {2, "ENTITIES"}});
+}
+
+void append_loop(std::string& text, const char* layer, std::span<const Point2> points) {
+    append_words(text,
+                 {{0, "POLYLINE"}, {8, layer}, {66, "1"}, {10, "0.0"}, {20, "0.0"}, {30, "0.0"}, {70, "1"}});
+    for (const Point2 p : points) {
+        append_words(text, {{0, "VERTEX"}, {8, layer}});
+        append_group(text, 10, real_mm(p.x));
+        append_group(text, 20, real_mm(p.y));
+        append_group(text, 30, "0.0");
     }
+    append_words(text, {{0, "SEQEND"}, {8, layer}});
+}
+
+void append_label(std::string& text, Point2 at, const std::string& words) {
+    append_words(text, {{0, "TEXT"}, {8, "LABEL"}});
+    append_group(text, 10, real_mm(at.x));
+    append_group(text, 20, real_mm(at.y));
+    append_group(text, 30, "0.0");
+    append_group(text, 40, "8.0");
+    append_group(text, 1, words);
+}
+
+}  // namespace
+
+std::string sheet_dxf(const SheetsPlan& plan, std::size_t index) {
+    const SheetProgram& program = plan.programs[index];
+    std::string text;
+    append_head(text, {0, 0}, {to_units(program.stock.length), to_units(program.stock.width)});
+    for (const SheetWay& way : program.ways) append_loop(text, way.is_hole ? "HOLE" : "CUT", loop_of(way));
     for (const int number : program.pieces) {
         const SheetPiece& piece = plan.pieces[static_cast<std::size_t>(number) - 1];
-        append_group(text, 0, "TEXT");
-        append_group(text, 8, "LABEL");
-        append_group(text, 10, real_mm(piece.label.x));
-        append_group(text, 20, real_mm(piece.label.y));
-        append_group(text, 30, "0.0");
-        append_group(text, 40, "8.0");
-        append_group(text, 1, std::to_string(number));
+        append_label(text, piece.label, std::to_string(number));
+        const Loops tabs = placed(piece.hold.added, piece.place);
+        for (std::size_t l = 0; l < tabs.size(); ++l) append_loop(text, "TAB", tabs.loop(l));
     }
-    append_group(text, 0, "ENDSEC");
-    append_group(text, 0, "EOF");
+    append_words(text, {{0, "ENDSEC"}, {0, "EOF"}});
+    return text;
+}
+
+std::string loops_dxf(const Loops& loops, const std::string& label) {
+    std::string text;
+    Box2 box;
+    for (const Point2 p : loops.points) box.grow(p);
+    if (loops.points.empty()) box.min = box.max = {0, 0};
+    append_head(text, box.min, box.max);
+    for (std::size_t l = 0; l < loops.size(); ++l)
+        append_loop(text, signed_area(loops.loop(l)) < 0 ? "HOLE" : "CUT", loops.loop(l));
+    append_label(text, {box.min.x + to_units(5), box.min.y + to_units(5)}, label);
+    append_words(text, {{0, "ENDSEC"}, {0, "EOF"}});
     return text;
 }
 
