@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, report, inspect, repair, slice, sheets, bond, job. Errors are one
-// line on stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, report, inspect, repair, prepare, slice, sheets, bond, job. Errors
+// are one line on stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -19,9 +19,11 @@
 #include <string>
 #include <string_view>
 
+#include "io/prepare.h"
 #include "io/slabwright.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
+#include "tools/prepare_command.h"
 #include "tools/sheets_command.h"
 
 namespace {
@@ -37,6 +39,7 @@ extern "C" void on_signal(int signal) {
 }
 
 struct Options {
+    PrepareOptions prepare;
     std::string repair, stl, out, maps, access_maps, job_file, units, strategy, finder, device, library;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
@@ -209,6 +212,7 @@ Job job_of(const Options& options) {
     word("layers.strategy", options.strategy);
     word("layers.finder", options.finder);
     put("tolerances.weld", options.weld_given ? fmt::format("{}", options.weld) : "");
+    keys += prepare_keys(options.prepare);
     return keys.empty() ? job : job_from_toml(keys, "command line", job);
 }
 
@@ -353,6 +357,14 @@ void run_repair(const Options& options) {
     });
 }
 
+void run_prepare(const Options& options) {
+    const Job job = job_of(options);
+    with_context(options, [&](Context& context) {
+        const PreparedModel model = prepare_model(context, options.stl, job, options.out);
+        return options.json ? prepare_json(model, options.out) : prepare_text(model, options.out);
+    });
+}
+
 void run_slice(const Options& options) {
     const Job job = job_of(options);
     with_context(options, [&](Context& context) {
@@ -397,6 +409,28 @@ void add_common(CLI::App& command, Options& options) {
                   "mend a mesh that is no solid; --repair=rebuild makes its surface anew where mending does "
                   "not close it")
         ->check(CLI::IsMember({"none", "mend", "rebuild"}));
+    add_prepare_options(command, options.prepare);
+}
+
+CLI::App* add_prepare_command(CLI::App& app, Options& options) {
+    CLI::App* command =
+        app.add_subcommand("prepare", "turn, scale, shrink, mirror or shift a model, or give it a skin");
+    command->add_option("MODEL", options.stl, "the model")->required();
+    command->add_option("-o,--out", options.out, "the model in millimetres: .stl or .3mf")->required();
+    add_common(*command, options);
+    return command;
+}
+
+CLI::App* add_repair_command(CLI::App& app, Options& options) {
+    CLI::App* command = app.add_subcommand(
+        "repair", "mend a mesh that is no solid: what was wrong is told, and a solid is written");
+    command->add_option("STL", options.stl, "the mesh")->required();
+    command->add_option("-o,--out", options.out, "STL for the solid, in the mesh's unit and place")
+        ->required();
+    command->add_flag("--rebuild", options.rebuild, "make the surface anew where mending does not close it");
+    add_reading(*command, options);
+    add_limits(*command, options);
+    return command;
 }
 
 /// Reads the command line and does what it asks for. @return the exit code
@@ -474,22 +508,14 @@ int command(int argc, char** argv) {
     inspect_command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
 
-    CLI::App* repair_command = app.add_subcommand(
-        "repair", "mend a mesh that is no solid: what was wrong is told, and a solid is written");
-    repair_command->add_option("STL", options.stl, "the mesh")->required();
-    repair_command->add_option("-o,--out", options.out, "STL for the solid, in the mesh's unit and place")
-        ->required();
-    repair_command->add_flag("--rebuild", options.rebuild,
-                             "make the surface anew where mending does not close it");
-    add_reading(*repair_command, options);
-    add_limits(*repair_command, options);
-
+    CLI::App* repair_command = add_repair_command(app, options);
     CLI::App* slice_command = app.add_subcommand("slice", "cut the pattern by level planes");
     slice_command->add_option("STL", options.stl, "the pattern")->required();
     slice_command->add_option("--every", options.every, "mm from one section to the next")->required();
     slice_command->add_option("-o,--out", options.out, "drawing: .svg, .dxf or .json")->required();
     add_common(*slice_command, options);
 
+    CLI::App* prepare_command = add_prepare_command(app, options);
     SheetsOptions sheets_options;
     CLI::App* sheets_command =
         app.add_subcommand("sheets", "plan a part as sheets cut from stock and bonded");
@@ -532,6 +558,7 @@ int command(int argc, char** argv) {
         else if (*report_command) run_report(options);
         else if (*inspect_command) run_inspect(options);
         else if (*repair_command) run_repair(options);
+        else if (*prepare_command) run_prepare(options);
         else if (*slice_command) run_slice(options);
         else if (*sheets_command)
             return run_sheets(options, sheets_options) ? 0 : static_cast<int>(ErrorKind::verification);
