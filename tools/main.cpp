@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, report, inspect, repair, prepare, slice, sheets, bond, job. Errors
-// are one line on stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, report, inspect, repair, prepare, split, slice, sheets, bond, job.
+// Errors are one line on stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -24,7 +24,9 @@
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
 #include "tools/prepare_command.h"
+#include "tools/progress_bar.h"
 #include "tools/sheets_command.h"
+#include "tools/split_command.h"
 
 namespace {
 
@@ -45,38 +47,6 @@ struct Options {
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
          quiet = false, defaults = false, weld_given = false, no_3d = false, rebuild = false;
-};
-
-/// A bar with phase and time left, redrawn at most ten times a second on a terminal's last line.
-class ProgressBar {
-public:
-    void show(const Progress& progress) {
-        const auto now = Clock::now();
-        if (drawn_ && now - last_ < std::chrono::milliseconds(100)) return;
-        last_ = now;
-        drawn_ = true;
-        constexpr int width = 30;
-        const int full = std::clamp(static_cast<int>(progress.fraction * width), 0, width);
-        std::string left;
-        const double elapsed = std::chrono::duration<double>(now - start_).count();
-        if (progress.fraction > 0.02 && elapsed > 1) {
-            const long seconds =
-                static_cast<long>(elapsed * (1 - progress.fraction) / progress.fraction + 0.5);
-            left = fmt::format("{}:{:02} left", seconds / 60, seconds % 60);
-        }
-        const std::string line = fmt::format("\r\x1b[K[{:#<{}}{:.<{}}] {:3.0f} %  {}  {}", "", full, "",
-                                             width - full, 100 * progress.fraction, progress.phase, left);
-        std::fwrite(line.data(), 1, line.size(), stderr);
-    }
-    void clear() {
-        if (drawn_) std::fputs("\r\x1b[K", stderr);
-        drawn_ = false;
-    }
-
-private:
-    using Clock = std::chrono::steady_clock;
-    Clock::time_point start_ = Clock::now(), last_{};
-    bool drawn_ = false;
 };
 
 /// @param also further errors of the same kind, which JSON names in the same object
@@ -365,6 +335,14 @@ void run_prepare(const Options& options) {
     });
 }
 
+void run_split(const Options& options, const SplitOptions& asked) {
+    const Job job = job_of(options);
+    with_context(options, [&](Context& context) {
+        const SplitModel model = split_model(context, options.stl, job, split_request(asked));
+        return options.json ? split_json(model) : split_text(model);
+    });
+}
+
 void run_slice(const Options& options) {
     const Job job = job_of(options);
     with_context(options, [&](Context& context) {
@@ -516,6 +494,11 @@ int command(int argc, char** argv) {
     add_common(*slice_command, options);
 
     CLI::App* prepare_command = add_prepare_command(app, options);
+    SplitOptions split_options;
+    CLI::App* split_command = app.add_subcommand("split", "cut a model into two halves, capped and dowelled");
+    split_command->add_option("MODEL", options.stl, "the model")->required();
+    add_common(*split_command, options);
+    add_split_options(*split_command, split_options);
     SheetsOptions sheets_options;
     CLI::App* sheets_command =
         app.add_subcommand("sheets", "plan a part as sheets cut from stock and bonded");
@@ -559,6 +542,7 @@ int command(int argc, char** argv) {
         else if (*inspect_command) run_inspect(options);
         else if (*repair_command) run_repair(options);
         else if (*prepare_command) run_prepare(options);
+        else if (*split_command) run_split(options, split_options);
         else if (*slice_command) run_slice(options);
         else if (*sheets_command)
             return run_sheets(options, sheets_options) ? 0 : static_cast<int>(ErrorKind::verification);

@@ -11,6 +11,7 @@
 
 #include "kernels/access/closest_point.h"
 #include "kernels/errors.h"
+#include "kernels/mesh/simplify.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/repair/repair.h"
@@ -23,10 +24,11 @@ namespace {
 
 constexpr double kMitre = 4;        // skins that a corner may go: 1/sin of half an edge's angle, 29°
 constexpr double kCoarsest = 0.75;  // mm, cell of the grid
-constexpr double kCellsAcross = 3;  // of a skin
+constexpr double kCellsAcross = 2;  // of a skin
 constexpr double kMostSkinCells = 60e6;
 constexpr double kBytesPerSkinCell = 8;
 constexpr double kBaseShare = 0.02;  // of a cell: what lies so near to the lowest level lies in it
+constexpr double kThinned = 0.005;   // mm, by which facets may move for there to be fewer
 constexpr int kMostRounds = 4;       // of a level set that is made a little farther out
 constexpr std::size_t kGrain = 4096;
 
@@ -216,7 +218,7 @@ void by_level_set(Context& context, MeshView mesh, const MeshReport& report, con
     result.cell_mm = cell;
     const MemoryCharge charge(context, static_cast<std::uint64_t>(cells(cell) * kBytesPerSkinCell),
                               "the cells of a skin");
-    double farther = cell * cell / (8 * mm);
+    double farther = cell * cell / (8 * mm) + kThinned;
     for (int round = 0; round < kMostRounds; ++round) {
         result.mesh = offset_surface(context, mesh, {mm + farther, cell});
         float lowest = bounds(context, result.mesh.view()).min.z;
@@ -228,6 +230,11 @@ void by_level_set(Context& context, MeshView mesh, const MeshReport& report, con
             Mended mended = mend(context, result.mesh.view(), result.report);
             result.mesh = std::move(mended.mesh);
             result.report = std::move(mended.report);
+        }
+        // A grid has far more facets than the surface needs.
+        if (is_solid(result.report)) {
+            result.mesh = simplify(context, result.mesh.view(), kThinned);
+            result.report = report_mesh(context, result.mesh.view());
         }
         const Measured measured = measure_skin(context, mesh, result.mesh.view(), chosen, mm);
         result.least_mm = measured.least, result.most_mm = measured.most;

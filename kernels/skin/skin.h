@@ -42,7 +42,7 @@ struct Skinned {
     /// The least distance from the skin to the model's facets that are to have it, or from them to the skin:
     /// measured at vertices, edge middles and facet middles of both. Never under mm − kSkinTolerance.
     double least_mm = 0;
-    double most_mm = 0;           ///< the greatest: at sharp edges, the mitre
+    double most_mm = 0;           ///< the greatest, as far as five skins: at sharp edges, the mitre
     double cell_mm = 0;           ///< of the grid, where one was used
     std::uint64_t facets_on = 0;  ///< facets of the model that have it
     /// Why not by vertices, and where: "12 vertices have no place", "3 facets turn over", "too thin".
