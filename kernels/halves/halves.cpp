@@ -19,10 +19,11 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kOnPlane = 1e-5;         // mm
-constexpr int kDowelCorners = 48;         // of a hole's circle
-constexpr std::size_t kMostPlaces = 240;  // at which a dowel is tried
-constexpr double kDepthStep = 1;          // mm between the places that are looked at along a hole
+constexpr double kOnPlane = 1e-5;        // mm
+constexpr int kDowelCorners = 48;        // of a hole's circle
+constexpr std::size_t kMostPlaces = 60;  // of a ring, at which a dowel is tried
+constexpr int kMostRings = 12;           // a quarter of a hole's radius and wall apart
+constexpr double kDepthStep = 1;         // mm between the places that are looked at along a hole
 
 using Loop = std::vector<std::uint32_t>;
 
@@ -209,17 +210,24 @@ std::vector<Dowel> place_dowels(Context& context, MeshView mesh, const PlaneFram
             section.points.push_back({to_units(flat.flat(v).a), to_units(flat.flat(v).b)});
         section.close_loop();
     }
-    const Loops room = offset(simplify(section), -keep, 0.01);
-    const std::size_t every = room.points.size() / kMostPlaces + 1;
+    const Loops outline = simplify(section);
     const ClosestPoint closest(context, mesh);
     std::vector<Point3> places;
-    for (std::size_t i = 0; i < room.points.size(); i += every) {
-        if (winding(section, room.points[i]) != 1) continue;  // of one body, which the hole is made in
-        const Point3 p = plane.at(to_mm(room.points[i].x), to_mm(room.points[i].y));
-        bool free = true;
-        for (double t = -rules.depth_mm; free && t <= rules.depth_mm; t += kDepthStep)
-            free = closest.query_unsigned(plus(p, plane.n, t), keep).distance >= keep - 0.02;
-        if (free) places.push_back(p);
+    // Ever farther from the outline: where walls lean inwards a hole has room only in the middle.
+    for (int ring = 0; ring < kMostRings; ++ring) {
+        const Loops room = offset(outline, -keep * (1 + 0.25 * ring), 0.01);
+        if (room.empty()) break;
+        const std::size_t every = room.points.size() / kMostPlaces + 1;
+        for (std::size_t i = 0; i < room.points.size(); i += every) {
+            if (winding(section, room.points[i]) != 1) continue;  // of one body, which the hole is made in
+            const Point3 p = plane.at(to_mm(room.points[i].x), to_mm(room.points[i].y));
+            bool free = true;
+            for (double t = rules.depth_mm; free && t >= 0; t -= kDepthStep)
+                for (const double along : {t, -t})
+                    free =
+                        free && closest.query_unsigned(plus(p, plane.n, along), keep).distance >= keep - 0.02;
+            if (free) places.push_back(p);
+        }
     }
     if (places.empty()) return {};
     std::pair<std::size_t, std::size_t> best{0, 0};
