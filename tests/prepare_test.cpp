@@ -345,7 +345,7 @@ TEST(PrepareCommand, WritesWhatAPlanOfTheJobMeans) {
     for (const char* name : {"out.stl", "out.3mf"}) {
         const std::string out = folder / name;
         const auto result = run("prepare " + kCover + " -o " + out +
-                             " --turn 90,0,30 --shrink aluminium --mirror y --shift 7,-11,5");
+                                " --turn 90,0,30 --shrink aluminium --mirror y --shift 7,-11,5");
         ASSERT_EQ(result.exit, 0) << result.err;
         EXPECT_NE(result.out.find("made 1.3 % larger for aluminium"), std::string::npos) << result.out;
         const PatternMesh written = read(out, {});

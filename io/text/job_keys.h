@@ -126,7 +126,6 @@ template <class JobLike, class Visit>
 void visit_job_keys(JobLike& job, Visit& visit) {
     visit.word("units", job.units, kUnitWords, "of the STL: mm or in; every length in this file is in mm");
     visit.key("allow_undercut", job.allow_undercut, "plan although undercuts stay unmade");
-
     visit_prepare_keys(job.prepare, visit);
     visit.table("input", "how the STL becomes the pattern");
     visit.word(
