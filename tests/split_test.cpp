@@ -1,6 +1,7 @@
 // A solid cut into halves: put together again it is the solid, dowels fit, and each half can be built.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -31,6 +32,13 @@ Point3 back(const AffineMap& map, const Point3& p) {
     for (std::size_t c = 0; c < 3; ++c)
         for (std::size_t r = 0; r < 3; ++r) q[c] += map.rows[r][c] * (p[r] - map.rows[r][3]);
     return q;
+}
+
+support::CommandResult run_line(const std::string& line) {
+    std::vector<std::string> arguments{SLABWRIGHT_COMMAND};
+    std::istringstream words(line);
+    for (std::string word; words >> word;) arguments.push_back(word);
+    return support::run_command(arguments);
 }
 
 /// Random points are inside the solid exactly if they are inside one half, and the solid's surface is the
@@ -170,31 +178,74 @@ TEST(Split, ValveBodyIsItselfAgain) {
 /// The command's halves of a ring that cannot be built as one pattern: each plans, and the programs make it.
 TEST(SplitCommand, HalvesPlanAndVerify) {
     TemporaryFolder folder;
-    const auto run = [](const std::string& line) {
-        std::vector<std::string> arguments{SLABWRIGHT_COMMAND};
-        std::istringstream words(line);
-        for (std::string word; words >> word;) arguments.push_back(word);
-        return support::run_command(arguments);
-    };
     shapes::Facets ball = shapes::torus(40, 45, 20);
     {
         Context context({.threads = 1});
         write_stl(folder / "ring.stl", weld(context, ball));
     }
     const std::string ring = folder / "ring.stl", a = folder / "a.stl", b = folder / "b.3mf";
-    EXPECT_EQ(run("plan " + ring + " -o " + (folder / "whole")).exit, 4);
-    const auto split = run("split " + ring + " --z 20 --dowel-depth 8 -o " + a + " " + b + " --json");
+    EXPECT_EQ(run_line("plan " + ring + " -o " + (folder / "whole")).exit, 4);
+    const auto split = run_line("split " + ring + " --z 20 --dowel-depth 8 -o " + a + " " + b + " --json");
     ASSERT_EQ(split.exit, 0) << split.err;
     const auto told = nlohmann::json::parse(split.out);
     EXPECT_EQ(told.at("schema"), "slabwright.split/1");
     EXPECT_EQ(told.at("dowels").size(), 2U);
     for (const std::string& half : {a, b}) {
-        const auto planned = run("plan " + half + " -o " + (folder / "plan") + " --accept-weak-joints");
+        const auto planned = run_line("plan " + half + " -o " + (folder / "plan") + " --accept-weak-joints");
         EXPECT_EQ(planned.exit, 0) << planned.out << planned.err;
     }
-    EXPECT_EQ(run("split " + ring + " -o " + a + " " + b).exit, 2);
-    EXPECT_EQ(run("split " + ring + " --z 14 -o " + a + " " + a).exit, 2);
-    EXPECT_EQ(run("split " + ring + " --z 99 -o " + a + " " + b).exit, 3);
+    EXPECT_EQ(run_line("split " + ring + " -o " + a + " " + b).exit, 2);
+    EXPECT_EQ(run_line("split " + ring + " --z 14 -o " + a + " " + a).exit, 2);
+    EXPECT_EQ(run_line("split " + ring + " --z 99 -o " + a + " " + b).exit, 3);
+}
+
+/// The lines of a refusal's help that are commands, in order.
+std::vector<std::string> commands_in(const std::string& text) {
+    std::vector<std::string> commands;
+    std::istringstream lines(text);
+    const std::string before = "  slabwright ";
+    for (std::string line; std::getline(lines, line);)
+        if (line.starts_with(before)) commands.push_back(line.substr(before.size()));
+    return commands;
+}
+
+/// What is refused for its undercuts names the command that builds it; that very command is run.
+TEST(PlanCommand, NamesTheCommandsThatBuildWhatItRefuses) {
+    TemporaryFolder folder;
+    const auto save = [&](const char* name, const shapes::Facets& facets) {
+        Context context({.threads = 1});
+        write_stl(folder / name, weld(context, facets));
+        return std::string(folder / name);
+    };
+    // A ring.
+    const std::string ring = save("ring.stl", shapes::torus(40, 45, 20));
+    const auto refused = run_line("plan " + ring + " -o " + (folder / "ring"));
+    EXPECT_EQ(refused.exit, 4);
+    EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+    const std::vector<std::string> ways = commands_in(refused.out);
+    ASSERT_FALSE(ways.empty()) << refused.out;
+    EXPECT_EQ(ways[0].substr(0, 6), "split ") << refused.out;
+    ASSERT_NE(refused.out.find("leaves nothing unmade"), std::string::npos) << refused.out;
+    EXPECT_EQ(run_line(ways[0] + " --dowel 0").exit, 0);
+    for (const char* half : {"ring-above.stl", "ring-below.stl"}) {
+        const auto planned = run_line("plan " + (folder / half) + " -o " + (folder / "half"));
+        EXPECT_EQ(planned.exit, 0) << planned.out << planned.err;
+    }
+    // A pyramid that stands on its top.
+    const shapes::Facets pyramid{
+        {{{-10, -10, 0}, {-10, 10, 0}, {10, 10, 0}}},    {{{-10, -10, 0}, {10, 10, 0}, {10, -10, 0}}},
+        {{{-40, -40, 40}, {40, -40, 40}, {40, 40, 40}}}, {{{-40, -40, 40}, {40, 40, 40}, {-40, 40, 40}}},
+        {{{-10, -10, 0}, {10, -10, 0}, {40, -40, 40}}},  {{{-10, -10, 0}, {40, -40, 40}, {-40, -40, 40}}},
+        {{{10, -10, 0}, {10, 10, 0}, {40, 40, 40}}},     {{{10, -10, 0}, {40, 40, 40}, {40, -40, 40}}},
+        {{{10, 10, 0}, {-10, 10, 0}, {-40, 40, 40}}},    {{{10, 10, 0}, {-40, 40, 40}, {40, 40, 40}}},
+        {{{-10, 10, 0}, {-10, -10, 0}, {-40, -40, 40}}}, {{{-10, 10, 0}, {-40, -40, 40}, {-40, 40, 40}}}};
+    const auto over = run_line("plan " + save("pyramid.stl", pyramid) + " -o " + (folder / "pyramid"));
+    EXPECT_EQ(over.exit, 4);
+    const std::vector<std::string> turns = commands_in(over.out);
+    ASSERT_FALSE(turns.empty()) << over.out;
+    EXPECT_NE(turns[0].find("--turn 180,0,0"), std::string::npos) << over.out;
+    const auto planned = run_line(turns[0]);
+    EXPECT_EQ(planned.exit, 0) << planned.out << planned.err;
 }
 
 }  // namespace

@@ -15,12 +15,14 @@
 #include <iostream>
 #include <map>
 #include <new>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "io/prepare.h"
 #include "io/slabwright.h"
+#include "io/ways_out.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
 #include "tools/prepare_command.h"
@@ -227,10 +229,18 @@ int run_plan(const Options& options) {
     require_replaceable(options.out);  // before an hour of planning, not after it
     VerifyResult found;
     found.passed = true;
+    std::optional<Error> refused;  // for undercuts: what would help is told beside it
     with_context(options, [&](Context& context) {
         if (!options.no_verify) context.share_progress(0, kPlanningShare);
         std::shared_ptr<Pattern> pattern = read_pattern(context, options.stl, job);
-        Plan result = plan(context, *pattern, job);
+        Plan result;
+        try {
+            result = plan(context, *pattern, job);
+        } catch (const Error& error) {
+            if (error.code() != "undercut.unmade" || options.json || options.quiet) throw;
+            refused = error;
+            return ways_out_text(context, *pattern, job, options.out);
+        }
         if (!options.access_maps.empty())
             write_access_maps(context, result, options.stl, options.access_maps);
         if (options.no_verify) {
@@ -244,6 +254,7 @@ int run_plan(const Options& options) {
         return options.json ? plan_summary_json(result, options.out, &found)
                             : summary(result, options.out) + verdict(found, options.out);
     });
+    if (refused) return complain(*refused, false);
     const std::span<const Error> refusals(found.refusals);
     if (options.json && !refusals.empty()) return complain(refusals[0], true, refusals.subspan(1));
     constexpr std::size_t shown = 20;  // one line each
