@@ -92,6 +92,35 @@ void validate_tool(const Tool& tool, std::size_t position) {
     require(key("ramp_deg"), tool.ramp_deg, -90, 90);
 }
 
+void validate_prepare(const PrepareJob& p) {
+    const auto numbers = [](const char* key, const std::vector<double>& values, std::size_t count,
+                            double least, double most) {
+        if (values.size() != count)
+            refuse(key, fmt::format("{} has {} numbers", key, values.size()),
+                   fmt::format("give {} numbers, e.g. {}", count,
+                               count == 6 ? "[0.0, 0.0, 0.0, 100.0, 100.0, 50.0]" : "[0.0, 0.0, 1.0]"));
+        for (const double value : values) require(key, value, least, most);
+    };
+    numbers("prepare.turn", p.turn, 3, -360, 360);
+    numbers("prepare.scale", p.scale, 3, 0.0001, 10000);
+    numbers("prepare.shift", p.shift, 3, -100000, 100000);
+    require("prepare.skin", p.skin, 0, 100);
+    require("prepare.skin_angle_deg", p.skin_angle_deg, 0, 180);
+    if (!p.skin_normal.empty()) {
+        numbers("prepare.skin_normal", p.skin_normal, 3, -1e6, 1e6);
+        if (std::hypot(p.skin_normal[0], p.skin_normal[1], p.skin_normal[2]) < 1e-6)
+            refuse("prepare.skin_normal", "prepare.skin_normal has no direction",
+                   "give e.g. [0.0, 0.0, 1.0]");
+    }
+    if (!p.skin_box.empty()) {
+        numbers("prepare.skin_box", p.skin_box, 6, -1e6, 1e6);
+        for (std::size_t k = 0; k < 3; ++k)
+            if (!(p.skin_box[k] <= p.skin_box[k + 3]))
+                refuse("prepare.skin_box", "prepare.skin_box has its corners the wrong way round",
+                       "give the least x, y, z first");
+    }
+}
+
 // A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the
 // bottom.
 
@@ -262,7 +291,7 @@ void validate(const Job& job) {
     require("material.kte", m.kte, 0, 100000);
     require("material.kfc", m.kfc, 0, 100000);
     require("material.kfe", m.kfe, 0, 100000);
-
+    validate_prepare(job.prepare);
     const Slabs& s = job.slabs;
     if (s.thicknesses.empty())
         refuse("slabs.thicknesses", "slabs.thicknesses is empty",

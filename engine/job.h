@@ -51,6 +51,8 @@ enum class AccessRule : std::uint8_t { sections, exact, printed };
 /// tolerances.rough_cusp, or the smaller.
 enum class RoughLimit : std::uint8_t { smaller, finish_radius, cusp };
 enum class ToolKind : std::uint8_t { flat, ball, face, drill };
+/// The axis whose coordinate changes its sign; the mirror lies in the origin.
+enum class MirrorAxis : std::uint8_t { none, x, y, z };
 
 inline constexpr double kInch = 25.4;
 
@@ -219,10 +221,27 @@ struct InputJob {
     Repair repair = Repair::none;
 };
 
+/// What is done to the model before it is planned, in this order: turned, scaled, scaled by the contraction,
+/// mirrored, given its skin, shifted (METHOD.md section 15). About the origin of the file.
+struct PrepareJob {
+    std::vector<double> turn{0, 0, 0};   ///< degrees about x, then y, then z; the axes stay where they are
+    std::vector<double> scale{1, 1, 1};  ///< along the machine's x, y and z
+    std::string shrink = "0 %";          ///< the pattern maker's contraction: a percentage, or a metal
+    MirrorAxis mirror = MirrorAxis::none;
+    std::vector<double> shift{0, 0, 0};  ///< mm; a plan takes x and y of it, for it sets the pattern down
+    double skin = 0;                     ///< mm of machining stock, along the normal
+    std::vector<double> skin_normal;     ///< only on facets whose normal lies this way; empty: any way
+    double skin_angle_deg = 10;          ///< within this angle of skin_normal
+    std::vector<double> skin_box;  ///< only on facets that lie in this box, prepared but neither shifted nor
+                                   ///< set down: x y z of its least corner and of its greatest, mm; empty:
+                                   ///< anywhere
+};
+
 struct Job {
     LengthUnit units = LengthUnit::mm;  ///< of the STL
     bool allow_undercut = false;
     InputJob input;
+    PrepareJob prepare;
     Material material;
     Slabs slabs;
     Machine machine;

@@ -11,6 +11,7 @@
 #include "engine/job.h"
 #include "kernels/export.h"
 #include "kernels/features/features.h"
+#include "kernels/geometry/affine.h"
 #include "kernels/polygons/loops.h"
 
 namespace slabwright {
@@ -208,12 +209,22 @@ struct InputRepair {
     std::uint64_t triangles = 0;  ///< after it
 };
 
+/// What was done to the model before it was planned.
+struct InputPreparation {
+    AffineMap map;             ///< from the file, in mm, to the pattern before it is set on z = 0
+    double skin_mm = 0;        ///< of machining stock
+    std::string skin_how;      ///< "vertices" or "level set"; "": no skin
+    double skin_least_mm = 0;  ///< the least and the greatest distance measured between skin and model
+    double skin_most_mm = 0;
+};
+
 struct InputInfo {
     std::string file, sha256;
     std::uint64_t triangles = 0;
-    std::array<double, 3> min{}, max{};  ///< mm, as in the STL (before the pattern is set on z = 0)
-    double volume_mm3 = 0;               ///< enclosed; an opening in the base plane counts as filled
-    std::optional<InputRepair> repair;   ///< where one was asked for
+    std::array<double, 3> min{}, max{};        ///< mm, as in the STL (before the pattern is set on z = 0)
+    double volume_mm3 = 0;                     ///< enclosed; an opening in the base plane counts as filled
+    std::optional<InputRepair> repair;         ///< where one was asked for
+    std::optional<InputPreparation> prepared;  ///< where anything was done
 };
 
 struct Plan {

@@ -1,5 +1,4 @@
 #include "io/report_html.h"
-#include "io/text/json_text.h"
 
 #include <fmt/format.h>
 
@@ -24,6 +23,7 @@
 #include "io/read/planned_folder.h"
 #include "io/report_template.h"
 #include "io/text/base64.h"
+#include "io/text/json_text.h"
 #include "io/write/output_file.h"
 #include "io/write/report_as_built.h"
 #include "io/write/thinned_path.h"
@@ -57,8 +57,7 @@ constexpr double kReachDistance = 0.1;      // mm from the surface that a tool m
 constexpr std::string_view kDataMark = "/*slabwright:data*/null";
 constexpr std::string_view kModelBegin = "<!--slabwright:3d-->", kModelEnd = "<!--/slabwright:3d-->";
 
-/// Runs `body` over a document of OUT; what the JSON library says against it becomes an error that names the
-/// file.
+/// Runs `body` over a document of OUT; what the JSON library says against it becomes an error with its name.
 template <class Body>
 auto understood(const fs::path& path, const char* code, Body&& body) {
     try {

@@ -36,6 +36,19 @@ Enum value_of(const Word<Enum> (&words)[N], const std::string& text) {
     throw std::out_of_range(text);
 }
 
+/// What sheets.json says was done to the model.
+Preparation preparation_in(const nlohmann::json& prepared) {
+    Preparation preparation;
+    preparation.map.rows = prepared.at("matrix").get<std::array<std::array<double, 4>, 3>>();
+    if (!prepared.contains("skin")) return preparation;
+    const auto& skin = prepared.at("skin");
+    preparation.skin.mm = skin.at("mm").get<double>();
+    preparation.skin.angle_deg = skin.at("angle_deg").get<double>();
+    if (skin.contains("normal")) preparation.skin.normal = skin.at("normal").get<std::array<double, 3>>();
+    if (skin.contains("box")) preparation.skin.box = skin.at("box").get<std::array<double, 6>>();
+    return preparation;
+}
+
 SheetsFolder read_folder(const fs::path& directory) {
     const fs::path path = directory / "sheets.json";
     const char* remedy = "write the folder again with `slabwright sheets`";
@@ -50,6 +63,8 @@ SheetsFolder read_folder(const fs::path& directory) {
         folder.pattern.reading = {value_of(kUnitWords, input.at("units").get<std::string>()),
                                   input.at("weld").get<double>(),
                                   value_of(kRepairWords, input.at("repair").get<std::string>())};
+        if (input.contains("prepared"))
+            folder.pattern.reading.preparation = preparation_in(input.at("prepared"));
         folder.axis = document.at("axis").get<std::string>().at(0);
         folder.part_may_lose = document.at("side") != "outside";
         for (const auto& program : document.at("programs"))

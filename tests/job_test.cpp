@@ -55,8 +55,10 @@ struct Scramble {
     void key(const char*, int& value, const char*) { value += 1; }
     void key(const char*, bool& value, const char*) { value = !value; }
     void key(const char*, std::string& value, const char*) { value += " \"quoted\" \\ \n\t \xC3\xA4"; }
-    void key(const char*, std::vector<double>& value, const char*) {
-        value = {6.35, 12.7, real(18, 19), 25.4};
+    void key(const char* name, std::vector<double>& value, const char*) {
+        if (name == std::string_view("thicknesses")) value = {6.35, 12.7, real(18, 19), 25.4};
+        else if (name == std::string_view("skin_box")) value = {0, 1, real(0, 2), 3, 4, 5};
+        else value = {1, 2, real(0.1, 3)};
     }
     void degrees(const char*, double& value, const char*) {
         value = std::round(real(0, 40)) * std::numbers::pi / 180;

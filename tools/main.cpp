@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, report, inspect, repair, slice, sheets, feed, bond, job. Errors are
-// one line on stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, report, inspect, repair, prepare, split, slice, sheets, feed, bond,
+// job. Errors are one line on stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -15,14 +15,20 @@
 #include <iostream>
 #include <map>
 #include <new>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "io/prepare.h"
 #include "io/slabwright.h"
+#include "io/ways_out.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
+#include "tools/prepare_command.h"
+#include "tools/progress_bar.h"
 #include "tools/sheets_command.h"
+#include "tools/split_command.h"
 
 namespace {
 
@@ -37,43 +43,12 @@ extern "C" void on_signal(int signal) {
 }
 
 struct Options {
+    PrepareOptions prepare;
     std::string repair, stl, out, maps, access_maps, job_file, units, strategy, finder, device, library;
     int threads = 0;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
          quiet = false, defaults = false, weld_given = false, no_3d = false, rebuild = false;
-};
-
-/// A bar with phase and time left, redrawn at most ten times a second on a terminal's last line.
-class ProgressBar {
-public:
-    void show(const Progress& progress) {
-        const auto now = Clock::now();
-        if (drawn_ && now - last_ < std::chrono::milliseconds(100)) return;
-        last_ = now;
-        drawn_ = true;
-        constexpr int width = 30;
-        const int full = std::clamp(static_cast<int>(progress.fraction * width), 0, width);
-        std::string left;
-        const double elapsed = std::chrono::duration<double>(now - start_).count();
-        if (progress.fraction > 0.02 && elapsed > 1) {
-            const long seconds =
-                static_cast<long>(elapsed * (1 - progress.fraction) / progress.fraction + 0.5);
-            left = fmt::format("{}:{:02} left", seconds / 60, seconds % 60);
-        }
-        const std::string line = fmt::format("\r\x1b[K[{:#<{}}{:.<{}}] {:3.0f} %  {}  {}", "", full, "",
-                                             width - full, 100 * progress.fraction, progress.phase, left);
-        std::fwrite(line.data(), 1, line.size(), stderr);
-    }
-    void clear() {
-        if (drawn_) std::fputs("\r\x1b[K", stderr);
-        drawn_ = false;
-    }
-
-private:
-    using Clock = std::chrono::steady_clock;
-    Clock::time_point start_ = Clock::now(), last_{};
-    bool drawn_ = false;
 };
 
 /// @param also further errors of the same kind, which JSON names in the same object
@@ -209,6 +184,7 @@ Job job_of(const Options& options) {
     word("layers.strategy", options.strategy);
     word("layers.finder", options.finder);
     put("tolerances.weld", options.weld_given ? fmt::format("{}", options.weld) : "");
+    keys += prepare_keys(options.prepare);
     return keys.empty() ? job : job_from_toml(keys, "command line", job);
 }
 
@@ -253,10 +229,18 @@ int run_plan(const Options& options) {
     require_replaceable(options.out);  // before an hour of planning, not after it
     VerifyResult found;
     found.passed = true;
+    std::optional<Error> refused;  // for undercuts: what would help is told beside it
     with_context(options, [&](Context& context) {
         if (!options.no_verify) context.share_progress(0, kPlanningShare);
         std::shared_ptr<Pattern> pattern = read_pattern(context, options.stl, job);
-        Plan result = plan(context, *pattern, job);
+        Plan result;
+        try {
+            result = plan(context, *pattern, job);
+        } catch (const Error& error) {
+            if (error.code() != "undercut.unmade" || options.json || options.quiet) throw;
+            refused = error;
+            return ways_out_text(context, *pattern, job, options.out);
+        }
         if (!options.access_maps.empty())
             write_access_maps(context, result, options.stl, options.access_maps);
         if (options.no_verify) {
@@ -270,6 +254,7 @@ int run_plan(const Options& options) {
         return options.json ? plan_summary_json(result, options.out, &found)
                             : summary(result, options.out) + verdict(found, options.out);
     });
+    if (refused) return complain(*refused, false);
     const std::span<const Error> refusals(found.refusals);
     if (options.json && !refusals.empty()) return complain(refusals[0], true, refusals.subspan(1));
     constexpr std::size_t shown = 20;  // one line each
@@ -353,6 +338,22 @@ void run_repair(const Options& options) {
     });
 }
 
+void run_prepare(const Options& options) {
+    const Job job = job_of(options);
+    with_context(options, [&](Context& context) {
+        const PreparedModel model = prepare_model(context, options.stl, job, options.out);
+        return options.json ? prepare_json(model, options.out) : prepare_text(model, options.out);
+    });
+}
+
+void run_split(const Options& options, const SplitOptions& asked) {
+    const Job job = job_of(options);
+    with_context(options, [&](Context& context) {
+        const SplitModel model = split_model(context, options.stl, job, split_request(asked));
+        return options.json ? split_json(model) : split_text(model);
+    });
+}
+
 void run_slice(const Options& options) {
     const Job job = job_of(options);
     with_context(options, [&](Context& context) {
@@ -397,6 +398,28 @@ void add_common(CLI::App& command, Options& options) {
                   "mend a mesh that is no solid; --repair=rebuild makes its surface anew where mending does "
                   "not close it")
         ->check(CLI::IsMember({"none", "mend", "rebuild"}));
+    add_prepare_options(command, options.prepare);
+}
+
+CLI::App* add_prepare_command(CLI::App& app, Options& options) {
+    CLI::App* command =
+        app.add_subcommand("prepare", "turn, scale, shrink, mirror or shift a model, or give it a skin");
+    command->add_option("MODEL", options.stl, "the model")->required();
+    command->add_option("-o,--out", options.out, "the model in millimetres: .stl or .3mf")->required();
+    add_common(*command, options);
+    return command;
+}
+
+CLI::App* add_repair_command(CLI::App& app, Options& options) {
+    CLI::App* command = app.add_subcommand(
+        "repair", "mend a mesh that is no solid: what was wrong is told, and a solid is written");
+    command->add_option("STL", options.stl, "the mesh")->required();
+    command->add_option("-o,--out", options.out, "STL for the solid, in the mesh's unit and place")
+        ->required();
+    command->add_flag("--rebuild", options.rebuild, "make the surface anew where mending does not close it");
+    add_reading(*command, options);
+    add_limits(*command, options);
+    return command;
 }
 
 CLI::App* add_sheets_command(CLI::App& app, Options& options, SheetsOptions& asked) {
@@ -484,22 +507,19 @@ int command(int argc, char** argv) {
     inspect_command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
 
-    CLI::App* repair_command = app.add_subcommand(
-        "repair", "mend a mesh that is no solid: what was wrong is told, and a solid is written");
-    repair_command->add_option("STL", options.stl, "the mesh")->required();
-    repair_command->add_option("-o,--out", options.out, "STL for the solid, in the mesh's unit and place")
-        ->required();
-    repair_command->add_flag("--rebuild", options.rebuild,
-                             "make the surface anew where mending does not close it");
-    add_reading(*repair_command, options);
-    add_limits(*repair_command, options);
-
+    CLI::App* repair_command = add_repair_command(app, options);
     CLI::App* slice_command = app.add_subcommand("slice", "cut the pattern by level planes");
     slice_command->add_option("STL", options.stl, "the pattern")->required();
     slice_command->add_option("--every", options.every, "mm from one section to the next")->required();
     slice_command->add_option("-o,--out", options.out, "drawing: .svg, .dxf or .json")->required();
     add_common(*slice_command, options);
 
+    CLI::App* prepare_command = add_prepare_command(app, options);
+    SplitOptions split_options;
+    CLI::App* split_command = app.add_subcommand("split", "cut a model into two halves, capped and dowelled");
+    split_command->add_option("MODEL", options.stl, "the model")->required();
+    add_common(*split_command, options);
+    add_split_options(*split_command, split_options);
     SheetsOptions sheets_options;
     CLI::App* sheets_command = add_sheets_command(app, options, sheets_options);
     FeedOptions feed_options;
@@ -538,6 +558,8 @@ int command(int argc, char** argv) {
         else if (*report_command) run_report(options);
         else if (*inspect_command) run_inspect(options);
         else if (*repair_command) run_repair(options);
+        else if (*prepare_command) run_prepare(options);
+        else if (*split_command) run_split(options, split_options);
         else if (*slice_command) run_slice(options);
         else if (*sheets_command)
             return run_sheets(options, sheets_options) ? 0 : static_cast<int>(ErrorKind::verification);

@@ -293,7 +293,8 @@ Mesh load_mesh(Context& context, const SourceData& data, const ReadingOptions& o
                              *decoded.mm_per_unit),
                  std::nullopt});
         if (!decoded.mm_per_unit) question = true;
-        return place_corners(context, decoded, decoded.mm_per_unit.value_or(unit_of(options.units)));
+        return place_corners(context, decoded, decoded.mm_per_unit.value_or(unit_of(options.units)),
+                             options.preparation.map);
     }();
     const MemoryCharge placed(context, corners.placed.size() * sizeof(corners.placed[0]),
                               "the corners of " + place);
@@ -328,7 +329,7 @@ bool names_a_facet(const MeshReport& r) {
 }  // namespace
 
 ReadingOptions reading_options(const Job& job) {
-    return {job.units, job.tolerances.weld, job.input.repair, 0.01};
+    return {job.units, job.tolerances.weld, job.input.repair, 0.01, preparation_of(job.prepare)};
 }
 
 Mesh read_mesh(Context& context, const PatternSource& source, LengthUnit units) {
@@ -369,6 +370,13 @@ std::optional<Diagnostic> weld_and_report(Context& context, PatternMesh& pattern
                       std::nullopt};
 }
 
+/// The box, where it is not that of all corners of the file. @param base z of the pattern's bottom
+void measure_again(PatternMesh& pattern, double base) {
+    const Box3& box = pattern.report.box;
+    pattern.input.min = {box.min.x, box.min.y, base};
+    pattern.input.max = {box.max.x, box.max.y, base + box.max.z};
+}
+
 void leave_strays_out(Context& context, PatternMesh& pattern) {
     if (pattern.report.degenerate_facets.count == 0) return;
     const std::uint64_t strays = draw_strays_in(pattern.mesh, pattern.report);
@@ -376,9 +384,7 @@ void leave_strays_out(Context& context, PatternMesh& pattern) {
     const double base = pattern.input.min[2] + double{bounds(pattern.mesh.view()).min.z};
     set_on_base(pattern.mesh);
     pattern.report = report_mesh(context, pattern.mesh.view());
-    const Box3& box = pattern.report.box;
-    pattern.input.min = {box.min.x, box.min.y, base};
-    pattern.input.max = {box.max.x, box.max.y, base + box.max.z};
+    measure_again(pattern, base);
     pattern.diagnostics.push_back(
         {Severity::note, "mesh.stray",
          number_of(strays, "facet", "facets") + " without area that hang together with no body: left out",
@@ -399,6 +405,38 @@ void repair_as_asked(Context& context, PatternMesh& pattern, Repair how, const s
     pattern.input.repair = std::move(repaired.told);
     pattern.diagnostics.insert(pattern.diagnostics.end(), repaired.diagnostics.begin(),
                                repaired.diagnostics.end());
+}
+
+void skin_as_asked(Context& context, PatternMesh& pattern, const Preparation& preparation,
+                   const std::string& place) {
+    if (preparation.changes_nothing()) return;
+    InputPreparation told{preparation.map, preparation.skin.mm, {}, 0, 0};
+    if (preparation.skin.mm > 0) {
+        require_solid(context, pattern, place);
+        Skin skin = preparation.skin;
+        const double base = pattern.input.min[2];
+        if (skin.box) (*skin.box)[2] -= base, (*skin.box)[5] -= base;
+        context.begin_phase("skin", 0.01, 0.02);
+        Skinned skinned = add_skin(context, pattern.mesh.view(), skin);
+        const bool by_vertices = skinned.method == SkinMethod::vertices;
+        told.skin_how = by_vertices ? "vertices" : "level set";
+        told.skin_least_mm = skinned.least_mm, told.skin_most_mm = skinned.most_mm;
+        pattern.mesh = std::move(skinned.mesh);
+        const double lowest = bounds(pattern.mesh.view()).min.z;
+        set_on_base(pattern.mesh);
+        pattern.report = report_mesh(context, pattern.mesh.view());
+        measure_again(pattern, base + lowest);
+        pattern.diagnostics.push_back(
+            {Severity::note, "skin.added",
+             fmt::format("{:g} mm of skin on {}, {}: {:.3f} to {:.3f} mm measured", skin.mm,
+                         number_of(skinned.facets_on, "facet", "facets"),
+                         by_vertices ? "by vertices"
+                                     : fmt::format("made anew in cells of {:.2f} mm because {}",
+                                                   skinned.cell_mm, skinned.reason),
+                         skinned.least_mm, skinned.most_mm),
+             std::nullopt});
+    }
+    pattern.input.prepared = std::move(told);
 }
 
 }  // namespace
@@ -446,6 +484,7 @@ PatternMesh read_pattern_mesh(Context& context, const PatternSource& source, con
     if (note) pattern.diagnostics.push_back(std::move(*note));
     leave_strays_out(context, pattern);
     repair_as_asked(context, pattern, options.repair, place);
+    skin_as_asked(context, pattern, options.preparation, place);
     pattern.input.volume_mm3 = pattern.report.volume_mm3;
     pattern.mesh.roles = facet_roles(context, pattern.mesh.view());
     context.advance();

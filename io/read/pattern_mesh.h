@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/plan.h"
+#include "engine/prepare/preparation.h"
 #include "io/read/pattern_source.h"
 #include "kernels/mesh/report.h"
 #include "kernels/mesh/weld.h"
@@ -17,15 +18,17 @@ struct ReadingOptions {
     double weld_mm = 0;                 ///< 0: bit-exact only
     Repair repair = Repair::none;       ///< of a mesh that is no solid, once it is welded
     double deviation_mm = 0.01;         ///< of facets from the surfaces of a format that has such (STEP)
+    Preparation preparation = {};       ///< what is done to the model, before it is planned
     friend bool operator==(const ReadingOptions&, const ReadingOptions&) = default;
 };
 
+/// @throws Error(usage) as preparation_of()
 [[nodiscard]] ReadingOptions reading_options(const Job& job);
 
 struct PatternMesh {
-    /// Millimetres, set on z = 0 (the lowest vertex); x and y as in the file. Facets in the file's order;
-    /// where a sound file of 50 000 facets or more does not have neighbours follow each other, in an order in
-    /// space in which they do.
+    /// Millimetres, prepared, set on z = 0 (the lowest vertex); x and y as in the file where nothing was
+    /// done. Facets in the file's order; where a sound file of 50 000 facets or more does not have neighbours
+    /// follow each other, in an order in space in which they do.
     Mesh mesh;
     MeshReport report;
     InputInfo input;
@@ -44,7 +47,8 @@ struct PatternMesh {
 /// (mesh.stray). Diagnostics: units.suspicious, units.stated (the file's own unit is not the job's),
 /// mesh.welded, mesh.stray, and mesh.open, open_base, misoriented, inverted, non_manifold, duplicate,
 /// degenerate, each with its count and the centre of its first facet. Where a repair was asked for, they are
-/// of what it left, and what it did is told as repair_mesh() does. @throws as that
+/// of what it left, and what it did is told as repair_mesh() does. A skin that was asked for is added last,
+/// to a solid (skin.added); box and volume are with it. @throws as that, and as add_skin()
 [[nodiscard]] PatternMesh read_pattern_mesh(Context& context, const PatternSource& source,
                                             const ReadingOptions& options = {});
 

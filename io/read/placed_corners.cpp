@@ -57,18 +57,25 @@ constexpr std::size_t kPlaceGrain = std::size_t{1} << 15;
 
 }  // namespace
 
-PlacedCorners place_corners(Context& context, const DecodedMesh& decoded, double mm_per_unit) {
+PlacedCorners place_corners(Context& context, const DecodedMesh& decoded, double mm_per_unit,
+                            const AffineMap& map) {
     const DecodedRuns runs(decoded);
-    Extent box = Extent::none();
-    if (decoded.box) {
-        box = *decoded.box;
+    const bool mapped = !map.is_identity();
+    const auto place = [&](const FileVertex& p) {
+        const FileVertex mm{p[0] * mm_per_unit, p[1] * mm_per_unit, p[2] * mm_per_unit};
+        return mapped ? map.of(mm) : mm;
+    };
+    PlacedCorners corners;
+    if (decoded.box && !mapped) {
+        corners.min = place(decoded.box->min);
+        corners.max = place(decoded.box->max);
     } else {
-        box = parallel_reduce(
+        const Extent box = parallel_reduce(
             context, runs.count, kPlaceGrain, Extent::none(),
             [&](std::size_t begin, std::size_t end) {
                 Extent part = Extent::none();
-                runs.each(begin, end, [&](std::size_t, const std::array<FileVertex, 3>& corners) {
-                    for (const FileVertex& p : corners) part.add(p);
+                runs.each(begin, end, [&](std::size_t, const std::array<FileVertex, 3>& from) {
+                    for (const FileVertex& p : from) part.add(place(p));
                 });
                 return part;
             },
@@ -76,26 +83,25 @@ PlacedCorners place_corners(Context& context, const DecodedMesh& decoded, double
                 a.merge(b);
                 return a;
             });
-    }
-    PlacedCorners corners;
-    for (std::size_t k = 0; k < 3; ++k) {
-        corners.min[k] = box.min[k] * mm_per_unit;
-        corners.max[k] = box.max[k] * mm_per_unit;
+        corners.min = box.min;
+        corners.max = box.max;
     }
     const double lowest = corners.min[2];
-    if (decoded.records.count > 0) {
+    if (decoded.records.count > 0 && !mapped) {
         corners.facets = decoded.records;
         corners.facets.mm_per_unit = mm_per_unit;
         corners.facets.lowest_mm = lowest;
         return corners;
     }
+    const bool mirrors = mapped && map.mirrors();
     corners.placed = RawArray<std::array<Vec3f, 3>>(runs.count);
     parallel_for(context, runs.count, kPlaceGrain, [&](std::size_t begin, std::size_t end) {
         runs.each(begin, end, [&](std::size_t f, const std::array<FileVertex, 3>& from) {
-            for (std::size_t c = 0; c < 3; ++c)
-                corners.placed[f][c] = {static_cast<float>(from[c][0] * mm_per_unit),
-                                        static_cast<float>(from[c][1] * mm_per_unit),
-                                        static_cast<float>(from[c][2] * mm_per_unit - lowest)};
+            for (std::size_t c = 0; c < 3; ++c) {
+                const FileVertex p = place(from[mirrors && c > 0 ? 3 - c : c]);
+                corners.placed[f][c] = {static_cast<float>(p[0]), static_cast<float>(p[1]),
+                                        static_cast<float>(p[2] - lowest)};
+            }
         });
     });
     corners.facets = {reinterpret_cast<const char*>(corners.placed.data()), runs.count};

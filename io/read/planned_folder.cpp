@@ -182,6 +182,17 @@ void read_job(const Field& job, BuildPlan& build) {
         job["machine"].fail("states a machine that does not move");
 }
 
+/// How the pattern was read: as the job says, placed by the very numbers that the plan states.
+ReadingOptions read_reading(const Field& input, const BuildPlan& build) {
+    ReadingOptions reading = reading_options(build.job);
+    if (!input.has("prepared")) return reading;
+    const Field matrix = input["prepared"]["matrix"];
+    for (std::size_t r = 0; r < 3; ++r)
+        for (std::size_t c = 0; c < 4; ++c) reading.preparation.map.rows[r][c] = matrix[r][c].number();
+    if (reading.preparation.map.determinant() == 0) matrix.fail("flattens the pattern");
+    return reading;
+}
+
 std::vector<Support> read_supports(const Field& plan) {
     std::vector<Support> supports;
     if (!plan.has("supports")) return supports;
@@ -324,7 +335,7 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     if (plan.has("job")) read_job(plan["job"], build);
     build.pattern = plan["input"]["file"].text();
     build.sha256 = plan["input"]["sha256"].text();
-    folder.pattern = {build.pattern, build.sha256, reading_options(build.job), read_supports(plan)};
+    folder.pattern = {build.pattern, build.sha256, read_reading(plan["input"], build), read_supports(plan)};
     for (std::size_t k = 0; k < 2; ++k) {
         build.stock_min[k] = plan["stock"]["min"][k].number();
         build.stock_max[k] = plan["stock"]["max"][k].number();

@@ -52,6 +52,9 @@ inline constexpr Word<RoughLimit> kRoughLimitWords[] = {{"smaller", RoughLimit::
 inline constexpr Word<ToolKind> kToolWords[] = {
     {"flat", ToolKind::flat}, {"ball", ToolKind::ball}, {"face", ToolKind::face}, {"drill", ToolKind::drill}};
 
+inline constexpr Word<MirrorAxis> kMirrorWords[] = {
+    {"none", MirrorAxis::none}, {"x", MirrorAxis::x}, {"y", MirrorAxis::y}, {"z", MirrorAxis::z}};
+
 template <class Enum, std::size_t N>
 [[nodiscard]] const char* word_of(const Word<Enum> (&words)[N], Enum value) {
     for (const Word<Enum>& word : words)
@@ -99,12 +102,31 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
               "plunges");
 }
 
+/// Walks the keys of what is done to the model before it is planned.
+template <class PrepareLike, class Visit>
+void visit_prepare_keys(PrepareLike& prepare, Visit& visit) {
+    visit.table("prepare", "what is done to the model before it is planned, in this order");
+    visit.key("turn", prepare.turn, "degrees about x, then y, then z");
+    visit.key("scale", prepare.scale, "along x, y and z");
+    visit.key("shrink", prepare.shrink,
+              "contraction of the metal that is cast: a percentage, or grey_iron, malleable_iron, steel, "
+              "aluminium, magnesium, copper, brass, bronze");
+    visit.word("mirror", prepare.mirror, kMirrorWords,
+               "none, x, y or z: the coordinate that changes its sign");
+    visit.key("skin", prepare.skin, "mm of machining stock on the model, along the normal");
+    visit.key("skin_normal", prepare.skin_normal, "only on facets whose normal lies this way; []: on all");
+    visit.key("skin_angle_deg", prepare.skin_angle_deg, "degrees that it may be off");
+    visit.key("skin_box", prepare.skin_box,
+              "mm, least and greatest x y z: only on facets in it, before shift; []: anywhere");
+    visit.key("shift", prepare.shift, "mm; the pattern is set on z = 0 all the same");
+}
+
 /// Walks every key of the job but the tools: first those of the top, then table by table.
 template <class JobLike, class Visit>
 void visit_job_keys(JobLike& job, Visit& visit) {
     visit.word("units", job.units, kUnitWords, "of the STL: mm or in; every length in this file is in mm");
     visit.key("allow_undercut", job.allow_undercut, "plan although undercuts stay unmade");
-
+    visit_prepare_keys(job.prepare, visit);
     visit.table("input", "how the STL becomes the pattern");
     visit.word(
         "repair", job.input.repair, kRepairWords,

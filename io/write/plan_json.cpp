@@ -301,6 +301,22 @@ void put_repair(JsonText& json, const InputRepair& repair) {
     json.end().end();
 }
 
+void put_preparation(JsonText& json, const InputPreparation& prepared) {
+    json.begin_object().key("matrix").begin_array();
+    for (const auto& row : prepared.map.rows) {
+        json.begin_array(Shape::line);
+        for (const double v : row) json.exact(v);
+        json.end();
+    }
+    json.end();
+    if (!prepared.skin_how.empty()) {
+        json.key("skin").begin_object(Shape::line).key("mm").exact(prepared.skin_mm);
+        json.key("how").string(prepared.skin_how).key("least").rounded(prepared.skin_least_mm, 4);
+        json.key("most").rounded(prepared.skin_most_mm, 4).end();
+    }
+    json.end();
+}
+
 void put_input(JsonText& json, const InputInfo& input) {
     json.begin_object();
     json.key("file").string(input.file);
@@ -315,6 +331,10 @@ void put_input(JsonText& json, const InputInfo& input) {
     if (input.repair) {
         json.key("repair");
         put_repair(json, *input.repair);
+    }
+    if (input.prepared) {
+        json.key("prepared");
+        put_preparation(json, *input.prepared);
     }
     json.end();
 }

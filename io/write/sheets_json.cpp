@@ -22,6 +22,30 @@ const char* name_of(SheetHead head) {
     return head == SheetHead::router ? "router" : head == SheetHead::laser ? "laser" : "jet";
 }
 
+/// All that reads the pattern alike again.
+void put_preparation(JsonText& json, const Preparation& preparation) {
+    json.begin_object().key("matrix").begin_array();
+    for (const auto& row : preparation.map.rows) {
+        json.begin_array(JsonText::Shape::line);
+        for (const double v : row) json.exact(v);
+        json.end();
+    }
+    json.end();
+    const auto put = [&](const char* key, const auto& values) {
+        json.key(key).begin_array();
+        for (const double v : values) json.exact(v);
+        json.end();
+    };
+    if (const Skin& skin = preparation.skin; skin.mm > 0) {
+        json.key("skin").begin_object(JsonText::Shape::line).key("mm").exact(skin.mm);
+        json.key("angle_deg").exact(skin.angle_deg);
+        if (skin.normal) put("normal", *skin.normal);
+        if (skin.box) put("box", *skin.box);
+        json.end();
+    }
+    json.end();
+}
+
 }  // namespace
 
 std::string sheet_file(std::size_t index) { return fmt::format("sheet_{:02}", index + 1); }
@@ -102,7 +126,12 @@ std::string sheets_json(const SheetsPlan& plan, const InputInfo& input, const Re
         .key("triangles")
         .count(input.triangles);
     json.key("units").string(word_of(kUnitWords, reading.units)).key("weld").exact(reading.weld_mm);
-    json.key("repair").string(word_of(kRepairWords, reading.repair)).end();
+    json.key("repair").string(word_of(kRepairWords, reading.repair));
+    if (!reading.preparation.changes_nothing()) {
+        json.key("prepared");
+        put_preparation(json, reading.preparation);
+    }
+    json.end();
     json.key("axis").string(std::string(1, job.axis)).key("height").rounded(plan.height, 4);
     json.key("strategy").string(name_of(job.slicing.strategy)).key("side").string(name_of(job.slicing.side));
     json.key("head").string(name_of(job.head)).key("kerf").exact(job.cutting.kerf);

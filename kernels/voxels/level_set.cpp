@@ -33,6 +33,8 @@ constexpr int kPartCells = kPart * kPart * kPart;
 constexpr float kBand = 3;            // cells beside the mesh whose distance is known
 constexpr double kClearly = 0.2;      // so far from a half, the winding number is not near the border
 constexpr double kBytesPerCell = 24;  // of a block, of the tree, and of the surface
+constexpr double kAside = 0.4142;  // cells: no facet of a part that stands square lies on a cell, where its
+                                   // sign would be chance
 
 using BlockPlace = std::array<int, 3>;  ///< in blocks
 
@@ -319,11 +321,9 @@ Mesh surface_of_winding(Context& context, MeshView near, const WindingField& win
                         const LevelSetOptions& options) {
     if (near.facets.empty()) return {};
     const Box3 box = bounds(context, near);
-    // No facet of a part that stands square lies on cells, where its sign would be chance.
-    constexpr double aside = 0.4142;
-    const std::array<double, 3> origin{box.min.x - aside * options.cell_mm,
-                                       box.min.y - aside * options.cell_mm,
-                                       box.min.z - aside * options.cell_mm};
+    const std::array<double, 3> origin{box.min.x - kAside * options.cell_mm,
+                                       box.min.y - kAside * options.cell_mm,
+                                       box.min.z - kAside * options.cell_mm};
     Mesh result;
     // OpenVDB's own parallelism stays within the context's threads.
     run_confined(context, [&] {
@@ -343,6 +343,27 @@ Mesh surface_of_winding(Context& context, MeshView near, const WindingField& win
         mesher(*grid);
         context.throw_if_cancelled();
         result = taken(mesher, origin, options.cell_mm);
+    });
+    return result;
+}
+
+Mesh offset_surface(Context& context, MeshView mesh, const OffsetSurfaceOptions& options) {
+    const Box3 box = bounds(context, mesh);
+    const double cell = options.cell_mm, cells_out = options.distance_mm / cell;
+    const std::array<double, 3> origin{double{box.min.x} - kAside * cell, double{box.min.y} - kAside * cell,
+                                       double{box.min.z} - kAside * cell};
+    Mesh result;
+    run_confined(context, [&] {
+        Interrupter interrupter{&context};
+        const auto transform = openvdb::math::Transform::createLinearTransform(1.0);
+        const auto distance = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
+            interrupter, MeshInCells{mesh, cell, origin}, *transform, static_cast<float>(cells_out) + kBand,
+            kBand);
+        context.throw_if_cancelled();
+        openvdb::tools::VolumeToMesh mesher(cells_out);
+        mesher(*distance);
+        context.throw_if_cancelled();
+        result = taken(mesher, origin, cell);
     });
     return result;
 }

@@ -1,4 +1,5 @@
-// The surface of a solid that is known by its winding number, on a sparse grid.
+// Surfaces that are made anew on a sparse grid: of a solid that is known by its winding number, and at a
+// distance outside of a solid.
 #pragma once
 
 #include <array>
@@ -31,5 +32,19 @@ struct LevelSetOptions {
 /// Error(cancelled)
 [[nodiscard]] Mesh surface_of_winding(Context& context, MeshView near, const WindingField& winding,
                                       const LevelSetOptions& options);
+
+struct OffsetSurfaceOptions {
+    double distance_mm = 1;
+    double cell_mm = 0.5;
+};
+
+/// The points outside of a solid at this distance from its facets. On the grid distances are exact; between
+/// its points the surface may lie nearer by some cell² / (8·distance), and in creases farther by a third of a
+/// cell: what is asked of it must be measured on it. Deterministic. Some 8 bytes for each cell of the band
+/// between solid and surface, which the caller charges.
+/// @param mesh closed. Where it crosses itself its inner walls lie inside
+/// @returns a closed surface with vertices and facets, no neighbours
+/// @throws Error(cancelled)
+[[nodiscard]] Mesh offset_surface(Context& context, MeshView mesh, const OffsetSurfaceOptions& options);
 
 }  // namespace slabwright

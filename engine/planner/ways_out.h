@@ -1,0 +1,43 @@
+// What would make a pattern buildable that undercuts keep from it: other sides down, or halves.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "engine/job.h"
+#include "kernels/halves/halves.h"
+#include "kernels/mesh/mesh.h"
+#include "kernels/mesh/report.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// How a pattern builds as it lies, by its features and the job's layers; no paths are planned.
+struct Lying {
+    int layers = 0;
+    double unmade_mm3 = 0;  ///< under overhangs thicker than tolerances.undercut
+    double unmade_mm = 0;   ///< the tallest of it
+    bool has_room = true;   ///< whether slab and layers hold it
+};
+
+/// @param mesh a solid on z = 0. @throws as find_features() and place_layers_optimal()
+[[nodiscard]] Lying lying(Context& context, MeshView mesh, const Job& job);
+
+/// One way: turned, or cut by a plane into halves that are built cut face down.
+struct WayOut {
+    std::optional<std::array<double, 3>> turn;  ///< degrees, as PrepareJob::turn
+    std::optional<CutPlane> plane;              ///< in the frame of the mesh
+    Lying outcome;                              ///< of both halves together
+};
+
+/// Tries the six sides down and planes halfway along each axis and through the widest level section, and
+/// returns those that leave less than half of what the pattern as it lies does, the best first: least
+/// unmade, then fewest layers; at most four. Each is looked at as a plan looks at it, so what it is said to
+/// leave is what its plan leaves unmade. Planes that cannot be cut are left out. Deterministic. Some tenths
+/// of a second a way.
+/// @param as_it_lies of the mesh
+[[nodiscard]] std::vector<WayOut> ways_out(Context& context, MeshView mesh, const MeshReport& report,
+                                           const Job& job, const Lying& as_it_lies);
+
+}  // namespace slabwright
