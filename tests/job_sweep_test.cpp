@@ -38,7 +38,9 @@ struct NumberSetter {
     void table_name(const std::string& of) { table = of + "."; }
     void table_begins(const char* of) { table_name(of); }
     void key(const char* key, double& number, const char*) { set(key, number, 1); }
-    void key(const char* key, std::vector<double>& numbers, const char*) { set(key, numbers.front(), 1); }
+    void key(const char* key, std::vector<double>& numbers, const char*) {
+        if (!numbers.empty()) set(key, numbers.front(), 1);  // an empty list holds no number
+    }
     void degrees(const char* key, double& radians, const char*) { set(key, radians, std::acos(-1.0) / 180); }
     void key(const char* key, int& number, const char*) {
         double real = number;

@@ -363,7 +363,6 @@ TEST(Polygons, NestOfManyFinsAndOfLoopsGivenManyTimes) {
     std::mt19937_64 random(seed_of("nest fins"));
     for (int round = 0; round < 40; ++round)
         nest_fins(random, 1 + static_cast<int>(random() % 12), 1 + static_cast<int>(random() % 5));
-    // By asking every loop about every other these would take minutes.
     nest_fins(random, 400, 1);
     nest_fins(random, 1, 3000);
 }
