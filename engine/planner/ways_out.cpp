@@ -92,9 +92,8 @@ Lying lying(Context& context, MeshView mesh, const Job& job) {
 std::vector<WayOut> ways_out(Context& context, MeshView mesh, const MeshReport& report, const Job& job,
                              const Lying& as_it_lies) {
     std::vector<WayOut> ways;
-    const auto keep = [&](WayOut way) {
-        if (way.outcome.has_room && way.outcome.unmade_mm3 < as_it_lies.unmade_mm3 / 2)
-            ways.push_back(std::move(way));
+    const auto keep = [&](const WayOut& way) {
+        if (way.outcome.has_room && way.outcome.unmade_mm3 < as_it_lies.unmade_mm3 / 2) ways.push_back(way);
     };
     constexpr std::array<std::array<double, 3>, 5> sides{
         {{180, 0, 0}, {90, 0, 0}, {-90, 0, 0}, {0, 90, 0}, {0, -90, 0}}};
