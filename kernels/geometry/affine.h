@@ -7,7 +7,8 @@
 
 namespace slabwright {
 
-/// p ↦ A·p + t, as rows (A | t); t in mm. Rounds in the order in which it is written.
+/// Maps p to A·p + t. Its rows are those of A, each with its t, in mm. Rounds in the order in which it is
+/// written.
 struct AffineMap {
     std::array<std::array<double, 4>, 3> rows{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <string>
+#include <vector>
 
 #include "kernels/errors.h"
 #include "kernels/polygons/loops.h"
@@ -44,6 +46,35 @@ std::int32_t checked(cInt value) {
     return static_cast<std::int32_t>(value);
 }
 
+/// Turns loops as they lie: outer ones counter-clockwise, holes clockwise. polyclipping decides which is
+/// which by what lies to the left of a loop's start, and where edges run within its unit of one another that
+/// may be wrong: an outline of a quarter of a square metre came back as a hole. Loops that its rounding alone
+/// explains stay as they are.
+void turn_as_nested(Loops& loops) {
+    std::vector<bool> hole(loops.size());
+    std::vector<std::size_t> by_size(loops.size());
+    std::iota(by_size.begin(), by_size.end(), std::size_t{0});
+    std::vector<double> areas(loops.size());
+    for (std::size_t i = 0; i < loops.size(); ++i) areas[i] = signed_area(loops.loop(i));
+    // A parent is never smaller than what it holds, and of two alike the one of the lower number.
+    std::stable_sort(by_size.begin(), by_size.end(),
+                     [&](std::size_t a, std::size_t b) { return std::fabs(areas[a]) > std::fabs(areas[b]); });
+    for (const std::size_t i : by_size) {
+        const std::int32_t parent = loops.parents[i];
+        hole[i] = parent >= 0 && !hole[static_cast<std::size_t>(parent)];
+        if (hole[i] == (areas[i] < 0)) continue;
+        const auto first = loops.points.begin() + loops.starts[i],
+                   last = loops.points.begin() + loops.starts[i + 1];
+        double around = 0;  // mm
+        for (auto p = first; p != last; ++p) {
+            const Point2 q = p + 1 == last ? *first : *(p + 1);
+            around += std::hypot(to_mm(std::int64_t{q.x} - p->x), to_mm(std::int64_t{q.y} - p->y));
+        }
+        constexpr double rounding = 4 / static_cast<double>(kUnitsPerMm);
+        if (std::fabs(areas[i]) > rounding * around) std::reverse(first, last);
+    }
+}
+
 Loops to_loops(const Paths& paths) {
     Loops loops;
     for (const Path& path : paths) {
@@ -52,6 +83,7 @@ Loops to_loops(const Paths& paths) {
         loops.close_loop();
     }
     nest(loops);
+    turn_as_nested(loops);
     return loops;
 }
 
