@@ -314,6 +314,42 @@ TEST(Polygons, NestAgreesWithBruteForceWhereLoopsTouchInPoints) {
     }
 }
 
+/// polyclipping decides what is a hole by what lies to the left of a loop's start. Where slivers lie along an
+/// edge, as shadows of steep facets do, it took this outline for one: a whole layer then had nothing under
+/// it.
+TEST(Polygons, BooleansTurnWhatRunsWithinAUnitOfSlivers) {
+    using Region = std::vector<std::vector<Point2>>;
+    const Region outline{{{1180622, 5665405}, {1156709, 5672185}, {1098020, 5688822}, {4000106, 21489}}};
+    const Region around{{{4488302, 308497},
+                         {1296090, 5632671},
+                         {995514, 5717882},
+                         {1046083, 5703546},
+                         {1122491, 5681885},
+                         {1213710, 5656025},
+                         {1053040, 5701574},
+                         {778726, 5779340}},
+                        {{1123894, 5681487}, {1126063, 5680873}, {1173338, 5667470}},
+                        {{1173338, 5667470}, {1166768, 5669333}, {1283266, 5636307}}};
+    std::mt19937_64 random(seed_of("BooleansTurnWhatRunsWithinAUnitOfSlivers"));
+    for (int round = 0; round < 2000; ++round) {
+        const auto moved = [&](const Region& region) {
+            Loops loops;
+            for (const std::vector<Point2>& loop : region) {
+                for (const Point2 p : loop) {
+                    const int x = static_cast<int>(random() % 3) - 1, y = static_cast<int>(random() % 3) - 1;
+                    loops.points.push_back(round == 0 ? p : Point2{p.x + x, p.y + y});
+                }
+                loops.close_loop();
+            }
+            return loops;
+        };
+        const Loops a = moved(outline), b = moved(around);
+        const double whole = area(a), common = area(intersect(a, b)), rest = area(subtract(a, b));
+        ASSERT_GT(common, 0) << "round " << round;
+        ASSERT_NEAR(common + rest, whole, 1) << "round " << round;
+    }
+}
+
 TEST(Polygons, NestWhereLoopsShareEdges) {
     Loops loops;
     add(loops, rectangle(0, 0, 100, 100));
