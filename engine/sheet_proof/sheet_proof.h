@@ -56,7 +56,7 @@ struct SheetProof {
     double left_on_top = 0;  ///< mm of the part above the last sheet
     int islands = 0;  ///< parts of sheets that nothing but the glue holds in place: where the programs tell
                       ///< of no dowel, those beyond one for each sheet
-    int dowels = 0;  ///< holes of dowels and rods, of all sheets
+    int dowels = 0;   ///< holes of dowels and rods, of all sheets
     std::vector<Diagnostic> violations;
 };
 
