@@ -268,7 +268,9 @@ void expect_distance(const Mesh& model, const Skinned& skinned, double mm, std::
 TEST(Skin, IsByVerticesOnACubeAndKeepsItsCorners) {
     Context context({.threads = 2});
     const Mesh cube = mesh_of(shapes::box({0, 0, 0}, {20, 20, 20}));
-    const Skinned skinned = add_skin(context, cube.view(), {.mm = 2});
+    Skin asked;
+    asked.mm = 2;
+    const Skinned skinned = add_skin(context, cube.view(), asked);
     EXPECT_EQ(skinned.method, SkinMethod::vertices);
     EXPECT_NEAR(skinned.report.volume_mm3, 24 * 24 * 24, 1e-2);
     EXPECT_NEAR(skinned.least_mm, 2, 1e-5);
@@ -278,7 +280,8 @@ TEST(Skin, IsByVerticesOnACubeAndKeepsItsCorners) {
 TEST(Skin, LiesOnChosenFacetsOnly) {
     Context context({.threads = 2});
     const Mesh block = mesh_of(shapes::box({0, 0, 0}, {40, 30, 20}));
-    Skin top{.mm = 3};
+    Skin top;
+    top.mm = 3;
     top.normal = {0, 0, 1};
     const Skinned machined = add_skin(context, block.view(), top);
     EXPECT_EQ(machined.facets_on, 2U);
