@@ -22,10 +22,10 @@ namespace slabwright {
 
 /// What skin is asked for.
 struct Skin {
-    double mm = 0;                                ///< along the normal; 0: none
-    std::optional<std::array<double, 3>> normal;  ///< only on facets whose normal lies this way
-    double angle_deg = 10;                        ///< within this angle
-    std::optional<std::array<double, 6>> box;  ///< only on facets wholly in it: least x y z, greatest x y z
+    double mm = 0;                                  ///< along the normal; 0: none
+    std::optional<std::array<double, 3>> normal{};  ///< only on facets whose normal lies this way
+    double angle_deg = 10;                          ///< within this angle
+    std::optional<std::array<double, 6>> box{};  ///< only on facets wholly in it: least x y z, greatest x y z
     friend bool operator==(const Skin&, const Skin&) = default;
     [[nodiscard]] bool is_everywhere() const { return !normal && !box; }
 };
