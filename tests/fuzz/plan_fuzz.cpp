@@ -1,5 +1,6 @@
-// Solids and jobs made from bytes: planned, written, read back and proven; the proof passes, or the plan was
-// refused by one clear error.
+// Solids and jobs made from bytes: planned, proven and written as `slabwright plan` does it. The proof
+// passes, or the plan is refused by clear errors; what was written, verify() judges alike.
+#include <memory>
 #include <random>
 #include <string>
 
@@ -50,10 +51,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::string stl = folder / "part.stl";
     write_stl(stl, weld(context, facets));
     fuzz::expect_clear_error([&] {
-        const Plan planned = plan(context, stl, wanted);
-        const VerifyResult proof = write_verified(context, planned, folder / "out", stl, 0.5);
-        for (const Diagnostic& v : proof.violations) fuzz::finding(v.code + " " + v.message);
-        fuzz::require(proof.passed, "a plan that does not pass and does not say why");
+        const std::shared_ptr<Pattern> pattern = read_pattern(context, stl, wanted);
+        Plan planned = plan(context, *pattern, wanted);
+        constexpr double cell_mm = 0.5;
+        const VerifyResult proven = write_proven(context, planned, folder / "out", pattern, false, cell_mm);
+        if (!proven.written) {
+            fuzz::require(!proven.refusals.empty(), "a plan that is refused and does not say why");
+            throw proven.refusals.front();
+        }
+        const VerifyResult judged = verify(context, folder / "out", stl, {}, cell_mm);
+        for (const Diagnostic& v : judged.violations) fuzz::finding(v.code + " " + v.message);
+        fuzz::require(proven.passed && judged.passed, "a plan that does not pass and does not say why");
     });
     return 0;
 }
