@@ -221,8 +221,8 @@ struct InputPreparation {
 struct InputInfo {
     std::string file, sha256;
     std::uint64_t triangles = 0;
-    std::array<double, 3> min{}, max{};        ///< mm, as in the STL (before the pattern is set on z = 0)
-    double volume_mm3 = 0;                     ///< enclosed; an opening in the base plane counts as filled
+    std::array<double, 3> min{}, max{};  ///< mm, as in the STL (before the pattern is set on z = 0)
+    double volume_mm3 = 0;  ///< of the solid, each place once; an opening in the base plane counts as filled
     std::optional<InputRepair> repair;         ///< where one was asked for
     std::optional<InputPreparation> prepared;  ///< where anything was done
 };

@@ -43,8 +43,10 @@
 #include "io/write/sections_svg.h"
 #include "io/write/sequence_json.h"
 #include "io/write/stl_writer.h"
+#include "kernels/mesh/facet_roles.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/slicing/slicing.h"
+#include "kernels/slicing/solid_volume.h"
 
 namespace slabwright {
 
@@ -433,6 +435,15 @@ void copy_file(Context& context, const std::string& from, const std::string& to)
 
 }  // namespace
 
+namespace {
+
+double volume_of_solid(Context& context, Mesh& mesh, const MeshReport& report) {
+    mesh.roles = facet_roles(context, mesh.view());
+    return solid_volume(context, mesh.view(), report.volume_mm3).mm3;
+}
+
+}  // namespace
+
 RepairResult repair(Context& context, const PatternSource& source, const std::string& out, const Job& job) {
     return guarded([&] {
         validate(job);
@@ -442,7 +453,7 @@ RepairResult repair(Context& context, const PatternSource& source, const std::st
         context.begin_phase("repair", 0.05, 0.95);
         const Repair how = job.input.repair == Repair::none ? Repair::mend : job.input.repair;
         Repaired repaired = repair_mesh(context, stl.mesh.view(), stl.report, how, source.name());
-        RepairResult result{std::move(repaired.told), std::move(repaired.diagnostics), stl.report.volume_mm3};
+        RepairResult result{std::move(repaired.told), std::move(repaired.diagnostics), stl.input.volume_mm3};
         const bool needed = result.repair.how != "none";
         const bool is_file = source.kind() == PatternSource::Kind::file;
         if (!needed && job.tolerances.weld == 0 && is_file && stl.family == "stl") {
@@ -450,7 +461,7 @@ RepairResult repair(Context& context, const PatternSource& source, const std::st
             return result;
         }
         Mesh mesh = std::move(needed ? repaired.mesh : stl.mesh);
-        if (needed) result.volume_mm3 = repaired.report.volume_mm3;
+        if (needed) result.volume_mm3 = volume_of_solid(context, mesh, repaired.report);
         // Back to where the file has it, in its unit.
         const double unit = job.units == LengthUnit::inch ? kInch : 1.0, lowest = stl.input.min[2];
         for (Vec3f& v : mesh.vertices)

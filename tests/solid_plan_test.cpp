@@ -181,3 +181,18 @@ TEST(APattern, PassesItsProofWithNoAllowanceNoMarginAndShortFlutes) {
         if (tool.kind != ToolKind::face) tool.flute_length = std::min(tool.flute_length, 12.0);
     plan_and_prove(pattern(), flutes, "short_flutes");
 }
+
+// The box of the first is 8 cm³, and the second lies in it by half.
+TEST(AnySolid, SaysThatBodiesOverlapAndCountsWhatTheyShareOnce) {
+    shapes::Facets facets = shapes::box({0, 0, 0}, {20, 20, 20});
+    shapes::append(facets, shapes::box({10, 5, 0}, {30, 15, 20}));
+    Context context;
+    const support::TemporaryFolder folder;
+    const std::string stl = folder / "part.stl";
+    write_stl(stl, weld(context, facets));
+    const std::string told = inspect(context, stl, Job{});
+    EXPECT_NE(told.find("mesh.overlap"), std::string::npos);
+    EXPECT_NE(told.find("\"volume_mm3\": 10000"), std::string::npos) << told;
+    write_stl(stl, weld(context, shapes::box({0, 0, 0}, {20, 20, 20})));
+    EXPECT_EQ(inspect(context, stl, Job{}).find("mesh.overlap"), std::string::npos);
+}

@@ -2,6 +2,7 @@
 // against winding numbers counted by brute force, on random bodies that overlap, touch and are inside out.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -14,9 +15,11 @@
 #include "kernels/cutting/layer_solid.h"
 #include "kernels/features/features.h"
 #include "kernels/mesh/facet_roles.h"
+#include "kernels/mesh/report.h"
 #include "kernels/mesh/weld.h"
 #include "kernels/mesh/windings.h"
 #include "kernels/slicing/slicing.h"
+#include "kernels/slicing/solid_volume.h"
 #include "tests/data/luo_layer_sample.h"
 #include "tests/support/compositions.h"
 #include "tests/support/seed.h"
@@ -174,6 +177,53 @@ TEST(Sections, AreWhereTheWindingNumberIsNotZero) {
                 EXPECT_EQ(w, test::winding_by_angles(facets, p) != 0 ? 1 : 0) << trial << " z " << p[2];
             }
         }
+    }
+}
+
+TEST(SolidVolume, CountsWhatBodiesShareOnce) {
+    Context context;
+    const auto volume = [&](const shapes::Facets& facets, double wound) {
+        const Mesh mesh = solid_of(context, facets);
+        return solid_volume(context, mesh.view(), wound).mm3;
+    };
+    const shapes::Facets large = shapes::box({0, 0, 0}, {20, 20, 20});
+    EXPECT_EQ(volume(large, 8000), 8000);
+    shapes::Facets overlapping = large;  // they share 10 × 10 × 12
+    shapes::append(overlapping, shapes::box({10, 10, 8}, {30, 30, 28}));
+    EXPECT_NEAR(volume(overlapping, 16000), 16000 - 1200, 22);  // 128 sections of 28 mm, jumps of 100 mm²
+    shapes::Facets nested = large;
+    shapes::append(nested, shapes::box({5, 5, 5}, {15, 15, 15}));
+    EXPECT_NEAR(volume(nested, 9000), 8000, 16);
+    shapes::Facets inside_out = large;
+    shapes::append(inside_out, shapes::flipped(shapes::box({30, 0, 0}, {40, 10, 20})));
+    EXPECT_NEAR(volume(inside_out, 6000), 10000, 1e-6);
+}
+
+TEST(SolidVolume, IsThatOfPointsWithAWindingNumberAtRandom) {
+    Context context;
+    std::mt19937 random(test::seed());
+    for (int trial = 0; trial < kCompositions; ++trial) {
+        const Mesh mesh = solid_of(context, test::Composer(random, {}).facets());
+        const Box3 box = bounds(mesh.view());
+        const Vec3f low = box.min, high = box.max;
+        constexpr int n = 20;
+        std::uniform_real_distribution<double> u(0, 1.0 / n);
+        std::vector<Point> points;  // one in each cell of a grid
+        for (int k = 0; k < n * n * n; ++k) {
+            const double x = double(k % n) / n + u(random), y = double(k / n % n) / n + u(random),
+                         z = double(k / n / n) / n + u(random);
+            points.push_back(
+                {low.x + x * (high.x - low.x), low.y + y * (high.y - low.y), low.z + z * (high.z - low.z)});
+        }
+        const std::vector<int> winding = windings_at(context, mesh.view(), points);
+        const double whole = double(high.x - low.x) * (high.y - low.y) * (high.z - low.z);
+        const double counted =
+            whole *
+            static_cast<double>(std::count_if(winding.begin(), winding.end(), [](int w) { return w != 0; })) /
+            (n * n * n);
+        const double found =
+            solid_volume(context, mesh.view(), report_mesh(context, mesh.view()).volume_mm3).mm3;
+        EXPECT_NEAR(found, counted, 0.01 * whole) << trial;
     }
 }
 

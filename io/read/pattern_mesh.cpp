@@ -21,6 +21,7 @@
 #include "kernels/mesh/facet_roles.h"
 #include "kernels/mesh/raw_array.h"
 #include "kernels/parallel/parallel.h"
+#include "kernels/slicing/solid_volume.h"
 
 namespace slabwright {
 
@@ -198,6 +199,28 @@ void describe_report(const Mesh& mesh, const MeshReport& report, std::vector<Dia
              facets(report.duplicate_facets) + " given twice", diagnostics);
     describe(mesh, report.degenerate_facets, Severity::note, "mesh.degenerate",
              facets(report.degenerate_facets) + " without area", diagnostics);
+}
+
+/// The volume of the input: what bodies share counts once, which is told. Of a mesh that is open above its
+/// base it is the facets' own, which means little.
+void count_overlaps_once(Context& context, PatternMesh& pattern) {
+    constexpr double told_from = 1;  // mm³
+    const double wound = pattern.report.volume_mm3;
+    pattern.input.volume_mm3 = wound;
+    if (pattern.mesh.roles.empty() || pattern.report.open_edges_off_base.count > 0) return;
+    const SolidVolume solid = solid_volume(context, pattern.mesh.view(), wound);
+    pattern.input.volume_mm3 = solid.mm3;
+    if (std::abs(solid.mm3 - wound) < std::max(told_from, solid.uncertain_mm3)) return;
+    const auto first = std::find_if(pattern.mesh.roles.begin(), pattern.mesh.roles.end(),
+                                    [](FacetRole role) { return role != FacetRole::surface; });
+    const auto facet = static_cast<std::uint32_t>(first - pattern.mesh.roles.begin());
+    pattern.diagnostics.push_back(
+        {Severity::note, "mesh.overlap",
+         fmt::format(
+             "bodies overlap, lie in others or are inside out, first at facet {}: {:.2f} cm3 where each "
+             "place counts once, {:.2f} by the facets' sense",
+             facet, solid.mm3 / 1000, wound / 1000),
+         facet_centre(pattern.mesh, facet)});
 }
 
 /// The unit is never guessed; a box that suggests another is only remarked on.
@@ -485,10 +508,10 @@ PatternMesh read_pattern_mesh(Context& context, const PatternSource& source, con
     leave_strays_out(context, pattern);
     repair_as_asked(context, pattern, options.repair, place);
     skin_as_asked(context, pattern, options.preparation, place);
-    pattern.input.volume_mm3 = pattern.report.volume_mm3;
     pattern.mesh.roles = facet_roles(context, pattern.mesh.view());
     context.advance();
     describe_report(pattern.mesh, pattern.report, pattern.diagnostics);
+    count_overlaps_once(context, pattern);
     return pattern;
 }
 

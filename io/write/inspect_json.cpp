@@ -81,7 +81,7 @@ std::string inspection_json(const Inspection& inspection) {
     json.key("facets").count(report.facets);
     json.key("vertices").count(report.vertices);
     json.key("components").count(report.components);
-    json.key("volume_mm3").rounded(report.volume_mm3, 3);
+    json.key("volume_mm3").rounded(inspection.input.volume_mm3, 3);
     json.key("area_mm2").rounded(report.area_mm2, 3);
     for (const NamedFinding& f : findings(report)) {
         json.key(f.name).begin_object(Shape::line).key("count").count(f.finding.count).key("first_facet");
@@ -128,7 +128,7 @@ std::string inspection_text(const Inspection& inspection) {
                         mm(input.max[1] - input.min[1]), mm(input.max[2] - input.min[2]));
     text += fmt::format("  facets      {} in {} {}\n", report.facets, report.components,
                         report.components == 1 ? "body" : "bodies");
-    text += fmt::format("  volume      {} cm3, surface {} cm2\n", mm(report.volume_mm3 / 1000, 2),
+    text += fmt::format("  volume      {} cm3, surface {} cm2\n", mm(input.volume_mm3 / 1000, 2),
                         mm(report.area_mm2 / 100, 2));
     for (const NamedFinding& f : findings(report))
         if (f.finding.count > 0)
