@@ -13,7 +13,9 @@
 
 #include <fmt/format.h>
 
+#include "engine/moves/motion_time.h"
 #include "engine/paths/operations/finish_slopes.h"
+#include "engine/paths/operations/raster_lines.h"
 #include "engine/paths/runs/chains.h"
 #include "engine/paths/runs/feet.h"
 #include "engine/paths/runs/layer_cut.h"
@@ -34,72 +36,45 @@ constexpr double kRounding = 1e-6;  // mm: what is nearer may be found by one qu
 // Places of a line of which a wider end mill is asked before they are asked one by one.
 constexpr std::array<std::int32_t, 2> kTogether{16, 4};
 
-}  // namespace
+using Runs = std::vector<std::vector<PathPoint>>;
 
-Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
-    const Tool& tool = cut.layer.tools.finish;
-    Operation op = cut.operation(OperationKind::finish, "projected raster", tool);
-    const double r = tool.diameter / 2, gouge = cut.job.tolerances.gouge, cusp = cut.job.tolerances.cusp;
-    const FinishSlopes slopes = finish_slopes(cut.job.cutting);
-    if (slopes.projection_to < 0) return op;
+RasterFacets raster_facets(const LayerCut& cut) {
+    RasterFacets facets;
+    facets.slopes = finish_slopes(cut.job.cutting);
+    facets.radius = cut.layer.tools.finish.diameter / 2;
+    facets.top = cut.layer.z_top - 1.5 * kTopSheet;
+    if (facets.slopes.projection_to < 0) return facets;
+    const double keep_nz = std::cos(facets.slopes.projection_to);
+    const auto is_floor = [&](const SolidFacet& f) {
+        return std::any_of(cut.floors.begin(), cut.floors.end(),
+                           [&](double z) { return lies_on_floor(f, z); });
+    };
+    for (const SolidFacet& f : cut.solid.facets) {
+        if (f.nz < keep_nz || f.z_max <= cut.layer.z_bottom || f.z_min == cut.layer.z_top) continue;
+        facets.shallow.push_back(f);
+        if (f.z_min < facets.top && !is_floor(f)) facets.made.push_back(f);
+    }
+    return facets;
+}
+
+Slide raster_slide(const LayerCut& cut, const DropIndex& ball) {
+    return {&ball, true, safe_chord_mm(ball.cutter().radius, cut.job.tolerances.gouge), cut.layer.z_top, 3};
+}
+
+// What the ball runs on these lines, the even raster first, then the lines between.
+Runs raster_runs(const LayerCut& cut, const RasterFacets& facets, const RasterLines& raster,
+                 const DropIndex& ball) {
+    const double r = facets.radius, top = facets.top, gouge = cut.job.tolerances.gouge,
+                 cusp = cut.job.tolerances.cusp;
+    const FinishSlopes& slopes = facets.slopes;
     // Steeper than step_nz the cusp is kept by the level contours, where both cut everything.
     const double keep_nz = std::cos(slopes.projection_to), step_nz = std::cos(slopes.projection_keep) - 1e-9;
     const bool uniform = cut.job.cutting.uniform_steps,
                steeper = slopes.projection_keep < slopes.projection_to;
-
-    std::vector<SolidFacet> shallow;
-    for (const SolidFacet& f : cut.solid.facets)
-        if (f.nz >= keep_nz && f.z_max > cut.layer.z_bottom && !(f.z_min == cut.layer.z_top))
-            shallow.push_back(f);
-    if (shallow.empty()) return op;
-
-    // How far the shallow facets face along y, by strips of y: that decides the step-over of the passes over
-    // them.
-    double y_low = kUnbounded, y_high = -kUnbounded;
-    for (const SolidFacet& f : shallow)
-        for (const Vec3d& p : f.p) y_low = std::min(y_low, p[1]), y_high = std::max(y_high, p[1]);
-    constexpr double strip = 0.5;
-    std::vector<float> facing(static_cast<std::size_t>((y_high - y_low) / strip) + 1,
-                              -1);  // −1: nothing shallow there
-    for (const SolidFacet& f : shallow) {
-        if (f.nz < step_nz) continue;
-        const auto [low, high] = std::minmax({f.p[0][1], f.p[1][1], f.p[2][1]});
-        for (auto s = static_cast<std::size_t>((low - y_low) / strip),
-                  e = static_cast<std::size_t>((high - y_low) / strip);
-             s <= e; ++s)
-            facing[s] = std::max(facing[s], static_cast<float>(std::abs(f.normal[1])));
-    }
-    std::vector<std::int32_t> lines;
-    bool floor_bites = false;
-    const float worst = *std::max_element(facing.begin(), facing.end());
-    const double reach_beside =
-        r * std::sqrt(1 - keep_nz * keep_nz);  // how far the ball stands from its contact
-    for (double y = y_low - reach_beside; y <= y_high + reach_beside;) {
-        lines.push_back(to_units(y));
-        // The ball at y touches within r of it; the pass must be near enough for the steepest face in
-        // between.
-        const auto index = [&](double v) {
-            return std::clamp<long>(static_cast<long>(std::floor((v - y_low) / strip)), 0,
-                                    static_cast<long>(facing.size()) - 1);
-        };
-        float most = uniform ? std::max(worst, 0.0F) : 0;
-        for (long s = index(y - r); s <= index(y + r); ++s)
-            most = std::max(most, facing[static_cast<std::size_t>(s)]);
-        double d = raster_stepover(r, cusp, most);
-        if (d < cut.job.cutting.min_stepover) d = cut.job.cutting.min_stepover, floor_bites = true;
-        op.stepover = std::max(op.stepover, d);
-        y += d;
-    }
-    if (floor_bites)
-        diagnostics.push_back(
-            {Severity::warning,
-             "finish.stepover_floor",
-             fmt::format(
-                 "layer {}: the raster's step-over was kept at {:.2f} mm, cusps there exceed {:.3f} mm",
-                 cut.layer.index, cut.job.cutting.min_stepover, cusp),
-             {}});
-
-    const DropIndex& ball = cut.drops({Cutter::Profile::ball, r});
+    // Places are named by u along the lines and v across them.
+    const std::vector<std::int32_t>& lines = raster.across;
+    const bool along_x = raster.along == Axis::x;
+    const auto placed = [along_x](auto u, auto v) { return along_x ? std::array{u, v} : std::array{v, u}; };
     // The flat end mills that have finished floors; semi-roughing does so on contours only.
     std::vector<std::pair<double, std::unique_ptr<DropIndex>>> flats;
     auto add_flat = [&](const Tool& one) {
@@ -113,18 +88,11 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const double chord = safe_chord_mm(r, gouge);
     // Samples stand on multiples of one step, so that those of neighbouring lines are neighbours.
     const std::int32_t step = safe_step(r, gouge);
-    auto is_floor = [&](const SolidFacet& f) {
-        return std::any_of(cut.floors.begin(), cut.floors.end(),
-                           [&](double z) { return lies_on_floor(f, z); });
-    };
     auto floor_done = [&](double z) {
         for (const double floor : cut.floors)
             if (z <= floor + 1e-6 && z >= floor - kSameFloor) return true;
         return false;
     };
-
-    // The rim of the layer's flat top, where the facets end (kTopSheet), is made by the walls under it.
-    const double top = cut.layer.z_top - 1.5 * kTopSheet;
 
     // Whether the flat end mill finishes a floor's place: from right over it, or with its rim from beside a
     // wall.
@@ -147,7 +115,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     };
     std::vector<std::vector<FloorSpan>> floor_spans(lines.size());
     for (const double floor : cut.floors) {
-        const Fibres over = covering(cut.context, floor_facets(cut, floor), kOverFloor, Axis::x, lines);
+        const Fibres over = covering(cut.context, floor_facets(cut, floor), kOverFloor, raster.along, lines);
         for (std::size_t l = 0; l < lines.size(); ++l)
             for (const Forbidden& f : over.line(l)) floor_spans[l].push_back({f.low, f.high, floor});
     }
@@ -157,7 +125,7 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
 
     // A place of the ball on the surface: tip and contact.
     struct Sample {
-        std::int32_t x = 0, z = 0;  // 0.1 µm
+        std::int32_t u = 0, z = 0;  // 0.1 µm
         double tip = 0;             // mm
         std::array<double, 3> contact{};
         bool wanted = false, reachable = false, cut = false;
@@ -168,11 +136,11 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     struct Met {
         MetPoints ball, flat;
     };
-    auto sample = [&](std::int32_t ux, std::int32_t uy, Met& met) {
-        const double x = to_mm(ux), y = to_mm(uy);
+    auto sample = [&](std::int32_t u, std::int32_t v, Met& met) {
+        const auto [x, y] = placed(to_mm(u), to_mm(v));
         const Rest rest = ball.drop(x, y, -std::numeric_limits<double>::infinity(), &met.ball);
         Sample s;
-        s.x = ux;
+        s.u = u;
         s.steep = steeper && rest.nz < step_nz;
         s.contact = {x - r * rest.nx, y - r * rest.ny, rest.contact_z(r)};
         const double contact = s.contact[2];
@@ -210,31 +178,32 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         std::array<std::int32_t, kTogether.size()> ask{INT32_MIN, INT32_MIN};
         Met met{};
     };
-    auto flat_stands = [&](FloorWalk& walk, std::int32_t k, std::int32_t uy, double floor) {
+    auto flat_stands = [&](FloorWalk& walk, std::int32_t k, std::int32_t v, double floor) {
         if (k < walk.stood && floor == walk.floor) return true;
-        const double y = to_mm(uy);
         for (std::size_t w = 0; w < kTogether.size(); ++w) {
             if (k < walk.ask[w]) continue;
-            const double middle = to_mm(k * step) + 0.5 * to_mm((kTogether[w] - 1) * step);
+            const auto [x, y] = placed(to_mm(k * step) + 0.5 * to_mm((kTogether[w] - 1) * step), to_mm(v));
             if (std::any_of(floor_mills.begin(), floor_mills.end(), [&](const FloorMill& mill) {
-                    return mill.wide[w] && !mill.wide[w]->stands_over(middle, y, floor + kOnFloor - kRounding,
-                                                                      &walk.met.flat);
+                    return mill.wide[w] &&
+                           !mill.wide[w]->stands_over(x, y, floor + kOnFloor - kRounding, &walk.met.flat);
                 })) {
                 walk.floor = floor, walk.stood = k + kTogether[w];
                 return true;
             }
             walk.ask[w] = k + kTogether[w];
         }
+        const auto [x, y] = placed(to_mm(k * step), to_mm(v));
         return std::any_of(floor_mills.begin(), floor_mills.end(), [&](const FloorMill& mill) {
-            return !mill.narrow->stands_over(to_mm(k * step), y, floor + kOnFloor, &walk.met.flat);
+            return !mill.narrow->stands_over(x, y, floor + kOnFloor, &walk.met.flat);
         });
     };
-    auto finished = [&](FloorWalk& walk, std::int32_t k, std::int32_t uy,
+    auto finished = [&](FloorWalk& walk, std::int32_t k, std::int32_t v,
                         double floor) -> std::optional<Sample> {
-        if (!flat_stands(walk, k, uy, floor)) return std::nullopt;
+        if (!flat_stands(walk, k, v, floor)) return std::nullopt;
         Sample s;
-        s.x = k * step;
-        s.contact = {to_mm(s.x), to_mm(uy), floor};
+        s.u = k * step;
+        const auto [x, y] = placed(to_mm(s.u), to_mm(v));
+        s.contact = {x, y, floor};
         s.tip = floor + kOnFloor;
         s.reachable = floor >= cut.layer.floor_below;
         if (s.reachable) s.z = to_units(s.tip) + 1;
@@ -242,13 +211,13 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     };
     // Between two places of the ball a cusp of about c·δ/(8r) stays, c the way between the contacts and δ the
     // way of the ball: on a plane both are the same, in a hollow the contacts run ahead of the ball.
-    auto too_far = [&](const Sample& a, std::int32_t ya, const Sample& b, std::int32_t yb) {
+    auto too_far = [&](const Sample& a, std::int32_t va, const Sample& b, std::int32_t vb) {
         if (!a.reachable || !b.reachable || (a.steep && b.steep) ||
             (a.contact[2] < cut.layer.z_bottom && b.contact[2] < cut.layer.z_bottom))
             return false;
         const double c =
             std::hypot(a.contact[0] - b.contact[0], a.contact[1] - b.contact[1], a.contact[2] - b.contact[2]);
-        const double d = std::hypot(to_mm(a.x) - to_mm(b.x), to_mm(ya) - to_mm(yb), a.tip - b.tip);
+        const double d = std::hypot(to_mm(a.u) - to_mm(b.u), to_mm(va) - to_mm(vb), a.tip - b.tip);
         return c * d > 8 * r * cusp * 1.5;
     };
     // Where walls are projected too, a line follows them in safe chords, down to the last place that the ball
@@ -257,26 +226,22 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const std::int32_t finest = to_units(walls ? 0.005 : 0.02);
     auto apart = [&](const Sample& a, const Sample& b) {
         if (!a.reachable || !b.reachable) return a.reachable != b.reachable;
-        return std::hypot(to_mm(a.x) - to_mm(b.x), a.tip - b.tip) > chord;
+        return std::hypot(to_mm(a.u) - to_mm(b.u), a.tip - b.tip) > chord;
     };
-    auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t y, Met& met) -> void {
-        if (!line.empty() && b.x - line.back().x <= step && b.x - line.back().x > 2 * finest &&
-            (too_far(line.back(), y, b, y) || (walls && apart(line.back(), b)))) {
-            const Sample middle = sample(line.back().x + (b.x - line.back().x) / 2, y, met);
-            self(self, line, middle, y, met);
-            self(self, line, b, y, met);
+    auto append_between = [&](auto&& self, Line& line, Sample b, std::int32_t v, Met& met) -> void {
+        if (!line.empty() && b.u - line.back().u <= step && b.u - line.back().u > 2 * finest &&
+            (too_far(line.back(), v, b, v) || (walls && apart(line.back(), b)))) {
+            const Sample middle = sample(line.back().u + (b.u - line.back().u) / 2, v, met);
+            self(self, line, middle, v, met);
+            self(self, line, b, v, met);
             return;
         }
         line.push_back(b);
     };
 
-    // What the ball may make: the shallow surface, but for floors. Of these it makes the places where no flat
-    // end mill stood.
-    std::vector<SolidFacet> made;
-    for (const SolidFacet& f : shallow)
-        if (f.z_min < top && !is_floor(f)) made.push_back(f);
-    const Fibres reach = covering(cut.context, made, r, Axis::x, lines);
-    const double low_limit = cut.low(0, r) * kUnitsPerMm, high_limit = cut.high(0, r) * kUnitsPerMm;
+    const Fibres& reach = raster.reach;
+    const int axis = along_x ? 0 : 1;
+    const double low_limit = cut.low(axis, r) * kUnitsPerMm, high_limit = cut.high(axis, r) * kUnitsPerMm;
     std::vector<std::vector<std::array<std::int32_t, 2>>> unfinished(
         lines.size());  // places on floors, in steps, first and last of a row
     parallel_each(cut.context, lines.size(), [&](std::size_t l) {
@@ -289,8 +254,8 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                            std::floor(std::min(span.high * kUnitsPerMm, high_limit) / step));
             for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                 next = k + 1;
-                if (flat_stands(walk, k, lines[l], span.z) ||
-                    flat_covers(to_mm(k * step), to_mm(lines[l]), span.z, walk.met.flat) ||
+                const auto [x, y] = placed(to_mm(k * step), to_mm(lines[l]));
+                if (flat_stands(walk, k, lines[l], span.z) || flat_covers(x, y, span.z, walk.met.flat) ||
                     !sample(k * step, lines[l], walk.met).wanted)
                     continue;
                 if (!unfinished[l].empty() && unfinished[l].back()[1] + 1 == k) unfinished[l].back()[1] = k;
@@ -321,9 +286,9 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                            std::floor(std::min(span.high + step, high_limit) / step));
             for (std::int32_t k = std::max(first, next); k <= last; ++k) {
                 next = k + 1;
-                const double x = to_mm(k * step);
-                while (floor != floor_spans[l].end() && floor->high < x) ++floor;
-                const std::optional<Sample> done = floor != floor_spans[l].end() && floor->low < x
+                const double u = to_mm(k * step);
+                while (floor != floor_spans[l].end() && floor->high < u) ++floor;
+                const std::optional<Sample> done = floor != floor_spans[l].end() && floor->low < u
                                                        ? finished(walk, k, lines[l], floor->z)
                                                        : std::nullopt;
                 append_between(append_between, samples[l],
@@ -331,10 +296,10 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             }
         }
     });
-    auto at = [](const Line& line, std::int32_t x) -> const Sample* {
-        const auto it = std::lower_bound(line.begin(), line.end(), x,
-                                         [](const Sample& s, std::int32_t v) { return s.x < v; });
-        return it != line.end() && it->x == x ? &*it : nullptr;
+    auto at = [](const Line& line, std::int32_t u) -> const Sample* {
+        const auto it = std::lower_bound(line.begin(), line.end(), u,
+                                         [](const Sample& s, std::int32_t other) { return s.u < other; });
+        return it != line.end() && it->u == u ? &*it : nullptr;
     };
     // One sample and one line beyond what is wanted, so that the cusp at its rim is cut as well.
     parallel_each(cut.context, lines.size(), [&](std::size_t l) {
@@ -342,54 +307,55 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         for (std::size_t i = 0; i < line.size(); ++i) {
             Sample& s = line[i];
             if (!s.reachable) continue;
-            s.cut = s.wanted || (i > 0 && s.x - line[i - 1].x <= step && line[i - 1].wanted) ||
-                    (i + 1 < line.size() && line[i + 1].x - s.x <= step && line[i + 1].wanted);
+            s.cut = s.wanted || (i > 0 && s.u - line[i - 1].u <= step && line[i - 1].wanted) ||
+                    (i + 1 < line.size() && line[i + 1].u - s.u <= step && line[i + 1].wanted);
             for (const std::size_t n : {l - 1, l + 1}) {
                 if (s.cut || n >= lines.size()) continue;
-                const Sample* beside = at(samples[n], s.x);
+                const Sample* beside = at(samples[n], s.u);
                 s.cut = beside && beside->wanted;
             }
         }
     });
     // Where the surface turns faster than the lines follow, lines in between, over those places only.
     struct Between {
-        std::int32_t y = 0;
+        std::int32_t v = 0;
         Line line;
     };
     std::vector<std::vector<Between>> between(lines.size());
     parallel_each(cut.context, uniform ? 0 : lines.size() - 1, [&](std::size_t l) {
-        auto refine = [&](auto&& self, const Line& a, std::int32_t ya, const Line& b,
-                          std::int32_t yb) -> void {
-            if (yb - ya < 2 * finest) return;
-            const std::int32_t y = ya + (yb - ya) / 2;
+        auto refine = [&](auto&& self, const Line& a, std::int32_t va, const Line& b,
+                          std::int32_t vb) -> void {
+            if (vb - va < 2 * finest) return;
+            const std::int32_t v = va + (vb - va) / 2;
             Line middle;
             Met met;
             std::int32_t done = INT32_MIN;
             for (const Sample& s : a) {
-                if (s.x % step != 0) continue;
-                const Sample* other = at(b, s.x);
-                if (!other || !too_far(s, ya, *other, yb)) continue;
-                for (const std::int32_t x : {s.x - step, s.x, s.x + step}) {
-                    if (x <= done) continue;
-                    append_between(append_between, middle, sample(x, y, met), y, met);
-                    done = x;
+                if (s.u % step != 0) continue;
+                const Sample* other = at(b, s.u);
+                if (!other || !too_far(s, va, *other, vb)) continue;
+                for (const std::int32_t u : {s.u - step, s.u, s.u + step}) {
+                    if (u <= done) continue;
+                    append_between(append_between, middle, sample(u, v, met), v, met);
+                    done = u;
                 }
             }
             if (middle.empty()) return;
             for (Sample& s : middle) s.cut = s.wanted;
-            self(self, a, ya, middle, y);
-            between[l].push_back({y, middle});
-            self(self, middle, y, b, yb);
+            self(self, a, va, middle, v);
+            between[l].push_back({v, middle});
+            self(self, middle, v, b, vb);
         };
-        refine(refine, samples[l], lines[l], samples[l + 1], lines[l + 1]);
+        if (raster.apart.empty() || !raster.apart[l])
+            refine(refine, samples[l], lines[l], samples[l + 1], lines[l + 1]);
     });
 
-    const Slide slide{&ball, true, chord, cut.layer.z_top, 3};
-    std::vector<std::vector<PathPoint>> runs;
-    auto append_runs = [&](const Line& line, std::int32_t y) {
+    const Slide slide = raster_slide(cut, ball);
+    Runs runs;
+    auto append_runs = [&](const Line& line, std::int32_t v) {
         std::vector<PathPoint> points;
         std::size_t last_cut = 0;  // length of `points` up to the last one that cuts
-        std::int32_t before = 0, last_cut_x = 0;
+        std::int32_t before = 0, last_cut_u = 0;
         auto close = [&] {
             points.resize(last_cut);
             if (points.size() >= 2) runs.push_back(simplify(points, simplify_tolerance_units(gouge)));
@@ -397,31 +363,87 @@ Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
             last_cut = 0;
         };
         for (const Sample& s : line) {
-            if (!points.empty() && s.x - before > step) close();
-            before = s.x;
+            if (!points.empty() && s.u - before > step) close();
+            before = s.u;
             if (!s.cut && points.empty()) continue;
             // Short stretches between two that cut are travelled along the surface.
-            if (!s.reachable || (!s.cut && s.x - last_cut_x > to_units(3))) {
+            if (!s.reachable || (!s.cut && s.u - last_cut_u > to_units(3))) {
                 close();
                 continue;
             }
-            append_free(points, {s.x, y, s.z}, slide);
+            const auto [x, y] = placed(s.u, v);
+            append_free(points, {x, y, s.z}, slide);
             if (s.cut) {
                 last_cut = points.size();
-                last_cut_x = s.x;
+                last_cut_u = s.u;
             }
         }
         close();
     };
-    // First the even raster, then the lines between.
     for (std::size_t l = 0; l < lines.size(); ++l) append_runs(samples[l], lines[l]);
     for (const auto& group : between)
-        for (const Between& b : group) append_runs(b.line, b.y);
+        for (const Between& b : group) append_runs(b.line, b.v);
+    return runs;
+}
+
+// Of the runs one by one, s, with what it takes to come to the next.
+double seconds_of(const LayerCut& cut, const Runs& runs) {
+    constexpr double to_the_next = 0.2;  // s
+    const double speed = std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed) / 60;
+    double sum = to_the_next * static_cast<double>(runs.size());
+    for (const std::vector<PathPoint>& run : runs) {
+        Travel travel(cut.job.machine.acceleration);
+        for (std::size_t k = 1; k < run.size(); ++k) {
+            const PathPoint &a = run[k - 1], &b = run[k];
+            const Vec3d way{to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z)};
+            const double mm = length(way);
+            if (mm > 0) travel.add({.length = mm, .speed = speed, .direction = scaled(1 / mm, way)});
+        }
+        sum += travel.seconds();
+    }
+    return sum;
+}
+
+// Along x, or along y where that is shorter by more than the estimate is worth, and a sample of the lines
+// takes less time too: a line along a fin is run faster than one across it.
+RasterLines chosen_lines(const LayerCut& cut, const RasterFacets& facets, const DropIndex& ball) {
+    constexpr double clearly = 0.95;
+    constexpr std::size_t groups = 8, together = 5;
+    RasterLines x = raster_lines(cut, facets, Axis::x);
+    if (cut.job.cutting.uniform_steps) return x;
+    RasterLines y = raster_lines(cut, facets, Axis::y);
+    if (!(length_mm(y) < clearly * length_mm(x))) return x;
+    const auto seconds = [&](const RasterLines& lines) {
+        const RasterLines some = some_of(lines, groups, together);
+        return seconds_of(cut, raster_runs(cut, facets, some, ball)) *
+               static_cast<double>(lines.across.size()) / static_cast<double>(some.across.size());
+    };
+    return seconds(y) < clearly * seconds(x) ? y : x;
+}
+
+}  // namespace
+
+Operation finish_raster(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
+    const Tool& tool = cut.layer.tools.finish;
+    Operation op = cut.operation(OperationKind::finish, "projected raster", tool);
+    const RasterFacets facets = raster_facets(cut);
+    if (facets.shallow.empty()) return op;
+    const DropIndex& ball = cut.drops({Cutter::Profile::ball, facets.radius});
+    const RasterLines raster = chosen_lines(cut, facets, ball);
+    op.stepover = raster.widest_mm;
+    if (raster.kept_wide)
+        diagnostics.push_back(
+            {Severity::warning,
+             "finish.stepover_floor",
+             fmt::format(
+                 "layer {}: the raster's step-over was kept at {:.2f} mm, cusps there exceed {:.3f} mm",
+                 cut.layer.index, cut.job.cutting.min_stepover, cut.job.tolerances.cusp),
+             {}});
 
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
     path.set_surroundings(cut.around(tool, &ball));
-    follow_nearest(path, chained(std::move(runs), slide));
+    follow_nearest(path, chained(raster_runs(cut, facets, raster, ball), raster_slide(cut, ball)));
     path.finish();
     return op;
 }
