@@ -173,6 +173,33 @@ INSTANTIATE_TEST_SUITE_P(Real, PlanCorpus,
                                          Share{"relief", 1, 3}, Share{"relief", 2, 3}, Share{"nasty", 0, 1}),
                          share_name);
 
+// Machine castings as a shop gets them, bodies inside out and all: mended where asked, every one is made, and
+// none ends with programs that do not pass.
+class Pool : public testing::TestWithParam<std::size_t> {};
+constexpr std::size_t kPoolShares = 20;
+
+TEST_P(Pool, IsMendedAndMade) {
+    const char* corpus = corpus_or_say();
+    if (!corpus) return;
+    std::vector<fs::path> files;
+    for (const fs::path& file : files_of(fs::path(corpus) / "pool"))
+        if (file.extension() == ".stl") files.push_back(file);
+    ASSERT_GE(files.size(), kPoolShares);
+    for (std::size_t i = GetParam(); i < files.size(); i += kPoolShares) {
+        SCOPED_TRACE(files[i].filename().string());
+        TemporaryFolder temporary;
+        const fs::path out = temporary.path / "out";
+        const std::string plan = "plan '" + files[i].string() + "' -o '" + out.string() +
+                                 "' --json --threads 1 --allow-undercut --repair";
+        Outcome outcome = run_command(plan, temporary.path);
+        if (outcome.status == 3) outcome = run_command(plan + " rebuild", temporary.path);
+        EXPECT_EQ(outcome.status, 0) << outcome.errors;
+        if (outcome.status == 0) check_verdict(out);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Real, Pool, testing::Range(std::size_t{0}, kPoolShares));
+
 // A part as other people would lay it on the table: turned by 33° about z, so that no wall follows an axis,
 // and scaled so that its longer side is `side` mm (0: as it is).
 void write_turned(const fs::path& from, const fs::path& to, double side) {
