@@ -19,8 +19,8 @@ enum class LengthUnit : std::uint8_t { mm, inch };
 /// its surface is made anew where mending does not close it.
 enum class Repair : std::uint8_t { none, mend, rebuild };
 /// Boundaries as printed (LUO 4.2.5), by the dynamic program, or, slabs bonded to any thickness, those with
-/// which the whole build takes least.
-enum class LayerStrategy : std::uint8_t { printed, optimal, combined };
+/// which the whole build takes least; `uniform`: as far apart as they may be, for comparing.
+enum class LayerStrategy : std::uint8_t { printed, optimal, combined, uniform };
 /// Where z = 0 lies in the programs: at the pattern's bottom, at the layer's top, or as suits the machine's
 /// table (frame_of).
 enum class Frame : std::uint8_t { pattern_base, layer_top, automatic };

@@ -185,6 +185,19 @@ TEST(Layers, PrintedTallRegionsMatchBruteForce) {
     }
 }
 
+// Peaks just above, and a flat that looks down between, the heights of whole slabs: the control meets none.
+TEST(Layers, UniformTakesNoNoticeOfThePattern) {
+    const LayerRequest r = request(50, {level(FeatureType::peak, 20), level(FeatureType::down_flat, 30)});
+    const LayerPlacement uniform = place_layers(LayerStrategy::uniform, r);
+    EXPECT_EQ(tops(uniform), (std::vector<double>{18.5, 37, 50}));
+    expect_placement(r, uniform);
+    EXPECT_TRUE(has(uniform, "layers.type1"));
+    EXPECT_TRUE(has(uniform, "layers.type2"));
+    EXPECT_EQ(place_layers(LayerStrategy::printed, r).cost.broken_type2, 0);
+    EXPECT_LT(place_layers(LayerStrategy::optimal, r).cost, uniform.cost);
+    EXPECT_EQ(tops(place_layers(LayerStrategy::uniform, request(37, {}))), (std::vector<double>{18.5, 37}));
+}
+
 TEST(Layers, TypeTwoSplitsARegion) {
     const LayerRequest r = request(30, {level(FeatureType::peak, 20), level(FeatureType::down_flat, 17)});
     const LayerPlacement p = place_layers_printed(r);

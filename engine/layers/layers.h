@@ -75,7 +75,11 @@ struct LayerPlacement {
 [[nodiscard]] LayerPlacement place_layers_printed(const LayerRequest& request);
 /// A dynamic program over candidate heights; never worse than `printed` in the order of LayerCost.
 [[nodiscard]] LayerPlacement place_layers_optimal(const LayerRequest& request);
-/// The cost of any placement, for comparing the two.
+/// Layers as thick as they may be, whatever they break: what the others are measured against.
+[[nodiscard]] LayerPlacement place_layers_uniform(const LayerRequest& request);
+/// By the strategy of that name; `combined`, which compares whole plans, begins with `optimal`.
+[[nodiscard]] LayerPlacement place_layers(LayerStrategy strategy, const LayerRequest& request);
+/// The cost of any placement, for comparing them.
 [[nodiscard]] LayerCost layer_cost(const LayerRequest& request, const std::vector<double>& tops);
 
 }  // namespace slabwright

@@ -464,9 +464,7 @@ Plan plan_from(Context& context, MeshView view, Plan plan, const std::array<doub
         request.section_area = {};  // nobody asks again, and it is large
         return fastest_plan(context, view, plan, request, tried, {0.02, 0.985}, origin);
     }
-    const LayerPlacement placement = job.layers.strategy == LayerStrategy::printed
-                                         ? place_layers_printed(request)
-                                         : place_layers_optimal(request);
+    const LayerPlacement placement = place_layers(job.layers.strategy, request);
     request.section_area = {};
     return plan_layers(context, view, plan, request, placement, {0.02, 0.985}, origin);
 }

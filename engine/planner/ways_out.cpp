@@ -71,9 +71,7 @@ Lying lying(Context& context, MeshView mesh, const Job& job) {
     request.filled_underside = job.tolerances.undercut;
     request.features = find_features(context, mesh, options).features;
     request.section_area = SectionAreas(context, mesh);
-    const LayerPlacement placement = job.layers.strategy == LayerStrategy::printed
-                                         ? place_layers_printed(request)
-                                         : place_layers_optimal(request);
+    const LayerPlacement placement = place_layers(job.layers.strategy, request);
     std::vector<double> tops;
     for (const Boundary& b : placement.boundaries) tops.push_back(b.z);
     Lying result;

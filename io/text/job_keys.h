@@ -18,7 +18,8 @@ inline constexpr Word<Repair> kRepairWords[] = {
     {"none", Repair::none}, {"mend", Repair::mend}, {"rebuild", Repair::rebuild}};
 inline constexpr Word<LayerStrategy> kStrategyWords[] = {{"printed", LayerStrategy::printed},
                                                          {"optimal", LayerStrategy::optimal},
-                                                         {"combined", LayerStrategy::combined}};
+                                                         {"combined", LayerStrategy::combined},
+                                                         {"uniform", LayerStrategy::uniform}};
 inline constexpr Word<SupportRule> kSupportWords[] = {{"none", SupportRule::none},
                                                       {"auto", SupportRule::automatic}};
 inline constexpr Word<Finder> kFinderWords[] = {
@@ -215,8 +216,8 @@ void visit_job_keys(JobLike& job, Visit& visit) {
 
     visit.table("layers", "where layers end");
     visit.word("strategy", job.layers.strategy, kStrategyWords,
-               "optimal, printed (LUO 4.2.5), or combined: slabs bonded to any thickness, whatever is built "
-               "fastest (LUO 6.4.2)");
+               "optimal, printed (LUO 4.2.5), combined: slabs bonded to any thickness, whatever is built "
+               "fastest (LUO 6.4.2), or uniform: as thick as they may be, for comparing");
     visit.word(
         "supports", job.layers.supports, kSupportWords,
         "auto: columns of stock stay under what nothing of the pattern carries, to be sawn off; or none");
