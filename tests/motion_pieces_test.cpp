@@ -107,9 +107,11 @@ std::string zigzag_down(double blend) {
     return repeated(40, Turtle(blend, 3000), [](Turtle& t, int) { t.line(12, -0.8), t.turn(180); });
 }
 
-std::string rising_into_arcs(double blend) {
-    return repeated(40, Turtle(blend),
-                    [](Turtle& t, int i) { t.line(8, i % 2 == 0 ? 2 : -2), t.arc(20, 20); });
+std::string rising_into_arcs(double blend, double rise) {
+    return repeated(40, Turtle(blend), [&](Turtle& t, int i) {
+        t.line(8, i % 2 == 0 ? rise : -rise);
+        t.arc(20, 20);
+    });
 }
 
 std::string rapids(double blend) {
@@ -142,6 +144,7 @@ const Piece kPieces[] = {
     {"short_2", true, [] { return lines(0.02, 0.4, 2, true); }, 15.72},
     {"short_20", true, [] { return lines(0.02, 0.4, 20, true); }, 37.09},
     {"line_arc_0", true, [] { return lines_and_arcs(0.02, 0); }, 7.66},
+    {"arcs_003", true, [] { return arcs(0.02, 0.03, false); }, 6.85},
     {"line_arc_2", true, [] { return lines_and_arcs(0.02, 2); }, 8.84},
     {"line_arc_12", true, [] { return lines_and_arcs(0.1, 12); }, 11.94},
     {"line_arc_away_2", true, [] { return lines_and_arcs(0.1, -2); }, 7.43},
@@ -153,7 +156,7 @@ const Piece kPieces[] = {
     {"s_0", true, [] { return arcs(0.02, 0, true); }, 10.20},
     {"s_3", true, [] { return arcs(0.02, 3, true); }, 11.92},
     {"s_12", true, [] { return arcs(0.1, -12, true); }, 13.76},
-    {"rising_into_arcs", true, [] { return rising_into_arcs(0.1); }, 16.99},
+    {"rising_into_arcs", true, [] { return rising_into_arcs(0.1, 2); }, 16.99},
     {"raster", true, [] { return raster(0.02, 80, 0); }, 8.99},
     {"raster_waves", true, [] { return raster(0.02, 0.5, 0.7); }, 11.27},
     {"zigzag_down", true, [] { return zigzag_down(0.02); }, 12.24},
