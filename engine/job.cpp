@@ -124,6 +124,17 @@ void validate_prepare(const PrepareJob& p) {
 // A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the
 // bottom.
 
+void validate_motion(const Machine& c) {
+    require("machine.max_feed", c.max_feed, 1, 1e6);
+    require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
+    require("machine.acceleration", c.acceleration, 1, 1e6, Ends::closed, kNoRouter);
+    for (const auto& [key, value] : {std::pair{"machine.rapid_y", c.rapid_y},
+                                     {"machine.rapid_z", c.rapid_z},
+                                     {"machine.acceleration_y", c.acceleration_y},
+                                     {"machine.acceleration_z", c.acceleration_z}})
+        if (value != 0) require(key, value, 1, 1e6, Ends::closed, kNoRouter);
+}
+
 }  // namespace
 
 double max_layer_of(const Job& job, const Tool& tool) {
@@ -322,9 +333,7 @@ void validate(const Job& job) {
     require("machine.table_speed", c.table_speed, 1, 1e6, Ends::closed, kNoRouter);
     require("machine.feed_height", c.feed_height, 0, 100000);
     require("machine.feed_mass_kg", c.feed_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
-    require("machine.max_feed", c.max_feed, 1, 1e6);
-    require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
-    require("machine.acceleration", c.acceleration, 1, 1e6, Ends::closed, kNoRouter);
+    validate_motion(c);
     require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
     require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
     require("machine.tool_change_s", c.tool_change_s, 0, 36000);

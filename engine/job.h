@@ -109,8 +109,10 @@ struct Machine {
     double build_mass_kg = 1440;
     double feed_height = 1200;  ///< of the feed chamber, from which slabs are taken; 0: laid by hand
     double feed_mass_kg = 1440;
-    double max_feed = 9000, rapid_feed = 12000;  ///< mm/min
-    double acceleration = 1000;                  ///< mm/s²
+    double max_feed = 9000, rapid_feed = 12000;     ///< mm/min, along the path; rapid_feed of x as well
+    double rapid_y = 0, rapid_z = 0;                ///< mm/min, that these axes can do; 0: as x
+    double acceleration = 1000;                     ///< mm/s², of x
+    double acceleration_y = 0, acceleration_z = 0;  ///< mm/s²; 0: as x
     double max_rpm = 18000;
     double spindle_dwell_s = 3;
     double tool_change_s = 15;

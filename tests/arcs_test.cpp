@@ -225,16 +225,19 @@ TEST(Arcs, TakeAboutTheTimeOfTheirChords) {
         ASSERT_GT(arcs_in(fitted), 0);
         const MotionTime chords = motion_time(moves, machine), arcs = motion_time(fitted, machine);
         EXPECT_NEAR(arcs.cutting_mm, chords.cutting_mm, 1e-3 * chords.cutting_mm);
-        EXPECT_NEAR(arcs.minutes, chords.minutes, 0.01 * chords.minutes) << r;
+        // Along an arc half of the acceleration is left for its ends, a quarter for the last.
+        EXPECT_NEAR(arcs.minutes, chords.minutes, 0.01 * chords.minutes + 0.17 / 60) << r;
     }
     // A small radius is taken at the speed that the acceleration allows, v² = √¾·a·r; along it half is left.
     const std::vector<Move> half{{10 * kMm, 0, 0, 0}, {-96000, 28000, 0, 9000, -10 * kMm, 0}};
     Machine slow;
     slow.acceleration = 100;
     const double v = std::sqrt(std::sqrt(0.75) * 100 * 10), along = slow.acceleration / 2;
-    const double length = 10 * (pi - std::asin(0.28)), ramp = v * v / (2 * along);
-    ASSERT_GT(length, 2 * ramp);
-    EXPECT_NEAR(motion_time(half, slow).minutes * 60, 2 * v / along + (length - 2 * ramp) / v, 1e-9);
+    // …and a quarter at the program's end, so that it never reaches v: two ramps that meet.
+    const double length = 10 * (pi - std::asin(0.28)), end = along / 2;
+    const double peak = std::min(v, std::sqrt(2 * length / (1 / end + 1 / end)));
+    EXPECT_LT(peak, v);
+    EXPECT_NEAR(motion_time(half, slow).minutes * 60, 2 * peak / end, 1e-9);
 }
 
 // v² = a·r: at 50 mm/s and 500 mm/s² arcs of 5 mm radius are as fast as their chords, at 75 mm/s only those

@@ -49,8 +49,10 @@ struct Scramble {
     double real(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
     void table(const char*, const char*) {}
     void required() {}
-    void key(const char*, double& value, const char*) {
-        value = value == 0 ? real(0, 1e-3) : value * (1 - real(0, 0.005));
+    void key(const char* name, double& value, const char*) {
+        const std::string_view key(name);
+        if (key.starts_with("rapid_") || key.starts_with("acceleration_")) value = real(100, 200);
+        else value = value == 0 ? real(0, 1e-3) : value * (1 - real(0, 0.005));
     }
     void key(const char*, int& value, const char*) { value += 1; }
     void key(const char*, bool& value, const char*) { value = !value; }
@@ -312,6 +314,9 @@ TEST(Job, ValidateRefusesWhatNoMachineHas) {
     EXPECT_FALSE(is_valid([](Job& j) { j.slabs.thicknesses = {19, 19}; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.slabs.facing_allowance = 19; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.machine.acceleration = std::numeric_limits<double>::quiet_NaN(); }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.machine.acceleration_z = -1; }));
+    EXPECT_FALSE(is_valid([](Job& j) { j.machine.rapid_y = 0.5; }));
+    EXPECT_TRUE(is_valid([](Job& j) { j.machine.rapid_y = 500, j.machine.acceleration_z = 0; }));
     EXPECT_FALSE(is_valid([](Job& j) { j.machine.rapid_feed = std::numeric_limits<double>::infinity(); }));
     EXPECT_FALSE(is_valid([](Job& j) { j.machine.base_board_cut = 20; }));
     EXPECT_TRUE(is_valid([](Job& j) { j.machine.base_board_cut = 0; }));

@@ -149,7 +149,7 @@ TEST(Thinning, LosesNoTimeByLongerChords) {
                 legs.push_back({l, feed / 60, {dx / l, dy / l, 0}});
                 legs.back().leaving = legs.back().direction;
             }
-            return travel_seconds(legs, machine.acceleration);
+            return travel_seconds(legs, axis_limits(machine));
         };
         EXPECT_LT(coarsely.size(), finely.size());
         EXPECT_LT(seconds(coarsely), 1.01 * seconds(finely)) << a << ' ' << b << ' ' << wave;

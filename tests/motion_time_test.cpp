@@ -19,41 +19,51 @@ struct Stretch {
     double length, speed, acceleration, entry;
 };
 
-/// All stretches of legs as Travel documents them, then backwards over all of them, then forwards.
-double reference_seconds(std::vector<MotionLeg> legs, double a, double junction_mm) {
+/// Three axes that do the same.
+AxisLimits alike(double acceleration) {
+    return {{1000, 1000, 1000}, {acceleration, acceleration, acceleration}};
+}
+
+/// All stretches of level, straight legs as Travel documents them, then backwards over all of them, then
+/// forwards.
+double reference_seconds(std::vector<MotionLeg> legs, const AxisLimits& axes, double junction_mm) {
     const double dt = 0.001, share = std::sqrt(0.75);
+    const double a = std::min(axes.acceleration[0], axes.acceleration[1]);
     const auto along = [&](double v, double r) {
         return a * std::sqrt(std::max(0.0, 1 - std::pow(v * v / (r * a), 2)));
     };
-    for (MotionLeg& leg : legs) {
-        leg.speed = std::min(leg.speed, leg.length / (1.02 * dt));
-        if (leg.radius > 0) leg.speed = std::min(leg.speed, std::sqrt(share * a * leg.radius));
-    }
+    const auto straight = [](const std::array<double, 3>& most, const MotionLeg& leg) {
+        return std::min(most[0] / std::abs(leg.direction[0]), most[1] / std::abs(leg.direction[1]));
+    };
+    for (MotionLeg& leg : legs)
+        leg.speed = std::min({leg.speed, leg.length / (1.02 * dt), straight(axes.speed, leg)});
     std::vector<Stretch> all;
     double taken = 0, entry = 0;
     for (std::size_t i = 0; i < legs.size(); ++i) {
         const MotionLeg& leg = legs[i];
-        const double own = leg.radius > 0 ? along(leg.speed, leg.radius) : a;
+        const double own = straight(axes.acceleration, leg);
         if (i + 1 == legs.size()) {
-            all.push_back({std::max(0.0, leg.length - taken), leg.speed, own, entry});
+            all.push_back({std::max(0.0, leg.length - taken), leg.speed, own / 2, entry});
             break;
         }
         const MotionLeg& next = legs[i + 1];
         double cosine = 0, step = 0, speed = 0, setback = 0, arc = 0, arc_acceleration = 0;
         for (std::size_t k = 0; k < 3; ++k) {
             cosine += leg.leaving[k] * next.direction[k];
-            step = std::max(step, std::abs(next.direction[k] - leg.leaving[k]));
+            step = std::max(step, std::abs(next.direction[k] - leg.leaving[k]) / axes.acceleration[k]);
         }
         cosine = std::clamp(cosine, -1.0, 1.0);
         if (leg.rapid == next.rapid) {
-            const double slower = std::min(leg.speed, next.speed), kink = step * (slower / dt + a) / a;
+            const double slower = std::min(leg.speed, next.speed),
+                         kink = step * (slower / dt + std::max(own, straight(axes.acceleration, next)));
             const double c = std::sqrt((1 + cosine) / 2), s = std::sqrt((1 - cosine) / 2);
             if (kink <= 0.1) speed = slower;
             else if (c > std::sin(std::numbers::pi / 180)) speed = slower * 0.1 / kink;
             if (kink > 0.1 && c > std::sin(std::numbers::pi / 180)) {
                 const double d = std::min({leg.length / 2, next.length / 2, s * junction_mm / (1 - c)});
                 const double widest = d * c / s, turn = 2 * std::asin(s);
-                const double v = std::min(std::max(leg.speed, next.speed), std::sqrt(share * a * widest));
+                const double v = std::min({std::max(leg.speed, next.speed), std::sqrt(share * a * widest),
+                                           axes.speed[0], axes.speed[1]});
                 const double ramp = std::min(v, std::sqrt(a * d)) / (a / 2) * v;
                 const double r = std::max(v * v / (share * a), std::min(ramp / turn, widest));
                 if (const double w = std::min(v, r * turn / (1.02 * dt)); w > speed) {
@@ -107,10 +117,13 @@ TEST(Travel, LegByLegIsAllAtOnce) {
     for (const std::size_t count : {0, 1, 2, 1023, 1024, 1025, 1026, 5000, 60000})
         // From legs on which nobody reaches his speed, in gentle turns, to long ones in sharp turns.
         for (const double size : {0.001, 0.05, 1.0, 30.0}) {
-            const double acceleration = 200 + 2000 * unit(random), turn = size < 0.5 ? 0.02 : 1;
+            const double turn = size < 0.5 ? 0.02 : 1;
+            const auto draw = [&](double least, double more) { return least + more * unit(random); };
+            const AxisLimits axes{{draw(50, 150), draw(50, 150), 1},
+                                  {draw(200, 2000), draw(200, 2000), draw(20, 2000)}};
             std::vector<MotionLeg> legs;
             double heading = 0;
-            Travel travel(acceleration);
+            Travel travel(axes);
             for (std::size_t i = 0; i < count; ++i) {
                 heading +=
                     turn * (2 * unit(random) - 1) * (unit(random) < 0.01 ? std::numbers::pi / turn : 1);
@@ -120,10 +133,10 @@ TEST(Travel, LegByLegIsAllAtOnce) {
                 travel.add(legs.back());
                 if (i % 7 == 0) travel.add({0, 1, {0, 0, 1}});  // passed over
             }
-            const double expected = reference_seconds(legs, acceleration, kJunction);
+            const double expected = reference_seconds(legs, axes, kJunction);
             EXPECT_NEAR(travel.seconds(), expected, 1e-9 * expected)
                 << "seed " << seed << " legs " << count << " of " << size;
-            EXPECT_NEAR(travel_seconds(legs, acceleration), expected, 1e-9 * expected);
+            EXPECT_NEAR(travel_seconds(legs, axes), expected, 1e-9 * expected);
             // Begins anew.
             for (const MotionLeg& leg : legs) travel.add(leg);
             EXPECT_NEAR(travel.seconds(), expected, 1e-9 * expected);
@@ -146,7 +159,7 @@ TEST(Travel, ChordsAreRunNoFasterThanTheirCircle) {
                             {std::cos(heading), std::sin(heading), 0}});
             legs.back().leaving = legs.back().direction;
         }
-        return travel_seconds(legs, acceleration, blend) / turns;
+        return travel_seconds(legs, alike(acceleration), blend) / turns;
     };
     const double circle = 2 * std::numbers::pi * radius / bears;
     for (const int chords : {20, 30, 100}) {

@@ -321,5 +321,30 @@ TEST(Planner, ThePumpCoverVerifies) {
     EXPECT_TRUE(result.passed) << (result.violations.empty() ? "" : result.violations[0].message);
 }
 
+// A slow z and y: no feed asks them for more, which verify() would refuse, and it takes longer.
+TEST(Planner, FeedsKeepToTheAxes) {
+    Context context;
+    const std::string stl = SLABWRIGHT_SOURCE_DIR "/tests/data/pump-cover.stl";
+    Job job;
+    const double minutes = plan(context, stl, job).totals.cutting_minutes;
+    job.machine.rapid_y = 6000, job.machine.rapid_z = 900;
+    const Plan slow = plan(context, stl, job);
+    EXPECT_GT(slow.totals.cutting_minutes, 1.1 * minutes);
+    for (const Layer& layer : slow.layers)
+        for (const Operation& op : layer.operations)
+            for (std::size_t k = 1; k < op.moves.size(); ++k) {
+                const Move &a = op.moves[k - 1], &b = op.moves[k];
+                if (b.feed == 0 || b.is_arc()) continue;
+                const double y = std::abs(to_mm(b.y) - to_mm(a.y)), z = std::abs(to_mm(b.z) - to_mm(a.z));
+                const double length = std::hypot(to_mm(b.x) - to_mm(a.x), y, z);
+                ASSERT_LE(b.feed * z, 900.001 * length) << op.purpose << " move " << k;
+                ASSERT_LE(b.feed * y, 6000.001 * length) << op.purpose << " move " << k;
+            }
+    const support::TemporaryFolder folder;
+    write(context, slow, folder / "out");
+    const VerifyResult result = verify(context, folder / "out", stl);
+    EXPECT_TRUE(result.passed) << (result.violations.empty() ? "" : result.violations[0].message);
+}
+
 }  // namespace
 }  // namespace slabwright

@@ -150,6 +150,25 @@ TEST(ProgramCheck, AWordThatChangesALengthOrAFeedIsTold) {
     EXPECT_GT(told, 100);
 }
 
+TEST(ProgramCheck, NoAxisIsAskedForMoreThanItDoes) {
+    Plan plan = plan_of({{0, 0, 300000, 0},
+                         {0, 0, 100000, 1500},
+                         {300000, 0, 140000, 9000},
+                         {500000, 0, 140000, 9000},
+                         {500000, 0, 300000, 0}},
+                        Frame::pattern_base);
+    const std::string text = program_text(plan, plan.layers[0], plan.layers[0].operations[0]);
+    const auto found = [&](double x, double y, double z) {
+        plan.job.machine.rapid_feed = x, plan.job.machine.rapid_y = y, plan.job.machine.rapid_z = z;
+        return codes(check(plan, text));
+    };
+    EXPECT_EQ(found(9000, 0, 0), "");
+    EXPECT_EQ(found(9000, 10, 1500), "");  // 4 mm up over 30: z does 1190
+    EXPECT_EQ(found(9000, 0, 1499), "program.axis:18");
+    EXPECT_EQ(found(9000, 0, 1189), "program.axis:18");
+    EXPECT_EQ(found(8999, 0, 0), "program.axis:20");
+}
+
 TEST(ProgramCheck, EachFaultByItsName) {
     const Plan plan =
         plan_of({{0, 0, 300000, 0}, {0, 0, 100000, 1500}, {500000, 0, 100000, 9000}, {500000, 0, 300000, 0}},

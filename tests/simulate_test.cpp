@@ -632,37 +632,69 @@ TEST(Simulate, TimeInClosedForm) {
     m.acceleration = 1000, m.rapid_feed = 12000, m.max_feed = 9000, m.tool_change_s = 0;
     Program p;
     p.steps = {{0, 0, 0, 0, 1, true}, {100, 0, 0, 6000, 2, true}};
-    EXPECT_NEAR(program_seconds(p, m), 100.0 / 100 + 100.0 / 1000, 1e-9);  // L/v + v/a
-    p.steps[1].x = 1;                                                      // too short to reach 100 mm/s
-    EXPECT_NEAR(program_seconds(p, m), 2 * std::sqrt(1.0 / 1000), 1e-9);
+    // L/v + v/a; the last motion has half of the acceleration.
+    EXPECT_NEAR(program_seconds(p, m), 100.0 / 100 + 100.0 / 500, 1e-9);
+    p.steps[1].x = 1;  // too short to reach 100 mm/s
+    EXPECT_NEAR(program_seconds(p, m), 2 * std::sqrt(1.0 / 500), 1e-9);
     p.steps = {{0, 0, 0, 0, 1, true}, {50, 0, 0, 6000, 2, true}, {100, 0, 0, 6000, 3, true}};
-    EXPECT_NEAR(program_seconds(p, m), 1.1, 1e-9);  // straight on: no stop
+    EXPECT_NEAR(program_seconds(p, m), 1.15, 1e-9);  // straight on: no stop
     p.steps[2] = {0, 0, 0, 6000, 3, true};
-    EXPECT_NEAR(program_seconds(p, m), 2 * (0.5 + 0.1), 1e-9);  // back: a full stop
+    EXPECT_NEAR(program_seconds(p, m), 2 * 0.5 + 0.1 + 0.2, 1e-9);  // back: a full stop
     p.dwell_s = 3, m.tool_change_s = 15;
-    EXPECT_NEAR(program_seconds(p, m), 19.2, 1e-9);
+    EXPECT_NEAR(program_seconds(p, m), 19.3, 1e-9);
     // A corner of 90° is rounded by an arc of r = δ·c/(1 − c), c = cos 45°, that bears √(√¾·a·r).
     m.tool_change_s = p.dwell_s = 0;
     p.steps[2] = {50, 50, 0, 6000, 3, true};
     for (const double blend : {0.02, 0.1}) {
         p.blend = blend;
         const double c = std::sqrt(0.5), r = blend * c / (1 - c), v = std::sqrt(std::sqrt(0.75) * 1000 * r);
-        const double leg = (50 - r) / 100 + (100.0 * 100 + (100 - v) * (100 - v)) / (2 * 1000 * 100);
-        EXPECT_NEAR(program_seconds(p, m), 2 * leg + r * std::numbers::pi / 2 / v, 1e-9);
+        // At 100 mm/s from rest, by the acceleration a, and slower for the corner by b.
+        const auto leg = [&](double a, double b) {
+            return (50 - r) / 100 + 100 / (2 * a) + (100 - v) * (100 - v) / (2 * b * 100);
+        };
+        EXPECT_NEAR(program_seconds(p, m), leg(1000, 1000) + leg(500, 500) + r * std::numbers::pi / 2 / v,
+                    1e-9);
     }
     p.blend = 0;  // exactly by the corner: a stop
-    EXPECT_NEAR(program_seconds(p, m), 2 * (0.5 + 0.1), 1e-9);
+    EXPECT_NEAR(program_seconds(p, m), 2 * 0.5 + 0.1 + 0.2, 1e-9);
     // On from a rapid the machine stands still, though the way is straight.
     p.steps = {{0, 0, 0, 0, 1, true}, {50, 0, 0, 0, 2, true}, {100, 0, 0, 6000, 3, true}};
-    EXPECT_NEAR(program_seconds(p, m), 50.0 / 200 + 0.2 + 50.0 / 100 + 0.1, 1e-9);
-    // From where the program before has ended: up 20, across 50; its tool stays.
+    const double both = 50.0 / 200 + 0.2 + 50.0 / 100 + 0.2;
+    EXPECT_NEAR(program_seconds(p, m), both, 1e-9);
+    // From where the program before has ended: up 20, across 50, of which y does 40; its tool stays.
     m.tool_change_s = 15;
     Program before = p;
     before.steps = {{0, 0, 0, 0, 1, true}, {30, 40, -20, 0, 2, true}};
-    const double approach = 2 * std::sqrt(20.0 / 1000) + 50.0 / 200 + 0.2;
-    EXPECT_NEAR(program_seconds(p, m, &before), 50.0 / 200 + 0.2 + 50.0 / 100 + 0.1 + approach, 1e-9);
+    const double approach = 2 * std::sqrt(20.0 / 1000) + 50.0 / 200 + 200 / (1000 / 0.8);
+    EXPECT_NEAR(program_seconds(p, m, &before), both + approach, 1e-9);
     before.tool = p.tool + 1;
-    EXPECT_NEAR(program_seconds(p, m, &before), 50.0 / 200 + 0.2 + 50.0 / 100 + 0.1 + approach + 15, 1e-9);
+    EXPECT_NEAR(program_seconds(p, m, &before), both + approach + 15, 1e-9);
+}
+
+// What is slanted is as fast as its slowest axis lets it be, and gathers speed so.
+TEST(Simulate, TimeByTheSlowestAxis) {
+    Machine m;
+    m.acceleration = 1000, m.rapid_feed = 12000, m.max_feed = 9000, m.tool_change_s = 0;
+    const auto seconds = [&](double x, double y, double z, double feed) {
+        Program p;
+        p.steps = {{0, 0, 0, 0, 1, true}, {x, y, z, feed, 2, true}};
+        return program_seconds(p, m);
+    };
+    const auto expected = [](double length, double v, double a) { return length / v + v / (a / 2); };
+    EXPECT_NEAR(seconds(300, 400, 0, 0), expected(500, 200, 1000 / 0.8), 1e-9);
+    m.acceleration_y = 400;
+    EXPECT_NEAR(seconds(300, 400, 0, 0), expected(500, 200, 400 / 0.8), 1e-9);
+    EXPECT_NEAR(seconds(300, 0, 0, 0), expected(300, 200, 1000), 1e-9);
+    m.rapid_z = 1500, m.acceleration_z = 300;
+    EXPECT_NEAR(seconds(0, 0, 50, 0), expected(50, 25, 300), 1e-9);
+    EXPECT_NEAR(seconds(0, 0, 50, 3000), expected(50, 25, 300), 1e-9);  // a feed as well
+    EXPECT_NEAR(seconds(400, 0, 300, 0), expected(500, 25 / 0.6, 300 / 0.6), 1e-9);
+    m.rapid_y = 3000;
+    EXPECT_NEAR(seconds(300, 400, 0, 9000), expected(500, 50 / 0.8, 400 / 0.8), 1e-9);
+    // The way from the program before.
+    Program p, before;
+    p.steps = {{0, 0, 0, 0, 1, true}}, before.steps = {{0, 100, -30, 0, 1, true}};
+    EXPECT_NEAR(program_seconds(p, m, &before), 30 / 25.0 + 25 / 300.0 + 100 / 50.0 + 50 / 400.0, 1e-9);
 }
 
 TEST(Simulate, MapsCancelMemoryAndNonsense) {

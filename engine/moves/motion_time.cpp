@@ -2,52 +2,125 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <utility>
 
 namespace slabwright {
 
-// What of the acceleration is left along an arc that is run at a speed.
-double Travel::along_arc(double speed, double radius) const {
-    const double across = speed * speed / (radius * acceleration_);
-    return acceleration_ * std::sqrt(std::max(0.0, 1 - across * across));
+namespace {
+
+constexpr double kLeastAngle = 0.0174524;  // sine of 1 degree: nearly back the way it came
+constexpr double kLevel = 1e-6;            // rise per mm of what counts as level
+
+// What of an acceleration is left along an arc that is run at a speed.
+double along_arc(double speed, double radius, double acceleration) {
+    const double across = speed * speed / (radius * acceleration);
+    return acceleration * std::sqrt(std::max(0.0, 1 - across * across));
 }
 
-Travel::Corner Travel::corner(const MotionLeg& from, const MotionLeg& to) const {
+// The most that the axes bear in every direction of the plane of two directions.
+double in_plane(const std::array<double, 3>& limits, const std::array<double, 3>& u,
+                const std::array<double, 3>& v) {
+    const std::array<double, 3> normal{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                                       u[0] * v[1] - u[1] * v[0]};
+    const double size = std::hypot(normal[0], normal[1], normal[2]);
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < 3; ++k) {
+        // Of the axis's unit vector, what lies in the plane.
+        const double share = size > 0 ? std::sqrt(std::max(0.0, 1 - std::pow(normal[k] / size, 2))) : 1;
+        if (share > kLevel) least = std::min(least, limits[k] / share);
+    }
+    return least;
+}
+
+}  // namespace
+
+AxisLimits axis_limits(const Machine& machine) {
+    const auto or_x = [](double own, double of_x) { return own > 0 ? own : of_x; };
+    const double v = machine.rapid_feed / 60, a = machine.acceleration;
+    return {{v, or_x(machine.rapid_y / 60, v), or_x(machine.rapid_z / 60, v)},
+            {a, or_x(machine.acceleration_y, a), or_x(machine.acceleration_z, a)}};
+}
+
+double along_axes(const std::array<double, 3>& limits, const std::array<double, 3>& direction) {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < 3; ++k)
+        if (direction[k] != 0) least = std::min(least, limits[k] / std::fabs(direction[k]));
+    return least;
+}
+
+// How much of two legs the arc of their corner may take, mm.
+struct Travel::Reach {
+    double length = 0;
+    double wider = 0;      // than half the turn, radians
+    double curvature = 0;  // of both legs, to the side of the turn, 1/mm
+    bool possible = true;
+};
+
+Travel::Reach Travel::reach(const Leg& from, const Leg& to, double turn) {
+    Reach found{std::min(from.length, to.length) / 2};
+    if (from.radius <= 0 && to.radius <= 0) return found;
+    if (std::fabs(from.leaving[2]) > kLevel || std::fabs(to.direction[2]) > kLevel) {
+        found.possible = false;  // out of the arc's plane
+        return found;
+    }
+    const bool left = from.leaving[0] * to.direction[1] > from.leaving[1] * to.direction[0];
+    const double quarter = std::numbers::pi / 2;
+    const auto of = [&](const Leg& leg, double share) {
+        if (leg.radius <= 0) return leg.length / 2;
+        const bool same = leg.left == left;
+        const double angle = std::min(leg.length / leg.radius * share, same ? quarter - turn / 2 : quarter);
+        found.curvature += (same ? 1 : -1) / leg.radius;
+        if (!same) return angle * leg.radius;
+        found.wider = std::max(found.wider, angle / 4);
+        return std::sin(angle / 4) * leg.radius;
+    };
+    found.length = std::min(of(from, 2.0 / 3), of(to, 1.0 / 3));
+    return found;
+}
+
+Travel::Corner Travel::corner(const Leg& from, const Leg& to) const {
     Corner corner;
     if (from.rapid != to.rapid) return corner;
-    double cosine = 0, step = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-        cosine += from.leaving[k] * to.direction[k];
-        step = std::max(step, std::fabs(to.direction[k] - from.leaving[k]));
-    }
-    cosine = std::clamp(cosine, -1.0, 1.0);
     // Run straight through, the velocity changes by `step`·v within one servo period.
     const double slower = std::min(from.speed, to.speed);
-    const double kink = step * (slower / kServoPeriod + acceleration_) / acceleration_;
+    const double jump = slower / kServoPeriod + std::max(from.acceleration, to.acceleration);
+    double cosine = 0, kink = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        cosine += from.leaving[k] * to.direction[k];
+        kink = std::max(kink, std::fabs(to.direction[k] - from.leaving[k]) * jump / limits_.acceleration[k]);
+    }
+    cosine = std::clamp(cosine, -1.0, 1.0);
+    if (from.radius > 0 || to.radius > 0) kink *= 2;
     if (kink <= kKink) {
         corner.speed = slower;
         return corner;
     }
-    constexpr double least_angle = 0.0174524;  // sine of 1°: nearly back the way it came
-    const double c = std::sqrt((1 + cosine) / 2), s = std::sqrt((1 - cosine) / 2);
-    if (c <= least_angle || !(junction_mm_ > 0)) return corner;
+    const double turn = 2 * std::asin(std::sqrt((1 - cosine) / 2));
+    if (std::cos(turn / 2) <= kLeastAngle || !(junction_mm_ > 0)) return corner;
     corner.speed = slower * kKink / kink;
-    const double turn = 2 * std::asin(s), normal = kNormalShare * acceleration_;
-    const double touches = std::min({from.length / 2, to.length / 2, s * junction_mm_ / (1 - c)});
+    const Reach may = reach(from, to, turn);
+    if (!may.possible) return corner;
+    const double a = in_plane(limits_.acceleration, from.leaving, to.direction), normal = kNormalShare * a;
+    const double c = std::cos(turn / 2 + may.wider), s = std::sin(turn / 2 + may.wider);
+    const double touches = std::min(may.length, s * junction_mm_ / (1 - c));
     const double widest = touches * c / s;
-    const double planned = std::min(std::max(from.speed, to.speed), std::sqrt(normal * widest));
+    const double planned = std::min({std::max(from.speed, to.speed), std::sqrt(normal * widest),
+                                     in_plane(limits_.speed, from.leaving, to.direction)});
     // Short legs are taken by wider arcs, in the time of a ramp of half the acceleration.
-    const double half = acceleration_ / 2;
+    const double half = a / 2;
     const double ramp = std::min(planned, std::sqrt(2 * half * touches)) / half * planned;
-    const double radius = std::max(planned * planned / normal, std::min(ramp / turn, widest));
-    const double length = radius * turn;
+    const double radius =
+        std::max(planned * planned / normal, std::min(ramp / (turn + 2 * may.wider), widest));
+    // What it takes of arcs turns it further, or less.
+    const double bent = 1 - radius * may.curvature / 2;
+    if (bent <= 0) return corner;
+    const double setback = radius * std::tan(turn / 2) / bent;
+    const double length = radius * (turn + setback * may.curvature);
     const double speed = std::min(planned, length / (kLeastPeriods * kServoPeriod));
     if (speed <= corner.speed) return corner;
-    corner.speed = speed;
-    corner.setback = radius * s / c;
-    corner.length = length;
-    corner.acceleration = along_arc(speed, radius);
-    return corner;
+    return {speed, setback, length, along_arc(speed, radius, a)};
 }
 
 void Travel::push(double length, double speed, double acceleration, double entry) {
@@ -57,17 +130,26 @@ void Travel::push(double length, double speed, double acceleration, double entry
     stretches_.push_back({length, speed, acceleration, entry});
 }
 
-// What corners leave of the last leg.
-void Travel::push_leg(double left) {
-    const double acceleration = last_.radius > 0 ? along_arc(last_.speed, last_.radius) : acceleration_;
-    push(left, last_.speed, acceleration, last_entry_);
+Travel::Leg Travel::limited(const MotionLeg& told) const {
+    Leg leg{told};
+    leg.speed = std::min(leg.speed, leg.length / (kLeastPeriods * kServoPeriod));
+    if (leg.radius > 0) {
+        const double a = std::min(limits_.acceleration[0], limits_.acceleration[1]);
+        // What is left along the arc is reckoned from the fastest that it could be run, whatever its feed.
+        const double fastest =
+            std::min({limits_.speed[0], limits_.speed[1], std::sqrt(kNormalShare * a * leg.radius)});
+        leg.speed = std::min(leg.speed, fastest);
+        leg.acceleration = along_arc(fastest, leg.radius, a);
+    } else {
+        leg.speed = std::min(leg.speed, along_axes(limits_.speed, leg.direction));
+        leg.acceleration = along_axes(limits_.acceleration, leg.direction);
+    }
+    return leg;
 }
 
 void Travel::add(const MotionLeg& told) {
     if (told.length <= 0) return;
-    MotionLeg leg = told;
-    leg.speed = std::min(leg.speed, leg.length / (kLeastPeriods * kServoPeriod));
-    if (leg.radius > 0) leg.speed = std::min(leg.speed, std::sqrt(kNormalShare * acceleration_ * leg.radius));
+    const Leg leg = limited(told);
     if (!begun_) {
         begun_ = true;
         taken_ = 0;
@@ -80,12 +162,12 @@ void Travel::add(const MotionLeg& told) {
     if (met.length > 0) {
         // So little of a leg is left between two arcs that it goes with the second.
         const bool consumed = left < kGapPeriods * kServoPeriod * met.speed;
-        if (!consumed) push_leg(left);
+        if (!consumed) push(left, last_.speed, last_.acceleration, last_entry_);
         const double entry = std::min({met.speed, last_.speed, consumed ? last_entry_ : last_.speed});
         push(met.length + (consumed ? left : 0), met.speed, met.acceleration, entry);
         last_entry_ = std::min(met.speed, leg.speed);
     } else {
-        push_leg(left);
+        push(left, last_.speed, last_.acceleration, last_entry_);
         last_entry_ = std::min({met.speed, last_.speed, leg.speed});
     }
     taken_ = met.setback;
@@ -93,7 +175,7 @@ void Travel::add(const MotionLeg& told) {
 }
 
 double Travel::seconds() {
-    if (begun_) push_leg(std::max(0.0, last_.length - taken_));
+    if (begun_) push(std::max(0.0, last_.length - taken_), last_.speed, last_.acceleration / 2, last_entry_);
     settle(0);
     begun_ = false;
     speed_now_ = 0;
@@ -135,49 +217,62 @@ void Travel::settle(double next) {
     stretches_.clear();
 }
 
-double travel_seconds(std::span<const MotionLeg> legs, double acceleration, double junction_mm) {
-    Travel travel(acceleration, junction_mm);
+double travel_seconds(std::span<const MotionLeg> legs, const AxisLimits& limits, double junction_mm) {
+    Travel travel(limits, junction_mm);
     for (const MotionLeg& leg : legs) travel.add(leg);
     return travel.seconds();
 }
 
+MotionLeg straight_leg(const std::array<double, 3>& from, const std::array<double, 3>& to, double feed,
+                       const Machine& machine) {
+    std::array<double, 3> d{to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+    const double length = std::hypot(d[0], d[1], d[2]);
+    if (length > 0)
+        for (double& v : d) v /= length;
+    const bool rapid = feed == 0;
+    return {length, (rapid ? machine.rapid_feed : std::min(feed, machine.max_feed)) / 60, d, d, 0, rapid};
+}
+
+MotionLeg arc_leg(double start, double sweep, double radius, double feed, const Machine& machine) {
+    const double side = sweep > 0 ? 1 : -1, end = start + sweep;
+    return {radius * std::fabs(sweep),
+            std::min(feed, machine.max_feed) / 60,
+            {-side * std::sin(start), side * std::cos(start), 0},
+            {-side * std::sin(end), side * std::cos(end), 0},
+            radius,
+            false,
+            sweep > 0};
+}
+
 double approach_seconds(const std::array<double, 3>& from, const std::array<double, 3>& to,
                         const Machine& machine) {
-    const auto alone = [&](double length) {
-        const MotionLeg leg{length, machine.rapid_feed / 60, {1, 0, 0}, {1, 0, 0}, 0, true};
-        return travel_seconds({&leg, 1}, machine.acceleration);
+    const AxisLimits limits = axis_limits(machine);
+    const auto alone = [&](const MotionLeg& leg) {
+        if (leg.length <= 0) return 0.0;
+        const double v = std::min(leg.speed, along_axes(limits.speed, leg.direction)),
+                     a = along_axes(limits.acceleration, leg.direction);
+        return leg.length > v * v / a ? leg.length / v + v / a : 2 * std::sqrt(leg.length / a);
     };
-    return alone(std::fabs(to[2] - from[2])) + alone(std::hypot(to[0] - from[0], to[1] - from[1]));
+    const std::array<double, 3> above{from[0], from[1], to[2]};
+    return alone(straight_leg(from, above, 0, machine)) + alone(straight_leg(above, to, 0, machine));
 }
 
 std::array<double, 3> place_of(const Move& move) { return {to_mm(move.x), to_mm(move.y), to_mm(move.z)}; }
 
 MotionTime motion_time(std::span<const Move> moves, const Machine& machine, double junction_mm) {
     MotionTime total;
-    Travel travel(machine.acceleration, junction_mm);
+    Travel travel(axis_limits(machine), junction_mm);
     for (std::size_t i = 1; i < moves.size(); ++i) {
         const Move &a = moves[i - 1], &b = moves[i];
-        const std::array<double, 3> d{to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y),
-                                      to_mm(std::int64_t{b.z} - a.z)};
-        const double length = std::hypot(d[0], d[1], d[2]);
-        if (length == 0) continue;
-        const bool rapid = b.feed == 0;
         if (b.is_arc()) {
             const ArcShape arc = arc_shape(a, b);
-            const double side = arc.sweep > 0 ? 1 : -1, end = arc.start + arc.sweep;
             total.cutting_mm += arc.length();
-            travel.add({arc.length(),
-                        std::min<double>(b.feed, machine.max_feed) / 60,
-                        {-side * std::sin(arc.start), side * std::cos(arc.start), 0},
-                        {-side * std::sin(end), side * std::cos(end), 0},
-                        arc.radius,
-                        false});
+            travel.add(arc_leg(arc.start, arc.sweep, arc.radius, b.feed, machine));
             continue;
         }
-        (rapid ? total.rapid_mm : total.cutting_mm) += length;
-        const std::array<double, 3> direction{d[0] / length, d[1] / length, d[2] / length};
-        travel.add({length, (rapid ? machine.rapid_feed : std::min<double>(b.feed, machine.max_feed)) / 60,
-                    direction, direction, 0, rapid});
+        const MotionLeg leg = straight_leg(place_of(a), place_of(b), b.feed, machine);
+        (leg.rapid ? total.rapid_mm : total.cutting_mm) += leg.length;
+        travel.add(leg);
     }
     total.minutes = travel.seconds() / 60;
     return total;

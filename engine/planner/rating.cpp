@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -12,7 +13,30 @@
 
 namespace slabwright {
 
+namespace {
+
+// No motion asks an axis for more than it can do: where the machine slows down by itself, nobody has planned
+// for it.
+void limit_to_axes(Operation& op, const Machine& machine) {
+    const AxisLimits limits = axis_limits(machine);
+    const double least = *std::min_element(limits.speed.begin(), limits.speed.end());
+    if (least * 60 >= machine.max_feed) return;
+    const double level = std::min(limits.speed[0], limits.speed[1]);
+    for (std::size_t i = 1; i < op.moves.size(); ++i) {
+        Move& move = op.moves[i];
+        if (move.feed == 0) continue;
+        const MotionLeg leg = straight_leg(place_of(op.moves[i - 1]), place_of(move), move.feed, machine);
+        if (leg.length <= 0) continue;
+        const double most = move.is_arc() ? level : along_axes(limits.speed, leg.direction);
+        if (move.feed > most * 60)
+            move.feed = static_cast<std::uint32_t>(std::max(1.0, std::floor(most * 60)));
+    }
+}
+
+}  // namespace
+
 void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnostic>& diagnostics) {
+    limit_to_axes(op, job.machine);
     const MotionTime time = motion_time(op.moves, job.machine, op.blend);
     op.cutting_mm = time.cutting_mm;
     op.rapid_mm = time.rapid_mm;

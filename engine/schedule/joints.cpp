@@ -129,7 +129,7 @@ Loops held_back(const Loops& region, double setback, int halvings) {
         // A section has a point at every facet that it cuts, more than where glue goes needs. Thinned it may
         // be too wide by as much as it is thinned, and offset() errs towards the larger region by up to its
         // tolerance; that much more setback keeps the promised distance.
-        const double fine = std::min(0.05, setback / 20);
+        const double fine = std::clamp(setback / 20, 1e-4, 0.05);  // offset() is no finer
         const Loops inside = offset(thinned(region, fine), -(setback + 2 * fine), fine);
         // Wide enough is where a disc of twice the setback finds room.
         const Loops wide = offset(offset(inside, -setback, fine), 2 * setback + 4 * fine, fine);

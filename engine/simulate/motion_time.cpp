@@ -27,31 +27,22 @@ std::optional<std::array<double, 3>> last_place(const Program& program) {
 }  // namespace
 
 double program_seconds(const Program& program, const Machine& machine, const Program* before) {
-    Travel travel(machine.acceleration, program.blend);
+    Travel travel(axis_limits(machine), program.blend);
     auto arc = program.arcs.begin();
     for (std::size_t i = 1; i < program.steps.size(); ++i) {
-        if (arc != program.arcs.end() && arc->begin == i) {  // as in motion_time()
+        if (arc != program.arcs.end() && arc->begin == i) {
             const LevelArc& a = arc->arc;
-            const double side = a.turn > 0 ? 1 : -1, end = a.start + a.turn;
-            travel.add({a.length(),
-                        std::min(program.steps[i].feed, machine.max_feed) / 60,
-                        {-side * std::sin(a.start), side * std::cos(a.start), 0},
-                        {-side * std::sin(end), side * std::cos(end), 0},
-                        a.radius,
-                        false});
+            travel.add(arc_leg(a.start, a.turn, a.radius, program.steps[i].feed, machine));
             i = arc->end - 1;
             ++arc;
             continue;
         }
-        const ProgramStep &from = program.steps[i - 1], &to = program.steps[i];
-        std::array<double, 3> d{to.x - from.x, to.y - from.y, to.z - from.z};
-        for (double& v : d)
-            if (!std::isfinite(v)) v = 0;  // from an unknown place: what it takes cannot be known
-        const double length = std::hypot(d[0], d[1], d[2]);
-        if (length <= 0) continue;
-        for (double& v : d) v /= length;
-        travel.add({length, (to.rapid() ? machine.rapid_feed : std::min(to.feed, machine.max_feed)) / 60, d,
-                    d, 0, to.rapid()});
+        const ProgramStep &a = program.steps[i - 1], &b = program.steps[i];
+        std::array<double, 3> from{a.x, a.y, a.z};
+        std::array<double, 3> to{b.x, b.y, b.z};
+        for (std::size_t k = 0; k < 3; ++k)
+            if (!std::isfinite(to[k] - from[k])) from[k] = to[k] = 0;  // what it takes cannot be known
+        travel.add(straight_leg(from, to, b.feed, machine));
     }
     double seconds = program.dwell_s + travel.seconds();
     if (!before || before->tool != program.tool) seconds += machine.tool_change_s;

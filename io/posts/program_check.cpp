@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/moves/motion_time.h"
+
 namespace slabwright {
 
 namespace {
@@ -108,6 +110,29 @@ private:
             violate("program.feed",
                     fmt::format("feeds at {:.0f} mm/min; tool and machine bear {:.0f}", fastest->feed, limit),
                     fastest->line, fastest->feed - limit);
+        axes();
+    }
+
+    // Where an axis cannot do what a motion asks of it, the machine slows down by itself.
+    void axes() {
+        const AxisLimits limits = axis_limits(machine_);
+        double worst = kFeed;
+        std::size_t axis = 0, at = 0;
+        for (std::size_t i = 1; i < program_.steps.size(); ++i) {
+            const ProgramStep &a = program_.steps[i - 1], &b = program_.steps[i];
+            if (b.rapid() || !a.known() || !b.known()) continue;
+            const MotionLeg leg = straight_leg({a.x, a.y, a.z}, {b.x, b.y, b.z}, b.feed, machine_);
+            if (leg.length <= 0) continue;
+            for (std::size_t k = 0; k < 3; ++k) {
+                const double over = b.feed * std::fabs(leg.direction[k]) - limits.speed[k] * 60;
+                if (over > worst) worst = over, axis = k, at = i;
+            }
+        }
+        if (at == 0) return;
+        violate("program.axis",
+                fmt::format("asks the {} axis for {:.0f} mm/min; it does {:.0f}", "xyz"[axis],
+                            limits.speed[axis] * 60 + worst, limits.speed[axis] * 60),
+                program_.steps[at].line, worst);
     }
 
     void path_mode() {

@@ -26,6 +26,7 @@ struct ProgramPlan {
 /// program.spin_up: it feeds before the spindle has had the machine's time to start;
 /// program.dwell: it dwells longer than that in all, which burns wood where it cuts;
 /// program.feed: above the tool's or the machine's feed;
+/// program.axis: faster along an axis than that does;
 /// program.path_mode: it lets the machine leave its path by more, or round corners by less, than planned;
 /// program.lengths: at some feed, or in rapids, it goes another length than planned, or elsewhere.
 /// @param program with z from the pattern's bottom

@@ -123,6 +123,17 @@ void visit_prepare_keys(PrepareLike& prepare, Visit& visit) {
 }
 
 /// Walks every key of the job but the tools: first those of the top, then table by table.
+template <class MachineLike, class Visit>
+void visit_motion_keys(MachineLike& machine, Visit& visit) {
+    visit.key("max_feed", machine.max_feed, "mm/min");
+    visit.key("rapid_feed", machine.rapid_feed, "mm/min along the path, and of the x axis");
+    visit.key("rapid_y", machine.rapid_y, "mm/min that this axis can do, feeding as well; 0: as x");
+    visit.key("rapid_z", machine.rapid_z, "mm/min that this axis can do, feeding as well; 0: as x");
+    visit.key("acceleration", machine.acceleration, "mm/s^2 of the x axis");
+    visit.key("acceleration_y", machine.acceleration_y, "mm/s^2; 0: as x");
+    visit.key("acceleration_z", machine.acceleration_z, "mm/s^2; 0: as x");
+}
+
 template <class JobLike, class Visit>
 void visit_job_keys(JobLike& job, Visit& visit) {
     visit.word("units", job.units, kUnitWords, "of the STL: mm or in; every length in this file is in mm");
@@ -173,9 +184,7 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("feed_height", job.machine.feed_height,
               "mm, of the feed chamber, which slabs are taken from; 0: they are laid by hand");
     visit.key("feed_mass_kg", job.machine.feed_mass_kg, "kg that the feed table carries");
-    visit.key("max_feed", job.machine.max_feed, "mm/min");
-    visit.key("rapid_feed", job.machine.rapid_feed, "mm/min");
-    visit.key("acceleration", job.machine.acceleration, "mm/s^2");
+    visit_motion_keys(job.machine, visit);
     visit.key("max_rpm", job.machine.max_rpm, "turns a minute");
     visit.key("spindle_dwell_s", job.machine.spindle_dwell_s, "s, from spindle start to the first motion");
     visit.key("tool_change_s", job.machine.tool_change_s, "s");
