@@ -92,6 +92,17 @@ void validate_tool(const Tool& tool, std::size_t position) {
     require(key("ramp_deg"), tool.ramp_deg, -90, 90);
 }
 
+void validate_bonding(const Bonding& b) {
+    require("bonding.press_force", b.press_force, 0, 1e7);
+    require("bonding.press_time_s", b.press_time_s, 0, 1e6);
+    require("bonding.open_time_s", b.open_time_s, 0, 1e6);
+    require("bonding.max_pressure_mpa", b.max_pressure_mpa, 0.0001, 1000);
+    require("bonding.min_pressure_mpa", b.min_pressure_mpa, 0, b.max_pressure_mpa);
+    require("bonding.edge_setback", b.edge_setback, 0, 1000);
+    require("bonding.handling_s", b.handling_s, 0, 1e6);
+    require("bonding.glue_s_per_m2", b.glue_s_per_m2, 0, 1e6);
+}
+
 void validate_prepare(const PrepareJob& p) {
     const auto numbers = [](const char* key, const std::vector<double>& values, std::size_t count,
                             double least, double most) {
@@ -342,14 +353,7 @@ void validate(const Job& job) {
     require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
     require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
 
-    const Bonding& b = job.bonding;
-    require("bonding.press_force", b.press_force, 0, 1e7);
-    require("bonding.press_time_s", b.press_time_s, 0, 1e6);
-    require("bonding.max_pressure_mpa", b.max_pressure_mpa, 0.0001, 1000);
-    require("bonding.min_pressure_mpa", b.min_pressure_mpa, 0, b.max_pressure_mpa);
-    require("bonding.edge_setback", b.edge_setback, 0, 1000);
-    require("bonding.handling_s", b.handling_s, 0, 1e6);
-    require("bonding.glue_s_per_m2", b.glue_s_per_m2, 0, 1e6);
+    validate_bonding(job.bonding);
 
     const Tolerances& t = job.tolerances;
     require("tolerances.gouge", t.gouge, 0.001, 1, Ends::closed, kFinerThanProgrammed);
@@ -410,11 +414,11 @@ void validate(const Job& job) {
                fmt::format("flask.gap is {}: the cutters do not pass between pattern and flask", f.gap),
                fmt::format("give at least {} (the widest end mill, the wall allowance and room)",
                            least_flask_gap(job)));
-    if (f.enabled && !(f.wall > 2 * b.edge_setback))
+    if (f.enabled && !(f.wall > 2 * job.bonding.edge_setback))
         refuse("flask.wall",
                fmt::format("flask.wall is {}: glue that keeps {} mm from every edge finds no place on it",
-                           f.wall, b.edge_setback),
-               fmt::format("give more than {}, or less bonding.edge_setback", 2 * b.edge_setback));
+                           f.wall, job.bonding.edge_setback),
+               fmt::format("give more than {}, or less bonding.edge_setback", 2 * job.bonding.edge_setback));
 
     if (job.tools.empty())
         throw Error(ErrorKind::usage, "job.tool", "the tool library is empty", "tool",

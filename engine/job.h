@@ -133,6 +133,7 @@ struct Bonding {
     bool accept_weak = false;   ///< a joint that cannot hold is a warning, not a refusal
     double edge_setback = 3.0;  ///< glue keeps this far from finished edges
     double handling_s = 60;     ///< fetch, clamp, place
+    double open_time_s = 0;     ///< from the glue to the press at most; 0: not stated
     double glue_s_per_m2 = 60;
 };
 

@@ -29,31 +29,20 @@
 #include "kernels/errors.h"
 #include "tests/support/comma_locale.h"
 #include "tests/support/files.h"
+#include "tests/support/schema.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
 namespace fs = std::filesystem;
 using nlohmann::json;
+using slabwright::support::schema_complaint;
 using slabwright::support::slurp;
 using slabwright::support::spit;
 using slabwright::support::TemporaryFolder;
 using slabwright::support::tree;
 
 namespace {
-
-/// What jsonschema (python3-jsonschema) says; "" when the text keeps the schema.
-std::string schema_complaint(const std::string& text, const char* schema) {
-    TemporaryFolder folder;
-    spit(folder.path / "it.json", text);
-    const std::string command = "/usr/bin/python3 -m jsonschema -i '" + (folder.path / "it.json").string() +
-                                "' '" SLABWRIGHT_SOURCE_DIR "/io/" + schema + "' >'" +
-                                (folder.path / "log").string() + "' 2>&1 </dev/null";
-    const int status = std::system(command.c_str());
-    if (status == 0) return "";
-    const std::string log = slurp(folder.path / "log");
-    return log.empty() ? "status " + std::to_string(status) : log;
-}
 
 Plan hand_made() {
     Plan plan;
@@ -186,15 +175,16 @@ TEST(PlanJson, KeepsItsSchema) {
         Plan plan = hand_made();
         plan.job.machine.frame = frame;
         schedule(plan);
-        EXPECT_EQ(schema_complaint(plan_json(plan), "plan.schema.json"), "");
-        EXPECT_EQ(schema_complaint(sequence_json(plan), "sequence.schema.json"), "");
+        EXPECT_EQ(schema_complaint(plan_json(plan), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"), "");
+        EXPECT_EQ(schema_complaint(sequence_json(plan), SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
+                  "");
     }
     Plan plan = hand_made();
     schedule(plan);
     for (const char* how : {"none", "mend", "rebuild"}) {
         plan.input.repair = InputRepair{how, {}, .02, .25, .1, .05, 1000};
         plan.input.repair->defects = {{"crack", 12, .03, "mm", {1, 2, 3}}, {"degenerate", 1, 0, "", {}}};
-        EXPECT_EQ(schema_complaint(plan_json(plan), "plan.schema.json"), "");
+        EXPECT_EQ(schema_complaint(plan_json(plan), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"), "");
         EXPECT_EQ(json::parse(plan_json(plan))["input"]["repair"]["defects"][0]["count"], 12);
     }
 }
@@ -205,7 +195,7 @@ TEST(PlanJson, SchemaRefusesWhatBreaksTheContract) {
     const auto refused = [&](const std::function<void(json&)>& change) {
         json broken = good;
         change(broken);
-        return schema_complaint(broken.dump(), "plan.schema.json") != "";
+        return schema_complaint(broken.dump(), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json") != "";
     };
     EXPECT_TRUE(refused([](json& j) { j["layers"][0]["operations"][0].erase("peak_force_n"); }));
     EXPECT_TRUE(refused([](json& j) { j["layers"][0]["operations"][0]["kind"] = "polish"; }));
@@ -215,7 +205,7 @@ TEST(PlanJson, SchemaRefusesWhatBreaksTheContract) {
     EXPECT_TRUE(refused([](json& j) { j["diagnostics"][0].erase("where"); }));
     json sequence = json::parse(sequence_json(hand_made()));
     sequence["steps"][2].erase("needs");
-    EXPECT_NE(schema_complaint(sequence.dump(), "sequence.schema.json"), "");
+    EXPECT_NE(schema_complaint(sequence.dump(), SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"), "");
 }
 
 TEST(PlanJson, SaysWhatThePlanHolds) {
@@ -261,7 +251,7 @@ TEST(PlanJson, SaysWhatStaysOfTheSlabs) {
     };
     plan.flask = Flask{square(1000001), {square(500000), square(510000)}, 24.5, 2e6, 1e6};
     const std::string text = plan_json(plan);
-    EXPECT_EQ(schema_complaint(text, "plan.schema.json"), "");
+    EXPECT_EQ(schema_complaint(text, SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"), "");
     const json flask = json::parse(text)["flask"];
     EXPECT_EQ(flask["outer"][0], json::array({-100.0001, -100.0001}));
     EXPECT_EQ(flask["inner"], flask["inner_by_layer"][0]);

@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, report, inspect, repair, prepare, split, slice, sheets, feed, bond,
-// job. Errors are one line on stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, resume, report, inspect, repair, prepare, split, slice, sheets,
+// feed, bond, job. Errors are one line on stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -27,6 +27,7 @@
 #include "tools/bond_command.h"
 #include "tools/prepare_command.h"
 #include "tools/progress_bar.h"
+#include "tools/resume_command.h"
 #include "tools/sheets_command.h"
 #include "tools/split_command.h"
 
@@ -422,6 +423,20 @@ CLI::App* add_repair_command(CLI::App& app, Options& options) {
     return command;
 }
 
+CLI::App* add_report_command(CLI::App& app, Options& options) {
+    CLI::App* command = app.add_subcommand(
+        "report", "make OUT/report.html again: the build to be seen before the wood is cut");
+    command->add_option("OUT", options.out, "folder of the plan")->required();
+    command->add_option("--stl", options.stl, "the pattern; the file that plan.json names, if not given");
+    command->add_flag("--no-3d", options.no_3d, "a light page: no model, no paths");
+    command
+        ->add_option("--size-limit", options.size_limit_mb,
+                     "MB that the page may have; detail is left out to keep to it")
+        ->check(CLI::Range(0.1, 1000.0));
+    add_limits(*command, options);
+    return command;
+}
+
 CLI::App* add_sheets_command(CLI::App& app, Options& options, SheetsOptions& asked) {
     CLI::App* command = app.add_subcommand("sheets", "plan a part as sheets cut from stock and bonded");
     command->add_option("STL", options.stl, "the part")->required();
@@ -465,7 +480,6 @@ int command(int argc, char** argv) {
         ->check(CLI::IsMember({"exact", "halving", "both"}));
     plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
     plan_command->add_flag("--accept-weak-joints", options.accept_weak, "plan although a joint may not hold");
-
     plan_command->add_option("--access-maps", options.access_maps,
                              "folder for what each tool reaches of each layer's facets, as PLY");
     plan_command->add_flag("--keep-failed", options.keep_failed,
@@ -488,17 +502,10 @@ int command(int argc, char** argv) {
                                "folder for a picture of each layer: left over, missed, unreachable, gouged");
     add_limits(*verify_command, options);
 
-    CLI::App* report_command = app.add_subcommand(
-        "report", "make OUT/report.html again: the build to be seen before the wood is cut");
-    report_command->add_option("OUT", options.out, "folder of the plan")->required();
-    report_command->add_option("--stl", options.stl,
-                               "the pattern; the file that plan.json names, if not given");
-    report_command->add_flag("--no-3d", options.no_3d, "a light page: no model, no paths");
-    report_command
-        ->add_option("--size-limit", options.size_limit_mb,
-                     "MB that the page may have; detail is left out to keep to it")
-        ->check(CLI::Range(0.1, 1000.0));
-    add_limits(*report_command, options);
+    ResumeOptions resume_options;
+    CLI::App* resume_command = add_resume_command(app, options.out, resume_options);
+    add_limits(*resume_command, options);
+    CLI::App* report_command = add_report_command(app, options);
 
     CLI::App* inspect_command =
         app.add_subcommand("inspect", "report on the mesh, its features and undercuts");
@@ -555,6 +562,10 @@ int command(int argc, char** argv) {
     try {
         if (*plan_command) return run_plan(options);
         else if (*verify_command) return run_verify(options) ? 0 : static_cast<int>(ErrorKind::verification);
+        else if (*resume_command)
+            with_context(options, [&](Context& context) {
+                return run_resume(context, options.out, resume_options, options.json);
+            });
         else if (*report_command) run_report(options);
         else if (*inspect_command) run_inspect(options);
         else if (*repair_command) run_repair(options);

@@ -46,17 +46,6 @@ double minutes_of(const Layer& layer, const Machine& machine) {
     return minutes;
 }
 
-// No program asks for more than tool and machine can: ways down through air are planned at the tool's own
-// feeds. Times are those of the machine anyway.
-void limit_feeds(Operation& op, const Job& job) {
-    const auto tool =
-        std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
-    const double most =
-        tool == job.tools.end() ? job.machine.max_feed : std::min(tool->max_feed, job.machine.max_feed);
-    const auto fastest = static_cast<std::uint32_t>(std::max(1.0, std::floor(most)));
-    for (Move& move : op.moves) move.feed = std::min(move.feed, fastest);
-}
-
 std::vector<int> tools_in_order(const Layer& layer) {
     std::vector<int> tools;
     for (const Operation& op : layer.operations)
@@ -254,6 +243,15 @@ private:
 };
 
 }  // namespace
+
+void limit_feeds(Operation& op, const Job& job) {
+    const auto tool =
+        std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
+    const double most =
+        tool == job.tools.end() ? job.machine.max_feed : std::min(tool->max_feed, job.machine.max_feed);
+    const auto fastest = static_cast<std::uint32_t>(std::max(1.0, std::floor(most)));
+    for (Move& move : op.moves) move.feed = std::min(move.feed, fastest);
+}
 
 PlannedLayer plan_layer(Context& context, const LayerGround& ground, std::size_t index,
                         ProgressPart& progress) {

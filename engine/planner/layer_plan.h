@@ -39,4 +39,8 @@ struct PlannedLayer {
 [[nodiscard]] PlannedLayer plan_layer(Context& context, const LayerGround& ground, std::size_t index,
                                       ProgressPart& progress);
 
+/// No program asks for more than tool and machine can: ways down through air are planned at the tool's own
+/// feeds. Times are those of the machine anyway.
+void limit_feeds(Operation& operation, const Job& job);
+
 }  // namespace slabwright

@@ -58,9 +58,8 @@ double slab_mass_kg(const Plan& plan, double thickness) {
 
 std::vector<int> feed_loads(const Plan& plan) {
     const Machine& machine = plan.job.machine;
-    std::vector<int> loads;
-    if (machine.feed_height == 0) return loads;
-    double height = INFINITY, mass = INFINITY;
+    if (machine.feed_height == 0) return {};
+    std::vector<double> slabs;
     for (const Layer& layer : plan.layers) {
         const double slab = layer.slab_thickness / layer.slabs, weight = slab_mass_kg(plan, slab);
         const std::string place = fmt::format("layer {}", layer.index);
@@ -77,17 +76,35 @@ std::vector<int> feed_loads(const Plan& plan) {
                             "table's machine.feed_mass_kg of {:.1f} kg",
                             layer.index, weight, weight - machine.feed_mass_kg, machine.feed_mass_kg),
                 place, "take thinner slabs, or lay them by hand (machine.feed_height = 0)");
-        for (int k = 0; k < layer.slabs; ++k) {
-            if (height + slab > machine.feed_height + kSlack || mass + weight > machine.feed_mass_kg) {
-                loads.push_back(0);
-                height = mass = 0;
-            }
-            ++loads.back();
-            height += slab;
-            mass += weight;
+        slabs.insert(slabs.end(), static_cast<std::size_t>(layer.slabs), slab);
+    }
+    return feed_loads(machine, slabs, slab_mass_kg(plan, 1));
+}
+
+std::vector<int> feed_loads(const Machine& machine, std::span<const double> slabs, double kg_per_mm) {
+    std::vector<int> loads;
+    if (machine.feed_height == 0) return loads;
+    double height = INFINITY, mass = INFINITY;
+    for (const double slab : slabs) {
+        const double weight = slab * kg_per_mm;
+        if (height + slab > machine.feed_height + kSlack || mass + weight > machine.feed_mass_kg) {
+            loads.push_back(0);
+            height = mass = 0;
         }
+        ++loads.back();
+        height += slab;
+        mass += weight;
     }
     return loads;
+}
+
+void add_heights(SequenceStep& step, const Operation& operation, double origin) {
+    if (operation.moves.empty()) return;
+    const auto [low, high] = std::minmax_element(operation.moves.begin(), operation.moves.end(),
+                                                 [](const Move& a, const Move& b) { return a.z < b.z; });
+    const std::int32_t zero = to_units(origin);
+    step.numbers.emplace_back("z_low_mm", to_mm(std::int64_t{low->z} - zero));
+    step.numbers.emplace_back("z_high_mm", to_mm(std::int64_t{high->z} - zero));
 }
 
 void check_chambers(const Plan& plan) {

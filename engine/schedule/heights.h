@@ -6,6 +6,7 @@
 // travel of one layer. On a fixed table it needs that of the whole build.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "engine/plan.h"
@@ -32,6 +33,14 @@ struct LayerHeights {
 /// allow, in the order of the build. Empty where slabs are laid by hand.
 /// @throws as check_chambers
 [[nodiscard]] std::vector<int> feed_loads(const Plan& plan);
+/// The same of any slabs, whether or not each fits. @param slabs mm, in the order in which they are taken
+/// @param kg_per_mm of a whole slab
+[[nodiscard]] std::vector<int> feed_loads(const Machine& machine, std::span<const double> slabs,
+                                          double kg_per_mm);
+
+/// Tells a step the lowest and the highest z of its program, as the program counts them: z_low_mm, z_high_mm.
+/// @param origin of its z = 0, mm, pattern-base
+void add_heights(SequenceStep& step, const Operation& operation, double origin);
 
 /// Looks at layers and slabs alone, before any path is made.
 /// @throws Error(no_plan, "machine.build_height") where the table would have to sink farther than its

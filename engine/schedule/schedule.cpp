@@ -48,16 +48,6 @@ private:
     double height_ = 0;
 };
 
-/// The lowest and the highest z of a program, as it counts them.
-void add_heights(SequenceStep& step, const Operation& operation, double origin) {
-    if (operation.moves.empty()) return;
-    const auto [low, high] = std::minmax_element(operation.moves.begin(), operation.moves.end(),
-                                                 [](const Move& a, const Move& b) { return a.z < b.z; });
-    const std::int32_t zero = to_units(origin);
-    step.numbers.emplace_back("z_low_mm", to_mm(std::int64_t{low->z} - zero));
-    step.numbers.emplace_back("z_high_mm", to_mm(std::int64_t{high->z} - zero));
-}
-
 /// Digits of a number, at least `least`.
 int width_of(std::size_t largest, int least) {
     return std::max(least, static_cast<int>(std::to_string(largest).size()));

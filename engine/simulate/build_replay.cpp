@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <unordered_map>
 
+#include "engine/simulate/planned_build.h"
 #include "engine/simulate/sequence_findings.h"
 #include "engine/simulate/step_order.h"
 
@@ -18,57 +18,44 @@ constexpr double kLength = 1e-3;   // mm by which stated lengths may differ: bot
 constexpr double kSeconds = 0.02;  // a program's minutes are rounded to four places
 constexpr double kForce = 0.01;    // N and kg
 constexpr double kLitres = 0.01;
-constexpr std::size_t kStepsEach = 8;  // for each slab, without its programs and their tool changes
-
-/// A slab of the build.
-struct DueSlab {
-    std::size_t layer = 0;  // index into the layers
-    int number = 0;         // within its layer, from 0
-    double thickness = 0, z_bottom = 0;
-    std::size_t glue = 0;  // which of the sequence's: those under layers first, then those between slabs
-};
-
-/// A state of the machine that a step brought about; none: it does not hold.
-using Cause = std::optional<std::size_t>;
 
 class BuildReplay : SequenceFindings {
 public:
-    BuildReplay(const BuildPlan& plan, const BuildSequence& sequence)
-        : SequenceFindings(sequence.steps), plan_(plan), sequence_(sequence), order_(sequence.steps) {
-        std::size_t between = plan.layers.size();
-        for (std::size_t l = 0; l < plan.layers.size(); ++l) {
-            const LayerToBuild& layer = plan.layers[l];
-            const double each = layer.slab_thickness / layer.slabs;
-            for (int k = 0; k < layer.slabs; ++k)
-                slabs_.push_back({l, k, each, layer.z_bottom + k * each, k == 0 ? l : between++});
-        }
+    BuildReplay(const BuildPlan& plan, const BuildSequence& sequence, BuildState from)
+        : SequenceFindings(sequence.steps),
+          plan_(plan),
+          sequence_(sequence),
+          build_(plan),
+          slabs_(build_.slabs()),
+          order_(sequence.steps),
+          s_(std::move(from)) {
+        s_.ran_in.resize(plan.programs.size());
+        s_.faced_off.resize(plan.face_offs.size());
         programs_left_.resize(plan.layers.size());
-        for (const PlannedProgram& program : plan.programs) ++programs_left_[program.layer];
-        ran_in_.resize(plan.programs.size());
+        for (std::size_t p = 0; p < plan.programs.size(); ++p)
+            if (!s_.ran_in[p]) ++programs_left_[plan.programs[p].layer];
     }
 
-    std::vector<Violation> run() {
-        check_head();
-        const std::size_t most = kStepsEach * (slabs_.size() + 1) + 2 * plan_.programs.size() + kStepsEach;
-        if (sequence_.steps.size() > most) {
+    ReplayedBuild run(std::size_t until) {
+        if (s_.done == 0) check_head();
+        if (sequence_.steps.size() > build_.most_steps()) {
             complain("sequence.length", fmt::format("{} steps, where this build has no more than {}",
-                                                    sequence_.steps.size(), most));
-            return take();
+                                                    sequence_.steps.size(), build_.most_steps()));
+            return {std::move(s_), take()};
         }
-        for (std::size_t i = 0; i < sequence_.steps.size(); ++i) {
-            speak_of(i);
+        for (std::size_t i = 0; i < s_.done; ++i) (void)order_.add_next();  // told when they were replayed
+        while (s_.done < until) {
+            speak_of(s_.done);
             for (const auto& [code, message] : order_.add_next()) complain(code, message);
             replay_step();
+            ++s_.done;
         }
         speak_of({});
-        check_end();
-        return take();
+        if (until == sequence_.steps.size()) check_end();
+        return {std::move(s_), take()};
     }
 
 private:
-    // --- what is said of a step
-    // -------------------------------------------------------------------------------
-
     /// Seconds that only the job can tell.
     void expect_job_seconds(double planned) {
         if (plan_.job_stated) expect_seconds(planned, kSeconds);
@@ -78,9 +65,6 @@ private:
         if (layer < plan_.layers.size() && step().layer != plan_.layers[layer].index)
             complain("sequence.layer", fmt::format("belongs to layer {}", plan_.layers[layer].index));
     }
-
-    // --- what the steps need
-    // ----------------------------------------------------------------------------------
 
     /// The step presupposes what `cause` brought about; without it, the machine is not in a state for the
     /// step.
@@ -97,7 +81,6 @@ private:
     }
 
     // --- the steps
-    // --------------------------------------------------------------------------------------------
 
     void check_head() {
         if (sequence_.pattern != plan_.pattern || sequence_.sha256 != plan_.sha256)
@@ -124,6 +107,8 @@ private:
                                                                {"tool_change", &BuildReplay::tool_change},
                                                                {"face", &BuildReplay::program},
                                                                {"mill", &BuildReplay::program},
+                                                               {"clear", &BuildReplay::clear},
+                                                               {"face_off", &BuildReplay::face_off},
                                                                {"unload", &BuildReplay::unload},
                                                                {"mould_box", &BuildReplay::mould_box}};
         const auto act = acts.find(step().action);
@@ -131,14 +116,9 @@ private:
             complain("sequence.action", "is no action of this machine");
             return;
         }
-        if (unloaded_ && step().action != "mould_box")
+        if (s_.unloaded && step().action != "mould_box")
             complain("sequence.order", "comes after the unloading");
         (this->*act->second)();
-    }
-
-    [[nodiscard]] double slab_mass(double thickness) const {
-        return (plan_.stock_max[0] - plan_.stock_min[0]) * (plan_.stock_max[1] - plan_.stock_min[1]) *
-               thickness * 1e-9 * plan_.job.material.density_kg_m3;
     }
 
     void expect_board_size(const char* code) {
@@ -147,124 +127,118 @@ private:
     }
 
     void mount_board() {
-        if (board_) complain("sequence.order", "a board is mounted already");
+        if (s_.board) complain("sequence.order", "a board is mounted already");
         expect_layer(0);
         expect_seconds(0, kSeconds);
         expect_board_size("sequence.slab");
         if (plan_.job_stated) {
             const double thickness = plan_.job.machine.base_board_thickness;
             expect("sequence.slab", "thickness_mm", thickness, kLength);
-            expect("sequence.mass", "mass_kg", slab_mass(thickness), kForce);
+            expect("sequence.mass", "mass_kg", build_.slab_mass(thickness), kForce);
         }
-        board_ = stack_ready_ = here();
-        board_thickness_ = number("thickness_mm").value_or(0);
-        load_kg_ = slab_mass(board_thickness_);
+        s_.board = s_.stack_ready = here();
+        s_.board_thickness = number("thickness_mm").value_or(0);
+        s_.load_kg = build_.slab_mass(s_.board_thickness);
         check_load();
     }
 
     void check_load() {
-        if (plan_.job_stated && load_kg_ > plan_.job.machine.build_mass_kg + kForce)
+        if (plan_.job_stated && s_.load_kg > plan_.job.machine.build_mass_kg + kForce)
             complain("sequence.mass",
-                     fmt::format("the build table would carry {:.1f} kg, it bears {:.1f} kg", load_kg_,
+                     fmt::format("the build table would carry {:.1f} kg, it bears {:.1f} kg", s_.load_kg,
                                  plan_.job.machine.build_mass_kg),
-                     load_kg_ - plan_.job.machine.build_mass_kg);
+                     s_.load_kg - plan_.job.machine.build_mass_kg);
     }
 
     void load_feed() {
         expect_seconds(0, kSeconds);
-        if (in_feed_ > 0)
-            complain("sequence.feed", fmt::format("{} slabs still lie in the feed chamber", in_feed_));
-        if (taken_ < slabs_.size()) expect_layer(slabs_[taken_].layer);
-        wait_for(last_taken_);
+        if (s_.in_feed > 0)
+            complain("sequence.feed", fmt::format("{} slabs still lie in the feed chamber", s_.in_feed));
+        if (s_.taken < slabs_.size()) expect_layer(slabs_[s_.taken].layer);
+        wait_for(s_.last_taken);
         const int count = whole("slabs").value_or(0);
-        if (count < 1 || static_cast<std::size_t>(count) > slabs_.size() - std::min(taken_, slabs_.size()))
+        if (count < 1 || static_cast<std::size_t>(count) > slabs_.size() - std::min(s_.taken, slabs_.size()))
             complain("sequence.feed", fmt::format("loads {} slabs where the build still takes {}", count,
-                                                  slabs_.size() - std::min(taken_, slabs_.size())));
-        in_feed_ = std::max(0, count);
-        feed_height_ = 0;
-        for (std::size_t i = taken_; i < std::min(slabs_.size(), taken_ + static_cast<std::size_t>(in_feed_));
-             ++i)
-            feed_height_ += slabs_[i].thickness;
-        expect("sequence.feed", "height_mm", feed_height_, kLength);
+                                                  slabs_.size() - std::min(s_.taken, slabs_.size())));
+        s_.in_feed = std::max(0, count);
+        s_.feed_height = 0;
+        for (std::size_t i = s_.taken;
+             i < std::min(slabs_.size(), s_.taken + static_cast<std::size_t>(s_.in_feed)); ++i)
+            s_.feed_height += slabs_[i].thickness;
+        expect("sequence.feed", "height_mm", s_.feed_height, kLength);
         if (plan_.job_stated) {
             const Machine& machine = plan_.job.machine;
-            expect("sequence.feed", "mass_kg", slab_mass(feed_height_), kForce);
-            if (feed_height_ > machine.feed_height + kLength)
+            expect("sequence.feed", "mass_kg", build_.slab_mass(s_.feed_height), kForce);
+            if (s_.feed_height > machine.feed_height + kLength)
                 complain("sequence.travel",
-                         fmt::format("stacks {:.1f} mm in a feed chamber of {:.1f} mm", feed_height_,
+                         fmt::format("stacks {:.1f} mm in a feed chamber of {:.1f} mm", s_.feed_height,
                                      machine.feed_height),
-                         feed_height_ - machine.feed_height);
-            if (slab_mass(feed_height_) > machine.feed_mass_kg + kForce)
+                         s_.feed_height - machine.feed_height);
+            if (build_.slab_mass(s_.feed_height) > machine.feed_mass_kg + kForce)
                 complain("sequence.mass",
                          fmt::format("loads {:.1f} kg on a feed table that bears {:.1f} kg",
-                                     slab_mass(feed_height_), machine.feed_mass_kg),
-                         slab_mass(feed_height_) - machine.feed_mass_kg);
+                                     build_.slab_mass(s_.feed_height), machine.feed_mass_kg),
+                         build_.slab_mass(s_.feed_height) - machine.feed_mass_kg);
         }
-        loaded_ = here();
+        s_.loaded = here();
     }
 
     void take_slab() {
-        if (in_hand_) complain("sequence.order", "the material handler holds a slab already");
-        wait_for(hand_free_);
+        if (s_.in_hand) complain("sequence.order", "the material handler holds a slab already");
+        wait_for(s_.hand_free);
         const bool from_feed = !plan_.job_stated || plan_.job.machine.feed_height > 0;
         if (from_feed && plan_.job_stated) {
-            if (in_feed_ == 0) complain("sequence.feed", "the feed chamber is empty");
-            else wait_for(loaded_);
+            if (s_.in_feed == 0) complain("sequence.feed", "the feed chamber is empty");
+            else wait_for(s_.loaded);
         }
         if (plan_.job_stated) {
-            expect("sequence.feed", "feed_stack_mm", from_feed ? feed_height_ : 0, kLength);
+            expect("sequence.feed", "feed_stack_mm", from_feed ? s_.feed_height : 0, kLength);
             expect_word("sequence.slab", "material", plan_.job.material.name);
         }
         expect_job_seconds(plan_.job.bonding.handling_s / 3);
         expect_board_size("sequence.slab");
-        if (taken_ >= slabs_.size()) {
+        if (s_.taken >= slabs_.size()) {
             complain("sequence.order", "all slabs of the build have been taken");
         } else {
-            const DueSlab& slab = slabs_[taken_];
+            const DueSlab& slab = slabs_[s_.taken];
             expect_layer(slab.layer);
             expect("sequence.slab", "thickness_mm", slab.thickness, kLength);
-            if (plan_.job_stated) expect("sequence.mass", "mass_kg", slab_mass(slab.thickness), kForce);
-            feed_height_ = std::max(0.0, feed_height_ - slab.thickness);
-            ++taken_;
+            if (plan_.job_stated)
+                expect("sequence.mass", "mass_kg", build_.slab_mass(slab.thickness), kForce);
+            s_.feed_height = std::max(0.0, s_.feed_height - slab.thickness);
+            ++s_.taken;
         }
-        if (in_feed_ > 0 && --in_feed_ == 0) feed_height_ = 0;
-        in_hand_ = last_taken_ = here();
-        clamped_.reset();
+        if (s_.in_feed > 0 && --s_.in_feed == 0) s_.feed_height = 0;
+        s_.in_hand = s_.last_taken = here();
+        s_.clamped.reset();
     }
 
     void clamp() {
-        require(in_hand_, "the material handler holds no slab");
-        if (clamped_) complain("sequence.order", "the slab is clamped already");
-        if (taken_ > 0) expect_layer(slabs_[taken_ - 1].layer);
+        require(s_.in_hand, "the material handler holds no slab");
+        if (s_.clamped) complain("sequence.order", "the slab is clamped already");
+        if (s_.taken > 0) expect_layer(slabs_[s_.taken - 1].layer);
         expect_job_seconds(plan_.job.bonding.handling_s / 3);
-        clamped_ = here();
-    }
-
-    /// The joint under a slab.
-    [[nodiscard]] PlannedJoint joint_of(const DueSlab& slab) const {
-        const std::vector<PlannedJoint>& joints = plan_.layers[slab.layer].joints;
-        const auto k = static_cast<std::size_t>(slab.number);
-        return k < joints.size() ? joints[k] : PlannedJoint{};
+        s_.clamped = here();
     }
 
     /// The slab that is to be placed next; the last one when all are.
-    [[nodiscard]] const DueSlab& due_slab() const { return slabs_[std::min(placed_, slabs_.size() - 1)]; }
+    [[nodiscard]] const DueSlab& due_slab() const { return slabs_[std::min(s_.placed, slabs_.size() - 1)]; }
 
     void glue() {
         const DueSlab& slab = due_slab();
-        if (placed_ >= slabs_.size()) complain("sequence.order", "no slab is left for the glue");
+        if (s_.placed >= slabs_.size()) complain("sequence.order", "no slab is left for the glue");
         expect_layer(slab.layer);
-        if (glued_) complain("sequence.order", "there is glue on the stack already");
+        if (s_.glued) complain("sequence.order", "there is glue on the stack already");
         if (slab.number == 0)
-            require(stack_ready_, slab.layer == 0
-                                      ? "no board is mounted"
-                                      : "the layer below is not done: its programs have not all run");
-        else require(pressed_, "the slab below is not pressed");
+            require(s_.stack_ready, slab.layer == 0
+                                        ? "no board is mounted"
+                                        : "the layer below is not done: its programs have not all run");
+        else require(s_.pressed, "the slab below is not pressed");
         const double area = number("area_mm2").value_or(0),
                      whole_slab = (plan_.stock_max[0] - plan_.stock_min[0]) *
                                   (plan_.stock_max[1] - plan_.stock_min[1]);
         const double slack = 0.01 + 1e-6 * whole_slab;
-        if (const PlannedJoint planned = joint_of(slab); planned.glue_area_mm2)
+        if (const PlannedJoint planned = build_.joint_of(slab); planned.glue_area_mm2)
             expect("sequence.glue", "area_mm2", *planned.glue_area_mm2, slack);
         if (!(area >= 0 && area <= whole_slab + slack))
             complain("sequence.glue",
@@ -276,7 +250,7 @@ private:
             expect("sequence.glue", "setback_mm", slab.number == 0 ? bonding.edge_setback : 0, kLength);
             expect_seconds(bonding.glue_s_per_m2 * area * 1e-6, kSeconds);
         }
-        glued_ = here();
+        s_.glued = here();
     }
 
     /// Where the glue goes: the polygons that the step points to.
@@ -303,35 +277,35 @@ private:
 
     void place() {
         const DueSlab& slab = due_slab();
-        if (placed_ >= slabs_.size()) complain("sequence.order", "all slabs of the build are placed");
+        if (s_.placed >= slabs_.size()) complain("sequence.order", "all slabs of the build are placed");
         expect_layer(slab.layer);
-        require(in_hand_, "the material handler holds no slab");
-        require(clamped_, "the slab is not clamped");
-        require(glued_, "there is no glue on the stack");
+        require(s_.in_hand, "the material handler holds no slab");
+        require(s_.clamped, "the slab is not clamped");
+        require(s_.glued, "there is no glue on the stack");
         expect("sequence.place", "x_mm", plan_.stock_min[0], kLength);
         expect("sequence.place", "y_mm", plan_.stock_min[1], kLength);
         expect("sequence.place", "z_bottom_mm", slab.z_bottom, kLength);
         expect_job_seconds(plan_.job.bonding.handling_s / 3);
-        load_kg_ += slab_mass(slab.thickness);
-        if (plan_.job_stated) expect("sequence.mass", "table_load_kg", load_kg_, kForce);
+        s_.load_kg += build_.slab_mass(slab.thickness);
+        if (plan_.job_stated) expect("sequence.mass", "table_load_kg", s_.load_kg, kForce);
         check_load();
-        placed_ = std::min(placed_ + 1, slabs_.size());
-        in_hand_.reset();
-        clamped_.reset();
-        glued_.reset();
-        stack_ready_.reset();
-        pressed_.reset();
-        touched_.reset();
-        table_at_.reset();
-        hand_free_ = to_press_ = here();
+        s_.placed = std::min(s_.placed + 1, slabs_.size());
+        s_.in_hand.reset();
+        s_.clamped.reset();
+        s_.glued.reset();
+        s_.stack_ready.reset();
+        s_.pressed.reset();
+        s_.touched.reset();
+        s_.table_at.reset();
+        s_.hand_free = s_.to_press = here();
     }
 
     void press() {
-        require(to_press_, "no slab waits for the press");
-        if (placed_ > 0) {
-            const DueSlab& slab = slabs_[placed_ - 1];
+        require(s_.to_press, "no slab waits for the press");
+        if (s_.placed > 0) {
+            const DueSlab& slab = slabs_[s_.placed - 1];
             expect_layer(slab.layer);
-            if (const PlannedJoint planned = joint_of(slab); planned.press_force_n)
+            if (const PlannedJoint planned = build_.joint_of(slab); planned.press_force_n)
                 expect("sequence.press", "force_n", *planned.press_force_n, kForce);
         }
         if (plan_.job_stated) {
@@ -340,121 +314,106 @@ private:
                 complain("sequence.press", "presses harder than the machine's press can");
         }
         expect_job_seconds(plan_.job.bonding.press_time_s);
-        to_press_.reset();
-        pressed_ = here();
-    }
-
-    /// The layer whose slabs are all placed and pressed; none while one is missing.
-    [[nodiscard]] std::optional<std::size_t> whole_layer() const {
-        if (placed_ == 0 || !pressed_) return std::nullopt;
-        const DueSlab& last = slabs_[placed_ - 1];
-        if (last.number + 1 != plan_.layers[last.layer].slabs) return std::nullopt;
-        return last.layer;
+        s_.to_press.reset();
+        s_.pressed = here();
     }
 
     void table() {
-        const std::optional<std::size_t> l = whole_layer();
+        const std::optional<std::size_t> l = build_.whole_layer(s_);
         if (!l) complain("sequence.order", "the layer's slabs are not all placed and pressed");
-        wait_for(pressed_);
-        wait_for(last_cut_);
-        if (table_at_) complain("sequence.order", "the table is at this layer's height already");
-        const std::size_t at = l.value_or(placed_ > 0 ? slabs_[placed_ - 1].layer : 0);
+        wait_for(s_.pressed);
+        wait_for(s_.last_cut);
+        if (s_.table_at) complain("sequence.order", "the table is at this layer's height already");
+        const std::size_t at = l.value_or(s_.placed > 0 ? slabs_[s_.placed - 1].layer : 0);
         expect_layer(at);
-        const double bottom = bottom_at(at), planned = bottom - board_thickness_;
+        const double bottom = build_.bottom_at(at), planned = bottom - s_.board_thickness;
         expect("sequence.table", "table_height_mm", planned, kLength);
-        expect("sequence.table", "work_offset_z_mm", bottom + origin_of(at), kLength);
+        expect("sequence.table", "work_offset_z_mm", bottom + build_.origin_of(at), kLength);
         const Machine& machine = plan_.job.machine;
         const bool moves = machine.table == BuildTable::moving;
         // How far the table's surface lies under the plane in which layers' tops are cut.
-        const double deep = board_thickness_ + plan_.layers[at].z_top;
+        const double deep = s_.board_thickness + plan_.layers[at].z_top;
         if (plan_.job_stated && moves && deep > machine.build_height + kLength)
             complain("sequence.travel",
                      fmt::format("sinks {:.1f} mm; the table travels {:.1f} mm", deep, machine.build_height),
                      deep - machine.build_height);
-        expect_job_seconds(
-            table_before_ && moves ? std::abs(planned - *table_before_) / machine.table_speed * 60 : 0);
-        table_before_ = planned;
-        touched_.reset();
-        table_at_ = here();
-    }
-
-    /// Where a layer's programs have their z = 0, pattern-base.
-    [[nodiscard]] double origin_of(std::size_t layer) const {
-        return plan_.frame == Frame::layer_top ? plan_.layers[layer].z_top : 0;
-    }
-
-    /// Where the pattern's bottom stands while a layer is cut, from where the programs' z = 0 is in the first
-    /// layer. A table that moves brings each layer's top to one height.
-    [[nodiscard]] double bottom_at(std::size_t layer) const {
-        const double risen = plan_.layers[layer].z_top - plan_.layers.front().z_top;
-        return -origin_of(0) - (plan_.job.machine.table == BuildTable::moving ? risen : 0);
+        expect_job_seconds(s_.table && moves ? std::abs(planned - *s_.table) / machine.table_speed * 60 : 0);
+        s_.table = planned;
+        s_.touched.reset();
+        s_.table_at = here();
     }
 
     void touch_off() {
-        require(table_at_, "the table is not at this layer's height");
-        if (touched_) complain("sequence.order", "the slab's top has been touched off already");
+        require(s_.table_at, "the table is not at this layer's height");
+        if (s_.touched) complain("sequence.order", "the slab's top has been touched off already");
         expect_seconds(0, kSeconds);
-        if (placed_ > 0) {
-            const std::size_t l = slabs_[placed_ - 1].layer;
-            const LayerToBuild& layer = plan_.layers[l];
+        if (s_.placed > 0) {
+            const std::size_t l = slabs_[s_.placed - 1].layer;
             expect_layer(l);
-            expect("sequence.touch_off", "slab_top_mm", layer.z_bottom + layer.slab_thickness - origin_of(l),
-                   kLength);
-            if (programs_left_[l] == 0) stack_ready_ = here();
+            expect("sequence.touch_off", "slab_top_mm", build_.stack_top(s_) - build_.origin_of(l), kLength);
+            if (programs_left_[l] == 0) s_.stack_ready = here();
         }
-        touched_ = here();
+        s_.touched = here();
     }
 
-    [[nodiscard]] const Tool* tool_of(int number) const {
-        for (const Tool& tool : plan_.tools)
-            if (tool.number == number) return &tool;
-        return nullptr;
+    /// The program that a tool put in now is for: the next one of the plan, or one that faces off where the
+    /// list has such a one before any other. Null when none is left; none where an interruption came first.
+    [[nodiscard]] std::optional<const PlannedProgram*> tool_user() const {
+        for (std::size_t i = here() + 1; i < sequence_.steps.size(); ++i) {
+            const std::string& action = sequence_.steps[i].action;
+            if (action == "face_off")
+                for (const auto& [key, value] : sequence_.steps[i].words)
+                    for (const PlannedProgram& p : plan_.face_offs)
+                        if (key == "program" && value == p.file) return &p;
+            if (action == "clear") return std::nullopt;
+            if (action == "face" || action == "mill") break;
+        }
+        return s_.next_program < plan_.programs.size() ? &plan_.programs[s_.next_program] : nullptr;
     }
 
     void tool_change() {
-        wait_for(last_cut_);
+        wait_for(s_.last_cut);
         const std::optional<int> tool = whole("tool");
-        if (tool && !tool_of(*tool))
+        if (tool && !build_.tool_of(*tool))
             complain("sequence.tool", fmt::format("tool {} is not in the library", *tool));
-        if (unused_change_) complain("sequence.tool", "the tool before it has not been used");
-        if (tool && spindle_tool_ == *tool)
+        if (s_.unused_change) complain("sequence.tool", "the tool before it has not been used");
+        if (tool && s_.spindle_tool == *tool)
             complain("sequence.tool", fmt::format("tool {} is in the spindle already", *tool));
-        if (next_program_ < plan_.programs.size()) {
-            const PlannedProgram& next = plan_.programs[next_program_];
-            expect_layer(next.layer);
-            if (tool && *tool != next.tool)
+        const std::optional<const PlannedProgram*> user = tool_user();
+        if (user && !*user) complain("sequence.order", "no program is left for the tool");
+        if (const PlannedProgram* next = user.value_or(nullptr)) {
+            expect_layer(next->layer);
+            if (tool && *tool != next->tool)
                 complain("sequence.tool", fmt::format("puts tool {} into the spindle; {} wants tool {}",
-                                                      *tool, next.file, next.tool));
-        } else {
-            complain("sequence.order", "no program is left for the tool");
+                                                      *tool, next->file, next->tool));
         }
         expect_job_seconds(plan_.job.machine.tool_change_s);
-        spindle_tool_ = tool.value_or(0);
-        tool_in_ = here();
-        unused_change_ = true;
+        s_.spindle_tool = tool.value_or(0);
+        s_.tool_in = here();
+        s_.unused_change = true;
     }
 
-    /// The program that the step names; none where the plan has no such program.
-    std::optional<std::size_t> named_program() {
+    /// The place of the program that the step names; none where the list has no such program.
+    std::optional<std::size_t> named_program(const std::vector<PlannedProgram>& programs) {
         const std::optional<std::string> file = word("program");
         if (!file) return std::nullopt;
-        for (std::size_t p = 0; p < plan_.programs.size(); ++p)
-            if (plan_.programs[p].file == *file) return p;
+        for (std::size_t p = 0; p < programs.size(); ++p)
+            if (programs[p].file == *file) return p;
         complain("sequence.program", fmt::format("{} is none of the plan's programs", *file));
         return std::nullopt;
     }
 
     void program() {
-        unused_change_ = false;
-        const std::optional<std::size_t> p = named_program();
+        s_.unused_change = false;
+        const std::optional<std::size_t> p = named_program(plan_.programs);
         if (p) {
             const PlannedProgram& planned = plan_.programs[*p];
-            if (ran_in_[*p])
+            if (s_.ran_in[*p])
                 complain("sequence.program",
-                         fmt::format("{} has run already, in {}", planned.file, title(*ran_in_[*p])));
-            else if (*p != next_program_ && next_program_ < plan_.programs.size())
+                         fmt::format("{} has run already, in {}", planned.file, title(*s_.ran_in[*p])));
+            else if (*p != s_.next_program && s_.next_program < plan_.programs.size())
                 complain("sequence.program", fmt::format("runs {} where {} is next", planned.file,
-                                                         plan_.programs[next_program_].file));
+                                                         plan_.programs[s_.next_program].file));
             expect_layer(planned.layer);
             if ((planned.kind == OperationKind::face) != (step().action == "face"))
                 complain("sequence.program",
@@ -462,112 +421,166 @@ private:
             if (!planned.purpose.empty()) expect_word("sequence.program", "purpose", planned.purpose);
             if (planned.minutes) expect_seconds(*planned.minutes * 60, kSeconds);
             check_tool(planned);
-            const std::optional<std::size_t> l = whole_layer();
+            const std::optional<std::size_t> l = build_.whole_layer(s_);
             if (!l || *l != planned.layer)
                 complain("sequence.order",
                          fmt::format("the slabs of layer {} are not placed and pressed, or lie under others",
                                      plan_.layers[planned.layer].index));
             check_heights(planned);
         }
-        require(touched_, "the slab's top has not been touched off");
-        wait_for(tool_in_);
-        wait_for(last_cut_);
-        last_cut_ = here();
-        if (!p || ran_in_[*p]) return;
-        ran_in_[*p] = here();
-        next_program_ = *p + 1;
-        if (--programs_left_[plan_.programs[*p].layer] == 0) stack_ready_ = here();
+        require(s_.touched, "the slab's top has not been touched off");
+        wait_for(s_.tool_in);
+        wait_for(s_.last_cut);
+        s_.last_cut = here();
+        if (!p || s_.ran_in[*p]) return;
+        s_.ran_in[*p] = here();
+        s_.next_program = *p + 1;
+        if (--programs_left_[plan_.programs[*p].layer] == 0) s_.stack_ready = here();
+    }
+
+    /// By hand, after an interruption: the handler and the feed chamber are emptied, wet glue is wiped off.
+    void clear() {
+        if (s_.to_press) complain("sequence.order", "a slab lies on wet glue; it must be pressed first");
+        wait_for(s_.hand_free);
+        wait_for(s_.last_taken);
+        wait_for(s_.glued);
+        wait_for(s_.clamped);
+        expect_seconds(0, kSeconds);
+        s_.in_hand.reset();
+        s_.clamped.reset();
+        s_.glued.reset();
+        s_.in_feed = 0;
+        s_.feed_height = 0;
+        s_.taken = s_.placed;
+        s_.unused_change = false;
+        s_.hand_free = s_.last_taken = here();
+    }
+
+    /// A layer is milled away, down to the joint under it, to be made again.
+    void face_off() {
+        s_.unused_change = false;
+        const std::optional<std::size_t> p = named_program(plan_.face_offs);
+        require(s_.touched, "the stack's top has not been touched off");
+        wait_for(s_.tool_in);
+        wait_for(s_.last_cut);
+        s_.last_cut = here();
+        if (!p) return;
+        const PlannedProgram& planned = plan_.face_offs[*p];
+        if (s_.faced_off[*p])
+            complain("sequence.program",
+                     fmt::format("{} has run already, in {}", planned.file, title(*s_.faced_off[*p])));
+        s_.faced_off[*p] = here();
+        expect_layer(planned.layer);
+        check_tool(planned);
+        check_heights(planned);
+        const LayerToBuild& layer = plan_.layers[planned.layer];
+        if (planned.low && !(std::abs(*planned.low - layer.z_bottom) <= kLength))
+            complain("sequence.height", fmt::format("faces down to {:.3f} mm; the joint under layer {} is at "
+                                                    "{:.3f} mm",
+                                                    *planned.low, layer.index, layer.z_bottom));
+        if (s_.in_hand || s_.glued || s_.in_feed > 0)
+            complain("sequence.order",
+                     "slabs wait in the handler or the feed chamber, or glue is on the stack");
+        if (build_.whole_layer(s_) != planned.layer)
+            complain("sequence.order",
+                     fmt::format("layer {} is not whole, or lies under others", layer.index));
+        else take_off(planned.layer);
+    }
+
+    /// What stands is what stood before the layer's first slab.
+    void take_off(std::size_t layer) {
+        while (s_.placed > 0 && slabs_[s_.placed - 1].layer == layer)
+            s_.load_kg -= build_.slab_mass(slabs_[--s_.placed].thickness);
+        s_.taken = s_.placed;
+        s_.next_program = 0;
+        for (std::size_t p = 0; p < plan_.programs.size(); ++p) {
+            if (plan_.programs[p].layer < layer) s_.next_program = p + 1;
+            if (plan_.programs[p].layer != layer || !s_.ran_in[p]) continue;
+            s_.ran_in[p].reset();
+            ++programs_left_[layer];
+        }
+        s_.table_at.reset();
+        s_.touched.reset();
+        s_.stack_ready = here();
     }
 
     void check_tool(const PlannedProgram& planned) {
         const std::optional<int> tool = whole("tool");
-        if (tool && !tool_of(*tool))
+        if (tool && !build_.tool_of(*tool))
             complain("sequence.tool", fmt::format("tool {} is not in the library", *tool));
         if (tool && *tool != planned.tool)
             complain("sequence.tool",
                      fmt::format("{} is made for tool {}, not {}", planned.file, planned.tool, *tool));
-        if (spindle_tool_ != planned.tool)
+        if (s_.spindle_tool != planned.tool)
             complain("sequence.tool",
-                     spindle_tool_ == 0
+                     s_.spindle_tool == 0
                          ? fmt::format("no tool has been put into the spindle for {}", planned.file)
-                         : fmt::format("tool {} is in the spindle, {} is made for tool {}", spindle_tool_,
+                         : fmt::format("tool {} is in the spindle, {} is made for tool {}", s_.spindle_tool,
                                        planned.file, planned.tool));
     }
 
     /// What the step says of the program's heights, and where they bring the spindle.
     void check_heights(const PlannedProgram& planned) {
-        const double origin = origin_of(planned.layer);
+        const double origin = build_.origin_of(planned.layer);
         if (planned.low && planned.high) {
             expect("sequence.height", "z_low_mm", *planned.low - origin, kLength);
             expect("sequence.height", "z_high_mm", *planned.high - origin, kLength);
         }
-        const Tool* tool = tool_of(planned.tool);
+        const Tool* tool = build_.tool_of(planned.tool);
         if (!planned.low || !planned.high || !tool || !plan_.job_stated) return;
-        const double up = bottom_at(planned.layer) + tool->stickout;
-        lowest_ = std::min(lowest_, up + *planned.low);
-        highest_ = std::max(highest_, up + *planned.high);
-        const double over = highest_ - lowest_ - plan_.job.machine.travel_z;
+        const double up = build_.bottom_at(planned.layer) + tool->stickout;
+        s_.lowest = std::min(s_.lowest, up + *planned.low);
+        s_.highest = std::max(s_.highest, up + *planned.high);
+        const double over = s_.highest - s_.lowest - plan_.job.machine.travel_z;
         if (over > kLength && !spindle_told_) {
             spindle_told_ = true;
             complain("sequence.travel",
                      fmt::format("up to here the spindle goes over {:.1f} mm, tools' lengths included; it "
                                  "travels {:.1f} mm",
-                                 highest_ - lowest_, plan_.job.machine.travel_z),
+                                 s_.highest - s_.lowest, plan_.job.machine.travel_z),
                      over);
         }
     }
 
     void unload() {
-        if (unloaded_) complain("sequence.order", "the stack is unloaded already");
+        if (s_.unloaded) complain("sequence.order", "the stack is unloaded already");
         expect_layer(plan_.layers.size() - 1);
         expect_seconds(0, kSeconds);
-        require(stack_ready_, "the top layer is not done");
-        wait_for(last_cut_);
-        unloaded_ = here();
+        require(s_.stack_ready, "the top layer is not done");
+        wait_for(s_.last_cut);
+        s_.unloaded = here();
     }
 
     void mould_box() {
-        require(unloaded_, "the stack is not unloaded");
+        require(s_.unloaded, "the stack is not unloaded");
         if (!plan_.flask) complain("sequence.order", "the plan has no flask");
-        if (boxed_) complain("sequence.order", "the moulding box is made already");
+        if (s_.boxed) complain("sequence.order", "the moulding box is made already");
         expect_layer(plan_.layers.size() - 1);
         expect_seconds(0, kSeconds);
         expect("sequence.value", "height_mm", plan_.layers.back().z_top, kLength);
         if (plan_.flask_mass_kg) expect("sequence.value", "flask_mass_kg", *plan_.flask_mass_kg, kForce);
         if (plan_.sand_litres) expect("sequence.value", "sand_litres", *plan_.sand_litres, kLitres);
-        boxed_ = here();
+        s_.boxed = here();
     }
 
     void check_end() {
-        if (placed_ < slabs_.size())
-            complain("sequence.missing",
-                     fmt::format("{} of {} slabs are never placed", slabs_.size() - placed_, slabs_.size()));
+        if (s_.placed < slabs_.size())
+            complain("sequence.missing", fmt::format("{} of {} slabs are never placed",
+                                                     slabs_.size() - s_.placed, slabs_.size()));
         for (std::size_t p = 0; p < plan_.programs.size(); ++p)
-            if (!ran_in_[p])
+            if (!s_.ran_in[p])
                 complain("sequence.missing", fmt::format("{} is never run", plan_.programs[p].file));
-        if (!unloaded_) complain("sequence.missing", "the stack is never unloaded");
-        if (plan_.flask && !boxed_) complain("sequence.missing", "the moulding box is never made");
+        if (!s_.unloaded) complain("sequence.missing", "the stack is never unloaded");
+        if (plan_.flask && !s_.boxed) complain("sequence.missing", "the moulding box is never made");
     }
 
     const BuildPlan& plan_;
     const BuildSequence& sequence_;
-    std::vector<DueSlab> slabs_;              // of the whole build, bottom up
+    const PlannedBuild build_;
+    const std::vector<DueSlab>& slabs_;       // of the whole build, bottom up
     std::vector<std::size_t> programs_left_;  // of each layer
-    std::vector<Cause> ran_in_;               // the step in which each program ran
-
     StepOrder order_;
-    Cause board_, loaded_, last_taken_, in_hand_, clamped_, hand_free_, glued_, to_press_, pressed_;
-    Cause stack_ready_;  // glue may go on it: the board, or the last program of the layer below
-    Cause table_at_, touched_, tool_in_, last_cut_, unloaded_, boxed_;
-    std::size_t taken_ = 0, placed_ = 0;  // slabs
-    std::size_t next_program_ = 0;
-    int in_feed_ = 0;
-    int spindle_tool_ = 0;  // 0: none
-    bool unused_change_ = false;
-    double feed_height_ = 0, load_kg_ = 0, board_thickness_ = 0;
-    std::optional<double> table_before_;
-    double lowest_ = std::numeric_limits<double>::infinity(),
-           highest_ = -std::numeric_limits<double>::infinity();  // of the spindle
+    BuildState s_;
     bool spindle_told_ = false;
 };
 
@@ -575,7 +588,12 @@ private:
 
 std::vector<Violation> replay_build(const BuildPlan& plan, const BuildSequence& sequence) {
     if (plan.layers.empty()) return {};
-    return BuildReplay(plan, sequence).run();
+    return replay_steps(plan, sequence, {}, sequence.steps.size()).violations;
+}
+
+ReplayedBuild replay_steps(const BuildPlan& plan, const BuildSequence& sequence, const BuildState& from,
+                           std::size_t until) {
+    return BuildReplay(plan, sequence, from).run(until);
 }
 
 }  // namespace slabwright

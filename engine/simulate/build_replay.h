@@ -14,6 +14,7 @@
 
 #include "engine/job.h"
 #include "engine/plan.h"
+#include "engine/simulate/build_state.h"
 #include "engine/simulate/simulate.h"
 
 namespace slabwright {
@@ -52,6 +53,8 @@ struct BuildPlan {
     std::array<double, 2> stock_min{}, stock_max{};
     std::vector<LayerToBuild> layers;
     std::vector<PlannedProgram> programs;
+    /// Programs that face spoilt layers off (engine/planner/remake.h); of the plan's own sequence none.
+    std::vector<PlannedProgram> face_offs{};
     std::vector<Tool> tools;
     bool flask = false;
     std::optional<double> flask_mass_kg, sand_litres;
@@ -62,6 +65,8 @@ struct StatedGlue {
     int layer = 0;
     double area_mm2 = 0;                         ///< of its loops, holes taken off
     std::array<double, 2> min{0, 0}, max{0, 0};  ///< of its points, mm
+    double z = 0;                                ///< of the joint, mm, pattern-base; 0 where it is not stated
+    std::vector<std::vector<std::array<double, 2>>> loops{};  ///< mm
 };
 
 /// A sequence as it was read.
@@ -83,5 +88,19 @@ struct BuildSequence {
 /// sequence.mass, sequence.travel, sequence.time, sequence.value (a quantity that is missing or not what the
 /// plan says), sequence.missing (what was not done in the end).
 [[nodiscard]] std::vector<Violation> replay_build(const BuildPlan& plan, const BuildSequence& sequence);
+
+/// What some steps bring about.
+struct ReplayedBuild {
+    BuildState state;
+    std::vector<Violation> violations;  ///< as replay_build's, of these steps
+};
+
+/// The same from a state on, which the steps before it brought about: those from place `from.done` up to
+/// place `until`. What must be done in the end is asked for where `until` is the end of the list.
+/// @param plan has a layer
+/// @param from a state of this plan and sequence, or a fresh one
+/// @param until from.done to the count of the steps
+[[nodiscard]] ReplayedBuild replay_steps(const BuildPlan& plan, const BuildSequence& sequence,
+                                         const BuildState& from, std::size_t until);
 
 }  // namespace slabwright

@@ -112,6 +112,13 @@ Tool read_tool(const Field& t) {
     if (t.has("max_rpm")) tool.max_rpm = t["max_rpm"].number();
     if (t.has("max_feed")) tool.max_feed = t["max_feed"].number();
     tool.plunges = t.has("plunges") ? t["plunges"].boolean() : plunges_by_default(tool.kind);
+    if (t.has("plunge_feed")) tool.plunge_feed = t["plunge_feed"].number();
+    if (t.has("stepdown")) {
+        tool.stepdown_min = t["stepdown"][std::size_t{0}].number();
+        tool.stepdown_max = t["stepdown"][std::size_t{1}].number();
+    }
+    if (t.has("stepover")) tool.stepover = t["stepover"].number();
+    if (t.has("strength_mpa")) tool.strength_mpa = t["strength_mpa"].number();
     if (t.has("core_diameter")) tool.core_diameter = t["core_diameter"].number();
     if (t.has("ramp_deg")) tool.ramp_deg = t["ramp_deg"].number();
     if (tool.core_diameter >= tool.diameter) t["core_diameter"].fail("is no less than the diameter");

@@ -99,6 +99,7 @@ StatedGlue read_glue(const Json& from, std::size_t place) {
     const std::string of = fmt::format("glue[{}]", place);
     StatedGlue glue;
     glue.layer = whole_of(member(from, "layer", of), of + ".layer");
+    if (from.contains("z_mm")) glue.z = number_of(from["z_mm"], of + ".z_mm");
     bool first = true;
     for (const Json& loop : list_of(member(from, "loops", of), SIZE_MAX, of + ".loops")) {
         std::vector<std::array<double, 2>> points;
@@ -120,6 +121,7 @@ StatedGlue read_glue(const Json& from, std::size_t place) {
             doubled += (points[i][0] - points[0][0]) * (points[i + 1][1] - points[0][1]) -
                        (points[i + 1][0] - points[0][0]) * (points[i][1] - points[0][1]);
         glue.area_mm2 += doubled / 2;
+        glue.loops.push_back(std::move(points));
     }
     return glue;
 }

@@ -201,8 +201,8 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("glue", job.bonding.glue, "");
     visit.key("press_force", job.bonding.press_force, "N, at most");
     visit.key("press_time_s", job.bonding.press_time_s, "s");
-    visit.key("max_pressure_mpa", job.bonding.max_pressure_mpa,
-              "MPa on the glued area, so that no rib is crushed");
+    visit.key("open_time_s", job.bonding.open_time_s, "s, from the glue to the press; 0: not stated");
+    visit.key("max_pressure_mpa", job.bonding.max_pressure_mpa, "MPa on the glue, so that no rib is crushed");
     visit.key("min_pressure_mpa", job.bonding.min_pressure_mpa,
               "MPa that close a joint, by the glue; cyanoacrylate on RPM's machine: 17 kN on 1.2 m2");
     visit.key("edge_setback", job.bonding.edge_setback, "mm that glue keeps from finished edges");

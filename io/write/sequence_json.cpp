@@ -8,6 +8,23 @@
 
 namespace slabwright {
 
+namespace {
+
+constexpr int kQuantity = 6;  // decimals of a step's quantities
+
+/// What every step has.
+void begin_step(JsonText& json, const SequenceStep& step) {
+    json.key("id").integer(step.id);
+    json.key("layer").integer(step.layer);
+    json.key("action").string(step.action);
+    json.key("needs").begin_array();
+    for (const int need : step.needs) json.integer(need);
+    json.end();
+    json.key("seconds").rounded(step.seconds, 2);
+}
+
+}  // namespace
+
 std::string sequence_json(const Plan& plan) {
     using Shape = JsonText::Shape;
     JsonText json;
@@ -36,18 +53,12 @@ std::string sequence_json(const Plan& plan) {
     json.key("steps").begin_array();
     for (const SequenceStep& step : plan.sequence) {
         json.begin_object(Shape::line);
-        json.key("id").integer(step.id);
-        json.key("layer").integer(step.layer);
-        json.key("action").string(step.action);
-        json.key("needs").begin_array();
-        for (const int need : step.needs) json.integer(need);
-        json.end();
-        json.key("seconds").rounded(step.seconds, 2);
+        begin_step(json, step);
         for (const auto& [key, value] : step.words) json.key(key).string(value);
         if (const auto of = glue_of.find(step.layer); step.action == "glue" && of != glue_of.end())
             if (const std::size_t k = told[step.layer]++; k < of->second.size())
                 json.key("polygons").string("#/glue/" + std::to_string(of->second[k]));
-        for (const auto& [key, value] : step.numbers) json.key(key).rounded(value, 6);
+        for (const auto& [key, value] : step.numbers) json.key(key).rounded(value, kQuantity);
         json.end();
     }
     json.end();
@@ -59,6 +70,40 @@ std::string sequence_json(const Plan& plan) {
         for (std::size_t i = 0; i < g.joint->glue.size(); ++i) {
             json.begin_array(Shape::line);
             for (const Point2 p : g.joint->glue.loop(i)) json.begin_array().units(p.x).units(p.y).end();
+            json.end();
+        }
+        json.end().end();
+    }
+    json.end().end();
+    return json.take();
+}
+
+std::string sequence_json(const BuildSequence& sequence) {
+    using Shape = JsonText::Shape;
+    JsonText json;
+    json.begin_object();
+    json.key("schema").string("slabwright.sequence/1");
+    json.key("units").string("mm");
+    json.key("frame").string(word_of(kFrameWords, sequence.frame));
+    json.key("pattern").string(sequence.pattern);
+    json.key("sha256").string(sequence.sha256);
+    json.key("steps").begin_array();
+    for (const SequenceStep& step : sequence.steps) {
+        json.begin_object(Shape::line);
+        begin_step(json, step);
+        for (const auto& [key, value] : step.words) json.key(key).string(value);
+        for (const auto& [key, value] : step.numbers) json.key(key).rounded(value, kQuantity);
+        json.end();
+    }
+    json.end();
+    json.key("glue").begin_array();
+    for (const StatedGlue& g : sequence.glue) {
+        json.begin_object().key("layer").integer(g.layer);
+        json.key("z_mm").rounded(g.z, kQuantity);
+        json.key("loops").begin_array();
+        for (const auto& loop : g.loops) {
+            json.begin_array(Shape::line);
+            for (const auto& [x, y] : loop) json.begin_array().rounded(x, 4).rounded(y, 4).end();
             json.end();
         }
         json.end().end();

@@ -1,0 +1,281 @@
+#include "engine/planner/remake.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "engine/forces/feeds.h"
+#include "engine/moves/motion_time.h"
+#include "engine/paths/operations/facing.h"
+#include "engine/paths/runs/layer_cut.h"
+#include "engine/planner/layer_plan.h"
+#include "engine/schedule/heights.h"
+#include "engine/simulate/planned_build.h"
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+namespace {
+
+[[noreturn]] void refuse(ErrorKind kind, const char* code, const std::string& message,
+                         const std::string& remedy) {
+    throw Error(kind, code, message, "--remake", remedy);
+}
+
+/// What of a plan its programs are made and written with.
+Plan bare_plan(const BuildPlan& build) {
+    Plan plan;
+    plan.job = build.job;
+    plan.job.tools = build.tools;
+    plan.input.file = build.pattern;
+    plan.input.sha256 = build.sha256;
+    plan.stock_min = build.stock_min;
+    plan.stock_max = build.stock_max;
+    for (const LayerToBuild& from : build.layers) {
+        Layer& layer = plan.layers.emplace_back();
+        layer.index = from.index;
+        layer.z_bottom = from.z_bottom;
+        layer.z_top = from.z_top;
+        layer.slab_thickness = from.slab_thickness;
+        layer.slabs = from.slabs;
+    }
+    return plan;
+}
+
+/// The index of the layer asked for and of the one on top, which is whole.
+struct Spoilt {
+    std::size_t layer = 0, top = 0;
+};
+
+Spoilt spoilt_layers(const RemakeRequest& request, const PlannedBuild& build) {
+    const std::vector<LayerToBuild>& layers = request.plan.layers;
+    const BuildState& state = request.state;
+    if (!request.plan.job_stated)
+        refuse(ErrorKind::no_plan, "resume.job", "plan.json states no job, so no program can be made",
+               "plan again");
+    const auto at = std::find_if(layers.begin(), layers.end(),
+                                 [&](const LayerToBuild& l) { return l.index == request.layer; });
+    if (at == layers.end())
+        refuse(ErrorKind::usage, "resume.layer", fmt::format("the plan has no layer {}", request.layer),
+               fmt::format("give {} to {}", layers.front().index, layers.back().index));
+    if (state.unloaded)
+        refuse(ErrorKind::usage, "resume.unloaded", "the stack is off the machine",
+               "plan again, or mount the stack again and say --after the step before the unloading");
+    const auto l = static_cast<std::size_t>(at - layers.begin());
+    if (state.placed == 0 || build.slabs()[state.placed - 1].layer < l)
+        refuse(ErrorKind::usage, "resume.layer",
+               fmt::format("no slab of layer {} is on the stack yet", request.layer),
+               "take another slab if one is spoilt, and go on with the sequence");
+    const std::size_t top = build.slabs()[state.placed - 1].layer;
+    if (state.to_press)
+        refuse(ErrorKind::usage, "resume.unpressed",
+               fmt::format("a slab of layer {} lies on its glue and is not pressed yet", layers[top].index),
+               "press it and say --after that step; or lift it off, wipe the glue off, and say --after the "
+               "step before the glue");
+    if (build.whole_layer(state) != top)
+        refuse(ErrorKind::usage, "resume.incomplete",
+               fmt::format("layer {} has not all of its {} slabs yet", layers[top].index, layers[top].slabs),
+               "bond the others first, say --after the last press, and remake then");
+    return {l, top};
+}
+
+/// The program that faces one layer off, with feeds and time. @param top mm, what it stands up to
+Operation face_off(Context& context, const Plan& plan, const Layer& layer, double top) {
+    LayerJob job;
+    job.job = &plan.job;
+    job.index = layer.index;
+    job.z_bottom = job.z_top = job.floor_below = layer.z_bottom;
+    job.slab_thickness = top - layer.z_bottom;
+    job.stock_min = plan.stock_min;
+    job.stock_max = plan.stock_max;
+    const LayerCut cut{context, job, plan.job, LayerSolid{}, top, {}, {}};
+    Layer faced = layer;
+    faced.slab_thickness = job.slab_thickness;
+    faced.operations.push_back(face_layer(cut));
+    faced.operations[0].purpose = fmt::format("face off layer {} to the joint under it", layer.index);
+    limit_feeds(faced.operations[0], plan.job);
+    std::vector<Diagnostic> unused;  // of feeds that were lowered
+    if (plan.job.cutting.engagement == Engagement::simulated) rate_layer(context, faced, plan, unused);
+    Operation operation = std::move(faced.operations[0]);
+    const MotionTime time = motion_time(operation.moves, plan.job.machine, operation.blend);
+    operation.cutting_mm = time.cutting_mm;
+    operation.rapid_mm = time.rapid_mm;
+    operation.minutes = time.minutes + plan.job.machine.spindle_dwell_s / 60;
+    return operation;
+}
+
+/// The steps of the new sequence, one after another.
+class RemadeSteps {
+public:
+    RemadeSteps(const RemakeRequest& request, const Plan& plan)
+        : request_(request),
+          plan_(plan),
+          machine_(plan.job.machine),
+          spindle_tool_(request.state.spindle_tool),
+          table_(request.state.table) {
+        const auto done = request.sequence.steps.begin() + static_cast<std::ptrdiff_t>(request.state.done);
+        steps_.assign(request.sequence.steps.begin(), done);
+        std::set<int> open;  // steps that no other one needs: all is done when these are
+        for (const SequenceStep& step : steps_) open.insert(step.id);
+        for (const SequenceStep& step : steps_)
+            for (const int need : step.needs) open.erase(need);
+        last_ = add(plan.layers[0].index, "clear", {open.begin(), open.end()}, 0).id;
+    }
+
+    void clear_for(const Layer& layer) { steps_.back().layer = layer.index; }
+
+    /// @param set whether the table is at the layer's height already, @param touched and its top found
+    void face_off(const Layer& layer, const Operation& operation, double top, bool set, bool touched) {
+        const LayerHeights heights = layer_heights(machine_, plan_.layers.front().z_top, layer.z_top);
+        if (!set) {
+            SequenceStep& table = follow(layer.index, "table", table_time(heights.table));
+            table.numbers = {{"table_height_mm", heights.table}, {"work_offset_z_mm", heights.work_offset}};
+        }
+        if (!set || !touched)
+            follow(layer.index, "touch_off", 0).numbers = {{"slab_top_mm", top - heights.origin}};
+        if (spindle_tool_ != operation.tool) {
+            follow(layer.index, "tool_change", machine_.tool_change_s).numbers = {{"tool", operation.tool}};
+            spindle_tool_ = operation.tool;
+        }
+        SequenceStep& step = follow(layer.index, "face_off", operation.minutes * 60);
+        step.numbers = {{"tool", operation.tool}};
+        add_heights(step, operation, heights.origin);
+        step.words = {{"program", request_.folder + operation.file}, {"purpose", operation.purpose}};
+    }
+
+    /// The plan's own steps from a layer on.
+    void build_from(std::size_t layer) {
+        base_ = last_;
+        std::map<int, std::size_t> place;
+        for (std::size_t l = 0; l < plan_.layers.size(); ++l) place[plan_.layers[l].index] = l;
+        std::vector<double> slabs;
+        for (std::size_t l = layer; l < plan_.layers.size(); ++l)
+            for (int k = 0; k < plan_.layers[l].slabs; ++k)
+                slabs.push_back(plan_.layers[l].slab_thickness / plan_.layers[l].slabs);
+        loads_ = feed_loads(machine_, slabs, slab_mass_kg(plan_, 1));
+        for (const SequenceStep& step : request_.own.steps)
+            if (const auto at = place.find(step.layer); at != place.end() && at->second >= layer)
+                build(step, slabs);
+    }
+
+    [[nodiscard]] std::vector<SequenceStep> take() { return std::move(steps_); }
+
+private:
+    SequenceStep& add(int layer, const char* action, std::vector<int> needs, double seconds) {
+        SequenceStep& step = steps_.emplace_back();
+        step.id = static_cast<int>(steps_.size());
+        step.layer = layer;
+        step.action = action;
+        step.needs = std::move(needs);
+        step.seconds = seconds;
+        return step;
+    }
+    /// A step after the one before.
+    SequenceStep& follow(int layer, const char* action, double seconds) {
+        SequenceStep& step = add(layer, action, {last_}, seconds);
+        last_ = step.id;
+        return step;
+    }
+    double table_time(double to) {
+        const double seconds = table_ ? table_seconds(machine_, *table_, to) : 0;
+        table_ = to;
+        return seconds;
+    }
+
+    /// A plan's own step, with its needs in the new numbers. Loads and changes of tool are made anew.
+    void build(const SequenceStep& own, const std::vector<double>& slabs) {
+        std::set<int> needs;
+        for (const int need : own.needs) {
+            const auto known = now_.find(need);
+            if (known == now_.end()) needs.insert(base_);  // of what was faced off, or lies under it
+            else needs.insert(known->second.begin(), known->second.end());
+        }
+        if (own.action == "mount_board" || own.action == "load_feed" || own.action == "tool_change") {
+            if (needs.empty()) needs.insert(base_);
+            now_[own.id] = {needs.begin(), needs.end()};
+            return;
+        }
+        if (needs.empty()) needs.insert(base_);
+        SequenceStep step = own;
+        for (auto& [key, value] : step.numbers) {
+            if (key == "table_height_mm") step.seconds = table_time(value);
+            if (key == "feed_stack_mm") {
+                if (left_ == 0 && next_load_ < loads_.size()) needs.insert(load(own.layer, slabs));
+                value = feed_height_;
+            }
+            if (key != "tool" || static_cast<int>(value) == spindle_tool_) continue;
+            spindle_tool_ = static_cast<int>(value);
+            SequenceStep& change =
+                add(own.layer, "tool_change", {needs.begin(), needs.end()}, machine_.tool_change_s);
+            change.numbers = {{"tool", value}};
+            needs = {change.id};
+        }
+        if (own.action == "take_slab") take_slab(slabs);
+        step.id = static_cast<int>(steps_.size()) + 1;
+        step.needs = {needs.begin(), needs.end()};
+        now_[own.id] = {step.id};
+        if (own.action == "take_slab") last_taken_ = step.id;
+        steps_.push_back(std::move(step));
+    }
+
+    int load(int layer, const std::vector<double>& slabs) {
+        left_ = loads_[next_load_++];
+        feed_height_ = 0;
+        for (int k = 0; k < left_; ++k) feed_height_ += slabs[next_slab_ + static_cast<std::size_t>(k)];
+        SequenceStep& step = add(layer, "load_feed", {last_taken_ == 0 ? base_ : last_taken_}, 0);
+        step.numbers = {
+            {"slabs", left_}, {"height_mm", feed_height_}, {"mass_kg", slab_mass_kg(plan_, feed_height_)}};
+        return step.id;
+    }
+
+    void take_slab(const std::vector<double>& slabs) {
+        if (left_ > 0) feed_height_ = --left_ == 0 ? 0 : feed_height_ - slabs[next_slab_];
+        ++next_slab_;
+    }
+
+    const RemakeRequest& request_;
+    const Plan& plan_;
+    const Machine& machine_;
+    std::vector<SequenceStep> steps_;
+    int spindle_tool_ = 0, last_ = 0, base_ = 0, last_taken_ = 0;
+    std::optional<double> table_;
+    std::map<int, std::vector<int>> now_;  // what a step of the plan's own sequence is now
+    std::vector<int> loads_;
+    std::size_t next_load_ = 0, next_slab_ = 0;
+    int left_ = 0;
+    double feed_height_ = 0;
+};
+
+}  // namespace
+
+Remake remake_layer(Context& context, const RemakeRequest& request) {
+    const PlannedBuild build(request.plan);
+    const Spoilt spoilt = spoilt_layers(request, build);
+    Remake remake;
+    Plan& plan = remake.plan = bare_plan(request.plan);
+    validate(plan.job);
+    remake.most_mm = face_step(plan.job, tool_of_kind(plan.job, ToolKind::face));
+    RemadeSteps steps(request, plan);
+    steps.clear_for(plan.layers[spoilt.top]);
+    for (std::size_t l = spoilt.top + 1; l-- > spoilt.layer;) {
+        Layer& layer = plan.layers[l];
+        const bool on_top = l == spoilt.top;
+        const double top = on_top ? build.stack_top(request.state) : layer.z_top;
+        Operation operation = face_off(context, plan, layer, top);
+        operation.file = fmt::format("F{:03}_L{:03}_face_off_T{}.ngc", remake.layers.size() + 1, layer.index,
+                                     operation.tool);
+        steps.face_off(layer, operation, top, on_top && request.state.table_at.has_value(),
+                       on_top && request.state.touched.has_value());
+        remake.layers.push_back(l);
+        remake.tops.push_back(top);
+        layer.operations.push_back(std::move(operation));
+    }
+    steps.build_from(spoilt.layer);
+    remake.steps = steps.take();
+    return remake;
+}
+
+}  // namespace slabwright
