@@ -326,6 +326,8 @@ void validate(const Job& job) {
     require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
     require("machine.acceleration", c.acceleration, 1, 1e6, Ends::closed, kNoRouter);
     require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
+    require("machine.spindle_power_w", c.spindle_power_w, 0, 1e6);
+    require("machine.spindle_torque_nm", c.spindle_torque_nm, 0, 1e4);
     require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
     require("machine.tool_change_s", c.tool_change_s, 0, 36000);
     require("machine.clearance", c.clearance, 1, 1000, Ends::closed,

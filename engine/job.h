@@ -112,6 +112,8 @@ struct Machine {
     double max_feed = 9000, rapid_feed = 12000;  ///< mm/min
     double acceleration = 1000;                  ///< mm/s²
     double max_rpm = 18000;
+    double spindle_power_w = 0;    ///< that it has for cutting, at any speed; 0: no limit
+    double spindle_torque_nm = 0;  ///< likewise
     double spindle_dwell_s = 3;
     double tool_change_s = 15;
     double clearance = 10;  ///< mm of air between a rapid and the highest stock

@@ -176,6 +176,9 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("rapid_feed", job.machine.rapid_feed, "mm/min");
     visit.key("acceleration", job.machine.acceleration, "mm/s^2");
     visit.key("max_rpm", job.machine.max_rpm, "turns a minute");
+    visit.key("spindle_power_w", job.machine.spindle_power_w,
+              "W that the spindle has for cutting, kept by feed and stepdown; 0: no limit");
+    visit.key("spindle_torque_nm", job.machine.spindle_torque_nm, "Nm, likewise");
     visit.key("spindle_dwell_s", job.machine.spindle_dwell_s, "s, from spindle start to the first motion");
     visit.key("tool_change_s", job.machine.tool_change_s, "s");
     visit.key("clearance", job.machine.clearance, "mm of air between a rapid and the highest stock");

@@ -1,0 +1,92 @@
+#include "engine/forces/bent_cutter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+
+#include "engine/forces/cuts.h"
+#include "kernels/forces/deflection.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kAccuracy = 0.01;  // of coarse classes' peaks, as a share: far finer than the classes are
+
+SegmentForces forces_of(const CutSegment& cut, double accuracy) {
+    return cut.profile == CutterProfile::flat ? closed_form_forces(cut, accuracy)
+                                              : reference_forces(cut, accuracy);
+}
+
+}  // namespace
+
+SegmentForces stated_forces(const CutSegment& cut) { return forces_of(cut, kStatedAccuracy); }
+
+std::optional<Bent> SharedBents::find(const Of& of, const ClassAndFeed& key) {
+    const std::shared_lock lock(mutex_);
+    const auto cuts = known_.find(of);
+    if (cuts == known_.end()) return std::nullopt;
+    const auto cut = cuts->second.find(key);
+    return cut == cuts->second.end() ? std::nullopt : std::optional(cut->second);
+}
+
+void SharedBents::add(const Of& of, const ClassAndFeed& key, const Bent& bent) {
+    const std::lock_guard lock(mutex_);
+    known_[of].try_emplace(key, bent);
+}
+
+BentCutter::BentCutter(const Job& job, const Operation& operation, const Tool& tool, SharedBents* shared)
+    : job_(job), tool_(tool), shared_(shared), idle_(idle_cut(job, tool)) {
+    idle_.spindle_rpm = operation.spindle_rpm;
+}
+
+Bent BentCutter::stated(const CutZones& zones, double feed) {
+    const Bent &a = stated(zones.below, feed), b = stated(zones.above, feed);
+    return {a.wall_mm + b.wall_mm, a.stress_mpa + b.stress_mpa, a.x_n + b.x_n,        a.y_n + b.y_n,
+            a.z_n + b.z_n,         a.torque_nmm + b.torque_nmm, a.power_w + b.power_w};
+}
+
+double BentCutter::needed_wood(const Bent& b, double height, double overhang) const {
+    return least_overhang_thickness(
+               {b.x_n, b.y_n, b.z_n, overhang, height, tool_.diameter / 2, job_.material.strength_mpa})
+        .least_mm;
+}
+
+double BentCutter::thickest_chip(const CutClass& c) const {
+    const EngagementArc arc = segment_of(c, idle_, tool_, 1, kCoarse).arc;
+    const double middle = std::clamp(std::numbers::pi / 2, arc.entry_rad, arc.exit_rad);
+    return std::max(1e-3, std::sin(middle));
+}
+
+double BentCutter::share(const Bent& b, double limit) const {
+    double most = b.wall_mm / limit;
+    if (tool_.strength_mpa > 0) most = std::max(most, b.stress_mpa / tool_.strength_mpa);
+    if (job_.machine.spindle_torque_nm > 0)
+        most = std::max(most, b.torque_nmm / (1000 * job_.machine.spindle_torque_nm));
+    if (job_.machine.spindle_power_w > 0) most = std::max(most, b.power_w / job_.machine.spindle_power_w);
+    return most;
+}
+
+const Bent& BentCutter::find(Known& known, const CutClass& c, double feed, bool fine) {
+    const ClassAndFeed key{c, feed};
+    const auto [it, fresh] = known.try_emplace(key);
+    if (!fresh) return it->second;
+    // What others tell is what would be found here.
+    const SharedBents::Of of{tool_.number, idle_.spindle_rpm, fine};
+    if (shared_ != nullptr)
+        if (const std::optional<Bent> told = shared_->find(of, key)) return it->second = *told;
+    const SegmentForces f = forces_of(segment_of(c, idle_, tool_, feed, fine ? kFine : kCoarse),
+                                      fine ? kStatedAccuracy : kAccuracy);
+    it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter),
+                  cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter),
+                  f.peak_x_n,
+                  f.peak_y_n,
+                  f.peak_z_n,
+                  f.peak_torque_nmm,
+                  f.mean_power_w};
+    if (shared_ != nullptr) shared_->add(of, key, it->second);
+    return it->second;
+}
+
+}  // namespace slabwright
