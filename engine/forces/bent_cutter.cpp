@@ -41,12 +41,6 @@ BentCutter::BentCutter(const Job& job, const Operation& operation, const Tool& t
     idle_.spindle_rpm = operation.spindle_rpm;
 }
 
-Bent BentCutter::stated(const CutZones& zones, double feed) {
-    const Bent &a = stated(zones.below, feed), b = stated(zones.above, feed);
-    return {a.wall_mm + b.wall_mm, a.stress_mpa + b.stress_mpa, a.x_n + b.x_n,        a.y_n + b.y_n,
-            a.z_n + b.z_n,         a.torque_nmm + b.torque_nmm, a.power_w + b.power_w};
-}
-
 double BentCutter::needed_wood(const Bent& b, double height, double overhang) const {
     return least_overhang_thickness(
                {b.x_n, b.y_n, b.z_n, overhang, height, tool_.diameter / 2, job_.material.strength_mpa})

@@ -55,9 +55,6 @@ public:
     [[nodiscard]] const Bent& at(const CutClass& c, double feed) { return find(known_, c, feed, false); }
     /// Of a fine class, as the plan will state it.
     [[nodiscard]] const Bent& stated(const CutClass& c, double feed) { return find(stated_, c, feed, true); }
-    /// Of two cuts at once: the peaks of both added, which they need not reach at the same time.
-    [[nodiscard]] Bent stated(const CutZones& zones, double feed);
-
     /// How thick the wood must be that carries a cut at this height above the joint, so far from what carries
     /// the wood, mm.
     [[nodiscard]] double needed_wood(const Bent& b, double height, double overhang) const;

@@ -29,22 +29,6 @@ CutClass class_of(const CutStretch& s, const Tool& tool, ClassSteps steps) {
     return c;
 }
 
-CutZones zones_of(const CutStretch& s, const Tool& tool) {
-    CutZones zones;
-    const double all = s.width * (s.high - s.low);
-    zones.both = s.low < s.split && s.split < s.high && s.above_split_mm2 > 0 && s.above_split_mm2 < all;
-    if (!zones.both) return zones;
-    CutStretch part = s;
-    part.high = s.split;
-    part.width = std::min(tool.diameter, (all - s.above_split_mm2) / (s.split - s.low));
-    zones.below = class_of(part, tool, kFine);
-    part = s;
-    part.low = s.split;
-    part.width = std::min(tool.diameter, s.above_split_mm2 / (s.high - s.split));
-    zones.above = class_of(part, tool, kFine);
-    return zones;
-}
-
 CutClass shallower(CutClass c, int passes) {
     c.depth =
         static_cast<std::int16_t>(std::max(0.0, c.depth - std::floor(kCoarse.depth * std::log2(passes))));

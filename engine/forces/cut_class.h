@@ -51,15 +51,6 @@ using ByClassAndFeed = std::unordered_map<ClassAndFeed, T, HashClassAndFeed>;
 /// The class of a stretch of a tool's way: depth and width are rounded up.
 [[nodiscard]] CutClass class_of(const CutStretch& stretch, const Tool& tool, ClassSteps steps);
 
-/// A stretch that meets a floor and a wall at once, as two cuts: what lies below CutStretch::split and what
-/// lies above it. Where all lies on one side, that and a cut of nothing.
-struct CutZones {
-    CutClass below, above;
-    bool both = false;  ///< wood lies in either
-};
-/// Fine classes of the two.
-[[nodiscard]] CutZones zones_of(const CutStretch& stretch, const Tool& tool);
-
 /// One of so many equal passes of a coarse class.
 [[nodiscard]] CutClass shallower(CutClass c, int passes);
 

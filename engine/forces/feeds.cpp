@@ -31,7 +31,8 @@ constexpr double kHolds = 1 - kAccuracy;  // of a limit, when the peaks are as r
 constexpr double kLeastShare = 0.125;     // of the planned feed: slower, a cutter rubs
 constexpr double kLeastRun = 20;          // mm that a faster feed must last
 constexpr int kMostPasses = 4;            // into which a cut is divided at once
-constexpr int kMostRounds = 3;            // of dividing
+constexpr int kMostRounds = 6;            // of dividing
+constexpr double kThinnerShell = 0.35;    // of a ball's lowest pass, from round to round
 
 /// A feed that a class of cuts may have, with what it bears there once that was asked.
 struct FeedStep {
@@ -42,7 +43,6 @@ struct FeedStep {
 /// A stretch of an operation's way, as far as its feed and its forces depend on it.
 struct Seen {
     CutClass coarse, fine;
-    CutZones zones;
     std::uint32_t first = 0, last = 0;
     bool cuts = false;
     float depth = 0;   ///< over the tip, mm
@@ -135,7 +135,6 @@ void run_through(Context& context, StandingSlab& slab, const Operation& op, cons
         if (now.cuts) {
             now.coarse = class_of(s, tool, kCoarse);
             now.fine = class_of(s, tool, kFine);
-            now.zones = zones_of(s, tool);
             now.depth = static_cast<float>(s.high);
             now.height = static_cast<float>(std::max(0.0, s.at[2] - layer.z_bottom + (s.low + s.high) / 2));
             // Roughing is carried by the slab that stands, floors by what stays under them. Thinner than the
@@ -226,7 +225,7 @@ template <class LoadOf>
 std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, const Tool& tool,
                                int round, LoadOf&& load) {
     const double diameter = tool.diameter;
-    const PassShares shares = tool.kind == ToolKind::ball ? PassShares::growing : PassShares::equal;
+    const bool ball = tool.kind == ToolKind::ball;
     // Wood that no passes save, as over a wide cavity, is not worth their time: neither where it breaks nor,
     // on levels above, where it will.
     const auto column = [&](const Seen& s) {
@@ -242,17 +241,21 @@ std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& o
         const Load whole = load(s, 1);
         int passes = 0;
         if (whole.cutter > 1)
-            passes = std::clamp(static_cast<int>(std::ceil(whole.cutter)) + round, 2, kMostPasses);
+            passes =
+                std::clamp(static_cast<int>(std::ceil(whole.cutter)) + (ball ? 0 : round), 2, kMostPasses);
         if (whole.wood > 1 && !lost.contains(column(s)))
             passes = std::max(passes, passes_for_wood(s, passes, load));
         if (passes == 0) continue;
+        // A ball takes a shell as thick as its lowest pass is raised: what is too much still gets a thinner
+        // one.
+        const double depth = ball ? s.depth * std::pow(kThinnerShell, round) : s.depth;
         if (!runs.empty() && s.first <= runs.back().last + 1) {
             DeepRun& run = runs.back();
             run.last = std::max(run.last, s.last);
-            run.depth_mm = std::max(run.depth_mm, static_cast<double>(s.depth));
+            run.depth_mm = std::max(run.depth_mm, depth);
             run.passes = std::max(run.passes, passes);
         } else {
-            runs.push_back({s.first, s.last, s.depth, passes, shares});
+            runs.push_back({s.first, s.last, depth, passes, ball ? PassShares::growing : PassShares::equal});
         }
     }
     // A run goes by feed and in the plane from end to end.
@@ -295,14 +298,6 @@ public:
         return load_of(lowest, cutting_.at(lowest.coarse, s.feed));
     }
 
-    /// Whether a cut is stated as that of two zones: where its whole class would pass a limit, and these bear
-    /// less. @param feed mm/min
-    bool in_zones(const Seen& s, double feed) {
-        if (!s.zones.both || share(cutting_.at(s.coarse, feed)) <= kClassSlack) return false;
-        const double whole = share(cutting_.stated(s.fine, feed));
-        return whole > kHolds && share(cutting_.stated(s.zones, feed)) < whole;
-    }
-
     void choose(Seen& s) {
         const std::uint32_t planned = op_.moves[s.last].feed;
         if (!s.cuts) {
@@ -339,11 +334,7 @@ private:
         return Load{share(bent), wood_load(s, bent)};
     }
     /// As the plan will state it.
-    double stated_share(const Seen& s, double feed) {
-        const double whole = share(cutting_.stated(s.fine, feed));
-        return whole > kHolds && s.zones.both ? std::min(whole, share(cutting_.stated(s.zones, feed)))
-                                              : whole;
-    }
+    double stated_share(const Seen& s, double feed) { return share(cutting_.stated(s.fine, feed)); }
     // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
     [[nodiscard]] std::uint32_t most_of(std::uint32_t planned) const {
         return never_faster_ || planned <= tool_.plunge_feed ? planned : fastest_;
@@ -570,13 +561,6 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
                     ++broken;
                     if (wood > most) most = wood, breaks = &s, needed = wood * s.wood;
                 }
-            if (choice.in_zones(s, feed)) {
-                result.zoned.push_back({static_cast<std::uint32_t>(result.starts.size() - 1),
-                                        segment_of(s.zones.below, choice.cutting().idle(), tool, feed, kFine),
-                                        segment_of(s.zones.above, choice.cutting().idle(), tool, feed, kFine),
-                                        s.at, s.last});
-                continue;
-            }
             if (!listed.insert({s.fine, static_cast<double>(feed)}).second) continue;
             result.cuts.push_back(segment_of(s.fine, choice.cutting().idle(), tool, feed, kFine));
             result.places.push_back(s.at);

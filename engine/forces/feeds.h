@@ -26,22 +26,12 @@ namespace slabwright {
 /// Feeds come in this many steps of the fastest that tool and machine allow.
 inline constexpr int kFeedSteps = 16;
 
-/// A cut that meets a floor and a wall at once, as what it does to either: their peaks are added, which they
-/// need not reach at the same time.
-struct ZonedCut {
-    std::uint32_t operation = 0;  ///< of its layer, from 0
-    CutSegment below, above;
-    std::array<float, 3> at{};  ///< mm, where it ends
-    std::uint32_t move = 0;
-};
-
 /// The different cuts of a layer's operations, in the order in which they are met first.
 struct LayerCuts {
     std::vector<CutSegment> cuts;
     std::vector<std::array<float, 3>> places;  ///< mm, where each is met first
     std::vector<std::uint32_t> moves;          ///< and by which move
     std::vector<std::size_t> starts;           ///< of each operation's, and their end
-    std::vector<ZonedCut> zoned;               ///< those that as one cut would pass a limit
 };
 
 /// What the cuts of a plan's tools bear, for the layers of one plan to tell each other: most of a layer's

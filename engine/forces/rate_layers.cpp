@@ -43,16 +43,6 @@ struct Peaks {
     }
 };
 
-SegmentForces both(const SegmentForces& a, const SegmentForces& b) {
-    SegmentForces sum;
-    sum.peak_resultant_n = a.peak_resultant_n + b.peak_resultant_n;
-    sum.peak_in_plane_n = a.peak_in_plane_n + b.peak_in_plane_n;
-    sum.peak_y_n = a.peak_y_n + b.peak_y_n;
-    sum.peak_torque_nmm = a.peak_torque_nmm + b.peak_torque_nmm;
-    sum.mean_power_w = a.mean_power_w + b.mean_power_w;
-    return sum;
-}
-
 /// What passes a limit by most, in words: its operation, how much of what, and the remedy.
 struct Passed {
     double share = 1 + kFineRounding;  // of the limit; a fine class may be heavier than its cut by so much
@@ -144,18 +134,13 @@ std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan,
     for (std::size_t l = 0; l < layers.size(); ++l) {
         const std::size_t base = bases[l];
         PassedLimits passed;
-        auto zoned = layers[l].zoned.begin();
-        for (std::uint32_t o = 0; o < plan.layers[l].operations.size(); ++o) {
-            Operation& op = plan.layers[l].operations[o];
+        for (Operation& op : plan.layers[l].operations) {
             Peaks peaks;
             for (const std::size_t i : hardest.groups[group].all())
                 if (i != kNoCut)
                     peaks.raise(stated_forces(cuts[i]), layers[l].places[i - base],
                                 layers[l].moves[i - base]);
             ++group;
-            for (; zoned != layers[l].zoned.end() && zoned->operation == o; ++zoned)
-                peaks.raise(both(stated_forces(zoned->below), stated_forces(zoned->above)), zoned->at,
-                            zoned->move);
             if (!(peaks.resultant.value > 0)) continue;
             const Tool& tool = *std::find_if(job.tools.begin(), job.tools.end(),
                                              [&](const Tool& t) { return t.number == op.tool; });

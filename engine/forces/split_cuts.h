@@ -16,7 +16,7 @@ enum class PassShares : std::uint8_t { equal, growing };
 /// A run of feed moves that is to be cut in several passes.
 struct DeepRun {
     std::uint32_t first = 0, last = 0;  ///< moves, both included; all by feed
-    double depth_mm = 0;                ///< engaged height over the tip where it is deepest
+    double depth_mm = 0;                ///< over the tip, that the passes divide
     int passes = 2;                     ///< at least 2
     PassShares shares = PassShares::equal;
     friend bool operator==(const DeepRun&, const DeepRun&) = default;

@@ -17,7 +17,7 @@ constexpr double kLeastTaken = 1e-4;  // mm: less is rounding, of paths and of h
 
 // What a stretch has met so far.
 struct Met {
-    double volume = 0, low = kUnbounded, high = -kUnbounded, side = 0, above = 0;  // above: of the volume
+    double volume = 0, low = kUnbounded, high = -kUnbounded, side = 0;
 };
 
 // Lowers cells, and tells the part of the way on which the cutter's edge comes to each of them, or the first
@@ -27,7 +27,6 @@ struct Meeting {
     float* height;
     PartedWay way;
     std::array<double, 2> from;
-    double split;      // CutStretch::split
     double tip, rise;  // over the slab's bottom, mm: of the way's begin, and from part to part
     std::vector<Met>& parts;
 
@@ -72,7 +71,6 @@ struct Meeting {
             m.low = std::min(m.low, left - low);
             m.high = std::max(m.high, stood - low);
             m.side += (stood - left) * across[k];
-            m.above += std::max(0.0, stood - std::max(left, low + split)) * area;
         }
         parts[static_cast<std::size_t>(p)] = m;
     }
@@ -165,7 +163,6 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
     std::optional<Surrounded> around;
     if (!all) around.emplace(grid_, operation, parts, end.radius);
     bool told = all;
-    const double split = end.radius / 3;
     const double enough = std::max(end.radius / 2, 3 * grid_.cell);
     CutStretch now;
     Met met;
@@ -177,9 +174,6 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
                 now.width = std::min(tool.diameter, met.volume / (std::max(now.length, 2 * grid_.cell) *
                                                                   (now.high - now.low)));
                 now.left = met.side > 0;
-                // Of a cross-section that is as wide as the cutter at most, the same share.
-                now.split = split;
-                now.above_split_mm2 = met.above / met.volume * now.width * (now.high - now.low);
             }
             stretch(now);
         }
@@ -196,8 +190,8 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
                      slope = length > 0 ? (to[2] - from[2]) / length : 0;
         const double part = length / static_cast<double>(count);
         by_part.assign(count, {});
-        Meeting meeting{grid_, height_.data(),    {},           {from[0], from[1]},
-                        split, from[2] - bottom_, slope * part, by_part};
+        Meeting meeting{grid_,        height_.data(), {}, {from[0], from[1]}, from[2] - bottom_,
+                        slope * part, by_part};
         if (length > 0)
             meeting.way = {(to[0] - from[0]) / length, (to[1] - from[1]) / length, end.radius,
                            static_cast<double>(count) / length, static_cast<int>(count)};
@@ -208,7 +202,7 @@ void StandingSlab::run(const Operation& operation, const Tool& tool, std::span<c
         for (std::size_t p = 0; p < count; ++p) {
             const Met& m = by_part[p];
             met = {met.volume + m.volume, std::min(met.low, m.low), std::max(met.high, m.high),
-                   met.side + m.side, met.above + m.above};
+                   met.side + m.side};
             if (now.length == 0) now.first = move;
             now.last = move;
             now.length += part;

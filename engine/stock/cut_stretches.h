@@ -20,10 +20,7 @@ struct CutStretch {
     std::uint32_t first = 0, last = 0;  ///< the moves that it is made of; the first of a program is none
     double length = 0;                  ///< in the plane
     double low = 0, high = 0;           ///< heights over the tip between which something was taken away
-    double width = 0;  ///< the cross-section that was taken away, over high − low; at most the diameter
-    double split =
-        0;  ///< height over the tip: a third of the cutter's radius, over most that lies on a floor
-    double above_split_mm2 = 0;  ///< of the cross-section; the rest of width·(high − low) lies below
+    double width = 0;   ///< the cross-section that was taken away, over high − low; at most the diameter
     bool left = false;  ///< most of it lay left of the way: a spindle that turns clockwise mills it up
     std::array<double, 3> at{};  ///< where it ends
     [[nodiscard]] bool cuts() const { return width > 0 && high > low; }
