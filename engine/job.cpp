@@ -92,6 +92,29 @@ void validate_tool(const Tool& tool, std::size_t position) {
     require(key("ramp_deg"), tool.ramp_deg, -90, 90);
 }
 
+void validate_machine(const Machine& c) {
+    require("machine.travel_x", c.travel_x, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.travel_y", c.travel_y, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.travel_z", c.travel_z, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.build_height", c.build_height, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.build_mass_kg", c.build_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
+    require("machine.table_speed", c.table_speed, 1, 1e6, Ends::closed, kNoRouter);
+    require("machine.feed_height", c.feed_height, 0, 100000);
+    require("machine.feed_mass_kg", c.feed_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
+    require("machine.max_feed", c.max_feed, 1, 1e6);
+    require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
+    require("machine.acceleration", c.acceleration, 1, 1e6, Ends::closed, kNoRouter);
+    require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
+    require("machine.spindle_power_w", c.spindle_power_w, 0, 1e6);
+    require("machine.spindle_torque_nm", c.spindle_torque_nm, 0, 1e4);
+    require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
+    require("machine.tool_change_s", c.tool_change_s, 0, 36000);
+    require("machine.clearance", c.clearance, 1, 1000, Ends::closed,
+            "rapids pass the stock at that height, on a machine that rounds its corners");
+    require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
+    require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
+}
+
 void validate_prepare(const PrepareJob& p) {
     const auto numbers = [](const char* key, const std::vector<double>& values, std::size_t count,
                             double least, double most) {
@@ -313,28 +336,7 @@ void validate(const Job& job) {
                            s.facing_allowance, s.thicknesses.front()),
                "face off less, or take that slab out of the list");
 
-    const Machine& c = job.machine;
-    require("machine.travel_x", c.travel_x, 1, 100000, Ends::closed, kNoRouter);
-    require("machine.travel_y", c.travel_y, 1, 100000, Ends::closed, kNoRouter);
-    require("machine.travel_z", c.travel_z, 1, 100000, Ends::closed, kNoRouter);
-    require("machine.build_height", c.build_height, 1, 100000, Ends::closed, kNoRouter);
-    require("machine.build_mass_kg", c.build_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
-    require("machine.table_speed", c.table_speed, 1, 1e6, Ends::closed, kNoRouter);
-    require("machine.feed_height", c.feed_height, 0, 100000);
-    require("machine.feed_mass_kg", c.feed_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
-    require("machine.max_feed", c.max_feed, 1, 1e6);
-    require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
-    require("machine.acceleration", c.acceleration, 1, 1e6, Ends::closed, kNoRouter);
-    require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
-    require("machine.spindle_power_w", c.spindle_power_w, 0, 1e6);
-    require("machine.spindle_torque_nm", c.spindle_torque_nm, 0, 1e4);
-    require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
-    require("machine.tool_change_s", c.tool_change_s, 0, 36000);
-    require("machine.clearance", c.clearance, 1, 1000, Ends::closed,
-            "rapids pass the stock at that height, on a machine that rounds its corners");
-    require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
-    require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
-
+    validate_machine(job.machine);
     const Bonding& b = job.bonding;
     require("bonding.press_force", b.press_force, 0, 1e7);
     require("bonding.press_time_s", b.press_time_s, 0, 1e6);

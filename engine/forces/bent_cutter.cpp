@@ -23,6 +23,23 @@ SegmentForces forces_of(const CutSegment& cut, double accuracy) {
 
 SegmentForces stated_forces(const CutSegment& cut) { return forces_of(cut, kStatedAccuracy); }
 
+Bent bent_by(const SegmentForces& f, double across_n, const Tool& tool) {
+    return {cutter_deflection(across_n, tool.stickout, tool.diameter),
+            cutter_stress(f.peak_in_plane_n, tool.stickout, tool.diameter),
+            f.peak_x_n,
+            f.peak_y_n,
+            f.peak_z_n,
+            f.peak_torque_nmm,
+            f.mean_power_w};
+}
+
+double share_of_limits(const Bent& bent, double limit, const Tool& tool, const Job& job) {
+    const auto share = [](double is, double most) { return most > 0 ? is / most : 0; };
+    return std::max({bent.wall_mm / limit, share(bent.stress_mpa, tool.strength_mpa),
+                     share(bent.torque_nmm, 1000 * job.machine.spindle_torque_nm),
+                     share(bent.power_w, job.machine.spindle_power_w)});
+}
+
 std::optional<Bent> SharedBents::find(const Of& of, const ClassAndFeed& key) {
     const std::shared_lock lock(mutex_);
     const auto cuts = known_.find(of);
@@ -53,15 +70,6 @@ double BentCutter::thickest_chip(const CutClass& c) const {
     return std::max(1e-3, std::sin(middle));
 }
 
-double BentCutter::share(const Bent& b, double limit) const {
-    double most = b.wall_mm / limit;
-    if (tool_.strength_mpa > 0) most = std::max(most, b.stress_mpa / tool_.strength_mpa);
-    if (job_.machine.spindle_torque_nm > 0)
-        most = std::max(most, b.torque_nmm / (1000 * job_.machine.spindle_torque_nm));
-    if (job_.machine.spindle_power_w > 0) most = std::max(most, b.power_w / job_.machine.spindle_power_w);
-    return most;
-}
-
 const Bent& BentCutter::find(Known& known, const CutClass& c, double feed, bool fine) {
     const ClassAndFeed key{c, feed};
     const auto [it, fresh] = known.try_emplace(key);
@@ -72,13 +80,7 @@ const Bent& BentCutter::find(Known& known, const CutClass& c, double feed, bool 
         if (const std::optional<Bent> told = shared_->find(of, key)) return it->second = *told;
     const SegmentForces f = forces_of(segment_of(c, idle_, tool_, feed, fine ? kFine : kCoarse),
                                       fine ? kStatedAccuracy : kAccuracy);
-    it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter),
-                  cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter),
-                  f.peak_x_n,
-                  f.peak_y_n,
-                  f.peak_z_n,
-                  f.peak_torque_nmm,
-                  f.mean_power_w};
+    it->second = bent_by(f, f.peak_y_n, tool_);
     if (shared_ != nullptr) shared_->add(of, key, it->second);
     return it->second;
 }

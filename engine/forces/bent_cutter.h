@@ -26,6 +26,13 @@ struct Bent {
     double power_w = 0;                ///< mean over a turn
 };
 
+/// What these forces do. @param across_n the force that bends the tip normal to the way
+[[nodiscard]] Bent bent_by(const SegmentForces& forces, double across_n, const Tool& tool);
+
+/// What a cut bears as a share of its limits, the largest: the wall's error against `limit` (mm), the
+/// cutter's stress where its strength is stated, the spindle's torque and power where the machine's are.
+[[nodiscard]] double share_of_limits(const Bent& bent, double limit, const Tool& tool, const Job& job);
+
 /// What the cuts of several layers bear, by tool and speed. Several threads may use it at once.
 class SharedBents {
 public:
@@ -62,9 +69,9 @@ public:
     /// The thickest chip of a coarse class, as a share of the feed per tooth.
     [[nodiscard]] double thickest_chip(const CutClass& c) const;
 
-    /// What the cut bears as a share of its limits, the largest: the wall's error against `limit` (mm), the
-    /// cutter's stress where its strength is stated, the spindle's torque and power where the machine's are.
-    [[nodiscard]] double share(const Bent& b, double limit) const;
+    [[nodiscard]] double share(const Bent& bent, double limit) const {
+        return share_of_limits(bent, limit, tool_, job_);
+    }
 
 private:
     using Known = ByClassAndFeed<Bent>;

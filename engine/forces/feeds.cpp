@@ -28,7 +28,6 @@ constexpr double kAccuracy = 0.01;  // of the peaks that feeds are chosen by (Be
 constexpr double kClassSlack =
     0.9;  // a coarse class that bears less than this share of a limit stands for all its cuts
 constexpr double kHolds = 1 - kAccuracy;  // of a limit, when the peaks are as rough as that
-constexpr double kLeastShare = 0.125;     // of the planned feed: slower, a cutter rubs
 constexpr double kLeastRun = 20;          // mm that a faster feed must last
 constexpr int kMostPasses = 4;            // into which a cut is divided at once
 constexpr int kMostRounds = 6;            // of dividing
@@ -242,7 +241,7 @@ std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& o
         int passes = 0;
         if (whole.cutter > 1)
             passes =
-                std::clamp(static_cast<int>(std::ceil(whole.cutter)) + (ball ? 0 : round), 2, kMostPasses);
+                std::clamp(static_cast<int>(std::ceil(whole.cutter)) + round, 2, kMostPasses);
         if (whole.wood > 1 && !lost.contains(column(s)))
             passes = std::max(passes, passes_for_wood(s, passes, load));
         if (passes == 0) continue;
@@ -353,7 +352,7 @@ private:
             for (int k = 1; k <= kFeedSteps; ++k)
                 steps.push_back({fastest_ * static_cast<std::uint32_t>(k) / kFeedSteps, nullptr});
             std::erase_if(steps, [&](const FeedStep& f) {
-                return f.feed > chip || f.feed < 1 || f.feed < kLeastShare * planned;
+                return f.feed > chip || f.feed < 1 || f.feed < kLeastFeedShare * planned;
             });
             if (steps.empty()) steps.push_back({planned, nullptr});
             std::sort(steps.begin(), steps.end(),
