@@ -113,5 +113,50 @@ TEST(StandingWalls, ThinPartsAreWallsAndPinsButNoCorners) {
     }
 }
 
+// A block with a free wall beside it, through two layers: told where it is thin, with the whole height, and
+// not where it is thick, low, or only a ridge.
+TEST(StandingWalls, ToldWhereTheyBreakThroughTheLayersBelow) {
+    const auto told = [](double thick, double force, bool ridge) {
+        Plan plan;
+        const Loops wall = rectangle(40, thick, 0, 0, 60), block = rectangle(60, 60, 0),
+                    all = unite(block, wall);
+        std::vector<std::vector<JointWood>> wood(2);
+        for (int l = 0; l < 2; ++l) {
+            Layer& layer = plan.layers.emplace_back();
+            layer.index = l + 1;
+            layer.z_bottom = 15.0 * l;
+            layer.z_top = 15.0 * (l + 1);
+            Operation op;
+            op.kind = OperationKind::finish;
+            op.tool = 3;
+            op.stepdown = 3;
+            op.spindle_rpm = 18000;
+            op.peak_force_n = force;
+            op.moves = {{0, 0, 0, 0}, {to_units(10), 0, 0, 5000}};
+            layer.operations = {op};
+            JointWood& joint = wood[static_cast<std::size_t>(l)].emplace_back();
+            joint.z = layer.z_bottom;
+            joint.above = joint.below = joint.both = all;
+            for (Loops& higher : joint.higher) higher = ridge && l == 1 ? block : all;
+        }
+        Context context;
+        return weak_walls(context, plan, wood);
+    };
+    const std::vector<Diagnostic> thin = told(1, 10, false);
+    ASSERT_EQ(thin.size(), 2U);
+    EXPECT_EQ(thin[0].code, "wall.weak");
+    EXPECT_NE(thin[0].message.find("layer 1: a wall or pin 1.0 mm thick stands 15.0 mm high"),
+              std::string::npos)
+        << thin[0].message;
+    // The second layer's top is as high as three quarters of it are known to stand over the first one's foot.
+    EXPECT_NE(thin[1].message.find("stands 26.2 mm high"), std::string::npos) << thin[1].message;
+    ASSERT_TRUE(thin[1].where);
+    EXPECT_NEAR((*thin[1].where)[1], 60, 0.1);
+    EXPECT_NEAR((*thin[1].where)[2], 0, 1e-9);
+    EXPECT_TRUE(told(6, 10, false).empty());
+    EXPECT_TRUE(told(1, 0.5, false).empty());
+    EXPECT_EQ(told(1, 10, true).size(), 1U) << "a ridge is thin, but not tall";
+}
+
 }  // namespace
 }  // namespace slabwright
