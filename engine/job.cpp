@@ -103,6 +103,38 @@ void validate_bonding(const Bonding& b) {
     require("bonding.glue_s_per_m2", b.glue_s_per_m2, 0, 1e6);
 }
 
+void validate_motion(const Machine& c) {
+    require("machine.max_feed", c.max_feed, 1, 1e6);
+    require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
+    require("machine.acceleration", c.acceleration, 1, 1e6, Ends::closed, kNoRouter);
+    for (const auto& [key, value] : {std::pair{"machine.rapid_y", c.rapid_y},
+                                     {"machine.rapid_z", c.rapid_z},
+                                     {"machine.acceleration_y", c.acceleration_y},
+                                     {"machine.acceleration_z", c.acceleration_z}})
+        if (value != 0) require(key, value, 1, 1e6, Ends::closed, kNoRouter);
+}
+
+void validate_machine(const Machine& c) {
+    require("machine.travel_x", c.travel_x, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.travel_y", c.travel_y, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.travel_z", c.travel_z, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.build_height", c.build_height, 1, 100000, Ends::closed, kNoRouter);
+    require("machine.build_mass_kg", c.build_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
+    require("machine.table_speed", c.table_speed, 1, 1e6, Ends::closed, kNoRouter);
+    require("machine.feed_height", c.feed_height, 0, 100000);
+    require("machine.feed_mass_kg", c.feed_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
+    validate_motion(c);
+    require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
+    require("machine.spindle_power_w", c.spindle_power_w, 0, 1e6);
+    require("machine.spindle_torque_nm", c.spindle_torque_nm, 0, 1e4);
+    require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
+    require("machine.tool_change_s", c.tool_change_s, 0, 36000);
+    require("machine.clearance", c.clearance, 1, 1000, Ends::closed,
+            "rapids pass the stock at that height, on a machine that rounds its corners");
+    require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
+    require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
+}
+
 void validate_prepare(const PrepareJob& p) {
     const auto numbers = [](const char* key, const std::vector<double>& values, std::size_t count,
                             double least, double most) {
@@ -130,20 +162,6 @@ void validate_prepare(const PrepareJob& p) {
                 refuse("prepare.skin_box", "prepare.skin_box has its corners the wrong way round",
                        "give the least x, y, z first");
     }
-}
-
-// A face mill works on top of the layer and a drill's depth is the hole's own: neither has to reach the
-// bottom.
-
-void validate_motion(const Machine& c) {
-    require("machine.max_feed", c.max_feed, 1, 1e6);
-    require("machine.rapid_feed", c.rapid_feed, 1, 1e6);
-    require("machine.acceleration", c.acceleration, 1, 1e6, Ends::closed, kNoRouter);
-    for (const auto& [key, value] : {std::pair{"machine.rapid_y", c.rapid_y},
-                                     {"machine.rapid_z", c.rapid_z},
-                                     {"machine.acceleration_y", c.acceleration_y},
-                                     {"machine.acceleration_z", c.acceleration_z}})
-        if (value != 0) require(key, value, 1, 1e6, Ends::closed, kNoRouter);
 }
 
 }  // namespace
@@ -335,24 +353,7 @@ void validate(const Job& job) {
                            s.facing_allowance, s.thicknesses.front()),
                "face off less, or take that slab out of the list");
 
-    const Machine& c = job.machine;
-    require("machine.travel_x", c.travel_x, 1, 100000, Ends::closed, kNoRouter);
-    require("machine.travel_y", c.travel_y, 1, 100000, Ends::closed, kNoRouter);
-    require("machine.travel_z", c.travel_z, 1, 100000, Ends::closed, kNoRouter);
-    require("machine.build_height", c.build_height, 1, 100000, Ends::closed, kNoRouter);
-    require("machine.build_mass_kg", c.build_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
-    require("machine.table_speed", c.table_speed, 1, 1e6, Ends::closed, kNoRouter);
-    require("machine.feed_height", c.feed_height, 0, 100000);
-    require("machine.feed_mass_kg", c.feed_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
-    validate_motion(c);
-    require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
-    require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
-    require("machine.tool_change_s", c.tool_change_s, 0, 36000);
-    require("machine.clearance", c.clearance, 1, 1000, Ends::closed,
-            "rapids pass the stock at that height, on a machine that rounds its corners");
-    require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
-    require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
-
+    validate_machine(job.machine);
     validate_bonding(job.bonding);
 
     const Tolerances& t = job.tolerances;

@@ -114,6 +114,8 @@ struct Machine {
     double acceleration = 1000;                     ///< mm/s², of x
     double acceleration_y = 0, acceleration_z = 0;  ///< mm/s²; 0: as x
     double max_rpm = 18000;
+    double spindle_power_w = 0;    ///< that it has for cutting, at any speed; 0: no limit
+    double spindle_torque_nm = 0;  ///< likewise
     double spindle_dwell_s = 3;
     double tool_change_s = 15;
     double clearance = 10;  ///< mm of air between a rapid and the highest stock

@@ -1,126 +1,37 @@
 #include "engine/forces/feeds.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <functional>
-#include <map>
-#include <mutex>
-#include <numbers>
+#include <iterator>
+#include <memory>
 #include <optional>
 #include <set>
-#include <shared_mutex>
-#include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "engine/forces/bent_cutter.h"
+#include "engine/forces/cut_class.h"
 #include "engine/forces/cuts.h"
 #include "engine/forces/split_cuts.h"
 #include "engine/tools/tools.h"
 #include "kernels/errors.h"
-#include "kernels/forces/deflection.h"
-#include "kernels/forces/hardest.h"
-#include "kernels/mesh/raw_array.h"
-#include "kernels/parallel/parallel.h"
 #include "kernels/parallel/scratch_pool.h"
 
 namespace slabwright {
 
 namespace {
 
-constexpr double kLeastDepth = 0.01;  // mm: shallower cuts are taken as this deep
-constexpr double kAccuracy =
-    0.01;  // of peaks that feeds are chosen by, as a share: far finer than the classes are
+constexpr double kAccuracy = 0.01;  // of the peaks that feeds are chosen by (BentCutter::at)
 constexpr double kClassSlack =
     0.9;  // a coarse class that bears less than this share of a limit stands for all its cuts
 constexpr double kHolds = 1 - kAccuracy;  // of a limit, when the peaks are as rough as that
-constexpr double kLeastShare = 0.125;     // of the planned feed: slower, a cutter rubs
 constexpr double kLeastRun = 20;          // mm that a faster feed must last
 constexpr int kMostPasses = 4;            // into which a cut is divided at once
-constexpr int kMostRounds = 3;            // of dividing
-constexpr double kStatedAccuracy = 1e-5;  // of the peaks that a plan states
-
-/// Classes to a doubling of the depth, of the diameter, and of the radius.
-struct ClassSteps {
-    int depth, width, low;
-};
-constexpr ClassSteps kCoarse{8, 24, 16};   // by which feeds are chosen
-constexpr ClassSteps kFine{64, 240, 128};  // by which forces are stated: within 1 % of the cut's own
-
-/// A cut's class: what its forces depend on but the feed.
-struct CutClass {
-    std::int16_t low = 0, depth = 0, width = 0;
-    bool left = false;
-    friend bool operator==(const CutClass&, const CutClass&) = default;
-};
-
-/// What is known of classes at a feed, mm/min.
-struct ClassAndFeed {
-    CutClass of;
-    double feed = 0;
-    friend bool operator==(const ClassAndFeed&, const ClassAndFeed&) = default;
-};
-struct HashClassAndFeed {
-    std::size_t operator()(const ClassAndFeed& key) const {
-        const auto word = [](std::int16_t v) { return std::uint64_t{static_cast<std::uint16_t>(v)}; };
-        std::uint64_t h = word(key.of.low) | word(key.of.depth) << 16U | word(key.of.width) << 32U |
-                          std::uint64_t{key.of.left} << 48U;
-        h = (h ^ h >> 29U) * 0x9E3779B97F4A7C15U + std::bit_cast<std::uint64_t>(key.feed);
-        return (h ^ h >> 32U) * 0xD6E8FEB86659FD93U >> 16U;
-    }
-};
-template <class T>
-using ByClassAndFeed = std::unordered_map<ClassAndFeed, T, HashClassAndFeed>;
-
-double depth_of(int depth, ClassSteps steps) {
-    return kLeastDepth * std::exp2(static_cast<double>(depth) / steps.depth);
-}
-
-CutClass class_of(const CutStretch& s, const Tool& tool, ClassSteps steps) {
-    CutClass c;
-    const double r = tool.diameter / 2;
-    if (tool.kind == ToolKind::ball)
-        c.low = static_cast<std::int16_t>(std::floor(std::min(s.low, r) / r * steps.low));
-    const double low = c.low * r / steps.low,
-                 depth = std::clamp(s.high - low, kLeastDepth, 30 * tool.diameter);
-    c.depth = static_cast<std::int16_t>(std::ceil(std::log2(depth / kLeastDepth) * steps.depth - 1e-9));
-    // The class is deeper than the cut; its width is that of the same cross-section.
-    const double width = s.width * (s.high - s.low) / (s.high - low);
-    c.width = static_cast<std::int16_t>(std::clamp(std::ceil(width / tool.diameter * steps.width - 1e-9), 1.0,
-                                                   static_cast<double>(steps.width)));
-    c.left = s.left;
-    return c;
-}
-
-/// One of so many passes of it.
-CutClass shallower(CutClass c, int passes) {
-    c.depth =
-        static_cast<std::int16_t>(std::max(0.0, c.depth - std::floor(kCoarse.depth * std::log2(passes))));
-    return c;
-}
-
-CutSegment segment_of(const CutClass& c, const CutSegment& idle, const Tool& tool, double feed,
-                      ClassSteps steps) {
-    CutSegment cut = idle;
-    const double r = tool.diameter / 2;
-    cut.low_mm = c.low * r / steps.low;
-    cut.high_mm = cut.low_mm + depth_of(c.depth, steps);
-    const bool cap = cut.profile == CutterProfile::ball && cut.high_mm < r;
-    const double circle = cap ? std::sqrt(cut.high_mm * (2 * r - cut.high_mm)) : r;
-    cut.arc = engagement_arc(circle, c.width * tool.diameter / steps.width,
-                             c.left ? MillingSense::up : MillingSense::down);
-    cut.chip_load_mm = feed / (cut.spindle_rpm * tool.flutes);
-    return cut;
-}
-
-/// What a cut does to the tool, and to the wood that carries it.
-struct Bent {
-    double wall_mm = 0;
-    double stress_mpa = 0;             ///< of the cutter, in bending at the holder
-    double x_n = 0, y_n = 0, z_n = 0;  ///< peaks
-};
+constexpr int kMostRounds = 6;            // of dividing
+constexpr double kThinnerShell = 0.35;    // of a ball's lowest pass, from round to round
 
 /// A feed that a class of cuts may have, with what it bears there once that was asked.
 struct FeedStep {
@@ -155,91 +66,15 @@ struct SeenMemory {
 }  // namespace
 
 struct KnownCuts::Impl {
-    /// A tool at a speed, whose cuts are classed finely or coarsely.
-    struct Of {
-        int tool = 0;
-        double spindle_rpm = 0;
-        bool fine = false;
-        auto operator<=>(const Of&) const = default;
-    };
-    std::shared_mutex mutex;
-    std::map<Of, ByClassAndFeed<Bent>> known;
+    SharedBents bents;
     ScratchPool<SeenMemory> memory;  // which layers leave to each other: to fill it is little against what
                                      // new memory of that size costs
-
-    std::optional<Bent> find(const Of& of, const ClassAndFeed& key) {
-        const std::shared_lock lock(mutex);
-        const auto cuts = known.find(of);
-        if (cuts == known.end()) return std::nullopt;
-        const auto cut = cuts->second.find(key);
-        return cut == cuts->second.end() ? std::nullopt : std::optional(cut->second);
-    }
-    void add(const Of& of, const ClassAndFeed& key, const Bent& bent) {
-        const std::lock_guard lock(mutex);
-        known[of].try_emplace(key, bent);
-    }
 };
 
 KnownCuts::KnownCuts() : impl_(std::make_unique<Impl>()) {}
 KnownCuts::~KnownCuts() = default;
 
 namespace {
-
-class BentCutter {
-public:
-    BentCutter(const Job& job, const Operation& operation, const Tool& tool, KnownCuts* shared)
-        : job_(job), tool_(tool), shared_(shared), idle_(idle_cut(job, tool)) {
-        idle_.spindle_rpm = operation.spindle_rpm;
-    }
-    [[nodiscard]] const CutSegment& idle() const { return idle_; }
-
-    const Bent& at(const CutClass& c, double feed) { return find(known_, c, feed, false); }
-    /// Of a fine class, as the plan will state it.
-    const Bent& stated(const CutClass& c, double feed) { return find(stated_, c, feed, true); }
-
-    /// How thick the wood must be that carries a cut at this height above the joint, so far from what carries
-    /// the wood, mm.
-    [[nodiscard]] double needed_wood(const Bent& b, double height, double overhang) const {
-        return least_overhang_thickness(
-                   {b.x_n, b.y_n, b.z_n, overhang, height, tool_.diameter / 2, job_.material.strength_mpa})
-            .least_mm;
-    }
-
-    /// The thickest chip, as a share of the feed per tooth.
-    [[nodiscard]] double thickest_chip(const CutClass& c) const {
-        const EngagementArc arc = segment_of(c, idle_, tool_, 1, kCoarse).arc;
-        const double middle = std::clamp(std::numbers::pi / 2, arc.entry_rad, arc.exit_rad);
-        return std::max(1e-3, std::sin(middle));
-    }
-
-private:
-    using Known = ByClassAndFeed<Bent>;
-
-    const Bent& find(Known& known, const CutClass& c, double feed, bool fine) {
-        const ClassAndFeed key{c, feed};
-        const auto [it, fresh] = known.try_emplace(key);
-        if (!fresh) return it->second;
-        // What others tell is what would be found here.
-        const KnownCuts::Impl::Of of{tool_.number, idle_.spindle_rpm, fine};
-        if (shared_ != nullptr)
-            if (const std::optional<Bent> told = shared_->impl().find(of, key)) return it->second = *told;
-        const CutSegment cut = segment_of(c, idle_, tool_, feed, fine ? kFine : kCoarse);
-        const double accuracy = fine ? kStatedAccuracy : kAccuracy;
-        const SegmentForces f = cut.profile == CutterProfile::flat ? closed_form_forces(cut, accuracy)
-                                                                   : reference_forces(cut, accuracy);
-        it->second = {cutter_deflection(f.peak_y_n, tool_.stickout, tool_.diameter),
-                      cutter_stress(f.peak_in_plane_n, tool_.stickout, tool_.diameter), f.peak_x_n,
-                      f.peak_y_n, f.peak_z_n};
-        if (shared_ != nullptr) shared_->impl().add(of, key, it->second);
-        return it->second;
-    }
-
-    const Job& job_;
-    const Tool& tool_;
-    KnownCuts* shared_;
-    CutSegment idle_;
-    Known known_, stated_;
-};
 
 bool roughs(OperationKind kind) { return kind == OperationKind::rough || kind == OperationKind::face; }
 
@@ -386,8 +221,10 @@ int passes_for_wood(const Seen& s, int least, LoadOf&& load) {
 /// Runs of stretches that no feed makes light enough and that several passes would.
 /// @param load what a stretch bears in so many passes, in the lowest of them, which the least wood carries
 template <class LoadOf>
-std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, double diameter, int round,
-                               LoadOf&& load) {
+std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& op, const Tool& tool,
+                               int round, LoadOf&& load) {
+    const double diameter = tool.diameter;
+    const bool ball = tool.kind == ToolKind::ball;
     // Wood that no passes save, as over a wide cavity, is not worth their time: neither where it breaks nor,
     // on levels above, where it will.
     const auto column = [&](const Seen& s) {
@@ -403,17 +240,21 @@ std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& o
         const Load whole = load(s, 1);
         int passes = 0;
         if (whole.cutter > 1)
-            passes = std::clamp(static_cast<int>(std::ceil(whole.cutter)) + round, 2, kMostPasses);
+            passes =
+                std::clamp(static_cast<int>(std::ceil(whole.cutter)) + round, 2, kMostPasses);
         if (whole.wood > 1 && !lost.contains(column(s)))
             passes = std::max(passes, passes_for_wood(s, passes, load));
         if (passes == 0) continue;
+        // A ball takes a shell as thick as its lowest pass is raised: what is too much still gets a thinner
+        // one.
+        const double depth = ball ? s.depth * std::pow(kThinnerShell, round) : s.depth;
         if (!runs.empty() && s.first <= runs.back().last + 1) {
             DeepRun& run = runs.back();
             run.last = std::max(run.last, s.last);
-            run.depth_mm = std::max(run.depth_mm, static_cast<double>(s.depth));
+            run.depth_mm = std::max(run.depth_mm, depth);
             run.passes = std::max(run.passes, passes);
         } else {
-            runs.push_back({s.first, s.last, s.depth, passes});
+            runs.push_back({s.first, s.last, depth, passes, ball ? PassShares::growing : PassShares::equal});
         }
     }
     // A run goes by feed and in the plane from end to end.
@@ -424,6 +265,144 @@ std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& o
     });
     return runs;
 }
+
+/// What the cuts of one operation bear, and the feeds that they may have.
+class FeedChoice {
+public:
+    FeedChoice(Context& context, const Job& job, const Operation& op, const Tool& tool, SharedBents* shared,
+               bool never_faster)
+        : context_(context),
+          job_(job),
+          op_(op),
+          tool_(tool),
+          cutting_(job, op, tool, shared),
+          limit_(bending_limit(op, job)),
+          never_faster_(never_faster),
+          fastest_(static_cast<std::uint32_t>(std::floor(std::min(tool.max_feed, job.machine.max_feed)))) {}
+
+    [[nodiscard]] BentCutter& cutting() { return cutting_; }
+
+    [[nodiscard]] double wood_load(const Seen& s, const Bent& bent) const {
+        return s.overhang > 0 ? cutting_.needed_wood(bent, s.height, s.overhang) / s.wood : 0;
+    }
+
+    /// Of a cut whose feed is chosen, in the lowest of so many passes.
+    Load load(const Seen& s, int passes) {
+        if (passes == 1) return Load{s.stated > 0 ? s.stated : share(*s.bent), s.wood_load};
+        Seen lowest = s;
+        const float off = s.depth * static_cast<float>(passes - 1) / static_cast<float>(passes);
+        lowest.coarse = shallower(s.coarse, passes);
+        lowest.wood -= off;
+        lowest.height = std::max(0.F, lowest.height - off / 2);
+        return load_of(lowest, cutting_.at(lowest.coarse, s.feed));
+    }
+
+    void choose(Seen& s) {
+        const std::uint32_t planned = op_.moves[s.last].feed;
+        if (!s.cuts) {
+            s.feed = job_.cutting.adapt_feed ? most_of(planned) : planned;
+            return;
+        }
+        if (!job_.cutting.adapt_feed) {
+            s.feed = planned;
+            s.bent = &cutting_.at(s.coarse, planned);
+        } else {
+            ClassFeeds& of = feeds_of(s, planned);
+            FeedStep* step = of.chosen;
+            if (s.overhang > 0 || step == nullptr) step = slow_enough(s, of.steps);
+            if (!(s.overhang > 0)) of.chosen = step;
+            step = as_stated(s, of.steps, step);
+            s.feed = step->feed;
+            s.bent = &bent_at(s, *step);
+        }
+        // Where feed alone does not settle it.
+        if (share(*s.bent) > kClassSlack) s.stated = stated_share(s, s.feed) / kHolds;
+        s.wood_load = wood_load(s, *s.bent);
+    }
+
+private:
+    /// The steps of a class, fastest first, are the same wherever it is met.
+    struct ClassFeeds {
+        std::vector<FeedStep> steps;
+        FeedStep* chosen = nullptr;  // where nothing hangs over
+    };
+
+    [[nodiscard]] double share(const Bent& bent) const { return cutting_.share(bent, limit_); }
+    Load load_of(const Seen& s, const Bent& bent) {
+        if (++looked_at_ % 128 == 0) context_.throw_if_cancelled();
+        return Load{share(bent), wood_load(s, bent)};
+    }
+    /// As the plan will state it.
+    double stated_share(const Seen& s, double feed) { return share(cutting_.stated(s.fine, feed)); }
+    // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
+    [[nodiscard]] std::uint32_t most_of(std::uint32_t planned) const {
+        return never_faster_ || planned <= tool_.plunge_feed ? planned : fastest_;
+    }
+
+    ClassFeeds& feeds_of(const Seen& s, std::uint32_t planned) {
+        const ClassAndFeed key{s.coarse, static_cast<double>(planned)};
+        if (last_ != nullptr && key == last_key_) return *last_;
+        const auto [it, fresh] = known_.try_emplace(key);
+        if (fresh) {
+            const double chip = std::min<double>(
+                most_of(planned), std::max<double>(planned, planned / cutting_.thickest_chip(s.coarse)));
+            std::vector<FeedStep>& steps = it->second.steps;
+            // What is planned is a step too, so that a cut that needs no other feed keeps its own.
+            steps.push_back({planned, nullptr});
+            for (int k = 1; k <= kFeedSteps; ++k)
+                steps.push_back({fastest_ * static_cast<std::uint32_t>(k) / kFeedSteps, nullptr});
+            std::erase_if(steps, [&](const FeedStep& f) {
+                return f.feed > chip || f.feed < 1 || f.feed < kLeastFeedShare * planned;
+            });
+            if (steps.empty()) steps.push_back({planned, nullptr});
+            std::sort(steps.begin(), steps.end(),
+                      [](const FeedStep& x, const FeedStep& y) { return x.feed > y.feed; });
+        }
+        last_key_ = key;
+        last_ = &it->second;
+        return *last_;
+    }
+    const Bent& bent_at(const Seen& s, FeedStep& step) {
+        if (step.bent == nullptr) step.bent = &cutting_.at(s.coarse, step.feed);
+        return *step.bent;
+    }
+    /// The fastest step that all limits bear. Where none does: the slowest that is allowed, when it is the
+    /// cutter that bears too much; the fastest that the cutter bears, when it is the wood.
+    FeedStep* slow_enough(const Seen& s, std::vector<FeedStep>& steps) {
+        FeedStep* for_cutter = nullptr;
+        for (FeedStep& step : steps) {
+            const Load l = load_of(s, bent_at(s, step));
+            if (l.worst() <= 1) return &step;
+            if (l.cutter <= 1 && for_cutter == nullptr) for_cutter = &step;
+        }
+        return for_cutter != nullptr ? for_cutter : &steps.back();
+    }
+    /// A coarse class may bear a little less than a cut of it does, and more than any: near the limit and
+    /// beyond it, what the plan will state decides.
+    FeedStep* as_stated(const Seen& s, std::vector<FeedStep>& steps, FeedStep* step) {
+        const double bears = share(bent_at(s, *step));
+        if (bears < kClassSlack) return step;
+        const auto holds = [&](const FeedStep& f) { return stated_share(s, f.feed) <= kHolds; };
+        if (bears > 1)
+            return std::to_address(std::partition_point(steps.begin(), std::prev(steps.end()),
+                                                        [&](const FeedStep& f) { return !holds(f); }));
+        while (!holds(*step) && step != &steps.back()) ++step;
+        return step;
+    }
+
+    Context& context_;
+    const Job& job_;
+    const Operation& op_;
+    const Tool& tool_;
+    BentCutter cutting_;
+    const double limit_;  // mm, of the wall's error
+    const bool never_faster_;
+    const std::uint32_t fastest_;
+    ByClassAndFeed<ClassFeeds> known_;
+    ClassAndFeed last_key_;
+    ClassFeeds* last_ = nullptr;
+    std::size_t looked_at_ = 0;
+};
 
 double way_of(const Operation& op, std::uint32_t first, std::uint32_t last) {
     double way = 0;
@@ -469,7 +448,7 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
     auto& [seen, anew, all] = *lent;
     for (Operation& op : layer.operations) {
         context.throw_if_cancelled();
-        op.peak_force_n = op.deflection_mm = op.wall_error_mm = 0;
+        op.peak_force_n = op.deflection_mm = op.wall_error_mm = op.peak_torque_nmm = op.peak_power_w = 0;
         op.peak_at.reset();
         op.peak_move.reset();
         result.starts.push_back(result.cuts.size());
@@ -479,117 +458,11 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         if (!(op.spindle_rpm > 0))
             throw Error(ErrorKind::usage, "forces.spindle", "an operation mills with its spindle at rest",
                         op.purpose, "give the tool a speed");
-        BentCutter cutting(job, op, tool, known_cuts);
-        const double limit = bending_limit(op, job);
-        const bool never_faster = roughs(op.kind) || change == FeedChange::lower;
-        std::size_t looked_at = 0;
-        const auto cutter_share = [&](const Bent& bent) {
-            const double wall = bent.wall_mm / limit;
-            return tool.strength_mpa > 0 ? std::max(wall, bent.stress_mpa / tool.strength_mpa) : wall;
-        };
-        const auto wood_load = [&](const Seen& s, const Bent& bent) {
-            return s.overhang > 0 ? cutting.needed_wood(bent, s.height, s.overhang) / s.wood : 0;
-        };
-        const auto load_of = [&](const Seen& s, const Bent& bent) {
-            if (++looked_at % 128 == 0) context.throw_if_cancelled();
-            return Load{cutter_share(bent), wood_load(s, bent)};
-        };
-        // Of a cut whose feed is chosen.
-        const auto load = [&](const Seen& s, int passes) {
-            if (passes == 1) return Load{std::max(cutter_share(*s.bent), s.stated), s.wood_load};
-            Seen lowest = s;
-            const float off = s.depth * static_cast<float>(passes - 1) / static_cast<float>(passes);
-            lowest.coarse = shallower(s.coarse, passes);
-            lowest.wood -= off;
-            lowest.height = std::max(0.F, lowest.height - off / 2);
-            return load_of(lowest, cutting.at(lowest.coarse, s.feed));
-        };
+        FeedChoice choice(context, job, op, tool, known_cuts != nullptr ? &known_cuts->impl().bents : nullptr,
+                          roughs(op.kind) || change == FeedChange::lower);
+        const auto load = [&](const Seen& seen_here, int parted) { return choice.load(seen_here, parted); };
 
-        const auto fastest =
-            static_cast<std::uint32_t>(std::floor(std::min(tool.max_feed, job.machine.max_feed)));
-        // The fastest step that all limits bear. Where none does: the slowest that is allowed, when it is the
-        // cutter that bears too much; as planned, when it is the wood. The steps of a class, fastest first,
-        // are the same wherever it is met.
-        struct ClassFeeds {
-            std::vector<FeedStep> steps;
-            FeedStep* chosen = nullptr;  // where nothing hangs over
-        };
-        ByClassAndFeed<ClassFeeds> known;
-        ClassAndFeed last_key;
-        ClassFeeds* last = nullptr;
-        const auto feeds_of = [&](const Seen& s, std::uint32_t planned) -> ClassFeeds& {
-            const ClassAndFeed key{s.coarse, static_cast<double>(planned)};
-            if (last != nullptr && key == last_key) return *last;
-            const auto [it, fresh] = known.try_emplace(key);
-            if (fresh) {
-                // Entries on ramps and helices go at the plunge's feed, whether they meet wood yet or not.
-                const double most = never_faster || planned <= tool.plunge_feed ? planned : fastest;
-                const double chip =
-                    std::min(most, std::max<double>(planned, planned / cutting.thickest_chip(s.coarse)));
-                std::vector<FeedStep>& steps = it->second.steps;
-                // What is planned is a step too, so that a cut that needs no other feed keeps its own.
-                steps.push_back({planned, nullptr});
-                for (int k = 1; k <= kFeedSteps; ++k)
-                    steps.push_back({fastest * static_cast<std::uint32_t>(k) / kFeedSteps, nullptr});
-                std::erase_if(steps, [&](const FeedStep& f) {
-                    return f.feed > chip || f.feed < 1 || f.feed < kLeastShare * planned;
-                });
-                if (steps.empty()) steps.push_back({planned, nullptr});
-                std::sort(steps.begin(), steps.end(),
-                          [](const FeedStep& x, const FeedStep& y) { return x.feed > y.feed; });
-            }
-            last_key = key;
-            last = &it->second;
-            return *last;
-        };
-        const auto bent_at = [&](const Seen& s, FeedStep& step) -> const Bent& {
-            if (step.bent == nullptr) step.bent = &cutting.at(s.coarse, step.feed);
-            return *step.bent;
-        };
-        const auto slow_enough = [&](const Seen& s, std::vector<FeedStep>& steps) {
-            FeedStep* for_cutter = nullptr;
-            for (FeedStep& step : steps) {
-                const Load l = load_of(s, bent_at(s, step));
-                if (l.worst() <= 1) return &step;
-                if (l.cutter <= 1 && for_cutter == nullptr) for_cutter = &step;
-            }
-            return for_cutter != nullptr ? for_cutter : &steps.back();
-        };
-        // A coarse class may bear a little less than a cut of it does: near the limit, what the plan will
-        // state decides.
-        const auto as_stated = [&](const Seen& s, std::vector<FeedStep>& steps, FeedStep* step) {
-            const double bears = cutter_share(bent_at(s, *step));
-            if (bears < kClassSlack || bears > 1) return step;
-            while (cutter_share(cutting.stated(s.fine, step->feed)) > kHolds && step != &steps.back()) ++step;
-            return step;
-        };
-        const auto choose = [&](Seen& s) {
-            const std::uint32_t planned = op.moves[s.last].feed;
-            if (!s.cuts) {
-                const double most = never_faster || planned <= tool.plunge_feed ? planned : fastest;
-                s.feed = job.cutting.adapt_feed ? static_cast<std::uint32_t>(most) : planned;
-                return;
-            }
-            if (!job.cutting.adapt_feed) {
-                s.feed = planned;
-                s.bent = &cutting.at(s.coarse, planned);
-            } else {
-                ClassFeeds& of = feeds_of(s, planned);
-                FeedStep* step = of.chosen;
-                if (s.overhang > 0 || step == nullptr) step = slow_enough(s, of.steps);
-                if (!(s.overhang > 0)) of.chosen = step;
-                step = as_stated(s, of.steps, step);
-                s.feed = step->feed;
-                s.bent = &bent_at(s, *step);
-                // At its slowest it may still pass the limit by what its coarse class hides.
-                if (const double bears = cutter_share(*s.bent);
-                    step == &of.steps.back() && bears > kClassSlack && bears <= 1)
-                    s.stated = cutter_share(cutting.stated(s.fine, s.feed)) / kHolds;
-            }
-            s.wood_load = wood_load(s, *s.bent);
-        };
-
-        std::size_t divided = 0;
+        std::size_t divided = 0, looked_at = 0;
         double divided_way = 0, deepest = 0;
         int passes = 0;
         std::optional<std::array<double, 3>> divided_at;
@@ -599,10 +472,10 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             std::size_t asked = 0;
             for (Seen& s : seen) {
                 if (++asked % 64 == 0) context.throw_if_cancelled();
-                if (s.feed == 0) choose(s);
+                if (s.feed == 0) choice.choose(s);
             }
             if (!job.cutting.adapt_stepdown || round == kMostRounds) break;
-            const std::vector<DeepRun> runs = deep_runs(seen, op, tool.diameter, round, load);
+            const std::vector<DeepRun> runs = deep_runs(seen, op, tool, round, load);
             context.throw_if_cancelled();
             if (runs.empty()) break;
             for (const DeepRun& run : runs) {
@@ -680,14 +553,15 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             std::uint32_t feed = 0;
             for (std::uint32_t k = s.first; k <= s.last; ++k) feed = std::max(feed, op.moves[k].feed);
             if (s.overhang > 0)
-                if (const double wood =
-                        feed == s.feed ? s.wood_load : wood_load(s, cutting.at(s.coarse, feed));
+                if (const double wood = feed == s.feed
+                                            ? s.wood_load
+                                            : choice.wood_load(s, choice.cutting().at(s.coarse, feed));
                     wood > 1) {
                     ++broken;
                     if (wood > most) most = wood, breaks = &s, needed = wood * s.wood;
                 }
             if (!listed.insert({s.fine, static_cast<double>(feed)}).second) continue;
-            result.cuts.push_back(segment_of(s.fine, cutting.idle(), tool, feed, kFine));
+            result.cuts.push_back(segment_of(s.fine, choice.cutting().idle(), tool, feed, kFine));
             result.places.push_back(s.at);
             result.moves.push_back(s.last);
         }
@@ -702,91 +576,6 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
     }
     result.starts.push_back(result.cuts.size());
     return result;
-}
-
-std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan,
-                                                 std::span<const LayerCuts> layers, ForceSolver* solver) {
-    const Job& job = plan.job;
-    std::vector<std::size_t> starts, bases;
-    std::size_t count = 0;
-    for (const LayerCuts& layer : layers) {
-        for (std::size_t i = 0; i + 1 < layer.starts.size(); ++i) starts.push_back(count + layer.starts[i]);
-        bases.push_back(count);
-        count += layer.cuts.size();
-    }
-    starts.push_back(count);
-    const MemoryCharge memory(context, count * (sizeof(CutSegment) + sizeof(SegmentForces)),
-                              "the cuts of a plan");
-    RawArray<CutSegment> cuts(count);
-    parallel_each(context, layers.size(), [&](std::size_t l) {
-        std::copy(layers[l].cuts.begin(), layers[l].cuts.end(), cuts.data() + bases[l]);
-    });
-    const HardestSearch hardest = hardest_cuts(context, cuts.span(), starts, solver);
-    std::vector<std::vector<Diagnostic>> found(layers.size());
-    if (!hardest.note.empty())
-        plan.diagnostics.push_back(
-            {Severity::note,
-             "forces.no_device",
-             fmt::format("the forces of {} cuts were computed without an OpenCL device: {}", cuts.size(),
-                         hardest.note),
-             {}});
-    std::size_t group = 0;
-    for (std::size_t l = 0; l < layers.size(); ++l) {
-        const std::size_t base = bases[l];
-        for (Operation& op : plan.layers[l].operations) {
-            const HardestCuts& h = hardest.groups[group++];
-            if (h.resultant == kNoCut) continue;
-            const Tool& tool = *std::find_if(job.tools.begin(), job.tools.end(),
-                                             [&](const Tool& t) { return t.number == op.tool; });
-            const auto exact = [&](std::size_t i) {
-                return cuts[i].profile == CutterProfile::flat ? closed_form_forces(cuts[i], kStatedAccuracy)
-                                                              : reference_forces(cuts[i], kStatedAccuracy);
-            };
-            const auto place = [&](std::size_t i) {
-                const auto& at = layers[l].places[i - base];
-                return std::array<double, 3>{at[0], at[1], at[2]};
-            };
-            const double in_plane = exact(h.in_plane).peak_in_plane_n;
-            op.peak_force_n = exact(h.resultant).peak_resultant_n;
-            op.peak_at = place(h.resultant);
-            op.peak_move = layers[l].moves[h.resultant - base];
-            op.deflection_mm = cutter_deflection(in_plane, tool.stickout, tool.diameter);
-            op.wall_error_mm = cutter_deflection(exact(h.across).peak_y_n, tool.stickout, tool.diameter);
-            const int index = plan.layers[l].index;
-            if (const double limit = bending_limit(op, job); op.wall_error_mm > limit)
-                found[l].push_back({Severity::warning, "cut.deflection",
-                                    fmt::format("layer {}, {}: the cutter may bend by {:.4f} mm, more than "
-                                                "the {:.4f} mm allowed; use a shorter or thicker "
-                                                "tool or a smaller stepdown",
-                                                index, op.purpose, op.wall_error_mm, limit),
-                                    place(h.across)});
-            if (const double stress = cutter_stress(in_plane, tool.stickout, tool.diameter);
-                tool.strength_mpa > 0 && stress > tool.strength_mpa)
-                found[l].push_back({Severity::warning, "cut.strength",
-                                    fmt::format("layer {}, {}: the cutter would bear {:.0f} MPa in bending, "
-                                                "more than its {:.0f} MPa",
-                                                index, op.purpose, stress, tool.strength_mpa),
-                                    place(h.in_plane)});
-        }
-    }
-    return found;
-}
-
-void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Diagnostic>& diagnostics) {
-    const LayerCuts cuts = adapt_layer(context, layer, plan, nullptr, diagnostics);
-    Plan one;
-    one.job = plan.job;
-    one.layers.push_back(std::move(layer));
-    SolverAhead ahead(context);
-    ahead.expect(cuts.cuts);
-    const auto found = rate_layers(context, one, {&cuts, 1}, ahead.solver());
-    layer = std::move(one.layers[0]);
-    diagnostics.insert(diagnostics.end(), found[0].begin(), found[0].end());
-}
-
-double allowed_length(const Operation& operation, const Tool& tool, const Job& job) {
-    if (!(operation.wall_error_mm > 0)) return 0;
-    return tool.stickout * std::cbrt(bending_limit(operation, job) / operation.wall_error_mm);
 }
 
 }  // namespace slabwright

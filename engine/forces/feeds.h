@@ -26,6 +26,9 @@ namespace slabwright {
 /// Feeds come in this many steps of the fastest that tool and machine allow.
 inline constexpr int kFeedSteps = 16;
 
+/// The least share of a planned feed: slower, a cutter rubs.
+inline constexpr double kLeastFeedShare = 0.125;
+
 /// The different cuts of a layer's operations, in the order in which they are met first.
 struct LayerCuts {
     std::vector<CutSegment> cuts;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/forces/bent_cutter.h"
 #include "engine/forces/cuts.h"
+#include "engine/forces/feeds.h"
 #include "kernels/errors.h"
 #include "kernels/forces/deflection.h"
 
@@ -60,12 +62,34 @@ CutSegment heaviest_cut(const Operation& operation, const Tool& tool, const Job&
 void rate_operation(Operation& operation, const Tool& tool, const Job& job) {
     const CutSegment cut = heaviest_cut(operation, tool, job);
     operation.peak_force_n = operation.deflection_mm = operation.wall_error_mm = 0;
+    operation.peak_torque_nmm = operation.peak_power_w = 0;
     operation.peak_at.reset();
     if (cut.high_mm <= 0) return;
     const CutForce force = peak_force(cut);
     operation.peak_force_n = force.peak_resultant_n;
     operation.deflection_mm = cutter_deflection(force.peak_in_plane_n, tool.stickout, tool.diameter);
     operation.wall_error_mm = operation.deflection_mm;
+    operation.peak_torque_nmm = force.torque_nmm;
+    operation.peak_power_w = force.power_w;
+}
+
+bool slow_down(Operation& operation, const Tool& tool, const Job& job) {
+    CutSegment cut = heaviest_cut(operation, tool, job);
+    if (cut.high_mm <= 0) return false;
+    const double planned = fastest_feed(operation), limit = bending_limit(operation, job);
+    const auto holds = [&](double feed) {
+        cut.chip_load_mm = feed / (cut.spindle_rpm * tool.flutes);
+        const SegmentForces f = stated_forces(cut);
+        return share_of_limits(bent_by(f, f.peak_in_plane_n, tool), limit, tool, job) <= 1;
+    };
+    if (holds(planned)) return false;
+    std::uint32_t most = 0;
+    for (int k = kFeedSteps - 1; k >= kFeedSteps * kLeastFeedShare && most == 0; --k)
+        if (const double feed = std::floor(planned * k / kFeedSteps);
+            holds(feed) || k - 1 < kFeedSteps * kLeastFeedShare)
+            most = static_cast<std::uint32_t>(std::max(1.0, feed));
+    for (Move& move : operation.moves) move.feed = std::min(move.feed, most);
+    return true;
 }
 
 }  // namespace slabwright

@@ -26,4 +26,10 @@ namespace slabwright {
 /// not take
 void rate_operation(Operation& operation, const Tool& tool, const Job& job);
 
+/// Lowers the operation's feeds, by sixteenths of its fastest in the plane and to kLeastFeedShare of it at
+/// most, until its heaviest nominal cut holds: bending, the cutter's strength, torque and power of the
+/// spindle. Slower feeds stay as they are.
+/// @returns whether a feed is another now. @throws as rate_operation
+bool slow_down(Operation& operation, const Tool& tool, const Job& job);
+
 }  // namespace slabwright

@@ -36,7 +36,9 @@ std::vector<Move> split_runs(const std::vector<Move>& moves, std::span<const Dee
         start.feed = plunge_feed;
         start.i = start.j = 0;
         for (int pass = 1; pass < run.passes; ++pass) {
-            const std::int32_t up = to_units(run.depth_mm * (run.passes - pass) / run.passes);
+            const double rest = static_cast<double>(run.passes - pass) / run.passes;
+            const std::int32_t up =
+                to_units(run.depth_mm * (run.shares == PassShares::growing ? rest * rest : rest));
             result.push_back(raised(start, up));
             for (std::uint32_t k = run.first; k <= run.last; ++k) result.push_back(raised(moves[k], up));
             for (std::uint32_t k = run.last; k >= run.first; --k)

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "engine/forces/min_material.h"
+#include "engine/forces/op_forces.h"
 #include "engine/moves/motion_time.h"
 #include "engine/paths/paths.h"
 #include "engine/tool_choice/reach_ratio.h"
@@ -181,6 +182,12 @@ private:
         if (!best_) allowed_left_ = kMore * result.left_mm2 + kFew;
         if (!result.given_up) trial.left_mm2 = result.left_mm2;
         trial.leaves_more = best_ && !result.given_up && result.left_mm2 > allowed_left_;
+        if (job.cutting.engagement == Engagement::nominal && job.cutting.adapt_feed)
+            for (Operation& op : layer.operations)
+                slow_down(op,
+                          *std::find_if(job.tools.begin(), job.tools.end(),
+                                        [&](const Tool& t) { return t.number == op.tool; }),
+                          job);
         const bool compared = selection_ || sets_.size() > 1;  // else nobody asks for its time
         if (compared) trial.minutes = minutes_of(layer, job.machine);
         trial.whole = !result.given_up && trial.minutes <= most;

@@ -22,6 +22,7 @@
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
 #include "engine/schedule/schedule.h"
+#include "engine/schedule/standing_walls.h"
 #include "engine/schedule/supports.h"
 #include "engine/stock/layer_stock.h"
 #include "engine/stock/standing.h"
@@ -386,6 +387,7 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
 
     context.begin_phase("schedule", share.at(0.99), share.at(1));
     load_joints(context, plan, joints, origin);
+    for (Diagnostic& weak : weak_walls(context, plan, joints)) plan.diagnostics.push_back(std::move(weak));
     context.throw_if_cancelled();
     schedule(plan);
     check_spindle(plan);

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/forces/cut_class.h"
 #include "engine/forces/feeds.h"
 #include "engine/forces/op_forces.h"
 #include "engine/moves/motion_time.h"
@@ -46,13 +47,16 @@ void rate(const Job& job, const Layer& layer, Operation& op, std::vector<Diagnos
         std::find_if(job.tools.begin(), job.tools.end(), [&](const Tool& t) { return t.number == op.tool; });
     rate_operation(op, *tool, job);
     const double allowance = bending_limit(op, job);
-    if (op.kind == OperationKind::rough && op.deflection_mm > allowance)
-        diagnostics.push_back({Severity::warning,
-                               "rough.deflection",
-                               fmt::format("layer {}: the roughing cutter may bend by {:.3f} mm, more than "
-                                           "the {:.3f} mm it leaves for finishing",
-                                           layer.index, op.deflection_mm, allowance),
-                               {}});
+    if (const bool rough = op.kind == OperationKind::rough;
+        op.deflection_mm > (1 + kFineRounding) * allowance)
+        diagnostics.push_back(
+            {Severity::warning,
+             rough ? "rough.deflection" : "cut.deflection",
+             fmt::format("layer {}, {}: the cutter T{} may bend by {:.3f} mm, more than the "
+                         "{:.3f} mm {}; use a shorter or thicker tool or a smaller stepdown",
+                         layer.index, op.purpose, op.tool, op.deflection_mm, allowance,
+                         rough ? "it leaves for finishing" : "allowed"),
+             {}});
 }
 
 void add_approaches(Plan& plan, const std::vector<bool>& rated) {

@@ -122,7 +122,7 @@ void visit_prepare_keys(PrepareLike& prepare, Visit& visit) {
     visit.key("shift", prepare.shift, "mm; the pattern is set on z = 0 all the same");
 }
 
-/// Walks every key of the job but the tools: first those of the top, then table by table.
+/// Walks the keys of speeds and accelerations, axis by axis.
 template <class MachineLike, class Visit>
 void visit_motion_keys(MachineLike& machine, Visit& visit) {
     visit.key("max_feed", machine.max_feed, "mm/min");
@@ -134,6 +134,41 @@ void visit_motion_keys(MachineLike& machine, Visit& visit) {
     visit.key("acceleration_z", machine.acceleration_z, "mm/s^2; 0: as x");
 }
 
+/// Walks the keys of the router.
+template <class MachineLike, class Visit>
+void visit_machine_keys(MachineLike& machine, Visit& visit) {
+    visit.table("machine", "the router");
+    visit.key("name", machine.name, "");
+    visit.key("travel_x", machine.travel_x, "mm");
+    visit.key("travel_y", machine.travel_y, "mm");
+    visit.key("travel_z", machine.travel_z, "mm, of the spindle");
+    visit.word("table", machine.table, kTableWords,
+               "moving: the build table sinks by every layer; fixed: a router whose table stays");
+    visit.key("table_speed", machine.table_speed, "mm/min, of a table that moves");
+    visit.key("build_height", machine.build_height,
+              "mm, of the build chamber: how far a table that moves goes down");
+    visit.key("build_mass_kg", machine.build_mass_kg, "kg that the build table carries");
+    visit.key("feed_height", machine.feed_height,
+              "mm, of the feed chamber, which slabs are taken from; 0: they are laid by hand");
+    visit.key("feed_mass_kg", machine.feed_mass_kg, "kg that the feed table carries");
+    visit_motion_keys(machine, visit);
+    visit.key("max_rpm", machine.max_rpm, "turns a minute");
+    visit.key("spindle_power_w", machine.spindle_power_w,
+              "W that the spindle has for cutting, kept by feed and stepdown; 0: no limit");
+    visit.key("spindle_torque_nm", machine.spindle_torque_nm, "Nm, likewise");
+    visit.key("spindle_dwell_s", machine.spindle_dwell_s, "s, from spindle start to the first motion");
+    visit.key("tool_change_s", machine.tool_change_s, "s");
+    visit.key("clearance", machine.clearance, "mm of air between a rapid and the highest stock");
+    visit.word("frame", machine.frame, kFrameWords,
+               "pattern-base (z = 0 at the pattern's bottom), layer-top (z = 0 at the layer's top), or auto: "
+               "layer-top where the table moves");
+    visit.key("base_board_thickness", machine.base_board_thickness,
+              "mm, the sacrificial board under the first layer");
+    visit.key("base_board_cut", machine.base_board_cut,
+              "mm that may be cut into it; negative: as deep as the finish tool overruns");
+}
+
+/// Walks every key of the job but the tools: first those of the top, then table by table.
 template <class JobLike, class Visit>
 void visit_job_keys(JobLike& job, Visit& visit) {
     visit.word("units", job.units, kUnitWords, "of the STL: mm or in; every length in this file is in mm");
@@ -170,32 +205,7 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("facing_allowance", job.slabs.facing_allowance,
               "mm that the face mill takes off at least, to find the whole slab");
 
-    visit.table("machine", "the router");
-    visit.key("name", job.machine.name, "");
-    visit.key("travel_x", job.machine.travel_x, "mm");
-    visit.key("travel_y", job.machine.travel_y, "mm");
-    visit.key("travel_z", job.machine.travel_z, "mm, of the spindle");
-    visit.word("table", job.machine.table, kTableWords,
-               "moving: the build table sinks by every layer; fixed: a router whose table stays");
-    visit.key("table_speed", job.machine.table_speed, "mm/min, of a table that moves");
-    visit.key("build_height", job.machine.build_height,
-              "mm, of the build chamber: how far a table that moves goes down");
-    visit.key("build_mass_kg", job.machine.build_mass_kg, "kg that the build table carries");
-    visit.key("feed_height", job.machine.feed_height,
-              "mm, of the feed chamber, which slabs are taken from; 0: they are laid by hand");
-    visit.key("feed_mass_kg", job.machine.feed_mass_kg, "kg that the feed table carries");
-    visit_motion_keys(job.machine, visit);
-    visit.key("max_rpm", job.machine.max_rpm, "turns a minute");
-    visit.key("spindle_dwell_s", job.machine.spindle_dwell_s, "s, from spindle start to the first motion");
-    visit.key("tool_change_s", job.machine.tool_change_s, "s");
-    visit.key("clearance", job.machine.clearance, "mm of air between a rapid and the highest stock");
-    visit.word("frame", job.machine.frame, kFrameWords,
-               "pattern-base (z = 0 at the pattern's bottom), layer-top (z = 0 at the layer's top), or auto: "
-               "layer-top where the table moves");
-    visit.key("base_board_thickness", job.machine.base_board_thickness,
-              "mm, the sacrificial board under the first layer");
-    visit.key("base_board_cut", job.machine.base_board_cut,
-              "mm that may be cut into it; negative: as deep as the finish tool overruns");
+    visit_machine_keys(job.machine, visit);
 
     visit.table("bonding", "glue and press");
     visit.key("glue", job.bonding.glue, "");
@@ -290,8 +300,8 @@ void visit_job_keys(JobLike& job, Visit& visit) {
                "what forces are computed from: simulated, what stands when a move cuts; nominal, an "
                "operation's largest steps");
     visit.key("adapt_feed", job.cutting.adapt_feed,
-              "feeds lowered where the cutter would bend too far, raised where the chip is thin; needs "
-              "simulated engagement");
+              "feeds lowered where the cutter would bend too far, with simulated engagement also "
+              "raised where the chip is thin");
     visit.key("adapt_stepdown", job.cutting.adapt_stepdown,
               "deep cuts in several passes where no feed keeps cutter and wood within their limits; needs "
               "simulated engagement");

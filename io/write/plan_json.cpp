@@ -137,6 +137,8 @@ void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const O
     json.key("peak_force_n").rounded(operation.peak_force_n, kForce);
     json.key("deflection_mm").rounded(operation.deflection_mm, kDeflection);
     json.key("wall_error_mm").rounded(operation.wall_error_mm, kDeflection);
+    json.key("peak_torque_nmm").rounded(operation.peak_torque_nmm, kForce);
+    json.key("peak_power_w").rounded(operation.peak_power_w, kForce);
     json.key("peak_at");
     put_place(json, operation.peak_at);
     json.key("peak_line");

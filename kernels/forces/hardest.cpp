@@ -22,8 +22,15 @@ SegmentForces in_double(const CutSegment& cut) {
                                               : reference_forces(cut, kForceAccuracy);
 }
 
-constexpr double SegmentForces::*kAsked[] = {&SegmentForces::peak_resultant_n,
-                                             &SegmentForces::peak_in_plane_n, &SegmentForces::peak_y_n};
+constexpr std::array<double SegmentForces::*, 5> kAsked{
+    &SegmentForces::peak_resultant_n, &SegmentForces::peak_in_plane_n, &SegmentForces::peak_y_n,
+    &SegmentForces::peak_torque_nmm, &SegmentForces::mean_power_w};
+
+// By how much the device may be off in each of these.
+std::array<double, kAsked.size()> doubts(const SegmentForces& found, const CutSegment& cut) {
+    const double force = kScreen * found.peak_resultant_n, torque = force * cut.radius_mm;
+    return {force, force, force, torque, torque * forces::watts_per_nmm(cut.spindle_rpm)};
+}
 
 }  // namespace
 
@@ -71,15 +78,17 @@ HardestSearch hardest_cuts(Context& context, std::span<const CutSegment> cuts,
     } else {
         solver->solve(context, cuts, found.span());
         for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
-            double surely[3] = {0, 0, 0};
-            for (std::size_t i = starts[g]; i < starts[g + 1]; ++i)
-                for (int q = 0; q < 3; ++q)
-                    surely[q] =
-                        std::max(surely[q], found[i].*kAsked[q] - kScreen * found[i].peak_resultant_n);
+            std::array<double, kAsked.size()> surely{};
             for (std::size_t i = starts[g]; i < starts[g + 1]; ++i) {
+                const auto doubt = doubts(found[i], cuts[i]);
+                for (std::size_t q = 0; q < kAsked.size(); ++q)
+                    surely[q] = std::max(surely[q], found[i].*kAsked[q] - doubt[q]);
+            }
+            for (std::size_t i = starts[g]; i < starts[g + 1]; ++i) {
+                const auto doubt = doubts(found[i], cuts[i]);
                 bool may = false;
-                for (int q = 0; q < 3; ++q)
-                    may |= found[i].*kAsked[q] + kScreen * found[i].peak_resultant_n >= surely[q];
+                for (std::size_t q = 0; q < kAsked.size(); ++q)
+                    may |= found[i].*kAsked[q] + doubt[q] >= surely[q];
                 if (may) doubtful.push_back(static_cast<std::uint32_t>(i));
             }
         }
@@ -89,12 +98,13 @@ HardestSearch hardest_cuts(Context& context, std::span<const CutSegment> cuts,
     });
     std::size_t next = 0;
     for (std::size_t g = 0; g + 1 < starts.size(); ++g) {
-        std::size_t best[3] = {kNoCut, kNoCut, kNoCut};
+        std::array<std::size_t, kAsked.size()> best;
+        best.fill(kNoCut);
         for (; next < doubtful.size() && doubtful[next] < starts[g + 1]; ++next)
-            for (int q = 0; q < 3; ++q)
+            for (std::size_t q = 0; q < kAsked.size(); ++q)
                 if (best[q] == kNoCut || found[doubtful[next]].*kAsked[q] > found[best[q]].*kAsked[q])
                     best[q] = doubtful[next];
-        search.groups.push_back({best[0], best[1], best[2]});
+        search.groups.push_back({best[0], best[1], best[2], best[3], best[4]});
     }
     return search;
 }

@@ -2,6 +2,7 @@
 // decides.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <future>
@@ -15,10 +16,14 @@
 
 namespace slabwright {
 
-/// Indices into the cuts: of the largest peak resultant, of the largest force in the plane, and of the
-/// largest across the way (y). The first of equals; kNoCut in an empty group.
+/// Indices into the cuts: of the largest peak resultant, of the largest force in the plane, of the largest
+/// across the way (y), of the largest peak torque, and of the largest mean power. The first of equals; kNoCut
+/// in an empty group.
 struct HardestCuts {
-    std::size_t resultant, in_plane, across;
+    std::size_t resultant, in_plane, across, torque, power;
+    [[nodiscard]] std::array<std::size_t, 5> all() const {
+        return {resultant, in_plane, across, torque, power};
+    }
     friend bool operator==(const HardestCuts&, const HardestCuts&) = default;
 };
 inline constexpr std::size_t kNoCut = static_cast<std::size_t>(-1);

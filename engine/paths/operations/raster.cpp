@@ -392,7 +392,7 @@ double seconds_of(const LayerCut& cut, const Runs& runs) {
     const double speed = std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed) / 60;
     double sum = to_the_next * static_cast<double>(runs.size());
     for (const std::vector<PathPoint>& run : runs) {
-        Travel travel(cut.job.machine.acceleration);
+        Travel travel(axis_limits(cut.job.machine));
         for (std::size_t k = 1; k < run.size(); ++k) {
             const PathPoint &a = run[k - 1], &b = run[k];
             const Vec3d way{to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z)};

@@ -1,0 +1,129 @@
+// Limits that feeds and passes keep: a ball's bending, the spindle's torque and power, nominal cuts.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "engine/forces/bent_cutter.h"
+#include "engine/forces/cuts.h"
+#include "engine/forces/feeds.h"
+#include "engine/forces/op_forces.h"
+
+namespace slabwright {
+namespace {
+
+Move at(double x, double y, double z, std::uint32_t feed) {
+    return {to_units(x), to_units(y), to_units(z), feed};
+}
+
+Plan plate() {
+    Plan plan;
+    plan.stock_min = {0, 0};
+    plan.stock_max = {120, 80};
+    plan.layers.resize(1);
+    plan.layers[0].index = 1;
+    plan.layers[0].z_top = 18;
+    plan.layers[0].slab_thickness = 18;
+    return plan;
+}
+
+Operation slot(const Plan& plan, OperationKind kind, int tool, double y, double z, std::uint32_t feed) {
+    Operation op;
+    op.kind = kind;
+    op.purpose = "slot";
+    op.tool = tool;
+    op.spindle_rpm = plan.job.tools[static_cast<std::size_t>(tool) - 1].max_rpm;
+    op.moves = {at(-10, y, 30, 0), at(-10, y, z, 0), at(130, y, z, feed), at(130, y, 30, 0)};
+    return op;
+}
+
+std::vector<Diagnostic> rated(Plan& plan, std::vector<Operation> operations) {
+    Context context;
+    std::vector<Diagnostic> found;
+    plan.layers[0].operations = std::move(operations);
+    rate_layer(context, plan.layers[0], plan, found);
+    std::erase_if(found, [](const Diagnostic& d) { return d.severity != Severity::warning; });
+    return found;
+}
+
+// A ball of the default library, in full wood as deep as its radius: whatever its lowest pass is raised by,
+// the last one touches the wall as high. Thinner shells bend it less.
+TEST(Limits, ABallTakesThinShells) {
+    for (const double deep : {2.6, 3.1, 3.6}) {
+        Plan plan = plate();
+        const std::vector<Diagnostic> found =
+            rated(plan, {slot(plan, OperationKind::finish, 3, 40, 18 - deep, 5000)});
+        const Operation& op = plan.layers[0].operations[0];
+        EXPECT_TRUE(found.empty()) << deep << " " << found[0].message;
+        EXPECT_LE(op.wall_error_mm, bending_limit(op, plan.job)) << deep;
+        EXPECT_GT(op.wall_error_mm, 0);
+    }
+}
+
+TEST(Limits, AToolThatBendsInThreeProgramsIsToldOnce) {
+    Plan plan = plate();
+    plan.job.tools[2].stickout = 150;
+    const std::vector<Diagnostic> found = rated(plan, {slot(plan, OperationKind::finish, 3, 20, 15, 5000),
+                                                       slot(plan, OperationKind::finish, 3, 40, 14, 5000),
+                                                       slot(plan, OperationKind::finish, 3, 60, 15, 5000)});
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_EQ(found[0].code, "cut.deflection");
+    EXPECT_NE(found[0].message.find("in 3 of its programs"), std::string::npos) << found[0].message;
+    EXPECT_NE(found[0].message.find("T3"), std::string::npos);
+    ASSERT_TRUE(found[0].where);
+}
+
+TEST(Limits, TorqueAndPowerOfTheSpindle) {
+    Plan plan = plate();
+    const auto rough = [&] { return slot(plan, OperationKind::rough, 2, 40, 14.5, 9000); };
+    EXPECT_TRUE(rated(plan, {rough()}).empty());
+    const Operation free = plan.layers[0].operations[0];
+    // As the force model says of the slot, up to the class of depth.
+    const CutSegment cut = slot_cut(plan.job, plan.job.tools[1], 3.5);
+    const SegmentForces f = stated_forces(cut);
+    EXPECT_NEAR(free.peak_torque_nmm, f.peak_torque_nmm, 0.02 * f.peak_torque_nmm);
+    EXPECT_NEAR(free.peak_power_w, f.mean_power_w, 0.02 * f.mean_power_w);
+
+    for (const double share : {0.8, 0.5, 0.25}) {
+        plan.job.machine.spindle_torque_nm = share * free.peak_torque_nmm / 1000;
+        plan.job.machine.spindle_power_w = 0;
+        EXPECT_TRUE(rated(plan, {rough()}).empty()) << share;
+        EXPECT_LE(plan.layers[0].operations[0].peak_torque_nmm, share * free.peak_torque_nmm) << share;
+        plan.job.machine.spindle_torque_nm = 0;
+        plan.job.machine.spindle_power_w = share * free.peak_power_w;
+        EXPECT_TRUE(rated(plan, {rough()}).empty()) << share;
+        EXPECT_LE(plan.layers[0].operations[0].peak_power_w, share * free.peak_power_w) << share;
+    }
+    // What no feed and no pass takes down is told, each with its own code.
+    plan.job.machine.spindle_torque_nm = 0.0002 * free.peak_torque_nmm / 1000;
+    plan.job.machine.spindle_power_w = 0.0002 * free.peak_power_w;
+    const std::vector<Diagnostic> found = rated(plan, {rough()});
+    ASSERT_EQ(found.size(), 2U);
+    EXPECT_EQ(found[0].code, "cut.power");
+    EXPECT_EQ(found[1].code, "cut.torque");
+}
+
+TEST(Limits, NominalCutsSlowDownToo) {
+    Plan plan = plate();
+    const Tool& flat = plan.job.tools[1];
+    Operation op = slot(plan, OperationKind::rough, 2, 40, 15, 9000);
+    op.stepdown = 3;
+    rate_operation(op, flat, plan.job);
+    const double torque = op.peak_torque_nmm;
+    EXPECT_GT(torque, 0);
+    EXPECT_GT(op.peak_power_w, 0);
+    EXPECT_FALSE(slow_down(op, flat, plan.job));
+    EXPECT_EQ(op.moves[2].feed, 9000U);
+    plan.job.machine.spindle_torque_nm = 0.7 * torque / 1000;
+    EXPECT_TRUE(slow_down(op, flat, plan.job));
+    EXPECT_LT(op.moves[2].feed, 9000U);
+    EXPECT_GT(op.moves[2].feed, 1125U);
+    rate_operation(op, flat, plan.job);
+    EXPECT_LE(op.peak_torque_nmm, 0.7 * torque);
+    // Nothing helps: no slower than the least share.
+    plan.job.machine.spindle_torque_nm = 1e-6;
+    EXPECT_TRUE(slow_down(op, flat, plan.job));
+    EXPECT_GE(op.moves[2].feed, 300U);
+}
+
+}  // namespace
+}  // namespace slabwright
