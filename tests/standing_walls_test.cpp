@@ -97,19 +97,19 @@ TEST(StandingWalls, RandomFeetAgainstBruteForce) {
 }
 
 TEST(StandingWalls, ThinPartsAreWallsAndPinsButNoCorners) {
-    std::vector<bool> attached;
+    std::vector<double> contact;
     // A block with a rib, and a pin beside it.
     const Loops block = rectangle(60, 60, 0), rib = rectangle(30, 3, 0, 45, 0);
-    const std::vector<Loops> none = thin_parts(block, attached);
+    const std::vector<Loops> none = thin_parts(block, contact);
     EXPECT_TRUE(none.empty()) << none.size();
-    const std::vector<Loops> both =
-        thin_parts(unite(unite(block, rib), rectangle(4, 4, 0, 45, 25)), attached);
+    const std::vector<Loops> both = thin_parts(unite(unite(block, rib), rectangle(4, 4, 0, 45, 25)), contact);
     ASSERT_EQ(both.size(), 2U);
-    EXPECT_TRUE(attached[0] != attached[1]);
+    EXPECT_TRUE((contact[0] > 0) != (contact[1] > 0));
     for (std::size_t i = 0; i < 2; ++i) {
         const WallFoot foot = wall_foot(both[i]);
-        EXPECT_NEAR(foot.thickness_mm, attached[i] ? 3 : 4, 0.1);
-        EXPECT_NEAR(foot.length_mm, attached[i] ? 30 : 4, 1);
+        EXPECT_NEAR(foot.thickness_mm, contact[i] > 0 ? 3 : 4, 0.1);
+        EXPECT_NEAR(foot.length_mm, contact[i] > 0 ? 30 : 4, 1);
+        if (contact[i] > 0) EXPECT_NEAR(contact[i], 3, 1);
     }
 }
 

@@ -20,6 +20,8 @@ constexpr double kArc = 0.02;           // mm, tolerance of offsets
 constexpr double kLeastArea = 1;        // mm²: less is a sliver
 constexpr double kCovered = 0.02;       // of a wall's area: less thick wood under it does not carry it
 constexpr double kStripHeights = 1.96;  // of the height, the length of a plate that bends under a point force
+constexpr double kBeside = 0.1;         // mm: wood that near lies against it
+constexpr double kStub = 3;             // thicknesses
 /// Walls are looked for up to each of these, mm; what is thinner than a share of it is a corner, or one of
 /// the rung before.
 struct Rung {
@@ -54,7 +56,7 @@ struct Level {
     const Loops* wood = nullptr;
     std::vector<std::pair<double, const Loops*>> over{};  ///< heights over it, and what stands there
     std::vector<Loops> thin{};
-    std::vector<bool> attached{};
+    std::vector<double> contact_mm{};
     Loops thick{};  ///< what is as thick as the last rung
 };
 
@@ -136,13 +138,13 @@ private:
             if (area(intersect(wall, *stands)) < area(wall) / 2) break;
             else top = z;
         if (!(top > levels_[from].z)) return;
-        rate({&levels_[from], &wall, levels_[from].attached[part]}, layer, top, push, worst);
+        rate({&levels_[from], &wall, levels_[from].contact_mm[part]}, layer, top, push, worst);
         for (std::size_t i = from; i-- > 0;) {
             const Level& below = levels_[i];
             if (area(intersect(wall, below.thick)) > kCovered * area(wall)) return;
             const std::size_t foot = under(below, wall);
             if (foot == below.thin.size()) return;
-            rate({&below, &below.thin[foot], below.attached[foot]}, layer, top, push, worst);
+            rate({&below, &below.thin[foot], below.contact_mm[foot]}, layer, top, push, worst);
         }
     }
     static std::size_t under(const Level& level, const Loops& wall) {
@@ -157,11 +159,13 @@ private:
     struct Foot {
         const Level* level;
         const Loops* piece;
-        bool attached;
+        double contact_mm;
     };
     void rate(const Foot& at, std::size_t layer, double top, const Push& push, Worst& worst) const {
         WallFoot foot = wall_foot(*at.piece);
-        foot.attached = at.attached;
+        foot.contact_mm = at.contact_mm;
+        // A bump, or a web as short as it is thick, is part of what it stands against.
+        if (at.contact_mm > 0 && foot.reach_mm() < kStub * foot.thickness_mm) return;
         const double height = top - at.level->z;
         // Roughing leaves its allowance on either side of the wall.
         WallFoot roughed = foot;
@@ -190,10 +194,16 @@ private:
 }  // namespace
 
 double WallFoot::stress_mpa(double force_n, double height_mm) const {
-    const double arm = attached ? std::min(height_mm, length_mm) : height_mm;
-    if (!(arm > 0) || !(force_n > 0)) return 0;
-    const double strip = std::min(length_mm, kStripHeights * arm) * thickness_mm * thickness_mm / 6;
-    return force_n * arm / std::min(strip, weakest_mm3);
+    if (!(height_mm > 0) || !(force_n > 0)) return 0;
+    const double section = thickness_mm * thickness_mm / 6;  // of a millimetre
+    if (contact_mm > 0 && reach_mm() < height_mm)
+        return force_n * reach_mm() / (std::min(height_mm, kStripHeights * reach_mm()) * section);
+    const double strip = std::min(length_mm, kStripHeights * height_mm) * section;
+    return force_n * height_mm / (contact_mm > 0 ? strip : std::min(strip, weakest_mm3));
+}
+
+double WallFoot::reach_mm() const {
+    return contact_mm > 0 ? length_mm / std::max(1.0, contact_mm / thickness_mm) : 0;
 }
 
 WallFoot wall_foot(const Loops& piece) {
@@ -204,9 +214,9 @@ WallFoot wall_foot(const Loops& piece) {
     return foot;
 }
 
-std::vector<Loops> thin_parts(const Loops& region, std::vector<bool>& attached) {
+std::vector<Loops> thin_parts(const Loops& region, std::vector<double>& contact_mm) {
     std::vector<Loops> parts;
-    attached.clear();
+    contact_mm.clear();
     for (const Rung& rung : kRungs) {
         const double r = rung.thickness / 2;
         // Grown by a little more than it shrank, so that no skin is left along straight borders.
@@ -214,7 +224,7 @@ std::vector<Loops> thin_parts(const Loops& region, std::vector<bool>& attached) 
         for (Loops& piece : Pieces(subtract(region, thick)).regions) {
             if (area(piece) < kLeastArea) continue;
             if (offset(piece, -rung.least_share * r, kArc).empty()) continue;
-            attached.push_back(!intersect(offset(piece, 3 * kArc, kArc), thick).empty());
+            contact_mm.push_back(area(intersect(offset(piece, kBeside, kArc), thick)) / kBeside);
             parts.push_back(std::move(piece));
         }
     }
@@ -226,7 +236,7 @@ std::vector<Diagnostic> weak_walls(Context& context, const Plan& plan,
     std::vector<Level> levels = levels_of(plan, wood);
     parallel_each(context, levels.size(), [&](std::size_t i) {
         Level& level = levels[i];
-        level.thin = thin_parts(*level.wood, level.attached);
+        level.thin = thin_parts(*level.wood, level.contact_mm);
         if (level.thin.empty()) return;
         const double r = kRungs.back().thickness / 2;
         level.thick = offset(offset(*level.wood, -r, kArc), r, kArc);
