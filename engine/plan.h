@@ -81,7 +81,7 @@ struct Operation {
     std::string file;  ///< name under nc/, "" until named
     double cutting_mm = 0, rapid_mm = 0, minutes = 0;
     double peak_force_n = 0, deflection_mm = 0;  ///< the largest of all its cuts
-    double wall_error_mm = 0;  ///< the most that the cutter, bending, leaves on a wall or takes from it
+    double wall_error_mm = 0;    ///< the most that the cutter, bending, leaves on a wall or takes from it
     double peak_torque_nmm = 0;  ///< over a turn, the largest of all its cuts
     double peak_power_w = 0;     ///< mean over a turn, the largest of all its cuts
     std::optional<std::array<double, 3>>

@@ -240,8 +240,7 @@ std::vector<DeepRun> deep_runs(const std::vector<Seen>& seen, const Operation& o
         const Load whole = load(s, 1);
         int passes = 0;
         if (whole.cutter > 1)
-            passes =
-                std::clamp(static_cast<int>(std::ceil(whole.cutter)) + round, 2, kMostPasses);
+            passes = std::clamp(static_cast<int>(std::ceil(whole.cutter)) + round, 2, kMostPasses);
         if (whole.wood > 1 && !lost.contains(column(s)))
             passes = std::max(passes, passes_for_wood(s, passes, load));
         if (passes == 0) continue;
