@@ -190,7 +190,6 @@ TEST(Layers, UniformTakesNoNoticeOfThePattern) {
     const LayerRequest r = request(50, {level(FeatureType::peak, 20), level(FeatureType::down_flat, 30)});
     const LayerPlacement uniform = place_layers(LayerStrategy::uniform, r);
     EXPECT_EQ(tops(uniform), (std::vector<double>{18.5, 37, 50}));
-    expect_placement(r, uniform);
     EXPECT_TRUE(has(uniform, "layers.type1"));
     EXPECT_TRUE(has(uniform, "layers.type2"));
     EXPECT_EQ(place_layers(LayerStrategy::printed, r).cost.broken_type2, 0);
