@@ -182,19 +182,20 @@ Runs raster_runs(const LayerCut& cut, const RasterFacets& facets, const RasterLi
         if (k < walk.stood && floor == walk.floor) return true;
         for (std::size_t w = 0; w < kTogether.size(); ++w) {
             if (k < walk.ask[w]) continue;
-            const auto [x, y] = placed(to_mm(k * step) + 0.5 * to_mm((kTogether[w] - 1) * step), to_mm(v));
+            const std::array<double, 2> at =
+                placed(to_mm(k * step) + 0.5 * to_mm((kTogether[w] - 1) * step), to_mm(v));
             if (std::any_of(floor_mills.begin(), floor_mills.end(), [&](const FloorMill& mill) {
-                    return mill.wide[w] &&
-                           !mill.wide[w]->stands_over(x, y, floor + kOnFloor - kRounding, &walk.met.flat);
+                    return mill.wide[w] && !mill.wide[w]->stands_over(
+                                               at[0], at[1], floor + kOnFloor - kRounding, &walk.met.flat);
                 })) {
                 walk.floor = floor, walk.stood = k + kTogether[w];
                 return true;
             }
             walk.ask[w] = k + kTogether[w];
         }
-        const auto [x, y] = placed(to_mm(k * step), to_mm(v));
+        const std::array<double, 2> at = placed(to_mm(k * step), to_mm(v));
         return std::any_of(floor_mills.begin(), floor_mills.end(), [&](const FloorMill& mill) {
-            return !mill.narrow->stands_over(x, y, floor + kOnFloor, &walk.met.flat);
+            return !mill.narrow->stands_over(at[0], at[1], floor + kOnFloor, &walk.met.flat);
         });
     };
     auto finished = [&](FloorWalk& walk, std::int32_t k, std::int32_t v,
