@@ -31,6 +31,8 @@ constexpr double kHolds = 1 - kAccuracy;  // of a limit, when the peaks are as r
 constexpr double kLeastRun = 20;          // mm that a faster feed must last
 constexpr int kMostPasses = 4;            // into which a cut is divided at once
 constexpr int kMostRounds = 6;            // of dividing
+constexpr double kMostAdded = 2;          // of an operation's way, that rounds after the first may add
+constexpr double kAlwaysAdded = 3000;     // mm that they may add in any case
 constexpr double kThinnerShell = 0.35;    // of a ball's lowest pass, from round to round
 
 /// A feed that a class of cuts may have, with what it bears there once that was asked.
@@ -413,6 +415,13 @@ double way_of(const Operation& op, std::uint32_t first, std::uint32_t last) {
     return way;
 }
 
+/// What the runs' passes add to the way, mm.
+double way_added(const Operation& op, const std::vector<DeepRun>& runs) {
+    double sum = 0;
+    for (const DeepRun& run : runs) sum += (run.passes - 1) * way_of(op, run.first, run.last);
+    return sum;
+}
+
 }  // namespace
 
 CutSegment cut_of(const CutStretch& stretch, const Tool& tool, const Job& job, double feed) {
@@ -462,7 +471,9 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
         const auto load = [&](const Seen& seen_here, int parted) { return choice.load(seen_here, parted); };
 
         std::size_t divided = 0, looked_at = 0;
-        double divided_way = 0, deepest = 0;
+        double divided_way = 0, deepest = 0, added = 0;
+        const double whole =
+            op.moves.empty() ? 0 : way_of(op, 1, static_cast<std::uint32_t>(op.moves.size() - 1));
         int passes = 0;
         std::optional<std::array<double, 3>> divided_at;
         before = slab;
@@ -476,7 +487,9 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Ov
             if (!job.cutting.adapt_stepdown || round == kMostRounds) break;
             const std::vector<DeepRun> runs = deep_runs(seen, op, tool, round, load);
             context.throw_if_cancelled();
-            if (runs.empty()) break;
+            // A slender ball in a narrow place would take hours to bend as little as it may: it is told.
+            added += way_added(op, runs);
+            if (runs.empty() || (round > 0 && added > kMostAdded * whole + kAlwaysAdded)) break;
             for (const DeepRun& run : runs) {
                 ++divided;
                 divided_way += way_of(op, run.first, run.last);
