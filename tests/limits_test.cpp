@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/forces/bent_cutter.h"
 #include "engine/forces/cuts.h"
@@ -57,6 +58,30 @@ TEST(Limits, ABallTakesThinShells) {
         EXPECT_LE(op.wall_error_mm, bending_limit(op, plan.job)) << deep;
         EXPECT_GT(op.wall_error_mm, 0);
     }
+}
+
+// Passes as thin as such a ball needs would be many times the way: it is told instead.
+TEST(Limits, ASlenderBallDoesNotTakeHours) {
+    Plan plan = plate();
+    plan.job.tools[2].stickout = 90;
+    Operation slots = slot(plan, OperationKind::finish, 3, 10, 14, 5000);
+    for (double y = 22; y < 80; y += 12) {
+        const Operation next = slot(plan, OperationKind::finish, 3, y, 14, 5000);
+        slots.moves.insert(slots.moves.end(), next.moves.begin(), next.moves.end());
+    }
+    const auto way = [](const Operation& op) {
+        double sum = 0;
+        for (std::size_t k = 1; k < op.moves.size(); ++k)
+            if (op.moves[k].feed != 0)
+                sum += std::hypot(to_mm(op.moves[k].x - op.moves[k - 1].x),
+                                  to_mm(op.moves[k].y - op.moves[k - 1].y));
+        return sum;
+    };
+    const double before = way(slots);
+    const std::vector<Diagnostic> found = rated(plan, {slots});
+    EXPECT_LE(way(plan.layers[0].operations[0]), 1.1 * (3 * before + 3000));
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_EQ(found[0].code, "cut.deflection");
 }
 
 TEST(Limits, AToolThatBendsInThreeProgramsIsToldOnce) {
