@@ -8,24 +8,13 @@
 #include "engine/forces/cuts.h"
 #include "engine/forces/feeds.h"
 #include "engine/forces/op_forces.h"
+#include "tests/support/plate.h"
 
 namespace slabwright {
 namespace {
 
-Move at(double x, double y, double z, std::uint32_t feed) {
-    return {to_units(x), to_units(y), to_units(z), feed};
-}
-
-Plan plate() {
-    Plan plan;
-    plan.stock_min = {0, 0};
-    plan.stock_max = {120, 80};
-    plan.layers.resize(1);
-    plan.layers[0].index = 1;
-    plan.layers[0].z_top = 18;
-    plan.layers[0].slab_thickness = 18;
-    return plan;
-}
+using test::at;
+using test::plate;
 
 Operation slot(const Plan& plan, OperationKind kind, int tool, double y, double z, std::uint32_t feed) {
     Operation op;
