@@ -1,5 +1,6 @@
 // The simulator on a part whose programs are written by hand: the good ones pass, and each corruption is
 // reported as what it is.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -569,6 +570,35 @@ TEST(Simulate, ArcsCutWhatTheirChordsCut) {
     EXPECT_NEAR(arcs.programs[1].cutting_mm, chords.programs[1].cutting_mm, 0.01);
     EXPECT_NEAR(arcs.programs[1].seconds, chords.programs[1].seconds, 0.02 * chords.programs[1].seconds);
     EXPECT_EQ(codes(read_few), codes(arcs));
+}
+
+// The text rounds an arc's end and its centre, each for itself, so that its radius at both ends differs. What
+// lies at the cutter's rim there has been cut all the same, and a retract takes none of it.
+TEST(Simulate, ARetractFromAnArcsEndTakesNothing) {
+    Block block;
+    block.input.stock_min = {-100, -100}, block.input.stock_max = {120, 120};
+    block.options.cell = 0.1;
+    block.input.tools[2] = {3, ToolKind::flat, "flat", 20,   60, 20,   60, 60, 2,
+                            0, 18000,          9000,   1500, 1,  10.0, 1};
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> place(-60, 80), angle(0, 2 * std::numbers::pi), radius(3, 40);
+    std::string text = kStart + "S12000 M3\nG0 X-200 Y-200 Z25\nF3000\n";
+    for (int k = 0; k < 80; ++k) {
+        const double x = place(random), y = place(random), r = radius(random), a = angle(random),
+                     b = a + 0.2 + angle(random) / 2;
+        text +=
+            fmt::format("G0 X{:.4f} Y{:.4f}\nG1 Z{:.4f}\n{} X{:.4f} Y{:.4f} I{:.4f} J{:.4f}\nG0 Z25\n",
+                        x + r * std::cos(a), y + r * std::sin(a), 11.9 - 0.1 * k, k % 2 == 0 ? "G3" : "G2",
+                        x + r * std::cos(b), y + r * std::sin(b), -r * std::cos(a), -r * std::sin(a));
+    }
+    Program p = read_gcode(text + "M5\nM2\n", "arcs");
+    ASSERT_EQ(p.arcs.size(), 80U);
+    p.file = "L1_02", p.planned_tool = 3, p.kind = OperationKind::finish;
+    block.rough() = p;
+    const SimulationReport report = block.run();
+    EXPECT_GT(report.programs[1].removed_mm3, 1000);
+    for (const Violation& v : report.violations)
+        EXPECT_FALSE(v.code == "rapid.through_stock" && v.file == "L1_02") << v.line << ": " << v.message;
 }
 
 // An arc is seen to leave the machine's travel though both its ends lie within it, and by how much.

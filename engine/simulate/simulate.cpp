@@ -696,7 +696,16 @@ private:
                     after = {steps[i + 1].x, steps[i + 1].y, steps[i + 1].z}, chain.after = &after;
                 tell(i, in_arc ? stock.cut(p.end, arcs[arc].arc, deep)
                                : stock.cut(p.end, from, to, deep, chain));
-                if (in_arc) cut_arcs = arc + 1;
+                if (in_arc) {
+                    cut_arcs = arc + 1;
+                    // An arc of one radius ends up to a rounding of the text beside where the text ends it.
+                    // What a rapid starts from has been cut there.
+                    const std::size_t next = arcs[arc].end;
+                    const ProgramStep& last = steps[next - 1];
+                    const Point3 there{last.x, last.y, last.z};
+                    if (next < steps.size() && steps[next].rapid())
+                        tell(i, stock.cut(p.end, there, there, deep));
+                }
             }
             auto follow = [&](double thick, double above, Extreme& extreme, std::uint32_t& line) {
                 if (low + above >= top) return;
