@@ -20,8 +20,7 @@ namespace {
 
 constexpr int kBandRows = 24;          // of the stock: bands are cut in parallel, and joined in their order
 constexpr double kLeastVolume = 1e-6;  // mm³ that a piece must take to count as cutting
-constexpr double kForceShare =
-    1e-4;  // of a piece's force that it may be wrong by: it is drawn, and read to a hundredth of a newton
+constexpr double kForceShare = 1e-3;   // of a piece's force that it may be wrong by: it is drawn
 
 /// What one piece took, before it is a depth and a width.
 struct Taken {

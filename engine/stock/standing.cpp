@@ -102,21 +102,6 @@ void Standing::rows_in_both(double radius, const std::array<double, 2>& a, const
     }
 }
 
-// Lowers the cells whose centres lie within `radius` of a, but not of b.
-void Standing::lower_in_first(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b,
-                              float z) {
-    rows_in_both(radius, a, a, [&](int j, int first, int last) {
-        float* const h = height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_);
-        const double y = y0_ + j * cell_, w2 = radius * radius - (y - b[1]) * (y - b[1]),
-                     w = w2 > 0 ? std::sqrt(w2) : -1;
-        const int from = static_cast<int>(std::clamp(std::ceil((b[0] - w - x0_) / cell_), -1.0, nx_ + 1.0)),
-                  to = static_cast<int>(std::clamp(std::floor((b[0] + w - x0_) / cell_), -1.0, nx_ + 1.0));
-        const bool parted = w >= 0 && from <= to;
-        for (int i = first; i <= (parted ? std::min(last, from - 1) : last); ++i) h[i] = std::min(h[i], z);
-        for (int i = parted ? std::max(first, to + 1) : last + 1; i <= last; ++i) h[i] = std::min(h[i], z);
-    });
-}
-
 void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, const std::array<double, 3>& to,
                    double core) {
     const std::array<double, 2> a{from[0], from[1]}, b{to[0], to[1]};
@@ -127,19 +112,21 @@ void Standing::cut(const Cutter& cutter, const std::array<double, 3>& from, cons
         // Each covered cell was covered at some place of the way, and no place is higher than its higher end.
         const auto z = static_cast<float>((l2 > 0 ? high : low) - top_ + kRounding);
         const bool level = from[2] == to[2], been = level && from == last_ && cutter.radius == last_radius_;
-        // Where it has been its core has been too, and has not cleared what is no longer under it.
         const double under = core > 0 ? core + d_ : 0;
-        if (under > 0 && been) lower_in_first(under, a, b, z);
+        const auto lower = [&](int j, int together, const RowSpans& spans) {
+            lower_spans(height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_),
+                        static_cast<std::size_t>(nx_), together, spans, z);
+        };
+        // Where it has been its core has been too, and has not cleared what is no longer under it: what the
+        // core has left on its way back from b to a. (All else of that way is cleared in any case.)
+        if (under > 0 && under < cutter.radius - d_ && been) each_spans(under, b, a, true, lower);
         under_core_.clear();
         if (under > 0 && !been)
             rows_in_both(under, a, b, [&](int j, int first, int last) {
                 const auto row = height_.begin() + static_cast<std::ptrdiff_t>(j) * nx_;
                 under_core_.insert(under_core_.end(), row + first, row + last + 1);
             });
-        each_spans(cutter.radius - d_, a, b, been, [&](int j, int together, const RowSpans& spans) {
-            lower_spans(height_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_),
-                        static_cast<std::size_t>(nx_), together, spans, z);
-        });
+        each_spans(cutter.radius - d_, a, b, been, lower);
         if (!under_core_.empty()) {
             auto kept = under_core_.cbegin();
             rows_in_both(under, a, b, [&](int j, int first, int last) {

@@ -66,8 +66,6 @@ private:
     template <class Row>
     void rows_in_both(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b,
                       Row&& row) const;
-    void lower_in_first(double radius, const std::array<double, 2>& a, const std::array<double, 2>& b,
-                        float z);
 
     double cell_, d_, x0_, y0_;  // x0_, y0_: the centre of cell (0, 0)
     double top_;                 // heights are kept relative to it

@@ -96,14 +96,21 @@ void RisingEnvelope::at(double z_top, float none, float* out) {
 
 void RisingEnvelope::covered_air(double z_bottom, float* out) {
     std::fill(out, out + above_.size(), 0.0F);
-    std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
-        return std::tie(a.column, a.z, a.winding) < std::tie(b.column, b.z, b.winding);
-    });
-    for (auto first = crossings_.begin(); first != crossings_.end();) {
-        const auto end = std::find_if(first, crossings_.end(),
-                                      [&](const Crossing& c) { return c.column != first->column; });
+    if (crossings_.empty()) return;
+    // By column, of which most have one or two: column c has [ends[c], ends[c + 1]).
+    std::vector<std::uint32_t> ends(above_.size() + 2, 0);
+    for (const Crossing& c : crossings_) ++ends[c.column + 2];
+    for (std::size_t c = 2; c < ends.size(); ++c) ends[c] += ends[c - 1];
+    std::vector<Crossing> sorted(crossings_.size());
+    for (const Crossing& c : crossings_) sorted[ends[c.column + 1]++] = c;
+    for (std::size_t column = 0; column < above_.size(); ++column) {
+        const auto first = sorted.begin() + ends[column], end = sorted.begin() + ends[column + 1];
+        if (first == end) continue;
+        std::sort(first, end, [](const Crossing& a, const Crossing& b) {
+            return std::tie(a.z, a.winding) < std::tie(b.z, b.winding);
+        });
         // From above: the winding number over the highest crossing is known.
-        std::int32_t winding = above_[first->column];
+        std::int32_t winding = above_[column];
         bool under_part = winding != 0;
         double air = 0, upper = 0;
         for (auto c = std::make_reverse_iterator(end); c != std::make_reverse_iterator(first); ++c) {
@@ -113,8 +120,7 @@ void RisingEnvelope::covered_air(double z_bottom, float* out) {
             upper = c->z;
         }
         if (winding == 0 && under_part) air += std::max(0.0, upper - z_bottom);
-        out[first->column] = static_cast<float>(air);
-        first = end;
+        out[column] = static_cast<float>(air);
     }
 }
 

@@ -23,6 +23,20 @@ struct Crossing {
     std::int32_t turns;
 };
 
+/// What a row's columns cross: as it is found, and by column.
+struct RowOfColumns {
+    std::vector<Crossing> found, sorted;
+    std::vector<std::uint32_t> ends;  ///< column c has [ends[c], ends[c + 1])
+
+    void by_column(std::size_t columns) {
+        ends.assign(columns + 2, 0);
+        sorted.resize(found.size());
+        for (const Crossing& c : found) ++ends[c.column + 2];
+        for (std::size_t c = 2; c < ends.size(); ++c) ends[c] += ends[c - 1];
+        for (const Crossing& c : found) sorted[ends[c.column + 1]++] = c;
+    }
+};
+
 class Columns {
 public:
     Columns(MeshView mesh, std::span<const double> borders, const ColumnGrid& grid)
@@ -31,16 +45,18 @@ public:
     }
 
     /// Gaps of a row by column, and from above in each.
-    void gaps(std::size_t row, std::vector<Crossing>& crossings, std::vector<FilledGap>& found) const {
-        crossings.clear();
+    void gaps(std::size_t row, RowOfColumns& of_row, std::vector<FilledGap>& found) const {
+        of_row.found.clear();
         for (std::size_t e = starts_[row]; e < starts_[row + 1]; ++e)
-            cross(entries_[e], grid_.y0 + static_cast<double>(row) * grid_.cell, crossings);
-        std::sort(crossings.begin(), crossings.end(), [](const Crossing& a, const Crossing& b) {
-            return std::tie(a.column, b.z, a.facet) < std::tie(b.column, a.z, b.facet);
-        });
-        for (auto c = crossings.begin(); c != crossings.end();) {
-            const auto end = std::find_if(c, crossings.end(),
-                                          [&](const Crossing& other) { return other.column != c->column; });
+            cross(entries_[e], grid_.y0 + static_cast<double>(row) * grid_.cell, of_row.found);
+        of_row.by_column(grid_.columns);
+        for (std::size_t column = 0; column < grid_.columns; ++column) {
+            const auto begin = of_row.sorted.begin();
+            auto c = begin + of_row.ends[column];
+            const auto end = begin + of_row.ends[column + 1];
+            std::sort(c, end, [](const Crossing& a, const Crossing& b) {
+                return std::tie(b.z, a.facet) < std::tie(a.z, b.facet);
+            });
             int winding = 0;
             for (; c != end; ++c) {
                 winding += c->turns;
@@ -147,8 +163,8 @@ std::vector<std::vector<FilledGap>> filled_gaps(Context& context, MeshView mesh,
     const MemoryCharge charge(context, mesh.size() * 16 + 4'000'000, "measuring undercuts");
     const Columns columns(mesh, borders, grid);
     parallel_for(context, rows.size(), kRows, [&](std::size_t begin, std::size_t end) {
-        std::vector<Crossing> crossings;
-        for (std::size_t row = begin; row < end; ++row) columns.gaps(row, crossings, rows[row]);
+        RowOfColumns of_row;
+        for (std::size_t row = begin; row < end; ++row) columns.gaps(row, of_row, rows[row]);
     });
     return rows;
 }
