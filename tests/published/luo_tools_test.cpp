@@ -13,23 +13,10 @@
 #include "kernels/mesh/mesh.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"
+#include "tests/published/luo_sample.h"
 
 namespace slabwright {
 namespace {
-
-Job luo_job() {
-    Job job;
-    job.tools = luo_library();
-    job.tolerances.cusp = 0.002 * kInch;  // from which .0445 in follows
-    job.tolerances.rough_cusp = 0.01 * kInch;
-    job.slabs.thicknesses = {0.75 * kInch};
-    job.slabs.length = 10 * kInch;  // "0.75 inch thick 10 × 8 inch MDF"
-    job.slabs.width = 8 * kInch;
-    job.slabs.facing_allowance = 0;
-    job.selection.compare = false;
-    job.selection.accessibility = AccessRule::printed;
-    return job;
-}
 
 // Where AR comes from: print's own tables 5.5 and 5.6, or their rule applied to this part.
 enum class Source { tables, printed };
@@ -52,20 +39,7 @@ protected:
     }
 
     ToolChoice choose(double z_bottom_in, double z_top_in) {
-        LayerJob layer;
-        layer.mesh = mesh.view();
-        layer.job = &job;
-        layer.z_bottom = z_bottom_in * kInch;
-        layer.z_top = z_top_in * kInch;
-        layer.slab_thickness = 0.75 * kInch;
-        const Box3 box = bounds(mesh.view());
-        const double dx = (job.slabs.length - (box.max.x - box.min.x)) / 2,
-                     dy = (job.slabs.width - (box.max.y - box.min.y)) / 2;
-        layer.stock_min = {box.min.x - dx, box.min.y - dy};
-        layer.stock_max = {box.max.x + dx, box.max.y + dy};
-        for (const Feature& f : features)
-            if (f.type == FeatureType::up_flat && f.z_low > layer.z_bottom && f.z_low < layer.z_top)
-                layer.flats.push_back({f.z_low, f.z_low});
+        const LayerJob layer = luo_layer(mesh, job, features, z_bottom_in, z_top_in);
         ToolChoice choice = select_tools(
             context, layer,
             GetParam() == Source::tables ? tables(z_bottom_in) : reach_ratio(context, layer, nullptr));
