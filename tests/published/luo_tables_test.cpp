@@ -132,7 +132,7 @@ protected:
 
 // Print's .75, .75 and .5 in, by print's own rules. The part here has the slot's floor at 1.70 in, where
 // table 6.3 has it: with MTmin at .20 in the boundary at 1.50 would lie exactly so much under it, which
-// single precision takes for too near and moves to 1.30.
+// the rounding of the model's coordinates makes too near: it moves to 1.30.
 TEST_F(LuoTables, Table53Layers) {
     job.layers.strategy = LayerStrategy::printed;
     job.bonding.accept_weak = true;
