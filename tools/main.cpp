@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, resume, report, inspect, repair, prepare, split, slice, sheets,
-// feed, bond, job. Errors are one line on stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, resume, report, inspect, repair, prepare, orient, split,
+// slice, sheets, feed, bond, job. Errors are one line on stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -13,18 +13,19 @@
 #include <cstdio>
 #include <cstring>
 #include <iostream>
-#include <map>
 #include <new>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "io/orient.h"
 #include "io/prepare.h"
 #include "io/slabwright.h"
 #include "io/ways_out.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
+#include "tools/plan_text.h"
 #include "tools/prepare_command.h"
 #include "tools/progress_bar.h"
 #include "tools/resume_command.h"
@@ -45,8 +46,9 @@ extern "C" void on_signal(int signal) {
 
 struct Options {
     PrepareOptions prepare;
-    std::string repair, stl, out, maps, access_maps, job_file, units, strategy, finder, device, library;
-    int threads = 0;
+    std::string orient, repair, stl, out, maps, access_maps, job_file, units, strategy, finder, device,
+        library;
+    int threads = 0, plans = 3;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
          quiet = false, defaults = false, weld_given = false, no_3d = false, rebuild = false;
@@ -74,98 +76,6 @@ void print(std::string_view text) {
     const std::string shown = terminal_text(text, false);
     const bool written = std::fwrite(shown.data(), 1, shown.size(), stdout) == shown.size();
     require_told(written && std::fflush(stdout) == 0);
-}
-
-std::string number(double value, int decimals) { return number_text(value, decimals); }
-
-std::string duration(double minutes) {
-    if (minutes < 1) return fmt::format("{:.0f} s", minutes * 60);
-    const long total = static_cast<long>(minutes + 0.5);
-    return total < 60 ? fmt::format("{} min", total) : fmt::format("{} h {:02} min", total / 60, total % 60);
-}
-
-/// One line on a finding.
-std::string told(const Diagnostic& d) {
-    std::string text = fmt::format("{}: {}", name(d.severity), d.message);
-    if (d.where)
-        text += fmt::format(" (x {} y {} z {})", number((*d.where)[0], 1), number((*d.where)[1], 1),
-                            number((*d.where)[2], 1));
-    return text + '\n';
-}
-
-/// What the person at the router needs to know before the build: how long, what to load, what to mind.
-std::string summary(const Plan& plan, const std::string& out) {
-    const Totals& t = plan.totals;
-    std::string text = fmt::format(
-        "{}: {} {}, {} programs, {} in all (cutting {}, bonding {}, tool changes {})\n", out, t.layers,
-        t.layers == 1 ? "layer" : "layers", t.operations, duration(t.build_minutes),
-        duration(t.cutting_minutes), duration(t.bonding_minutes), duration(t.tool_change_minutes));
-    text += fmt::format("stock   {} x {} mm, {} kg with the base board\n",
-                        number(plan.stock_max[0] - plan.stock_min[0], 1),
-                        number(plan.stock_max[1] - plan.stock_min[1], 1), number(t.stack_mass_kg, 1));
-    std::map<double, int> slabs;
-    for (const Layer& layer : plan.layers) slabs[layer.slab_thickness / layer.slabs] += layer.slabs;
-    for (const auto& [thickness, count] : slabs)
-        text += fmt::format("slabs   {} of {} mm {}\n", count, number(thickness, 3), plan.job.material.name);
-    for (const Tool& tool : plan.job.tools) {
-        double minutes = 0;
-        int programs = 0;
-        for (const Layer& layer : plan.layers)
-            for (const Operation& operation : layer.operations)
-                if (operation.tool == tool.number) minutes += operation.minutes, ++programs;
-        if (programs > 0)
-            text += fmt::format("tool    T{} {}, {} in {} {}\n", tool.number, tool.name, duration(minutes),
-                                programs, programs == 1 ? "program" : "programs");
-    }
-    for (const Layer& layer : plan.layers)
-        text += fmt::format("layer   {}: {} to {} mm, {}\n", layer.index, number(layer.z_bottom, 3),
-                            number(layer.z_top, 3), layer.reason);
-    for (const Severity severity : {Severity::error, Severity::warning}) {
-        // The same finding can come a hundred times; the first few of each code are told, plan.json holds
-        // all.
-        std::map<std::string, int> seen;
-        for (const Diagnostic& d : plan.diagnostics) {
-            if (d.severity != severity || ++seen[d.code] > 5) continue;
-            text += told(d);
-        }
-        for (const auto& [code, count] : seen)
-            if (count > 5)
-                text += fmt::format("{}: {} more of {} in plan.json\n", name(severity), count - 5, code);
-    }
-    return text;
-}
-
-/// "makes the part", or what of it is not made.
-std::string makes(const VerifyResult& result) {
-    if (!result.passed) return "does NOT make the part";
-    if (result.is_whole()) return "makes the part";
-    std::string text = "makes all but";
-    if (result.unmade_mm3 >= 1)
-        text += fmt::format(" {} that stay filled under overhangs (up to {} mm high)",
-                            result.unmade_mm3 < 1000 ? number(result.unmade_mm3, 0) + " mm³"
-                                                     : number(result.unmade_mm3 / 1000, 0) + " cm³",
-                            number(result.unmade_mm, 2));
-    if (result.unreachable_mm2 > 0.01 * result.pattern_mm2)
-        text += fmt::format(
-            "{} {} mm² that no tool reaches ({} % of the pattern seen from above, up to {} mm)",
-            result.unmade_mm3 >= 1 ? " and" : "", number(result.unreachable_mm2, 0),
-            number(100 * result.unreachable_mm2 / result.pattern_mm2, 1), number(result.unreachable_mm, 2));
-    return text;
-}
-
-/// What the simulation of the programs says.
-std::string verdict(const VerifyResult& result, const std::string& out) {
-    std::string text =
-        fmt::format("{}: {}, deepest gouge {:.4f} mm, simulated at {:.3f} mm, programs run {}\n", out,
-                    makes(result), result.gouge_mm, result.cell_mm, duration(result.minutes));
-    constexpr std::size_t shown = 20;  // verify.json holds them all
-    for (std::size_t i = 0; i < std::min(shown, result.violations.size()); ++i)
-        text += fmt::format("{}: {}\n", result.violations[i].code, result.violations[i].message);
-    if (result.violations.size() > shown)
-        text += fmt::format("{} more in verify.json\n", result.violations.size() - shown);
-    constexpr std::size_t few = 3;
-    for (std::size_t i = 0; i < std::min(few, result.advice.size()); ++i) text += told(result.advice[i]);
-    return text;
 }
 
 Job job_of(const Options& options) {
@@ -224,14 +134,34 @@ void with_context(const Options& options, Body&& body) {
     if (!options.quiet) print(output);
 }
 
+void run_orient(const Options& options) {
+    const Job job = job_of(options);
+    with_context(options, [&](Context& context) {
+        const OrientModel model =
+            orient_model(context, options.stl, job, static_cast<std::size_t>(options.plans));
+        return options.json ? orient_json(model) : orient_text(model);
+    });
+}
+
 /// Returns the exit code: whether the programs make the part, as far as that was asked.
 int run_plan(const Options& options) {
-    const Job job = job_of(options);
+    if (options.orient == "report") {
+        run_orient(options);
+        return 0;
+    }
+    Job job = job_of(options);
     require_replaceable(options.out);  // before an hour of planning, not after it
     VerifyResult found;
     found.passed = true;
     std::optional<Error> refused;  // for undercuts: what would help is told beside it
     with_context(options, [&](Context& context) {
+        std::string lies;
+        if (options.orient == "auto") {
+            job = oriented(job, orient_model(context, options.stl, job));
+            const std::vector<double>& turn = job.prepare.turn;
+            lies =
+                fmt::format("{}: turned by {:g} {:g} {:g} degrees\n", options.stl, turn[0], turn[1], turn[2]);
+        }
         if (!options.no_verify) context.share_progress(0, kPlanningShare);
         std::shared_ptr<Pattern> pattern = read_pattern(context, options.stl, job);
         Plan result;
@@ -248,12 +178,12 @@ int run_plan(const Options& options) {
             pattern.reset();
             write(context, result, options.out, options.stl);
             return options.json ? plan_summary_json(result, options.out, nullptr)
-                                : summary(result, options.out);
+                                : lies + summary(result, options.out);
         }
         found = write_proven(context, result, options.out, pattern, options.keep_failed, options.cell);
         if (!found.written) return std::string();
         return options.json ? plan_summary_json(result, options.out, &found)
-                            : summary(result, options.out) + verdict(found, options.out);
+                            : lies + summary(result, options.out) + verdict(found, options.out);
     });
     if (refused) return complain(*refused, false);
     const std::span<const Error> refusals(found.refusals);
@@ -340,8 +270,9 @@ void run_repair(const Options& options) {
 }
 
 void run_prepare(const Options& options) {
-    const Job job = job_of(options);
+    Job job = job_of(options);
     with_context(options, [&](Context& context) {
+        if (options.orient == "auto") job = oriented(job, orient_model(context, options.stl, job));
         const PreparedModel model = prepare_model(context, options.stl, job, options.out);
         return options.json ? prepare_json(model, options.out) : prepare_text(model, options.out);
     });
@@ -407,6 +338,20 @@ CLI::App* add_prepare_command(CLI::App& app, Options& options) {
         app.add_subcommand("prepare", "turn, scale, shrink, mirror or shift a model, or give it a skin");
     command->add_option("MODEL", options.stl, "the model")->required();
     command->add_option("-o,--out", options.out, "the model in millimetres: .stl or .3mf")->required();
+    command->add_option("--orient", options.orient, "auto: laid on the side on which it is best built")
+        ->check(CLI::IsMember({"auto"}));
+    add_common(*command, options);
+    return command;
+}
+
+CLI::App* add_orient_command(CLI::App& app, Options& options) {
+    CLI::App* command =
+        app.add_subcommand("orient",
+                           "on which side a model is best built: what each leaves unmade, its layers, "
+                           "foot and time");
+    command->add_option("MODEL", options.stl, "the model")->required();
+    command->add_option("--plans", options.plans, "how many of the best are planned, for their time")
+        ->check(CLI::Range(0, 20));
     add_common(*command, options);
     return command;
 }
@@ -478,6 +423,11 @@ int command(int argc, char** argv) {
         ->check(CLI::IsMember({"optimal", "printed", "combined"}));
     plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")
         ->check(CLI::IsMember({"exact", "halving", "both"}));
+    plan_command
+        ->add_option("--orient", options.orient,
+                     "auto: laid on the side on which it is best built; report: only what each side would "
+                     "give, as `orient` tells it")
+        ->check(CLI::IsMember({"auto", "report"}));
     plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
     plan_command->add_flag("--accept-weak-joints", options.accept_weak, "plan although a joint may not hold");
     plan_command->add_option("--access-maps", options.access_maps,
@@ -522,6 +472,7 @@ int command(int argc, char** argv) {
     add_common(*slice_command, options);
 
     CLI::App* prepare_command = add_prepare_command(app, options);
+    CLI::App* orient_command = add_orient_command(app, options);
     SplitOptions split_options;
     CLI::App* split_command = app.add_subcommand("split", "cut a model into two halves, capped and dowelled");
     split_command->add_option("MODEL", options.stl, "the model")->required();
@@ -570,6 +521,7 @@ int command(int argc, char** argv) {
         else if (*inspect_command) run_inspect(options);
         else if (*repair_command) run_repair(options);
         else if (*prepare_command) run_prepare(options);
+        else if (*orient_command) run_orient(options);
         else if (*split_command) run_split(options, split_options);
         else if (*slice_command) run_slice(options);
         else if (*sheets_command)

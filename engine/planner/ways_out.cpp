@@ -20,23 +20,6 @@ constexpr double kThinWood = 0.2 * kInch;  // mm above a boundary, where the job
 constexpr int kLevels = 31;                // at which the widest section is looked for
 constexpr std::size_t kMostWays = 4;
 
-Mesh turned_mesh(MeshView mesh, const std::array<double, 3>& degrees) {
-    const AffineMap map = turned(degrees);
-    Mesh result;
-    result.facets.assign(mesh.facets.begin(), mesh.facets.end());
-    result.neighbours.assign(mesh.neighbours.begin(), mesh.neighbours.end());
-    result.roles.assign(mesh.roles.begin(), mesh.roles.end());
-    result.vertices.resize(mesh.vertices.size());
-    double lowest = kUnbounded;
-    for (const Vec3f& v : mesh.vertices) lowest = std::min(lowest, map.of(to_double(v))[2]);
-    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-        const Point3 p = map.of(to_double(mesh.vertices[v]));
-        result.vertices[v] = {static_cast<float>(p[0]), static_cast<float>(p[1]),
-                              static_cast<float>(p[2] - lowest)};
-    }
-    return result;
-}
-
 /// The middle of the widest level sections.
 double widest_level(Context& context, MeshView mesh, double height) {
     std::vector<Plane> planes;
@@ -53,6 +36,23 @@ Lying both(const Lying& a, const Lying& b) {
 }
 
 }  // namespace
+
+Mesh laid_down(MeshView mesh, const std::array<double, 3>& degrees) {
+    const AffineMap map = turned(degrees);
+    Mesh result;
+    result.facets.assign(mesh.facets.begin(), mesh.facets.end());
+    result.neighbours.assign(mesh.neighbours.begin(), mesh.neighbours.end());
+    result.roles.assign(mesh.roles.begin(), mesh.roles.end());
+    result.vertices.resize(mesh.vertices.size());
+    double lowest = kUnbounded;
+    for (const Vec3f& v : mesh.vertices) lowest = std::min(lowest, map.of(to_double(v))[2]);
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+        const Point3 p = map.of(to_double(mesh.vertices[v]));
+        result.vertices[v] = {static_cast<float>(p[0]), static_cast<float>(p[1]),
+                              static_cast<float>(p[2] - lowest)};
+    }
+    return result;
+}
 
 Lying lying(Context& context, MeshView mesh, const Job& job) {
     const Box3 box = bounds(context, mesh);
@@ -97,7 +97,7 @@ std::vector<WayOut> ways_out(Context& context, MeshView mesh, const MeshReport& 
         {{180, 0, 0}, {90, 0, 0}, {-90, 0, 0}, {0, 90, 0}, {0, -90, 0}}};
     for (const std::array<double, 3>& side : sides) {
         context.throw_if_cancelled();
-        keep({side, std::nullopt, lying(context, turned_mesh(mesh, side).view(), job)});
+        keep({side, std::nullopt, lying(context, laid_down(mesh, side).view(), job)});
     }
     const Box3 box = bounds(context, mesh);
     std::vector<CutPlane> planes{

@@ -24,6 +24,9 @@ struct Lying {
 /// @param mesh a solid on z = 0. @throws as find_features() and place_layers_optimal()
 [[nodiscard]] Lying lying(Context& context, MeshView mesh, const Job& job);
 
+/// The mesh turned about the origin and set down on z = 0. @param degrees as PrepareJob::turn
+[[nodiscard]] Mesh laid_down(MeshView mesh, const std::array<double, 3>& degrees);
+
 /// One way: turned, or cut by a plane into halves that are built cut face down.
 struct WayOut {
     std::optional<std::array<double, 3>> turn;  ///< degrees, as PrepareJob::turn
