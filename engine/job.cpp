@@ -211,6 +211,48 @@ double max_layer_thickness(const Job& job) {
     return std::min(slab - job.slabs.facing_allowance, max_bonded_layer_thickness(job));
 }
 
+bool says_rounding(Post post) {
+    switch (post) {
+        case Post::linuxcnc:
+        case Post::haas:
+        case Post::siemens:
+        case Post::heidenhain:
+            return true;
+        case Post::fanuc:
+        case Post::grbl:
+        case Post::mach:
+        case Post::iso:
+            return false;
+    }
+    return false;
+}
+
+bool knows_tool_lengths(Post post) { return post != Post::grbl; }
+
+std::string program_file(Post post, const std::string& stem) {
+    switch (post) {
+        case Post::linuxcnc:
+            return stem + ".ngc";
+        case Post::fanuc:
+        case Post::haas:
+        case Post::iso:
+            return stem + ".nc";
+        case Post::grbl:
+            return stem + ".gcode";
+        case Post::mach:
+            return stem + ".tap";
+        case Post::siemens:
+            return "_" + stem + ".mpf";
+        case Post::heidenhain:
+            return stem + ".h";
+    }
+    return stem;
+}
+
+double rough_blend(const Job& job) {
+    return says_rounding(job.machine.post) ? rough_blend(job.cutting) : kJunction;
+}
+
 double rough_blend(const Cutting& cutting) {
     return std::max(kJunction, std::min(cutting.rough_blend,
                                         std::min(cutting.wall_allowance, cutting.floor_allowance) / 3));

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <map>
 #include <set>
 
 #include "engine/base_board.h"
@@ -142,6 +143,17 @@ void read_programs(Context& context, const PlannedFolder& folder, const FolderRe
         of_programs[k] = check_program(programs[k], folder.sayings[present[k]],
                                        tool == tools.end() ? nullptr : &*tool, folder.build.job.machine);
     });
+    std::map<int, std::string> numbers;
+    for (std::size_t k = 0; k < present.size(); ++k) {
+        const Program& program = programs[k];
+        if (program.number == 0) continue;
+        const auto [other, first] = numbers.emplace(program.number, program.file);
+        if (!first)
+            of_programs[k].push_back(
+                {"program.number",
+                 fmt::format("is O{}, as {} is: the control would keep one of them", program.number, other->second),
+                 program.file, 0, {}, 0});
+    }
     for (const std::vector<Violation>& found : of_programs)
         violations.insert(violations.end(), found.begin(), found.end());
 }
@@ -173,9 +185,12 @@ Verification verify_folder(Context& context, const std::string& directory, const
     Verification result;
     result.input = folder.simulation;
     SimulationInput& input = result.input;
-    const fs::path table = out / "tool.tbl";
-    std::vector<Violation> violations = check_tool_table(
-        read_file(table, "verify.tool_table", kMostToolTableBytes), table.string(), input.tools);
+    std::vector<Violation> violations;
+    if (job.machine.post == Post::linuxcnc) {  // the others' tables are kept at the control
+        const fs::path table = out / "tool.tbl";
+        violations = check_tool_table(read_file(table, "verify.tool_table", kMostToolTableBytes),
+                                      table.string(), input.tools);
+    }
     read_programs(context, folder, refusal, input.programs, violations);
     find_strangers(folder, violations);
     BuildPlan build = folder.build;

@@ -5,7 +5,11 @@
 
 namespace slabwright {
 
-/// Names every operation's program, "L003_02_rough_T2.ngc": layer, order within it, kind and tool, with
+/// What a tool_change says of the tool's length for a control that keeps none (knows_tool_lengths): the
+/// operator brings the new tip to where the last tool's was touched off.
+inline constexpr const char* kTouchOffTool = "touch off";
+
+/// Names every operation's program, "L003_02_rough_T2.ngc" (program_file): layer, order within it, kind and tool, with
 /// widths such that the names sort in the order of execution.
 void name_programs(Plan& plan);
 
