@@ -128,7 +128,7 @@ Dialect grbl() {
     d.forbidden = "?!~$";
     d.head = "{unit} G17 G90 G94 G40 G49 G80\nG61\nG54\nT{tool}\nS{speed} M3\nG4 P{dwell}\n";
     d.notes =
-        "before the start: tool {tool} in the spindle, its tip touched off\n$11=0.02 at most, laser mode off";
+        "before the start: tool {tool} in the spindle, its tip touched off\nsetting 11 at 0.02 mm at most, laser mode (32) off";
     d.first = "G0 Z{z}\n";
     d.end = "M5\nM2\n";
     d.changes_tools = false;
