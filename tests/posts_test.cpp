@@ -344,6 +344,11 @@ TEST(Posts, AnotherDialectIsToldByName) {
                         ADD_FAILURE() << name_of(post, units) << " passes as "
                                       << name_of(other, other_units);
                     } catch (const Error& error) {
+                        if (post == other) {  // one of the wrong unit
+                            EXPECT_EQ(error.code(), post == Post::heidenhain ? "gcode.units"
+                                                                             : "gcode.left_in_force");
+                            continue;
+                        }
                         EXPECT_EQ(error.code(), "program.dialect");
                         EXPECT_EQ(error.message(), "is a program for " + name_of(post, units) +
                                                        " where the plan's are for " +

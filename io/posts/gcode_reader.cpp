@@ -190,7 +190,7 @@ std::string other_dialect(std::string_view text, const Dialect& expected) {
     for (const LengthUnit units : {expected.units, expected.inch() ? LengthUnit::mm : LengthUnit::inch})
         for (const Post post : {Post::linuxcnc, Post::fanuc, Post::haas, Post::grbl, Post::mach, Post::iso,
                                 Post::siemens, Post::heidenhain}) {
-            if (post == expected.post && units == expected.units) continue;
+            if (post == expected.post) continue;  // whose refusal tells of a wrong unit itself
             try {
                 (void)read_program_text(text, "", dialect_of(post, units));
                 return in_words(post, units);

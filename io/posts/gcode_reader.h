@@ -45,7 +45,7 @@ struct GcodeLimits {
 [[nodiscard]] Program read_program_text(std::string_view text, const std::string& file,
                                         const Dialect& dialect, const GcodeLimits& limits = {});
 
-/// Which other dialect takes the whole text, as the job's words name it ("haas", "fanuc in inch"); "" where
+/// Which other control's dialect takes the whole text, as the job's words name it ("haas", "fanuc in inch"); "" where
 /// none does.
 [[nodiscard]] std::string other_dialect(std::string_view text, const Dialect& expected);
 
