@@ -124,8 +124,8 @@ struct Machine {
     Frame frame = Frame::automatic;
     Post post = Post::linuxcnc;
     LengthUnit units = LengthUnit::mm;  ///< of the programs
-    double base_board_thickness = 19;  ///< the sacrificial board under the first layer
-    double base_board_cut = -1;        ///< how deep it may be cut; negative: the finish tool's overrun
+    double base_board_thickness = 19;   ///< the sacrificial board under the first layer
+    double base_board_cut = -1;         ///< how deep it may be cut; negative: the finish tool's overrun
 };
 
 struct Bonding {

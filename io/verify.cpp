@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <map>
+#include <numbers>
 #include <set>
 
 #include "engine/base_board.h"
@@ -149,10 +149,13 @@ void read_programs(Context& context, const PlannedFolder& folder, const FolderRe
         if (program.number == 0) continue;
         const auto [other, first] = numbers.emplace(program.number, program.file);
         if (!first)
-            of_programs[k].push_back(
-                {"program.number",
-                 fmt::format("is O{}, as {} is: the control would keep one of them", program.number, other->second),
-                 program.file, 0, {}, 0});
+            of_programs[k].push_back({"program.number",
+                                      fmt::format("is O{}, as {} is: the control would keep one of them",
+                                                  program.number, other->second),
+                                      program.file,
+                                      0,
+                                      {},
+                                      0});
     }
     for (const std::vector<Violation>& found : of_programs)
         violations.insert(violations.end(), found.begin(), found.end());

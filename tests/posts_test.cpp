@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
 #include <set>
@@ -14,20 +15,29 @@
 #include <vector>
 
 #include "engine/schedule/schedule.h"
+#include "engine/simulate/build_replay.h"
 #include "io/posts/dialect.h"
 #include "io/posts/gcode_reader.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/program_check.h"
 #include "io/posts/program_grid.h"
+#include "io/posts/tool_table.h"
 #include "io/read/planned_folder.h"
+#include "io/read/sequence_reader.h"
+#include "io/resume.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
+#include "io/write/sequence_json.h"
 #include "kernels/errors.h"
+#include "tests/support/block_build.h"
 #include "tests/support/files.h"
+#include "tests/support/rs274.h"
+#include "tests/support/schema.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
+using slabwright::support::schema_complaint;
 using slabwright::support::slurp;
 using slabwright::support::spit;
 using slabwright::support::TemporaryFolder;
@@ -77,8 +87,8 @@ std::string text_of(const Plan& plan) {
 /// @returns what differs, "" where nothing does
 std::string difference(const Plan& plan, const Layer& layer, const Operation& op) {
     const Dialect dialect = dialect_of(plan.job.machine);
-    const Program program = read_program_text(program_text(plan, layer, op), op.file, dialect,
-                                              gcode_limits(plan.job.tolerances));
+    const Program program =
+        read_program_text(program_text(plan, layer, op), op.file, dialect, gcode_limits(plan.job.tolerances));
     if (program.tool != op.tool || std::abs(program.spindle_rpm - op.spindle_rpm) > 0.5)
         return "another tool or speed";
     const std::vector<std::uint32_t> lines = move_lines(plan, layer, op);
@@ -117,7 +127,7 @@ std::string difference(const Plan& plan, const Layer& layer, const Operation& op
     }
     for (const ProgramArc& arc : program.arcs) {
         const auto at = std::find(lines.begin(), lines.end(), program.steps[arc.begin].line) - lines.begin();
-        const Move &from = op.moves[static_cast<std::size_t>(at) - 1];
+        const Move& from = op.moves[static_cast<std::size_t>(at) - 1];
         const ArcShape shape = arc_shape(from, op.moves[static_cast<std::size_t>(at)]);
         if (std::max(std::abs(shape.x - arc.arc.x), std::abs(shape.y - arc.arc.y)) > kNear)
             return "an arc about another centre";
@@ -139,7 +149,7 @@ std::string difference(const Plan& plan, const Layer& layer, const Operation& op
 }
 
 /// Moves that begin and end as a program must, arcs of every size among them, down to a few tenths of µm.
-std::vector<Move> random_moves(std::mt19937& random, std::size_t count) {
+std::vector<Move> random_moves(std::mt19937& random, std::size_t count, double least_exponent = 0) {
     const auto pick = [&](int low, int high) {
         return std::uniform_int_distribution<int>(low, high)(random);
     };
@@ -150,7 +160,7 @@ std::vector<Move> random_moves(std::mt19937& random, std::size_t count) {
     std::vector<Move> moves{{pick(-500000, 500000), pick(-500000, 500000), kClearance, 0}};
     Move at = moves[0];
     for (std::size_t n = 0; n < count; ++n) {
-        const double size = std::pow(10, share(0, 5.5));
+        const double size = std::pow(10, share(least_exponent, 5.5));
         at.i = at.j = 0;
         at.feed = pick(0, 5) == 0 ? 0 : static_cast<std::uint32_t>(pick(1, 6) * 1500 - pick(0, 3));
         if (pick(0, 2) == 0 && at.feed != 0) {
@@ -184,8 +194,8 @@ std::string name_of(Post post, LengthUnit units) { return in_words(post, units);
 std::string verdict(const Plan& plan, const std::string& text) {
     const Operation& op = plan.layers[0].operations[0];
     try {
-        const Program program = read_program_text(text, op.file, dialect_of(plan.job.machine),
-                                                  gcode_limits(plan.job.tolerances));
+        const Program program =
+            read_program_text(text, op.file, dialect_of(plan.job.machine), gcode_limits(plan.job.tolerances));
         ProgramPlan said;
         said.spindle_rpm = op.spindle_rpm;
         said.blend = op.blend;
@@ -286,7 +296,8 @@ TEST(Posts, ProgramsOfPartsReadBackTheSame) {
     }
     for (const std::string& part : parts) {
         Context context;
-        Plan made = plan(context, PatternSource(part), job_from_toml("allow_undercut = true\n[bonding]\naccept_weak = true\n", "t"));
+        Plan made = plan(context, PatternSource(part),
+                         job_from_toml("allow_undercut = true\n[bonding]\naccept_weak = true\n", "t"));
         for (const Post post : kPosts)
             for (const LengthUnit units : kUnits) {
                 made.job.machine.post = post;
@@ -316,8 +327,8 @@ TEST(Posts, EveryPlanPassesItsOwnProof) {
             const PatternSource source(kModels + "half-sphere.stl");
             const Job job = job_for(post, units);
             const VerifyResult result = write_verified(context, plan(context, source, job), out, source, 1);
-            EXPECT_TRUE(result.passed) << name_of(post, units)
-                                       << (result.violations.empty() ? "" : result.violations[0].message);
+            EXPECT_TRUE(result.passed)
+                << name_of(post, units) << (result.violations.empty() ? "" : result.violations[0].message);
             EXPECT_EQ(std::filesystem::exists(out + "/tool.tbl"), post == Post::linuxcnc);
             // Its last program cut short is told, whoever it is for.
             std::vector<std::string> files;
@@ -331,6 +342,61 @@ TEST(Posts, EveryPlanPassesItsOwnProof) {
         }
 }
 
+TEST(Posts, ALayerIsMadeAgainInEachDialect) {
+    for (const Post post : kPosts) {
+        const TemporaryFolder folder;
+        const std::string out = folder / "out";
+        Context context;
+        const Plan made =
+            plan(context, PatternSource(kModels + "half-sphere.stl"), job_for(post, LengthUnit::inch));
+        write(context, made, out);
+        EXPECT_EQ(schema_complaint(slurp(out + "/plan.json"), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
+                  "");
+        EXPECT_EQ(
+            schema_complaint(slurp(out + "/sequence.json"), SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
+            "");
+        int after = 0;  // into layer 2
+        for (const SequenceStep& step : made.sequence)
+            if (step.layer == 2 && step.action == "face") after = step.id;
+        const ResumeStatus status = resume_build(context, out, {after, 1, 1'795'617'730});
+        ASSERT_EQ(status.programs.size(), 2u) << name_of(post, LengthUnit::mm);
+        EXPECT_EQ(status.programs[0], "resume_001/nc/" + program_file(post, "F001_L002_face_off_T1"));
+        EXPECT_EQ(schema_complaint(slurp(out + "/resume_001/sequence.json"),
+                                   SLABWRIGHT_SOURCE_DIR "/io/sequence.schema.json"),
+                  "");
+        // What has not run yet is read and proven again each time.
+        (void)resume_build(context, out, {{}, {}, 1'795'617'790});
+        spit(out + "/" + status.programs[0], slurp(out + "/nc/" + made.layers[0].operations[0].file));
+        EXPECT_THROW((void)resume_build(context, out, {{}, {}, 1'795'617'790}), Error);
+    }
+}
+
+TEST(Posts, WhereTheControlKeepsNoLengthsTheSequenceSaysWhoDoes) {
+    for (const Post post : kPosts) {
+        Job job;
+        job.machine.post = post;
+        const Plan plan = support::block(job, {});
+        nlohmann::json sequence = nlohmann::json::parse(sequence_json(plan));
+        const BuildPlan build = support::stated(plan);
+        ASSERT_TRUE(replay_build(build, read_sequence(sequence.dump())).empty());
+        int said = 0;
+        for (nlohmann::json& step : sequence["steps"])
+            if (step.contains("length")) {
+                step["length"] = "keep";
+                ++said;
+            }
+        EXPECT_EQ(said > 0, post == Post::grbl);
+        std::vector<Violation> found = replay_build(build, read_sequence(sequence.dump()));
+        EXPECT_EQ(found.empty(), post != Post::grbl);
+        if (found.empty()) continue;
+        EXPECT_EQ(found[0].code, "sequence.tool_length") << found[0].message;
+        for (nlohmann::json& step : sequence["steps"]) step.erase("length");
+        found = replay_build(build, read_sequence(sequence.dump()));
+        ASSERT_FALSE(found.empty());
+        EXPECT_EQ(found[0].code, "sequence.value") << found[0].message;
+    }
+}
+
 TEST(Posts, AnotherDialectIsToldByName) {
     for (const Post post : kPosts)
         for (const LengthUnit units : kUnits) {
@@ -341,12 +407,11 @@ TEST(Posts, AnotherDialectIsToldByName) {
                     const Plan expecting = plan_with(other, other_units, square());
                     try {
                         (void)read_planned_program(text, "nc/x", expecting.job);
-                        ADD_FAILURE() << name_of(post, units) << " passes as "
-                                      << name_of(other, other_units);
+                        ADD_FAILURE() << name_of(post, units) << " passes as " << name_of(other, other_units);
                     } catch (const Error& error) {
                         if (post == other) {  // one of the wrong unit
-                            EXPECT_EQ(error.code(), post == Post::heidenhain ? "gcode.units"
-                                                                             : "gcode.left_in_force");
+                            EXPECT_EQ(error.code(),
+                                      post == Post::heidenhain ? "gcode.units" : "gcode.left_in_force");
                             continue;
                         }
                         EXPECT_EQ(error.code(), "program.dialect");
@@ -477,6 +542,63 @@ TEST(Posts, EveryLineLostIsToldOrDoesNothing) {
             at = end;
         }
     }
+}
+
+/// A program as LinuxCNC's interpreter takes it: lines that it has other words for are left out.
+std::string for_rs274(std::string text, Post post, LengthUnit units) {
+    const auto replace = [&](const std::string& from, const std::string& to) {
+        const std::size_t at = text.find(from);
+        ASSERT_NE(at, std::string::npos) << in_words(post, units) << ": " << from;
+        text.replace(at, from.size(), to);
+    };
+    const bool inch = units == LengthUnit::inch;
+    if (post == Post::fanuc) replace("O0201\n", "");
+    if (post == Post::haas) replace("O00201\n", "");
+    if (post == Post::haas) replace(inch ? "G187 P2 E0.000787" : "G187 P2 E0.02", "G64");
+    if (post == Post::iso) replace("G4 X3.", "G4 P3.");
+    if (post == Post::grbl) replace("T2\n", "T2 M6\n");
+    if (post == Post::siemens) {
+        replace(inch ? "G700" : "G710", inch ? "G20" : "G21");
+        replace(inch ? "G641 ADIS=0.000787 ADISPOS=0.000787" : "G641 ADIS=0.02 ADISPOS=0.02", "G64");
+        replace("D1\n", "G43 H2\n");
+        replace("G4 F3", "G4 P3");
+    }
+    return text;
+}
+
+TEST(Posts, AnIndependentInterpreterMovesWhereTheEngineSaid) {
+    // All but HEIDENHAIN's are RS-274 in their motions. Radii of a µm, which no path has, are none to it.
+    std::mt19937 random(test::seed());
+    for (const Post post : kPosts)
+        for (const LengthUnit units : kUnits) {
+            if (post == Post::heidenhain) continue;
+            const Plan plan = plan_with(post, units, random_moves(random, 1000, 1.5), 37.1234);
+            const Operation& op = plan.layers[0].operations[0];
+            Job table;
+            const auto canon =
+                support::interpret_rs274(for_rs274(text_of(plan), post, units), tool_table(table));
+            EXPECT_EQ(canon.tool, 2);
+            EXPECT_EQ(canon.spindle_rpm, 18000);
+            EXPECT_TRUE(canon.ended);
+            // Places that the planner names, one after another; each motion ends at the next that is written.
+            const double up = 37.1234, unit = units == LengthUnit::inch ? kInch : 1;
+            const std::vector<std::uint32_t> lines = move_lines(plan, plan.layers[0], op);
+            std::vector<const Move*> written;
+            for (std::size_t i = 0; i < lines.size(); ++i)
+                if (lines[i] != 0) written.push_back(&op.moves[i]);
+            ASSERT_EQ(canon.motions.size(), written.size() + 2) << in_words(post, units);
+            for (std::size_t i = 0; i < written.size(); ++i) {
+                const auto& at = canon.motions[i + 1];
+                const Move& move = *written[i];
+                const double off = std::max({std::abs(at.x * unit - to_mm(std::int64_t{move.x})),
+                                             std::abs(at.y * unit - to_mm(std::int64_t{move.y})),
+                                             std::abs(at.z * unit + up - to_mm(std::int64_t{move.z}))});
+                // The judge prints four decimals, of an inch too.
+                ASSERT_LE(off, units == LengthUnit::inch ? 0.5e-4 * kInch + 0.2e-3 : kNear)
+                    << in_words(post, units) << " " << i;
+                ASSERT_EQ(at.rapid, move.feed == 0) << i;
+            }
+        }
 }
 
 TEST(Posts, NamesFromOutsideStayInTheirComments) {

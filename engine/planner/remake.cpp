@@ -140,9 +140,7 @@ public:
         if (!set || !touched)
             follow(layer.index, "touch_off", 0).numbers = {{"slab_top_mm", top - heights.origin}};
         if (spindle_tool_ != operation.tool) {
-            SequenceStep& change = follow(layer.index, "tool_change", machine_.tool_change_s);
-            change.numbers = {{"tool", operation.tool}};
-            if (!knows_tool_lengths(machine_.post)) change.words = {{"length", kTouchOffTool}};
+            say_tool(follow(layer.index, "tool_change", machine_.tool_change_s), operation.tool, machine_);
             spindle_tool_ = operation.tool;
         }
         SequenceStep& step = follow(layer.index, "face_off", operation.minutes * 60);
@@ -215,8 +213,7 @@ private:
             spindle_tool_ = static_cast<int>(value);
             SequenceStep& change =
                 add(own.layer, "tool_change", {needs.begin(), needs.end()}, machine_.tool_change_s);
-            change.numbers = {{"tool", value}};
-            if (!knows_tool_lengths(machine_.post)) change.words = {{"length", kTouchOffTool}};
+            say_tool(change, spindle_tool_, machine_);
             needs = {change.id};
         }
         if (own.action == "take_slab") take_slab(slabs);
@@ -271,9 +268,9 @@ Remake remake_layer(Context& context, const RemakeRequest& request) {
         const bool on_top = l == spoilt.top;
         const double top = on_top ? build.stack_top(request.state) : layer.z_top;
         Operation operation = face_off(context, plan, layer, top);
-        operation.file = program_file(plan.job.machine.post,
-                                      fmt::format("F{:03}_L{:03}_face_off_T{}", remake.layers.size() + 1,
-                                                  layer.index, operation.tool));
+        operation.file = program_file(
+            plan.job.machine.post,
+            fmt::format("F{:03}_L{:03}_face_off_T{}", remake.layers.size() + 1, layer.index, operation.tool));
         operation.number = kFaceOffNumbers + static_cast<int>(remake.layers.size()) + 1;
         steps.face_off(layer, operation, top, on_top && request.state.table_at.has_value(),
                        on_top && request.state.touched.has_value());

@@ -74,8 +74,7 @@ private:
     void execute() {
         const std::string_view first = words_[0];
         if (closed_) fail("gcode.after_end", "a block after the program's end (END PGM)");
-        if (!begun_ && first != "BEGIN")
-            fail("gcode.begin", "the program does not begin with BEGIN PGM");
+        if (!begun_ && first != "BEGIN") fail("gcode.begin", "the program does not begin with BEGIN PGM");
         if (half_cycle_ != 0 && first != "CYCL") fail("gcode.block", "a cycle (CYCL DEF) without its values");
         if (first == "BEGIN" || first == "END") return ends(first == "BEGIN");
         if (ended_) fail("gcode.after_end", "a block after M30: the control never reads it");
@@ -90,8 +89,7 @@ private:
 
     void ends(bool begin) {
         const char* unit = dialect_.inch() ? "INCH" : "MM";
-        if (begin == begun_)
-            fail("gcode.begin", begin ? "a second BEGIN PGM" : "END PGM before BEGIN PGM");
+        if (begin == begun_) fail("gcode.begin", begin ? "a second BEGIN PGM" : "END PGM before BEGIN PGM");
         if (words_.size() != 4 || words_[1] != "PGM" || (words_[3] != "MM" && words_[3] != "INCH"))
             fail("gcode.begin", "BEGIN PGM and END PGM need the program's name and its unit");
         if (words_[3] != unit)

@@ -8,25 +8,24 @@ namespace {
 
 // In tenths: G0 to G3, G4, G17 to G21, G40, G43, G49, G53 to G59, G61, G64, G80, G90, G91, G94, and each
 // control's own.
-constexpr int kLinuxcncG[] = {0,   10,  20,  30,  40,  80,  170, 180, 190, 200, 210, 400, 430, 431,
-                              490, 540, 550, 560, 570, 580, 590, 591, 592, 593, 610, 611, 640, 800,
-                              900, 901, 910, 911, 940, 970};
-constexpr int kMachG[] = {0,   10,  20,  30,  40,  170, 180, 190, 200, 210, 400, 430, 490, 540, 550,
-                          560, 570, 580, 590, 610, 640, 800, 900, 901, 910, 911, 940};
+constexpr int kLinuxcncG[] = {0,   10,  20,  30,  40,  80,  170, 180, 190, 200, 210, 400,
+                              430, 431, 490, 540, 550, 560, 570, 580, 590, 591, 592, 593,
+                              610, 611, 640, 800, 900, 901, 910, 911, 940, 970};
+constexpr int kMachG[] = {0,   10,  20,  30,  40,  170, 180, 190, 200, 210, 400, 430, 490, 540,
+                          550, 560, 570, 580, 590, 610, 640, 800, 900, 901, 910, 911, 940};
 constexpr int kFanucG[] = {0,   10,  20,  30,  40,  170, 180, 190, 200, 210, 400, 430, 490,
                            540, 550, 560, 570, 580, 590, 610, 640, 800, 900, 910, 940};
 constexpr int kHaasG[] = {0,   10,  20,  30,  40,  170, 180, 190, 200, 210, 400, 430, 490,
                           540, 550, 560, 570, 580, 590, 610, 800, 900, 910, 940, 1870};
-constexpr int kGrblG[] = {0,   10,  20,  30,  40,  170, 180, 190, 200, 210, 400, 431,
-                          490, 540, 550, 560, 570, 580, 590, 610, 800, 900, 910, 911, 940};
-constexpr int kSiemensG[] = {0,   10,  20,  30,  40,  170, 180, 190, 400,  540,
+constexpr int kGrblG[] = {0,   10,  20,  30,  40,  170, 180, 190, 200, 210, 400, 431, 490,
+                          540, 550, 560, 570, 580, 590, 610, 800, 900, 910, 911, 940};
+constexpr int kSiemensG[] = {0,   10,  20,  30,  40,  170, 180, 190,  400,  540,
                              550, 560, 570, 600, 900, 910, 940, 6410, 7000, 7100};
 constexpr int kLinuxcncM[] = {0, 10, 20, 30, 40, 50, 60, 70, 80, 90, 300, 480, 600};
 constexpr int kCommonM[] = {0, 10, 20, 30, 40, 50, 60, 70, 80, 90, 300};
 constexpr int kGrblM[] = {0, 10, 20, 30, 40, 50, 70, 80, 90, 300};
 
-constexpr std::string_view kCornerNote =
-    "set the control to round corners by 0.02 mm at most";  // kJunction
+constexpr std::string_view kCornerNote = "set the control to round corners by 0.02 mm at most";  // kJunction
 
 Dialect linuxcnc() {
     Dialect d;
@@ -66,8 +65,7 @@ Dialect with_points(std::string_view name) {
 Dialect fanuc() {
     Dialect d = with_points("Fanuc");
     d.begin = "%\nO{number:04}\n";
-    d.head =
-        "{unit} G17 G90 G94 G40 G49 G80\nG64\nG54\nT{tool} M6\nS{speed} M3\nG4 P{dwell_ms}\n";
+    d.head = "{unit} G17 G90 G94 G40 G49 G80\nG64\nG54\nT{tool} M6\nS{speed} M3\nG4 P{dwell_ms}\n";
     d.notes = kCornerNote;
     d.numbered = true;
     d.dwell = Dialect::Dwell::p_milliseconds;
@@ -80,8 +78,7 @@ Dialect fanuc() {
 Dialect haas() {
     Dialect d = with_points("Haas");
     d.begin = "%\nO{number:05}\n";
-    d.head =
-        "{unit} G17 G90 G94 G40 G49 G80\nG187 P2 E{blend}\nG54\nT{tool} M6\nS{speed} M3\nG4 P{dwell}\n";
+    d.head = "{unit} G17 G90 G94 G40 G49 G80\nG187 P2 E{blend}\nG54\nT{tool} M6\nS{speed} M3\nG4 P{dwell}\n";
     d.numbered = true;
     d.dwell = Dialect::Dwell::p_by_point;
     d.rounding = Dialect::Rounding::g187;
@@ -128,7 +125,8 @@ Dialect grbl() {
     d.forbidden = "?!~$";
     d.head = "{unit} G17 G90 G94 G40 G49 G80\nG61\nG54\nT{tool}\nS{speed} M3\nG4 P{dwell}\n";
     d.notes =
-        "before the start: tool {tool} in the spindle, its tip touched off\nsetting 11 at 0.02 mm at most, laser mode (32) off";
+        "before the start: tool {tool} in the spindle, its tip touched off\nsetting 11 at 0.02 mm at most, "
+        "laser mode (32) off";
     d.first = "G0 Z{z}\n";
     d.end = "M5\nM2\n";
     d.changes_tools = false;
@@ -171,7 +169,8 @@ Dialect heidenhain() {
     d.longest_line = 128;
     d.begin = "BEGIN PGM {name} {unit}\n";
     d.head =
-        "TOOL CALL {tool} Z S{speed}\nCYCL DEF 32.0 TOLERANCE\nCYCL DEF 32.1 T{blend}\nM3\nCYCL DEF 9.0 DWELL "
+        "TOOL CALL {tool} Z S{speed}\nCYCL DEF 32.0 TOLERANCE\nCYCL DEF 32.1 T{blend}\nM3\nCYCL DEF 9.0 "
+        "DWELL "
         "TIME\nCYCL DEF 9.1 DWELL {dwell}\n";
     d.notes = "the active preset is the zero that the setup sheet shows";
     d.first = "L Z{z} R0 FMAX\n";

@@ -57,7 +57,8 @@ struct Dialect {
     std::size_t longest_comment = 200, longest_line = 252;
     std::string_view forbidden;  ///< characters that it acts on wherever they stand, in comments too
 
-    // What a program says: templates for fmt, with unit, number, tool, speed, dwell, dwell_ms, blend, name, z.
+    // What a program says: templates for fmt, with unit, number, tool, speed, dwell, dwell_ms, blend, name,
+    // z.
     std::string_view begin;  ///< before the comments
     std::string_view head;   ///< after them
     std::string_view first;  ///< the first motion, to the height z

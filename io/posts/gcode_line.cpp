@@ -107,7 +107,8 @@ private:
             if (dialect_.letters.find(letter) == std::string_view::npos)
                 place_.fail("gcode.unknown_word",
                             fmt::format("a word {}, which this reader does not know", letter));
-            if (dialect_.point && !pointed && std::string_view("EFIJKRXYZ").find(letter) != std::string_view::npos)
+            if (dialect_.point && !pointed &&
+                std::string_view("EFIJKRXYZ").find(letter) != std::string_view::npos)
                 place_.fail("gcode.decimal_point",
                             fmt::format("the word {} without its decimal point: {} counts in its least steps",
                                         letter, dialect_.name));
@@ -180,8 +181,9 @@ void check_characters(std::string_view& line, const GcodePlace& place, const Dia
     if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
     for (const char c : line) {
         if ((c < ' ' && c != '\t') || c > '~')
-            place.fail("gcode.character", fmt::format("the byte 0x{:02X}, which is no printing ASCII character",
-                                                      static_cast<unsigned char>(c)));
+            place.fail("gcode.character",
+                       fmt::format("the byte 0x{:02X}, which is no printing ASCII character",
+                                   static_cast<unsigned char>(c)));
         if (dialect.forbidden.find(c) != std::string_view::npos)
             place.fail("gcode.character",
                        fmt::format("the character {}, which {} acts on wherever it stands", c, dialect.name));

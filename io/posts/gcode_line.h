@@ -73,12 +73,13 @@ private:
 inline constexpr char kAdis = 'A', kAdisPos = 'B';
 
 /// Reads a line without its line feed; a carriage return may end it. Comments are those of the dialect: ( … )
-/// and ; to the end; a comment that LinuxCNC or Mach acts on ("MSG, …", "LOGOPEN, …", any word and a comma) is
-/// refused in all of them.
-/// @throws Error(verification): gcode.line_length over Dialect::longest_line characters, gcode.character beyond
-///   printing ASCII and tabs or that the control acts on, gcode.comment, gcode.percent, gcode.unknown_word for
-///   a letter or number that names nothing here, gcode.number, gcode.decimal_point for a length or feed without
-///   the point that the dialect needs, gcode.twice
+/// and ; to the end; a comment that LinuxCNC or Mach acts on ("MSG, …", "LOGOPEN, …", any word and a comma)
+/// is refused in all of them.
+/// @throws Error(verification): gcode.line_length over Dialect::longest_line characters, gcode.character
+/// beyond
+///   printing ASCII and tabs or that the control acts on, gcode.comment, gcode.percent, gcode.unknown_word
+///   for a letter or number that names nothing here, gcode.number, gcode.decimal_point for a length or feed
+///   without the point that the dialect needs, gcode.twice
 /// @param words are those of the line afterwards; one object serves for all lines of a program
 void read_gcode_line(std::string_view line, const GcodePlace& place, const Dialect& dialect,
                      GcodeLine& words);

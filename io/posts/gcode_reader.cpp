@@ -65,14 +65,14 @@ private:
         if (line.percent && begun_ && !ended_)
             fail("gcode.percent", "a % mark within the program: the machine stops there");
         if (!line.percent && !begun_ && dialect_.percent == Dialect::Percent::must)
-            fail("gcode.percent", fmt::format("no % mark before the program: {} finds no begin",
-                                              dialect_.name));
+            fail("gcode.percent",
+                 fmt::format("no % mark before the program: {} finds no begin", dialect_.name));
         closed_ = closed_ || (line.percent && ended_);
         begun_ = true;
         if (!dialect_.numbered || line.empty()) return;
         if (line.has('O') == (built_.program.number != 0))
-            fail("gcode.program_number", line.has('O') ? "a second program number (O)"
-                                                       : "words before the program's number (O)");
+            fail("gcode.program_number",
+                 line.has('O') ? "a second program number (O)" : "words before the program's number (O)");
         if (!line.has('O')) return;
         const double number = line['O'];
         if (!(number >= 1 && number <= 9999) || number != std::floor(number) || line.has_beside('O'))

@@ -1,5 +1,5 @@
-// Programs in: those that this project emits, in the dialect of their control, and no more of its language than
-// a router's operator would expect.
+// Programs in: those that this project emits, in the dialect of their control, and no more of its language
+// than a router's operator would expect.
 #pragma once
 
 #include <string>
@@ -18,8 +18,8 @@ struct GcodeLimits {
     double arc_radius_error = 0.005;  ///< mm: the two radii of an arc may differ by this
 };
 
-/// What a LinuxCNC program commands, line by line, arcs as chords; Program::arcs holds the level ones whose two radii
-/// agree to twice arc_error, or to what rounding to the dialect's last decimal does.
+/// What a LinuxCNC program commands, line by line, arcs as chords; Program::arcs holds the level ones whose
+/// two radii agree to twice arc_error, or to what rounding to the dialect's last decimal does.
 ///
 /// Understands comments, line numbers, a % before and after the program, G0–G3 (centre I J K, in planes G17
 /// G18 G19, or radius R), G4, G8, G17–G19, G20/G21, G40, G43 (length offset of the tool that is loaded: taken
@@ -45,8 +45,8 @@ struct GcodeLimits {
 [[nodiscard]] Program read_program_text(std::string_view text, const std::string& file,
                                         const Dialect& dialect, const GcodeLimits& limits = {});
 
-/// Which other control's dialect takes the whole text, as the job's words name it ("haas", "fanuc in inch"); "" where
-/// none does.
+/// Which other control's dialect takes the whole text, as the job's words name it ("haas", "fanuc in inch");
+/// "" where none does.
 [[nodiscard]] std::string other_dialect(std::string_view text, const Dialect& expected);
 
 }  // namespace slabwright

@@ -91,7 +91,7 @@ public:
 private:
     std::uint32_t words(const Move& to, const WrittenMove& w) {
         using Kind = WrittenMove::Kind;
-        const int motion = to.feed == 0                       ? 0
+        const int motion = to.feed == 0                        ? 0
                            : w.kind == Kind::counter_clockwise ? 3
                            : w.kind == Kind::clockwise         ? 2
                                                                : 1;

@@ -147,7 +147,9 @@ void ModalState::apply(const GcodeLine& line, const GcodePlace& place) {
 
 void ModalState::dwell(const GcodeLine& line, const GcodePlace& place) {
     using Dwell = Dialect::Dwell;
-    const char letter = dialect_.dwell == Dwell::x_seconds ? 'X' : dialect_.dwell == Dwell::f_seconds ? 'F' : 'P';
+    const char letter = dialect_.dwell == Dwell::x_seconds   ? 'X'
+                        : dialect_.dwell == Dwell::f_seconds ? 'F'
+                                                             : 'P';
     if (!line.has(letter) || line[letter] < 0)
         place.fail("gcode.dwell", fmt::format("G4 without a time {}", letter));
     const bool milliseconds = dialect_.dwell == Dwell::p_milliseconds ||
@@ -230,22 +232,20 @@ void ModalState::m_word(int m, const GcodePlace& place) {
     }
 }
 
+bool ModalState::motion_word(int g) {
+    if (g == 0) motion_ = Motion::rapid;
+    else if (g == 10) motion_ = Motion::line;
+    else if (g == 20) motion_ = Motion::clockwise;
+    else if (g == 30) motion_ = Motion::counter_clockwise;
+    else if (g == 800) motion_ = Motion::none;
+    else return false;
+    motion_named_ = motion_ != Motion::none;
+    return true;
+}
+
 void ModalState::g_word(int g, const GcodePlace& place) {
-    const auto motion = [&](Motion to) {
-        motion_ = to;
-        motion_named_ = to != Motion::none;
-    };
+    if (motion_word(g)) return;
     switch (g) {
-        case 0:
-            return motion(Motion::rapid);
-        case 10:
-            return motion(Motion::line);
-        case 20:
-            return motion(Motion::clockwise);
-        case 30:
-            return motion(Motion::counter_clockwise);
-        case 800:
-            return motion(Motion::none);
         case 170:
             plane_ = {0, 1, 2};
             break;
@@ -282,7 +282,8 @@ void ModalState::g_word(int g, const GcodePlace& place) {
         case 610:
         case 611:
             // One that never leaves its path slows down at corners by a setting, as if it rounded them.
-            named_path_mode_ = dialect_.rounding == Dialect::Rounding::exact ? PathMode{kJunction, 0} : PathMode{};
+            named_path_mode_ =
+                dialect_.rounding == Dialect::Rounding::exact ? PathMode{kJunction, 0} : PathMode{};
             path_mode_ = true;
             break;
         case 900:
@@ -394,8 +395,9 @@ void ModalState::require_for_motion(const GcodePlace& place) const {
     require(radius_mode_ || !dialect_.lathe_words, "x as it is, not as a diameter (G8)");
     require(revolutions_ || !dialect_.lathe_words, "a spindle speed in revolutions (G97)");
     require(work_offset_, "its work offset (G54)");
-    require(path_mode_, dialect_.rounding == Dialect::Rounding::g64_p ? "how far the machine may leave its path (G64 P…)"
-                                                                : "how far the control may leave its path");
+    require(path_mode_, dialect_.rounding == Dialect::Rounding::g64_p
+                            ? "how far the machine may leave its path (G64 P…)"
+                            : "how far the control may leave its path");
     if (motion_ != Motion::rapid && !(feed_ > 0))
         place.fail("gcode.feed", "a feed motion before any feed (F)");
 }

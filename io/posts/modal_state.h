@@ -24,8 +24,9 @@ public:
     enum class Motion { none, rapid, line, clockwise, counter_clockwise };
     enum class Spindle { unknown, off, clockwise };
 
-    /// Takes all words of a line but its coordinates, its program number and its end, in LinuxCNC's order, whatever the order in
-    /// the line: feed, speed, tool, change, spindle; then dwell, plane, units, offsets, path mode, distances.
+    /// Takes all words of a line but its coordinates, its program number and its end, in LinuxCNC's order,
+    /// whatever the order in the line: feed, speed, tool, change, spindle; then dwell, plane, units, offsets,
+    /// path mode, distances.
     /// @throws Error(verification): gcode.twice for two words of one group, gcode.unknown_word for a G or M
     ///   number that is none of this project's, gcode.number, gcode.unused_word, gcode.unset for a length
     ///   before its unit, gcode.tool, gcode.offset, gcode.spindle, gcode.coolant, gcode.pause, gcode.dwell,
@@ -67,6 +68,7 @@ public:
 private:
     enum class Distance { unknown, absolute, incremental };
 
+    bool motion_word(int g);
     void g_word(int g, const GcodePlace& place);
     void m_word(int m, const GcodePlace& place);
     void change_tool(const GcodePlace& place);

@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kFarthest = 214000;  // mm: what paths in 0.1 µm can say
 
-/// By as many of its last decimal may an arc's two radii differ where begin, end and centre are rounded to it.
+/// By as many of its last decimal may an arc's two radii differ where begin, end and centre are rounded to
+/// it.
 constexpr double kRounded = 3;
 
 }  // namespace
@@ -19,8 +20,8 @@ ProgramBuilder::ProgramBuilder(std::string_view text, const Dialect& dialect, co
                                const GcodePlace& place)
     : text_(text),
       limits_(limits),
-      level_radius_error_(std::max(2 * limits.arc_error,
-                                   kRounded * std::pow(10, -dialect.decimals) * dialect.unit_mm())),
+      level_radius_error_(
+          std::max(2 * limits.arc_error, kRounded * std::pow(10, -dialect.decimals) * dialect.unit_mm())),
       place_(place) {}
 
 void ProgramBuilder::turn(double rpm) {

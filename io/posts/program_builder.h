@@ -14,9 +14,9 @@ namespace slabwright {
 
 /// An arc's centre and the axes of its plane.
 struct ReadArc {
-    double ca = 0, cb = 0;               ///< mm, along the first and second axis
-    bool clockwise = false;              ///< seen against the normal
-    std::array<int, 3> plane{0, 1, 2};   ///< first, second, normal (0: x)
+    double ca = 0, cb = 0;              ///< mm, along the first and second axis
+    bool clockwise = false;             ///< seen against the normal
+    std::array<int, 3> plane{0, 1, 2};  ///< first, second, normal (0: x)
 };
 
 class ProgramBuilder {

@@ -92,9 +92,9 @@ WrittenMove WrittenMoves::next(const Move& to) {
         const std::int64_t dx = to.x - ux_, dy = to.y - uy_;
         // Against the clock where the centre lies left of the chord.
         const Kind turn = dx * to.j > dy * to.i ? Kind::counter_clockwise : Kind::clockwise;
-        const bool turns = grid_.exact() || std::hypot(static_cast<double>(move.x - x_),
-                                                       static_cast<double>(move.y - y_)) >=
-                                                static_cast<double>(kShortestArc);
+        const bool turns =
+            grid_.exact() || std::hypot(static_cast<double>(move.x - x_), static_cast<double>(move.y - y_)) >=
+                                 static_cast<double>(kShortestArc);
         if (turns) move.kind = turn;
     }
     known_ = true;
@@ -140,8 +140,8 @@ std::vector<FeedLength> written_feed_lengths(const Dialect& dialect, std::span<c
         FeedLength more;
         if (i >= first && w.kind == Kind::line) more = straight_length(moves[i].feed, at, to);
         else if (i >= first && w.kind != Kind::none)
-            more = written_arc(moves[i].feed, at, to, grid.mm(w.cx), grid.mm(w.cy),
-                               w.kind == Kind::clockwise);
+            more =
+                written_arc(moves[i].feed, at, to, grid.mm(w.cx), grid.mm(w.cy), w.kind == Kind::clockwise);
         if (more.mm > 0) add_length(lengths, more);
         at = to;
     }

@@ -1,5 +1,5 @@
-// The places that a program can name: whole steps of its last decimal. What a plan has in 0.1 µm is rounded to
-// them once, here, for the text and for what plan.json says of it.
+// The places that a program can name: whole steps of its last decimal. What a plan has in 0.1 µm is rounded
+// to them once, here, for the text and for what plan.json says of it.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,8 @@ public:
     [[nodiscard]] std::int64_t steps(std::int64_t units) const;
     /// Where a step lies, mm.
     [[nodiscard]] double mm(std::int64_t steps) const;
-    /// Appends a place as the dialect spells it: "-1.25", "29." where points are needed, "+29" for HEIDENHAIN.
+    /// Appends a place as the dialect spells it: "-1.25", "29." where points are needed, "+29" for
+    /// HEIDENHAIN.
     void append(std::string& text, std::int64_t steps) const;
     /// A feed in mm/min, as F says it.
     [[nodiscard]] std::string feed(std::uint32_t mm_min) const;
@@ -35,8 +36,8 @@ private:
 
 /// A move as it is written: rounded to the grid.
 struct WrittenMove {
-    std::int64_t x = 0, y = 0, z = 0;    ///< steps
-    std::int64_t cx = 0, cy = 0;         ///< of an arc's centre
+    std::int64_t x = 0, y = 0, z = 0;                                                ///< steps
+    std::int64_t cx = 0, cy = 0;                                                     ///< of an arc's centre
     enum class Kind { none, line, clockwise, counter_clockwise } kind = Kind::none;  ///< none: it stays there
 };
 
@@ -55,14 +56,15 @@ public:
 private:
     const ProgramGrid& grid_;
     std::int64_t z_origin_;
-    bool known_ = false;                              // x and y are
-    std::int64_t ux_ = 0, uy_ = 0;                    // 0.1 µm
-    std::int64_t x_ = 0, y_ = 0, z_ = 0;              // steps
+    bool known_ = false;                  // x and y are
+    std::int64_t ux_ = 0, uy_ = 0;        // 0.1 µm
+    std::int64_t x_ = 0, y_ = 0, z_ = 0;  // steps
 };
 
 /// What plan.json says of a program: feed_lengths() of the moves as the dialect writes them.
 /// @param z_origin 0.1 µm, as for WrittenMoves; heights count from the pattern's bottom all the same
-[[nodiscard]] std::vector<FeedLength> written_feed_lengths(const Dialect& dialect, std::span<const Move> moves,
+[[nodiscard]] std::vector<FeedLength> written_feed_lengths(const Dialect& dialect,
+                                                           std::span<const Move> moves,
                                                            std::int64_t z_origin);
 
 /// What a program's z counts from, 0.1 µm above the pattern's bottom.

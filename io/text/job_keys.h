@@ -41,10 +41,10 @@ inline constexpr Word<Frame> kFrameWords[] = {
     {"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}, {"auto", Frame::automatic}};
 inline constexpr Word<BuildTable> kTableWords[] = {{"moving", BuildTable::moving},
                                                    {"fixed", BuildTable::fixed}};
-inline constexpr Word<Post> kPostWords[] = {{"linuxcnc", Post::linuxcnc},     {"fanuc", Post::fanuc},
-                                            {"haas", Post::haas},             {"grbl", Post::grbl},
-                                            {"mach", Post::mach},             {"iso", Post::iso},
-                                            {"siemens", Post::siemens},       {"heidenhain", Post::heidenhain}};
+inline constexpr Word<Post> kPostWords[] = {{"linuxcnc", Post::linuxcnc}, {"fanuc", Post::fanuc},
+                                            {"haas", Post::haas},         {"grbl", Post::grbl},
+                                            {"mach", Post::mach},         {"iso", Post::iso},
+                                            {"siemens", Post::siemens},   {"heidenhain", Post::heidenhain}};
 inline constexpr Word<LengthUnit> kProgramUnitWords[] = {{"mm", LengthUnit::mm}, {"inch", LengthUnit::inch}};
 inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated},
                                                         {"nominal", Engagement::nominal}};

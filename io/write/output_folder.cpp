@@ -40,8 +40,8 @@ constexpr std::array<std::string_view, 7> kFiles{"plan.json",   "tool.tbl",    "
 struct Inner {
     std::string_view folder, ending;
 };
-constexpr std::array<Inner, 9> kInner{Inner{"nc", ".ngc"},  Inner{"nc", ".nc"},  Inner{"nc", ".gcode"},
-                                      Inner{"nc", ".tap"},  Inner{"nc", ".mpf"}, Inner{"nc", ".h"},
+constexpr std::array<Inner, 9> kInner{Inner{"nc", ".ngc"},  Inner{"nc", ".nc"},   Inner{"nc", ".gcode"},
+                                      Inner{"nc", ".tap"},  Inner{"nc", ".mpf"},  Inner{"nc", ".h"},
                                       Inner{"dxf", ".dxf"}, Inner{"svg", ".svg"}, Inner{"fixture", ".dxf"}};
 
 [[noreturn]] void refuse(const char* code, const fs::path& place, const std::string& what,

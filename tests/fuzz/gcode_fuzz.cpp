@@ -1,5 +1,5 @@
-// Programs: any text is, in any dialect, a bounded list of motions, or one clear error; a program that reads is
-// judged.
+// Programs: any text is, in any dialect, a bounded list of motions, or one clear error; a program that reads
+// is judged.
 #include <cmath>
 
 #include "engine/job.h"
