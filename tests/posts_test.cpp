@@ -148,8 +148,8 @@ std::string difference(const Plan& plan, const Layer& layer, const Operation& op
     return steps.size() > written ? "motions that nobody planned" : "";
 }
 
-/// Moves that begin and end as a program must, arcs of every size among them, down to a few tenths of µm.
-std::vector<Move> random_moves(std::mt19937& random, std::size_t count, double least_exponent = 0) {
+/// Moves that begin and end as a program must, arcs of every size among them, down to a radius of 1 µm.
+std::vector<Move> random_moves(std::mt19937& random, std::size_t count, double least_exponent = 1) {
     const auto pick = [&](int low, int high) {
         return std::uniform_int_distribution<int>(low, high)(random);
     };
