@@ -90,6 +90,7 @@ ProgramBuilder::Sweep ProgramBuilder::sweep_of(const std::array<double, 3>& to, 
     const double da = to[a] - at_[a], db = to[b] - at_[b];
     const double r0 = std::hypot(at_[a] - arc.ca, at_[b] - arc.cb),
                  r1 = std::hypot(to[a] - arc.ca, to[b] - arc.cb);
+    if (std::max(r0, r1) > kFarthest) place_.fail("gcode.number", "an arc of a radius beyond 214 m");
     if (!(r0 > 0) || std::abs(r0 - r1) > limits_.arc_radius_error)
         place_.fail("gcode.arc", "an arc whose start and end lie at different radii");
     const double start = std::atan2(at_[b] - arc.cb, at_[a] - arc.ca);

@@ -40,7 +40,7 @@ public:
     void rapid(const std::array<double, 3>& to);
     /// @throws Error(verification): gcode.unknown_place, gcode.number for a place beyond 214 m
     void line(const std::array<double, 3>& to, double feed);
-    /// @throws as line(); gcode.arc where begin and end lie at different radii
+    /// @throws as line(), for a radius beyond 214 m too; gcode.arc where begin and end lie at different radii
     void arc(const std::array<double, 3>& to, const ReadArc& arc, double feed);
     /// @throws Error(verification, "gcode.number")
     void check_place(const std::array<double, 3>& to) const;

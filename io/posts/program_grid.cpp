@@ -28,10 +28,10 @@ std::int64_t divide_rounding(std::int64_t a, std::int64_t b) {
 ProgramGrid::ProgramGrid(const Dialect& dialect)
     : dialect_(&dialect),
       exact_(!dialect.inch() && dialect.decimals == kUnitDecimals),
+      plain_(exact_ && !dialect.point && !dialect.conversational),
       per_unit_(power_of_ten(dialect.decimals)) {}
 
-std::int64_t ProgramGrid::steps(std::int64_t units) const {
-    if (exact_) return units;
+std::int64_t ProgramGrid::rounded(std::int64_t units) const {
     // A unit of 0.1 µm is 1/254000 in.
     const std::int64_t units_of_length = dialect_->inch() ? 254000 : power_of_ten(kUnitDecimals);
     return divide_rounding(units * per_unit_, units_of_length);
@@ -41,7 +41,7 @@ double ProgramGrid::mm(std::int64_t steps) const {
     return static_cast<double>(steps) / static_cast<double>(per_unit_) * dialect_->unit_mm();
 }
 
-void ProgramGrid::append(std::string& text, std::int64_t steps) const {
+void ProgramGrid::append_spelled(std::string& text, std::int64_t steps) const {
     if (steps < 0) text += '-';
     else if (dialect_->conversational) text += '+';
     const std::int64_t size = steps < 0 ? -steps : steps;

@@ -7,6 +7,7 @@
 
 #include "engine/moves/feed_lengths.h"
 #include "io/posts/dialect.h"
+#include "io/text/decimal.h"
 
 namespace slabwright {
 
@@ -17,20 +18,25 @@ public:
     /// Whether its steps are the plan's own, 0.1 µm: nothing is rounded.
     [[nodiscard]] bool exact() const { return exact_; }
     /// The nearest step to a place in 0.1 µm, halves away from zero: off by half a step at most.
-    [[nodiscard]] std::int64_t steps(std::int64_t units) const;
+    [[nodiscard]] std::int64_t steps(std::int64_t units) const { return exact_ ? units : rounded(units); }
     /// Where a step lies, mm.
     [[nodiscard]] double mm(std::int64_t steps) const;
     /// Appends a place as the dialect spells it: "-1.25", "29." where points are needed, "+29" for
     /// HEIDENHAIN.
-    void append(std::string& text, std::int64_t steps) const;
+    void append(std::string& text, std::int64_t steps) const {
+        if (plain_) append_mm(text, steps);
+        else append_spelled(text, steps);
+    }
     /// A feed in mm/min, as F says it.
     [[nodiscard]] std::string feed(std::uint32_t mm_min) const;
     /// A length in mm that is no place: to four decimals, in inch to six and never more than it is.
     [[nodiscard]] std::string length(double mm) const;
 
 private:
+    [[nodiscard]] std::int64_t rounded(std::int64_t units) const;
+    void append_spelled(std::string& text, std::int64_t steps) const;
     const Dialect* dialect_;
-    bool exact_;
+    bool exact_, plain_;     // plain: exact, and spelled as everywhere
     std::int64_t per_unit_;  // steps of a mm or inch
 };
 
