@@ -423,6 +423,51 @@ TEST(Posts, AnotherDialectIsToldByName) {
         }
 }
 
+TEST(Posts, AFolderOfAnotherControlIsToldByBothNames) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out";
+    Context context;
+    const PatternSource source(kModels + "half-sphere.stl");
+    const Plan made = plan(context, source, job_for(Post::haas, LengthUnit::mm));
+    write(context, made, out);
+    // One program of the same name, as a Fanuc would have it; then all of them, by what plan.json says.
+    Plan fanuc = made;
+    fanuc.job.machine.post = Post::fanuc;
+    const Operation& first = made.layers[0].operations[0];
+    spit(out + "/nc/" + first.file, program_text(fanuc, fanuc.layers[0], fanuc.layers[0].operations[0]));
+    const auto told = [&] {
+        std::vector<Violation> of_dialects;
+        for (const Violation& v :
+             verify_folder(context, out, {.source = source, .cell = 2}).report.violations)
+            if (v.code == "program.dialect") of_dialects.push_back(v);
+        return of_dialects;
+    };
+    std::vector<Violation> found = told();
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].file, first.file);
+    EXPECT_EQ(found[0].message, "is a program for fanuc where the plan's are for haas");
+    const std::string document = slurp(out + "/plan.json"), says = "\"post\": \"haas\"";
+    std::string other = document;
+    other.replace(other.find(says), says.size(), "\"post\": \"fanuc\"");
+    spit(out + "/plan.json", other);
+    found = told();
+    std::size_t programs = 0;
+    for (const Layer& layer : made.layers) programs += layer.operations.size();
+    EXPECT_EQ(found.size(), programs - 1);
+    // Two of one number.
+    const Operation& second = made.layers[0].operations[1];
+    std::string text = program_text(made, made.layers[0], second);
+    text.replace(text.find("O00102"), 6, "O00101");
+    spit(out + "/plan.json", document);
+    spit(out + "/nc/" + first.file, program_text(made, made.layers[0], first));
+    spit(out + "/nc/" + second.file, text);
+    const auto report = verify_folder(context, out, {.source = source, .cell = 2}).report;
+    const auto twice = std::find_if(report.violations.begin(), report.violations.end(),
+                                    [](const Violation& v) { return v.code == "program.number"; });
+    ASSERT_NE(twice, report.violations.end());
+    EXPECT_EQ(twice->file, second.file);
+}
+
 TEST(Posts, DamagedTextsAreTold) {
     struct Damage {
         Post post;

@@ -328,7 +328,7 @@ Program read_planned_program(const std::string& text, const std::string& file, c
     } catch (const Error& error) {
         const std::string other = other_dialect(text, dialect);
         if (other.empty()) throw;
-        throw Error(error.kind(), "program.dialect",
+        throw Error(error.kind(), kForeignProgram,
                     "is a program for " + other + " where the plan's are for " +
                         in_words(dialect.post, dialect.units),
                     error.place(), "do not mix folders; plan again with the machine.post of your control");
