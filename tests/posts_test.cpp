@@ -655,6 +655,15 @@ TEST(Posts, NamesFromOutsideStayInTheirComments) {
     }
 }
 
+TEST(Posts, WhatNoProgramCanSayIsNotPlannedWith) {
+    for (const Post post : kPosts) {
+        const Job job = job_for(post, LengthUnit::mm);
+        const bool says =
+            post == Post::linuxcnc || post == Post::haas || post == Post::siemens || post == Post::heidenhain;
+        EXPECT_DOUBLE_EQ(rough_blend(job), says ? 0.1 : kJunction) << name_of(post, LengthUnit::mm);
+    }
+}
+
 TEST(Posts, ProgramsAreNamedAsTheirControlsWantThem) {
     EXPECT_EQ(program_file(Post::linuxcnc, "L003_02_rough_T2"), "L003_02_rough_T2.ngc");
     EXPECT_EQ(program_file(Post::siemens, "L003_02_rough_T2"), "_L003_02_rough_T2.mpf");

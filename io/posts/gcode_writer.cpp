@@ -195,8 +195,7 @@ std::string comment_line(const Dialect& dialect, std::string_view text) {
 class Templates {
 public:
     Templates(const Plan& plan, const Operation& operation, const Dialect& dialect)
-        : dialect_(dialect),
-          unit_(unit_word(dialect)),
+        : unit_(unit_word(dialect)),
           name_(operation.file.substr(0, operation.file.rfind('.'))),
           blend_(ProgramGrid(dialect).length(operation.blend)),
           dwell_s_(plan.job.machine.spindle_dwell_s),
@@ -219,7 +218,6 @@ private:
         if (dialect.post == Post::siemens) return dialect.inch() ? "G700" : "G710";
         return dialect.inch() ? "G20" : "G21";
     }
-    const Dialect& dialect_;
     std::string_view unit_;
     std::string name_, speed_, dwell_, blend_;
     double dwell_s_;

@@ -10,9 +10,12 @@ namespace {
 
 constexpr double kFarthest = 214000;  // mm: what paths in 0.1 µm can say
 
-/// By as many of its last decimal may an arc's two radii differ where begin, end and centre are rounded to
-/// it.
-constexpr double kRounded = 3;
+/// By how much an arc's two radii may differ, mm, where begin, end and centre are rounded to a last decimal
+/// that is coarser than the plan's own 0.1 µm.
+double rounded_radii(const Dialect& dialect) {
+    const double step = std::pow(10, -dialect.decimals) * dialect.unit_mm();
+    return step > 1.5e-4 ? 3 * step : 0;
+}
 
 }  // namespace
 
@@ -20,8 +23,7 @@ ProgramBuilder::ProgramBuilder(std::string_view text, const Dialect& dialect, co
                                const GcodePlace& place)
     : text_(text),
       limits_(limits),
-      level_radius_error_(
-          std::max(2 * limits.arc_error, kRounded * std::pow(10, -dialect.decimals) * dialect.unit_mm())),
+      level_radius_error_(std::max(2 * limits.arc_error, rounded_radii(dialect))),
       place_(place) {}
 
 void ProgramBuilder::turn(double rpm) {

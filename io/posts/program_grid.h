@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "engine/moves/feed_lengths.h"
 #include "io/posts/dialect.h"
