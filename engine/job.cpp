@@ -43,9 +43,31 @@ void require(const std::string& key, double value, double low, double high, Ends
                        why != nullptr && value < low ? fmt::format(" ({})", why) : ""));
 }
 
-void validate_tool(const Tool& tool, std::size_t position) {
+/// The highest number that a control's tool table, or its table of lengths, goes to.
+int highest_tool(Post post) {
+    switch (post) {
+        case Post::linuxcnc:
+            return 99999;
+        case Post::fanuc:
+        case Post::iso:
+            return 999;
+        case Post::haas:
+            return 200;
+        case Post::grbl:
+            return 255;
+        case Post::mach:
+            return 254;
+        case Post::siemens:
+            return 32000;
+        case Post::heidenhain:
+            return 32767;
+    }
+    return 99999;
+}
+
+void validate_tool(const Tool& tool, std::size_t position, Post post) {
     const auto key = [&](const char* name) { return fmt::format("tool[{}].{}", position + 1, name); };
-    require(key("number"), tool.number, 1, 99999);
+    require(key("number"), tool.number, 1, highest_tool(post));
     require(key("diameter"), tool.diameter, 0.3, 1000, Ends::closed, kNoCutter);
     require(key("flute_length"), tool.flute_length, 0.1, 1000, Ends::closed, kNoCutter);
     require(key("shank_diameter"), tool.shank_diameter, 0.1, 1000, Ends::closed, kNoCutter);
@@ -467,7 +489,7 @@ void validate(const Job& job) {
         throw Error(ErrorKind::usage, "job.tool", "the tool library is empty", "tool",
                     "add a [[tool]] to the job file");
     for (std::size_t i = 0; i < job.tools.size(); ++i) {
-        validate_tool(job.tools[i], i);
+        validate_tool(job.tools[i], i, job.machine.post);
         for (std::size_t j = 0; j < i; ++j)
             if (job.tools[j].number == job.tools[i].number)
                 refuse(fmt::format("tool[{}].number", i + 1),

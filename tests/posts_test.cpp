@@ -664,6 +664,23 @@ TEST(Posts, WhatNoProgramCanSayIsNotPlannedWith) {
     }
 }
 
+TEST(Posts, ToolsAreNumberedAsTheirTablesGo) {
+    for (const auto& [post, highest] : {std::pair{Post::linuxcnc, 99999},
+                                        {Post::fanuc, 999},
+                                        {Post::haas, 200},
+                                        {Post::grbl, 255},
+                                        {Post::mach, 254},
+                                        {Post::iso, 999},
+                                        {Post::siemens, 32000},
+                                        {Post::heidenhain, 32767}}) {
+        Job job = job_for(post, LengthUnit::mm);
+        job.tools[2].number = highest;
+        EXPECT_NO_THROW(validate(job)) << name_of(post, LengthUnit::mm);
+        job.tools[2].number = highest + 1;
+        EXPECT_THROW(validate(job), Error) << name_of(post, LengthUnit::mm);
+    }
+}
+
 TEST(Posts, ProgramsAreNamedAsTheirControlsWantThem) {
     EXPECT_EQ(program_file(Post::linuxcnc, "L003_02_rough_T2"), "L003_02_rough_T2.ngc");
     EXPECT_EQ(program_file(Post::siemens, "L003_02_rough_T2"), "_L003_02_rough_T2.mpf");
