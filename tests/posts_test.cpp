@@ -569,6 +569,29 @@ TEST(Posts, DamagedTextsAreTold) {
     EXPECT_EQ(told.size(), std::size(kPosts) - 1) << "LinuxCNC's are in gcode_reader_test";
 }
 
+TEST(Posts, MillimetresInAnInchProgramAreTold) {
+    for (const Post post : kPosts) {
+        const Plan plan = plan_with(post, LengthUnit::inch, square());
+        const std::string text = text_of(plan);
+        ASSERT_EQ(verdict(plan, text), "") << name_of(post, LengthUnit::inch);
+        const auto changed = [&](const std::string& from, const std::string& to) {
+            std::string other = text;
+            const std::size_t at = other.find(from);
+            EXPECT_NE(at, std::string::npos) << from << "\n" << text;
+            return verdict(plan, other.replace(at, from.size(), to));
+        };
+        const bool words = post != Post::heidenhain, siemens = post == Post::siemens;
+        EXPECT_EQ(words ? changed(siemens ? "G700" : "G20", siemens ? "G710" : "G21") : changed("INCH", "MM"),
+                  words ? "gcode.left_in_force" : "gcode.units")
+            << name_of(post, LengthUnit::inch);
+        EXPECT_EQ(changed("-0.19685", words ? "-5." : "-5"), "program.lengths");
+        EXPECT_EQ(changed(words ? "F59.055" : "F590.551", "F1500."),
+                  words ? "program.feed" : "program.lengths");
+        // A feed that is off in its last decimal but one is another feed.
+        EXPECT_EQ(changed(words ? "F59.055" : "F590.551", words ? "F59.065" : "F590.651"), "program.lengths");
+    }
+}
+
 TEST(Posts, EveryLineLostIsToldOrDoesNothing) {
     // Whatever one line of a program is missing, the rest is refused or is another program than planned.
     for (const Post post : kPosts) {
