@@ -43,9 +43,31 @@ void require(const std::string& key, double value, double low, double high, Ends
                        why != nullptr && value < low ? fmt::format(" ({})", why) : ""));
 }
 
-void validate_tool(const Tool& tool, std::size_t position) {
+/// The highest number that a control's tool table, or its table of lengths, goes to.
+int highest_tool(Post post) {
+    switch (post) {
+        case Post::linuxcnc:
+            return 99999;
+        case Post::fanuc:
+        case Post::iso:
+            return 999;
+        case Post::haas:
+            return 200;
+        case Post::grbl:
+            return 255;
+        case Post::mach:
+            return 254;
+        case Post::siemens:
+            return 32000;
+        case Post::heidenhain:
+            return 32767;
+    }
+    return 99999;
+}
+
+void validate_tool(const Tool& tool, std::size_t position, Post post) {
     const auto key = [&](const char* name) { return fmt::format("tool[{}].{}", position + 1, name); };
-    require(key("number"), tool.number, 1, 99999);
+    require(key("number"), tool.number, 1, highest_tool(post));
     require(key("diameter"), tool.diameter, 0.3, 1000, Ends::closed, kNoCutter);
     require(key("flute_length"), tool.flute_length, 0.1, 1000, Ends::closed, kNoCutter);
     require(key("shank_diameter"), tool.shank_diameter, 0.1, 1000, Ends::closed, kNoCutter);
@@ -209,6 +231,48 @@ double max_layer_thickness(const Job& job) {
                             ? 0
                             : *std::max_element(job.slabs.thicknesses.begin(), job.slabs.thicknesses.end());
     return std::min(slab - job.slabs.facing_allowance, max_bonded_layer_thickness(job));
+}
+
+bool says_rounding(Post post) {
+    switch (post) {
+        case Post::linuxcnc:
+        case Post::haas:
+        case Post::siemens:
+        case Post::heidenhain:
+            return true;
+        case Post::fanuc:
+        case Post::grbl:
+        case Post::mach:
+        case Post::iso:
+            return false;
+    }
+    return false;
+}
+
+bool knows_tool_lengths(Post post) { return post != Post::grbl; }
+
+std::string program_file(Post post, const std::string& stem) {
+    switch (post) {
+        case Post::linuxcnc:
+            return stem + ".ngc";
+        case Post::fanuc:
+        case Post::haas:
+        case Post::iso:
+            return stem + ".nc";
+        case Post::grbl:
+            return stem + ".gcode";
+        case Post::mach:
+            return stem + ".tap";
+        case Post::siemens:
+            return "_" + stem + ".mpf";
+        case Post::heidenhain:
+            return stem + ".h";
+    }
+    return stem;
+}
+
+double rough_blend(const Job& job) {
+    return says_rounding(job.machine.post) ? rough_blend(job.cutting) : kJunction;
 }
 
 double rough_blend(const Cutting& cutting) {
@@ -425,7 +489,7 @@ void validate(const Job& job) {
         throw Error(ErrorKind::usage, "job.tool", "the tool library is empty", "tool",
                     "add a [[tool]] to the job file");
     for (std::size_t i = 0; i < job.tools.size(); ++i) {
-        validate_tool(job.tools[i], i);
+        validate_tool(job.tools[i], i, job.machine.post);
         for (std::size_t j = 0; j < i; ++j)
             if (job.tools[j].number == job.tools[i].number)
                 refuse(fmt::format("tool[{}].number", i + 1),

@@ -26,6 +26,8 @@ enum class LayerStrategy : std::uint8_t { printed, optimal, combined, uniform };
 enum class Frame : std::uint8_t { pattern_base, layer_top, automatic };
 /// Whether the build table sinks by every layer, so that all of them are cut at one height (RPM), or stays.
 enum class BuildTable : std::uint8_t { moving, fixed };
+/// The control that the programs are written for, and whose text is proven (io/posts/dialect.h).
+enum class Post : std::uint8_t { linuxcnc, fanuc, haas, grbl, mach, iso, siemens, heidenhain };
 /// Which slopes level contours finish and which projected paths do (SHAPING 5): each its own side of the
 /// steep limit, one of them everything, or both everything, each in the steps that it needs at the limit.
 enum class FinishStrategy : std::uint8_t { split, levels, projection, both };
@@ -120,8 +122,10 @@ struct Machine {
     double tool_change_s = 15;
     double clearance = 10;  ///< mm of air between a rapid and the highest stock
     Frame frame = Frame::automatic;
-    double base_board_thickness = 19;  ///< the sacrificial board under the first layer
-    double base_board_cut = -1;        ///< how deep it may be cut; negative: the finish tool's overrun
+    Post post = Post::linuxcnc;
+    LengthUnit units = LengthUnit::mm;  ///< of the programs
+    double base_board_thickness = 19;   ///< the sacrificial board under the first layer
+    double base_board_cut = -1;         ///< how deep it may be cut; negative: the finish tool's overrun
 };
 
 struct Bonding {
@@ -289,6 +293,20 @@ struct Job {
 /// By how much the machine may round corners of roughing paths, mm: Cutting::rough_blend, but no more than a
 /// third of what roughing leaves, and no less than everywhere else (kJunction).
 [[nodiscard]] double rough_blend(const Cutting& cutting);
+/// The same; kJunction for a control whose programs cannot say it (says_rounding).
+[[nodiscard]] double rough_blend(const Job& job);
+
+/// Whether programs for a control say themselves how far it may round a corner; for the others that is a
+/// setting of the control, and counted as kJunction.
+[[nodiscard]] bool says_rounding(Post post);
+
+/// Whether a control measures tools or keeps their lengths; where it does not, the operator touches off each
+/// tool that is changed.
+[[nodiscard]] bool knows_tool_lengths(Post post);
+
+/// The file of a program as its control wants it named: "L003_02_rough_T2" is "L003_02_rough_T2.ngc" for
+/// LinuxCNC and "_L003_02_rough_T2.mpf" for Siemens, whose names begin with two letters.
+[[nodiscard]] std::string program_file(Post post, const std::string& stem);
 
 /// By how much arcs and longer chords of roughing paths may leave what they are fitted to, mm: a fifteenth of
 /// what roughing leaves.

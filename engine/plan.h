@@ -79,6 +79,7 @@ struct Operation {
     double blend = kJunction;  ///< mm by which the machine may round the path's corners (G64 P)
     std::vector<Move> moves;
     std::string file;  ///< name under nc/, "" until named
+    int number = 0;    ///< of the program, for controls that number them (O0302); 0 until named
     double cutting_mm = 0, rapid_mm = 0, minutes = 0;
     double peak_force_n = 0, deflection_mm = 0;  ///< the largest of all its cuts
     double wall_error_mm = 0;    ///< the most that the cutter, bending, leaves on a wall or takes from it

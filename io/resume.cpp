@@ -127,7 +127,7 @@ private:
     /// The program that faces a layer off, of its text. @param layer index
     [[nodiscard]] Program face_off_of(const std::string& text, const std::string& file,
                                       std::size_t layer) const {
-        Program program = read_gcode(text, file, gcode_limits(folder_.build.job.tolerances));
+        Program program = read_planned_program(text, file, folder_.build.job);
         const double up =
             folder_.build.frame == Frame::layer_top ? to_mm(to_units(folder_.build.layers[layer].z_top)) : 0;
         for (ProgramStep& step : program.steps) step.z += up;

@@ -189,7 +189,7 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out, const std
         file.close();
         context.advance();
     });
-    write_file_in(out.path(), "tool.tbl", tool_table(plan.job));
+    if (plan.job.machine.post == Post::linuxcnc) write_file_in(out.path(), "tool.tbl", tool_table(plan.job));
     write_file_in(out.path(), "sequence.json", sequence_json(plan));
     write_file_in(out.path(), "plan.json", plan_json(plan));
     context.throw_if_cancelled();

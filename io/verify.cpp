@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <numbers>
 #include <set>
 
@@ -110,8 +111,22 @@ void write_maps(const SimulationReport& report, const std::string& directory) {
 
 namespace {
 
+/// Two programs of one number: a control keeps the one that came last.
+void check_numbers(const std::vector<Program>& programs, std::vector<std::vector<Violation>>& found) {
+    std::map<int, std::string> numbers;
+    for (std::size_t k = 0; k < programs.size(); ++k) {
+        const Program& program = programs[k];
+        if (program.number == 0) continue;
+        const auto [other, first] = numbers.emplace(program.number, program.file);
+        if (first) continue;
+        const std::string what = fmt::format("is O{}, as {} is: the control would keep one of them",
+                                             program.number, other->second);
+        found[k].push_back({"program.number", what, program.file, 0, {}, 0});
+    }
+}
+
 /// Reads the programs that OUT holds of those that plan.json names, in its order, and checks each against
-/// what the plan says of it.
+/// what the plan says of it. Those of another control are told and left out, as if they were missing.
 void read_programs(Context& context, const PlannedFolder& folder, const FolderRefusal& refusal,
                    std::vector<Program>& programs, std::vector<Violation>& violations) {
     std::vector<std::size_t> present;
@@ -134,14 +149,28 @@ void read_programs(Context& context, const PlannedFolder& folder, const FolderRe
     }
     programs.resize(present.size());
     std::vector<std::vector<Violation>> of_programs(present.size());
+    std::vector<char> foreign(present.size());
     parallel_each(context, present.size(), [&](std::size_t k) {
-        programs[k] = folder.read_program(present[k], refusal);
+        try {
+            programs[k] = folder.read_program(present[k], refusal);
+        } catch (const Error& error) {
+            if (error.code() != kForeignProgram) throw;
+            const std::string file = folder.build.programs[present[k]].file.substr(3);
+            of_programs[k].push_back({error.code(), error.message(), file, 0, {}, 0});
+            foreign[k] = 1;
+            return;
+        }
         const std::vector<Tool>& tools = folder.build.tools;
         const auto tool = std::find_if(tools.begin(), tools.end(),
                                        [&](const Tool& t) { return t.number == programs[k].tool; });
         of_programs[k] = check_program(programs[k], folder.sayings[present[k]],
                                        tool == tools.end() ? nullptr : &*tool, folder.build.job.machine);
     });
+    check_numbers(programs, of_programs);
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < programs.size(); ++k)
+        if (foreign[k] == 0 && kept++ != k) programs[kept - 1] = std::move(programs[k]);
+    programs.resize(kept);
     for (const std::vector<Violation>& found : of_programs)
         violations.insert(violations.end(), found.begin(), found.end());
 }
@@ -173,9 +202,12 @@ Verification verify_folder(Context& context, const std::string& directory, const
     Verification result;
     result.input = folder.simulation;
     SimulationInput& input = result.input;
-    const fs::path table = out / "tool.tbl";
-    std::vector<Violation> violations = check_tool_table(
-        read_file(table, "verify.tool_table", kMostToolTableBytes), table.string(), input.tools);
+    std::vector<Violation> violations;
+    if (job.machine.post == Post::linuxcnc) {  // the others' tables are kept at the control
+        const fs::path table = out / "tool.tbl";
+        violations = check_tool_table(read_file(table, "verify.tool_table", kMostToolTableBytes),
+                                      table.string(), input.tools);
+    }
     read_programs(context, folder, refusal, input.programs, violations);
     find_strangers(folder, violations);
     BuildPlan build = folder.build;

@@ -33,12 +33,12 @@ struct Verification {
     std::string json;                  ///< what verify.json holds (schema slabwright.verify/1)
 };
 
-/// Reads plan.json, every program of nc/, tool.tbl, sequence.json and, if it is not given, the pattern,
-/// replays the sequence, simulates the programs, and writes OUT/verify.json (a whole file or none). The
-/// report's violations say what is wrong with programs and part; `report.passed()` is the verdict.
+/// Reads plan.json, every program of nc/, for LinuxCNC tool.tbl, sequence.json and, if it is not given, the
+/// pattern, replays the sequence, simulates the programs, and writes OUT/verify.json (a whole file or none).
+/// The report's violations say what is wrong with programs and part; `report.passed()` is the verdict.
 /// @throws Error(verification) when OUT cannot be understood: plan.json missing or not of schema
 /// slabwright.plan/1 or without
-///   a key (names it), a program that read_gcode refuses (file:line)
+///   a key (names it), a program that read_planned_program() refuses (file:line)
 /// @throws Error(input) when the STL is missing, unreadable, or not the one that was planned (by its SHA-256)
 [[nodiscard]] Verification verify_folder(Context& context, const std::string& directory,
                                          const VerifyOptions& options = {});

@@ -13,12 +13,15 @@
 #include "engine/paths/runs/layer_cut.h"
 #include "engine/planner/layer_plan.h"
 #include "engine/schedule/heights.h"
+#include "engine/schedule/schedule.h"
 #include "engine/simulate/planned_build.h"
 #include "kernels/errors.h"
 
 namespace slabwright {
 
 namespace {
+
+constexpr int kFaceOffNumbers = 8000;  // above those of the plan's own programs
 
 [[noreturn]] void refuse(ErrorKind kind, const char* code, const std::string& message,
                          const std::string& remedy) {
@@ -137,7 +140,7 @@ public:
         if (!set || !touched)
             follow(layer.index, "touch_off", 0).numbers = {{"slab_top_mm", top - heights.origin}};
         if (spindle_tool_ != operation.tool) {
-            follow(layer.index, "tool_change", machine_.tool_change_s).numbers = {{"tool", operation.tool}};
+            say_tool(follow(layer.index, "tool_change", machine_.tool_change_s), operation.tool, machine_);
             spindle_tool_ = operation.tool;
         }
         SequenceStep& step = follow(layer.index, "face_off", operation.minutes * 60);
@@ -210,7 +213,7 @@ private:
             spindle_tool_ = static_cast<int>(value);
             SequenceStep& change =
                 add(own.layer, "tool_change", {needs.begin(), needs.end()}, machine_.tool_change_s);
-            change.numbers = {{"tool", value}};
+            say_tool(change, spindle_tool_, machine_);
             needs = {change.id};
         }
         if (own.action == "take_slab") take_slab(slabs);
@@ -265,8 +268,10 @@ Remake remake_layer(Context& context, const RemakeRequest& request) {
         const bool on_top = l == spoilt.top;
         const double top = on_top ? build.stack_top(request.state) : layer.z_top;
         Operation operation = face_off(context, plan, layer, top);
-        operation.file = fmt::format("F{:03}_L{:03}_face_off_T{}.ngc", remake.layers.size() + 1, layer.index,
-                                     operation.tool);
+        operation.file = program_file(
+            plan.job.machine.post,
+            fmt::format("F{:03}_L{:03}_face_off_T{}", remake.layers.size() + 1, layer.index, operation.tool));
+        operation.number = kFaceOffNumbers + static_cast<int>(remake.layers.size()) + 1;
         steps.face_off(layer, operation, top, on_top && request.state.table_at.has_value(),
                        on_top && request.state.touched.has_value());
         remake.layers.push_back(l);

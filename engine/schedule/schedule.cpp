@@ -62,12 +62,23 @@ void name_programs(Plan& plan) {
         most = std::max(most, layer.operations.size());
     }
     const int layer_width = width_of(highest, 3), operation_width = width_of(most, 2);
+    int running = 0;
     for (Layer& layer : plan.layers)
         for (std::size_t i = 0; i < layer.operations.size(); ++i) {
             Operation& operation = layer.operations[i];
-            operation.file = fmt::format("L{:0{}}_{:0{}}_{}_T{}.ngc", layer.index, layer_width, i + 1,
-                                         operation_width, name(operation.kind), operation.tool);
+            operation.file = program_file(
+                plan.job.machine.post, fmt::format("L{:0{}}_{:0{}}_{}_T{}", layer.index, layer_width, i + 1,
+                                                   operation_width, name(operation.kind), operation.tool));
+            // O0302 is layer 3's second, where all numbers fit below those of what is faced off again.
+            ++running;
+            const auto by_place = 100 * layer.index + static_cast<int>(i) + 1;
+            operation.number = highest < 80 && most < 100 ? by_place : running;
         }
+}
+
+void say_tool(SequenceStep& change, int tool, const Machine& machine) {
+    change.numbers = {{"tool", tool}};
+    if (!knows_tool_lengths(machine.post)) change.words = {{"length", "touch off"}};
 }
 
 void schedule(Plan& plan) {
@@ -180,7 +191,7 @@ void schedule(Plan& plan) {
                 // The program's own T and M6 then find the tool in the spindle, also when the build resumes
                 // at the program.
                 SequenceStep& change = add(layer.index, "tool_change", {last}, job.machine.tool_change_s);
-                change.numbers = {{"tool", operation.tool}};
+                say_tool(change, operation.tool, job.machine);
                 last = change.id;
                 spindle_tool = operation.tool;
                 ++totals.tool_changes;

@@ -5,8 +5,12 @@
 
 namespace slabwright {
 
-/// Names every operation's program, "L003_02_rough_T2.ngc": layer, order within it, kind and tool, with
-/// widths such that the names sort in the order of execution.
+/// Says which tool a tool_change puts in; for a control that keeps no lengths (knows_tool_lengths) also
+/// "length": "touch off", by which the operator brings the new tip to where the last one's was touched off.
+void say_tool(SequenceStep& change, int tool, const Machine& machine);
+
+/// Names every operation's program, "L003_02_rough_T2.ngc" (program_file): layer, order within it, kind and
+/// tool, with widths such that the names sort in the order of execution.
 void name_programs(Plan& plan);
 
 /// Names the programs and fills plan.sequence and plan.totals from the layers (part_volume_mm3 is left as it

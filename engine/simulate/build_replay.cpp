@@ -388,6 +388,7 @@ private:
                                                       *tool, next->file, next->tool));
         }
         expect_job_seconds(plan_.job.machine.tool_change_s);
+        if (!build_.keeps_lengths()) expect_word("sequence.tool_length", "length", "touch off");
         s_.spindle_tool = tool.value_or(0);
         s_.tool_in = here();
         s_.unused_change = true;

@@ -37,6 +37,8 @@ public:
     /// first layer. A table that moves brings each layer's top to one height.
     [[nodiscard]] double bottom_at(std::size_t layer) const;
     [[nodiscard]] const Tool* tool_of(int number) const;
+    /// Whether the control keeps tools' lengths; else each change of a tool is a touch-off.
+    [[nodiscard]] bool keeps_lengths() const { return knows_tool_lengths(plan_.job.machine.post); }
 
     /// The layer whose slabs are all placed and pressed and that lies on top; none while one is missing.
     [[nodiscard]] std::optional<std::size_t> whole_layer(const BuildState& state) const;

@@ -55,6 +55,7 @@ struct ProgramWord {
 /// One program and what it says of itself.
 struct Program {
     std::string file;  ///< its name under nc/
+    int number = 0;    ///< by which a control knows it that numbers programs (O0302); 0: it has none
     int layer = 0;     ///< index into the layers
     OperationKind kind{};
     int tool = 0;                                  ///< that the program loads (T … M6)

@@ -33,26 +33,28 @@ bool is_letter(char c) { return upper(c) >= 'A' && upper(c) <= 'Z'; }
 /// Reads one line from left to right.
 class LineReader {
 public:
-    LineReader(std::string_view text, const GcodePlace& place, GcodeLine& line)
-        : text_(text), place_(place), line_(line) {}
+    LineReader(std::string_view text, const GcodePlace& place, const Dialect& dialect, GcodeLine& line)
+        : text_(text), place_(place), dialect_(dialect), line_(line) {}
 
     void run() {
         line_.clear();
-        check_characters();
+        check_characters(text_, place_, dialect_);
         while (at_ < text_.size()) {
             const char c = text_[at_];
             if (is_blank(c)) {
                 ++at_;
-            } else if (c == ';') {
+            } else if (c == ';' && dialect_.semicolon) {
                 check_comment(text_.substr(at_ + 1));
                 break;
-            } else if (c == '%') {
+            } else if (c == '%' && dialect_.percent != Dialect::Percent::none) {
                 if (text_.find_first_not_of(" \t%") != std::string_view::npos)
                     place_.fail("gcode.percent", "text beside a % mark");
                 line_.percent = true;
                 break;
-            } else if (c == '(') {
+            } else if (c == '(' && dialect_.parentheses) {
                 comment();
+            } else if (dialect_.named_words && text_.substr(at_).starts_with("ADIS")) {
+                named_word();
             } else {
                 word();
             }
@@ -60,19 +62,6 @@ public:
     }
 
 private:
-    /// A NUL hides the rest of a line from LinuxCNC; letters beyond ASCII look like others.
-    void check_characters() {
-        if (text_.size() > kLongestLine)
-            place_.fail("gcode.line_length", fmt::format("a line of {} characters; LinuxCNC takes {}",
-                                                         text_.size(), kLongestLine));
-        if (!text_.empty() && text_.back() == '\r') text_.remove_suffix(1);
-        for (const char c : text_)
-            if ((c < ' ' && c != '\t') || c > '~')
-                place_.fail("gcode.character",
-                            fmt::format("the byte 0x{:02X}, which is no printing ASCII character",
-                                        static_cast<unsigned char>(c)));
-    }
-
     void comment() {
         const std::size_t close = text_.find(')', at_);
         if (close == std::string_view::npos) place_.fail("gcode.comment", "a comment that is not closed");
@@ -106,7 +95,8 @@ private:
         if (letter < 'A' || letter > 'Z')
             place_.fail("gcode.unknown_word",
                         fmt::format("'{}' begins no word that this reader knows", text_[at_]));
-        const double value = number(letter);
+        bool pointed = false;
+        const double value = number(letter, pointed);
         if (letter == 'G' || letter == 'M') {
             code(letter == 'G' ? line_.g : line_.m, letter, value);
         } else if (letter == 'N') {
@@ -114,17 +104,38 @@ private:
             if (value < 0) place_.fail("gcode.number", "a negative line number");
             numbered_ = true;
         } else {
-            if (std::string_view("FHIJKPQRSTXYZ").find(letter) == std::string_view::npos)
+            if (dialect_.letters.find(letter) == std::string_view::npos)
                 place_.fail("gcode.unknown_word",
                             fmt::format("a word {}, which this reader does not know", letter));
-            if (line_.has(letter))
-                place_.fail("gcode.twice", fmt::format("the word {} stands twice in one line", letter));
-            line_.set(letter, value);
+            if (dialect_.point && !pointed &&
+                std::string_view("EFIJKRXYZ").find(letter) != std::string_view::npos)
+                place_.fail("gcode.decimal_point",
+                            fmt::format("the word {} without its decimal point: {} counts in its least steps",
+                                        letter, dialect_.name));
+            set(letter, value, pointed);
         }
     }
 
+    void set(char letter, double value, bool pointed) {
+        if (line_.has(letter))
+            place_.fail("gcode.twice", fmt::format("the word {} stands twice in one line", letter));
+        line_.set(letter, value, pointed);
+    }
+
+    /// ADIS=0.02, ADISPOS=0.02
+    void named_word() {
+        const std::size_t equals = text_.find('=', at_);
+        const std::string_view name = text_.substr(at_, equals == std::string_view::npos ? 0 : equals - at_);
+        if (name != "ADIS" && name != "ADISPOS")
+            place_.fail("gcode.unknown_word", "a name that this reader does not know");
+        at_ = equals;
+        bool pointed = false;
+        const double value = number('=', pointed);
+        set(name == "ADIS" ? kAdis : kAdisPos, value, pointed);
+    }
+
     /// The number after a letter, up to the next character that can belong to none.
-    double number(char letter) {
+    double number(char letter, bool& pointed) {
         ++at_;
         while (at_ < text_.size() && is_blank(text_[at_])) ++at_;
         const std::size_t start = at_;
@@ -138,6 +149,7 @@ private:
         if (status != std::errc{} || stop != digits.data() + digits.size() || digits.empty())
             place_.fail("gcode.number", fmt::format("no number follows {}", letter),
                         "exponents, parameters and expressions are not emitted, so not read");
+        pointed = digits.find('.') != std::string_view::npos;
         return value;
     }
 
@@ -153,6 +165,7 @@ private:
 
     std::string_view text_;
     const GcodePlace& place_;
+    const Dialect& dialect_;
     std::size_t at_ = 0;
     bool numbered_ = false;
     GcodeLine& line_;
@@ -160,8 +173,26 @@ private:
 
 }  // namespace
 
-void read_gcode_line(std::string_view line, const GcodePlace& place, GcodeLine& words) {
-    LineReader(line, place, words).run();
+/// A NUL hides the rest of a line from LinuxCNC; letters beyond ASCII look like others.
+void check_characters(std::string_view& line, const GcodePlace& place, const Dialect& dialect) {
+    if (line.size() > dialect.longest_line)
+        place.fail("gcode.line_length", fmt::format("a line of {} characters; {} takes {}", line.size(),
+                                                    dialect.name, dialect.longest_line));
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    for (const char c : line) {
+        if ((c < ' ' && c != '\t') || c > '~')
+            place.fail("gcode.character",
+                       fmt::format("the byte 0x{:02X}, which is no printing ASCII character",
+                                   static_cast<unsigned char>(c)));
+        if (dialect.forbidden.find(c) != std::string_view::npos)
+            place.fail("gcode.character",
+                       fmt::format("the character {}, which {} acts on wherever it stands", c, dialect.name));
+    }
+}
+
+void read_gcode_line(std::string_view line, const GcodePlace& place, const Dialect& dialect,
+                     GcodeLine& words) {
+    LineReader(line, place, dialect, words).run();
 }
 
 }  // namespace slabwright

@@ -1,5 +1,5 @@
-// RS-274 in: the programs that this project emits, and no more of the language than a router's operator would
-// expect.
+// Programs in: those that this project emits, in the dialect of their control, and no more of its language
+// than a router's operator would expect.
 #pragma once
 
 #include <string>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/simulate/program.h"
+#include "io/posts/dialect.h"
 
 namespace slabwright {
 
@@ -17,8 +18,8 @@ struct GcodeLimits {
     double arc_radius_error = 0.005;  ///< mm: the two radii of an arc may differ by this
 };
 
-/// What a program commands, line by line, arcs as chords; Program::arcs holds the level ones whose two radii
-/// agree to twice arc_error.
+/// What a LinuxCNC program commands, line by line, arcs as chords; Program::arcs holds the level ones whose
+/// two radii agree to twice arc_error, or to what rounding to the dialect's last decimal does.
 ///
 /// Understands comments, line numbers, a % before and after the program, G0–G3 (centre I J K, in planes G17
 /// G18 G19, or radius R), G4, G8, G17–G19, G20/G21, G40, G43 (length offset of the tool that is loaded: taken
@@ -36,5 +37,16 @@ struct GcodeLimits {
 ///   m
 [[nodiscard]] Program read_gcode(std::string_view text, const std::string& file,
                                  const GcodeLimits& limits = {});
+
+/// The same of a program in any dialect (io/FORMATS.md has each one's words): the modal state of its control
+/// is known at every motion, and what the control does not know is refused.
+/// @throws Error(verification, "gcode.…") with file:line as read_gcode(); also gcode.decimal_point,
+///   gcode.program_number, gcode.block for HEIDENHAIN's numbered blocks
+[[nodiscard]] Program read_program_text(std::string_view text, const std::string& file,
+                                        const Dialect& dialect, const GcodeLimits& limits = {});
+
+/// Which other control's dialect takes the whole text, as the job's words name it ("haas", "fanuc in inch");
+/// "" where none does.
+[[nodiscard]] std::string other_dialect(std::string_view text, const Dialect& expected);
 
 }  // namespace slabwright

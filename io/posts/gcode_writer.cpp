@@ -6,7 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "io/text/decimal.h"
+#include "io/posts/dialect.h"
+#include "io/posts/program_grid.h"
 #include "io/text/json_text.h"
 #include "kernels/errors.h"
 
@@ -23,7 +24,7 @@ std::string decimal(double value, int decimals) {
 }
 
 /// What a program needs to be safe to start and to leave the spindle where the next one can start.
-void require_safe(const Layer& layer, const Operation& operation, const Tool* tool) {
+void require_safe(const Layer& layer, const Operation& operation, const Tool* tool, const Dialect& dialect) {
     const auto refuse = [&](const std::string& message) {
         throw Error(ErrorKind::no_plan, "program.unsafe",
                     fmt::format("{} of layer {}: {}", name(operation.kind), layer.index, message),
@@ -31,6 +32,8 @@ void require_safe(const Layer& layer, const Operation& operation, const Tool* to
     };
     if (tool == nullptr) refuse(fmt::format("tool {} is not in the library", operation.tool));
     if (!(operation.spindle_rpm >= 1)) refuse("the spindle does not turn");
+    if (dialect.numbered && (operation.number < 1 || operation.number > 9999))
+        refuse(fmt::format("{} takes no program O{}", dialect.name, operation.number));
     const std::vector<Move>& moves = operation.moves;
     const std::int32_t clearance = to_units(operation.clearance_z);
     if (moves.size() < 2) refuse("it has no moves");
@@ -52,25 +55,46 @@ void require_safe(const Layer& layer, const Operation& operation, const Tool* to
 /// Writes modal motion: a word appears when its value changes, and G when the kind of motion does.
 class MotionText {
 public:
-    MotionText(std::string& text, std::int64_t z_origin) : text_(text), z_origin_(z_origin) {}
+    MotionText(std::string& text, const Dialect& dialect, std::int64_t z_origin, std::size_t blocks)
+        : text_(text), dialect_(dialect), grid_(dialect), moves_(grid_, z_origin), blocks_(blocks) {}
 
-    /// A motion in Z alone, always spelled out with its G0: the first and the last of a program.
-    void rapid_z(std::int64_t z) {
-        text_ += "G0 Z";
-        append_mm(text_, z - z_origin_);
-        text_ += '\n';
+    /// The first motion, in Z alone, by the dialect's template, which is given the height as a text.
+    template <class Template>
+    void begin(std::int64_t z, Template&& filled) {
+        std::string height;
+        grid_.append(height, z_ = moves_.height(z));
+        begin_block();
+        text_ += filled(height);
         motion_ = 0;
-        z_ = z;
     }
-    /// Where x and y are unknown (at the start of a program) both are written.
-    void move(const Move& to) {
-        const bool x = !xy_known_ || to.x != x_, y = !xy_known_ || to.y != y_, z = to.z != z_;
-        if (!x && !y && !z) return;
-        int motion = to.feed == 0 ? 0 : 1;
-        if (to.is_arc()) {  // against the clock (G3) where the centre lies left of the chord
-            const std::int64_t dx = to.x - x_, dy = to.y - y_;
-            motion = dx * to.j > dy * to.i ? 3 : 2;
-        }
+    /// A motion in Z alone, always spelled out with its G0: the last of a program.
+    void rapid_z(std::int64_t z) {
+        begin_block();
+        text_ += dialect_.conversational ? "L Z" : "G0 Z";
+        grid_.append(text_, z_ = moves_.height(z));
+        text_ += dialect_.conversational ? " FMAX\n" : "\n";
+        motion_ = 0;
+    }
+    /// Where x and y are unknown (at the start of a program) both are written. @returns lines written
+    std::uint32_t move(const Move& to) {
+        const WrittenMove w = moves_.next(to);
+        if (w.kind == WrittenMove::Kind::none) return 0;
+        const std::uint32_t lines = dialect_.conversational ? conversational(to, w) : words(to, w);
+        x_ = w.x;
+        y_ = w.y;
+        z_ = w.z;
+        xy_known_ = true;
+        return lines;
+    }
+    [[nodiscard]] std::size_t blocks() const { return blocks_; }
+
+private:
+    std::uint32_t words(const Move& to, const WrittenMove& w) {
+        using Kind = WrittenMove::Kind;
+        const int motion = to.feed == 0                        ? 0
+                           : w.kind == Kind::counter_clockwise ? 3
+                           : w.kind == Kind::clockwise         ? 2
+                                                               : 1;
         if (motion != motion_) {
             text_ += 'G';
             text_ += static_cast<char>('0' + motion);
@@ -78,32 +102,59 @@ public:
             motion_ = motion;
         }
         const std::size_t start = text_.size();
-        if (x) word('X', to.x, start);
-        if (y) word('Y', to.y, start);
-        if (z) word('Z', to.z - z_origin_, start);
-        if (to.is_arc()) {
-            word('I', to.i, start);
-            word('J', to.j, start);
+        if (!xy_known_ || w.x != x_) word('X', w.x, start);
+        if (!xy_known_ || w.y != y_) word('Y', w.y, start);
+        if (w.z != z_) word('Z', w.z, start);
+        if (motion > 1) {
+            word('I', w.cx - x_, start);
+            word('J', w.cy - y_, start);
         }
-        if (motion != 0 && to.feed != feed_) {
-            feed_ = to.feed;
-            text_ += fmt::format(" F{}", feed_);
-        }
+        if (motion != 0) feed(to.feed);
         text_ += '\n';
-        x_ = to.x;
-        y_ = to.y;
-        z_ = to.z;
-        xy_known_ = true;
+        return 1;
     }
-
-private:
-    void word(char letter, std::int64_t units, std::size_t start) {
+    /// An arc is a block with its centre and one with its end.
+    std::uint32_t conversational(const Move& to, const WrittenMove& w) {
+        using Kind = WrittenMove::Kind;
+        const bool arc = to.feed != 0 && w.kind != Kind::line;
+        begin_block();
+        if (arc) {
+            text_ += "CC";
+            word('X', w.cx, 0);
+            word('Y', w.cy, 0);
+            text_ += '\n';
+            begin_block();
+        }
+        text_ += arc ? "C" : "L";
+        if (arc || !xy_known_ || w.x != x_) word('X', w.x, 0);
+        if (arc || !xy_known_ || w.y != y_) word('Y', w.y, 0);
+        if (!arc && w.z != z_) word('Z', w.z, 0);
+        if (arc) text_ += w.kind == Kind::clockwise ? " DR-" : " DR+";
+        if (to.feed == 0) text_ += " FMAX";
+        else feed(to.feed);
+        text_ += '\n';
+        return arc ? 2 : 1;
+    }
+    void feed(std::uint32_t feed) {
+        if (feed == feed_) return;
+        feed_ = feed;
+        text_ += " F";
+        text_ += grid_.feed(feed);
+    }
+    void begin_block() {
+        if (dialect_.conversational) text_ += fmt::format("{} ", blocks_++);
+    }
+    void word(char letter, std::int64_t steps, std::size_t start) {
         if (text_.size() != start) text_ += ' ';
         text_ += letter;
-        append_mm(text_, units);
+        grid_.append(text_, steps);
     }
     std::string& text_;
-    std::int64_t z_origin_, x_ = 0, y_ = 0, z_ = 0;
+    const Dialect& dialect_;
+    ProgramGrid grid_;
+    WrittenMoves moves_;
+    std::size_t blocks_;
+    std::int64_t x_ = 0, y_ = 0, z_ = 0;  // steps
     bool xy_known_ = false;
     int motion_ = -1;
     std::uint32_t feed_ = 0;
@@ -127,6 +178,93 @@ std::string comment_text(std::string_view text) {
 
 namespace {
 
+/// A comment as a dialect takes it.
+std::string comment_line(const Dialect& dialect, std::string_view text) {
+    std::string inside = comment_text(text);
+    if (inside.size() > dialect.longest_comment) inside.resize(dialect.longest_comment);
+    for (char& c : inside) {
+        if (dialect.capitals && c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+        const bool plain = (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                           std::string_view(" .,:+-/=").find(c) != std::string_view::npos;
+        if ((dialect.capitals && !plain) || dialect.forbidden.find(c) != std::string_view::npos) c = '-';
+    }
+    return dialect.parentheses ? "(" + inside + ")\n" : "; " + inside + "\n";
+}
+
+/// What a dialect's templates are filled with.
+class Templates {
+public:
+    Templates(const Plan& plan, const Operation& operation, const Dialect& dialect)
+        : unit_(unit_word(dialect)),
+          name_(operation.file.substr(0, operation.file.rfind('.'))),
+          blend_(ProgramGrid(dialect).length(operation.blend)),
+          dwell_s_(plan.job.machine.spindle_dwell_s),
+          operation_(operation) {
+        append_rounded(speed_, operation.spindle_rpm, 0);
+        append_rounded(dwell_, dwell_s_, 3);
+        if (dialect.point && dwell_.find('.') == std::string::npos) dwell_ += '.';
+    }
+    [[nodiscard]] std::string filled(std::string_view text, const std::string& z = "") const {
+        return fmt::format(fmt::runtime(text), fmt::arg("unit", unit_), fmt::arg("name", name_),
+                           fmt::arg("number", operation_.number), fmt::arg("tool", operation_.tool),
+                           fmt::arg("speed", speed_), fmt::arg("dwell", dwell_),
+                           fmt::arg("dwell_ms", std::llround(dwell_s_ * 1000)), fmt::arg("blend", blend_),
+                           fmt::arg("z", z));
+    }
+
+private:
+    static std::string_view unit_word(const Dialect& dialect) {
+        if (dialect.conversational) return dialect.inch() ? "INCH" : "MM";
+        if (dialect.post == Post::siemens) return dialect.inch() ? "G700" : "G710";
+        return dialect.inch() ? "G20" : "G21";
+    }
+    std::string_view unit_;
+    std::string name_, speed_, dwell_, blend_;
+    double dwell_s_;
+    const Operation& operation_;
+};
+
+/// All that comes before the first motion.
+std::string head_text(const Plan& plan, const Layer& layer, const Operation& operation, const Tool& tool,
+                      const Dialect& dialect) {
+    const bool layer_top = frame_of(plan.job.machine) == Frame::layer_top;
+    const Templates templates(plan, operation, dialect);
+    std::string text = templates.filled(dialect.begin);
+    const auto comment = [&](const std::string& line) { text += comment_line(dialect, line); };
+    comment(fmt::format("Slabwright {}: {}", SLABWRIGHT_VERSION, operation.file));
+    comment(fmt::format("pattern {}", plan.input.file));
+    comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index,
+                        plan.layers.size(), decimal(layer.z_bottom, 4), decimal(layer.z_top, 4)));
+    comment(fmt::format("z = 0 at {}", layer_top ? "the layer's top" : "the pattern's bottom"));
+    comment(fmt::format("{}: {}", name(operation.kind), operation.purpose));
+    comment(fmt::format("tool {}: {}, diameter {} mm", tool.number, tool.name, decimal(tool.diameter, 4)));
+    comment(fmt::format("cutting {} mm, {} min", decimal(operation.cutting_mm, 1),
+                        decimal(operation.minutes, 2)));
+    const std::string notes = templates.filled(dialect.notes);
+    for (std::size_t at = 0; at < notes.size();) {
+        const std::size_t end = std::min(notes.find('\n', at), notes.size());
+        comment(notes.substr(at, end - at));
+        at = end + 1;
+    }
+    text += templates.filled(dialect.head);
+    const std::vector<Move>& moves = operation.moves;
+    // Centres count from where an arc begins, whatever the program before has left in force.
+    if (std::any_of(moves.begin(), moves.end(), [](const Move& m) { return m.is_arc(); }))
+        text += dialect.centres;
+    return text;
+}
+
+/// Lines with numbers before them, from `first` on.
+std::string in_blocks(const std::string& text, std::size_t first) {
+    std::string out;
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t end = text.find('\n', at);
+        out += fmt::format("{} {}\n", first++, text.substr(at, end - at));
+        at = end + 1;
+    }
+    return out;
+}
+
 // As write_program; stops before the first line after move `until`, with a piece that ends there.
 // @param lines gets the line of each move, 0 where it has none; may be null
 void write_until(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink,
@@ -134,40 +272,24 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
     const std::vector<Tool>& tools = plan.job.tools;
     const auto tool =
         std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == operation.tool; });
-    require_safe(layer, operation, tool == tools.end() ? nullptr : &*tool);
-
-    const bool layer_top = frame_of(plan.job.machine) == Frame::layer_top;
+    const Dialect dialect = dialect_of(plan.job.machine);
+    require_safe(layer, operation, tool == tools.end() ? nullptr : &*tool, dialect);
+    const Templates templates(plan, operation, dialect);
     std::string text;
     text.reserve(kPiece + 4096);
-    const auto comment = [&](const std::string& line) { text += fmt::format("({})\n", comment_text(line)); };
-    comment(fmt::format("Slabwright {}: {}", SLABWRIGHT_VERSION, operation.file));
-    comment(fmt::format("pattern {}", plan.input.file));
-    comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index,
-                        plan.layers.size(), decimal(layer.z_bottom, 4), decimal(layer.z_top, 4)));
-    comment(fmt::format("z = 0 at {}", layer_top ? "the layer's top" : "the pattern's bottom"));
-    comment(fmt::format("{}: {}", name(operation.kind), operation.purpose));
-    comment(fmt::format("tool {}: {}, diameter {} mm", tool->number, tool->name, decimal(tool->diameter, 4)));
-    comment(fmt::format("cutting {} mm, {} min", decimal(operation.cutting_mm, 1),
-                        decimal(operation.minutes, 2)));
-    text += fmt::format(
-        "G21 G17 G90 G94 G40 G49 G80\nG8 G97\nG64 P{3} Q0\nG54\nT{0} M6\nG43 H{0}\nS{1} M3\nG4 P{2}\n",
-        tool->number, decimal(operation.spindle_rpm, 0), decimal(plan.job.machine.spindle_dwell_s, 3),
-        decimal(operation.blend, 4));
-
-    const std::vector<Move>& moves = operation.moves;
-    // Centres count from where an arc begins, whatever the program before has left in force.
-    if (std::any_of(moves.begin(), moves.end(), [](const Move& m) { return m.is_arc(); })) text += "G91.1\n";
-    const std::int32_t clearance = to_units(operation.clearance_z);
-    MotionText motion(text, layer_top ? to_units(layer.z_top) : 0);
-    motion.rapid_z(clearance);
+    text += head_text(plan, layer, operation, *tool, dialect);
     auto line = static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
+    if (dialect.conversational) text = in_blocks(text, 0);
+    const std::vector<Move>& moves = operation.moves;
+    const std::int32_t clearance = to_units(operation.clearance_z);
+    MotionText motion(text, dialect, program_origin(plan.job, layer), line);
+    motion.begin(clearance, [&](const std::string& z) { return templates.filled(dialect.first, z); });
+    ++line;
     if (lines != nullptr) lines->assign(moves.size(), 0);
     const auto write = [&](std::size_t i) {
-        const std::size_t size = text.size();
-        motion.move(moves[i]);
-        if (text.size() == size) return;
-        ++line;
-        if (lines != nullptr) (*lines)[i] = line;
+        const std::uint32_t written = motion.move(moves[i]);
+        line += written;
+        if (written != 0 && lines != nullptr) (*lines)[i] = line;
     };
     // The first move's x and y are where the program's work starts. The next move goes there by itself when
     // it is a rapid at clearance height; else the tool is brought over that place before it may go down.
@@ -181,7 +303,8 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
         }
     }
     motion.rapid_z(clearance);
-    text += "M5\nM2\n";
+    const std::string end = templates.filled(dialect.end);
+    text += dialect.conversational ? in_blocks(end, motion.blocks()) : end;
     sink(text);
 }
 

@@ -2,14 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <span>
 
 namespace slabwright {
 
 namespace {
-
-constexpr double kInchInMm = 25.4;
 
 /// The groups of which a line may hold one word; those without a bit are no words of this project.
 std::uint32_t group_of_g(int g) {
@@ -36,6 +36,8 @@ std::uint32_t group_of_g(int g) {
             return 1u << 5;
         case 200:
         case 210:
+        case 7000:
+        case 7100:
             return 1u << 6;
         case 400:
             return 1u << 7;
@@ -53,9 +55,12 @@ std::uint32_t group_of_g(int g) {
         case 592:
         case 593:
             return 1u << 9;
+        case 600:
         case 610:
         case 611:
         case 640:
+        case 1870:
+        case 6410:
             return 1u << 10;
         case 970:
             return 1u << 11;
@@ -92,11 +97,11 @@ std::uint32_t group_of_m(int m) {
 }
 
 void check_groups(const GcodeNumbers& numbers, char letter, std::uint32_t (*group_of)(int),
-                  const GcodePlace& place) {
+                  std::span<const int> known, const GcodePlace& place) {
     std::uint32_t seen = 0;
     for (const int number : numbers) {
         const std::uint32_t group = group_of(number);
-        if (group == 0)
+        if (group == 0 || std::find(known.begin(), known.end(), number) == known.end())
             place.fail("gcode.unknown_word",
                        fmt::format("{}{} is no word that this reader knows", letter, gcode_number(number)));
         if ((seen & group) != 0)
@@ -120,8 +125,8 @@ void ModalState::apply(const GcodeLine& line, const GcodePlace& place) {
     motion_named_ = spins_up_ = false;
     named_path_mode_.reset();
     dwell_.reset();
-    if (line.g.count > 0) check_groups(line.g, 'G', group_of_g, place);
-    if (line.m.count > 0) check_groups(line.m, 'M', group_of_m, place);
+    if (line.g.count > 0) check_groups(line.g, 'G', group_of_g, dialect_.g, place);
+    if (line.m.count > 0) check_groups(line.m, 'M', group_of_m, dialect_.m, place);
     check_words(line, place);
     speed_and_feed(line, place);
     if (line.has('T')) {
@@ -129,30 +134,62 @@ void ModalState::apply(const GcodeLine& line, const GcodePlace& place) {
         selected_ = whole(line['T'], 'T', place);
     }
     if (line.m.has(60)) change_tool(place);
+    else if (!dialect_.changes_tools && selected_ > 0) loaded_ = selected_;
+    if (line.has('D')) edge(line, place);
     for (const int m : line.m) m_word(m, place);
-    if (line.g.has(40)) {
-        if (!line.has('P') || line['P'] < 0) place.fail("gcode.dwell", "G4 without a time P");
-        dwell_ = line['P'];
-    }
+    if (line.g.has(40)) dwell(line, place);
     for (const int g : line.g) g_word(g, place);
     if (line.g.has(430)) length_offset(line, place);
     if (line.g.has(640)) path_mode(line, place);
+    if (line.g.has(1870)) rounding_187(line, place);
+    if (line.g.has(6410)) rounding_adis(line, place);
+}
+
+void ModalState::dwell(const GcodeLine& line, const GcodePlace& place) {
+    using Dwell = Dialect::Dwell;
+    const char letter = dialect_.dwell == Dwell::x_seconds   ? 'X'
+                        : dialect_.dwell == Dwell::f_seconds ? 'F'
+                                                             : 'P';
+    if (!line.has(letter) || line[letter] < 0)
+        place.fail("gcode.dwell", fmt::format("G4 without a time {}", letter));
+    const bool milliseconds = dialect_.dwell == Dwell::p_milliseconds ||
+                              (dialect_.dwell == Dwell::p_by_point && !line.pointed('P'));
+    if (dialect_.dwell == Dwell::p_milliseconds && line.pointed('P'))
+        place.fail("gcode.dwell", "G4 P with a decimal point; this control takes whole milliseconds");
+    dwell_ = line[letter] / (milliseconds ? 1000 : 1);
+}
+
+/// The length of the tool that is loaded comes into force by its edge.
+void ModalState::edge(const GcodeLine& line, const GcodePlace& place) {
+    const int number = whole(line['D'], 'D', place);
+    if (number > 1) place.fail("gcode.offset", "another edge (D) than the first of the tool");
+    if (number == 1 && loaded_ == 0)
+        place.fail("gcode.offset", "a tool's edge (D1) before the tool is loaded (M6)");
+    length_offset_ = number == 1;
 }
 
 /// A parameter that no word of the line takes is a slip that LinuxCNC refuses.
 void ModalState::check_words(const GcodeLine& line, const GcodePlace& place) const {
-    const bool dwells = line.g.has(40), blends = line.g.has(640);
-    if (line.has('P') && !dwells && !blends) place.fail("gcode.unused_word", "P without G4 or G64");
+    const bool dwells = line.g.has(40), adis = line.g.has(6410), g187 = line.g.has(1870),
+               blends = line.g.has(640) && dialect_.rounding == Dialect::Rounding::g64_p;
+    if (line.has('P') && !dwells && !blends && !g187)
+        place.fail("gcode.unused_word", dialect_.rounding == Dialect::Rounding::g187 ? "P without G4 or G187"
+                                                                                     : "P without G4 or G64");
     if (line.has('Q') && !blends) place.fail("gcode.unused_word", "Q without G64");
+    if (line.has('E') && !g187) place.fail("gcode.unused_word", "E without G187");
+    if ((line.has(kAdis) || line.has(kAdisPos)) && !adis)
+        place.fail("gcode.unused_word", "ADIS without G641");
     if (line.has('H') && !line.g.has(430)) place.fail("gcode.unused_word", "H without G43");
-    if (dwells && (blends || line.has('X') || line.has('Y') || line.has('Z')))
+    const bool times_x = dialect_.dwell == Dialect::Dwell::x_seconds;
+    if (dwells && (blends || adis || g187 || (line.has('X') && !times_x) || line.has('Y') || line.has('Z')))
         place.fail("gcode.dwell", "G4 beside other words that take numbers");
 }
 
 void ModalState::speed_and_feed(const GcodeLine& line, const GcodePlace& place) {
-    if (line.has('F')) {
+    const bool times = line.g.has(40) && dialect_.dwell == Dialect::Dwell::f_seconds;
+    if (line.has('F') && !times) {
         if (!(line['F'] > 0)) place.fail("gcode.number", "a feed of zero or less");
-        feed_ = length(line['F'], place);  // in the unit before a G20 or G21 of this line
+        feed_ = feed_of(line['F'], place);  // in the unit before a G20 or G21 of this line
     }
     if (line.has('S')) {
         if (line['S'] < 0) place.fail("gcode.number", "a negative spindle speed");
@@ -195,22 +232,20 @@ void ModalState::m_word(int m, const GcodePlace& place) {
     }
 }
 
+bool ModalState::motion_word(int g) {
+    if (g == 0) motion_ = Motion::rapid;
+    else if (g == 10) motion_ = Motion::line;
+    else if (g == 20) motion_ = Motion::clockwise;
+    else if (g == 30) motion_ = Motion::counter_clockwise;
+    else if (g == 800) motion_ = Motion::none;
+    else return false;
+    motion_named_ = motion_ != Motion::none;
+    return true;
+}
+
 void ModalState::g_word(int g, const GcodePlace& place) {
-    const auto motion = [&](Motion to) {
-        motion_ = to;
-        motion_named_ = to != Motion::none;
-    };
+    if (motion_word(g)) return;
     switch (g) {
-        case 0:
-            return motion(Motion::rapid);
-        case 10:
-            return motion(Motion::line);
-        case 20:
-            return motion(Motion::clockwise);
-        case 30:
-            return motion(Motion::counter_clockwise);
-        case 800:
-            return motion(Motion::none);
         case 170:
             plane_ = {0, 1, 2};
             break;
@@ -221,9 +256,11 @@ void ModalState::g_word(int g, const GcodePlace& place) {
             plane_ = {1, 2, 0};
             break;
         case 200:
-            unit_ = kInchInMm;
+        case 7000:
+            unit_ = kInch;
             break;
         case 210:
+        case 7100:
             unit_ = 1;
             break;
         case 80:
@@ -241,9 +278,12 @@ void ModalState::g_word(int g, const GcodePlace& place) {
         case 540:
             work_offset_ = true;
             break;
+        case 600:
         case 610:
         case 611:
-            named_path_mode_ = PathMode{};
+            // One that never leaves its path slows down at corners by a setting, as if it rounded them.
+            named_path_mode_ =
+                dialect_.rounding == Dialect::Rounding::exact ? PathMode{kJunction, 0} : PathMode{};
             path_mode_ = true;
             break;
         case 900:
@@ -267,6 +307,8 @@ void ModalState::g_word(int g, const GcodePlace& place) {
         case 40:
         case 430:
         case 640:
+        case 1870:
+        case 6410:
             break;  // with their parameters, in apply()
         default:
             place.fail("gcode.offset",
@@ -284,7 +326,29 @@ void ModalState::length_offset(const GcodeLine& line, const GcodePlace& place) {
     length_offset_ = true;
 }
 
+void ModalState::rounding_187(const GcodeLine& line, const GcodePlace& place) {
+    const double p = line['P'];
+    if (!line.has('P') || (p != 1 && p != 2 && p != 3))
+        place.fail("gcode.path_mode", "G187 without a smoothness P1, P2 or P3");
+    if (!(line['E'] > 0)) place.fail("gcode.path_mode", "G187 without the rounding E that it allows");
+    named_path_mode_ = PathMode{length(line['E'], place), 0};
+    path_mode_ = true;
+}
+
+void ModalState::rounding_adis(const GcodeLine& line, const GcodePlace& place) {
+    if (!(line[kAdis] > 0) || !(line[kAdisPos] > 0))
+        place.fail("gcode.path_mode", "G641 without ADIS= and ADISPOS=: the machine's own would count");
+    const double feeds = length(line[kAdis], place), rapids = length(line[kAdisPos], place);
+    named_path_mode_ = PathMode{std::min(feeds, rapids), std::abs(feeds - rapids)};
+    path_mode_ = true;
+}
+
 void ModalState::path_mode(const GcodeLine& line, const GcodePlace& place) {
+    if (dialect_.rounding != Dialect::Rounding::g64_p) {
+        named_path_mode_ = PathMode{kJunction, 0};
+        path_mode_ = true;
+        return;
+    }
     for (const char letter : {'P', 'Q'})
         if (line[letter] < 0)
             place.fail("gcode.number", fmt::format("G64 with a negative tolerance {}", letter));
@@ -305,9 +369,19 @@ double ModalState::length(double value, const GcodePlace& place) const {
     return value * unit_;
 }
 
+/// A feed in inches a minute has three decimals: it is the whole millimetre a minute that is written so.
+double ModalState::feed_of(double value, const GcodePlace& place) const {
+    const double feed = length(value, place);
+    const double whole = std::round(feed), written = 0.5e-3 * unit_ + 1e-9;
+    return unit_ == kInch && std::abs(feed - whole) <= written ? whole : feed;
+}
+
 void ModalState::require_for_motion(const GcodePlace& place) const {
     if (loaded_ == 0) place.fail("gcode.tool", "a motion before a tool is loaded (T… M6)");
-    if (!length_offset_) place.fail("gcode.offset", "a motion without the length offset of its tool (G43)");
+    if (!length_offset_ && !no_length_offset_)
+        place.fail("gcode.offset", dialect_.length == Dialect::Length::edge
+                                       ? "a motion without the length of its tool (D1)"
+                                       : "a motion without the length offset of its tool (G43)");
     const auto require = [&](bool known, const char* what) {
         if (!known)
             place.fail("gcode.unset", fmt::format("a motion before {}", what),
@@ -318,10 +392,12 @@ void ModalState::require_for_motion(const GcodePlace& place) const {
     require(distance_ != Distance::unknown, "absolute or incremental distances (G90)");
     require(feed_per_minute_, "the meaning of its feed (G94)");
     require(no_compensation_, "cutter compensation is off (G40)");
-    require(radius_mode_, "x as it is, not as a diameter (G8)");
-    require(revolutions_, "a spindle speed in revolutions (G97)");
+    require(radius_mode_ || !dialect_.lathe_words, "x as it is, not as a diameter (G8)");
+    require(revolutions_ || !dialect_.lathe_words, "a spindle speed in revolutions (G97)");
     require(work_offset_, "its work offset (G54)");
-    require(path_mode_, "how far the machine may leave its path (G64 P…)");
+    require(path_mode_, dialect_.rounding == Dialect::Rounding::g64_p
+                            ? "how far the machine may leave its path (G64 P…)"
+                            : "how far the control may leave its path");
     if (motion_ != Motion::rapid && !(feed_ > 0))
         place.fail("gcode.feed", "a feed motion before any feed (F)");
 }
@@ -331,7 +407,8 @@ void ModalState::require_at_end(const GcodePlace& place) const {
         place.fail("gcode.left_in_force", fmt::format("the program leaves the machine {}", what),
                    "whoever moves it by hand afterwards does not expect that");
     };
-    if (unit_ == kInchInMm) refuse("in inches (G20)");
+    if (unit_ == kInch && !dialect_.inch()) refuse("in inches (G20)");
+    if (unit_ == 1 && dialect_.inch()) refuse("in millimetres, where the plan's programs are in inches");
     if (incremental()) refuse("in incremental distances (G91)");
 }
 

@@ -1,4 +1,4 @@
-// What of a LinuxCNC control's state the words of a program have set. Nothing is known where it begins:
+// What of a control's state the words of a program have set. Nothing is known where it begins:
 // whatever ran before may have left the machine in inches, in another plane or with another tool's length in
 // force. A motion is refused while anything that decides where it goes has not been stated.
 //
@@ -15,11 +15,18 @@ namespace slabwright {
 
 class ModalState {
 public:
+    /// @param dialect must outlive it
+    explicit ModalState(const Dialect& dialect)
+        : dialect_(dialect), no_length_offset_(dialect.length == Dialect::Length::touch_off) {
+        if (dialect.centres_incremental) absolute_centres_ = false;
+    }
+
     enum class Motion { none, rapid, line, clockwise, counter_clockwise };
     enum class Spindle { unknown, off, clockwise };
 
-    /// Takes all words of a line but its coordinates and its end, in LinuxCNC's order, whatever the order in
-    /// the line: feed, speed, tool, change, spindle; then dwell, plane, units, offsets, path mode, distances.
+    /// Takes all words of a line but its coordinates, its program number and its end, in LinuxCNC's order,
+    /// whatever the order in the line: feed, speed, tool, change, spindle; then dwell, plane, units, offsets,
+    /// path mode, distances.
     /// @throws Error(verification): gcode.twice for two words of one group, gcode.unknown_word for a G or M
     ///   number that is none of this project's, gcode.number, gcode.unused_word, gcode.unset for a length
     ///   before its unit, gcode.tool, gcode.offset, gcode.spindle, gcode.coolant, gcode.pause, gcode.dwell,
@@ -30,7 +37,8 @@ public:
     ///   not stated before this motion; gcode.feed for a feed motion before any F
     void require_for_motion(const GcodePlace& place) const;
 
-    /// @throws Error(verification, "gcode.left_in_force") where the program ends in inches or incremental
+    /// @throws Error(verification, "gcode.left_in_force") where the program ends in another unit than the
+    ///   dialect's, or incremental
     void require_at_end(const GcodePlace& place) const;
 
     [[nodiscard]] Motion motion() const { return motion_; }
@@ -60,6 +68,7 @@ public:
 private:
     enum class Distance { unknown, absolute, incremental };
 
+    bool motion_word(int g);
     void g_word(int g, const GcodePlace& place);
     void m_word(int m, const GcodePlace& place);
     void change_tool(const GcodePlace& place);
@@ -67,8 +76,14 @@ private:
     void path_mode(const GcodeLine& line, const GcodePlace& place);
     void speed_and_feed(const GcodeLine& line, const GcodePlace& place);
     void check_words(const GcodeLine& line, const GcodePlace& place) const;
+    void rounding_187(const GcodeLine& line, const GcodePlace& place);
+    void rounding_adis(const GcodeLine& line, const GcodePlace& place);
+    void dwell(const GcodeLine& line, const GcodePlace& place);
+    void edge(const GcodeLine& line, const GcodePlace& place);
     double length(double value, const GcodePlace& place) const;
+    double feed_of(double value, const GcodePlace& place) const;
 
+    const Dialect& dialect_;
     Motion motion_ = Motion::none;
     std::array<int, 3> plane_{-1, -1, -1};
     double unit_ = 0;  // unknown
@@ -78,6 +93,7 @@ private:
     bool work_offset_ = false, path_mode_ = false;
     int selected_ = 0, loaded_ = 0;
     bool length_offset_ = false;  // of the tool that is loaded
+    bool no_length_offset_;       // the control knows of none
     double feed_ = 0, speed_ = 0;
     Spindle spindle_ = Spindle::unknown;
 

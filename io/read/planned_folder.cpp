@@ -321,6 +321,20 @@ GcodeLimits gcode_limits(const Tolerances& tolerances) {
     return limits;
 }
 
+Program read_planned_program(const std::string& text, const std::string& file, const Job& job) {
+    const Dialect dialect = dialect_of(job.machine);
+    try {
+        return read_program_text(text, file, dialect, gcode_limits(job.tolerances));
+    } catch (const Error& error) {
+        const std::string other = other_dialect(text, dialect);
+        if (other.empty()) throw;
+        throw Error(error.kind(), kForeignProgram,
+                    "is a program for " + other + " where the plan's are for " +
+                        in_words(dialect.post, dialect.units),
+                    error.place(), "do not mix folders; plan again with the machine.post of your control");
+    }
+}
+
 PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refusal) {
     const std::string file = (out / "plan.json").string();
     const Refuse refuse{refusal, file};
@@ -364,7 +378,7 @@ Program PlannedFolder::read_program(std::size_t i, const FolderRefusal& refusal)
     const PlannedProgram& planned = build.programs[i];
     const std::string text =
         read_whole(path / planned.file, {refusal.kind, refusal.program, kMostProgramBytes, "plan again"});
-    Program program = read_gcode(text, planned.file, gcode_limits(build.job.tolerances));
+    Program program = read_planned_program(text, planned.file, build.job);
     // Programs count from the top in whole 0.1 µm, as they were written.
     const double up =
         build.frame == Frame::layer_top ? to_mm(to_units(simulation.layers[planned.layer].z_top)) : 0;

@@ -42,6 +42,13 @@ struct PlannedFolder {
 [[nodiscard]] PlannedFolder read_planned_folder(const std::filesystem::path& out,
                                                 const FolderRefusal& refusal);
 
+/// The code of a program of another control's dialect.
+inline constexpr const char* kForeignProgram = "program.dialect";
+
+/// Reads a program of a plan in the dialect of its job's machine. @throws Error as read_program_text(), or
+/// kForeignProgram, which names both, where it is a whole program of another dialect
+[[nodiscard]] Program read_planned_program(const std::string& text, const std::string& file, const Job& job);
+
 /// How a plan's programs are read: chords that stand for an arc take next to nothing of the gouge tolerance
 /// that the paths were made for.
 [[nodiscard]] GcodeLimits gcode_limits(const Tolerances& tolerances);

@@ -41,6 +41,11 @@ inline constexpr Word<Frame> kFrameWords[] = {
     {"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}, {"auto", Frame::automatic}};
 inline constexpr Word<BuildTable> kTableWords[] = {{"moving", BuildTable::moving},
                                                    {"fixed", BuildTable::fixed}};
+inline constexpr Word<Post> kPostWords[] = {{"linuxcnc", Post::linuxcnc}, {"fanuc", Post::fanuc},
+                                            {"haas", Post::haas},         {"grbl", Post::grbl},
+                                            {"mach", Post::mach},         {"iso", Post::iso},
+                                            {"siemens", Post::siemens},   {"heidenhain", Post::heidenhain}};
+inline constexpr Word<LengthUnit> kProgramUnitWords[] = {{"mm", LengthUnit::mm}, {"inch", LengthUnit::inch}};
 inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated},
                                                         {"nominal", Engagement::nominal}};
 inline constexpr Word<SelectionMode> kSelectionWords[] = {{"select", SelectionMode::select},
@@ -162,6 +167,11 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
     visit.word("frame", machine.frame, kFrameWords,
                "pattern-base (z = 0 at the pattern's bottom), layer-top (z = 0 at the layer's top), or auto: "
                "layer-top where the table moves");
+    visit.word("post", machine.post, kPostWords,
+               "the control that the programs are for: linuxcnc, fanuc, haas, grbl, mach, iso, siemens or "
+               "heidenhain");
+    visit.word("units", machine.units, kProgramUnitWords,
+               "of the programs: mm or inch; this file and plan.json stay in mm");
     visit.key("base_board_thickness", machine.base_board_thickness,
               "mm, the sacrificial board under the first layer");
     visit.key("base_board_cut", machine.base_board_cut,

@@ -40,8 +40,9 @@ constexpr std::array<std::string_view, 7> kFiles{"plan.json",   "tool.tbl",    "
 struct Inner {
     std::string_view folder, ending;
 };
-constexpr std::array<Inner, 4> kInner{Inner{"nc", ".ngc"}, Inner{"dxf", ".dxf"}, Inner{"svg", ".svg"},
-                                      Inner{"fixture", ".dxf"}};
+constexpr std::array<Inner, 9> kInner{Inner{"nc", ".ngc"},  Inner{"nc", ".nc"},   Inner{"nc", ".gcode"},
+                                      Inner{"nc", ".tap"},  Inner{"nc", ".mpf"},  Inner{"nc", ".h"},
+                                      Inner{"dxf", ".dxf"}, Inner{"svg", ".svg"}, Inner{"fixture", ".dxf"}};
 
 [[noreturn]] void refuse(const char* code, const fs::path& place, const std::string& what,
                          const std::string& remedy = kRemedy) {
@@ -92,7 +93,8 @@ bool is_program_name(const std::string& name) {
     return std::any_of(kInner.begin(), kInner.end(), [&](const Inner& inner) {
         const std::size_t ending = name.rfind(inner.ending);
         return ending != std::string::npos &&
-               (name.size() == ending + 4 || maker_of(name, name.substr(1, ending + 3), kPartial));
+               (name.size() == ending + inner.ending.size() ||
+                maker_of(name, name.substr(1, ending + inner.ending.size() - 1), kPartial));
     });
 }
 

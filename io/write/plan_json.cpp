@@ -6,6 +6,7 @@
 #include "engine/forces/feeds.h"
 #include "engine/moves/feed_lengths.h"
 #include "io/posts/gcode_writer.h"
+#include "io/posts/program_grid.h"
 #include "io/text/job_keys.h"
 
 namespace slabwright {
@@ -126,7 +127,8 @@ void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const O
     json.key("spindle_rpm").rounded(operation.spindle_rpm, 0);
     json.key("blend").rounded(operation.blend, kLength);
     json.key("feeds").begin_array(Shape::line);
-    for (const FeedLength& f : feed_lengths(operation.moves)) {
+    for (const FeedLength& f : written_feed_lengths(dialect_of(plan.job.machine), operation.moves,
+                                                    program_origin(plan.job, layer))) {
         json.begin_object(Shape::line).key("feed").exact(f.feed).key("mm").rounded(f.mm, kExact);
         json.key("centre").begin_array(Shape::line);
         for (const double v : f.centre()) json.rounded(v, kExact);

@@ -32,6 +32,8 @@ std::string told(const SequenceStep& step) {
         if (key == "slab_top_mm") text += " at z = " + mm(value) + " mm";
         if (key == "force_n") text += fmt::format(" with {:.0f} N", value);
     }
+    for (const auto& [key, value] : step.words)
+        if (key == "length") text += ", " + value + " its tip";
     if (step.action == "clear") text += " the handler and the feed chamber by hand, wipe wet glue off";
     if (step.seconds >= 1) text += fmt::format(", {:.0f} s", step.seconds);
     return text;

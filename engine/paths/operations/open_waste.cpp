@@ -65,7 +65,7 @@ OpenLevel plan_open_level(const LayerCut& cut, const Tool& face, const Tool& too
     level.above = above_z;
     if (forbidden.empty()) return level;
     const double wider = (face.diameter - tool.diameter) / 2;
-    const double blend = rough_blend(cut.job.cutting);
+    const double blend = rough_blend(cut.job);
     const Loops kept = simplify(
         thinned_rings(cut, face, filled(offset_outline(forbidden, wider + kCollar, kOffsetError)), blend));
     level.left = offset_outline(kept, kOverlap - wider, kOffsetError);
@@ -128,7 +128,7 @@ Operation clear_open_waste(const LayerCut& cut, const Tool& face, std::span<Open
     const std::size_t no_ways = cut.no_way_in.size();
     for (;;) {
         op = cut.operation(OperationKind::rough, "open waste", face);
-        op.blend = rough_blend(cut.job.cutting);
+        op.blend = rough_blend(cut.job);
         double saved = in_spindle ? 0 : -cut.job.machine.tool_change_s / 60;
         for (const OpenLevel& level : levels)
             if (!level.rings.pieces.empty()) saved += level.saved;

@@ -162,7 +162,7 @@ std::vector<Operation> rough_layer(const LayerCut& cut) {
     const bool contour = cut.job.cutting.rough_pattern == RoughPattern::contour;
     Operation op =
         cut.operation(OperationKind::rough, contour ? "contour-parallel levels" : "zigzag levels", tool);
-    op.blend = rough_blend(cut.job.cutting);
+    op.blend = rough_blend(cut.job);
     const double r = tool.diameter / 2, clearance = cut.layer.z_top + cut.job.machine.clearance;
     const Cutter cutter{Cutter::Profile::flat, r + kept_off_walls(cut.job.cutting)};
     const double allowance = cut.job.cutting.floor_allowance;

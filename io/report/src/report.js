@@ -114,7 +114,7 @@ export function layerName(l) {
 }
 
 export function operationName(operation) {
-    return `${operation.name.replace(/\.ngc$/, '')}, ${words(operation.kind)}: ${operation.purpose}`;
+    return `${operation.name.replace(/\.(ngc|nc|gcode|tap|mpf|h)$/, '')}, ${words(operation.kind)}: ${operation.purpose}`;
 }
 
 export const featureKinds = {

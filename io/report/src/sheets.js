@@ -68,6 +68,14 @@ function toolRows(uses, key) {
 }
 const toolHead = ['✓', 'Place', 'Tool', 'Ø mm', 'Stick-out mm', 'Flutes mm', 'rpm', 'Feed mm/min'];
 
+// Which control the programs are for, where it is not LinuxCNC in millimetres, and what they leave to its settings.
+function control() {
+    const {post, units} = plan.job.machine;
+    if (!post || (post === 'linuxcnc' && units === 'mm')) return '';
+    const settings = {fanuc: 'corners rounded by 0.02 mm at most', iso: 'corners rounded by 0.02 mm at most', mach: 'corners rounded by 0.02 mm at most, G4 in seconds', grbl: '$11 = 0.02 at most, $32 = 0'}[post];
+    return ` (${post}, ${units}${settings ? `; set there: ${settings}` : ''})`;
+}
+
 function fact(name, ...content) {
     return make('div', {class: 'fact'}, make('h4', {}, name), content);
 }
@@ -116,7 +124,9 @@ function sheet(l, minutes) {
             l === 0 ? `base board ${figure(plan.job.machine.base_board_thickness, 1)} mm mounted and level` : `layer ${plan.layers[l - 1].index} faced, free of dust where the glue goes`,
             `slab at least ${figure(layer.slab_thickness, 2)} mm thick all over, no warp`,
             ...(glued ? [`glue on, pressed ${figure(plan.job.bonding.press_time_s, 0)} s`] : []),
-            'XY and Z touched off as above', 'dust extraction on',
+            'XY and Z touched off as above',
+            ...(plan.job.machine.post === 'grbl' ? ['at each change of tool: the new tip touched off where the last one was'] : []),
+            'dust extraction on',
             `after facing: top measured at z ${figure(plan.frame === 'layer-top' ? 0 : layer.z_top, 2)}`,
         ].map((text, i) => tick(`L${l}:check${i}`, text))),
         make('p', {class: 'proof'}, make('strong', {}, 'Simulated: '), simulated(l).join('; ')));
@@ -139,7 +149,7 @@ function cover(minutes) {
                 `base board ${wide} × ${figure(plan.job.machine.base_board_thickness, 1)} mm`,
                 ...t.slabs.map(s => `${plural(s.count, 'slab')} ${plan.job.material.name}, ${wide} × ${figure(s.thickness, 2)} mm`),
                 `${plan.job.bonding.glue} for ${figure(t.glue_mm2 / 100, 0)} cm²`,
-                `${plural(used.length, 'tool')} as below, programs of nc/ on the control`,
+                `${plural(used.length, 'tool')} as below, programs of nc/ on the control${control()}`,
                 `press up to ${figure(Math.max(...plan.layers.map(layer => layer.press_force_n)), 0)} N, ${figure(plan.job.bonding.press_time_s, 0)} s a joint`,
                 `machine carries ${figure(t.stack_mass_kg, 0)} kg`,
             ].map((text, i) => tick(`cover:${i}`, text))))),

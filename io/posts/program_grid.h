@@ -1,0 +1,81 @@
+// The places that a program can name: whole steps of its last decimal. What a plan has in 0.1 µm is rounded
+// to them once, here, for the text and for what plan.json says of it.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/moves/feed_lengths.h"
+#include "io/posts/dialect.h"
+#include "io/text/decimal.h"
+
+namespace slabwright {
+
+class ProgramGrid {
+public:
+    explicit ProgramGrid(const Dialect& dialect);
+
+    /// Whether its steps are the plan's own, 0.1 µm: nothing is rounded.
+    [[nodiscard]] bool exact() const { return exact_; }
+    /// The nearest step to a place in 0.1 µm, halves away from zero: off by half a step at most.
+    [[nodiscard]] std::int64_t steps(std::int64_t units) const { return exact_ ? units : rounded(units); }
+    /// Where a step lies, mm.
+    [[nodiscard]] double mm(std::int64_t steps) const;
+    /// Appends a place as the dialect spells it: "-1.25", "29." where points are needed, "+29" for
+    /// HEIDENHAIN.
+    void append(std::string& text, std::int64_t steps) const {
+        if (plain_) append_mm(text, steps);
+        else append_spelled(text, steps);
+    }
+    /// A feed in mm/min, as F says it.
+    [[nodiscard]] std::string feed(std::uint32_t mm_min) const;
+    /// A length in mm that is no place: to four decimals, in inch to six and never more than it is.
+    [[nodiscard]] std::string length(double mm) const;
+
+private:
+    [[nodiscard]] std::int64_t rounded(std::int64_t units) const;
+    void append_spelled(std::string& text, std::int64_t steps) const;
+    const Dialect* dialect_;
+    bool exact_, plain_;     // plain: exact, and spelled as everywhere
+    std::int64_t per_unit_;  // steps of a mm or inch
+};
+
+/// A move as it is written: rounded to the grid.
+struct WrittenMove {
+    std::int64_t x = 0, y = 0, z = 0;                                                ///< steps
+    std::int64_t cx = 0, cy = 0;                                                     ///< of an arc's centre
+    enum class Kind { none, line, clockwise, counter_clockwise } kind = Kind::none;  ///< none: it stays there
+};
+
+/// Rounds an operation's moves one after another.
+class WrittenMoves {
+public:
+    /// @param z_origin 0.1 µm: what the program's z counts from
+    WrittenMoves(const ProgramGrid& grid, std::int64_t z_origin) : grid_(grid), z_origin_(z_origin) {}
+
+    /// Takes up a height; x and y stay as they are.
+    std::int64_t height(std::int64_t z_units);
+    /// An arc whose rounded ends are less than ten steps apart is a line: by then rounding could turn it into
+    /// a full circle.
+    WrittenMove next(const Move& to);
+
+private:
+    const ProgramGrid& grid_;
+    std::int64_t z_origin_;
+    bool known_ = false;                  // x and y are
+    std::int64_t ux_ = 0, uy_ = 0;        // 0.1 µm
+    std::int64_t x_ = 0, y_ = 0, z_ = 0;  // steps
+};
+
+/// What plan.json says of a program: feed_lengths() of the moves as the dialect writes them.
+/// @param z_origin 0.1 µm, as for WrittenMoves; heights count from the pattern's bottom all the same
+[[nodiscard]] std::vector<FeedLength> written_feed_lengths(const Dialect& dialect,
+                                                           std::span<const Move> moves,
+                                                           std::int64_t z_origin);
+
+/// What a program's z counts from, 0.1 µm above the pattern's bottom.
+[[nodiscard]] std::int64_t program_origin(const Job& job, const Layer& layer);
+
+}  // namespace slabwright
