@@ -333,6 +333,30 @@ void add_common(CLI::App& command, Options& options) {
     add_prepare_options(command, options.prepare);
 }
 
+CLI::App* add_plan_command(CLI::App& app, Options& options) {
+    CLI::App* command = app.add_subcommand("plan", "plan the build of a pattern and write it to a folder");
+    command->add_option("STL", options.stl, "the pattern")->required();
+    command->add_option("-o,--out", options.out, "folder for the plan; a plan in it is replaced")->required();
+    add_common(*command, options);
+    command->add_option("--strategy", options.strategy, "of layer placement: optimal, printed or combined")
+        ->check(CLI::IsMember({"optimal", "printed", "combined"}));
+    command->add_option("--finder", options.finder, "of features: exact, halving or both")
+        ->check(CLI::IsMember({"exact", "halving", "both"}));
+    command
+        ->add_option("--orient", options.orient,
+                     "auto: laid on the side on which it is best built; report: only what each side would "
+                     "give, as `orient` tells it")
+        ->check(CLI::IsMember({"auto", "report"}));
+    command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
+    command->add_flag("--accept-weak-joints", options.accept_weak, "plan although a joint may not hold");
+    command->add_option("--access-maps", options.access_maps,
+                        "folder for what each tool reaches of each layer's facets, as PLY");
+    command->add_flag("--keep-failed", options.keep_failed,
+                      "write the programs also where they do not make the part (exit code 5)");
+    command->add_flag("--no-verify", options.no_verify, "write the plan without simulating its programs");
+    return command;
+}
+
 CLI::App* add_prepare_command(CLI::App& app, Options& options) {
     CLI::App* command =
         app.add_subcommand("prepare", "turn, scale, shrink, mirror or shift a model, or give it a skin");
@@ -412,31 +436,7 @@ int command(int argc, char** argv) {
     app.set_version_flag("--version", "slabwright " + version() + "\nreads " + pattern_formats());
     app.require_subcommand(1);
 
-    CLI::App* plan_command =
-        app.add_subcommand("plan", "plan the build of a pattern and write it to a folder");
-    plan_command->add_option("STL", options.stl, "the pattern")->required();
-    plan_command->add_option("-o,--out", options.out, "folder for the plan; a plan in it is replaced")
-        ->required();
-    add_common(*plan_command, options);
-    plan_command
-        ->add_option("--strategy", options.strategy, "of layer placement: optimal, printed or combined")
-        ->check(CLI::IsMember({"optimal", "printed", "combined"}));
-    plan_command->add_option("--finder", options.finder, "of features: exact, halving or both")
-        ->check(CLI::IsMember({"exact", "halving", "both"}));
-    plan_command
-        ->add_option("--orient", options.orient,
-                     "auto: laid on the side on which it is best built; report: only what each side would "
-                     "give, as `orient` tells it")
-        ->check(CLI::IsMember({"auto", "report"}));
-    plan_command->add_flag("--allow-undercut", options.allow_undercut, "plan although undercuts stay unmade");
-    plan_command->add_flag("--accept-weak-joints", options.accept_weak, "plan although a joint may not hold");
-    plan_command->add_option("--access-maps", options.access_maps,
-                             "folder for what each tool reaches of each layer's facets, as PLY");
-    plan_command->add_flag("--keep-failed", options.keep_failed,
-                           "write the programs also where they do not make the part (exit code 5)");
-    plan_command->add_flag("--no-verify", options.no_verify,
-                           "write the plan without simulating its programs");
-
+    CLI::App* plan_command = add_plan_command(app, options);
     CLI::App* verify_command =
         app.add_subcommand("verify", "simulate the programs of a plan against the pattern");
     verify_command->add_option("OUT", options.out, "folder of the plan")->required();

@@ -564,6 +564,16 @@ private:
         double z = 0;
     };
 
+    /// An arc of one radius ends up to a rounding of the text beside where the text ends it. What a rapid
+    /// starts from has been cut there.
+    static CutEffect cut_arc_end(const PreparedProgram& p, const ProgramArc& arc, Stock& stock, double deep) {
+        const std::vector<ProgramStep>& steps = p.program->steps;
+        if (arc.end >= steps.size() || !steps[arc.end].rapid()) return {};
+        const ProgramStep& last = steps[arc.end - 1];
+        const Point3 there{last.x, last.y, last.z};
+        return stock.cut(p.end, there, there, deep);
+    }
+
     /// Runs a program over a tile whose highest stock stands at `top`; whether it took anything.
     bool run_program(const PreparedProgram& p, Stock& stock, double top, LevelMotions& level,
                      TileProgram& out) const {
@@ -698,13 +708,7 @@ private:
                                : stock.cut(p.end, from, to, deep, chain));
                 if (in_arc) {
                     cut_arcs = arc + 1;
-                    // An arc of one radius ends up to a rounding of the text beside where the text ends it.
-                    // What a rapid starts from has been cut there.
-                    const std::size_t next = arcs[arc].end;
-                    const ProgramStep& last = steps[next - 1];
-                    const Point3 there{last.x, last.y, last.z};
-                    if (next < steps.size() && steps[next].rapid())
-                        tell(i, stock.cut(p.end, there, there, deep));
+                    tell(i, cut_arc_end(p, arcs[arc], stock, deep));
                 }
             }
             auto follow = [&](double thick, double above, Extreme& extreme, std::uint32_t& line) {
