@@ -39,16 +39,10 @@ Turn random_turn(std::mt19937& random) {
 }
 
 Mesh mesh_of(Context& context, const test::PlateFacets& facets, const Turn& turn) {
-    std::vector<std::array<Vec3f, 3>> corners;
-    for (const auto& facet : facets) {
-        std::array<Vec3f, 3> rounded;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Vec3d p = turned(turn, facet[k]);
-            rounded[k] = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
-        }
-        corners.push_back(rounded);
-    }
-    return weld(context, corners);
+    test::PlateFacets placed = facets;
+    for (auto& facet : placed)
+        for (Vec3d& p : facet) p = turned(turn, p);
+    return weld(context, test::rounded(placed));
 }
 
 constexpr Turn kAsItIs{Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}};
@@ -64,13 +58,13 @@ struct Made {
 };
 
 // A plate, with what was made into it.
-struct Made_plate {
+struct MadePlate {
     test::DrilledPlate plate;
     std::vector<Made> holes;
 };
 
 // One hole of random size and form in a cell of its own.
-void drill(Made_plate& to, double height, double breadth, std::mt19937& random) {
+void drill(MadePlate& to, double height, double breadth, std::mt19937& random) {
     const auto draw = [&](double a, double b) {
         return std::uniform_real_distribution<double>(a, b)(random);
     };
@@ -81,14 +75,14 @@ void drill(Made_plate& to, double height, double breadth, std::mt19937& random) 
     const double jitter = n >= 16 && pick(0, 1) == 1 ? 0.3 : 0;
     Made made{HoleKind::plain, HoleBottom::open, {}, {}, diameter, diameter, n};
     const int form = pick(0, 6);
-    const double wide = form == 3 || form == 4 || form == 5 ? r * draw(1.3, 1.6) : r;
+    const double wide = form >= 3 && form <= 5 ? std::min(r * draw(1.3, 1.6), r + height / 2) : r;
     const double width = 2 * wide + draw(0.5, 12);
     const double x = to.plate.next_x() + width / 2, y = breadth / 2;
     LoopAxis axis{{x, y, 0}};
     const std::vector<double> angles = test::turn(n, draw(0, 1), jitter, random);
-    // Every third wall of 12 sides or more has other corners below than above.
+    // Every third wall of 16 sides or more has other corners below than above.
     const std::vector<double> lower =
-        n >= 12 && pick(0, 2) == 0 ? test::turn(n + pick(0, 3), draw(0, 1), 0, random) : angles;
+        n >= 16 && pick(0, 2) == 0 ? test::turn(n + pick(0, 3), draw(0, 1), 0, random) : angles;
     std::vector<test::Loop> loops;
     const double depth = height * draw(0.4, 0.8);
     Vec3d apex{x, y, height - depth};
@@ -234,7 +228,7 @@ TEST(Holes, SixtyAtAnyAxisAreFoundAndNothingElse) {
     std::size_t holes = 0;
     for (int i = 0; i < 20; ++i) {
         const double height = std::uniform_real_distribution<double>(12, 60)(random), breadth = 150;
-        Made_plate made{test::DrilledPlate(breadth, height), {}};
+        MadePlate made{test::DrilledPlate(breadth, height), {}};
         for (int k = 0; k < 3; ++k) drill(made, height, breadth, random);
         leave_undrilled(made.plate, height, breadth, random);
         const Turn turn = i == 0 ? kAsItIs : random_turn(random);
@@ -251,6 +245,133 @@ TEST(Holes, SixtyAtAnyAxisAreFoundAndNothingElse) {
         holes += made.holes.size();
     }
     EXPECT_EQ(holes, 60u);
+}
+
+// A bore of eight sides, and a hole that comes from the block's side through one of them into the bore.
+TEST(Holes, OneThatIsCutByTheMouthOfAnotherIsWhole) {
+    std::mt19937 random(test::seed());
+    Context context;
+    const double half = 60, height = 50, radius = 40, small = 7;
+    const LoopAxis bore{{0, 0, 0}};
+    const std::vector<double> eight = test::turn(8, kPi / 8, 0, random);
+    const test::Loop above = bore.ring(eight, radius, height), below = bore.ring(eight, radius, 0);
+    const auto outline = [&](double z) {
+        return test::Loop{{-half, -half, z}, {half, -half, z}, {half, half, z}, {-half, half, z}};
+    };
+    test::PlateFacets facets;
+    const test::Loop top = outline(height), bottom = outline(0);
+    test::strip(facets, bore, top, above);
+    test::strip(facets, bore, below, bottom);
+    for (std::size_t k = 0; k < 3; ++k)
+        test::quad(facets, bottom[k == 0 ? 0 : k + 1], bottom[k == 0 ? 1 : (k + 2) % 4],
+                   top[k == 0 ? 1 : (k + 2) % 4], top[k == 0 ? 0 : k + 1]);
+    // The corners lie at odd multiples of 22.5°, so that the last side, between the last and the first, looks
+    // along x.
+    for (std::size_t k = 0; k < 7; ++k) test::quad(facets, above[k], above[k + 1], below[k + 1], below[k]);
+    const double wall = radius * std::cos(kPi / 8);
+    const LoopAxis cross_hole = LoopAxis::along({wall, 0, height / 2}, {-1, 0, 0});
+    const std::vector<double> angles = test::turn(30, 0.02, 0, random);
+    const test::Loop inner = cross_hole.ring(angles, small, 0);
+    const test::Loop outer = cross_hole.ring(angles, small, wall - half);
+    test::strip(facets, cross_hole, {above[7], above[0], below[0], below[7]}, inner);
+    test::strip(facets, cross_hole, inner, outer);
+    test::strip(facets, cross_hole, outer, {bottom[1], bottom[2], top[2], top[1]});
+    for (int i = 0; i < 5; ++i) {
+        const Turn turn = i == 0 ? kAsItIs : random_turn(random);
+        const Mesh mesh = mesh_of(context, facets, turn);
+        ASSERT_TRUE(test::closed(mesh.view()));
+        const std::vector<RoundHole> found = find_holes(context, mesh.view());
+        ASSERT_EQ(found.size(), 2u);
+        const RoundHole &wide = found[0].diameter_mm > 20 ? found[0] : found[1],
+                        &narrow = found[0].diameter_mm > 20 ? found[1] : found[0];
+        EXPECT_NEAR(wide.diameter_mm, 2 * radius, 1e-3);
+        EXPECT_NEAR(wide.depth_mm, height, 1e-3);
+        EXPECT_NEAR(narrow.diameter_mm, 2 * small, 1e-3);
+        EXPECT_NEAR(narrow.depth_mm, half - wall, 1e-3);
+        EXPECT_NEAR(std::abs(dot(narrow.into, turned(turn, {1, 0, 0}))), 1, 1e-6);
+        EXPECT_EQ(narrow.bottom, HoleBottom::open);
+    }
+}
+
+TEST(Holes, SayWhereTheirMouthAndStepsAre) {
+    std::mt19937 random(test::seed());
+    Context context;
+    test::DrilledPlate plate(40, 30);
+    const std::vector<double> angles = test::turn(40, 0, 0, random);
+    const LoopAxis axis{{20, 20, 0}};
+    const Vec3d tip{20, 20, 10 - 0.6009 * 3};
+    plate.cell(40, axis,
+               {axis.ring(angles, 8, 30), axis.ring(angles, 8, 25), axis.ring(angles, 3, 25),
+                axis.ring(angles, 3, 10)},
+               &tip);
+    const std::vector<RoundHole> found =
+        find_holes(context, mesh_of(context, plate.closed(), kAsItIs).view());
+    ASSERT_EQ(found.size(), 1u);
+    const RoundHole& hole = found[0];
+    EXPECT_EQ(hole.kind, HoleKind::counterbored);
+    EXPECT_EQ(hole.bottom, HoleBottom::cone);
+    EXPECT_NEAR(length(minus(hole.mouth, {20, 20, 30})), 0, 1e-4);
+    EXPECT_NEAR(length(minus(hole.into, {0, 0, -1})), 0, 1e-6);
+    ASSERT_EQ(hole.steps.size(), 3u);
+    const double expected[3][4] = {{0, 5, 16, 16}, {5, 20, 6, 6}, {20, 20 + 0.6009 * 3, 6, 0}};
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_NEAR(hole.steps[i].from_mm, expected[i][0], 1e-4) << i;
+        EXPECT_NEAR(hole.steps[i].to_mm, expected[i][1], 1e-4) << i;
+        EXPECT_NEAR(hole.steps[i].diameter_mm, expected[i][2], 1e-4) << i;
+        EXPECT_NEAR(hole.steps[i].end_diameter_mm, expected[i][3], 1e-4) << i;
+    }
+    // Both walls, the shelf and the tip: 2·40 facets each, the tip 40.
+    EXPECT_EQ(hole.facets.size(), 280u);
+    EXPECT_NEAR(hole.chord_mm, 8 * (1 - std::cos(kPi / 40)), 1e-4);
+}
+
+TEST(Holes, RefuseDiametersOutOfOrder) {
+    Context context;
+    for (const HoleOptions& options :
+         {HoleOptions{0, 10, 0}, HoleOptions{5, 5, 0}, HoleOptions{1, HUGE_VAL, 0}, HoleOptions{1, 9, -1}}) {
+        try {
+            (void)find_holes(context, MeshView{}, options);
+            ADD_FAILURE();
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code(), "holes.options");
+        }
+    }
+    EXPECT_TRUE(find_holes(context, MeshView{}).empty());
+}
+
+// Counted by hand in sections: the cover's flange has 8 and its dome 1, the mould's plate 3, all with a
+// shelf; the housing has 17 in its foot, 10 blind ones in each of two pads and 1 that is askew.
+TEST(HolesCorpus, AsManyAsOneCounts) {
+    const char* corpus = std::getenv("SLABWRIGHT_CORPUS");
+    if (corpus == nullptr) GTEST_SKIP() << "SLABWRIGHT_CORPUS is not set";
+    struct Counted {
+        const char* file;
+        std::size_t upright, askew;
+        HoleKind kind;
+    };
+    for (const Counted& part : {Counted{"casting_cover.stl", 9, 0, HoleKind::plain},
+                                Counted{"mold_cavity_ktool.stl", 3, 0, HoleKind::counterbored},
+                                Counted{"machine_housing_TR12J.stl", 17, 21, HoleKind::plain}}) {
+        SCOPED_TRACE(part.file);
+        std::ifstream in(std::filesystem::path(corpus) / "castings" / part.file, std::ios::binary);
+        const std::string bytes((std::istreambuf_iterator<char>(in)), {});
+        ASSERT_GT(bytes.size(), 84u);
+        std::uint32_t count = 0;
+        std::memcpy(&count, &bytes[80], 4);
+        ASSERT_EQ(bytes.size(), 84 + std::size_t{50} * count);
+        std::vector<std::array<Vec3f, 3>> corners(count);
+        for (std::uint32_t i = 0; i < count; ++i)
+            std::memcpy(&corners[i], &bytes[84 + std::size_t{50} * i + 12], 36);
+        Context context;
+        const Mesh mesh = weld(context, corners);
+        std::size_t upright = 0, askew = 0;
+        for (const RoundHole& hole : find_holes(context, mesh.view())) {
+            ++(hole.into[2] < -0.99999 ? upright : askew);
+            EXPECT_EQ(hole.kind, part.kind);
+        }
+        EXPECT_EQ(upright, part.upright);
+        EXPECT_EQ(askew, part.askew);
+    }
 }
 
 }  // namespace

@@ -81,7 +81,6 @@ private:
     }
 
     bool find_floor(WallEnd& result) const {
-        bool is_too_wide = false;
         const double most = wall_.cylinder.radius + 2 * wall_.tolerance_mm;
         const auto belongs = [&](std::uint32_t f) {
             if (wall_of_[f] != kNoWall) return false;
@@ -92,7 +91,7 @@ private:
             return true;
         };
         std::vector<std::uint32_t> floor = spread(bends_, first_, belongs);
-        if (is_too_wide || share_of(floor) < kMostOfAll) return false;
+        if (share_of(floor) < kMostOfAll) return false;
         result.beyond = WallEnd::Beyond::floor;
         result.next = narrower(floor);
         result.facets = std::move(floor);

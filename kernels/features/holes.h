@@ -61,7 +61,7 @@ struct HoleOptions {
 
 /// Finds every round hole of 8 sides or more, by the place of its first facet. Corners may miss a circle by
 /// its chords' sagitta, but 2 % of its radius at most. An octagonal pocket cannot be told from a hole of 8
-/// sides. Where the corners at a wall's two ends do not face each other it needs 12. Costs about as much as
+/// sides. Where the corners at a wall's two ends do not face each other it needs 16. Costs about as much as
 /// one pass over the facets for every direction in which their edges run.
 /// @throws Error(usage, "holes.options") for diameters out of order or not finite; Error(cancelled)
 [[nodiscard]] std::vector<RoundHole> find_holes(Context& context, MeshView mesh,

@@ -147,7 +147,9 @@ private:
             if (!gather(seed, axis, tilt) || !looks_all_around(axis)) {
                 // Facets between rings of other corners may all stand askew: the wider tolerance had them.
                 if (wider.empty()) return std::nullopt;
-                found_ = std::move(wider);
+                ++stamp_;
+                found_.clear();
+                for (const std::uint32_t f : wider) add(f);
                 break;
             }
             wider = found_;
@@ -223,10 +225,17 @@ private:
     // Least squares of the corners' distances from the cylinder (Gauss–Newton: place, tilt, radius).
     bool through_corners(Vec3d axis, Cylinder& cylinder) const {
         std::vector<std::uint32_t> ids;
-        for (const std::uint32_t f : found_) {
-            if (!bends_.is_sure(f)) continue;  // a needle of a neighbour's may reach far
-            for (const std::uint32_t v : bends_.mesh().facets[f]) ids.push_back(v);
-        }
+        // Of the edges between sides: other corners may lie on a side, where another hole opens into it.
+        for (const std::uint32_t f : found_)
+            for (std::uint32_t k = 0; k < 3; ++k) {
+                const std::uint32_t g = bends_.mesh().neighbours[f][k];
+                if (g == kNoFacet || stamps_[g] != stamp_) continue;
+                const Bend bend = bends_.at({f, k});
+                if (!bend.is_sure || std::abs(bend.rad) < kLeastBend) continue;
+                const Index3& corners = bends_.mesh().facets[f];
+                ids.push_back(corners[k]);
+                ids.push_back(corners[(k + 1) % 3]);
+            }
         std::sort(ids.begin(), ids.end());
         ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
         if (ids.size() < 8) return false;
@@ -285,18 +294,26 @@ private:
         return std::nullopt;
     }
 
+    // All corners on the cylinder; or, on a side into which another hole opens, on a plane that spans a
+    // chord.
     bool lies_on(std::uint32_t facet, const Cylinder& cylinder, double tolerance) const {
         Vec3d middle{};
+        double nearest = kUnbounded;
         for (std::uint32_t k = 0; k < 3; ++k) {
             const Vec3d p = bends_.corner(facet, k);
-            if (std::abs(cylinder.place(p).radius - cylinder.radius) > tolerance) return false;
+            const double radius = cylinder.place(p).radius;
+            if (radius > cylinder.radius + tolerance) return false;
+            nearest = std::min(nearest, radius);
             middle = plus(middle, p, 1.0 / 3);
         }
-        if (!bends_.is_sure(facet)) return true;
+        const bool all_on = nearest >= cylinder.radius - tolerance;
+        if (!bends_.is_sure(facet)) return all_on;
         const Vec3d& n = bends_.normal(facet);
-        const Vec3d d = minus(middle, cylinder.at);
-        const Vec3d outward = plus(d, cylinder.axis, -dot(d, cylinder.axis));
-        return std::abs(dot(n, cylinder.axis)) <= std::sin(kWallTilt) && dot(n, outward) < 0;
+        const double slope = std::abs(dot(n, cylinder.axis));
+        const double inwards = dot(n, minus(cylinder.at, middle));  // of the plane, to the axis
+        if (all_on) return slope <= std::sin(kWallTilt) && inwards > 0;
+        return slope <= std::sin(kGatherTilts[2]) &&
+               inwards >= std::cos(kWidestChord / 2) * cylinder.radius - tolerance;
     }
 
     // found_ as a wall, if its border goes once around the axis at each end.

@@ -97,6 +97,19 @@ inline void quad(PlateFacets& to, const Vec3d& a, const Vec3d& b, const Vec3d& c
     to.push_back({a, c, d});
 }
 
+/// As a mesh's file has them.
+inline std::vector<std::array<Vec3f, 3>> rounded(const PlateFacets& facets) {
+    std::vector<std::array<Vec3f, 3>> corners;
+    for (const auto& facet : facets) {
+        std::array<Vec3f, 3> floats;
+        for (std::size_t k = 0; k < 3; ++k)
+            floats[k] = {static_cast<float>(facet[k][0]), static_cast<float>(facet[k][1]),
+                         static_cast<float>(facet[k][2])};
+        corners.push_back(floats);
+    }
+    return corners;
+}
+
 /// Cells of one height and breadth beside each other along x, from x = 0, between y = 0 and `breadth`.
 class DrilledPlate {
 public:
