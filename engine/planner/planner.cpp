@@ -15,6 +15,7 @@
 #include "engine/layers/candidates.h"
 #include "engine/layers/layers.h"
 #include "engine/moves/motion_time.h"
+#include "engine/planner/drill_plan.h"
 #include "engine/planner/layer_plan.h"
 #include "engine/planner/local_frame.h"
 #include "engine/planner/rating.h"
@@ -263,7 +264,10 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
 void cut_layers(Context& context, Plan& plan, MeshView pattern,
                 const std::vector<std::vector<JointWood>>& joints, ProgressShare share) {
     const Job& job = plan.job;
-    const PathGround ground = ground_of(context, plan, pattern);
+    const DrillPlan drilling = plan_drilling(context, pattern, plan);
+    plan.diagnostics.insert(plan.diagnostics.end(), drilling.diagnostics.begin(), drilling.diagnostics.end());
+    PathGround ground = ground_of(context, plan, drilling.closed ? drilling.closed->view() : pattern);
+    ground.pattern = pattern;
     std::optional<AccessScene> scene;
     if (selects_tools(job) && job.selection.accessibility == AccessRule::exact)
         scene.emplace(context, ground.mesh);
@@ -291,7 +295,7 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
         const Loops* const carried_by = i > 0 ? &joints[i].front().below : nullptr;
         planned[i] = plan_layer(context,
                                 {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr,
-                                 carried_by, &stock_memory, &known_cuts},
+                                 carried_by, &stock_memory, &drilling.layers[i], &known_cuts},
                                 i, progress);
         solver.expect(planned[i].cuts.cuts);
     });
