@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <string>
 
 #include <fmt/format.h>
 
 #include "engine/base_board.h"
+#include "engine/prepare/drilled_holes.h"
 #include "kernels/features/holes.h"
+#include "kernels/features/rounded_holes.h"
 #include "kernels/mesh/weld.h"
 
 namespace slabwright {
@@ -20,39 +21,9 @@ constexpr double kUpright = 0.99999848;  // cosine of .1°
 constexpr double kSame = 1e-3;           // mm: heights nearer than this are one
 constexpr double kGougeShare = 0.5;      // of the tolerance, for chords; roundings and the axis take the rest
 constexpr double kCuspShare = 0.9;
-constexpr double kSimilar = 0.25;  // mm: a drill that differs by less from a hole was meant for it
 
 double point_length(const Tool& drill) {
     return drill.diameter / 2 / std::tan(cutter_shape(drill).taper_rad);
-}
-
-// The loops at a hole's border, each as its corners in order; none where they are not simple.
-std::vector<std::vector<std::uint32_t>> rims_of(MeshView mesh, const RoundHole& hole) {
-    std::map<std::uint32_t, std::uint32_t> next;  // along the facets outside
-    for (const std::uint32_t f : hole.facets)
-        for (std::size_t k = 0; k < 3; ++k) {
-            const std::uint32_t g = mesh.neighbours[f][k];
-            if (g != kNoFacet && std::binary_search(hole.facets.begin(), hole.facets.end(), g)) continue;
-            if (!next.emplace(mesh.facets[f][k], mesh.facets[f][(k + 1) % 3]).second) return {};
-        }
-    std::vector<std::vector<std::uint32_t>> rims;
-    while (!next.empty()) {
-        std::vector<std::uint32_t>& rim = rims.emplace_back();
-        for (auto at = next.begin(); at != next.end(); at = next.find(rim.back())) {
-            if (rim.empty()) rim.push_back(at->first);
-            rim.push_back(at->second);
-            next.erase(at);
-        }
-        if (rim.front() != rim.back()) return {};
-        rim.pop_back();
-    }
-    return rims;
-}
-
-bool is_level(MeshView mesh, const std::vector<std::uint32_t>& rim) {
-    const double z = mesh.vertices[rim.front()].z;
-    return std::all_of(rim.begin(), rim.end(),
-                       [&](std::uint32_t v) { return std::abs(double{mesh.vertices[v].z} - z) < kSame; });
 }
 
 class Driller {
@@ -88,7 +59,7 @@ private:
         const Tool* best = nullptr;
         const auto off = [&](const Tool& t) { return std::abs(t.diameter - hole.diameter_mm); };
         for (const Tool& tool : plan_.job.tools)
-            if (tool.kind == ToolKind::drill && off(tool) <= kSimilar && (!best || off(tool) < off(*best)))
+            if (tool.kind == ToolKind::drill && off(tool) <= kMeantFor && (!best || off(tool) < off(*best)))
                 best = &tool;
         return best;
     }
@@ -131,7 +102,8 @@ private:
             for (const Layer& layer : plan_.layers)
                 if (layer.z_bottom - point < -board && layer.z_bottom < hole.mouth[2] - kSame)
                     return fmt::format(
-                        "the drill's point would go {:.2f} mm into the base board, {:.2f} mm are allowed",
+                        "the drill's point would go {:.2f} mm into the base board, {:.2f} mm are allowed "
+                        "(machine.base_board_cut)",
                         point - layer.z_bottom, board);
         } else if (std::abs(hole.mouth[2] - hole.depth_mm - (bottom - point)) > t.cusp / 2) {
             return "its cone is not that of the drill's point";

@@ -19,6 +19,7 @@
 #include "engine/planner/layer_plan.h"
 #include "engine/planner/local_frame.h"
 #include "engine/planner/rating.h"
+#include "engine/prepare/drilled_holes.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
@@ -489,8 +490,13 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     const MemoryCharge mesh_memory(
         context, mesh.vertices.size() * 2 * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3),
         "the mesh");
-    MeshView view = mesh.view();
-    const std::array<double, 2> origin = local_origin(bounds(context, view));
+    const std::array<double, 2> origin = local_origin(bounds(context, mesh.view()));
+    const std::optional<Mesh> rounded = rounded_for_drills(
+        context, mesh.view(), drill_rule(job.tools, job.tolerances.gouge), &plan.diagnostics);
+    // What is told so far counts from the mesh's own origin.
+    for (Diagnostic& told : plan.diagnostics)
+        for (std::size_t k = 0; told.where && k < 2; ++k) (*told.where)[k] -= origin[k];
+    MeshView view = rounded ? rounded->view() : mesh.view();
     const BulkVector<Vec3f> vertices = in_local_frame(context, view, origin);
     view.vertices = vertices;
     plan = plan_from(context, view, std::move(plan), origin);
