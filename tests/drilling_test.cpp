@@ -34,15 +34,16 @@ CommandResult run(std::vector<std::string> arguments) {
     return support::run_command(arguments);
 }
 
-// Along x: 6 mm through, 8 mm blind with a drill's cone, 6 mm blind and flat, 6 mm through of few sides, 6 mm
-// tilted.
+// Along x: 6 mm through with a counterbore, 8 mm blind with a drill's cone, 6 mm blind and flat, 6 mm through
+// of few sides, 6 mm tilted.
 std::string drilled_plate() {
     std::mt19937 random(1);
     test::DrilledPlate plate(50, 40);
     const std::vector<double> many = test::turn(120, 0.1, 0, random), few = test::turn(16, 0.1, 0, random);
     const auto axis = [&] { return LoopAxis{{plate.next_x() + 15, 25, 0}}; };
     LoopAxis a = axis();
-    plate.cell(30, a, {a.ring(many, 3, 40), a.ring(many, 3, 0)}, nullptr);
+    plate.cell(30, a, {a.ring(many, 9, 40), a.ring(many, 9, 36), a.ring(many, 3, 36), a.ring(many, 3, 0)},
+               nullptr);
     a = axis();
     const Vec3d point{a.at[0], 25, 20 - 4 / std::tan(kPoint)};
     plate.cell(30, a, {a.ring(many, 4, 40), a.ring(many, 4, 20)}, &point);

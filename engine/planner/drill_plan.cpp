@@ -36,7 +36,8 @@ public:
     DrillPlan run() {
         std::vector<std::uint8_t> gone(mesh_.size(), 0);
         std::vector<std::vector<std::uint32_t>> rims;
-        for (const RoundHole& hole : find_holes(context_, mesh_)) {
+        for (const RoundHole& found : find_holes(context_, mesh_)) {
+            const RoundHole hole = narrowest_part(found).value_or(found);
             const Tool* const drill = nearest(hole);
             if (drill == nullptr) continue;
             const std::vector<std::vector<std::uint32_t>> around = rims_of(mesh_, hole);

@@ -20,12 +20,12 @@ struct DrillPlan {
         diagnostics;  ///< of holes that a drill of the library would fit, but that are milled
 };
 
-/// Looks for holes only where the library has a drill. Drilled are upright plain holes with a level mouth,
-/// through to the board or ending in the drill's own cone, whose circle lies within `gouge` of the drill's
-/// with the mesh's chords and within `cusp` from outside, as deep as flutes and stick-out reach from the
-/// layer's top. In every layer the full diameter goes down to the layer's bottom; the point dips into what is
-/// drilled below, or into the board as far as the job lets cutters cut it. All other holes are milled as
-/// before.
+/// Looks for holes only where the library has a drill. Drilled are upright holes that begin at a level
+/// rim, plain ones and the narrowest part of those that widen towards the mouth (narrowest_part), through to
+/// the board or ending in the drill's own cone, whose circle lies within `gouge` of the drill's with the
+/// mesh's chords and within `cusp` from outside, as deep as flutes and stick-out reach from the layer's top.
+/// In every layer the full diameter goes down to the layer's bottom; the point dips into what is drilled
+/// below, or into the board as far as the job lets cutters cut it. All other holes are milled as before.
 /// @param plan its job and layers
 [[nodiscard]] DrillPlan plan_drilling(Context& context, MeshView pattern, const Plan& plan);
 

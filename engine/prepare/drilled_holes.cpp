@@ -27,7 +27,9 @@ DrillRule drill_rule(std::span<const Tool> tools, double gouge) {
 std::optional<Mesh> rounded_for_drills(Context& context, MeshView pattern, const DrillRule& rule,
                                        std::vector<Diagnostic>* told) {
     if (rule.diameters.empty()) return std::nullopt;
-    std::vector<RoundHole> holes = find_holes(context, pattern);
+    std::vector<RoundHole> holes;
+    for (const RoundHole& hole : find_holes(context, pattern))
+        if (std::optional<RoundHole> part = narrowest_part(hole)) holes.push_back(std::move(*part));
     std::erase_if(holes, [&](const RoundHole& hole) {
         return hole.chord_mm <= kChordShare * rule.gouge ||
                std::none_of(rule.diameters.begin(), rule.diameters.end(),

@@ -23,7 +23,7 @@ struct DrillRule {
 };
 [[nodiscard]] DrillRule drill_rule(std::span<const Tool> tools, double gouge);
 
-/// The pattern with every upright plain hole of a drill's size made round (with_rounded_holes), where its
+/// The pattern with every upright hole of a drill's size made round in its narrowest part, where its
 /// chords lie farther within the circle than half of `gouge`. Plan and proof both take this for the pattern.
 /// @param told gets a note of how many holes were rounded, and by how much the pattern grew at most
 /// @return none where nothing is rounded

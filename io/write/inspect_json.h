@@ -14,8 +14,8 @@ struct Inspection {
     InputInfo input;
     MeshReport report;
     std::vector<Diagnostic> diagnostics;
-    bool solid =
-        false;  ///< whether a planner may use the mesh; features, holes and undercuts are looked for only then
+    bool solid = false;  ///< whether a planner may use the mesh; features, holes and undercuts are looked for
+                         ///< only then
     std::string unusable;  ///< why not, in one line
     std::vector<Feature> features;
     std::vector<FinderDisagreement> disagreements;

@@ -292,8 +292,8 @@ RoundHole HoleMaker::made_of(std::vector<Link> chain) const {
     };
     const auto cone = [&](std::uint32_t w, const WallEnd& end, double wall_end, bool is_first) {
         const double far = on_axis(w, end.far_end.along), wide = 2 * walls_[w].cylinder.radius;
-        if (is_first) hole.steps.push_back({far, wall_end, 2 * end.far_end.radius, wide});
-        else hole.steps.push_back({wall_end, far, wide, 2 * end.far_end.radius});
+        if (is_first) hole.steps.push_back({far, wall_end, 2 * end.far_end.radius, wide, 0, end.facets});
+        else hole.steps.push_back({wall_end, far, wide, 2 * end.far_end.radius, 0, end.facets});
     };
     hole.diameter_mm = kUnbounded;
     for (std::size_t i = 0; i < chain.size(); ++i) {
@@ -309,9 +309,9 @@ RoundHole HoleMaker::made_of(std::vector<Link> chain) const {
             const HoleStep last = hole.steps.back();
             const bool is_cone = near.beyond == Beyond::cone ||
                                  end_of(chain[i - 1].wall, 1 - chain[i - 1].mouth_end).beyond == Beyond::cone;
-            if (is_cone) hole.steps.push_back({last.to_mm, from, last.end_diameter_mm, wide});
+            if (is_cone) hole.steps.push_back({last.to_mm, from, last.end_diameter_mm, wide, 0, {}});
         }
-        hole.steps.push_back({from, to, wide, wide});
+        hole.steps.push_back({from, to, wide, wide, wall.chord_mm, wall.facets});
         if (i + 1 == chain.size() && far.beyond == Beyond::cone) cone(w, far, to, false);
         hole.diameter_mm = std::min(hole.diameter_mm, wide);
         hole.chord_mm = std::max(hole.chord_mm, wall.chord_mm);
@@ -333,6 +333,33 @@ RoundHole HoleMaker::made_of(std::vector<Link> chain) const {
 }
 
 }  // namespace
+
+std::optional<RoundHole> narrowest_part(const RoundHole& hole) {
+    if (hole.kind == HoleKind::plain) return hole;
+    const auto is_wall = [](const HoleStep& step) { return step.diameter_mm == step.end_diameter_mm; };
+    const bool has_point = hole.bottom == HoleBottom::cone;
+    const std::size_t last = hole.steps.size() - (has_point ? 2 : 1);
+    if (last >= hole.steps.size() || !is_wall(hole.steps[last])) return std::nullopt;
+    for (std::size_t i = 0; i < last; ++i)
+        if (is_wall(hole.steps[i]) && hole.steps[i].diameter_mm <= hole.steps[last].diameter_mm)
+            return std::nullopt;
+    RoundHole part = hole;
+    part.kind = HoleKind::plain;
+    part.steps.assign(hole.steps.begin() + static_cast<std::ptrdiff_t>(last), hole.steps.end());
+    const double start = part.steps.front().from_mm;
+    part.mouth = plus(hole.mouth, hole.into, start);
+    part.depth_mm -= start;
+    part.diameter_mm = part.steps.front().diameter_mm;
+    part.chord_mm = part.steps.front().chord_mm;
+    part.facets.clear();
+    for (HoleStep& step : part.steps) {
+        step.from_mm -= start;
+        step.to_mm -= start;
+        part.facets.insert(part.facets.end(), step.facets.begin(), step.facets.end());
+    }
+    std::sort(part.facets.begin(), part.facets.end());
+    return part;
+}
 
 std::vector<RoundHole> find_holes(Context& context, MeshView mesh, const HoleOptions& options) {
     if (!(options.least_diameter_mm > 0 && options.most_diameter_mm > options.least_diameter_mm &&

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -35,9 +36,12 @@ enum class HoleBottom : std::uint8_t {
 
 /// A stretch of a hole: a cylinder where both diameters are the same, else a cone.
 struct HoleStep {
-    double from_mm = 0, to_mm = 0;  ///< along the axis, from the mouth inwards
-    double diameter_mm = 0;         ///< at `from`
-    double end_diameter_mm = 0;     ///< at `to`; 0 at a point
+    double from_mm = 0, to_mm = 0;      ///< along the axis, from the mouth inwards
+    double diameter_mm = 0;             ///< at `from`
+    double end_diameter_mm = 0;         ///< at `to`; 0 at a point
+    double chord_mm = 0;                ///< of a wall, as RoundHole has it
+    std::vector<std::uint32_t> facets;  ///< of its wall or flank, ascending; none of a cone between two walls
+                                        ///< that neither end leads to
 };
 
 struct RoundHole {
@@ -53,6 +57,12 @@ struct RoundHole {
                           ///< diameter can be off by
     std::vector<std::uint32_t> facets;  ///< of walls, shelves, cones and bottom; ascending
 };
+
+/// What a drill of the least diameter makes of a hole, as a plain hole: from the last wall on, with a conical
+/// bottom.
+/// @return the hole itself where it is plain; none where a wall before the last is no wider, or something
+/// other than a point follows the last
+[[nodiscard]] std::optional<RoundHole> narrowest_part(const RoundHole& hole);
 
 struct HoleOptions {
     double least_diameter_mm = 1, most_diameter_mm = 150;
