@@ -468,8 +468,8 @@ private:
 
     Tool completed(const LibraryTool& stated, std::size_t position) {
         toml::table values;
-        for (const auto& [key, value] : stated.values)
-            std::visit([&](const auto& v) { values.insert_or_assign(key, v); }, value);
+        for (const StatedValue& value : stated.values)
+            std::visit([&](const auto& v) { values.insert_or_assign(value.first, v); }, value.second);
         const auto number_of = [](const toml::table& table) {
             const toml::node* const node = table.get("number");
             return node != nullptr ? node->value_exact<std::int64_t>() : std::nullopt;

@@ -163,12 +163,12 @@ private:
     // convex, into found_. False when they spread wider than any hole.
     bool gather(std::uint32_t seed, const Vec3d& axis, double tilt) {
         const double most_slope = std::sin(tilt);
-        const auto [u, v] = across(axis);
+        const std::array<Vec3d, 2> uv = across(axis);
         double low[2] = {kUnbounded, kUnbounded}, high[2] = {-kUnbounded, -kUnbounded};
         const auto is_within = [&](std::uint32_t f) {
             for (std::uint32_t k = 0; k < 3; ++k) {
                 const Vec3d p = bends_.corner(f, k);
-                const double xy[2] = {dot(p, u), dot(p, v)};
+                const double xy[2] = {dot(p, uv[0]), dot(p, uv[1])};
                 for (int i = 0; i < 2; ++i) {
                     low[i] = std::min(low[i], xy[i]);
                     high[i] = std::max(high[i], xy[i]);
@@ -363,7 +363,7 @@ private:
 
 std::optional<RoundWall> WallFinder::closed(const Cylinder& cylinder) const {
     const MeshView& mesh = bends_.mesh();
-    const auto [u, v] = across(cylinder.axis);
+    const std::array<Vec3d, 2> uv = across(cylinder.axis);
     std::vector<FacetEdge> border;
     BorderLoops loops;
     for (const std::uint32_t f : found_)
@@ -376,7 +376,7 @@ std::optional<RoundWall> WallFinder::closed(const Cylinder& cylinder) const {
     const auto turn_of = [&](FacetEdge e) {
         const Vec3d p = minus(bends_.corner(e.facet, e.corner), cylinder.at);
         const Vec3d q = minus(bends_.corner(e.facet, e.corner + 1), cylinder.at);
-        const double px = dot(p, u), py = dot(p, v), qx = dot(q, u), qy = dot(q, v);
+        const double px = dot(p, uv[0]), py = dot(p, uv[1]), qx = dot(q, uv[0]), qy = dot(q, uv[1]);
         const double sign = mesh.role(e.facet) == FacetRole::turned ? -1 : 1;
         return sign * std::atan2(px * qy - py * qx, px * qx + py * qy);
     };
