@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -261,6 +262,45 @@ TEST(Drilling, HolesAreMadeRoundWhereTheMeshHasChords) {
     const std::vector<RoundHole> holes = find_holes(context, mesh.view());
     ASSERT_EQ(holes.size(), 1u);
     EXPECT_FALSE(with_rounded_holes(context, mesh.view(), holes, 0.001));
+}
+
+// Why a hole of about a drill's size is milled: with the reason, and its place.
+TEST(Drilling, WhatIsNotDrilledSaysWhy) {
+    std::mt19937 random(1);
+    test::DrilledPlate plate(50, 20);
+    const std::vector<double> many = test::turn(120, 0.1, 0, random);
+    const auto cell = [&](double diameter) {
+        const LoopAxis axis{{plate.next_x() + 15, 25, 0}};
+        plate.cell(30, axis, {axis.ring(many, diameter / 2, 20), axis.ring(many, diameter / 2, 0)}, nullptr);
+    };
+    for (const double diameter : {5.9, 6.1, 14.0}) cell(diameter);
+    const TemporaryFolder folder;
+    support::spit(folder / "plate.stl", stl_bytes("plate", test::rounded(plate.closed())));
+    std::string job = job_with_drills(run({"job", "--defaults"}).out);
+    job.replace(job.find("diameter = 8.0"), 14, "diameter = 14.0");
+    support::spit(folder / "job.toml", job);
+    const std::string out = folder / "out";
+    ASSERT_EQ(run({"plan", folder / "plate.stl", "-o", out, "--job", folder / "job.toml"}).exit, 0);
+    std::vector<std::string> told;
+    const json plan = json::parse(support::slurp(out + "/plan.json"));
+    for (const json& d : plan["diagnostics"])
+        if (d["code"] == "hole.milled")
+            told.push_back(fmt::format("{:.0f} ", d["where"][0].get<double>()) +
+                           d["message"].get<std::string>());
+    for (const json& layer : plan["layers"])
+        for (const json& op : layer["operations"]) EXPECT_NE(op["kind"], "drill");
+    std::sort(told.begin(), told.end());
+    ASSERT_EQ(told.size(), 3u);
+    EXPECT_EQ(told[0],
+              "15 a hole of 5.900 mm is not drilled: the drill of 6 mm is too thick by more than half of "
+              "tolerances.gouge");
+    EXPECT_EQ(
+        told[1],
+        "45 a hole of 6.100 mm is not drilled: the drill of 6 mm is too thin by more than tolerances.cusp");
+    EXPECT_EQ(told[2],
+              "75 a hole of 14.000 mm is not drilled: the drill's point would go 4.21 mm into the base "
+              "board, 3.17 mm "
+              "are allowed (machine.base_board_cut)");
 }
 
 }  // namespace

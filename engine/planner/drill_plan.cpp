@@ -81,12 +81,15 @@ private:
             return "its mouth is not level, or another hole opens into it";
         const double radius = hole.diameter_mm / 2, reach = drill.diameter / 2;
         const Tolerances& t = plan_.job.tolerances;
+        if (reach > radius + kGougeShare * t.gouge)
+            return fmt::format("the drill of {:.4g} mm is too thick by more than half of tolerances.gouge",
+                               drill.diameter);
         if (reach > radius - hole.chord_mm + kGougeShare * t.gouge)
             return fmt::format(
-                "the drill of {:.4g} mm would cut {:.3f} mm into its facets, whose chords lie {:.3f} mm "
-                "within "
-                "the circle: a finer export or a larger tolerances.gouge lets it",
-                drill.diameter, reach - radius + hole.chord_mm, hole.chord_mm);
+                "its chords lie {:.3f} mm within the circle, and the facets around a rim leave no room to "
+                "make it "
+                "round: export it finer",
+                hole.chord_mm);
         if (reach < radius - kCuspShare * t.cusp)
             return fmt::format("the drill of {:.4g} mm is too thin by more than tolerances.cusp",
                                drill.diameter);
