@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
@@ -301,6 +303,35 @@ TEST(Drilling, WhatIsNotDrilledSaysWhy) {
               "75 a hole of 14.000 mm is not drilled: the drill's point would go 4.21 mm into the base "
               "board, 3.17 mm "
               "are allowed (machine.base_board_cut)");
+}
+
+// The housing's foot has holes of 8 to 10 sides with slivers along their rims, whose edges must turn first.
+TEST(DrillingCorpus, HolesOfARealPartAreMadeRound) {
+    const char* corpus = std::getenv("SLABWRIGHT_CORPUS");
+    if (corpus == nullptr) GTEST_SKIP() << "SLABWRIGHT_CORPUS is not set";
+    const std::string bytes = support::slurp(std::string(corpus) + "/castings/machine_housing_TR12J.stl");
+    ASSERT_GT(bytes.size(), 84u);
+    std::vector<std::array<Vec3f, 3>> corners((bytes.size() - 84) / 50);
+    for (std::size_t i = 0; i < corners.size(); ++i) std::memcpy(&corners[i], &bytes[84 + 50 * i + 12], 36);
+    Context context;
+    const Mesh mesh = weld(context, corners);
+    std::vector<RoundHole> holes = find_holes(context, mesh.view());
+    std::erase_if(holes, [](const RoundHole& hole) {
+        return hole.into[2] > -0.99999 || std::abs(hole.diameter_mm - 10) > 0.1;
+    });
+    ASSERT_EQ(holes.size(), 16u);
+    const auto rounded = with_rounded_holes(context, mesh.view(), holes, 0.0015);
+    ASSERT_TRUE(rounded);
+    EXPECT_GE(rounded->rounded.size(), 15u);
+    EXPECT_TRUE(test::closed(rounded->mesh.view()));
+    double least = 0, most = 0;
+    for (const std::size_t i : rounded->rounded) {
+        const double ring = kPi * holes[i].diameter_mm * holes[i].chord_mm * holes[i].depth_mm;
+        least += 0.2 * ring, most += ring;
+    }
+    const double grown = test::volume(mesh.view()) - test::volume(rounded->mesh.view());
+    EXPECT_GT(grown, least);
+    EXPECT_LT(grown, most);
 }
 
 }  // namespace

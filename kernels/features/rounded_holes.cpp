@@ -18,6 +18,107 @@ constexpr int kMostParts = 256;         // of a chord
 
 using Rim = std::vector<std::uint32_t>;
 
+// Flips edges between level facets around a rim where the arc over a chord would reach out of its facet:
+// slivers that lie nearly along the rim are common there.
+class RimRoom {
+public:
+    explicit RimRoom(MeshView mesh) {
+        mesh_.vertices.assign(mesh.vertices.begin(), mesh.vertices.end());
+        mesh_.facets.assign(mesh.facets.begin(), mesh.facets.end());
+        mesh_.neighbours.assign(mesh.neighbours.begin(), mesh.neighbours.end());
+        mesh_.roles.assign(mesh.roles.begin(), mesh.roles.end());
+    }
+
+    Mesh make(Context& context, std::span<const RoundHole> holes) {
+        std::vector<std::uint8_t> of_hole(mesh_.facets.size(), 0);
+        for (const RoundHole& hole : holes)
+            for (const std::uint32_t f : hole.facets) of_hole[f] = 1;
+        constexpr int kPasses = 8;  // each may turn an edge to the next corner
+        for (int pass = 0; pass < kPasses; ++pass) {
+            touched_ = of_hole;
+            std::size_t flips = 0;
+            for (const RoundHole& hole : holes) flips += around(hole) ? 1 : 0;
+            if (flips == 0) break;
+            pair_edges(context, mesh_);
+        }
+        return std::move(mesh_);
+    }
+
+private:
+    bool around(const RoundHole& hole) {
+        bool has_flipped = false;
+        for (const std::uint32_t f : hole.facets)
+            for (std::size_t k = 0; k < 3; ++k) {
+                const std::uint32_t g = mesh_.neighbours[f][k];
+                if (g == kNoFacet || touched_[g] != 0) continue;
+                const std::uint32_t from = mesh_.facets[f][k], to = mesh_.facets[f][(k + 1) % 3];
+                const std::size_t apex = corner_beside(g, from, to);
+                if (!reaches_out(hole, from, to, mesh_.facets[g][apex])) continue;
+                has_flipped = flip(hole, from, to, g, apex) || has_flipped;
+            }
+        return has_flipped;
+    }
+
+    [[nodiscard]] std::size_t corner_beside(std::uint32_t facet, std::uint32_t a, std::uint32_t b) const {
+        std::size_t apex = 0;
+        while (mesh_.facets[facet][apex] == a || mesh_.facets[facet][apex] == b) ++apex;
+        return apex;
+    }
+    [[nodiscard]] Vec3d at(std::uint32_t v) const { return to_double(mesh_.vertices[v]); }
+    // Twice a facet's area as seen from above, mm².
+    [[nodiscard]] double area(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
+        const Vec3d u = minus(at(b), at(a)), v = minus(at(c), at(a));
+        return u[0] * v[1] - u[1] * v[0];
+    }
+
+    // Whether the tangents of the circle at both ends of a chord leave the apex on the circle's side: then
+    // the arc would come out of the facet.
+    [[nodiscard]] bool reaches_out(const RoundHole& hole, std::uint32_t from, std::uint32_t to,
+                                   std::uint32_t apex) const {
+        const Vec3d x = at(apex);
+        for (const std::uint32_t v : {from, to}) {
+            const Vec3d p = at(v);
+            const double ox = p[0] - hole.mouth[0], oy = p[1] - hole.mouth[1];
+            if (ox * (x[0] - p[0]) + oy * (x[1] - p[1]) <= 0) return true;
+        }
+        return false;
+    }
+
+    // Takes the edge from the apex to one end of the chord away, where the corner behind it is a better apex.
+    bool flip(const RoundHole& hole, std::uint32_t from, std::uint32_t to, std::uint32_t facet,
+              std::size_t apex) {
+        const std::uint32_t x = mesh_.facets[facet][apex];
+        for (const std::size_t side : {apex, (apex + 2) % 3}) {
+            const std::uint32_t other = mesh_.neighbours[facet][side];
+            if (other == kNoFacet || touched_[other] != 0) continue;
+            const std::uint32_t a = mesh_.facets[facet][side], b = mesh_.facets[facet][(side + 1) % 3];
+            const std::uint32_t y = mesh_.facets[other][corner_beside(other, a, b)];
+            const std::uint32_t kept = a == x ? b : a;  // the chord's end that loses the edge to x
+            const std::uint32_t rest = kept == from ? to : from;
+            if (std::abs(at(y)[2] - at(from)[2]) > kSame || std::abs(at(x)[2] - at(from)[2]) > kSame)
+                continue;
+            const double sign = area(to, from, x);
+            const Index3 near{to, from, y};
+            const Index3 far = kept == from ? Index3{rest, y, x} : Index3{y, rest, x};
+            if (area(near[0], near[1], near[2]) * sign <= 0 || area(far[0], far[1], far[2]) * sign <= 0)
+                continue;
+            // Towards an apex that the tangents do not cut off, or one that is at least farther out.
+            const auto out = [&](std::uint32_t v) {
+                return std::hypot(at(v)[0] - hole.mouth[0], at(v)[1] - hole.mouth[1]);
+            };
+            if (reaches_out(hole, from, to, y) && out(y) <= out(x)) continue;
+            mesh_.facets[facet] = near;
+            mesh_.facets[other] = far;
+            touched_[facet] = touched_[other] = 1;
+            return true;
+        }
+        return false;
+    }
+
+    Mesh mesh_;
+    std::vector<std::uint8_t> touched_;
+};
+
 class Rounder {
 public:
     Rounder(Context& context, MeshView mesh, double chord_mm)
@@ -224,7 +325,8 @@ bool is_level(MeshView mesh, const Rim& rim) {
 
 std::optional<RoundedMesh> with_rounded_holes(Context& context, MeshView mesh,
                                               std::span<const RoundHole> holes, double chord_mm) {
-    Rounder rounder(context, mesh, chord_mm);
+    const Mesh roomy = RimRoom(mesh).make(context, holes);
+    Rounder rounder(context, roomy.view(), chord_mm);
     for (std::size_t i = 0; i < holes.size(); ++i) rounder.round(holes[i], i);
     return rounder.take();
 }
