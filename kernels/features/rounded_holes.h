@@ -22,9 +22,10 @@ struct RoundedMesh {
 };
 
 /// Puts corners between those of the rims, on the circle, until no chord lies farther within it than
-/// `chord_mm`, and makes walls and cones anew between them. The facets around a rim get corners too; nothing
-/// else moves. Only upright plain holes (narrowest_part) with level rims, open below or ending in a point,
-/// are rounded, and only where no facet around the rim would fold.
+/// `chord_mm`, and makes walls and cones anew between them. The facets around a rim get corners too, and
+/// edges between level ones turn where an arc would reach out of a sliver; nothing else moves. Only upright
+/// plain holes (narrowest_part) with level rims, open below or ending in a point, are rounded, and only where
+/// no facet around the rim would fold.
 /// @return none where no hole was rounded
 [[nodiscard]] std::optional<RoundedMesh> with_rounded_holes(Context& context, MeshView mesh,
                                                             std::span<const RoundHole> holes,
