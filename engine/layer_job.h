@@ -24,6 +24,14 @@ struct Flat {
     double z = 0, highest = 0;  ///< mm: its height, and that of its highest vertex
 };
 
+/// A vertical hole, as a layer's drill makes it.
+struct DrilledHole {
+    double x = 0, y = 0;  ///< mm
+    double top = 0;       ///< mm: what stands there once all else is cut
+    double tip = 0;       ///< mm: how low the drill's point goes
+    int tool = 0;         ///< Tool::number of the drill
+};
+
 /// A layer's work is a value in and a value out.
 struct LayerJob {
     /// The pattern, pattern-base, or a lighter one that lies as near to it as the job's `gouge` leaves room
@@ -35,8 +43,9 @@ struct LayerJob {
     std::array<double, 2> stock_min{}, stock_max{};  ///< mm
     int index = 0;
     LayerTools tools;
-    Loops opening;            ///< of the flask in this layer; empty: no flask
-    std::vector<Flat> flats;  ///< strictly between z_bottom and z_top
+    Loops opening;                     ///< of the flask in this layer; empty: no flask
+    std::vector<DrilledHole> drilled;  ///< closed in the mesh: nothing else cuts them
+    std::vector<Flat> flats;           ///< strictly between z_bottom and z_top
     ProgressPart* progress =
         nullptr;             ///< told how far the paths are, up to kPathsShare; the rest is the caller's
     std::vector<Flat> feet;  ///< on which walls of this layer may stand: `flats` and those just below

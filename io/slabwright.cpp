@@ -30,6 +30,7 @@
 #include "io/read/pattern.h"
 #include "io/read/pattern_mesh.h"
 #include "io/read/repair.h"
+#include "io/read/tool_library.h"
 #include "io/report_html.h"
 #include "io/text/json_text.h"
 #include "io/verify.h"
@@ -85,11 +86,20 @@ std::string pattern_formats() {
     return missing.empty() ? built : built + "; not built: " + missing;
 }
 
-Job read_job(const std::string& path) {
+Job read_job(const std::string& path, const std::string& tool_library) {
     return guarded([&] {
-        const std::string text = read_whole(
-            path, {ErrorKind::usage, "job.unreadable", kMostJobBytes, "check the path after --job"});
-        return parse_job(text, path);
+        const std::string text = path.empty()
+                                     ? std::string()
+                                     : read_whole(path, {ErrorKind::usage, "job.unreadable", kMostJobBytes,
+                                                         "check the path after --job"});
+        // What a job names lies beside it; what was asked for, where it was asked.
+        const std::filesystem::path folder =
+            tool_library.empty() ? std::filesystem::path(path).parent_path() : std::filesystem::path();
+        return parse_job(text, path, {},
+                         {[&](const std::string& name, const std::vector<std::int64_t>& wanted) {
+                              return read_tool_library(folder / name, wanted);
+                          },
+                          tool_library});
     });
 }
 

@@ -36,8 +36,10 @@ namespace slabwright {
 /// "; not built: STEP".
 [[nodiscard]] SLABWRIGHT_API std::string pattern_formats();
 
-/// Reads a job file (TOML). @throws Error(usage) with file, line and the nearest known key
-[[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path);
+/// Reads a job file (TOML), "" for none, and the tool library that it names beside it.
+/// @param tool_library a file of tools instead of [tools] library (io/JOB.md)
+/// @throws Error(usage) with file, line and the nearest known key
+[[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path, const std::string& tool_library = {});
 
 /// A job with the keys that a text in TOML states, the others as in `base`. @param name of the text, for
 /// errors

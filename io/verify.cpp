@@ -215,7 +215,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     check_sequence(out / "sequence.json", build, violations);
 
     result.pattern = options.pattern && options.pattern->is(folder.pattern)
-                         ? propped(context, options.pattern, folder.pattern.supports)
+                         ? as_planned(context, options.pattern, folder.pattern)
                          : read_planned_pattern(context, directory, folder.pattern, options.source, "verify");
     Pattern& pattern = *result.pattern;
     input.mesh = pattern.read.mesh.view();

@@ -15,6 +15,7 @@
 #include "tests/data/models.h"
 #include "tests/support/comma_locale.h"
 #include "tests/support/command.h"
+#include "tests/support/drilled_plate.h"
 #include "tests/support/files.h"
 #include "tests/support/rs274.h"
 #include "tests/support/temporary_folder.h"
@@ -190,6 +191,26 @@ TEST(Command, UnusableInputExitsThree) {
     spit(folder.path / "empty.stl", "");
     spit(folder.path / "short.stl", whole.substr(0, whole.size() - 7));
     spit(folder.path / "text.stl", "solid x\nfacet normal 0 0 1\nouter loop\nvertex 1 2 three\n");
+    std::mt19937 random(1);
+    test::DrilledPlate plate(40, 30);
+    const test::LoopAxis axis{{20, 20, 0}};
+    const std::vector<double> angles = test::turn(40, 0, 0, random);
+    const Vec3d floor{20, 20, 10};
+    plate.cell(40, axis, {axis.ring(angles, 3, 30), axis.ring(angles, 3, 10)}, &floor);
+    spit(folder.path / "drilled.stl", stl_bytes("drilled", test::rounded(plate.closed())));
+    const CommandResult drilled = slabwright_command({"inspect", folder / "drilled.stl", "--json"});
+    ASSERT_EQ(drilled.exit, 0) << drilled.err;
+    const json holes = json::parse(drilled.out)["holes"];
+    ASSERT_EQ(holes.size(), 1u);
+    EXPECT_EQ(holes[0]["kind"], "plain");
+    EXPECT_EQ(holes[0]["bottom"], "flat");
+    EXPECT_EQ(holes[0]["into"], json({0, 0, -1}));
+    EXPECT_NEAR(holes[0]["diameter"].get<double>(), 6, 1e-3);
+    EXPECT_EQ(holes[0]["steps"].size(), 1u);
+    EXPECT_NE(slabwright_command({"inspect", folder / "drilled.stl"})
+                  .out.find("plain 6 mm, 20 mm deep, flat bottom, at x 20 y 20 z 30"),
+              std::string::npos);
+
     spit(folder.path / "open.stl", stl_bytes("open", box({0, 0, 0}, {50, 40, 30}, true)));
     spit(folder.path / "flat.stl", stl_bytes("flat", box({0, 0, 7}, {50, 40, 7})));
     for (const char* name : {"missing.stl", "empty.stl", "short.stl", "text.stl", "open.stl", "flat.stl"}) {
@@ -381,6 +402,7 @@ TEST(Command, InspectTellsPeopleAndPrograms) {
     EXPECT_EQ(report["mesh"]["open_edges"]["count"], 0);
     EXPECT_FALSE(report["features"].empty());
     EXPECT_TRUE(report["undercuts"].empty());
+    EXPECT_TRUE(report["holes"].empty());
 
     spit(folder.path / "open.stl", stl_bytes("open", box({0, 0, 0}, {50, 40, 30}, true)));
     const CommandResult open = slabwright_command({"inspect", folder / "open.stl", "--json"});

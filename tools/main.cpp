@@ -46,7 +46,7 @@ extern "C" void on_signal(int signal) {
 
 struct Options {
     PrepareOptions prepare;
-    std::string orient, repair, stl, out, maps, access_maps, job_file, units, strategy, finder, device,
+    std::string orient, repair, stl, out, maps, access_maps, job_file, tools, units, strategy, finder, device,
         library;
     int threads = 0, plans = 3;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
@@ -79,7 +79,7 @@ void print(std::string_view text) {
 }
 
 Job job_of(const Options& options) {
-    const Job job = options.job_file.empty() ? Job{} : read_job(options.job_file);
+    const Job job = read_job(options.job_file, options.tools);
     // An option is a key of the job, and says so in TOML. The words are checked already.
     std::string keys;
     const auto put = [&](std::string_view key, const std::string& value) {
@@ -324,6 +324,7 @@ void add_reading(CLI::App& command, Options& options) {
 void add_common(CLI::App& command, Options& options) {
     add_limits(command, options);
     command.add_option("--job", options.job_file, "job file; `slabwright job --defaults` prints one");
+    command.add_option("--tools", options.tools, "tool library: .tbl, .fctl, .fctb or .csv (io/JOB.md)");
     add_reading(command, options);
     command
         .add_flag("--repair{mend}", options.repair,
@@ -444,9 +445,8 @@ int command(int argc, char** argv) {
                                "the pattern; the file that plan.json names, if not given");
     for (CLI::App* command : {plan_command, verify_command})
         command
-            ->add_option(
-                "--cell", options.cell,
-                "mm between the points of the simulated stock; as fine as the cusp asks for if not given")
+            ->add_option("--cell", options.cell,
+                         "mm between points of the simulated stock; default: as the cusp asks")
             ->check(CLI::Range(0.01, 10.0));
     verify_command->add_option("--maps", options.maps,
                                "folder for a picture of each layer: left over, missed, unreachable, gouged");
@@ -457,8 +457,7 @@ int command(int argc, char** argv) {
     add_limits(*resume_command, options);
     CLI::App* report_command = add_report_command(app, options);
 
-    CLI::App* inspect_command =
-        app.add_subcommand("inspect", "report on the mesh, its features and undercuts");
+    CLI::App* inspect_command = app.add_subcommand("inspect", "report on mesh, features and undercuts");
     inspect_command->add_option("STL", options.stl, "the pattern")->required();
     add_common(*inspect_command, options);
     inspect_command->add_option("--finder", options.finder, "of features: exact, halving or both")

@@ -8,6 +8,7 @@
 
 #include "engine/moves/arcs.h"
 #include "engine/moves/motion_time.h"
+#include "engine/paths/operations/drilling.h"
 #include "engine/paths/operations/facing.h"
 #include "engine/paths/operations/floors.h"
 #include "engine/paths/operations/levels.h"
@@ -102,6 +103,15 @@ void report_loose(const LayerCut& cut, LayerResult& result) {
                                                   layer.index, piece.area_mm2, piece.thickness_mm,
                                                   result.operations[piece.operation].purpose),
                                       std::array<double, 3>{piece.x, piece.y, layer.z_bottom}});
+}
+
+void report_no_way_in(const LayerCut& cut, LayerResult& result) {
+    if (cut.no_way_in.empty()) return;
+    result.diagnostics.push_back(
+        {Severity::note, "entry.no_room",
+         fmt::format("layer {}: {} cut{} left to a tool that plunges: no room for a helix or a ramp",
+                     cut.layer.index, cut.no_way_in.size(), cut.no_way_in.size() == 1 ? "" : "s"),
+         cut.no_way_in.front()});
 }
 
 }  // namespace
@@ -292,12 +302,8 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         }
         result.left_mm2 = stock.area_over(context, limit);
     }
-    if (!cut.no_way_in.empty())
-        result.diagnostics.push_back(
-            {Severity::note, "entry.no_room",
-             fmt::format("layer {}: {} cut{} left to a tool that plunges: no room for a helix or a ramp",
-                         layer.index, cut.no_way_in.size(), cut.no_way_in.size() == 1 ? "" : "s"),
-             cut.no_way_in.front()});
+    report_no_way_in(cut, result);
+    for (Operation& op : drill_holes(cut)) take(std::move(op));
     reached(0.95);
     report_loose(cut, result);
     // Last, so that everything before has straight moves only to think of.

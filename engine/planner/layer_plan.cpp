@@ -75,6 +75,7 @@ public:
         work_.stock_max = plan.stock_max;
         work_.index = layer_.index;
         work_.stock_memory = ground.stock_memory;
+        if (ground.drilled != nullptr) work_.drilled = *ground.drilled;
         if (plan.flask) work_.opening = plan.flask->inner[index];
         fitted_.tolerances.gouge -= ground.mesh_gap;
         work_.flats = flats_between(layer_.z_bottom);

@@ -15,9 +15,11 @@
 #include "engine/layers/candidates.h"
 #include "engine/layers/layers.h"
 #include "engine/moves/motion_time.h"
+#include "engine/planner/drill_plan.h"
 #include "engine/planner/layer_plan.h"
 #include "engine/planner/local_frame.h"
 #include "engine/planner/rating.h"
+#include "engine/prepare/drilled_holes.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
@@ -263,7 +265,10 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
 void cut_layers(Context& context, Plan& plan, MeshView pattern,
                 const std::vector<std::vector<JointWood>>& joints, ProgressShare share) {
     const Job& job = plan.job;
-    const PathGround ground = ground_of(context, plan, pattern);
+    const DrillPlan drilling = plan_drilling(context, pattern, plan);
+    plan.diagnostics.insert(plan.diagnostics.end(), drilling.diagnostics.begin(), drilling.diagnostics.end());
+    PathGround ground = ground_of(context, plan, drilling.closed ? drilling.closed->view() : pattern);
+    ground.pattern = pattern;
     std::optional<AccessScene> scene;
     if (selects_tools(job) && job.selection.accessibility == AccessRule::exact)
         scene.emplace(context, ground.mesh);
@@ -291,7 +296,7 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
         const Loops* const carried_by = i > 0 ? &joints[i].front().below : nullptr;
         planned[i] = plan_layer(context,
                                 {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr,
-                                 carried_by, &stock_memory, &known_cuts},
+                                 carried_by, &stock_memory, &drilling.layers[i], &known_cuts},
                                 i, progress);
         solver.expect(planned[i].cuts.cuts);
     });
@@ -485,8 +490,13 @@ Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const
     const MemoryCharge mesh_memory(
         context, mesh.vertices.size() * 2 * sizeof(Vec3f) + mesh.facets.size() * 2 * sizeof(Index3),
         "the mesh");
-    MeshView view = mesh.view();
-    const std::array<double, 2> origin = local_origin(bounds(context, view));
+    const std::array<double, 2> origin = local_origin(bounds(context, mesh.view()));
+    const std::optional<Mesh> rounded = rounded_for_drills(
+        context, mesh.view(), drill_rule(job.tools, job.tolerances.gouge), &plan.diagnostics);
+    // What is told so far counts from the mesh's own origin.
+    for (Diagnostic& told : plan.diagnostics)
+        for (std::size_t k = 0; told.where && k < 2; ++k) (*told.where)[k] -= origin[k];
+    MeshView view = rounded ? rounded->view() : mesh.view();
     const BulkVector<Vec3f> vertices = in_local_frame(context, view, origin);
     view.vertices = vertices;
     plan = plan_from(context, view, std::move(plan), origin);

@@ -18,6 +18,13 @@ void add_lines(std::vector<std::uint32_t>& lines, std::span<const std::uint32_t>
         if (lines.empty() || lines.back() != line) lines.push_back(line);
 }
 
+std::vector<std::uint32_t> lines_of(std::span<const std::uint32_t> lines,
+                                    std::span<const std::uint32_t> motions) {
+    std::vector<std::uint32_t> of;
+    for (const std::uint32_t motion : motions) of.push_back(lines[motion]);
+    return of;
+}
+
 GougeReport join(GougeReport a, const GougeReport& b) {
     auto deeper = [](GougePlace& x, const GougePlace& y) {
         if (y.depth > x.depth) x = y;  // of equals the first, in the order of the program
@@ -34,7 +41,40 @@ GougeReport join(GougeReport a, const GougeReport& b) {
     return a;
 }
 
+// As StandingPart::deepest() for a cutter with a point. @return the motions beyond the tolerance
+std::vector<std::uint32_t> check_drill(const StandingPart& part, double z_top, const Tool& tool,
+                                       std::span<const StandingPart::Motion> motions,
+                                       std::span<const std::uint32_t> lines, const GougeOptions& options,
+                                       GougePlace& place) {
+    std::vector<std::uint32_t> beyond;
+    double most = options.ignore;
+    const double radius = tool.diameter / 2, taper = cutter_shape(tool).taper_rad;
+    for (std::size_t i = 0; i < motions.size(); ++i) {
+        const Point3 &from = motions[i].from, &to = motions[i].to;
+        const bool is_upright = from[0] == to[0] && from[1] == to[1];
+        const Point3& lower = from[2] < to[2] ? from : to;
+        const double at_least = std::min(most, options.tolerance);
+        const Penetration p = is_upright ? part.pointed(z_top, lower, radius, taper, at_least)
+                                         : part.cylinder(z_top, from, to, radius, at_least);
+        if (!p.found) continue;
+        if (p.depth > options.tolerance) beyond.push_back(static_cast<std::uint32_t>(i));
+        if (p.depth > most) {
+            most = p.depth;
+            place = {p.depth, lines[i], p.tip};
+        }
+    }
+    return beyond;
+}
+
 }  // namespace
+
+Tool wider(const Tool& tool, double by) {
+    Tool wide = tool;
+    for (double* const diameter : {&wide.diameter, &wide.shank_diameter, &wide.holder_diameter})
+        if (*diameter > 0) *diameter += 2 * by;
+    if (wide.kind == ToolKind::drill) wide.kind = ToolKind::flat;  // its point is wider too
+    return wide;
+}
 
 GougeReport check_gouge(Context& context, const StandingPart& part, double z_top, const Tool& tool,
                         const Program& program, const GougeOptions& options) {
@@ -95,16 +135,13 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
                 return std::move(found.beyond);
             };
             const bool ball = tool.kind == ToolKind::ball;
-            const auto lines_of = [&](std::span<const std::uint32_t> found) {
-                std::vector<std::uint32_t> of;
-                for (const std::uint32_t motion : found) of.push_back(lines[motion]);
-                return of;
-            };
             const std::vector<std::uint32_t> gouges =
-                check(ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter,
-                      ball ? &deepest : nullptr);
+                tool.kind == ToolKind::drill
+                    ? check_drill(part, z_top, tool, motions, lines, options, r.cutter)
+                    : check(ball ? StandingPart::Form::ball : StandingPart::Form::cylinder, radius, r.cutter,
+                            ball ? &deepest : nullptr);
             r.gouges = gouges.size();
-            add_lines(r.gouge_lines, lines_of(gouges));
+            add_lines(r.gouge_lines, lines_of(lines, gouges));
             std::vector<std::uint32_t> touched;
             double raised = 0;
             auto follow = [&](GougePlace& place, double thick, double above) {
@@ -119,7 +156,7 @@ GougeReport check_gouge(Context& context, const StandingPart& part, double z_top
             std::sort(touched.begin(), touched.end());
             touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
             r.contacts = touched.size();
-            add_lines(r.contact_lines, lines_of(touched));
+            add_lines(r.contact_lines, lines_of(lines, touched));
             return r;
         },
         join);

@@ -35,10 +35,13 @@ struct GougeOptions {
     double ignore = 1e-5;     ///< mm: depths up to this are not looked for
 };
 
+/// A tool that holds another, moved by up to `by` (mm) any way across its axis.
+[[nodiscard]] Tool wider(const Tool& tool, double by);
+
 /// Checks every motion, feed or rapid, from known place to known place. The error of a depth is at most
 /// StandingPart::kSheet under the layer's top and StandingPart::kNumericalError elsewhere, and more by
-/// Program::arc_error where arcs are. Drills are checked as cylinders of their diameter, which can only
-/// overstate.
+/// Program::arc_error where arcs are. A drill that goes straight up or down is
+/// checked with its point; on any other way as a cylinder of its diameter, which can only overstate.
 [[nodiscard]] GougeReport check_gouge(Context& context, const StandingPart& part, double z_top,
                                       const Tool& tool, const Program& program,
                                       const GougeOptions& options = {});

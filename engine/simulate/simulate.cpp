@@ -368,10 +368,7 @@ private:
         if (const Tool* const tool = prepared_[i].tool) {
             // A path whose corners the machine may round farther than a finish pass's is safe as far as it
             // may leave it.
-            Tool wide = *tool;
-            if (program.strays > kJunction)
-                for (double* const diameter : {&wide.diameter, &wide.shank_diameter, &wide.holder_diameter})
-                    if (*diameter > 0) *diameter += 2 * program.strays;
+            const Tool wide = program.strays > kJunction ? wider(*tool, program.strays) : *tool;
             f.gouge = check_gouge(context_, part_, layer.z_top, wide, program, {options_.gouge, 1e-5});
             if (walls)
                 f.flask =

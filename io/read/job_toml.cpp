@@ -93,6 +93,7 @@ public:
     }
 
     void required() { required_ = true; }
+    void set_missing_remedy(const char* remedy) { missing_remedy_ = remedy; }
 
     void key(const char* name, double& value, const char*) {
         if (const toml::node* node = find(name)) value = number(*node, prefix_ + name);
@@ -146,6 +147,7 @@ public:
     }
 
     [[nodiscard]] const std::map<std::string, std::string>& places() const { return places_; }
+    void learn_places(const Reader& other) { places_.insert(other.places_.begin(), other.places_.end()); }
     [[nodiscard]] std::string place_of(const toml::node& node) const {
         return node.source().begin.line > 0 ? fmt::format("{}:{}", file_, node.source().begin.line) : file_;
     }
@@ -178,8 +180,7 @@ protected:
         const toml::node* node = table_ != nullptr ? table_->get(name) : nullptr;
         if (node != nullptr) places_[prefix_ + name] = place_of(*node);
         else if (required)
-            fail(*table_, "job.missing_key", fmt::format("{}{} is missing", prefix_, name),
-                 "every [[tool]] needs it; see `slabwright job --defaults`");
+            fail(*table_, "job.missing_key", fmt::format("{}{} is missing", prefix_, name), missing_remedy_);
         return node;
     }
     double number(const toml::node& node, const std::string& key) const {
@@ -204,6 +205,7 @@ private:
     std::string file_, prefix_;
     const toml::table* table_;
     bool required_ = false;
+    const char* missing_remedy_ = "every [[tool]] needs it; see `slabwright job --defaults`";
     std::map<std::string, std::string> places_;
 };
 
@@ -259,6 +261,9 @@ KeyNames all_keys() {
     KeyNames names;
     visit_job_keys(job, names);
     names.table("tool", "");
+    visit_tool_keys(job.tools.front(), names);
+    names.table("tools", "");
+    names.names.insert(names.names.end(), {"tools.library", "tools.numbers"});
     visit_tool_keys(job.tools.front(), names);
     return names;
 }
@@ -364,9 +369,153 @@ struct Printer {
     }
 };
 
+std::vector<const toml::table*> listed_tools(const toml::table& root, const Reader& reader,
+                                             const KeyNames& known) {
+    std::vector<const toml::table*> listed;
+    const toml::node* const node = root.get("tool");
+    if (node == nullptr) return listed;
+    const toml::array* const tools = node->as_array();
+    if (tools == nullptr || !tools->is_array_of_tables())
+        reader.fail(*node, "job.type",
+                    fmt::format("tool is {}, not a list of tables", Reader::type_name(*node)),
+                    "write [[tool]] in double brackets");
+    for (const toml::node& entry : *tools) listed.push_back(entry.as_table());
+    for (const toml::table* const values : listed) refuse_unknown(*values, "tool.", known, reader);
+    return listed;
+}
+
+Tool tool_of(const toml::table& values, Reader& reader) {
+    Tool tool;
+    visit_tool_keys(tool, reader);
+    if (values.get("plunges") == nullptr) tool.plunges = plunges_by_default(tool.kind);
+    return tool;
+}
+
+// Whether two values of a key are the same, whole numbers and others alike.
+bool are_same(const toml::node& a, const toml::node& b) {
+    const auto x = a.value<double>(), y = b.value<double>();
+    if (x && y) return *x == *y;
+    const auto p = a.value_exact<std::string>(), q = b.value_exact<std::string>();
+    if (p && q) return *p == *q;
+    const auto s = a.value_exact<bool>(), t = b.value_exact<bool>();
+    return s && t && *s == *t;
+}
+
+// The tools of a library, each completed by the [[tool]] of its number, then by [tools]; then the [[tool]]
+// that it does not have.
+class LibraryTools {
+public:
+    LibraryTools(const toml::node* shared, std::vector<const toml::table*> listed, Reader& reader,
+                 const std::string& file)
+        : listed_(std::move(listed)), is_used_(listed_.size(), false), reader_(reader), file_(file) {
+        if (shared == nullptr) return;
+        shared_ = shared->as_table();
+        if (shared_ == nullptr)
+            reader.fail(*shared, "job.type",
+                        fmt::format("tools is {}, not a table", Reader::type_name(*shared)),
+                        "write [tools] on a line of its own");
+    }
+
+    std::vector<Tool> of(const ToolSource& source) {
+        const std::string library = source.library.empty() ? named() : source.library;
+        if (!source.read)
+            throw Error(ErrorKind::usage, "tools.no_files", "a job that is no file has no tool library",
+                        file_, "list the tools as [[tool]]");
+        const std::vector<std::int64_t> wanted = numbers();
+        std::vector<Tool> tools;
+        for (const LibraryTool& stated : source.read(library, wanted))
+            tools.push_back(completed(stated, tools.size() + 1));
+        for (const std::int64_t number : wanted)
+            if (std::none_of(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == number; }))
+                throw Error(ErrorKind::usage, "tools.number", fmt::format("it has no tool {}", number),
+                            library, "correct [tools] numbers");
+        for (std::size_t i = 0; i < listed_.size(); ++i) {
+            if (is_used_[i]) continue;
+            reader_.enter(listed_[i], fmt::format("tool[{}].", tools.size() + 1));
+            tools.push_back(tool_of(*listed_[i], reader_));
+        }
+        return tools;
+    }
+
+private:
+    std::string named() const {
+        const toml::node* const node = shared_ != nullptr ? shared_->get("library") : nullptr;
+        if (node == nullptr)
+            throw Error(ErrorKind::usage, "job.missing_key", "tools.library is missing",
+                        shared_ != nullptr ? reader_.place_of(*shared_) : file_,
+                        "name a file, or list the tools as [[tool]]");
+        const auto name = node->value_exact<std::string>();
+        if (!name)
+            reader_.fail(*node, "job.type",
+                         fmt::format("tools.library is {}, not a text in quotes", Reader::type_name(*node)),
+                         "give the file's name in quotes");
+        return *name;
+    }
+
+    std::vector<std::int64_t> numbers() const {
+        std::vector<std::int64_t> wanted;
+        const toml::node* const node = shared_ != nullptr ? shared_->get("numbers") : nullptr;
+        if (node == nullptr) return wanted;
+        const toml::array* const list = node->as_array();
+        if (list != nullptr)
+            for (const toml::node& element : *list)
+                if (const auto number = element.value_exact<std::int64_t>()) wanted.push_back(*number);
+        if (list == nullptr || wanted.empty() || wanted.size() != list->size())
+            reader_.fail(*node, "job.type", "tools.numbers is not a list of whole numbers",
+                         "write [1, 2, 5]; leave it out for all tools");
+        return wanted;
+    }
+
+    Tool completed(const LibraryTool& stated, std::size_t position) {
+        toml::table values;
+        for (const StatedValue& value : stated.values)
+            std::visit([&](const auto& v) { values.insert_or_assign(value.first, v); }, value.second);
+        const auto number_of = [](const toml::table& table) {
+            const toml::node* const node = table.get("number");
+            return node != nullptr ? node->value_exact<std::int64_t>() : std::nullopt;
+        };
+        if (!values.contains("number") && shared_ != nullptr && shared_->contains("number"))
+            values.insert_or_assign("number", *shared_->get("number"));
+        for (std::size_t i = 0; i < listed_.size(); ++i) {
+            if (!number_of(values) || number_of(*listed_[i]) != number_of(values)) continue;
+            is_used_[i] = true;
+            for (auto&& [key, node] : *listed_[i]) {
+                const toml::node* const there = values.get(key.str());
+                if (there != nullptr && !are_same(*there, node))
+                    reader_.fail(node, "tools.conflict",
+                                 fmt::format("{} is not what {} states of this tool",
+                                             std::string(key.str()).substr(0, kShown), stated.place),
+                                 "say it in one of both places only");
+                if (there == nullptr) values.insert_or_assign(key.str(), node);
+            }
+        }
+        if (shared_ != nullptr)
+            for (auto&& [key, node] : *shared_)
+                if (key.str() != "library" && key.str() != "numbers" && !values.contains(key.str()))
+                    values.insert_or_assign(key.str(), node);
+        Reader own(values, stated.place);
+        own.set_missing_remedy("state it in a [[tool]] of this number, or for all tools in [tools]");
+        own.enter(&values, fmt::format("tool[{}].", position));
+        Tool tool = tool_of(values, own);
+        reader_.learn_places(own);
+        return tool;
+    }
+
+    std::vector<const toml::table*> listed_;
+    std::vector<bool> is_used_;
+    Reader& reader_;
+    const std::string& file_;
+    const toml::table* shared_ = nullptr;
+};
+
+std::vector<Tool> library_tools(const toml::node* shared, std::vector<const toml::table*> listed,
+                                Reader& reader, const std::string& file, const ToolSource& source) {
+    return LibraryTools(shared, std::move(listed), reader, file).of(source);
+}
+
 }  // namespace
 
-Job parse_job(std::string_view text, const std::string& file, const Job& base) {
+Job parse_job(std::string_view text, const std::string& file, const Job& base, const ToolSource& tools) {
     require_shallow_keys(text, file);
     toml::table root;
     try {
@@ -382,22 +531,15 @@ Job parse_job(std::string_view text, const std::string& file, const Job& base) {
     const KeyNames known = all_keys();
     refuse_unknown(root, "", known, reader);
     visit_job_keys(job, reader);
-    if (const toml::node* node = root.get("tool")) {
-        const toml::array* tools = node->as_array();
-        if (tools == nullptr || !tools->is_array_of_tables())
-            reader.fail(*node, "job.type",
-                        fmt::format("tool is {}, not a list of tables", Reader::type_name(*node)),
-                        "write [[tool]] in double brackets");
+    const std::vector<const toml::table*> listed = listed_tools(root, reader, known);
+    const toml::node* const shared = root.get("tools");
+    if (shared != nullptr || !tools.library.empty()) {
+        job.tools = library_tools(shared, listed, reader, file, tools);
+    } else if (!listed.empty() || root.contains("tool")) {
         job.tools.clear();
-        std::size_t position = 0;
-        for (const toml::node& entry : *tools) {
-            const toml::table& values = *entry.as_table();
-            refuse_unknown(values, "tool.", known, reader);
-            reader.enter(&values, fmt::format("tool[{}].", ++position));
-            Tool tool;
-            visit_tool_keys(tool, reader);
-            if (values.get("plunges") == nullptr) tool.plunges = plunges_by_default(tool.kind);
-            job.tools.push_back(std::move(tool));
+        for (const toml::table* const values : listed) {
+            reader.enter(values, fmt::format("tool[{}].", job.tools.size() + 1));
+            job.tools.push_back(tool_of(*values, reader));
         }
     }
     try {

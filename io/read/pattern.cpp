@@ -30,15 +30,21 @@ fs::path find_pattern(const fs::path& directory, const std::string& file, const 
 
 bool Pattern::is(const PlannedPattern& planned) const {
     return read.input.sha256 == planned.sha256 && reading == planned.reading &&
-           (supports.empty() || supports == planned.supports);
+           ((supports.empty() && drills.diameters.empty()) ||
+            (supports == planned.supports && drills == planned.drills));
 }
 
-std::shared_ptr<Pattern> propped(Context& context, std::shared_ptr<Pattern> pattern,
-                                 const std::vector<Support>& supports) {
-    if (pattern->supports == supports) return pattern;
-    auto more =
-        std::make_shared<Pattern>(Pattern{pattern->place, pattern->reading, pattern->read, {}, supports});
-    more->read.mesh = with_supports(context, pattern->read.mesh.view(), supports);
+std::shared_ptr<Pattern> as_planned(Context& context, std::shared_ptr<Pattern> pattern,
+                                    const PlannedPattern& planned) {
+    const bool has_drills = !planned.drills.diameters.empty();
+    if (pattern->supports == planned.supports && (!has_drills || pattern->drills == planned.drills))
+        return pattern;
+    auto more = std::make_shared<Pattern>(
+        Pattern{pattern->place, pattern->reading, pattern->read, {}, planned.supports, planned.drills});
+    if (std::optional<Mesh> rounded = rounded_for_drills(context, more->read.mesh.view(), planned.drills))
+        more->read.mesh = std::move(*rounded);
+    if (!planned.supports.empty())
+        more->read.mesh = with_supports(context, more->read.mesh.view(), planned.supports);
     return more;
 }
 
@@ -47,13 +53,13 @@ std::shared_ptr<Pattern> read_planned_pattern(Context& context, const std::strin
                                               const std::string& asker) {
     const PatternSource source =
         given.empty() ? PatternSource(find_pattern(directory, planned.file, asker).string()) : given;
-    auto pattern = std::make_shared<Pattern>(
-        Pattern{source.name(), planned.reading, read_pattern_mesh(context, source, planned.reading), {}, {}});
+    auto pattern = std::make_shared<Pattern>(Pattern{
+        source.name(), planned.reading, read_pattern_mesh(context, source, planned.reading), {}, {}, {}});
     if (!pattern->is(planned))
         throw Error(ErrorKind::input, asker + ".other_pattern",
                     "is not the pattern that was planned: its SHA-256 is " + pattern->read.input.sha256,
                     source.name(), "name the planned STL with --stl, or plan again");
-    return propped(context, std::move(pattern), planned.supports);
+    return as_planned(context, std::move(pattern), planned);
 }
 
 }  // namespace slabwright

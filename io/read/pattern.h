@@ -9,6 +9,7 @@
 
 #include "engine/job.h"
 #include "engine/plan.h"
+#include "engine/prepare/drilled_holes.h"
 #include "io/read/pattern_mesh.h"
 #include "kernels/access/standing_part.h"
 
@@ -19,6 +20,7 @@ struct PlannedPattern {
     std::string file, sha256;
     ReadingOptions reading;  ///< as it was read for the plan
     std::vector<Support> supports{};
+    DrillRule drills{};
 };
 
 struct Pattern {
@@ -27,14 +29,17 @@ struct Pattern {
     PatternMesh read;
     std::optional<StandingPart> part;  ///< of the mesh, once somebody needs it
     std::vector<Support> supports{};   ///< that the mesh holds as further bodies
+    DrillRule drills{};                ///< for which its holes are round
 
-    /// Whether it is what was planned, read alike; its supports may be missing yet.
+    /// Whether it is what was planned, read alike; its round holes and supports may be missing yet.
     [[nodiscard]] bool is(const PlannedPattern& planned) const;
 };
 
-/// The pattern with the supports that stand under it; the same where it has them.
-[[nodiscard]] std::shared_ptr<Pattern> propped(Context& context, std::shared_ptr<Pattern> pattern,
-                                               const std::vector<Support>& supports);
+/// The pattern as the plan took it: with round holes for its drills, and with the supports that stand under
+/// it; the same where it is so.
+/// @pre pattern->is(planned)
+[[nodiscard]] std::shared_ptr<Pattern> as_planned(Context& context, std::shared_ptr<Pattern> pattern,
+                                                  const PlannedPattern& planned);
 
 /// @param directory OUT
 /// @param given the pattern; none looks for the file that the plan names: in OUT, beside OUT, in the working

@@ -371,6 +371,7 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     input.stock_max = build.stock_max;
     input.tools = build.tools;
     read_flask(plan, folder);
+    folder.pattern.drills = drill_rule(folder.simulation.tools, build.job.tolerances.gouge);
     return folder;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "io/text/json_text.h"
@@ -37,6 +38,42 @@ std::string mm(double value, int decimals = 3) {
     return text;
 }
 
+void put_holes(JsonText& json, const std::vector<RoundHole>& holes) {
+    json.key("holes").begin_array();
+    for (const RoundHole& hole : holes) {
+        json.begin_object(Shape::line).key("kind").string(name(hole.kind));
+        json.key("bottom").string(name(hole.bottom));
+        json.key("diameter").rounded(hole.diameter_mm, 4).key("depth").rounded(hole.depth_mm, 4);
+        json.key("chord").rounded(hole.chord_mm, 4);
+        json.key("mouth").begin_array();
+        for (const double x : hole.mouth) json.rounded(x, 4);
+        json.end().key("into").begin_array();
+        for (const double x : hole.into) json.rounded(x, 6);
+        json.end().key("steps").begin_array();
+        for (const HoleStep& step : hole.steps) {
+            json.begin_object().key("from").rounded(step.from_mm, 4).key("to").rounded(step.to_mm, 4);
+            json.key("diameter").rounded(step.diameter_mm, 4);
+            json.key("end_diameter").rounded(step.end_diameter_mm, 4).end();
+        }
+        json.end().key("facets").count(hole.facets.size()).key("first_facet").count(hole.facets.front());
+        json.end();
+    }
+    json.end();
+}
+
+std::string hole_line(const RoundHole& hole) {
+    std::string line = fmt::format("  hole        {} {} mm", name(hole.kind), mm(hole.diameter_mm));
+    line += fmt::format(", {} mm deep, {} at x {} y {} z {}", mm(hole.depth_mm),
+                        hole.bottom == HoleBottom::open    ? "open below,"
+                        : hole.bottom == HoleBottom::other ? "with a bottom of another form,"
+                                                           : fmt::format("{} bottom,", name(hole.bottom)),
+                        mm(hole.mouth[0], 2), mm(hole.mouth[1], 2), mm(hole.mouth[2], 2));
+    constexpr double upright = 0.99999848;  // cosine of .1°
+    if (std::abs(hole.into[2]) < upright)
+        line += fmt::format(", into {} {} {}", mm(hole.into[0], 4), mm(hole.into[1], 4), mm(hole.into[2], 4));
+    return line + "\n";
+}
+
 }  // namespace
 
 Inspection inspect_pattern(Context& context, const PatternSource& source, const Job& job) {
@@ -53,10 +90,12 @@ Inspection inspect_pattern(Context& context, const PatternSource& source, const 
     }
     if (result.solid) {
         const FeatureOptions options = feature_options(job);
-        context.begin_phase("features", 0.3, 0.7);
+        context.begin_phase("features", 0.3, 0.6);
         FeatureSet found = find_features(context, pattern.mesh.view(), options);
         result.features = std::move(found.features);
         result.disagreements = std::move(found.disagreements);
+        context.begin_phase("holes", 0.6, 0.7);
+        result.holes = find_holes(context, pattern.mesh.view());
         context.begin_phase("undercuts", 0.7, 1.0);
         const double tops[] = {double{bounds(pattern.mesh.view()).max.z}};
         result.undercuts = measure_undercuts(context, pattern.mesh.view(), tops, options);
@@ -105,6 +144,7 @@ std::string inspection_json(const Inspection& inspection) {
             .end();
     }
     json.end();
+    put_holes(json, inspection.holes);
     json.key("undercuts").begin_array();
     for (const UnmadeUndercut& u : inspection.undercuts) {
         json.begin_object(Shape::line).key("type").string(name(u.type));
@@ -152,6 +192,10 @@ std::string inspection_text(const Inspection& inspection) {
         }
         text += of_type.size() > shown ? ", ...\n" : "\n";
     }
+    for (std::size_t i = 0; i < std::min(shown, inspection.holes.size()); ++i)
+        text += hole_line(inspection.holes[i]);
+    if (inspection.holes.size() > shown)
+        text += fmt::format("  and {} more holes\n", inspection.holes.size() - shown);
     text += inspection.undercuts.empty() && inspection.solid ? "  undercuts   none\n" : "";
     for (std::size_t i = 0; i < std::min(shown, inspection.undercuts.size()); ++i) {
         const UnmadeUndercut& u = inspection.undercuts[i];

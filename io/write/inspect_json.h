@@ -6,6 +6,7 @@
 
 #include "io/read/pattern_mesh.h"
 #include "kernels/features/features.h"
+#include "kernels/features/holes.h"
 
 namespace slabwright {
 
@@ -13,13 +14,14 @@ struct Inspection {
     InputInfo input;
     MeshReport report;
     std::vector<Diagnostic> diagnostics;
-    bool solid =
-        false;  ///< whether a planner may use the mesh; features and undercuts are looked for only then
+    bool solid = false;  ///< whether a planner may use the mesh; features, holes and undercuts are looked for
+                         ///< only then
     std::string unusable;  ///< why not, in one line
     std::vector<Feature> features;
     std::vector<FinderDisagreement> disagreements;
     /// What would stay unmade if the pattern were one layer; layer boundaries can only make it less.
     std::vector<UnmadeUndercut> undercuts;
+    std::vector<RoundHole> holes;
 };
 
 /// Reads the file and looks at it. @throws Error(input | usage | cancelled) as read_pattern_mesh; a mesh that

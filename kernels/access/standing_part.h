@@ -56,6 +56,12 @@ public:
     [[nodiscard]] Penetration cylinder(double z_top, const Point3& from, const Point3& to, double radius,
                                        double at_least) const;
 
+    /// The same for a drill that stands with its point at `tip`: a cone under a cylinder of `radius`. Whoever
+    /// went straight down to there was nowhere deeper in the part.
+    /// @param taper_rad between the axis and the cone's flank
+    [[nodiscard]] Penetration pointed(double z_top, const Point3& tip, double radius, double taper_rad,
+                                      double at_least) const;
+
     enum class Form : char { ball, cylinder };
     struct Motion {
         Point3 from, to;
