@@ -45,7 +45,6 @@ inline constexpr Word<Post> kPostWords[] = {{"linuxcnc", Post::linuxcnc}, {"fanu
                                             {"haas", Post::haas},         {"grbl", Post::grbl},
                                             {"mach", Post::mach},         {"iso", Post::iso},
                                             {"siemens", Post::siemens},   {"heidenhain", Post::heidenhain}};
-inline constexpr Word<LengthUnit> kProgramUnitWords[] = {{"mm", LengthUnit::mm}, {"inch", LengthUnit::inch}};
 inline constexpr Word<Engagement> kEngagementWords[] = {{"simulated", Engagement::simulated},
                                                         {"nominal", Engagement::nominal}};
 inline constexpr Word<SelectionMode> kSelectionWords[] = {{"select", SelectionMode::select},
@@ -170,7 +169,7 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
     visit.word("post", machine.post, kPostWords,
                "the control that the programs are for: linuxcnc, fanuc, haas, grbl, mach, iso, siemens or "
                "heidenhain");
-    visit.word("units", machine.units, kProgramUnitWords,
+    visit.word("units", machine.units, kUnitWords,
                "of the programs: mm or inch; this file and plan.json stay in mm");
     visit.key("base_board_thickness", machine.base_board_thickness,
               "mm, the sacrificial board under the first layer");
