@@ -1,5 +1,5 @@
-// The `slabwright` command: plan, verify, resume, report, inspect, repair, prepare, orient, split,
-// slice, sheets, feed, bond, job. Errors are one line on stderr, their kind is the exit code.
+// The `slabwright` command: plan, verify, resume, report, inspect, repair, prepare, orient, quote,
+// split, slice, sheets, feed, bond, job. Errors are one line on stderr, their kind is the exit code.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -21,6 +21,7 @@
 
 #include "io/orient.h"
 #include "io/prepare.h"
+#include "io/quote.h"
 #include "io/slabwright.h"
 #include "io/ways_out.h"
 #include "tools/allocator.h"
@@ -140,6 +141,14 @@ void run_orient(const Options& options) {
         const OrientModel model =
             orient_model(context, options.stl, job, static_cast<std::size_t>(options.plans));
         return options.json ? orient_json(model) : orient_text(model);
+    });
+}
+
+void run_quote(const Options& options) {
+    const Job job = job_of(options);
+    with_context(options, [&](Context& context) {
+        const QuotedModel model = quote_model(context, options.stl, job);
+        return options.json ? quote_json(model) : quote_text(model);
     });
 }
 
@@ -381,6 +390,15 @@ CLI::App* add_orient_command(CLI::App& app, Options& options) {
     return command;
 }
 
+CLI::App* add_quote_command(CLI::App& app, Options& options) {
+    CLI::App* command = app.add_subcommand(
+        "quote",
+        "what a build takes, without a plan: layers, slabs, glue, about how long, what stays unmade");
+    command->add_option("MODEL", options.stl, "the pattern")->required();
+    add_common(*command, options);
+    return command;
+}
+
 CLI::App* add_repair_command(CLI::App& app, Options& options) {
     CLI::App* command = app.add_subcommand(
         "repair", "mend a mesh that is no solid: what was wrong is told, and a solid is written");
@@ -472,6 +490,7 @@ int command(int argc, char** argv) {
 
     CLI::App* prepare_command = add_prepare_command(app, options);
     CLI::App* orient_command = add_orient_command(app, options);
+    CLI::App* quote_command = add_quote_command(app, options);
     SplitOptions split_options;
     CLI::App* split_command = app.add_subcommand("split", "cut a model into two halves, capped and dowelled");
     split_command->add_option("MODEL", options.stl, "the model")->required();
@@ -521,6 +540,7 @@ int command(int argc, char** argv) {
         else if (*repair_command) run_repair(options);
         else if (*prepare_command) run_prepare(options);
         else if (*orient_command) run_orient(options);
+        else if (*quote_command) run_quote(options);
         else if (*split_command) run_split(options, split_options);
         else if (*slice_command) run_slice(options);
         else if (*sheets_command)

@@ -54,7 +54,7 @@ Mesh laid_down(MeshView mesh, const std::array<double, 3>& degrees) {
     return result;
 }
 
-Lying lying(Context& context, MeshView mesh, const Job& job) {
+LayersOf layers_of(Context& context, MeshView mesh, const Job& job) {
     const Box3 box = bounds(context, mesh);
     const FeatureOptions options = feature_options(job);
     // As a plan asks for its layers, but for the wood above a boundary.
@@ -71,12 +71,11 @@ Lying lying(Context& context, MeshView mesh, const Job& job) {
     request.filled_underside = job.tolerances.undercut;
     request.features = find_features(context, mesh, options).features;
     request.section_area = SectionAreas(context, mesh);
-    const LayerPlacement placement = place_layers(job.layers.strategy, request);
-    std::vector<double> tops;
-    for (const Boundary& b : placement.boundaries) tops.push_back(b.z);
-    Lying result;
-    result.layers = static_cast<int>(tops.size());
-    for (const UnmadeUndercut& u : measure_undercuts(context, mesh, tops, options))
+    LayersOf found;
+    for (const Boundary& b : place_layers(job.layers.strategy, request).boundaries) found.tops.push_back(b.z);
+    Lying& result = found.lying;
+    result.layers = static_cast<int>(found.tops.size());
+    for (const UnmadeUndercut& u : measure_undercuts(context, mesh, found.tops, options))
         if (u.thickness_mm > job.tolerances.undercut) {
             result.unmade_mm3 += u.volume_mm3;
             result.unmade_mm = std::max(result.unmade_mm, u.height_mm);
@@ -84,8 +83,10 @@ Lying lying(Context& context, MeshView mesh, const Job& job) {
     result.has_room = double{box.max.x} - box.min.x <= job.slabs.length &&
                       double{box.max.y} - box.min.y <= job.slabs.width &&
                       box.max.z <= job.machine.build_height;
-    return result;
+    return found;
 }
+
+Lying lying(Context& context, MeshView mesh, const Job& job) { return layers_of(context, mesh, job).lying; }
 
 std::vector<WayOut> ways_out(Context& context, MeshView mesh, const MeshReport& report, const Job& job,
                              const Lying& as_it_lies) {

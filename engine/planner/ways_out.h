@@ -21,7 +21,14 @@ struct Lying {
     bool has_room = true;   ///< whether slab and layers hold it
 };
 
+/// That, and where the layers end, mm, ascending.
+struct LayersOf {
+    Lying lying;
+    std::vector<double> tops;
+};
+
 /// @param mesh a solid on z = 0. @throws as find_features() and place_layers_optimal()
+[[nodiscard]] LayersOf layers_of(Context& context, MeshView mesh, const Job& job);
 [[nodiscard]] Lying lying(Context& context, MeshView mesh, const Job& job);
 
 /// The mesh turned about the origin and set down on z = 0. @param degrees as PrepareJob::turn

@@ -1,0 +1,159 @@
+#include "engine/planner/quote.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "engine/plan.h"
+#include "engine/schedule/fit.h"
+#include "engine/tools/tools.h"
+#include "kernels/cutting/cusp.h"
+#include "kernels/errors.h"
+#include "kernels/features/facet_classes.h"
+#include "kernels/polygons/loops.h"
+#include "kernels/slicing/slicing.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr double kBeside = 0.05;  // mm from a layer's ends to where it is cut by a plane
+constexpr double kUpright = 89.5, kLevel = 0.5, kSteep = 45;  // degrees
+
+/// What milling takes over its ways at full feed, and minutes of a place in a layer: fitted to the programs
+/// of 47 castings (bench/quote), least squares of relative errors, weighted by one over the root of each.
+/// Walls and floors are small beside these and go with the places.
+struct Rates {
+    double facing = 3.238, roughing = 0.599, contours = 2.66, raster = 3.403, place = 4.306;
+};
+constexpr Rates kRates{};
+constexpr double kSmallPlace = 60;  // mm: a loop so long counts as half a place
+constexpr double kChanges = 5;      // of tools in a layer
+
+/// Ways of one kind in all layers, mm.
+struct Ways {
+    double facing = 0, roughing = 0, contours = 0, raster = 0;
+    double places = 0;  ///< loops of sections, small ones by their length
+};
+
+const Tool& face_mill(const Job& job) {
+    for (const Tool& tool : job.tools)
+        if (tool.kind == ToolKind::face) return tool;
+    throw Error(ErrorKind::usage, "job.tool", "the library has no face mill", "tool", "give one");
+}
+
+double perimeter(std::span<const Point2> loop) {
+    double sum = 0;
+    for (std::size_t k = 0; k < loop.size(); ++k) {
+        const Point2 a = loop[k], b = loop[(k + 1) % loop.size()];
+        sum += std::hypot(to_mm(b.x) - to_mm(a.x), to_mm(b.y) - to_mm(a.y));
+    }
+    return sum;
+}
+
+/// The surface's ways by its slope.
+void add_surface(MeshView mesh, const Job& job, const LayerTools& tools, Ways& ways) {
+    const double ball = tools.finish.diameter / 2, cusp = job.tolerances.cusp;
+    for (std::uint32_t f = 0; f < mesh.size(); ++f) {
+        const Vec3d n = area_normal(mesh, f);
+        const double twice = length(n);
+        if (!(twice > 0)) continue;
+        const double mm2 = twice / 2, slope = std::acos(std::clamp(n[2] / twice, -1.0, 1.0));
+        const double degrees = slope * 180 / std::numbers::pi;
+        if (degrees >= kUpright || degrees <= kLevel) continue;
+        if (degrees > kSteep) {
+            const double down = std::min(tools.finish.stepdown_max, ball_level_stepdown(ball, slope, cusp));
+            ways.contours += mm2 * std::sin(slope) / down;
+        } else {
+            ways.raster += mm2 / raster_stepover(ball, cusp, 0);
+        }
+    }
+}
+
+}  // namespace
+
+Quote quote(Context& context, MeshView mesh, const Job& job) {
+    Plan plan;
+    plan.job = job;
+    const Box3 box = bounds(context, mesh);
+    place_stock(plan, box);
+    const LayersOf layers = layers_of(context, mesh, job);
+    const LayerTools tools = fixed_tools(job);
+    const Tool& face = face_mill(job);
+    Quote result;
+    result.outcome = layers.lying;
+    result.stock = {plan.stock_max[0] - plan.stock_min[0], plan.stock_max[1] - plan.stock_min[1]};
+    const double stock_mm2 = result.stock[0] * result.stock[1];
+
+    std::vector<Plane> planes;
+    double bottom = 0;
+    for (const double top : layers.tops) {
+        const double beside = std::min(kBeside, (top - bottom) / 4);
+        planes.push_back({bottom + beside, Side::above});
+        planes.push_back({(bottom + top) / 2, Side::above});
+        planes.push_back({top - beside, Side::above});
+        bottom = top;
+    }
+    const std::vector<Section> sections = slice(context, mesh, planes);
+    Ways ways;
+    std::map<double, int> slabs;
+    double stack_mm3 = 0;
+    bottom = 0;
+    for (std::size_t l = 0; l < layers.tops.size(); ++l) {
+        const double top = layers.tops[l], height = top - bottom;
+        const std::vector<double>& stocked = job.slabs.thicknesses;
+        const auto fits = std::find_if(stocked.begin(), stocked.end(), [&](double t) {
+            return t - job.slabs.facing_allowance >= height - 1e-9;
+        });
+        const double slab = fits != stocked.end() ? *fits : stocked.back();
+        const int together =
+            std::max(1, static_cast<int>(std::ceil((height + job.slabs.facing_allowance) / slab - 1e-9)));
+        slabs[slab] += together;
+        stack_mm3 += stock_mm2 * slab * together;
+        std::array<double, 3> area_at{};
+        for (std::size_t k = 3; k-- > 0;) {
+            const Loops solid = simplify(sections[3 * l + k].loops);
+            area_at[k] = area(solid);
+            if (k < 2) area_at[k] = std::max(area_at[k], area_at[k + 1]);  // what is under it stays filled
+            for (std::size_t i = 0; i < solid.size(); ++i) {
+                const double around = perimeter(solid.loop(i));
+                ways.places += around / (around + kSmallPlace) / 3;
+            }
+        }
+        const double solid_mm3 = (area_at[0] + 4 * area_at[1] + area_at[2]) / 6 * height;
+        const double takes = slab * together - height;
+        ways.facing += std::ceil(std::max(takes, 1e-3) / face.stepdown_max) * stock_mm2 /
+                       (face.diameter * face.stepover);
+        ways.roughing += std::max(0.0, stock_mm2 * height - solid_mm3) /
+                         (tools.rough.diameter * tools.rough.stepover * tools.rough.stepdown_max);
+        const double below = l == 0 ? area_at[0] : area(simplify(sections[3 * l - 1].loops));
+        result.glue_m2 += std::min(area_at[0], below) * 1e-6;
+        result.bonding_minutes += together * (job.bonding.handling_s + job.bonding.press_time_s) / 60;
+        bottom = top;
+    }
+    add_surface(mesh, job, tools, ways);
+    for (const auto& [thickness, count] : slabs) {
+        result.slabs.push_back({thickness, count});
+        result.slab_m2 += count * stock_mm2 * 1e-6;
+    }
+    const double layer_count = static_cast<double>(layers.tops.size());
+    result.mass_kg =
+        (stack_mm3 + stock_mm2 * job.machine.base_board_thickness) * 1e-9 * job.material.density_kg_m3;
+    const auto work = [&](std::string_view name, double mm, const Tool& tool, double rate) {
+        const double ideal = mm / std::min(tool.max_feed, job.machine.max_feed);
+        result.work.push_back({name, ideal, rate * ideal});
+    };
+    work("facing", ways.facing, face, kRates.facing);
+    work("roughing", ways.roughing, tools.rough, kRates.roughing);
+    work("contours", ways.contours, tools.finish, kRates.contours);
+    work("raster", ways.raster, tools.finish, kRates.raster);
+    result.work.push_back({"places", ways.places, kRates.place * ways.places});
+    for (const QuotedWork& w : result.work) result.cutting_minutes += w.minutes;
+    result.bonding_minutes += job.bonding.glue_s_per_m2 * result.glue_m2 / 60;
+    result.tool_change_minutes = kChanges * layer_count * job.machine.tool_change_s / 60;
+    result.build_minutes = result.cutting_minutes + result.bonding_minutes + result.tool_change_minutes;
+    return result;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,49 @@
+// What a build takes, before it is planned: layers, slabs, glue, time.
+#pragma once
+
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "engine/job.h"
+#include "engine/planner/ways_out.h"
+#include "kernels/mesh/mesh.h"
+#include "kernels/parallel/context.h"
+
+namespace slabwright {
+
+/// A kind of milling, as long as its ways are at full feed, and how long it then takes on the machine.
+struct QuotedWork {
+    std::string_view name;
+    double ideal_minutes = 0;
+    double minutes = 0;
+};
+
+/// Slabs of one thickness.
+struct QuotedSlabs {
+    double thickness = 0;  ///< mm
+    int count = 0;
+};
+
+struct Quote {
+    Lying outcome;
+    std::array<double, 2> stock{};  ///< of each slab, mm
+    std::vector<QuotedSlabs> slabs;
+    double slab_m2 = 0;  ///< of all slabs
+    double glue_m2 = 0;  ///< on all joints and the board
+    double mass_kg = 0;  ///< of the stack with its board
+    std::vector<QuotedWork> work;
+    /// Of four builds in five the time lies within this share of what is quoted.
+    double spread = 0.25;
+    double cutting_minutes = 0, bonding_minutes = 0, tool_change_minutes = 0, build_minutes = 0;
+};
+
+/// Reckons a build from the layers that a plan would have, sections in each and the surface by its slope: no
+/// paths are laid. What each kind of milling takes over its ways at full feed is fitted to plans of real
+/// castings (bench/quote prints how far it is off).
+/// @param mesh a solid on z = 0
+/// @throws Error(no_plan) where no slab or machine holds it, Error(usage, "job.tool") without a flat, a ball
+/// or a face mill, and as lying()
+[[nodiscard]] Quote quote(Context& context, MeshView mesh, const Job& job);
+
+}  // namespace slabwright

@@ -1,0 +1,81 @@
+// What is quoted at once, beside what a plan says.
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "io/quote.h"
+#include "io/slabwright.h"
+#include "io/write/stl_writer.h"
+#include "kernels/errors.h"
+#include "kernels/mesh/weld.h"
+#include "tests/data/models.h"
+#include "tests/mesh_shapes.h"
+#include "tests/support/temporary_folder.h"
+
+namespace slabwright {
+namespace {
+
+TEST(Quote, SaysWhatThePlanSays) {
+    Context context;
+    const support::TemporaryFolder folder;
+    for (const auto& [name, facets] :
+         {std::pair{"half-sphere.stl", half_sphere()}, {"pump-cover.stl", pump_cover()}}) {
+        const std::string stl = folder / name;
+        write_stl(stl, weld(context, facets));
+        const Quote q = quote_model(context, stl, Job{}).quote;
+        const Plan planned = plan(context, stl, Job{});
+        EXPECT_EQ(q.outcome.layers, planned.totals.layers) << name;
+        EXPECT_NEAR(q.stock[0], planned.stock_max[0] - planned.stock_min[0], 1e-3);
+        EXPECT_NEAR(q.stock[1], planned.stock_max[1] - planned.stock_min[1], 1e-3);
+        int quoted = 0, slabs = 0;
+        for (const QuotedSlabs& s : q.slabs) quoted += s.count;
+        double glue = 0;
+        for (const Layer& layer : planned.layers) {
+            slabs += layer.slabs;
+            for (const Joint& joint : layer.joints) glue += joint.area_mm2 * 1e-6;
+        }
+        EXPECT_EQ(quoted, slabs) << name;
+        EXPECT_NEAR(q.slab_m2, slabs * q.stock[0] * q.stock[1] * 1e-6, 1e-9);
+        EXPECT_NEAR(q.glue_m2, glue, 0.2 * glue) << name;
+        EXPECT_NEAR(q.mass_kg, planned.totals.stack_mass_kg, 1e-6) << name;
+        EXPECT_NEAR(q.build_minutes, planned.totals.build_minutes, 0.5 * planned.totals.build_minutes)
+            << name;
+        EXPECT_LT(q.outcome.unmade_mm3, 1);
+        double work = 0;
+        for (const QuotedWork& w : q.work) work += w.minutes;
+        EXPECT_NEAR(work, q.cutting_minutes, 1e-9);
+        EXPECT_NEAR(q.build_minutes, q.cutting_minutes + q.bonding_minutes + q.tool_change_minutes, 1e-9);
+    }
+}
+
+TEST(Quote, TakesTheThinnestSlabThatHoldsALayer) {
+    Context context;
+    const support::TemporaryFolder folder;
+    const std::string stl = folder / "block.stl";
+    write_stl(stl, weld(context, shapes::box({0, 0, 0}, {100, 80, 17})));
+    Job job;
+    job.slabs.thicknesses = {12, 19, 25};
+    const Quote q = quote_model(context, stl, job).quote;
+    ASSERT_EQ(q.slabs.size(), 1U);
+    EXPECT_EQ(q.slabs[0].thickness, 19);
+    EXPECT_EQ(q.slabs[0].count, 1);
+    EXPECT_NEAR(q.glue_m2, 100 * 80 * 1e-6, 1e-6);
+    EXPECT_NE(quote_json({{}, q}).find("slabwright.quote/1"), std::string::npos);
+    EXPECT_NE(quote_text({{}, q}).find("1 of 19 x"), std::string::npos) << quote_text({{}, q});
+}
+
+TEST(Quote, RefusesWhatNoSlabHolds) {
+    Context context;
+    const support::TemporaryFolder folder;
+    const std::string stl = folder / "beam.stl";
+    write_stl(stl, weld(context, shapes::box({0, 0, 0}, {3000, 80, 17})));
+    try {
+        (void)quote_model(context, stl, Job{});
+        FAIL();
+    } catch (const Error& e) {
+        EXPECT_EQ(e.code(), "fit.slab");
+    }
+}
+
+}  // namespace
+}  // namespace slabwright
