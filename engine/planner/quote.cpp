@@ -22,7 +22,7 @@ constexpr double kBeside = 0.05;  // mm from a layer's ends to where it is cut b
 constexpr double kUpright = 89.5, kLevel = 0.5, kSteep = 45;  // degrees
 
 /// What milling takes over its ways at full feed, and minutes of a place in a layer: fitted to the programs
-/// of 47 castings (bench/quote), least squares of relative errors, weighted by one over the root of each.
+/// of castings (bench/quote), least squares of relative errors, weighted by one over the root of each.
 /// Walls and floors are small beside these and go with the places.
 struct Rates {
     double facing = 3.238, roughing = 0.599, contours = 2.66, raster = 3.403, place = 4.306;
