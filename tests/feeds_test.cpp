@@ -390,7 +390,7 @@ TEST(Feeds, WoodThatHangsOverTooFarIsReported) {
                   at(130, 40, bottom + 3, 0), at(130, 40, 30, 0), at(-10, 40, 30, 0), at(-10, 40, bottom, 0),
                   at(130, 40, bottom, 9000), at(130, 40, 30, 0)})};
         std::vector<Diagnostic> diagnostics;
-        (void)adapt_layer(context, plan.layers[0], plan, &map, diagnostics);
+        (void)adapt_layer(context, plan.layers[0], plan, {&map, nullptr}, diagnostics);
         std::vector<std::string> found;
         for (const Diagnostic& d : diagnostics) found.push_back(d.code);
         return found;
@@ -423,7 +423,7 @@ TEST(Feeds, SliversAreNoSlab) {
             plan.layers[0].operations = {slot(sliver), slot(-1)};
             plan.layers[0].operations[1].purpose = "through";
             std::vector<Diagnostic> diagnostics;
-            (void)adapt_layer(context, plan.layers[0], plan, &map, diagnostics);
+            (void)adapt_layer(context, plan.layers[0], plan, {&map, nullptr}, diagnostics);
             const auto breaks =
                 std::count_if(diagnostics.begin(), diagnostics.end(), [](const Diagnostic& d) {
                     return d.code == "cut.overhang" && d.message.find("through") != std::string::npos;
@@ -453,7 +453,7 @@ TEST(Feeds, PassesForWoodThatTheySave) {
         plan.layers[0].z_top = plan.layers[0].slab_thickness = 12;
         plan.layers[0].operations = {slot};
         std::vector<Diagnostic> diagnostics;
-        (void)adapt_layer(context, plan.layers[0], plan, &map, diagnostics);
+        (void)adapt_layer(context, plan.layers[0], plan, {&map, nullptr}, diagnostics);
         const auto has = [&](const char* code) {
             return std::any_of(diagnostics.begin(), diagnostics.end(),
                                [&](const Diagnostic& d) { return d.code == code; });

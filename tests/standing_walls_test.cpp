@@ -109,7 +109,9 @@ TEST(StandingWalls, ThinPartsAreWallsAndPinsButNoCorners) {
         const WallFoot foot = wall_foot(both[i]);
         EXPECT_NEAR(foot.thickness_mm, contact[i] > 0 ? 3 : 4, 0.1);
         EXPECT_NEAR(foot.length_mm, contact[i] > 0 ? 30 : 4, 1);
-        if (contact[i] > 0) EXPECT_NEAR(contact[i], 3, 1);
+        if (contact[i] > 0) {
+            EXPECT_NEAR(contact[i], 3, 1);
+        }
     }
 }
 
@@ -140,7 +142,7 @@ TEST(StandingWalls, ToldWhereTheyBreakThroughTheLayersBelow) {
             for (Loops& higher : joint.higher) higher = ridge && l == 1 ? block : all;
         }
         Context context;
-        return weak_walls(context, plan, wood);
+        return weak_walls(plan, standing_feet(context, plan, wood));
     };
     const std::vector<Diagnostic> thin = told(1, 10, false);
     ASSERT_EQ(thin.size(), 2U);

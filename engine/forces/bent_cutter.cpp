@@ -29,6 +29,7 @@ Bent bent_by(const SegmentForces& f, double across_n, const Tool& tool) {
             f.peak_x_n,
             f.peak_y_n,
             f.peak_z_n,
+            f.peak_in_plane_n,
             f.peak_torque_nmm,
             f.mean_power_w};
 }

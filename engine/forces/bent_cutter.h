@@ -22,6 +22,7 @@ struct Bent {
     double wall_mm = 0;                ///< of the tip, normal to the way
     double stress_mpa = 0;             ///< of the cutter, in bending at the holder
     double x_n = 0, y_n = 0, z_n = 0;  ///< peaks
+    double in_plane_n = 0;             ///< peak: what pushes at a wall
     double torque_nmm = 0;             ///< peak over a turn
     double power_w = 0;                ///< mean over a turn
 };

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "engine/forces/min_material.h"
+#include "engine/forces/wall_map.h"
 #include "engine/plan.h"
 #include "engine/stock/cut_stretches.h"
 #include "kernels/forces/forces.h"
@@ -58,11 +59,19 @@ enum class FeedChange : std::uint8_t {
     lower  ///< of a layer whose feeds have been adapted before: faster than that they were found too fast
 };
 
-/// Runs a layer's operations, in their order, through a standing slab. Three things are looked at for every
+/// What of the wood limits a layer's cuts.
+struct WoodLimits {
+    const OverhangMap* overhang = nullptr;  ///< how far each place lies from what carries this slab; null:
+                                            ///< nothing hangs over
+    const WallMap* walls = nullptr;         ///< thin walls that stand in it; null: none
+};
+
+/// Runs a layer's operations, in their order, through a standing slab. Four things are looked at for every
 /// stretch: what the bending cutter leaves on a wall against the operation's limit, the cutter's stress
-/// against its strength where the job states one, and, where the slab hangs over, the wood against what the
+/// against its strength where the job states one, the stress at the foot of a thin wall beside the cut
+/// (WallMap), and, where the slab hangs over, the wood against what the
 /// cut needs (section 9): roughing is carried by what stands, floors by what stays under them.
-///   * Where the job adapts feeds, every move gets the fastest of kFeedSteps steps at which all three hold,
+///   * Where the job adapts feeds, every move gets the fastest of kFeedSteps steps at which all four hold,
 ///   but not under an eighth of what was planned,
 ///     and at which the thickest chip is no thicker than planned: that of a slot at the planned feed, the
 ///     finish feed or the tool's. A faster feed is taken only where it lasts for at least 20 mm; roughing,
@@ -72,15 +81,15 @@ enum class FeedChange : std::uint8_t {
 ///   wood only where the lowest of them then holds, and where none of the operation's cuts
 ///     breaks it all the same.
 /// Drills are left alone.
-/// @param overhang    how far each place lies from what carries this slab; null: nothing hangs over
 /// @param known of this very plan, or null
 /// @param diagnostics gets, per operation, "stepdown.lowered" (how many, how long, the deepest),
 /// "feed.lowered" (where and how far), and
-///                    "cut.overhang" where the wood would break all the same
+///                    "cut.overhang" where the wood would break all the same; of the layer "wall.weak", where
+///                    the foot of a wall would
 /// @throws Error(usage, "forces.spindle") when an operation mills with its spindle at rest; Error(usage,
 /// "forces.segment"); Error(cancelled)
 [[nodiscard]] LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan,
-                                    const OverhangMap* overhang, std::vector<Diagnostic>& diagnostics,
+                                    const WoodLimits& limits, std::vector<Diagnostic>& diagnostics,
                                     KnownCuts* known = nullptr, FeedChange change = FeedChange::any);
 
 /// Sets of every operation peak_force_n (resultant), deflection_mm (of the tip, in the plane), wall_error_mm

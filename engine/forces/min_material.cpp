@@ -79,10 +79,14 @@ double OverhangMap::at(double x, double y) const {
 
 double OverhangMap::largest() const { return *std::max_element(mm.begin(), mm.end()); }
 
+double overhang_cell(const std::array<double, 2>& low, const std::array<double, 2>& high) {
+    return std::max(high[0] - low[0], high[1] - low[1]) / kCells;
+}
+
 OverhangMap overhang_map(std::span<const Loops* const> regions, const std::array<double, 2>& low,
                          const std::array<double, 2>& high) {
     OverhangMap map;
-    const double cell = std::max(high[0] - low[0], high[1] - low[1]) / kCells;
+    const double cell = overhang_cell(low, high);
     const int nx = std::max(1, static_cast<int>(std::ceil((high[0] - low[0]) / cell))),
               ny = std::max(1, static_cast<int>(std::ceil((high[1] - low[1]) / cell)));
     map.low = low;

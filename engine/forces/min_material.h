@@ -40,6 +40,9 @@ struct OverhangMap {
     [[nodiscard]] double largest() const;
 };
 
+/// The side of a cell of the map of a rectangle, mm.
+[[nodiscard]] double overhang_cell(const std::array<double, 2>& low, const std::array<double, 2>& high);
+
 /// @param carried the regions that carry, by cells whose middle they hold
 [[nodiscard]] OverhangMap overhang_map(std::span<const Loops* const> carried,
                                        const std::array<double, 2>& stock_min,

@@ -159,7 +159,7 @@ std::vector<std::vector<Diagnostic>> rate_layers(Context& context, Plan& plan,
 }
 
 void rate_layer(Context& context, Layer& layer, const Plan& plan, std::vector<Diagnostic>& diagnostics) {
-    const LayerCuts cuts = adapt_layer(context, layer, plan, nullptr, diagnostics);
+    const LayerCuts cuts = adapt_layer(context, layer, plan, {}, diagnostics);
     Plan one;
     one.job = plan.job;
     one.layers.push_back(std::move(layer));

@@ -12,6 +12,7 @@
 #include "engine/forces/op_forces.h"
 #include "engine/moves/motion_time.h"
 #include "engine/paths/paths.h"
+#include "engine/schedule/standing_walls.h"
 #include "engine/tool_choice/reach_ratio.h"
 #include "engine/tool_choice/select.h"
 #include "kernels/mesh/part.h"
@@ -82,6 +83,9 @@ public:
         work_.floor_below = layer_.z_bottom - (ground.carried_by ? overrun_.below : overrun_.board);
         if (ground.carried_by)
             overhang_ = overhang_map({&ground.carried_by, 1}, plan.stock_min, plan.stock_max);
+        if (!ground.walls.empty())
+            walls_.emplace(ground.walls, plan.job.material.strength_mpa, widest_beside_walls(plan.job),
+                           plan.job.cutting.wall_allowance);
     }
 
     PlannedLayer run() {
@@ -194,7 +198,8 @@ private:
         trial.whole = !result.given_up && trial.minutes <= most;
         if (!trial.whole || trial.leaves_more || job.cutting.engagement != Engagement::simulated)
             return trial;
-        trial.planned.cuts = adapt_layer(context_, layer, ground_.plan, overhang_ ? &*overhang_ : nullptr,
+        trial.planned.cuts = adapt_layer(context_, layer, ground_.plan,
+                                         {overhang_ ? &*overhang_ : nullptr, walls_ ? &*walls_ : nullptr},
                                          trial.planned.diagnostics, ground_.known_cuts);
         if (compared) trial.minutes = minutes_of(layer, job.machine);
         return trial;
@@ -243,6 +248,7 @@ private:
     Mesh near_;  // what of the ground the layer's cutters may meet
     LayerJob work_;
     std::optional<OverhangMap> overhang_;
+    std::optional<WallMap> walls_;
     std::vector<NamedSet> sets_;
     std::optional<LayerSelection> selection_;
     std::optional<Trial> best_;

@@ -21,7 +21,8 @@ struct LayerGround {
     const Loops* carried_by =
         nullptr;  ///< what stays of the slab below the layer's joint; null: it lies on the board
     ScratchPool<StockMemory>* stock_memory =
-        nullptr;  ///< which layers leave to each other; null: each has its own
+        nullptr;                            ///< which layers leave to each other; null: each has its own
+    std::span<const StandingFoot> walls{};  ///< feet of thin walls that stand in this layer
     const std::vector<DrilledHole>* drilled = nullptr;  ///< of this layer, closed in `mesh`; null: none
     KnownCuts* known_cuts = nullptr;  ///< which layers tell each other; null: each finds its own
 };

@@ -262,8 +262,10 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
 
 // The programs of all layers, with their diagnostics.
 // @param joints what each layer lies on is that of its first
+// @param feet   of each layer's thin walls
 void cut_layers(Context& context, Plan& plan, MeshView pattern,
-                const std::vector<std::vector<JointWood>>& joints, ProgressShare share) {
+                const std::vector<std::vector<JointWood>>& joints,
+                const std::vector<std::vector<StandingFoot>>& feet, ProgressShare share) {
     const Job& job = plan.job;
     const DrillPlan drilling = plan_drilling(context, pattern, plan);
     plan.diagnostics.insert(plan.diagnostics.end(), drilling.diagnostics.begin(), drilling.diagnostics.end());
@@ -296,7 +298,7 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
         const Loops* const carried_by = i > 0 ? &joints[i].front().below : nullptr;
         planned[i] = plan_layer(context,
                                 {plan, ground.pattern, ground.mesh, ground.gap, scene ? &*scene : nullptr,
-                                 carried_by, &stock_memory, &drilling.layers[i], &known_cuts},
+                                 carried_by, &stock_memory, feet[i], &drilling.layers[i], &known_cuts},
                                 i, progress);
         solver.expect(planned[i].cuts.cuts);
     });
@@ -388,11 +390,13 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     const std::optional<Mesh> propped = prop(context, plan, pattern, joints);
     if (propped) pattern = propped->view();
     bond_layers(context, plan, joints, origin);
-    cut_layers(context, plan, pattern, joints, share);
+    const std::vector<std::vector<StandingFoot>> feet = standing_feet(context, plan, joints);
+    cut_layers(context, plan, pattern, joints, feet, share);
 
     context.begin_phase("schedule", share.at(0.99), share.at(1));
     load_joints(context, plan, joints, origin);
-    for (Diagnostic& weak : weak_walls(context, plan, joints)) plan.diagnostics.push_back(std::move(weak));
+    if (plan.job.cutting.engagement == Engagement::nominal)
+        for (Diagnostic& weak : weak_walls(plan, feet)) plan.diagnostics.push_back(std::move(weak));
     context.throw_if_cancelled();
     schedule(plan);
     check_spindle(plan);

@@ -12,6 +12,7 @@
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
 #include "engine/schedule/schedule.h"
+#include "engine/schedule/standing_walls.h"
 #include "kernels/parallel/parallel.h"
 
 namespace slabwright {
@@ -20,12 +21,15 @@ namespace {
 
 // What was said of a layer's forces, which are found anew: by the code's family and the layer's number.
 bool tells_forces(const Diagnostic& d, int layer) {
-    return d.code.starts_with("cut.") && d.message.starts_with(fmt::format("layer {}, ", layer));
+    return (d.code.starts_with("cut.") && d.message.starts_with(fmt::format("layer {}, ", layer))) ||
+           (d.code == "wall.weak" && d.message.starts_with(fmt::format("layer {}:", layer)));
 }
 
 // Forces of a mended layer, and feeds where they are too high; none is made faster again.
 // @param carried_by what stays of the slab below; null: the board
-std::vector<Diagnostic> load(Context& context, const Plan& plan, Layer& layer, const Loops* carried_by) {
+// @param feet       of thin walls that stand in the layer
+std::vector<Diagnostic> load(Context& context, const Plan& plan, Layer& layer, const Loops* carried_by,
+                             std::span<const StandingFoot> feet) {
     std::vector<Diagnostic> found;
     Plan alone;
     alone.job = plan.job;
@@ -33,7 +37,10 @@ std::vector<Diagnostic> load(Context& context, const Plan& plan, Layer& layer, c
     std::optional<OverhangMap> overhang;
     if (carried_by != nullptr) overhang = overhang_map({&carried_by, 1}, plan.stock_min, plan.stock_max);
     alone.layers.push_back(std::move(layer));
-    const LayerCuts cuts = adapt_layer(context, alone.layers[0], alone, overhang ? &*overhang : nullptr,
+    const WallMap walls(feet, plan.job.material.strength_mpa, widest_beside_walls(plan.job),
+                        plan.job.cutting.wall_allowance);
+    const LayerCuts cuts = adapt_layer(context, alone.layers[0], alone,
+                                       {overhang ? &*overhang : nullptr, feet.empty() ? nullptr : &walls},
                                        found, nullptr, FeedChange::lower);
     const std::vector<std::vector<Diagnostic>> rated = rate_layers(context, alone, {&cuts, 1}, nullptr);
     layer = std::move(alone.layers[0]);
@@ -50,7 +57,10 @@ Replanner::~Replanner() = default;
 
 std::vector<bool> Replanner::mend(Plan& plan, std::span<const LayerFaults> faults, int round) {
     const Job& job = plan.job;
-    if (!joints_) joints_ = wood_at_joints(context_, pattern_, plan);
+    if (!joints_) {
+        joints_ = wood_at_joints(context_, pattern_, plan);
+        feet_ = standing_feet(context_, plan, *joints_);
+    }
     std::vector<MendedLayer> mended(faults.size());
     std::vector<std::vector<Diagnostic>> told(faults.size());
     parallel_each(context_, faults.size(), [&](std::size_t k) {
@@ -64,7 +74,7 @@ std::vector<bool> Replanner::mend(Plan& plan, std::span<const LayerFaults> fault
                            {}});
         if (!mended[k].changed || job.cutting.engagement != Engagement::simulated) return;
         const std::vector<Diagnostic> found =
-            load(context_, plan, mended[k].layer, l > 0 ? &(*joints_)[l].front().below : nullptr);
+            load(context_, plan, mended[k].layer, l > 0 ? &(*joints_)[l].front().below : nullptr, feet_[l]);
         told[k].insert(told[k].end(), found.begin(), found.end());
     });
     // A layer after a mended one begins elsewhere, so its first program takes another time.

@@ -15,6 +15,7 @@
 namespace slabwright {
 
 struct JointWood;
+struct StandingFoot;
 
 /// How often a plan is proven again after its layers were mended, at most.
 inline constexpr int kProofRounds = 4;
@@ -42,6 +43,7 @@ private:
     MeshView pattern_;
     const StandingPart& part_;
     std::optional<std::vector<std::vector<JointWood>>> joints_;  // once they are needed
+    std::vector<std::vector<StandingFoot>> feet_;                // with them
 };
 
 }  // namespace slabwright

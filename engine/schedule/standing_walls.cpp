@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-#include <fmt/format.h>
+#include <map>
+#include <memory>
+#include <utility>
 
 #include "engine/forces/op_forces.h"
 #include "engine/schedule/footing.h"
@@ -16,12 +17,11 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kArc = 0.02;           // mm, tolerance of offsets
-constexpr double kLeastArea = 1;        // mm²: less is a sliver
-constexpr double kCovered = 0.02;       // of a wall's area: less thick wood under it does not carry it
-constexpr double kStripHeights = 1.96;  // of the height, the length of a plate that bends under a point force
-constexpr double kBeside = 0.1;         // mm: wood that near lies against it
-constexpr double kStub = 3;             // thicknesses
+constexpr double kArc = 0.02;      // mm, tolerance of offsets
+constexpr double kLeastArea = 1;   // mm²: less is a sliver
+constexpr double kCovered = 0.02;  // of a wall's area: less thick wood under it does not carry it
+constexpr double kBeside = 0.1;    // mm: wood that near lies against it
+constexpr double kStub = 3;        // thicknesses
 /// Walls are looked for up to each of these, mm; what is thinner than a share of it is a corner, or one of
 /// the rung before.
 struct Rung {
@@ -108,43 +108,42 @@ Push push_of(const Layer& layer, const Job& job) {
     return push;
 }
 
-/// The foot that bears most of one layer's walls.
-struct Worst {
-    double stress = 0, thickness = 0, height = 0, force = 0;
-    std::array<double, 3> at{};
-};
-
-class WallSearch {
+/// Follows the walls of one layer down to their feet.
+class FeetOfLayer {
 public:
-    WallSearch(const Plan& plan, std::span<const Level> levels) : plan_(plan), levels_(levels) {}
+    explicit FeetOfLayer(std::span<const Level> levels) : levels_(levels) {}
 
-    Worst of_layer(std::size_t layer) const {
-        const Push push = push_of(plan_.layers[layer], plan_.job);
-        Worst worst;
+    /// By level and part: how high what stands on it in the layer reaches, mm.
+    std::map<std::pair<std::size_t, std::size_t>, double> tops(std::size_t layer) const {
+        std::map<std::pair<std::size_t, std::size_t>, double> found;
         for (std::size_t i = 0; i < levels_.size(); ++i)
             if (levels_[i].layer == layer)
-                for (std::size_t p = 0; p < levels_[i].thin.size(); ++p) follow(i, p, push, worst);
-        return worst;
+                for (std::size_t p = 0; p < levels_[i].thin.size(); ++p) follow(i, p, found);
+        return found;
     }
 
 private:
     // From a thin part down, as long as what is under it is thin.
-    void follow(std::size_t from, std::size_t part, const Push& push, Worst& worst) const {
+    void follow(std::size_t from, std::size_t part,
+                std::map<std::pair<std::size_t, std::size_t>, double>& found) const {
         const Loops& wall = levels_[from].thin[part];
-        const std::size_t layer = levels_[from].layer;
         // As high as half of it is known to stand: a ridge is thin near its top too, but not tall.
         double top = levels_[from].z;
         for (const auto& [z, stands] : levels_[from].over)
             if (area(intersect(wall, *stands)) < area(wall) / 2) break;
             else top = z;
         if (!(top > levels_[from].z)) return;
-        rate({&levels_[from], &wall, levels_[from].contact_mm[part]}, layer, top, push, worst);
+        const auto stands_on = [&](std::size_t level, std::size_t foot) {
+            double& height = found[{level, foot}];
+            height = std::max(height, top);
+        };
+        stands_on(from, part);
         for (std::size_t i = from; i-- > 0;) {
             const Level& below = levels_[i];
             if (area(intersect(wall, below.thick)) > kCovered * area(wall)) return;
             const std::size_t foot = under(below, wall);
             if (foot == below.thin.size()) return;
-            rate({&below, &below.thin[foot], below.contact_mm[foot]}, layer, top, push, worst);
+            stands_on(i, foot);
         }
     }
     static std::size_t under(const Level& level, const Loops& wall) {
@@ -156,55 +155,27 @@ private:
         return best;
     }
 
-    struct Foot {
-        const Level* level;
-        const Loops* piece;
-        double contact_mm;
-    };
-    void rate(const Foot& at, std::size_t layer, double top, const Push& push, Worst& worst) const {
-        WallFoot foot = wall_foot(*at.piece);
-        foot.contact_mm = at.contact_mm;
-        // A bump, or a web as short as it is thick, is part of what it stands against.
-        if (at.contact_mm > 0 && foot.reach_mm() < kStub * foot.thickness_mm) return;
-        const double height = top - at.level->z;
-        // Roughing leaves its allowance on either side of the wall.
-        WallFoot roughed = foot;
-        if (at.level->layer == layer) {
-            const double thicker = 1 + 2 * plan_.job.cutting.wall_allowance / foot.thickness_mm;
-            roughed.thickness_mm *= thicker;
-            roughed.weakest_mm3 *= thicker * thicker;
-        }
-        const double arm = at.level->layer == layer ? std::min(height, push.step_mm) : height,
-                     by_rough = roughed.stress_mpa(push.rough_n, arm),
-                     by_finish = foot.stress_mpa(push.finish_n, height);
-        if (std::max(by_rough, by_finish) <= worst.stress) return;
-        const AreaMoments m = area_moments(*at.piece);
-        const bool rough = by_rough > by_finish;
-        worst = {std::max(by_rough, by_finish),
-                 foot.thickness_mm,
-                 rough ? arm : height,
-                 rough ? push.rough_n : push.finish_n,
-                 {m.x, m.y, at.level->z}};
-    }
-
-    const Plan& plan_;
     std::span<const Level> levels_;
 };
 
+// The wall of one layer that its operations load most.
+LoadedWall most_loaded(std::span<const StandingFoot> feet, const Push& push, const Job& job) {
+    LoadedWall worst;
+    for (const StandingFoot& at : feet) {
+        const double height = at.top - at.z;
+        // Roughing leaves its allowance on either side of the wall.
+        const WallFoot roughed = at.in_layer ? at.foot.thicker_by(job.cutting.wall_allowance) : at.foot;
+        const double arm = at.in_layer ? std::min(height, push.step_mm) : height,
+                     by_rough = roughed.stress_mpa(push.rough_n, arm),
+                     by_finish = at.foot.stress_mpa(push.finish_n, height);
+        if (std::max(by_rough, by_finish) <= worst.stress_mpa) continue;
+        worst = by_rough > by_finish ? LoadedWall{&at, arm, push.rough_n, by_rough}
+                                     : LoadedWall{&at, height, push.finish_n, by_finish};
+    }
+    return worst;
+}
+
 }  // namespace
-
-double WallFoot::stress_mpa(double force_n, double height_mm) const {
-    if (!(height_mm > 0) || !(force_n > 0)) return 0;
-    const double section = thickness_mm * thickness_mm / 6;  // of a millimetre
-    if (contact_mm > 0 && reach_mm() < height_mm)
-        return force_n * reach_mm() / (std::min(height_mm, kStripHeights * reach_mm()) * section);
-    const double strip = std::min(length_mm, kStripHeights * height_mm) * section;
-    return force_n * height_mm / (contact_mm > 0 ? strip : std::min(strip, weakest_mm3));
-}
-
-double WallFoot::reach_mm() const {
-    return contact_mm > 0 ? length_mm / std::max(1.0, contact_mm / thickness_mm) : 0;
-}
 
 WallFoot wall_foot(const Loops& piece) {
     WallFoot foot;
@@ -231,8 +202,8 @@ std::vector<Loops> thin_parts(const Loops& region, std::vector<double>& contact_
     return parts;
 }
 
-std::vector<Diagnostic> weak_walls(Context& context, const Plan& plan,
-                                   std::span<const std::vector<JointWood>> wood) {
+std::vector<std::vector<StandingFoot>> standing_feet(Context& context, const Plan& plan,
+                                                     std::span<const std::vector<JointWood>> wood) {
     std::vector<Level> levels = levels_of(plan, wood);
     parallel_each(context, levels.size(), [&](std::size_t i) {
         Level& level = levels[i];
@@ -241,22 +212,53 @@ std::vector<Diagnostic> weak_walls(Context& context, const Plan& plan,
         const double r = kRungs.back().thickness / 2;
         level.thick = offset(offset(*level.wood, -r, kArc), r, kArc);
     });
-    std::vector<Worst> worst(plan.layers.size());
-    const WallSearch search(plan, levels);
-    parallel_each(context, worst.size(), [&](std::size_t l) { worst[l] = search.of_layer(l); });
+    std::vector<std::map<std::pair<std::size_t, std::size_t>, double>> tops(plan.layers.size());
+    const FeetOfLayer search(levels);
+    parallel_each(context, tops.size(), [&](std::size_t l) { tops[l] = search.tops(l); });
+    // A foot carries what stands in several layers, and is measured once.
+    std::map<std::pair<std::size_t, std::size_t>, StandingFoot> measured;
+    for (const auto& of_layer : tops)
+        for (const auto& [at, top] : of_layer) measured.try_emplace(at);
+    std::vector<std::pair<const std::pair<std::size_t, std::size_t>, StandingFoot>*> order;
+    for (auto& entry : measured) order.push_back(&entry);
+    parallel_each(context, order.size(), [&](std::size_t k) {
+        const auto [level, part] = order[k]->first;
+        StandingFoot& foot = order[k]->second;
+        foot.outline = std::make_shared<const Loops>(levels[level].thin[part]);
+        foot.foot = wall_foot(*foot.outline);
+        foot.foot.contact_mm = levels[level].contact_mm[part];
+        foot.z = levels[level].z;
+        const AreaMoments m = area_moments(*foot.outline);
+        foot.middle = {m.x, m.y};
+    });
+    std::vector<std::vector<StandingFoot>> feet(plan.layers.size());
+    for (std::size_t l = 0; l < feet.size(); ++l)
+        for (const auto& [at, top] : tops[l]) {
+            StandingFoot foot = measured.at(at);
+            // A bump, or a web as short as it is thick, is part of what it stands against.
+            if (foot.foot.contact_mm > 0 && foot.foot.reach_mm() < kStub * foot.foot.thickness_mm) continue;
+            foot.top = top;
+            foot.in_layer = levels[at.first].layer == l;
+            feet[l].push_back(std::move(foot));
+        }
+    return feet;
+}
+
+double widest_beside_walls(const Job& job) {
+    double widest = 0;
+    for (const Tool& tool : job.tools)
+        if (is_end_mill(tool.kind)) widest = std::max(widest, tool.diameter / 2);
+    return widest;
+}
+
+std::vector<Diagnostic> weak_walls(const Plan& plan, std::span<const std::vector<StandingFoot>> feet) {
+    const double strength = plan.job.material.strength_mpa;
     std::vector<Diagnostic> found;
-    for (std::size_t l = 0; l < worst.size(); ++l)
-        if (const Worst& w = worst[l]; w.stress > plan.job.material.strength_mpa)
-            found.push_back(
-                {Severity::warning, "wall.weak",
-                 fmt::format(
-                     "layer {}: a wall or pin {:.1f} mm thick stands {:.1f} mm high where {:.0f} N push "
-                     "at it: {:.0f} MPa at its foot, more than the wood's {:.0f} MPa; cut it with a "
-                     "smaller tool or a lower finish_feed, lay a boundary nearer under its top, or make "
-                     "it thicker",
-                     plan.layers[l].index, w.thickness, w.height, w.force, w.stress,
-                     plan.job.material.strength_mpa),
-                 w.at});
+    for (std::size_t l = 0; l < feet.size(); ++l) {
+        const LoadedWall worst = most_loaded(feet[l], push_of(plan.layers[l], plan.job), plan.job);
+        if (worst.stress_mpa > strength)
+            found.push_back(weak_wall(plan.layers[l].index, worst, strength, ""));
+    }
     return found;
 }
 
