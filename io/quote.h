@@ -14,6 +14,7 @@ namespace slabwright {
 
 struct QuotedModel {
     InputInfo input;
+    Job job;
     Quote quote;
 };
 

@@ -74,6 +74,10 @@ void leave_local_frame(Plan& plan, const std::array<double, 2>& by) {
             }
             if (op.peak_at) move(*op.peak_at, by);
         }
+        if (layer.blank) {
+            move(layer.blank->min, by);
+            move(layer.blank->max, by);
+        }
         for (Joint& joint : layer.joints) {
             move(joint.centroid, by);
             move(joint.glue, units);

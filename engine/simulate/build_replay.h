@@ -29,6 +29,7 @@ struct LayerToBuild {
     int index = 0;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;  ///< mm, pattern-base; of all its slabs together
     int slabs = 1;
+    std::optional<Blank> blank{};  ///< what each of its slabs covers; none: the whole stock
     /// Of the joint under each of its slabs, upwards; what is not stated is not checked.
     std::vector<PlannedJoint> joints;
 };

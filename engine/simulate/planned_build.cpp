@@ -16,8 +16,16 @@ PlannedBuild::PlannedBuild(const BuildPlan& plan) : plan_(plan) {
     for (std::size_t l = 0; l < plan.layers.size(); ++l) {
         const LayerToBuild& layer = plan.layers[l];
         const double each = layer.slab_thickness / layer.slabs;
+        const Blank blank = layer.blank.value_or(Blank{plan.stock_min, plan.stock_max});
+        const double kg = blank.mm2() * each * 1e-9 * plan.job.material.density_kg_m3;
         for (int k = 0; k < layer.slabs; ++k)
-            slabs_.push_back({l, k, each, layer.z_bottom + k * each, k == 0 ? l : between++});
+            slabs_.push_back({.layer = l,
+                              .number = k,
+                              .thickness = each,
+                              .z_bottom = layer.z_bottom + k * each,
+                              .blank = blank,
+                              .kg = kg,
+                              .glue = k == 0 ? l : between++});
     }
 }
 
@@ -27,7 +35,7 @@ std::size_t PlannedBuild::most_steps() const {
     return builds * (kStepsEach * (slabs_.size() + 2) + 2 * programs);
 }
 
-double PlannedBuild::slab_mass(double thickness) const {
+double PlannedBuild::board_mass(double thickness) const {
     return (plan_.stock_max[0] - plan_.stock_min[0]) * (plan_.stock_max[1] - plan_.stock_min[1]) * thickness *
            1e-9 * plan_.job.material.density_kg_m3;
 }

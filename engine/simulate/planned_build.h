@@ -16,6 +16,8 @@ struct DueSlab {
     std::size_t layer = 0;               ///< index into the layers
     int number = 0;                      ///< within its layer, from 0
     double thickness = 0, z_bottom = 0;  ///< mm, pattern-base
+    Blank blank{};                       ///< what it covers
+    double kg = 0;
     std::size_t glue = 0;  ///< which of the sequence's: those under layers first, then those between slabs
 };
 
@@ -27,8 +29,8 @@ public:
     [[nodiscard]] const std::vector<DueSlab>& slabs() const { return slabs_; }  ///< bottom up
     /// No sequence of this build has more: of slabs and programs, and again for each layer made again.
     [[nodiscard]] std::size_t most_steps() const;
-    /// kg of a whole board or slab of this thickness, mm.
-    [[nodiscard]] double slab_mass(double thickness) const;
+    /// kg of a base board of this thickness, mm.
+    [[nodiscard]] double board_mass(double thickness) const;
     /// The joint under a slab.
     [[nodiscard]] PlannedJoint joint_of(const DueSlab& slab) const;
     /// Where a layer's programs have their z = 0, mm, pattern-base.

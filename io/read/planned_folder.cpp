@@ -289,6 +289,20 @@ void read_operation(const Field& op, std::size_t layer, std::set<std::string>& n
     folder.stepdowns.push_back(op.has("stepdown") ? std::optional(op["stepdown"].number()) : std::nullopt);
 }
 
+/// What a layer's slabs cover; none where that is the whole stock.
+std::optional<Blank> read_blank(const Field& blank, const BuildPlan& build) {
+    Blank read;
+    for (std::size_t k = 0; k < 2; ++k) {
+        read.min[k] = blank["min"][k].number();
+        read.max[k] = blank["max"][k].number();
+        if (!(read.max[k] > read.min[k])) blank.fail("is of no size");
+        if (read.min[k] < build.stock_min[k] - 1e-6 || read.max[k] > build.stock_max[k] + 1e-6)
+            blank.fail("reaches beyond the stock");
+    }
+    if (read == Blank{build.stock_min, build.stock_max}) return std::nullopt;
+    return read;
+}
+
 void read_layers(const Field& layers, PlannedFolder& folder) {
     std::set<std::string> named;
     if (layers.size() == 0) layers.fail("has no layer");
@@ -300,6 +314,8 @@ void read_layers(const Field& layers, PlannedFolder& folder) {
         layer.z_top = from["z_top"].number();
         layer.slab_thickness = from["slab_thickness"].number();
         folder.simulation.layers.push_back({layer.z_bottom, layer.z_top, layer.slab_thickness, {}});
+        if (from.has("blank")) layer.blank = read_blank(from["blank"], folder.build);
+        folder.simulation.layers.back().blank = layer.blank;
         if (from.has("slabs")) layer.slabs = from["slabs"].whole();
         if (layer.slabs < 1 || layer.slabs > 1000) from["slabs"].fail("is no count of slabs");
         if (from.has("joints"))

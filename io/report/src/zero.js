@@ -1,7 +1,7 @@
 // Where the programs' zero lies in each layer, what it can be touched off with, and whether there is wood to touch.
 
 import {figure} from './dom.js';
-import {data, plan} from './report.js';
+import {blankOf, data, plan} from './report.js';
 import {woodHeights} from './wood.js';
 
 const least = 0.005; // mm; nearer is the same place
@@ -13,8 +13,8 @@ export function shownHeights(l) {
 }
 
 // How far x 0, y 0 lies outside the slab, in words; '' where the slab covers it.
-function outside() {
-    const [x0, y0] = plan.stock.min, [x1, y1] = plan.stock.max, parts = [];
+function outside(l) {
+    const {min: [x0, y0], max: [x1, y1]} = blankOf(l), parts = [];
     if (x0 > least) parts.push(`${figure(x0, 2)} mm left of`);
     if (x1 < -least) parts.push(`${figure(-x1, 2)} mm right of`);
     if (y0 > least) parts.push(`${figure(y0, 2)} mm in front of`);
@@ -35,8 +35,8 @@ const millimetres = value => `${value < 0 ? '−' : ''}${figure(Math.abs(value),
 
 // {place, xy, z, after, warnings}: sentences for the sheet of layer l.
 export function zeroOf(l) {
-    const [x0, y0] = plan.stock.min, above = plan.frame === 'layer-top', layer = plan.layers[l], at = shownHeights(l), warnings = [];
-    const off = outside();
+    const [x0, y0] = blankOf(l).min, above = plan.frame === 'layer-top', layer = plan.layers[l], at = shownHeights(l), warnings = [];
+    const off = outside(l);
     const place = above ? 'x 0, y 0 of the STL; z 0 at this layer’s finished top' : 'x 0, y 0 of the STL; z 0 at the pattern’s bottom, the base board’s top';
     const xy = `slab’s left edge is x ${millimetres(x0)}, its front edge y ${millimetres(y0)}`;
     const raw = `raw slab top is z ${millimetres(at.raw)} if the slab is ${figure(layer.slab_thickness, 2)} mm thick: measure it`;
