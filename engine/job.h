@@ -53,6 +53,9 @@ enum class AccessRule : std::uint8_t { sections, exact, printed };
 /// tolerances.rough_cusp, or the smaller.
 enum class RoughLimit : std::uint8_t { smaller, finish_radius, cusp };
 enum class ToolKind : std::uint8_t { flat, ball, face, drill };
+/// Where x 0, y 0 of the programs lies: where the model has it, at the base board's corner of least x and y,
+/// or in the base board's middle.
+enum class WorkZero : std::uint8_t { model, corner, centre };
 /// How large slabs are sawn: all of them as the pattern needs, or each as its own layer does.
 enum class Blanks : std::uint8_t { pattern, layer };
 /// The axis whose coordinate changes its sign; the mirror lies in the origin.
@@ -130,8 +133,9 @@ struct Machine {
     Frame frame = Frame::automatic;
     Post post = Post::linuxcnc;
     LengthUnit units = LengthUnit::mm;  ///< of the programs
-    double base_board_thickness = 19;   ///< the sacrificial board under the first layer
-    double base_board_cut = -1;         ///< how deep it may be cut; negative: the finish tool's overrun
+    WorkZero zero = WorkZero::model;
+    double base_board_thickness = 19;  ///< the sacrificial board under the first layer
+    double base_board_cut = -1;        ///< how deep it may be cut; negative: the finish tool's overrun
 };
 
 struct Bonding {

@@ -253,6 +253,22 @@ struct Plan {
     std::vector<Diagnostic> diagnostics;
 };
 
+/// x 0, y 0 of the programs, 0.1 µm, pattern-base: machine.zero. The base board is as large as the stock.
+[[nodiscard]] inline Point2 work_zero(const Plan& plan) {
+    const auto at = [&](std::size_t k) {
+        switch (plan.job.machine.zero) {
+            case WorkZero::corner:
+                return to_units(plan.stock_min[k]);
+            case WorkZero::centre:
+                return to_units((plan.stock_min[k] + plan.stock_max[k]) / 2);
+            case WorkZero::model:
+                break;
+        }
+        return to_units(0.0);
+    };
+    return {at(0), at(1)};
+}
+
 /// What a layer's slabs cover: its own blank, or the plan's stock.
 [[nodiscard]] inline Blank slab_of(const Plan& plan, const Layer& layer) {
     return layer.blank.value_or(Blank{plan.stock_min, plan.stock_max});

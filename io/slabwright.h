@@ -83,9 +83,9 @@ struct Pattern;
 /// @throws Error(input) that names what stands against it
 SLABWRIGHT_API void require_replaceable(const std::string& directory);
 
-/// Writes plan.json, nc/, sequence.json, cut_list.csv and .dxf and, for LinuxCNC, tool.tbl into `directory`, all or nothing: a fresh
-/// folder beside it is filled and then takes its place; an existing folder is replaced only if it holds a
-/// plan.json of ours or is empty.
+/// Writes plan.json, nc/, sequence.json, cut_list.csv and .dxf and, for LinuxCNC, tool.tbl into `directory`,
+/// all or nothing: a fresh folder beside it is filled and then takes its place; an existing folder is
+/// replaced only if it holds a plan.json of ours or is empty.
 /// @param source the pattern that was planned: with it report.html is written too, where this library can
 /// (plan() notes when it cannot)
 /// @throws Error(input) when the place cannot be written

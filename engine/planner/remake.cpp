@@ -139,7 +139,7 @@ public:
             table.numbers = {{"table_height_mm", heights.table}, {"work_offset_z_mm", heights.work_offset}};
         }
         if (!set || !touched)
-            follow(layer.index, "touch_off", 0).numbers = {{"slab_top_mm", top - heights.origin}};
+            say_touch_off(follow(layer.index, "touch_off", 0), plan_, layer, top - heights.origin);
         if (spindle_tool_ != operation.tool) {
             say_tool(follow(layer.index, "tool_change", machine_.tool_change_s), operation.tool, machine_);
             spindle_tool_ = operation.tool;

@@ -82,6 +82,14 @@ void say_tool(SequenceStep& change, int tool, const Machine& machine) {
     if (!knows_tool_lengths(machine.post)) change.words = {{"length", "touch off"}};
 }
 
+void say_touch_off(SequenceStep& touch, const Plan& plan, const Layer& layer, double top) {
+    const Blank slab = slab_of(plan, layer);
+    const Point2 zero = work_zero(plan);
+    touch.numbers = {{"slab_left_mm", slab.min[0] - to_mm(zero.x)},
+                     {"slab_front_mm", slab.min[1] - to_mm(zero.y)},
+                     {"slab_top_mm", top}};
+}
+
 void schedule(Plan& plan) {
     name_programs(plan);
     const Job& job = plan.job;
@@ -180,7 +188,7 @@ void schedule(Plan& plan) {
         table.numbers = {{"table_height_mm", heights.table}, {"work_offset_z_mm", heights.work_offset}};
         // What the touch-off has to find: the raw slab's top, in the programs' frame.
         SequenceStep& touch = add(layer.index, "touch_off", {table.id}, 0);
-        touch.numbers = {{"slab_top_mm", layer.z_bottom + layer.slab_thickness - heights.origin}};
+        say_touch_off(touch, plan, layer, layer.z_bottom + layer.slab_thickness - heights.origin);
         int last = touch.id;
 
         for (const Operation& operation : layer.operations) {

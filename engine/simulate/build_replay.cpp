@@ -161,8 +161,7 @@ private:
             complain("sequence.feed", fmt::format("loads {} slabs where the build still takes {}", count,
                                                   slabs_.size() - std::min(s_.taken, slabs_.size())));
         s_.in_feed = std::max(0, count);
-        s_.feed_height = 0;
-        double kg = 0;
+        double kg = s_.feed_height = 0;
         for (std::size_t i = s_.taken;
              i < std::min(slabs_.size(), s_.taken + static_cast<std::size_t>(s_.in_feed)); ++i) {
             s_.feed_height += slabs_[i].thickness;
@@ -350,6 +349,8 @@ private:
         if (s_.placed > 0) {
             const std::size_t l = slabs_[s_.placed - 1].layer;
             expect_layer(l);
+            for (const auto& [key, at] : build_.edges_of(slabs_[s_.placed - 1]))
+                if (number(key) || build_.has_own_zero()) expect("sequence.touch_off", key, at, kLength);
             expect("sequence.touch_off", "slab_top_mm", build_.stack_top(s_) - build_.origin_of(l), kLength);
             if (programs_left_[l] == 0) s_.stack_ready = here();
         }

@@ -52,6 +52,7 @@ struct BuildPlan {
     Frame frame = Frame::pattern_base;
     std::string pattern, sha256;
     std::array<double, 2> stock_min{}, stock_max{};
+    std::array<double, 2> zero{};  ///< mm, pattern-base: x 0, y 0 of the programs
     std::vector<LayerToBuild> layers;
     std::vector<PlannedProgram> programs;
     /// Programs that face spoilt layers off (engine/planner/remake.h); of the plan's own sequence none.

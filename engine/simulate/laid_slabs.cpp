@@ -1,6 +1,7 @@
 #include "engine/simulate/laid_slabs.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -38,6 +39,16 @@ Mesh flask_walls(const std::vector<SimulatedLayer>& layers, std::size_t layer) {
         }
     }
     return walls;
+}
+
+double laid_top(const SimulatedLayer& layer, const CellGrid& grid) {
+    const auto covers = [&](std::size_t k, double first, int count) {
+        // Of the cells from the slab's begin on the first.
+        const double begin = std::max(0.0, std::ceil((layer.blank->min[k] - first) / grid.cell - 1e-9));
+        return begin < count && first + begin * grid.cell <= layer.blank->max[k] + 1e-9;
+    };
+    const bool laid = !layer.blank || (covers(0, grid.x0, grid.nx) && covers(1, grid.y0, grid.ny));
+    return layer.z_bottom + (laid ? layer.slab_thickness : 0);
 }
 
 std::vector<Violation> blanks_too_small(Context& context, const SimulationInput& input) {

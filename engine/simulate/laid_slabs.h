@@ -16,6 +16,10 @@ void lay_slab(Stock& stock, const SimulatedLayer& layer);
 /// what is cut far inside the flask shows in the stock.
 [[nodiscard]] Mesh flask_walls(const std::vector<SimulatedLayer>& layers, std::size_t layer);
 
+/// How high a layer's raw slab stands over a part of the stock: its top, or where it covers none of the cells
+/// its bottom.
+[[nodiscard]] double laid_top(const SimulatedLayer& layer, const CellGrid& grid);
+
 /// Where the part reaches past a layer's slab, stack.blank: no cut can make wood that was never laid. What
 /// ends within .01 mm of the layer's bottom or begins so near its top belongs to the layer beside it.
 /// @throws Error(cancelled)

@@ -55,6 +55,11 @@ double PlannedBuild::bottom_at(std::size_t layer) const {
     return -origin_of(0) - (plan_.job.machine.table == BuildTable::moving ? risen : 0);
 }
 
+std::array<std::pair<const char*, double>, 2> PlannedBuild::edges_of(const DueSlab& slab) const {
+    return {{{"slab_left_mm", slab.blank.min[0] - plan_.zero[0]},
+             {"slab_front_mm", slab.blank.min[1] - plan_.zero[1]}}};
+}
+
 const Tool* PlannedBuild::tool_of(int number) const {
     for (const Tool& tool : plan_.tools)
         if (tool.number == number) return &tool;

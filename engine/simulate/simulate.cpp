@@ -122,7 +122,7 @@ private:
             TileProgram& p = known->programs[i];
             p.stock_top = p.top_after = i > 0 && input_.programs[i - 1].layer == layer
                                             ? known->programs[i - 1].top_after
-                                            : of.z_bottom + of.slab_thickness;
+                                            : laid_top(of, grid);
         }
         return known;
     }
@@ -467,7 +467,7 @@ private:
         for (std::size_t l = 0; l < input_.layers.size(); ++l) {
             const SimulatedLayer& layer = input_.layers[l];
             lay_slab(stock, layer);
-            double top = layer.z_bottom + layer.slab_thickness;
+            double top = laid_top(layer, grid);
             for (; next < prepared_.size() && static_cast<std::size_t>(prepared_[next].program->layer) == l;
                  ++next) {
                 result.programs[next].stock_top = top;

@@ -351,6 +351,13 @@ Program read_planned_program(const std::string& text, const std::string& file, c
     }
 }
 
+void place_program(Program& program, const BuildPlan& build, std::size_t layer) {
+    // Programs count from there in whole 0.1 µm, as they were written.
+    const double up = build.frame == Frame::layer_top ? to_mm(to_units(build.layers[layer].z_top)) : 0;
+    for (ProgramStep& s : program.steps) s.x += build.zero[0], s.y += build.zero[1], s.z += up;
+    for (ProgramArc& a : program.arcs) a.arc.x += build.zero[0], a.arc.y += build.zero[1], a.arc.z += up;
+}
+
 PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refusal) {
     const std::string file = (out / "plan.json").string();
     const Refuse refuse{refusal, file};
@@ -378,6 +385,10 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
         build.stock_max[k] = plan["stock"]["max"][k].number();
         if (!(build.stock_max[k] > build.stock_min[k])) plan["stock"].fail("is of no size");
     }
+    for (std::size_t k = 0; k < 2 && plan.has("zero"); ++k) {
+        build.zero[k] = to_mm(to_units(plan["zero"][k].number()));
+        if (std::abs(build.zero[k]) > 200000) plan["zero"].fail("lies beyond 200 m");
+    }
     const Field tools = plan["tools"];
     for (std::size_t i = 0; i < tools.size(); ++i) build.tools.push_back(read_tool(tools[i]));
     read_layers(plan["layers"], folder);
@@ -396,11 +407,7 @@ Program PlannedFolder::read_program(std::size_t i, const FolderRefusal& refusal)
     const std::string text =
         read_whole(path / planned.file, {refusal.kind, refusal.program, kMostProgramBytes, "plan again"});
     Program program = read_planned_program(text, planned.file, build.job);
-    // Programs count from the top in whole 0.1 µm, as they were written.
-    const double up =
-        build.frame == Frame::layer_top ? to_mm(to_units(simulation.layers[planned.layer].z_top)) : 0;
-    for (ProgramStep& s : program.steps) s.z += up;
-    for (ProgramArc& a : program.arcs) a.arc.z += up;
+    place_program(program, build, planned.layer);
     program.file = planned.file.substr(3);
     program.layer = static_cast<int>(planned.layer);
     program.kind = planned.kind;

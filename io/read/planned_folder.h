@@ -49,6 +49,10 @@ inline constexpr const char* kForeignProgram = "program.dialect";
 /// kForeignProgram, which names both, where it is a whole program of another dialect
 [[nodiscard]] Program read_planned_program(const std::string& text, const std::string& file, const Job& job);
 
+/// Moves a program from where its coordinates count from to the pattern's base: BuildPlan::zero in x and y,
+/// the layer's top or 0 in z. @param layer index
+void place_program(Program& program, const BuildPlan& build, std::size_t layer);
+
 /// How a plan's programs are read: chords that stand for an arc take next to nothing of the gouge tolerance
 /// that the paths were made for.
 [[nodiscard]] GcodeLimits gcode_limits(const Tolerances& tolerances);

@@ -41,6 +41,8 @@ inline constexpr Word<Frame> kFrameWords[] = {
     {"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}, {"auto", Frame::automatic}};
 inline constexpr Word<BuildTable> kTableWords[] = {{"moving", BuildTable::moving},
                                                    {"fixed", BuildTable::fixed}};
+inline constexpr Word<WorkZero> kZeroWords[] = {
+    {"model", WorkZero::model}, {"corner", WorkZero::corner}, {"centre", WorkZero::centre}};
 inline constexpr Word<Blanks> kBlankWords[] = {{"pattern", Blanks::pattern}, {"layer", Blanks::layer}};
 inline constexpr Word<Post> kPostWords[] = {{"linuxcnc", Post::linuxcnc}, {"fanuc", Post::fanuc},
                                             {"haas", Post::haas},         {"grbl", Post::grbl},
@@ -172,6 +174,9 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
                "heidenhain");
     visit.word("units", machine.units, kUnitWords,
                "of the programs: mm or inch; this file and plan.json stay in mm");
+    visit.word("zero", machine.zero, kZeroWords,
+               "x 0, y 0 of the programs: model (as the model has it), corner (left front corner of the base "
+               "board) or centre (its middle)");
     visit.key("base_board_thickness", machine.base_board_thickness,
               "mm, the sacrificial board under the first layer");
     visit.key("base_board_cut", machine.base_board_cut,

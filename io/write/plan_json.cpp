@@ -128,8 +128,8 @@ void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const O
     json.key("spindle_rpm").rounded(operation.spindle_rpm, 0);
     json.key("blend").rounded(operation.blend, kLength);
     json.key("feeds").begin_array(Shape::line);
-    for (const FeedLength& f : written_feed_lengths(dialect_of(plan.job.machine), operation.moves,
-                                                    program_origin(plan.job, layer))) {
+    for (const FeedLength& f :
+         written_feed_lengths(dialect_of(plan.job.machine), operation.moves, program_origin(plan, layer))) {
         json.begin_object(Shape::line).key("feed").exact(f.feed).key("mm").rounded(f.mm, kExact);
         json.key("centre").begin_array(Shape::line);
         for (const double v : f.centre()) json.rounded(v, kExact);
@@ -402,6 +402,8 @@ std::string plan_json(const Plan& plan) {
     json.key("max");
     put_xy(json, plan.stock_max);
     json.end();
+    const Point2 zero = work_zero(plan);
+    json.key("zero").begin_array(Shape::line).units(zero.x).units(zero.y).end();
     json.key("flask");
     put_flask(json, plan);
     json.key("supports").begin_array();

@@ -51,11 +51,11 @@ export function planView(l, paper) {
     // The margin holds the dimensions; what it takes in the drawing's units depends on its scale.
     const margin = {left: 19, right: 10, top: 12, bottom: 17};
     const u = Math.max(width / (paper[0] - margin.left - margin.right), depth / (paper[1] - margin.top - margin.bottom));
-    const zx = Math.min(x1 + 6 * u, Math.max(x0 - 6 * u, 0)), zy = -Math.min(y1 + 6 * u, Math.max(y0 - 6 * u, 0));
+    const [ox, oy] = plan.zero ?? [0, 0], zx = Math.min(x1 + 6 * u, Math.max(x0 - 6 * u, ox)), zy = -Math.min(y1 + 6 * u, Math.max(y0 - 6 * u, oy));
     const view = {x: x0 - margin.left * u, y: -y1 - margin.top * u, w: width + (margin.left + margin.right) * u, h: depth + (margin.top + margin.bottom) * u};
     const {min, max} = plan.input.bbox, px0 = min[0], px1 = max[0], py0 = min[1], py1 = max[1];
     const filled = filledBoxes(l);
-    const inside = 0 >= sx0 && 0 <= sx1 && 0 >= sy0 && 0 <= sy1;
+    const inside = ox >= sx0 - 0.001 && ox <= sx1 && oy >= sy0 - 0.001 && oy <= sy1;
     return make('svg', {class: 'plan-view', viewBox: `${view.x} ${view.y} ${view.w} ${view.h}`, role: 'img',
         'aria-label': `Slab of layer ${layer.index} from above, ${figure(sx1 - sx0, 1)} by ${figure(sy1 - sy0, 1)} mm${smaller ? `, ${figure(sx0 - x0, 1)} mm right of and ${figure(sy0 - y0, 1)} mm behind the base board’s corner` : ''}; glue on ${figure(layer.glue_area_mm2 / 100, 1)} square centimetres; zero ${inside ? 'on' : 'beside'} the slab`},
     make('defs', {}, stripes(`glue-${l}`, '#d69a1e', '#f9dfa0', u, 45), stripes(`air-${l}`, red, '#f4c3c3', u, -45)),
@@ -76,8 +76,8 @@ export function planView(l, paper) {
     extension(px0, -py1, px0, -y1 - 7 * u, u), extension(px1, -py1, px1, -y1 - 7 * u, u), dimension(px0, px1, -y1 - 6 * u, false, `pattern ${figure(px1 - px0, 1)}`, u),
     extension(px1, -py0, x1 + 7.5 * u, -py0, u), extension(px1, -py1, x1 + 7.5 * u, -py1, u), dimension(-py0, -py1, x1 + 6.5 * u, true, `pattern ${figure(py1 - py0, 1)}`, u),
     // From the slab's corner to zero.
-    Math.abs(sx0) > 0.05 ? [extension(zx, zy, zx, -y0 + 8 * u, u), extension(sx0, -sy0, sx0, -y0 + 8 * u, u), dimension(sx0, zx, -y0 + 7 * u, false, figure(Math.abs(sx0), 2), u)] : null,
-    Math.abs(sy0) > 0.05 ? [extension(zx, zy, x0 - 8 * u, zy, u), dimension(-sy0, zy, x0 - 6 * u, true, figure(Math.abs(sy0), 2), u)] : null,
+    Math.abs(sx0 - ox) > 0.05 ? [extension(zx, zy, zx, -y0 + 8 * u, u), extension(sx0, -sy0, sx0, -y0 + 8 * u, u), dimension(sx0, zx, -y0 + 7 * u, false, figure(Math.abs(sx0 - ox), 2), u)] : null,
+    Math.abs(sy0 - oy) > 0.05 ? [extension(zx, zy, x0 - 8 * u, zy, u), dimension(-sy0, zy, x0 - 6 * u, true, figure(Math.abs(sy0 - oy), 2), u)] : null,
     // Zero with its axes.
     make('path', {d: `M${zx} ${zy}h${13 * u}l${-2.2 * u} ${-1 * u}v${2 * u}l${2.2 * u} ${-1 * u}M${zx} ${zy}v${-13 * u}l${-1 * u} ${2.2 * u}h${2 * u}l${-1 * u} ${-2.2 * u}`, stroke: red, 'stroke-width': 0.6 * u, fill: red}),
     make('circle', {cx: zx, cy: zy, r: 2 * u, fill: '#fff', stroke: red, 'stroke-width': 0.6 * u}), make('circle', {cx: zx, cy: zy, r: 0.6 * u, fill: red}),
