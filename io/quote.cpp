@@ -14,7 +14,7 @@ namespace slabwright {
 QuotedModel quote_model(Context& context, const PatternSource& source, const Job& job) {
     validate(job);
     const std::shared_ptr<Pattern> pattern = read_pattern(context, source, job);
-    return {pattern->read.input, job, quote(context, pattern->read.mesh.view(), job)};
+    return {pattern->read.input, quote(context, pattern->read.mesh.view(), job), job};
 }
 
 std::string quote_json(const QuotedModel& model) {

@@ -14,8 +14,8 @@ namespace slabwright {
 
 struct QuotedModel {
     InputInfo input;
-    Job job;
     Quote quote;
+    Job job{};  ///< that it was reckoned by
 };
 
 /// Reads a model as the job says and reckons its build (quote()).

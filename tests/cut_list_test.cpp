@@ -7,6 +7,7 @@
 #include <random>
 
 #include "engine/schedule/cut_list.h"
+#include "io/read/cut_list_check.h"
 #include "io/write/cut_list_files.h"
 #include "io/write/wood_json.h"
 #include "kernels/errors.h"
@@ -221,6 +222,54 @@ TEST(CutList, TakesEverySlabAndTheBoard) {
     std::size_t drawn = list.boards.size() + list.blanks.size();
     for (const BoardToSaw& board : list.boards) drawn += board.sawn.cuts.size() + board.sawn.offcuts.size();
     EXPECT_EQ(loops, drawn);
+}
+
+TEST(CutList, TheProofFollowsItAtTheSaw) {
+    Job job;
+    job.slabs.length = 1500;
+    job.slabs.width = 900;
+    const Plan plan = stack(job, {{{0, 0}, {500, 400}}, {{100, 100}, {311, 252}}, {{10, 20}, {95, 71}}});
+    BuildPlan build;
+    build.job = job;
+    build.job_stated = true;
+    build.stock_min = plan.stock_min;
+    build.stock_max = plan.stock_max;
+    for (const Layer& layer : plan.layers) {
+        LayerToBuild& to = build.layers.emplace_back();
+        to.index = layer.index;
+        to.slab_thickness = layer.slab_thickness;
+        to.blank = layer.blank;
+    }
+    const std::string csv = cut_list_csv(cut_list(plan));
+    const auto codes = [&](const std::string& text) {
+        std::string found;
+        for (const Violation& v : check_cut_list(text, build)) found += v.code + " ";
+        return found;
+    };
+    ASSERT_EQ(codes(csv), "");
+    // Every number that is wrong by a millimetre or more is told, and every line that is missing.
+    std::size_t begin = csv.find('\n') + 1, changed = 0;
+    for (std::size_t end = 0; begin < csv.size(); begin = end + 1) {
+        end = csv.find('\n', begin);
+        EXPECT_NE(codes(csv.substr(0, begin) + csv.substr(end + 1)), "") << csv.substr(begin, end - begin);
+        int column = 0;
+        bool whole = true;
+        for (std::size_t at = begin; at < end; ++at) {
+            if (csv[at] == ',') ++column, whole = true;
+            if (csv[at] == '.') whole = false;
+            if (!whole || csv[at] < '0' || csv[at] > '9') continue;
+            if (column == 0 || column == 1 || column == 3) continue;  // names
+            std::string text = csv;
+            text[at] = text[at] == '9' ? '0' : static_cast<char>(text[at] + 1);
+            EXPECT_NE(codes(text), "") << csv.substr(begin, end - begin) << ", column " << column;
+            ++changed;
+        }
+    }
+    EXPECT_GT(changed, 60u);
+    EXPECT_EQ(codes("kind\n"), "cut_list.unreadable ");
+    EXPECT_EQ(codes(csv + "piece,1\n"), "cut_list.unreadable ");
+    build.layers[1].blank->max[0] += 1;
+    EXPECT_EQ(codes(csv), "cut_list.piece ") << "a slab that is sawn smaller than the plan lays it";
 }
 
 TEST(CutList, ASlabLargerThanABoardIsRefused) {

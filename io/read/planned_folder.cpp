@@ -392,6 +392,7 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     const Field tools = plan["tools"];
     for (std::size_t i = 0; i < tools.size(); ++i) build.tools.push_back(read_tool(tools[i]));
     read_layers(plan["layers"], folder);
+    folder.states_wood = plan.has("wood");
     SimulationInput& input = folder.simulation;
     input.machine = build.job.machine;
     input.stock_min = build.stock_min;

@@ -35,6 +35,12 @@ const refreshed = readFileSync(file);
 execFileSync(command, ['report', out, '--quiet', '--threads', '1']);
 check.that('verify leaves the page that report makes', refreshed.equals(readFileSync(file)));
 const verify = JSON.parse(readFileSync(`${out}/verify.json`, 'utf8'));
+// The command prints the sheets as the browser does: a cover, the cut list, and a page for each layer.
+{
+    execFileSync(command, ['report', out, '--quiet', '--pdf', `${work}/sheets.pdf`]);
+    const pages = pdfPages(readFileSync(`${work}/sheets.pdf`));
+    check.that('report --pdf: the sheets', pages >= layers + 2 && pages <= 2 * layers + 3, `${pages} pages for ${layers} layers`);
+}
 const {page, complaints, requests} = await open(started, file);
 const change = (selector, value) => page.locator(selector).evaluate((element, v) => {
     element.value = v;
