@@ -381,8 +381,9 @@ double bending_limit(const Operation& operation, const Job& job) {
 LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const WoodLimits& limits,
                       std::vector<Diagnostic>& diagnostics, KnownCuts* known_cuts, FeedChange change) {
     const Job& job = plan.job;
-    StandingSlab slab(plan.stock_min, plan.stock_max, layer.z_bottom, layer.z_bottom + layer.slab_thickness,
-                      StandingSlab::cell_for(job, plan.stock_min, plan.stock_max));
+    const Blank blank = slab_of(plan, layer);
+    StandingSlab slab(blank.min, blank.max, layer.z_bottom, layer.z_bottom + layer.slab_thickness,
+                      StandingSlab::cell_for(job, blank.min, blank.max));
     const MemoryCharge memory(context, 3 * slab.bytes(), "the stock that forces are computed from");
     LayerCuts result;
     // What one operation leaves to the next, for its memory only.

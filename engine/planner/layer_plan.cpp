@@ -74,8 +74,9 @@ public:
         work_.z_bottom = layer_.z_bottom;
         work_.z_top = layer_.z_top;
         work_.slab_thickness = layer_.slab_thickness;
-        work_.stock_min = plan.stock_min;
-        work_.stock_max = plan.stock_max;
+        const Blank slab = slab_of(plan, layer_);
+        work_.stock_min = slab.min;
+        work_.stock_max = slab.max;
         work_.index = layer_.index;
         work_.stock_memory = ground.stock_memory;
         if (ground.drilled != nullptr) work_.drilled = *ground.drilled;
@@ -83,8 +84,7 @@ public:
         fitted_.tolerances.gouge -= ground.mesh_gap;
         work_.flats = flats_between(layer_.z_bottom);
         work_.floor_below = layer_.z_bottom - (ground.carried_by ? overrun_.below : overrun_.board);
-        if (ground.carried_by)
-            overhang_ = overhang_map({&ground.carried_by, 1}, plan.stock_min, plan.stock_max);
+        if (ground.carried_by) overhang_ = overhang_map({&ground.carried_by, 1}, slab.min, slab.max);
         if (!ground.walls.empty())
             walls_.emplace(ground.walls, plan.job.material.strength_mpa, widest_beside_walls(plan.job),
                            plan.job.cutting.wall_allowance);

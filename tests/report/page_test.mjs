@@ -35,6 +35,12 @@ const refreshed = readFileSync(file);
 execFileSync(command, ['report', out, '--quiet', '--threads', '1']);
 check.that('verify leaves the page that report makes', refreshed.equals(readFileSync(file)));
 const verify = JSON.parse(readFileSync(`${out}/verify.json`, 'utf8'));
+// The command prints the sheets as the browser does: a cover, the cut list, and a page for each layer.
+{
+    execFileSync(command, ['report', out, '--quiet', '--pdf', `${work}/sheets.pdf`]);
+    const pages = pdfPages(readFileSync(`${work}/sheets.pdf`));
+    check.that('report --pdf: the sheets', pages >= layers + 2 && pages <= 2 * layers + 3, `${pages} pages for ${layers} layers`);
+}
 const {page, complaints, requests} = await open(started, file);
 const change = (selector, value) => page.locator(selector).evaluate((element, v) => {
     element.value = v;
@@ -83,7 +89,7 @@ const numbers = text => text.split(',').map(Number);
     const times = await cover.locator('table').last().locator('tbody tr td:last-child').allTextContents();
     check.equal('cover: the layers’ times add up', times.slice(0, -1).reduce((sum, t) => sum + minutesOf(t), 0), minutesOf(times[times.length - 1]));
     for (let l = 0; l < layers; ++l) {
-        const sheet = page.locator('.sheet').nth(l + 1), text = await sheet.textContent(), layer = plan.layers[l];
+        const sheet = page.locator('.sheet:not(.cutlist)').nth(l + 1), text = await sheet.textContent(), layer = plan.layers[l];
         check.that(`sheet ${l + 1}: every program`, layer.operations.every(o => text.includes(o.file.replace('nc/', ''))));
         check.that(`sheet ${l + 1}: speeds and stick-outs`, layer.operations.every(o => {
             const tool = plan.tools.find(t => t.number === o.tool);
@@ -94,13 +100,23 @@ const numbers = text => text.split(',').map(Number);
             && (await sheet.locator('.side-view').textContent()).includes(`z ${shown(layer.z_bottom - down)}`));
         check.that(`sheet ${l + 1}: the slab’s measures`, (await sheet.locator('.plan-view').textContent()).includes(`slab ${Number((plan.stock.max[0] - plan.stock.min[0]).toFixed(1))}`));
     }
+    // The cut list draws every piece of every board with its measures.
+    const cutlist = page.locator('.sheet.cutlist'), boards = plan.wood.boards;
+    check.equal('cut list: a drawing for each board', await cutlist.locator('svg').count(), boards.length);
+    for (const [b, board] of boards.entries()) {
+        const label = await cutlist.locator('svg').nth(b).getAttribute('aria-label'), size = v => Number(v.toFixed(1));
+        check.that(`cut list: board ${b + 1} names its pieces`, board.pieces.every(p => label.includes(`${p.layer ? `layer ${p.layer}` : 'base board'} ${size(p.length)} × ${size(p.width)}`)), label);
+        check.equal(`cut list: board ${b + 1} has its rectangles`, await cutlist.locator('svg').nth(b).locator('rect').count(), 1 + board.pieces.length + board.cuts.length + board.offcuts.length);
+    }
+    const counted = (await cutlist.locator('tbody tr td:first-child').allTextContents()).reduce((sum, text) => sum + Number(text), 0);
+    check.equal('cut list: counts all pieces', counted, boards.reduce((sum, board) => sum + board.pieces.length, 0));
     // Feeds are those of the programs.
     const {feeds} = await page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent));
     plan.layers.flatMap(layer => layer.operations).forEach((operation, i) => {
         const said = new Set([...readFileSync(`${out}/${operation.file}`, 'utf8').matchAll(/\bF([\d.]+)/g)].map(([, f]) => Math.round(Number(f))));
         check.that(`feeds of ${operation.file}`, said.has(feeds[i].low) && said.has(feeds[i].high) && Math.max(feeds[i].high, feeds[i].plunge ?? 0) === Math.max(...said), JSON.stringify(feeds[i]));
     });
-    const box = page.locator('.sheet').nth(1).locator('input[type=checkbox]').first();
+    const box = page.locator('.sheet:not(.cutlist)').nth(1).locator('input[type=checkbox]').first();
     await box.check();
     check.that('sheet: a check can be ticked', await box.isChecked());
     await box.uncheck();
@@ -281,7 +297,7 @@ execFileSync(command, ['report', out, '--quiet', '--no-3d']);
     const light = await open(started, file);
     check.that('light: smaller', statSync(file).size < 1e6, statSync(file).size);
     check.equal('light: no view', await light.page.locator('canvas').count(), 0);
-    check.equal('light: a cover and sheets', await light.page.locator('.sheet').count(), layers + 1);
+    check.equal('light: a cover, a cut list and sheets', await light.page.locator('.sheet').count(), layers + 2);
     check.equal('light: no complaints', light.complaints, []);
     check.equal('light: axe', await violations(light.page), []);
     await light.page.close();
