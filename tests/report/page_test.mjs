@@ -285,7 +285,7 @@ check.equal('axe: no violations when narrow', await violations(page), []);
 check.that('narrow: no sideways scrolling', await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth + 1), await page.evaluate(() => document.documentElement.scrollWidth));
 await page.setViewportSize({width: 1280, height: 900});
 
-check.equal('print: a cover and one page for each layer', pdfPages(await page.pdf({preferCSSPageSize: true})), layers + 1);
+check.equal('print: a cover, the cut list and one page for each layer', pdfPages(await page.pdf({preferCSSPageSize: true})), layers + 2);
 check.equal('no complaints', complaints, []);
 check.equal('no request leaves the page', requests, []);
 check.that('size', statSync(file).size < 10e6);
@@ -350,5 +350,28 @@ check.equal('selection: no tables without a choice', await (async () => {
     await page.close();
     return count;
 })(), 0);
+// Supports stand on the sheets of the layers that they go through, and are sawn off in the end.
+{
+    const facets = [];
+    const box = (x0, y0, z0, x1, y1, z1) => {
+        const v = [[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0], [x0, y0, z1], [x1, y0, z1], [x1, y1, z1], [x0, y1, z1]];
+        for (const [a, b, c, d] of [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]) facets.push([v[a], v[b], v[c]], [v[a], v[c], v[d]]);
+    };
+    box(0, 0, 0, 60, 60, 50);
+    box(100, 0, 25, 140, 60, 50); // a leg that ends in the air
+    box(40, 20, 42, 120, 40, 50);
+    writeFileSync(`${work}/leg.stl`, `solid leg\n${facets.map(t => `facet normal 0 0 0\nouter loop\n${t.map(p => `vertex ${p.join(' ')}\n`).join('')}endloop\nendfacet\n`).join('')}endsolid leg\n`);
+    const built = `${work}/leg`;
+    execFileSync(command, ['plan', `${work}/leg.stl`, '-o', built, '--allow-undercut', '--quiet', '--no-verify']);
+    const {supports, layers: planned} = JSON.parse(readFileSync(`${built}/plan.json`, 'utf8'));
+    const {page, complaints} = await open(started, `${built}/report.html`);
+    check.that('supports: there is one', supports.length > 0);
+    for (const [l, layer] of planned.entries())
+        check.equal(`supports: on the sheet of layer ${layer.index}`, await page.locator(`#sheet-${l + 1} .plan-view path.support`).count(),
+            supports.filter(s => s.z_low < layer.z_top - 0.001 && s.z_high > layer.z_bottom + 0.001).length);
+    check.that('supports: sawn off in the end', (await page.locator('.cover .steps li:last-child').textContent()).includes(`saw off ${supports.length} support`));
+    check.equal('supports: no complaints', complaints, []);
+    await page.close();
+}
 await started.close();
 check.end();

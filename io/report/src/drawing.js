@@ -5,7 +5,7 @@ import {blankOf, data, flaskRings, plan} from './report.js';
 import {filledBoxes} from './wood.js';
 import {shownHeights} from './zero.js';
 
-const ink = '#1f252b', dim = '#525c66', red = '#b0141f', wood = '#f1e6d3', cutWood = '#d9bd8a', glueInk = '#8f6200';
+const ink = '#1f252b', dim = '#525c66', red = '#b0141f', wood = '#f1e6d3', cutWood = '#d9bd8a', glueInk = '#8f6200', purple = '#5b3a8e';
 
 function pathOf(loops) {
     const unit = data.outlines.unit_mm;
@@ -43,6 +43,9 @@ function stripes(id, color, ground, u, turn) {
         make('rect', {width: 2.4 * u, height: 2.4 * u, fill: ground}), make('path', {d: `M0 0V${2.4 * u}`, stroke: color, 'stroke-width': 0.7 * u}));
 }
 
+// Columns of stock that stand in a layer: they are left there, and sawn off when the pattern is done.
+export const supportsIn = l => (plan.supports ?? []).filter(s => s.z_low < plan.layers[l].z_top - 0.001 && s.z_high > plan.layers[l].z_bottom + 0.001);
+
 // The slab of layer l from above: slab, pattern, glue, zero, and their measures. paper: how large it is printed at most, mm.
 export function planView(l, paper) {
     const [x0, y0] = plan.stock.min, [x1, y1] = plan.stock.max, width = x1 - x0, depth = y1 - y0, layer = plan.layers[l];
@@ -66,6 +69,7 @@ export function planView(l, paper) {
     glue.length ? make('path', {d: pathOf(glue), fill: `url(#glue-${l})`, 'fill-rule': 'evenodd', stroke: glueInk, 'stroke-width': 0.25 * u}) : null,
     filled.length ? make('path', {d: filled.map(b => `M${b.x0.toFixed(2)} ${(-b.y0).toFixed(2)}H${b.x1.toFixed(2)}V${(-b.y1).toFixed(2)}H${b.x0.toFixed(2)}Z`).join(''), fill: `url(#air-${l})`, stroke: 'none'}) : null,
     make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: 'none', stroke: ink, 'stroke-width': 0.45 * u}),
+    supportsIn(l).map(s => make('path', {class: 'support', d: `M${s.x - s.width / 2} ${-s.y - s.width / 2}h${s.width}v${s.width}h${-s.width}Zl${s.width} ${s.width}m0 ${-s.width}l${-s.width} ${s.width}`, fill: '#fff', stroke: purple, 'stroke-width': 0.5 * u})),
     make('path', {d: pathOf(top.map(loop => loop.points)), fill: 'none', stroke: '#17636b', 'stroke-width': 0.4 * u, 'stroke-dasharray': `${2 * u} ${1.3 * u}`}),
     // Measures: the slab below and left, the pattern above and right.
     extension(sx0, -sy0, sx0, -y0 + 15 * u, u), extension(sx1, -sy0, sx1, -y0 + 15 * u, u), extension(sx0, -sy0, x0 - 15 * u, -sy0, u), extension(sx0, -sy1, x0 - 15 * u, -sy1, u),

@@ -2,7 +2,7 @@
 
 import {duration, figure, make, plural, words} from './dom.js';
 import {boardsText, costText, cutListSheet} from './cutlist.js';
-import {planView, sideView, stackView} from './drawing.js';
+import {planView, sideView, stackView, supportsIn} from './drawing.js';
 import {blankOf, blankSize, data, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
 import {filledVolume} from './wood.js';
 import {tableHeight, zeroOf} from './zero.js';
@@ -108,7 +108,7 @@ function sheet(l, minutes) {
         warningBox(warnings, 5),
         make('div', {class: 'drawings'}, planView(l, [132, 92]), sideView(l, [58, 92])),
         make('p', {class: 'key'}, make('i', {class: 'glue'}), ' glue ', make('i', {class: 'solid'}), ' pattern at the bottom ', make('i', {class: 'dash'}), ' at the top ',
-            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
+            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, supportsIn(l).length ? [make('i', {class: 'support'}), ' support, stays till the end '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
         make('div', {class: 'facts'},
             fact('Zero', make('p', {}, zero.place), make('p', {}, make('strong', {}, 'XY: '), zero.xy, zero.after ? `; ${zero.after}` : null), make('p', {}, make('strong', {}, 'Z: '), zero.z), make('p', {}, make('strong', {}, 'Table: '), tableHeight(l))),
             fact('Slab', make('p', {}, make('strong', {}, `${blankSize(l)} × ${figure(layer.slab_thickness, 2)} mm`), ` ${plan.job.material.name}${laid}`),
@@ -176,7 +176,7 @@ function cover(minutes) {
                 figure(layer.glue_area_mm2 / 100, 1), figure(layer.press_force_n, 0), String(layer.operations.length), perLayer[l] ? String(perLayer[l]) : '–', shown[l]]),
             ['', make('strong', {}, 'All'), '', '', '', figure(t.glue_mm2 / 100, 1), '', String(operations.length), '', make('strong', {}, duration(plan.totals.build_minutes))]], [2, 3, 4, 5, 6, 7, 8, 9]),
         make('h4', {}, 'Every layer goes'),
-        make('ol', {class: 'steps'}, ['Clean the joint, spread the glue, lay the slab, press.', 'Set the table, touch off as the layer’s sheet says.', 'Run its programs in the order of their names; the first faces the slab.', 'Measure the faced top, tick the sheet, go on to the next.'].map(s => make('li', {}, s))));
+        make('ol', {class: 'steps'}, ['Clean the joint, spread the glue, lay the slab, press.', 'Set the table, touch off as the layer’s sheet says.', 'Run its programs in the order of their names; the first faces the slab.', 'Measure the faced top, tick the sheet, go on to the next.', ...(plan.supports?.length ? [`When the last is done: saw off ${plural(plan.supports.length, 'support')}, from ${plan.supports.map(s => `x ${figure(s.x, 0)} y ${figure(s.y, 0)}`).slice(0, 6).join(', ')}${plan.supports.length > 6 ? ' …' : ''}.`] : [])].map(s => make('li', {}, s))));
 }
 
 export function buildSheets(section) {
