@@ -312,7 +312,7 @@ TEST(Write, HoldsTheContractAndReplacesOnlyItsOwn) {
     const Plan plan = hand_made();
     write(context, plan, out.string());
     const auto first = tree(out);
-    EXPECT_EQ(first.size(), 4u + 6u);
+    EXPECT_EQ(first.size(), 6u + 6u);
     EXPECT_EQ(first.at("plan.json"), plan_json(plan));
     EXPECT_EQ(first.at("tool.tbl"), tool_table(plan.job));
     EXPECT_EQ(first.at("sequence.json"), sequence_json(plan));
@@ -325,7 +325,7 @@ TEST(Write, HoldsTheContractAndReplacesOnlyItsOwn) {
     schedule(shorter);
     Context single({.threads = 1, .memory_bytes = 0, .progress = {}});
     write(single, shorter, out.string() + "/");
-    EXPECT_EQ(tree(out).size(), 4u + 3u);
+    EXPECT_EQ(tree(out).size(), 6u + 3u);
     EXPECT_EQ(std::distance(fs::directory_iterator(out.parent_path()), fs::directory_iterator()), 1)
         << "nothing stays beside it";
 

@@ -350,7 +350,7 @@ private:
             const std::size_t l = slabs_[s_.placed - 1].layer;
             expect_layer(l);
             for (const auto& [key, at] : build_.edges_of(slabs_[s_.placed - 1]))
-                if (number(key) || build_.has_own_zero()) expect("sequence.touch_off", key, at, kLength);
+                if (states(key) || build_.has_own_zero()) expect("sequence.touch_off", key, at, kLength);
             expect("sequence.touch_off", "slab_top_mm", build_.stack_top(s_) - build_.origin_of(l), kLength);
             if (programs_left_[l] == 0) s_.stack_ready = here();
         }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace slabwright {
@@ -18,6 +19,11 @@ void SequenceFindings::complain(const char* code, const std::string& message, do
     const std::string about =
         at_ ? fmt::format("step {} ({}, layer {}): ", step().id, step().action, step().layer) : "";
     found_.push_back({code, about + message, "sequence.json", 0, {}, size});
+}
+
+bool SequenceFindings::states(std::string_view key) const {
+    return std::any_of(step().numbers.begin(), step().numbers.end(),
+                       [&](const auto& number) { return number.first == key; });
 }
 
 std::optional<double> SequenceFindings::number(const char* key) {

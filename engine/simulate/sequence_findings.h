@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/plan.h"
@@ -25,6 +26,8 @@ public:
 
     void complain(const char* code, const std::string& message, double size = 0);
 
+    /// Whether the step has such a quantity; no complaint where it has none.
+    [[nodiscard]] bool states(std::string_view key) const;
     /// A quantity or a word of the step; none, and a complaint, where it has no such thing.
     std::optional<double> number(const char* key);
     std::optional<std::string> word(const char* key);
