@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <span>
 
 #include "engine/sheet_proof/hold_proof.h"
 #include "kernels/parallel/parallel.h"
@@ -59,8 +60,8 @@ std::vector<AxisPoint> at_depth(const std::vector<ReadHead>& way, double depth) 
 Point2 unit_point(double x, double y) { return {to_units(x), to_units(y)}; }
 
 /// What the cut takes of a level: about every piece of the axis, as far as half the kerf square to the
-/// surface that the axis sweeps. Outlines may overlap.
-Loops swept(const std::vector<AxisPoint>& axis, double kerf) {
+/// surface that the axis sweeps. Outlines overlap.
+Loops swept_by(std::span<const AxisPoint> axis, double kerf) {
     Loops loops;
     constexpr int around = 8;  // of each half circle
     for (std::size_t i = 0; i + 1 < axis.size(); ++i) {
@@ -88,6 +89,15 @@ Loops swept(const std::vector<AxisPoint>& axis, double kerf) {
         loops.close_loop();
     }
     return loops;
+}
+
+/// The same of a long axis. It is put together from halves: clipping is slow where many outlines lie one over
+/// the other, as they do where a head turns in one place.
+Loops swept(std::span<const AxisPoint> axis, double kerf) {
+    constexpr std::size_t at_once = 24;
+    if (axis.size() <= at_once) return unite(swept_by(axis, kerf), {});
+    const std::size_t half = axis.size() / 2;
+    return unite(swept(axis.first(half + 1), kerf), swept(axis.subspan(half), kerf));
 }
 
 /// A way at a level as a region: what it runs around. The way in is not part of its loop.
