@@ -41,6 +41,8 @@ inline constexpr Word<Frame> kFrameWords[] = {
     {"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}, {"auto", Frame::automatic}};
 inline constexpr Word<BuildTable> kTableWords[] = {{"moving", BuildTable::moving},
                                                    {"fixed", BuildTable::fixed}};
+inline constexpr Word<ProgramSpan> kProgramWords[] = {
+    {"operation", ProgramSpan::operation}, {"tool", ProgramSpan::tool}, {"layer", ProgramSpan::layer}};
 inline constexpr Word<Post> kPostWords[] = {{"linuxcnc", Post::linuxcnc}, {"fanuc", Post::fanuc},
                                             {"haas", Post::haas},         {"grbl", Post::grbl},
                                             {"mach", Post::mach},         {"iso", Post::iso},
@@ -171,6 +173,9 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
                "heidenhain");
     visit.word("units", machine.units, kUnitWords,
                "of the programs: mm or inch; this file and plan.json stay in mm");
+    visit.word("programs", machine.programs, kProgramWords,
+               "what one program holds: an operation, a tool (all that it does in a layer between two "
+               "changes), or a layer, which changes tools by itself");
     visit.key("base_board_thickness", machine.base_board_thickness,
               "mm, the sacrificial board under the first layer");
     visit.key("base_board_cut", machine.base_board_cut,

@@ -2,7 +2,7 @@
 
 import {duration, figure, make, plural, words} from './dom.js';
 import {planView, sideView, stackView} from './drawing.js';
-import {data, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
+import {data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
 import {filledVolume} from './wood.js';
 import {tableHeight, zeroOf} from './zero.js';
 
@@ -95,7 +95,7 @@ function simulated(l) {
 
 function sheet(l, minutes) {
     const layer = plan.layers[l], programs = operations.filter(operation => operation.layer === l), zero = zeroOf(l), filled = filledVolume(l);
-    const off = layer.z_bottom + layer.slab_thickness - layer.z_top, first = programs[0]?.name, final = programs[programs.length - 1]?.name;
+    const off = layer.z_bottom + layer.slab_thickness - layer.z_top, files = [...new Set(programs.map(o => fileOf(o).replace(/^nc\//, '')))], first = files[0], final = files[files.length - 1];
     const warnings = [...zero.warnings, ...(filled >= 1 ? [`${cubic(filled)} under overhangs stay filled in this layer (red in the drawing).`] : []), ...warningsOf(l)];
     const glued = layer.glue_area_mm2 > 0;
     return make('article', {class: 'sheet', 'aria-label': `Setup sheet of layer ${layer.index}`},
