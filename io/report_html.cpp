@@ -207,20 +207,9 @@ std::vector<Program> read_file(const PlannedFolder& folder, std::size_t first) {
 
 /// Between which feeds a program cuts, mm/min, in the plane and straight down; null where it never does.
 Json feeds_json(const Program& program) {
-    double low = HUGE_VAL, high = 0, plunge = 0;
-    for (std::size_t k = 1; k < program.steps.size(); ++k) {
-        const ProgramStep &from = program.steps[k - 1], &to = program.steps[k];
-        if (to.rapid() || !from.known() || !to.known()) continue;
-        if (from.x != to.x || from.y != to.y) {
-            low = std::min(low, to.feed);
-            high = std::max(high, to.feed);
-        } else if (to.z < from.z) {
-            plunge = std::max(plunge, to.feed);
-        }
-    }
-    return {{"low", high > 0 ? Json(rounded(low, 0)) : Json()},
-            {"high", high > 0 ? Json(rounded(high, 0)) : Json()},
-            {"plunge", plunge > 0 ? Json(rounded(plunge, 0)) : Json()}};
+    const CuttingFeeds feeds = cutting_feeds(program);
+    const auto json = [](double feed) { return feed > 0 ? Json(rounded(feed, 0)) : Json(); };
+    return {{"low", json(feeds.low)}, {"high", json(feeds.high)}, {"plunge", json(feeds.plunge)}};
 }
 
 /// What stands over in the end takes up to a fifth of the time of the replay: so many programs' steps.
