@@ -114,6 +114,27 @@ void validate_tool(const Tool& tool, std::size_t position, Post post) {
     require(key("ramp_deg"), tool.ramp_deg, -90, 90);
 }
 
+void validate_boards(const Slabs& s) {
+    require("slabs.length", s.length, 1, 100000);
+    require("slabs.width", s.width, 1, 100000);
+    require("slabs.margin", s.margin, 0, 10000);
+    require("slabs.board_length", s.board_length, 0, 100000);
+    require("slabs.board_width", s.board_width, 0, 100000);
+    require("slabs.kerf", s.kerf, 0, 100);
+}
+
+void validate_prices(const Prices& p, const Slabs& s) {
+    for (const double price : p.board_m2) require("prices.board_m2", price, 0, 1e9);
+    if (p.board_m2.size() > 1 && p.board_m2.size() != s.thicknesses.size())
+        refuse("prices.board_m2",
+               fmt::format("prices.board_m2 has {} prices for {} slabs.thicknesses", p.board_m2.size(),
+                           s.thicknesses.size()),
+               "give one for all of them, or one for each in the same order");
+    require("prices.base_board_m2", p.base_board_m2, 0, 1e9);
+    require("prices.glue_kg", p.glue_kg, 0, 1e9);
+    require("prices.machine_hour", p.machine_hour, 0, 1e9);
+}
+
 void validate_bonding(const Bonding& b) {
     require("bonding.press_force", b.press_force, 0, 1e7);
     require("bonding.press_time_s", b.press_time_s, 0, 1e6);
@@ -123,6 +144,7 @@ void validate_bonding(const Bonding& b) {
     require("bonding.edge_setback", b.edge_setback, 0, 1000);
     require("bonding.handling_s", b.handling_s, 0, 1e6);
     require("bonding.glue_s_per_m2", b.glue_s_per_m2, 0, 1e6);
+    require("bonding.glue_g_per_m2", b.glue_g_per_m2, 0, 1e6);
 }
 
 void validate_motion(const Machine& c) {
@@ -412,9 +434,7 @@ void validate(const Job& job) {
                    fmt::format("slabs.thicknesses has {} after {}", s.thicknesses[i], s.thicknesses[i - 1]),
                    "list them in ascending order, each once");
     }
-    require("slabs.length", s.length, 1, 100000);
-    require("slabs.width", s.width, 1, 100000);
-    require("slabs.margin", s.margin, 0, 10000);
+    validate_boards(s);
     require("slabs.facing_allowance", s.facing_allowance, 0, 1000);
     if (s.facing_allowance > s.thicknesses.front() - kLeastLayer)
         refuse("slabs.facing_allowance",
@@ -424,6 +444,7 @@ void validate(const Job& job) {
 
     validate_machine(job.machine);
     validate_bonding(job.bonding);
+    validate_prices(job.prices, s);
 
     const Tolerances& t = job.tolerances;
     require("tolerances.gouge", t.gouge, 0.001, 1, Ends::closed, kFinerThanProgrammed);

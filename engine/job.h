@@ -55,6 +55,11 @@ enum class AccessRule : std::uint8_t { sections, exact, printed };
 /// tolerances.rough_cusp, or the smaller.
 enum class RoughLimit : std::uint8_t { smaller, finish_radius, cusp };
 enum class ToolKind : std::uint8_t { flat, ball, face, drill };
+/// Where x 0, y 0 of the programs lies: where the model has it, at the base board's corner of least x and y,
+/// or in the base board's middle.
+enum class WorkZero : std::uint8_t { model, corner, centre };
+/// How large slabs are sawn: all of them as the pattern needs, or each as its own layer does.
+enum class Blanks : std::uint8_t { pattern, layer };
 /// The axis whose coordinate changes its sign; the mirror lies in the origin.
 enum class MirrorAxis : std::uint8_t { none, x, y, z };
 
@@ -102,6 +107,10 @@ struct Slabs {
     double length = 1160, width = 1160;     ///< the largest slab, x and y
     double margin = 25.4;           ///< the stock reaches this far past the pattern, where the slab allows
     double facing_allowance = 0.5;  ///< the face mill takes at least this off, to find the whole slab
+    Blanks blanks = Blanks::pattern;
+    /// Of the boards that slabs are sawn from; 0: as large as the largest slab.
+    double board_length = 0, board_width = 0;
+    double kerf = 4;  ///< of the saw
 };
 
 struct Machine {
@@ -127,6 +136,7 @@ struct Machine {
     Post post = Post::linuxcnc;
     LengthUnit units = LengthUnit::mm;  ///< of the programs
     ProgramSpan programs = ProgramSpan::operation;
+    WorkZero zero = WorkZero::model;
     double base_board_thickness = 19;  ///< the sacrificial board under the first layer
     double base_board_cut = -1;        ///< how deep it may be cut; negative: the finish tool's overrun
 };
@@ -144,6 +154,16 @@ struct Bonding {
     double handling_s = 60;     ///< fetch, clamp, place
     double open_time_s = 0;     ///< from the glue to the press at most; 0: not stated
     double glue_s_per_m2 = 60;
+    double glue_g_per_m2 = 0;  ///< 0: not stated
+};
+
+/// What things cost, in the shop's own currency. A price of 0 is not stated, and nothing is reckoned with it.
+struct Prices {
+    std::string currency;          ///< for the reader only
+    std::vector<double> board_m2;  ///< of boards: one for all slabs.thicknesses, or one for each
+    double base_board_m2 = 0;      ///< of the board under the first layer
+    double glue_kg = 0;
+    double machine_hour = 0;  ///< of the whole build, bonding included
 };
 
 struct Tolerances {
@@ -263,6 +283,7 @@ struct Job {
     Cutting cutting;
     ToolSelection selection;
     FlaskShape flask;
+    Prices prices;
     /// The fixed set: face mill, 1/2 in flat end mill, 1/4 in ball end mill (LUO's comparison set).
     std::vector<Tool> tools{
         {1, ToolKind::face, "face mill 50 mm", 50, 20, 20, 60, 60, 4, 0.0, 12000, 9000, 1000, 0.1, 4.0, 0.6},

@@ -140,6 +140,15 @@ struct Joint {
     Loops glue;                            ///< where glue goes
 };
 
+/// The corners of a slab as it is sawn and laid, mm, pattern-base.
+struct Blank {
+    std::array<double, 2> min{}, max{};
+    [[nodiscard]] double length() const { return max[0] - min[0]; }  ///< in x
+    [[nodiscard]] double width() const { return max[1] - min[1]; }   ///< in y
+    [[nodiscard]] double mm2() const { return length() * width(); }
+    friend bool operator==(const Blank&, const Blank&) = default;
+};
+
 struct Layer {
     int index = 0;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
@@ -147,9 +156,10 @@ struct Layer {
     std::string reason;  ///< why z_top lies where it lies, in words
     std::vector<Operation> operations;
     std::optional<LayerSelection> selection;  ///< none where there was nothing to select
-    int rounds = 0;             ///< how often a proof had it planned again (engine/planner/replan.h)
-    std::vector<Joint> joints;  ///< upwards: under its lowest slab, on the board or the layer below; then
-                                ///< between its slabs
+    int rounds = 0;              ///< how often a proof had it planned again (engine/planner/replan.h)
+    std::vector<Joint> joints;   ///< upwards: under its lowest slab, on the board or the layer below; then
+                                 ///< between its slabs
+    std::optional<Blank> blank;  ///< of each of its slabs (slabs.blanks = "layer"); none: the plan's stock
 };
 
 /// The file that holds a program: "L003.ngc" of "L003.ngc#2", and of itself.
@@ -251,5 +261,26 @@ struct Plan {
     Totals totals;
     std::vector<Diagnostic> diagnostics;
 };
+
+/// x 0, y 0 of the programs, 0.1 µm, pattern-base: machine.zero. The base board is as large as the stock.
+[[nodiscard]] inline Point2 work_zero(const Plan& plan) {
+    const auto at = [&](std::size_t k) {
+        switch (plan.job.machine.zero) {
+            case WorkZero::corner:
+                return to_units(plan.stock_min[k]);
+            case WorkZero::centre:
+                return to_units((plan.stock_min[k] + plan.stock_max[k]) / 2);
+            case WorkZero::model:
+                break;
+        }
+        return to_units(0.0);
+    };
+    return {at(0), at(1)};
+}
+
+/// What a layer's slabs cover: its own blank, or the plan's stock.
+[[nodiscard]] inline Blank slab_of(const Plan& plan, const Layer& layer) {
+    return layer.blank.value_or(Blank{plan.stock_min, plan.stock_max});
+}
 
 }  // namespace slabwright

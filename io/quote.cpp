@@ -7,13 +7,14 @@
 #include "io/read/pattern.h"
 #include "io/slabwright.h"
 #include "io/text/json_text.h"
+#include "io/write/wood_json.h"
 
 namespace slabwright {
 
 QuotedModel quote_model(Context& context, const PatternSource& source, const Job& job) {
     validate(job);
     const std::shared_ptr<Pattern> pattern = read_pattern(context, source, job);
-    return {pattern->read.input, quote(context, pattern->read.mesh.view(), job)};
+    return {pattern->read.input, quote(context, pattern->read.mesh.view(), job), job};
 }
 
 std::string quote_json(const QuotedModel& model) {
@@ -45,7 +46,12 @@ std::string quote_json(const QuotedModel& model) {
     json.end().key("cutting_minutes").rounded(q.cutting_minutes, 1);
     json.key("bonding_minutes").rounded(q.bonding_minutes, 1);
     json.key("tool_change_minutes").rounded(q.tool_change_minutes, 1);
-    json.key("build_minutes").rounded(q.build_minutes, 1).key("spread").rounded(q.spread, 2).end();
+    json.key("build_minutes").rounded(q.build_minutes, 1).key("spread").rounded(q.spread, 2);
+    json.key("boards").integer(static_cast<std::int64_t>(q.boards.boards.size()));
+    json.key("bought_m2").rounded(q.boards.bought_m2(), 4);
+    json.key("cost");
+    put_cost(json, model.job, q.cost);
+    json.end();
     return json.take();
 }
 
@@ -59,11 +65,13 @@ std::string quote_text(const QuotedModel& model) {
                     model.input.file, q.outcome.layers, q.outcome.layers == 1 ? "layer" : "layers",
                     hours(q.build_minutes), hours(q.cutting_minutes), hours(q.bonding_minutes),
                     hours(q.tool_change_minutes));
+    const bool by_layer = model.job.slabs.blanks == Blanks::layer;
     for (const QuotedSlabs& s : q.slabs)
-        text += fmt::format("slabs   {} of {:g} x {:.0f} x {:.0f} mm\n", s.count, s.thickness, q.stock[0],
-                            q.stock[1]);
-    text += fmt::format("wood    {:.2f} m2 of slabs, {:.1f} kg with the base board\n", q.slab_m2, q.mass_kg);
-    text += fmt::format("glue    on {:.3f} m2\n", q.glue_m2);
+        text += fmt::format("slabs   {} of {:g} x {:.0f} x {:.0f} mm{}\n", s.count, s.thickness, q.stock[0],
+                            q.stock[1], by_layer ? " at most" : "");
+    text += fmt::format("wood    {:.2f} m2 of slabs, {:.1f} kg with the base board; {}\n", q.slab_m2,
+                        q.mass_kg, boards_text(q.boards));
+    text += fmt::format("glue    on {:.3f} m2\n", q.glue_m2) + cost_text(model.job, q.cost);
     if (q.outcome.unmade_mm3 >= 1)
         text += fmt::format("unmade  {:.1f} cm3 under overhangs, up to {:.1f} mm high\n",
                             q.outcome.unmade_mm3 / 1000, q.outcome.unmade_mm);

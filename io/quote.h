@@ -15,6 +15,7 @@ namespace slabwright {
 struct QuotedModel {
     InputInfo input;
     Quote quote;
+    Job job{};  ///< that it was reckoned by
 };
 
 /// Reads a model as the job says and reckons its build (quote()).

@@ -128,9 +128,7 @@ private:
     [[nodiscard]] Program face_off_of(const std::string& text, const std::string& file,
                                       std::size_t layer) const {
         Program program = read_planned_program(text, file, folder_.build.job);
-        const double up =
-            folder_.build.frame == Frame::layer_top ? to_mm(to_units(folder_.build.layers[layer].z_top)) : 0;
-        for (ProgramStep& step : program.steps) step.z += up;
+        place_program(program, folder_.build, layer);
         program.file = file;
         program.layer = static_cast<int>(layer);
         program.kind = OperationKind::face;

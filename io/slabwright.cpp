@@ -17,6 +17,7 @@
 
 #include "engine/planner/planner.h"
 #include "engine/planner/replan.h"
+#include "engine/schedule/cut_list.h"
 #include "engine/simulate/simulation_memory.h"
 #include "engine/simulate/work.h"
 #include "engine/tool_choice/access_map.h"
@@ -35,6 +36,7 @@
 #include "io/text/json_text.h"
 #include "io/verify.h"
 #include "io/write/access_ply.h"
+#include "io/write/cut_list_files.h"
 #include "io/write/inspect_json.h"
 #include "io/write/output_file.h"
 #include "io/write/output_folder.h"
@@ -44,6 +46,7 @@
 #include "io/write/sections_svg.h"
 #include "io/write/sequence_json.h"
 #include "io/write/stl_writer.h"
+#include "io/write/wood_json.h"
 #include "kernels/mesh/facet_roles.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/slicing/slicing.h"
@@ -204,6 +207,9 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out, const std
     });
     if (plan.job.machine.post == Post::linuxcnc) write_file_in(out.path(), "tool.tbl", tool_table(plan.job));
     write_file_in(out.path(), "sequence.json", sequence_json(plan));
+    const CutList list = cut_list(plan);
+    write_file_in(out.path(), "cut_list.csv", cut_list_csv(list));
+    write_file_in(out.path(), "cut_list.dxf", cut_list_dxf(list));
     write_file_in(out.path(), "plan.json", plan_json(plan));
     context.throw_if_cancelled();
     context.advance();
@@ -271,6 +277,19 @@ void check_cell(double cell_mm) {
 
 void require_replaceable(const std::string& directory) {
     guarded([&] { const OutputFolder probe(directory); });
+}
+
+std::string wood_document(const Plan& plan) {
+    return guarded([&] {
+        const CutList list = cut_list(plan);
+        const CutList uniform = cut_list(plan, Blanks::pattern);
+        std::string text = fmt::format("wood    {}; {:.2f} m2 of {:.2f} m2 in slabs and board",
+                                       boards_text(list), list.sawn_m2(), list.bought_m2());
+        if (plan.job.slabs.blanks == Blanks::layer)
+            text += fmt::format("; all as large as the pattern {:.2f} m2 of {:.2f} m2", uniform.sawn_m2(),
+                                uniform.bought_m2());
+        return text + '\n' + cost_text(plan.job, cost_of(plan.job, amounts_of(plan, list)));
+    });
 }
 
 std::string plan_document(const Plan& plan) {

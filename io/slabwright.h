@@ -70,6 +70,10 @@ struct Pattern;
 /// What plan.json holds. @throws Error(no_plan) where a number is not finite
 [[nodiscard]] SLABWRIGHT_API std::string plan_document(const Plan& plan);
 
+/// The boards that a plan takes and, where the job states prices, what it costs: a line or two in words.
+/// @throws Error(no_plan, "slabs.board") where a slab is larger than a board
+[[nodiscard]] SLABWRIGHT_API std::string wood_document(const Plan& plan);
+
 /// The program of one operation of a layer of the plan, as the job's machine reads it.
 /// @throws Error(no_plan, "program.unsafe")
 [[nodiscard]] SLABWRIGHT_API std::string program_document(const Plan& plan, const Layer& layer,
@@ -79,9 +83,9 @@ struct Pattern;
 /// @throws Error(input) that names what stands against it
 SLABWRIGHT_API void require_replaceable(const std::string& directory);
 
-/// Writes plan.json, nc/, sequence.json and, for LinuxCNC, tool.tbl into `directory`, all or nothing: a fresh
-/// folder beside it is filled and then takes its place; an existing folder is replaced only if it holds a
-/// plan.json of ours or is empty.
+/// Writes plan.json, nc/, sequence.json, cut_list.csv and .dxf and, for LinuxCNC, tool.tbl into `directory`,
+/// all or nothing: a fresh folder beside it is filled and then takes its place; an existing folder is
+/// replaced only if it holds a plan.json of ours or is empty.
 /// @param source the pattern that was planned: with it report.html is written too, where this library can
 /// (plan() notes when it cannot)
 /// @throws Error(input) when the place cannot be written

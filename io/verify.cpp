@@ -13,6 +13,7 @@
 #include "engine/base_board.h"
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table_check.h"
+#include "io/read/cut_list_check.h"
 #include "io/read/input_file.h"
 #include "io/read/planned_folder.h"
 #include "io/read/sequence_reader.h"
@@ -26,6 +27,8 @@ namespace slabwright {
 namespace fs = std::filesystem;
 
 namespace {
+
+constexpr std::uint64_t kMostCutListBytes = 16 * kMebibyte;
 
 std::string read_file(const fs::path& path, const char* code, std::uint64_t most_bytes) {
     return read_whole(path, {ErrorKind::verification, code, most_bytes, "plan again"});
@@ -198,6 +201,19 @@ void find_strangers(const PlannedFolder& folder, std::vector<Violation>& violati
             {"program.unplanned", "nc/ holds it, plan.json does not name it", file, 0, {}, 0});
 }
 
+/// Follows the cut list at the saw.
+void saw_by_list(const fs::path& file, const BuildPlan& build, std::vector<Violation>& violations) {
+    std::error_code error;
+    if (!fs::is_regular_file(file, error)) {
+        violations.push_back(
+            {"cut_list.no_file", "there is no list of what to saw", "cut_list.csv", 0, {}, 0});
+        return;
+    }
+    const std::vector<Violation> found =
+        check_cut_list(read_file(file, "verify.cut_list", kMostCutListBytes), build);
+    violations.insert(violations.end(), found.begin(), found.end());
+}
+
 }  // namespace
 
 Verification verify_folder(Context& context, const std::string& directory, const VerifyOptions& options) {
@@ -220,6 +236,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     BuildPlan build = folder.build;
     set_heights(build, input.programs);
     check_sequence(out / "sequence.json", build, violations);
+    if (folder.states_wood) saw_by_list(out / "cut_list.csv", build, violations);
 
     result.pattern = options.pattern && options.pattern->is(folder.pattern)
                          ? as_planned(context, options.pattern, folder.pattern)

@@ -14,6 +14,7 @@
 #include "engine/forces/split_cuts.h"
 #include "engine/planner/planner.h"
 #include "engine/stock/cut_stretches.h"
+#include "kernels/forces/deflection.h"
 #include "tests/support/height_field.h"
 #include "tests/support/plate.h"
 #include "tests/support/seed.h"
@@ -522,6 +523,52 @@ TEST(Feeds, AnOperationMayBendItsCutterByWhatItLeaves) {
     EXPECT_DOUBLE_EQ(bending_limit(op, job), 0.1);
     op.kind = OperationKind::finish;
     EXPECT_DOUBLE_EQ(bending_limit(op, job), job.tolerances.cusp);
+}
+
+// A ball that takes a layer off a high wall cuts with its side, high over its tip: passes that are raised by
+// thinner and thinner shells would leave the highest of them all of that.
+TEST(Feeds, PassesForACutHighOverTheTip) {
+    Plan plan = plate();
+    plan.job.tools[2].stickout = 46;
+    const Tool &flat = plan.job.tools[1], &ball = plan.job.tools[2];
+    Context context;
+    int passes = 0, over = 0;
+    for (double width = 0.2; width < 1.7; width += 0.1)
+        for (const double tip : {1.0, 4.0, 8.0}) {
+            // A step at y = 40, which the flat leaves.
+            std::vector<Move> clear{at(-20, 20, 30, 0)};
+            for (double y = 0; y < 40 - flat.diameter / 2; y += 3) {
+                clear.push_back(at(-20, y, 30, 0));
+                clear.push_back(at(-20, y, tip, 0));
+                clear.push_back(at(140, y, tip, 3000));
+                clear.push_back(at(140, y, 30, 0));
+            }
+            const double along = 40 - flat.diameter / 2, beside = 40 - ball.diameter / 2 + width;
+            for (const Move& m : {at(-20, along, 30, 0), at(-20, along, tip, 0), at(140, along, tip, 3000),
+                                  at(140, along, 30, 0)})
+                clear.push_back(m);
+            Operation finish = line(plan, OperationKind::finish, 3,
+                                    {at(-20, beside, 30, 0), at(-20, beside, tip, 0),
+                                     at(140, beside, tip, 4000), at(140, beside, 30, 0)});
+            plan.layers[0].operations = {line(plan, OperationKind::rough, 2, clear), finish};
+            std::vector<Diagnostic> diagnostics;
+            (void)adapt_layer(context, plan.layers[0], plan, {}, diagnostics);
+            StandingSlab slab(plan.stock_min, plan.stock_max, 0, 18,
+                              StandingSlab::cell_for(plan.job, plan.stock_min, plan.stock_max));
+            (void)stretches(slab, plan.layers[0].operations[0], flat);
+            const Operation& op = plan.layers[0].operations[1];
+            passes += op.moves.size() > finish.moves.size() ? 1 : 0;
+            double worst = 0;
+            for (const CutStretch& s : stretches(slab, op, ball)) {
+                if (!s.cuts()) continue;
+                const SegmentForces f = reference_forces(cut_of(s, ball, plan.job, op.moves[s.last].feed));
+                worst = std::max(worst, cutter_deflection(f.peak_y_n, ball.stickout, ball.diameter));
+            }
+            EXPECT_LE(worst, 1.12 * bending_limit(op, plan.job)) << width << " mm wide, from " << tip;
+            over += worst > 1.02 * bending_limit(op, plan.job) ? 1 : 0;
+        }
+    EXPECT_GT(passes, 5);
+    EXPECT_LE(over, 8) << "of 45";  // by shells alone 21
 }
 
 }  // namespace

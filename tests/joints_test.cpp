@@ -140,6 +140,11 @@ struct Columns {
         }
         return false;
     }
+    // Whether a surface lies between two heights.
+    [[nodiscard]] static bool borders(const Column& c, double low, double high) {
+        return std::any_of(c.begin(), c.end(),
+                           [&](const auto& at) { return at.first > low && at.first < high; });
+    }
 };
 
 // Layers without their programs.
@@ -156,6 +161,7 @@ Plan layers_of(Context& context, MeshView mesh, Job job, bool bonded_slabs = fal
     request.min_material = job.material.min_thickness;
     request.slab_thicknesses = job.slabs.thicknesses;
     request.facing_allowance = job.slabs.facing_allowance;
+    request.filled_underside = job.tolerances.undercut;
     request.features = find_features(context, mesh, feature_options(job)).features;
     request.section_area = SectionAreas(context, mesh);
     // Of two slabs each, whatever that breaks, or as they are planned.
@@ -184,8 +190,9 @@ std::vector<std::vector<JointWood>> bond_all(Context& context, MeshView mesh, Pl
     return wood;
 }
 
-// Every joint on a grid: wood .06 mm below it, and above it up to the layer's top, for what lies under an
-// overhang stays filled.
+// Every joint on a grid: wood within .06 mm below it, and above it up to the layer's top, for what lies under
+// an overhang stays filled. Where surfaces come within .2 mm of the joint without lying in it, the joint may
+// hold less than the grid sees, never more.
 void expect_wood_at_joints(Context& context, MeshView mesh, Plan plan) {
     (void)bond_all(context, mesh, plan);
     const Box3 box = bounds(mesh);
@@ -196,7 +203,11 @@ void expect_wood_at_joints(Context& context, MeshView mesh, Plan plan) {
             SCOPED_TRACE("layer " + std::to_string(layer.index) + " joint at " + std::to_string(joint.z));
             const double beside = std::min(0.06, (layer.z_top - layer.z_bottom) / 4);
             if (joint.z > layer.z_top - 0.2) continue;
-            std::size_t both = 0, glued = 0, bare = 0, either = 0;
+            std::size_t both = 0, glued = 0, bare = 0, either = 0, warped = 0;
+            const auto beside_it = [&](const Column& c) {
+                return Columns::borders(c, joint.z - 0.2, joint.z - 0.005) ||
+                       Columns::borders(c, joint.z + 0.005, joint.z + 0.2);
+            };
             std::vector<double> rows;
             for (int j = 0; j < columns.ny; ++j) rows.push_back(columns.y(j) * kUnitsPerMm);
             const auto spans = line_spans(joint.glue, rows);
@@ -204,9 +215,10 @@ void expect_wood_at_joints(Context& context, MeshView mesh, Plan plan) {
                 for (int i = 0; i < columns.nx; ++i) {
                     const Column& c = columns.at[columns.index(i, j)];
                     const bool board = layer.index == 1 || k > 0;
-                    const bool above = Columns::wood(c, joint.z + beside, layer.z_top - 0.01),
-                               below = board || Columns::wood(c, joint.z - 0.06, joint.z - 0.06);
+                    const bool above = Columns::wood(c, joint.z + beside, layer.z_top - 0.001),
+                               below = board || Columns::wood(c, joint.z - 0.06, joint.z - 0.001);
                     both += above && below ? 1 : 0;
+                    warped += above && below && beside_it(c) ? 1 : 0;
                     either += above || (below && !board) ? 1 : 0;
                     const double x = columns.x(i) * kUnitsPerMm;
                     const auto& row = spans[static_cast<std::size_t>(j)];
@@ -221,8 +233,10 @@ void expect_wood_at_joints(Context& context, MeshView mesh, Plan plan) {
                 EXPECT_LE(static_cast<double>(bare), 0.02 * static_cast<double>(glued) + 2);
             }
             // A grid is as wrong as its cells along the border: a twentieth of a small region's.
-            EXPECT_NEAR(joint.standing_mm2, static_cast<double>(both) * mm2,
-                        0.02 * joint.standing_mm2 + 0.01 * static_cast<double>(either) * mm2 + 20 * mm2);
+            const double off =
+                0.02 * joint.standing_mm2 + 0.01 * static_cast<double>(either) * mm2 + 20 * mm2;
+            EXPECT_LE(joint.standing_mm2, static_cast<double>(both) * mm2 + off);
+            EXPECT_GE(joint.standing_mm2, static_cast<double>(both - warped) * mm2 - off);
             if (joint.area_mm2 > 0) {
                 EXPECT_NEAR(joint.pressure_mpa, joint.force_n / joint.area_mm2, 1e-9);
             }
@@ -624,24 +638,40 @@ TEST(Joints, OwnModelsHaveWoodWhereverGlueGoes) {
     }
 }
 
-TEST(Joints, CastingsHaveWoodWhereverGlueGoes) {
+// Every casting, relief and mesh of the pool, with slabs that are bonded into layers and without.
+TEST(Joints, MeshesOfOthersHaveWoodWhereverGlueGoes) {
     const char* corpus = std::getenv("SLABWRIGHT_CORPUS");
     if (corpus == nullptr || *corpus == '\0') {
         std::printf("skipped: SLABWRIGHT_CORPUS is not set\n");
         return;
     }
-    for (const char* name :
-         {"castings/casting_cover", "castings/midget_crankcase_front_pattern", "castings/valve_body_half",
-          "castings/ribbed_base_plate", "castings/bearing_block", "castings/mold_cavity_ktool",
-          "pool/fanuc_1", "pool/fanuc_8"}) {
+    // A terrain of 2.6 m and a broken mesh are no patterns.
+    const auto no_pattern = [](const std::string& name) {
+        return name == "gmsh_terrain_open_2649m" || name == "mount_rushmore_broken";
+    };
+    std::vector<std::string> names;
+    for (const std::string folder : {"castings", "relief", "pool"})
+        for (const auto& file : std::filesystem::directory_iterator(std::string(corpus) + "/" + folder))
+            if (file.path().extension() == ".stl" && !no_pattern(file.path().stem().string()))
+                names.push_back(folder + "/" + file.path().stem().string());
+    std::sort(names.begin(), names.end());
+    std::size_t layers = 0;
+    for (const std::string& name : names) {
         SCOPED_TRACE(name);
         const std::string path = std::string(corpus) + "/" + name + ".stl";
         ASSERT_TRUE(std::filesystem::exists(path)) << path;
         Context context;
-        const Mesh mesh = read_mesh(context, path);
-        for (const bool bonded : {false, true})
-            expect_wood_at_joints(context, mesh.view(), layers_of(context, mesh.view(), {}, bonded));
+        ReadingOptions options;
+        options.repair = Repair::mend;
+        const Mesh mesh = read_pattern_mesh(context, path, options).mesh;
+        for (const bool bonded : {false, true}) {
+            const Plan plan = layers_of(context, mesh.view(), {}, bonded);
+            expect_wood_at_joints(context, mesh.view(), plan);
+            layers += plan.layers.size();
+        }
     }
+    std::printf("%zu meshes, %zu layers\n", names.size(), layers);
+    EXPECT_GE(names.size(), 50U);
 }
 
 // Bodies stacked on one another, whose faces lie as near the joint as rounding, or a careless export, leaves

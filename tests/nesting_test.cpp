@@ -129,6 +129,47 @@ TEST(Nesting, OffcutsAreUsedFirstAndOnce) {
               3);
 }
 
+// A piece that fits one offcut and no whole sheet finds it, whatever else would lie there; two of them do
+// not.
+TEST(Nesting, APieceThatOnlyAnOffcutHoldsIsLaidThereOrRefused) {
+    Context context;
+    NestRules rules;
+    std::vector<Loops> pieces(4, ring(40, 0));
+    pieces.push_back(ring(55, 0));
+    const Nest nest = nest_pieces(context, pieces, {110, 110}, {{140, 140}}, rules);
+    expect_apart(pieces, nest, rules);
+    EXPECT_EQ(nest.stock.at(static_cast<std::size_t>(nest.places[4].stock)).length, 140);
+    pieces.push_back(ring(55, 0));
+    EXPECT_THROW((void)nest_pieces(context, pieces, {110, 110}, {{140, 140}}, rules), Error);
+}
+
+// Changes of the order are kept where they are better, so more tries never take more.
+TEST(Nesting, MoreTriesNeverTakeMore) {
+    Context context;
+    std::mt19937 random(test::seed());
+    double first = 0, last = 0;
+    for (int round = 0; round < 4; ++round) {
+        std::vector<Loops> pieces;
+        for (int i = 0; i < 20; ++i) pieces.push_back(random_piece(random));
+        double before = 1e300;
+        for (const int tries : {1, 4, 64}) {
+            NestRules rules;
+            rules.tries = tries;
+            const Nest nest = nest_pieces(context, pieces, {500, 9000}, {}, rules);
+            expect_apart(pieces, nest, rules);
+            double high = 0;
+            for (std::size_t i = 0; i < pieces.size(); ++i)
+                for (const Point2 p : placed(pieces[i], nest.places[i]).points)
+                    high = std::max(high, to_mm(p.y));
+            EXPECT_LE(high, before + 2 * rules.cell) << tries;
+            before = high;
+            (tries == 1 ? first : last) += tries == 4 ? 0 : high;
+        }
+    }
+    std::printf("  %.0f mm of a strip in the first order, %.0f mm in the best of 64\n", first, last);
+    EXPECT_LT(last, first);
+}
+
 TEST(Nesting, IsTheSameOnAnyNumberOfThreadsAndRefusesWhatDoesNotFit) {
     std::vector<NestPlace> first;
     for (const int threads : {1, 4}) {

@@ -39,7 +39,8 @@ void write_plan_folder(const fs::path& out) {
     spit(out / "plan.json",
          R"({"schema": "slabwright.plan/1", "layers": [{"operations": [{"file": "nc/L1_01_face_T1.ngc"}]},
              {"operations": [{"file": "nc/L2_01_face_T1.ngc"}]}]})");
-    for (const char* name : {"tool.tbl", "sequence.json", "report.html", "verify.json"})
+    for (const char* name :
+         {"tool.tbl", "sequence.json", "report.html", "verify.json", "cut_list.csv", "cut_list.dxf"})
         spit(out / name, "x");
     for (const char* name : {"L1_01_face_T1.ngc", "L2_01_face_T1.ngc"}) spit(out / "nc" / name, "M2\n");
 }

@@ -87,12 +87,15 @@ std::string text_of(const Plan& plan) {
 /// @returns what differs, "" where nothing does
 std::string difference(const Plan& plan, const Layer& layer, const Operation& op) {
     const Dialect dialect = dialect_of(plan.job.machine);
-    const Program program =
+    Program program =
         read_program_text(program_text(plan, layer, op), op.file, dialect, gcode_limits(plan.job.tolerances));
+    const ProgramOrigin origin = program_origin(plan, layer);
+    for (ProgramStep& step : program.steps) step.x += to_mm(origin.x), step.y += to_mm(origin.y);
+    for (ProgramArc& arc : program.arcs) arc.arc.x += to_mm(origin.x), arc.arc.y += to_mm(origin.y);
     if (program.tool != op.tool || std::abs(program.spindle_rpm - op.spindle_rpm) > 0.5)
         return "another tool or speed";
     const std::vector<std::uint32_t> lines = move_lines(plan, layer, op);
-    const double up = to_mm(program_origin(plan.job, layer));
+    const double up = to_mm(origin.z);
     std::map<std::uint32_t, std::pair<std::size_t, std::size_t>> steps;  // of a line, first and last
     for (std::size_t s = 0; s < program.steps.size(); ++s) {
         const auto [at, first] = steps.emplace(program.steps[s].line, std::pair{s, s});
@@ -137,7 +140,7 @@ std::string difference(const Plan& plan, const Layer& layer, const Operation& op
     ProgramPlan said;
     said.spindle_rpm = op.spindle_rpm;
     said.blend = op.blend;
-    said.feeds = written_feed_lengths(dialect, op.moves, program_origin(plan.job, layer));
+    said.feeds = written_feed_lengths(dialect, op.moves, program_origin(plan, layer));
     Program raised = program;
     for (ProgramStep& step : raised.steps) step.z += up;
     for (ProgramArc& arc : raised.arcs) arc.arc.z += up;
@@ -200,9 +203,9 @@ std::string verdict(const Plan& plan, const std::string& text) {
         said.spindle_rpm = op.spindle_rpm;
         said.blend = op.blend;
         said.feeds = written_feed_lengths(dialect_of(plan.job.machine), op.moves,
-                                          program_origin(plan.job, plan.layers[0]));
+                                          program_origin(plan, plan.layers[0]));
         Program raised = program;
-        const double up = to_mm(program_origin(plan.job, plan.layers[0]));
+        const double up = to_mm(program_origin(plan, plan.layers[0]).z);
         for (ProgramStep& step : raised.steps) step.z += up;
         for (ProgramArc& arc : raised.arcs) arc.arc.z += up;
         if (program.tool != op.tool) return "tool";
@@ -275,9 +278,14 @@ TEST(Posts, RandomMovesReadBackTheSame) {
         const double top = 37 + std::uniform_int_distribution<int>(0, 9999)(random) * 1e-4;
         for (const Post post : kPosts)
             for (const LengthUnit units : kUnits) {
-                const Plan plan = plan_with(post, units, moves, top);
-                EXPECT_EQ(difference(plan, plan.layers[0], plan.layers[0].operations[0]), "")
-                    << name_of(post, units);
+                Plan plan = plan_with(post, units, moves, top);
+                plan.stock_min = {-123.45678, 17.00004};
+                plan.stock_max = {999.9, 17.5};
+                for (const WorkZero zero : {WorkZero::model, WorkZero::corner, WorkZero::centre}) {
+                    plan.job.machine.zero = zero;
+                    EXPECT_EQ(difference(plan, plan.layers[0], plan.layers[0].operations[0]), "")
+                        << name_of(post, units);
+                }
             }
     }
 }
@@ -342,13 +350,60 @@ TEST(Posts, EveryPlanPassesItsOwnProof) {
         }
 }
 
+TEST(Posts, TheZeroLiesWhereTheJobPutsIt) {
+    const PatternSource source(kModels + "half-sphere.stl");
+    for (const char* zero : {"corner", "centre"}) {
+        const TemporaryFolder folder;
+        const std::string out = folder / "out";
+        Context context;
+        const Job job =
+            job_from_toml(fmt::format("[machine]\nzero = \"{}\"\n[slabs]\nblanks = \"layer\"\n", zero), "t");
+        const Plan made = plan(context, source, job);
+        ASSERT_TRUE(write_verified(context, made, out, source, 1).passed) << zero;
+        const auto document = nlohmann::json::parse(slurp(out + "/plan.json"));
+        const bool corner = zero == std::string("corner");
+        for (const std::size_t k : {std::size_t{0}, std::size_t{1}})
+            EXPECT_NEAR(document["zero"][k].get<double>(),
+                        corner ? made.stock_min[k] : (made.stock_min[k] + made.stock_max[k]) / 2, 1e-4);
+        // The first layer's slab begins at the corner, or as far left of its middle as right of it.
+        const double left = corner ? 0 : -(made.stock_max[0] - made.stock_min[0]) / 2;
+        nlohmann::json steps = nlohmann::json::parse(slurp(out + "/sequence.json"));
+        bool touched = false;
+        for (auto& step : steps["steps"])
+            if (step["action"] == "touch_off" && !touched) {
+                touched = true;
+                EXPECT_NEAR(step["slab_left_mm"].get<double>(), left, 1e-3);
+                step["slab_left_mm"] = left + 1;
+            }
+        ASSERT_TRUE(touched);
+        const auto codes = [&] {
+            std::string found;
+            for (const Violation& v :
+                 verify_folder(context, out, {.source = source, .cell = 1}).report.violations)
+                if (found.find(v.code) == std::string::npos) found += v.code + " ";
+            return found;
+        };
+        const std::string sequence = slurp(out + "/sequence.json"), text = slurp(out + "/plan.json");
+        spit(out + "/sequence.json", steps.dump());
+        EXPECT_EQ(codes(), "sequence.touch_off ") << zero;
+        spit(out + "/sequence.json", sequence);
+        // Programs that count from elsewhere do not make the part.
+        auto moved = document;
+        moved["zero"][0] = document["zero"][0].get<double>() + 1;
+        spit(out + "/plan.json", moved.dump());
+        EXPECT_NE(codes().find("gouge.cutter"), std::string::npos) << zero;
+    }
+}
+
 TEST(Posts, ALayerIsMadeAgainInEachDialect) {
     for (const Post post : kPosts) {
         const TemporaryFolder folder;
         const std::string out = folder / "out";
         Context context;
-        const Plan made =
-            plan(context, PatternSource(kModels + "half-sphere.stl"), job_for(post, LengthUnit::inch));
+        Job job = job_for(post, LengthUnit::inch);
+        job.machine.zero = WorkZero::corner;
+        job.slabs.blanks = Blanks::layer;
+        const Plan made = plan(context, PatternSource(kModels + "half-sphere.stl"), job);
         write(context, made, out);
         EXPECT_EQ(schema_complaint(slurp(out + "/plan.json"), SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
                   "");

@@ -48,6 +48,32 @@ TEST(Quote, SaysWhatThePlanSays) {
     }
 }
 
+TEST(Quote, ReckonsBoardsAndMoneyAsThePlanDoes) {
+    Context context;
+    const support::TemporaryFolder folder;
+    const std::string stl = folder / "half-sphere.stl";
+    write_stl(stl, weld(context, half_sphere()));
+    for (const Blanks blanks : {Blanks::pattern, Blanks::layer}) {
+        Job job;
+        job.slabs.blanks = blanks;
+        const QuotedModel free = quote_model(context, stl, job);
+        EXPECT_FALSE(free.quote.cost);
+        EXPECT_EQ(quote_text(free).find("cost"), std::string::npos);
+        job.prices = {"EUR", {20}, 0, 0, 60};
+        const QuotedModel priced = quote_model(context, stl, job);
+        const Plan planned = plan(context, stl, job);
+        const CutList list = cut_list(planned);
+        EXPECT_NEAR(priced.quote.boards.sawn_m2(), list.sawn_m2(), 1e-9);
+        EXPECT_NEAR(priced.quote.slab_m2,
+                    list.sawn_m2() - list.blanks[0].size.length * list.blanks[0].size.width * 1e-6, 1e-9);
+        ASSERT_TRUE(priced.quote.cost);
+        EXPECT_NEAR(*priced.quote.cost->boards, *cost_of(job, amounts_of(planned, list))->boards, 1e-9);
+        EXPECT_NEAR(*priced.quote.cost->machine, priced.quote.build_minutes, 1e-9);
+        EXPECT_NE(quote_text(priced).find("EUR (boards"), std::string::npos) << quote_text(priced);
+        EXPECT_NE(quote_json(priced).find("\"total\""), std::string::npos);
+    }
+}
+
 TEST(Quote, TakesTheThinnestSlabThatHoldsALayer) {
     Context context;
     const support::TemporaryFolder folder;

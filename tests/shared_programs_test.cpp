@@ -141,14 +141,14 @@ std::string verdict(const Plan& plan, const std::string& text) {
     try {
         std::vector<Program> programs =
             read_planned_operations(text, std::string(file_of(layer.operations[0].file)), plan.job, count);
-        const double up = to_mm(program_origin(plan.job, layer));
+        const double up = to_mm(program_origin(plan, layer));
         for (std::size_t k = 0; k < count; ++k) {
             const Operation& op = layer.operations[k];
             ProgramPlan said;
             said.spindle_rpm = op.spindle_rpm;
             said.blend = op.blend;
             said.feeds =
-                written_feed_lengths(dialect_of(plan.job.machine), op.moves, program_origin(plan.job, layer));
+                written_feed_lengths(dialect_of(plan.job.machine), op.moves, program_origin(plan, layer));
             for (ProgramStep& step : programs[k].steps) step.z += up;
             for (ProgramArc& arc : programs[k].arcs) arc.arc.z += up;
             if (programs[k].tool != op.tool) return "tool";

@@ -105,6 +105,48 @@ TEST(Tools, ALayerIsNeverSlowerThanWithTheFixedSet) {
     for (const Layer& layer : fixed.layers) EXPECT_FALSE(layer.selection.has_value());
 }
 
+// A library with a slender ball and a stout one as wide: where the slender one would bend too far at any feed
+// and depth, the stout one is taken, though it were slower; and no warning is left.
+TEST(Tools, AStifferTwinIsTakenWhereTheCutterWouldBend) {
+    Context context;
+    const Mesh mesh = test::height_field(context, 30, 1.5, [](double x, double y) {
+        return std::abs(x) < 4.5 && std::abs(y) < 20 ? 2.0 : 14.0;
+    });
+    Job job;
+    job.slabs.thicknesses = {15};
+    Tool slender = job.tools[2];
+    slender.number = 7;
+    slender.stickout = 110;
+    job.tools.insert(job.tools.begin() + 2, slender);
+    const auto bends = [](const Plan& plan) {
+        return std::count_if(plan.diagnostics.begin(), plan.diagnostics.end(),
+                             [](const Diagnostic& d) { return d.code == "cut.deflection"; });
+    };
+    job.selection.mode = SelectionMode::fixed;
+    EXPECT_GT(bends(make_plan(context, mesh, {}, job)), 0);
+    job.selection.mode = SelectionMode::select;
+    const Plan plan = make_plan(context, mesh, {}, job);
+    EXPECT_EQ(bends(plan), 0);
+    for (const Layer& layer : plan.layers)
+        for (const Operation& op : layer.operations) EXPECT_NE(op.tool, 7) << op.purpose;
+}
+
+TEST(Tools, AStifferTwinHasTheSameWidthAndLessStickOut) {
+    Job job;
+    Tool shorter = job.tools[2], thinner = job.tools[1];
+    shorter.number = 7, shorter.stickout -= 8, shorter.stepdown_max -= 0.5;
+    thinner.number = 8, thinner.diameter -= 1, thinner.stickout -= 20;
+    const LayerTools fixed = fixed_tools(job);
+    EXPECT_FALSE(stiffer_tools(job, fixed));
+    job.tools.push_back(shorter);
+    job.tools.push_back(thinner);
+    const std::optional<LayerTools> stiffer = stiffer_tools(job, fixed);
+    ASSERT_TRUE(stiffer);
+    EXPECT_EQ(stiffer->finish.number, 7);
+    EXPECT_EQ(stiffer->finish.stepdown_max, shorter.stepdown_max);
+    EXPECT_EQ(stiffer->rough.number, fixed.rough.number);
+}
+
 // One narrow place does not decide for the layer: the small tools cut there and nowhere else, and with their
 // changes counted the layer takes less time than if they cut all of it.
 TEST(Tools, ANarrowSlotIsCutBySmallToolsAlone) {

@@ -28,6 +28,7 @@
 #include "tools/bond_command.h"
 #include "tools/plan_text.h"
 #include "tools/prepare_command.h"
+#include "tools/print_pdf.h"
 #include "tools/progress_bar.h"
 #include "tools/resume_command.h"
 #include "tools/sheets_command.h"
@@ -47,6 +48,7 @@ extern "C" void on_signal(int signal) {
 
 struct Options {
     PrepareOptions prepare;
+    std::string pdf;  ///< of the setup sheets; "": none
     std::string orient, repair, stl, out, maps, access_maps, job_file, tools, units, strategy, finder, device,
         library;
     int threads = 0, plans = 3;
@@ -251,6 +253,7 @@ bool run_verify(const Options& options) {
 void run_report(const Options& options) {
     with_context(options, [&](Context& context) {
         report(context, options.out, options.stl, !options.no_3d, options.size_limit_mb);
+        if (!options.pdf.empty()) print_pdf(options.out + "/report.html", options.pdf);
         return options.json ? report_summary_json(options.out) : options.out + "/report.html\n";
     });
 }
@@ -417,6 +420,8 @@ CLI::App* add_report_command(CLI::App& app, Options& options) {
     command->add_option("OUT", options.out, "folder of the plan")->required();
     command->add_option("--stl", options.stl, "the pattern; the file that plan.json names, if not given");
     command->add_flag("--no-3d", options.no_3d, "a light page: no model, no paths");
+    command->add_option("--pdf", options.pdf,
+                        "the setup sheets as PDF too, printed by an installed Chromium");
     command
         ->add_option("--size-limit", options.size_limit_mb,
                      "MB that the page may have; detail is left out to keep to it")

@@ -45,6 +45,7 @@ std::string summary(const Plan& plan, const std::string& out) {
     for (const Layer& layer : plan.layers) slabs[layer.slab_thickness / layer.slabs] += layer.slabs;
     for (const auto& [thickness, count] : slabs)
         text += fmt::format("slabs   {} of {} mm {}\n", count, number(thickness, 3), plan.job.material.name);
+    text += wood_document(plan);
     for (const Tool& tool : plan.job.tools) {
         double minutes = 0;
         std::set<std::string_view> used;  // the programs that it is used in

@@ -155,7 +155,7 @@ SheetJob sheet_job(const SheetsOptions& options) {
     job.nesting.margin = options.margin;
     if (options.grain) job.nesting.turns = {0, 180};
     job.stock = {options.stock[0], options.stock[1]};
-    job.nesting.cell = std::max(2.0, std::max(options.stock[0], options.stock[1]) / 2000);
+    job.nesting.cell = std::max(1.0, std::max(options.stock[0], options.stock[1]) / 2000);
     job.axis = options.axis[0];
     job.lead = options.lead;
     job.feed = options.feed;

@@ -28,6 +28,7 @@ constexpr int kMostRounds = 6;          // of dividing
 constexpr double kMostAdded = 2;        // of an operation's way, that rounds after the first may add
 constexpr double kAlwaysAdded = 3000;   // mm that they may add in any case
 constexpr double kThinnerShell = 0.35;  // of a ball's lowest pass, from round to round
+constexpr double kSide = 0.75;          // of the diameter: higher, a ball cuts with its side
 
 /// What a layer's stretches are kept in while they are looked at, of any content.
 struct SeenMemory {
@@ -113,25 +114,35 @@ std::vector<DeepRun> deep_runs(const std::vector<SeenStretch>& seen, const Opera
     for (const SeenStretch& s : seen)
         if (s.overhang > 0 && load(s, 1).wood > 1 && passes_for_wood(s, 2, load) == 0) lost.insert(column(s));
     std::vector<DeepRun> runs;
+    double hardest = 0;  // of the last run
     for (const SeenStretch& s : seen) {
         if (!s.cuts || s.depth < 4 * kLeastDepth) continue;
         const CutLoad whole = load(s, 1);
+        // What a ball cuts with its side is divided by height. Below that a raised pass leaves a shell as
+        // thick as it is raised, which has thinner chips; what is too much still gets a thinner one.
+        const bool shell = ball && (s.depth < kSide * diameter || round > 1);
         int passes = 0;
         if (whole.side() > 1)
-            passes = std::clamp(static_cast<int>(std::ceil(whole.side())) + round, 2, kMostPasses);
+            passes = std::clamp(static_cast<int>(std::ceil(whole.side())) + (ball && !shell ? 0 : round), 2,
+                                kMostPasses);
         if (whole.wood > 1 && !lost.contains(column(s)))
             passes = std::max(passes, passes_for_wood(s, passes, load));
         if (passes == 0) continue;
-        // A ball takes a shell as thick as its lowest pass is raised: what is too much still gets a thinner
-        // one.
-        const double depth = ball ? s.depth * std::pow(kThinnerShell, round) : s.depth;
+        const double thick = s.depth - s.low, depth = shell  ? s.low + thick * std::pow(kThinnerShell, round)
+                                                      : ball ? thick
+                                                             : s.depth;
+        const PassShares shares = shell ? PassShares::growing : PassShares::equal;
         if (!runs.empty() && s.first <= runs.back().last + 1) {
             DeepRun& run = runs.back();
             run.last = std::max(run.last, s.last);
-            run.depth_mm = std::max(run.depth_mm, depth);
             run.passes = std::max(run.passes, passes);
+            // The hardest cut of a run says how it is divided.
+            if (run.shares == shares) run.depth_mm = std::max(run.depth_mm, depth);
+            else if (whole.side() > hardest) run.depth_mm = depth, run.shares = shares;
+            hardest = std::max(hardest, whole.side());
         } else {
-            runs.push_back({s.first, s.last, depth, passes, ball ? PassShares::growing : PassShares::equal});
+            runs.push_back({s.first, s.last, depth, passes, shares});
+            hardest = whole.side();
         }
     }
     // A run goes by feed and in the plane from end to end.
@@ -266,6 +277,7 @@ public:
             if (s.wall_n > 0)
                 if (const double wall = s.wall_load(bent()); wall > hardest.load)
                     hardest = {wall, bent().in_plane_n, wall_push(s, op_, tool_)};
+            if (feed == s.feed) cuts.strain = std::max(cuts.strain, choice_.load(s, 1).side());
             if (!listed.insert({s.fine, static_cast<double>(feed)}).second) continue;
             cuts.cuts.push_back(segment_of(s.fine, choice_.cutting().idle(), tool_, feed, kFine));
             cuts.places.push_back(s.at);
@@ -369,8 +381,9 @@ double bending_limit(const Operation& operation, const Job& job) {
 LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const WoodLimits& limits,
                       std::vector<Diagnostic>& diagnostics, KnownCuts* known_cuts, FeedChange change) {
     const Job& job = plan.job;
-    StandingSlab slab(plan.stock_min, plan.stock_max, layer.z_bottom, layer.z_bottom + layer.slab_thickness,
-                      StandingSlab::cell_for(job, plan.stock_min, plan.stock_max));
+    const Blank blank = slab_of(plan, layer);
+    StandingSlab slab(blank.min, blank.max, layer.z_bottom, layer.z_bottom + layer.slab_thickness,
+                      StandingSlab::cell_for(job, blank.min, blank.max));
     const MemoryCharge memory(context, 3 * slab.bytes(), "the stock that forces are computed from");
     LayerCuts result;
     // What one operation leaves to the next, for its memory only.

@@ -22,6 +22,7 @@ namespace slabwright {
 namespace {
 
 constexpr double kSelectionShare = 0.3;  // of a layer's work, where its tools are chosen
+constexpr double kStrained = 1.03;       // of a limit: within that, what a plan states may hold
 constexpr double kFirstSetsShare =
     0.4;  // of what then remains, the sets of the choice; those that they lead to take the rest
 
@@ -32,6 +33,7 @@ struct Trial {
     std::optional<double> left_mm2;  // none: given up before all its paths were planned
     bool leaves_more = false;        // than the first set
     bool whole = true;               // false: given up, its feeds were not adapted
+    bool strained = false;           // cutter, spindle or a thin wall bear more than they may
 };
 
 double minutes_of(const Layer& layer, const Machine& machine) {
@@ -72,8 +74,9 @@ public:
         work_.z_bottom = layer_.z_bottom;
         work_.z_top = layer_.z_top;
         work_.slab_thickness = layer_.slab_thickness;
-        work_.stock_min = plan.stock_min;
-        work_.stock_max = plan.stock_max;
+        const Blank slab = slab_of(plan, layer_);
+        work_.stock_min = slab.min;
+        work_.stock_max = slab.max;
         work_.index = layer_.index;
         work_.stock_memory = ground.stock_memory;
         if (ground.drilled != nullptr) work_.drilled = *ground.drilled;
@@ -81,8 +84,7 @@ public:
         fitted_.tolerances.gouge -= ground.mesh_gap;
         work_.flats = flats_between(layer_.z_bottom);
         work_.floor_below = layer_.z_bottom - (ground.carried_by ? overrun_.below : overrun_.board);
-        if (ground.carried_by)
-            overhang_ = overhang_map({&ground.carried_by, 1}, plan.stock_min, plan.stock_max);
+        if (ground.carried_by) overhang_ = overhang_map({&ground.carried_by, 1}, slab.min, slab.max);
         if (!ground.walls.empty())
             walls_.emplace(ground.walls, plan.job.material.strength_mpa, widest_beside_walls(plan.job),
                            plan.job.cutting.wall_allowance);
@@ -105,6 +107,12 @@ public:
                 sets_.push_back({"wider rough", std::move(tools)});
             try_sets(first, middle, 1);
         }
+        if (selecting && compare && best_->strained)
+            if (std::optional<LayerTools> stiffer = stiffer_tools(fitted_, sets_[chosen_].tools)) {
+                const std::size_t first = sets_.size();
+                sets_.push_back({"stiffer", std::move(*stiffer)});
+                try_sets(first, 1, 1);
+            }
         if (selection_) give_reasons();
         best_->planned.layer.selection = std::move(selection_);
         progress_.reach(1);
@@ -202,6 +210,7 @@ private:
                                          {overhang_ ? &*overhang_ : nullptr, walls_ ? &*walls_ : nullptr},
                                          trial.planned.diagnostics, ground_.known_cuts);
         if (compared) trial.minutes = minutes_of(layer, job.machine);
+        trial.strained = trial.planned.cuts.strain > kStrained;
         return trial;
     }
 
@@ -224,16 +233,27 @@ private:
             else if (!trial.whole)
                 set.reason = fmt::format("its paths alone take {:.1f} min, against {:.1f} min", trial.minutes,
                                          best_->minutes);
+            else if (trial.strained)
+                set.reason =
+                    fmt::format("cutter, spindle or a thin wall would bear {:.2f} times what they may",
+                                trial.planned.cuts.strain);
         }
-        if (!best_ || (trial.whole && !trial.leaves_more && trial.minutes < best_->minutes))
+        // What holds is better than what is fast.
+        if (!best_ || (trial.whole && !trial.leaves_more &&
+                       std::pair(trial.strained, trial.minutes) < std::pair(best_->strained, best_->minutes)))
             best_ = std::move(trial), chosen_ = s;
     }
 
     void give_reasons() {
         ToolSet& chosen = selection_->sets[chosen_];
         chosen.chosen = true;
-        chosen.reason =
-            sets_.size() > 1 ? "takes the least time of those that leave no more" : "not compared";
+        const bool faster =
+            std::any_of(selection_->sets.begin(), selection_->sets.end(), [&](const ToolSet& s) {
+                return !s.chosen && s.minutes < chosen.minutes && s.reason.starts_with("cutter");
+            });
+        chosen.reason = sets_.size() == 1 ? "not compared"
+                        : faster ? "takes the least time of those that leave no more and bear what they must"
+                                 : "takes the least time of those that leave no more";
         for (ToolSet& set : selection_->sets)
             if (set.reason.empty())
                 set.reason = fmt::format("takes {:.1f} min longer", set.minutes - chosen.minutes);

@@ -74,14 +74,22 @@ void leave_local_frame(Plan& plan, const std::array<double, 2>& by) {
             }
             if (op.peak_at) move(*op.peak_at, by);
         }
+        if (layer.blank) {
+            move(layer.blank->min, by);
+            move(layer.blank->max, by);
+        }
         for (Joint& joint : layer.joints) {
             move(joint.centroid, by);
             move(joint.glue, units);
         }
     }
+    // Edges count from the model's zero or from a place that moves with all else.
+    const bool of_model = plan.job.machine.zero == WorkZero::model;
     for (SequenceStep& step : plan.sequence)
-        for (auto& [name, number] : step.numbers)
-            if (name == "x_mm" || name == "y_mm") number += by[name == "x_mm" ? 0 : 1];
+        for (auto& [name, number] : step.numbers) {
+            if (name == "x_mm" || (of_model && name == "slab_left_mm")) number += by[0];
+            if (name == "y_mm" || (of_model && name == "slab_front_mm")) number += by[1];
+        }
     for (Diagnostic& d : plan.diagnostics)
         if (d.where) move(*d.where, by);
 }

@@ -20,6 +20,8 @@
 #include "engine/planner/local_frame.h"
 #include "engine/planner/rating.h"
 #include "engine/prepare/drilled_holes.h"
+#include "engine/schedule/blanks.h"
+#include "engine/schedule/cut_list.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
@@ -361,6 +363,7 @@ std::optional<Mesh> prop(Context& context, Plan& plan, MeshView pattern,
         if (more.empty()) break;
         plan.supports.insert(plan.supports.end(), more.begin(), more.end());
         propped = with_supports(context, pattern, plan.supports);
+        saw_blanks(context, propped->view(), plan);
         joints = wood_at_joints(context, propped->view(), plan);
     }
     for (const Support& s : plan.supports)
@@ -383,12 +386,14 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
                             placement.diagnostics.end());
     warn_of_overhang(plan, request, placement.boundaries);
     plan.layers = layers_between(plan.job, placement.boundaries);
-    check_chambers(plan);
     settle_undercuts(context, plan, pattern, origin);
     if (plan.job.flask.enabled) plan.flask = place_flask(context, pattern, plan);
+    saw_blanks(context, pattern, plan);
+    check_chambers(plan);
     std::vector<std::vector<JointWood>> joints = wood_at_joints(context, pattern, plan);
     const std::optional<Mesh> propped = prop(context, plan, pattern, joints);
     if (propped) pattern = propped->view();
+    (void)cut_list(plan);  // every slab is on a board
     bond_layers(context, plan, joints, origin);
     const std::vector<std::vector<StandingFoot>> feet = standing_feet(context, plan, joints);
     cut_layers(context, plan, pattern, joints, feet, share);

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "engine/plan.h"
+#include "engine/schedule/blanks.h"
 #include "engine/schedule/fit.h"
 #include "engine/tools/tools.h"
 #include "kernels/cutting/cusp.h"
@@ -52,6 +53,26 @@ double perimeter(std::span<const Point2> loop) {
     return sum;
 }
 
+/// Layers with the slabs that they are milled from, of the stocked thicknesses.
+std::vector<Layer> slabbed_layers(const Slabs& slabs, const std::vector<double>& tops) {
+    std::vector<Layer> layers;
+    double bottom = 0;
+    for (const double top : tops) {
+        const double height = top - bottom;
+        const auto fits = std::find_if(slabs.thicknesses.begin(), slabs.thicknesses.end(),
+                                       [&](double t) { return t - slabs.facing_allowance >= height - 1e-9; });
+        const double slab = fits != slabs.thicknesses.end() ? *fits : slabs.thicknesses.back();
+        Layer& layer = layers.emplace_back();
+        layer.index = static_cast<int>(layers.size());
+        layer.z_bottom = bottom;
+        layer.z_top = bottom = top;
+        layer.slabs =
+            std::max(1, static_cast<int>(std::ceil((height + slabs.facing_allowance) / slab - 1e-9)));
+        layer.slab_thickness = layer.slabs * slab;
+    }
+    return layers;
+}
+
 /// The surface's ways by its slope.
 void add_surface(MeshView mesh, const Job& job, const LayerTools& tools, Ways& ways) {
     const double ball = tools.finish.diameter / 2, cusp = job.tolerances.cusp;
@@ -84,7 +105,9 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
     Quote result;
     result.outcome = layers.lying;
     result.stock = {plan.stock_max[0] - plan.stock_min[0], plan.stock_max[1] - plan.stock_min[1]};
-    const double stock_mm2 = result.stock[0] * result.stock[1];
+    plan.layers = slabbed_layers(job.slabs, layers.tops);
+    saw_blanks(context, mesh, plan);
+    result.boards = cut_list(plan);
 
     std::vector<Plane> planes;
     double bottom = 0;
@@ -99,17 +122,13 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
     Ways ways;
     std::map<double, int> slabs;
     double stack_mm3 = 0;
-    bottom = 0;
     for (std::size_t l = 0; l < layers.tops.size(); ++l) {
-        const double top = layers.tops[l], height = top - bottom;
-        const std::vector<double>& stocked = job.slabs.thicknesses;
-        const auto fits = std::find_if(stocked.begin(), stocked.end(), [&](double t) {
-            return t - job.slabs.facing_allowance >= height - 1e-9;
-        });
-        const double slab = fits != stocked.end() ? *fits : stocked.back();
-        const int together =
-            std::max(1, static_cast<int>(std::ceil((height + job.slabs.facing_allowance) / slab - 1e-9)));
+        const Layer& layer = plan.layers[l];
+        const double height = layer.z_top - layer.z_bottom, stock_mm2 = slab_of(plan, layer).mm2();
+        const int together = layer.slabs;
+        const double slab = layer.slab_thickness / together;
         slabs[slab] += together;
+        result.slab_m2 += together * stock_mm2 * 1e-6;
         stack_mm3 += stock_mm2 * slab * together;
         std::array<double, 3> area_at{};
         for (std::size_t k = 3; k-- > 0;) {
@@ -130,16 +149,12 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
         const double below = l == 0 ? area_at[0] : area(simplify(sections[3 * l - 1].loops));
         result.glue_m2 += std::min(area_at[0], below) * 1e-6;
         result.bonding_minutes += together * (job.bonding.handling_s + job.bonding.press_time_s) / 60;
-        bottom = top;
     }
     add_surface(mesh, job, tools, ways);
-    for (const auto& [thickness, count] : slabs) {
-        result.slabs.push_back({thickness, count});
-        result.slab_m2 += count * stock_mm2 * 1e-6;
-    }
+    for (const auto& [thickness, count] : slabs) result.slabs.push_back({thickness, count});
     const double layer_count = static_cast<double>(layers.tops.size());
-    result.mass_kg =
-        (stack_mm3 + stock_mm2 * job.machine.base_board_thickness) * 1e-9 * job.material.density_kg_m3;
+    result.mass_kg = (stack_mm3 + result.stock[0] * result.stock[1] * job.machine.base_board_thickness) *
+                     1e-9 * job.material.density_kg_m3;
     const auto work = [&](std::string_view name, double mm, const Tool& tool, double rate) {
         const double ideal = mm / std::min(tool.max_feed, job.machine.max_feed);
         result.work.push_back({name, ideal, rate * ideal});
@@ -153,6 +168,10 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
     result.bonding_minutes += job.bonding.glue_s_per_m2 * result.glue_m2 / 60;
     result.tool_change_minutes = kChanges * layer_count * job.machine.tool_change_s / 60;
     result.build_minutes = result.cutting_minutes + result.bonding_minutes + result.tool_change_minutes;
+    Amounts amounts = amounts_of(plan, result.boards);
+    amounts.glue_m2 = result.glue_m2;
+    amounts.minutes = result.build_minutes;
+    result.cost = cost_of(job, amounts);
     return result;
 }
 

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "engine/job.h"
 #include "engine/planner/ways_out.h"
+#include "engine/schedule/cut_list.h"
 #include "kernels/mesh/mesh.h"
 #include "kernels/parallel/context.h"
 
@@ -27,7 +29,7 @@ struct QuotedSlabs {
 
 struct Quote {
     Lying outcome;
-    std::array<double, 2> stock{};  ///< of each slab, mm
+    std::array<double, 2> stock{};  ///< of the base board and the largest slab, mm
     std::vector<QuotedSlabs> slabs;
     double slab_m2 = 0;  ///< of all slabs
     double glue_m2 = 0;  ///< on all joints and the board
@@ -36,6 +38,8 @@ struct Quote {
     /// Of four builds in five the time lies within this share of what is quoted.
     double spread = 0.25;
     double cutting_minutes = 0, bonding_minutes = 0, tool_change_minutes = 0, build_minutes = 0;
+    CutList boards;
+    std::optional<Cost> cost;  ///< none where the job states no price
 };
 
 /// Reckons a build from the layers that a plan would have, sections in each and the surface by its slope: no

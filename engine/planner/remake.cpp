@@ -44,6 +44,7 @@ Plan bare_plan(const BuildPlan& build) {
         layer.z_top = from.z_top;
         layer.slab_thickness = from.slab_thickness;
         layer.slabs = from.slabs;
+        layer.blank = from.blank;
     }
     return plan;
 }
@@ -138,7 +139,7 @@ public:
             table.numbers = {{"table_height_mm", heights.table}, {"work_offset_z_mm", heights.work_offset}};
         }
         if (!set || !touched)
-            follow(layer.index, "touch_off", 0).numbers = {{"slab_top_mm", top - heights.origin}};
+            say_touch_off(follow(layer.index, "touch_off", 0), plan_, layer, top - heights.origin);
         if (spindle_tool_ != operation.tool) {
             say_tool(follow(layer.index, "tool_change", machine_.tool_change_s), operation.tool, machine_);
             spindle_tool_ = operation.tool;
@@ -154,11 +155,8 @@ public:
         base_ = last_;
         std::map<int, std::size_t> place;
         for (std::size_t l = 0; l < plan_.layers.size(); ++l) place[plan_.layers[l].index] = l;
-        std::vector<double> slabs;
-        for (std::size_t l = layer; l < plan_.layers.size(); ++l)
-            for (int k = 0; k < plan_.layers[l].slabs; ++k)
-                slabs.push_back(plan_.layers[l].slab_thickness / plan_.layers[l].slabs);
-        loads_ = feed_loads(machine_, slabs, slab_mass_kg(plan_, 1));
+        const std::vector<FeedSlab> slabs = feed_slabs(plan_, layer);
+        loads_ = feed_loads(machine_, slabs);
         for (const SequenceStep& step : request_.own.steps)
             if (const auto at = place.find(step.layer); at != place.end() && at->second >= layer)
                 build(step, slabs);
@@ -189,7 +187,7 @@ private:
     }
 
     /// A plan's own step, with its needs in the new numbers. Loads and changes of tool are made anew.
-    void build(const SequenceStep& own, const std::vector<double>& slabs) {
+    void build(const SequenceStep& own, const std::vector<FeedSlab>& slabs) {
         std::set<int> needs;
         for (const int need : own.needs) {
             const auto known = now_.find(need);
@@ -226,18 +224,21 @@ private:
         steps_.push_back(std::move(step));
     }
 
-    int load(int layer, const std::vector<double>& slabs) {
+    int load(int layer, const std::vector<FeedSlab>& slabs) {
         left_ = loads_[next_load_++];
         feed_height_ = 0;
-        for (int k = 0; k < left_; ++k) feed_height_ += slabs[next_slab_ + static_cast<std::size_t>(k)];
+        double kg = 0;
+        for (int k = 0; k < left_; ++k) {
+            feed_height_ += slabs[next_slab_ + static_cast<std::size_t>(k)].thickness;
+            kg += slabs[next_slab_ + static_cast<std::size_t>(k)].kg;
+        }
         SequenceStep& step = add(layer, "load_feed", {last_taken_ == 0 ? base_ : last_taken_}, 0);
-        step.numbers = {
-            {"slabs", left_}, {"height_mm", feed_height_}, {"mass_kg", slab_mass_kg(plan_, feed_height_)}};
+        step.numbers = {{"slabs", left_}, {"height_mm", feed_height_}, {"mass_kg", kg}};
         return step.id;
     }
 
-    void take_slab(const std::vector<double>& slabs) {
-        if (left_ > 0) feed_height_ = --left_ == 0 ? 0 : feed_height_ - slabs[next_slab_];
+    void take_slab(const std::vector<FeedSlab>& slabs) {
+        if (left_ > 0) feed_height_ = --left_ == 0 ? 0 : feed_height_ - slabs[next_slab_].thickness;
         ++next_slab_;
     }
 

@@ -35,7 +35,8 @@ std::vector<Diagnostic> load(Context& context, const Plan& plan, Layer& layer, c
     alone.job = plan.job;
     alone.stock_min = plan.stock_min, alone.stock_max = plan.stock_max;
     std::optional<OverhangMap> overhang;
-    if (carried_by != nullptr) overhang = overhang_map({&carried_by, 1}, plan.stock_min, plan.stock_max);
+    const Blank slab = slab_of(plan, layer);
+    if (carried_by != nullptr) overhang = overhang_map({&carried_by, 1}, slab.min, slab.max);
     alone.layers.push_back(std::move(layer));
     const WallMap walls(feet, plan.job.material.strength_mpa, widest_beside_walls(plan.job),
                         plan.job.cutting.wall_allowance);

@@ -52,17 +52,31 @@ double table_seconds(const Machine& machine, double from, double to) {
     return machine.table == BuildTable::moving ? std::abs(to - from) / machine.table_speed * 60 : 0;
 }
 
-double slab_mass_kg(const Plan& plan, double thickness) {
-    return (plan.stock_max[0] - plan.stock_min[0]) * (plan.stock_max[1] - plan.stock_min[1]) * thickness *
-           1e-9 * plan.job.material.density_kg_m3;
+double slab_mass_kg(const Plan& plan, const Blank& blank, double thickness) {
+    return blank.mm2() * thickness * 1e-9 * plan.job.material.density_kg_m3;
+}
+
+double board_mass_kg(const Plan& plan) {
+    return slab_mass_kg(plan, {plan.stock_min, plan.stock_max}, plan.job.machine.base_board_thickness);
+}
+
+std::vector<FeedSlab> feed_slabs(const Plan& plan, std::size_t from_layer) {
+    std::vector<FeedSlab> slabs;
+    for (std::size_t l = from_layer; l < plan.layers.size(); ++l) {
+        const Layer& layer = plan.layers[l];
+        const double each = layer.slab_thickness / layer.slabs;
+        slabs.insert(slabs.end(), static_cast<std::size_t>(layer.slabs),
+                     FeedSlab{each, slab_mass_kg(plan, slab_of(plan, layer), each)});
+    }
+    return slabs;
 }
 
 std::vector<int> feed_loads(const Plan& plan) {
     const Machine& machine = plan.job.machine;
     if (machine.feed_height == 0) return {};
-    std::vector<double> slabs;
     for (const Layer& layer : plan.layers) {
-        const double slab = layer.slab_thickness / layer.slabs, weight = slab_mass_kg(plan, slab);
+        const double slab = layer.slab_thickness / layer.slabs,
+                     weight = slab_mass_kg(plan, slab_of(plan, layer), slab);
         const std::string place = fmt::format("layer {}", layer.index);
         if (slab > machine.feed_height + kSlack)
             throw refusal("machine.feed_height",
@@ -77,17 +91,15 @@ std::vector<int> feed_loads(const Plan& plan) {
                             "table's machine.feed_mass_kg of {:.1f} kg",
                             layer.index, weight, weight - machine.feed_mass_kg, machine.feed_mass_kg),
                 place, "take thinner slabs, or lay them by hand (machine.feed_height = 0)");
-        slabs.insert(slabs.end(), static_cast<std::size_t>(layer.slabs), slab);
     }
-    return feed_loads(machine, slabs, slab_mass_kg(plan, 1));
+    return feed_loads(machine, feed_slabs(plan));
 }
 
-std::vector<int> feed_loads(const Machine& machine, std::span<const double> slabs, double kg_per_mm) {
+std::vector<int> feed_loads(const Machine& machine, std::span<const FeedSlab> slabs) {
     std::vector<int> loads;
     if (machine.feed_height == 0) return loads;
     double height = INFINITY, mass = INFINITY;
-    for (const double slab : slabs) {
-        const double weight = slab * kg_per_mm;
+    for (const auto& [slab, weight] : slabs) {
         if (height + slab > machine.feed_height + kSlack || mass + weight > machine.feed_mass_kg) {
             loads.push_back(0);
             height = mass = 0;

@@ -26,17 +26,26 @@ struct LayerHeights {
 /// Seconds that the table takes from one height to another; 0 where it is fixed.
 [[nodiscard]] double table_seconds(const Machine& machine, double from, double to);
 
-/// kg of a whole board or slab of this thickness, as large as the plan's stock.
-[[nodiscard]] double slab_mass_kg(const Plan& plan, double thickness);
+/// kg of a slab of this size and thickness.
+[[nodiscard]] double slab_mass_kg(const Plan& plan, const Blank& blank, double thickness);
+/// kg of the base board, which is as large as the plan's stock.
+[[nodiscard]] double board_mass_kg(const Plan& plan);
+
+/// A slab in the feed chamber.
+struct FeedSlab {
+    double thickness = 0;  ///< mm
+    double kg = 0;
+};
+
+/// Every slab of the build from a layer on, in the order in which they are taken.
+[[nodiscard]] std::vector<FeedSlab> feed_slabs(const Plan& plan, std::size_t from_layer = 0);
 
 /// How many slabs are stacked in the feed chamber at a time: as many as its height and its table's load
 /// allow, in the order of the build. Empty where slabs are laid by hand.
 /// @throws as check_chambers
 [[nodiscard]] std::vector<int> feed_loads(const Plan& plan);
-/// The same of any slabs, whether or not each fits. @param slabs mm, in the order in which they are taken
-/// @param kg_per_mm of a whole slab
-[[nodiscard]] std::vector<int> feed_loads(const Machine& machine, std::span<const double> slabs,
-                                          double kg_per_mm);
+/// The same of any slabs, whether or not each fits. @param slabs in the order in which they are taken
+[[nodiscard]] std::vector<int> feed_loads(const Machine& machine, std::span<const FeedSlab> slabs);
 
 /// Tells a step the lowest and the highest z of its program, as the program counts them: z_low_mm, z_high_mm.
 /// @param operations that the program holds, @param origin of its z = 0, mm, pattern-base

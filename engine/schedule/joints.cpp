@@ -11,6 +11,7 @@
 #include "engine/layers/layers.h"
 #include "engine/moves/path_builder.h"
 #include "engine/moves/thinning.h"
+#include "engine/schedule/blanks.h"
 #include "engine/schedule/footing.h"
 #include "engine/stock/loose.h"
 #include "kernels/cutting/layer_solid.h"
@@ -99,12 +100,12 @@ std::vector<std::vector<JointWood>> wood_at_joints(Context& context, MeshView me
         add(layer.z_bottom);
         for (const double z : inner_joints(layer)) add(z);
     }
-    const Loops stock = rectangle(plan.stock_min, plan.stock_max);
     parallel_each(context, joints.size(), [&](std::size_t i) {
+        const Blank slab = slab_of(plan, plan.layers[i]);
         for (std::size_t k = 0; k < joints[i].size(); ++k) {
             JointWood& wood = joints[i][k];
             const bool whole = i == 0 || k > 0;  // the board, or a slab that is not cut yet
-            if (whole) wood.below = stock;
+            if (whole) wood.below = rectangle(slab.min, slab.max);
             else wood.below = intersect(sections[2 * (i - 1)].loops, sections[2 * (i - 1) + 1].loops);
             if (plan.flask && stands_above(plan.layers[i], wood.z)) {
                 const Loops frame = flask_frame(*plan.flask, i);
@@ -341,16 +342,10 @@ constexpr double kGentle = 0.25;
 /// What stands on a joint may be lost without the build where it is no more than this share of the pattern.
 constexpr double kSmallTop = 0.05;
 
-/// A slab, or a piece of one, as it is laid: its corners, mm.
-struct LaidSlab {
-    std::array<double, 2> min{}, max{};
-    [[nodiscard]] double mm2() const { return (max[0] - min[0]) * (max[1] - min[1]); }
-};
-
 /// A slab needs to reach no farther than this past what its layer keeps, mm: programs pass the rest in air.
 constexpr double kPieceMargin = 15;
 
-LaidSlab piece_for(const JointWood& wood, const LaidSlab& stock) {
+Blank piece_for(const JointWood& wood, const Blank& stock) {
     Box2 box;
     for (const Loops* region : {&wood.above, &wood.both})
         for (const Point2 p : region->points) box.grow(p);
@@ -428,7 +423,7 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
     const std::size_t n = plan.layers.size();
     const double bears = plan.job.bonding.max_pressure_mpa, density = plan.job.material.density_kg_m3;
     const SlabCut cut = hardest_on_slab(plan.job);
-    const LaidSlab stock{plan.stock_min, plan.stock_max};
+    const std::vector<Blank> slabs = slabs_of(plan);
     // What of the wood is the pattern's: nothing ties it to the flask once its layer is cut.
     std::vector<Footing> footings;
     std::vector<DownForce> standing;
@@ -441,12 +436,12 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
         standing.push_back(
             weight_of(plan.layers[i], of_pattern(under.above), of_pattern(under.higher.back()), density));
     }
-    std::vector<LaidSlab> laid(n, stock);
+    std::vector<Blank> laid = slabs;
     // Joint i while layer c is cut: `weight` of what stands of the layers between, and the slab of c whole,
     // or what stands of it where a flask holds the slab.
     const auto at = [&](const Footing& footing, std::size_t i, std::size_t c, DownForce weight) {
         const Layer& layer = plan.layers[c];
-        const LaidSlab& s = laid[c];
+        const Blank& s = laid[c];
         const DownForce slab{s.mm2() * layer.slab_thickness * 1e-9 * density * kGravity,
                              (s.min[0] + s.max[0]) / 2, (s.min[1] + s.max[1]) / 2};
         weight = together(weight, plan.flask ? standing[c] : slab);
@@ -472,13 +467,13 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
     const auto with_piece = [&](const Footing& footing, std::size_t i, std::size_t c,
                                 const DownForce& weight) {
         const HardestTime whole = at(footing, i, c, weight);
-        if (whole.pull_mpa <= bears || plan.flask || laid[c].mm2() < stock.mm2()) return whole;
-        laid[c] = piece_for(wood[c].front(), stock);
+        if (whole.pull_mpa <= bears || plan.flask || laid[c].mm2() < slabs[c].mm2()) return whole;
+        laid[c] = piece_for(wood[c].front(), slabs[c]);
         const HardestTime piece = at(footing, i, c, weight);
-        if (laid[c].mm2() < 0.8 * stock.mm2() &&
+        if (laid[c].mm2() < 0.8 * slabs[c].mm2() &&
             (whole.turning > 1 ? piece.turning < 0.8 * whole.turning : piece.pull_mpa <= bears))
             return piece;
-        laid[c] = stock;
+        laid[c] = slabs[c];
         return whole;
     };
     std::vector<HardestTime> worst(n);
@@ -511,7 +506,7 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
     for (std::size_t i = 0; i < n; ++i) {
         const Layer& layer = plan.layers[i];
         const Joint& joint = layer.joints.front();
-        if (laid[i].mm2() < stock.mm2())
+        if (laid[i].mm2() < slabs[i].mm2())
             diagnostics.push_back(
                 {Severity::warning, "joint.small_slab",
                  fmt::format(
@@ -519,7 +514,7 @@ std::vector<std::vector<WeakJoint>> slabs_that_tip(Plan& plan, std::span<const s
                      "the whole slab's corner, not the whole slab, which would break off; programs "
                      "pass the rest in air",
                      layer.index, laid[i].max[0] - laid[i].min[0], laid[i].max[1] - laid[i].min[1],
-                     laid[i].min[0] - plan.stock_min[0], laid[i].min[1] - plan.stock_min[1]),
+                     laid[i].min[0] - slabs[i].min[0], laid[i].min[1] - slabs[i].min[1]),
                  std::array<double, 3>{joint.centroid[0], joint.centroid[1], joint.z}});
         if (joint.area_mm2 > 0)
             rate_footing(layer, wood[i].front(), plan.layers[worst[i].layer], worst[i], bears,

@@ -15,24 +15,26 @@ namespace {
 /// there and nothing is loaded.
 class FeedChamber {
 public:
-    explicit FeedChamber(const Plan& plan) : plan_(plan), loads_(feed_loads(plan)) {
-        for (const Layer& layer : plan.layers)
-            for (int k = 0; k < layer.slabs; ++k) thicknesses_.push_back(layer.slab_thickness / layer.slabs);
-    }
+    explicit FeedChamber(const Plan& plan) : loads_(feed_loads(plan)), slabs_(feed_slabs(plan)) {}
     [[nodiscard]] bool is_empty() const { return left_ == 0 && next_load_ < loads_.size(); }
     /// Fills the chamber and says with what.
     std::vector<std::pair<std::string, double>> load() {
         left_ = loads_[next_load_++];
         height_ = 0;
-        for (int k = 0; k < left_; ++k) height_ += thicknesses_[next_slab_ + static_cast<std::size_t>(k)];
-        return {{"slabs", left_}, {"height_mm", height_}, {"mass_kg", slab_mass_kg(plan_, height_)}};
+        double kg = 0;
+        for (int k = 0; k < left_; ++k) {
+            const FeedSlab& slab = slabs_[next_slab_ + static_cast<std::size_t>(k)];
+            height_ += slab.thickness;
+            kg += slab.kg;
+        }
+        return {{"slabs", left_}, {"height_mm", height_}, {"mass_kg", kg}};
     }
     /// Takes the next slab. @returns the height of the stack that it lay on top of, itself included, mm
     double take() {
         const double stack = height_;
         if (left_ > 0) {
             --left_;
-            height_ = left_ == 0 ? 0 : height_ - thicknesses_[next_slab_];
+            height_ = left_ == 0 ? 0 : height_ - slabs_[next_slab_].thickness;
         }
         ++next_slab_;
         return stack;
@@ -40,9 +42,8 @@ public:
     int last_taken = 0;  ///< the step that took the slab before; 0: none
 
 private:
-    const Plan& plan_;
     std::vector<int> loads_;
-    std::vector<double> thicknesses_;  // of every slab of the build
+    std::vector<FeedSlab> slabs_;  // of the whole build
     std::size_t next_load_ = 0, next_slab_ = 0;
     int left_ = 0;
     double height_ = 0;
@@ -136,13 +137,20 @@ void say_tool(SequenceStep& change, int tool, const Machine& machine) {
     if (!knows_tool_lengths(machine.post)) change.words = {{"length", "touch off"}};
 }
 
+void say_touch_off(SequenceStep& touch, const Plan& plan, const Layer& layer, double top) {
+    const Blank slab = slab_of(plan, layer);
+    const Point2 zero = work_zero(plan);
+    touch.numbers = {{"slab_left_mm", slab.min[0] - to_mm(zero.x)},
+                     {"slab_front_mm", slab.min[1] - to_mm(zero.y)},
+                     {"slab_top_mm", top}};
+}
+
 void schedule(Plan& plan) {
     name_programs(plan);
     const Job& job = plan.job;
     Totals totals;
     totals.part_volume_mm3 = plan.totals.part_volume_mm3;
-    const double stock_x = plan.stock_max[0] - plan.stock_min[0],
-                 stock_y = plan.stock_max[1] - plan.stock_min[1];
+    const Blank stock{plan.stock_min, plan.stock_max};
 
     std::vector<SequenceStep>& steps = plan.sequence;
     steps.clear();
@@ -161,11 +169,11 @@ void schedule(Plan& plan) {
     const int first_layer = plan.layers.empty() ? 0 : plan.layers.front().index;
     SequenceStep& board = add(first_layer, "mount_board", {}, 0);
     board.numbers = {{"thickness_mm", job.machine.base_board_thickness},
-                     {"length_mm", stock_x},
-                     {"width_mm", stock_y},
-                     {"mass_kg", slab_mass_kg(plan, job.machine.base_board_thickness)}};
+                     {"length_mm", stock.length()},
+                     {"width_mm", stock.width()},
+                     {"mass_kg", board_mass_kg(plan)}};
     FeedChamber feed(plan);
-    double carried_kg = slab_mass_kg(plan, job.machine.base_board_thickness);
+    double carried_kg = board_mass_kg(plan);
     double table_height = 0;     // of the layer before
     int stack_ready = board.id;  // the step after which the stack's top is ready for the next slab
     int handler_free = 0;        // the step after which the material handler is free; 0: from the start
@@ -174,7 +182,8 @@ void schedule(Plan& plan) {
 
     for (const Layer& layer : plan.layers) {
         ++totals.layers;
-        totals.stock_volume_mm3 += stock_x * stock_y * layer.slab_thickness;
+        const Blank blank = slab_of(plan, layer);
+        totals.stock_volume_mm3 += blank.mm2() * layer.slab_thickness;
 
         // A layer of several slabs: each is bonded to the one below before any is cut.
         const double slab = layer.slab_thickness / layer.slabs;
@@ -197,9 +206,9 @@ void schedule(Plan& plan) {
             if (handler_free != 0) needs.push_back(handler_free);
             SequenceStep& take = add(layer.index, "take_slab", std::move(needs), third);
             take.numbers = {{"thickness_mm", slab},
-                            {"length_mm", stock_x},
-                            {"width_mm", stock_y},
-                            {"mass_kg", slab_mass_kg(plan, slab)},
+                            {"length_mm", blank.length()},
+                            {"width_mm", blank.width()},
+                            {"mass_kg", slab_mass_kg(plan, blank, slab)},
                             {"feed_stack_mm", feed.take()}};
             take.words = {{"material", job.material.name}};
             const int taken = feed.last_taken = take.id;
@@ -210,9 +219,9 @@ void schedule(Plan& plan) {
             glue.words = {{"glue", job.bonding.glue}};
             const int glued = glue.id;
             SequenceStep& place = add(layer.index, "place", {clamped, glued}, third);
-            carried_kg += slab_mass_kg(plan, slab);
-            place.numbers = {{"x_mm", plan.stock_min[0]},
-                             {"y_mm", plan.stock_min[1]},
+            carried_kg += slab_mass_kg(plan, blank, slab);
+            place.numbers = {{"x_mm", blank.min[0]},
+                             {"y_mm", blank.min[1]},
                              {"z_bottom_mm", layer.z_bottom + k * slab},
                              {"table_load_kg", carried_kg}};
             handler_free = place.id;
@@ -234,7 +243,7 @@ void schedule(Plan& plan) {
         table.numbers = {{"table_height_mm", heights.table}, {"work_offset_z_mm", heights.work_offset}};
         // What the touch-off has to find: the raw slab's top, in the programs' frame.
         SequenceStep& touch = add(layer.index, "touch_off", {table.id}, 0);
-        touch.numbers = {{"slab_top_mm", layer.z_bottom + layer.slab_thickness - heights.origin}};
+        say_touch_off(touch, plan, layer, layer.z_bottom + layer.slab_thickness - heights.origin);
         int last = touch.id;
 
         for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
@@ -270,8 +279,8 @@ void schedule(Plan& plan) {
 
     totals.build_minutes =
         totals.cutting_minutes + totals.bonding_minutes + totals.tool_change_minutes + totals.table_minutes;
-    totals.stack_mass_kg = (totals.stock_volume_mm3 + stock_x * stock_y * job.machine.base_board_thickness) *
-                           1e-9 * job.material.density_kg_m3;
+    totals.stack_mass_kg = (totals.stock_volume_mm3 + stock.mm2() * job.machine.base_board_thickness) * 1e-9 *
+                           job.material.density_kg_m3;
     plan.totals = totals;
 }
 

@@ -9,6 +9,10 @@ namespace slabwright {
 /// "length": "touch off", by which the operator brings the new tip to where the last one's was touched off.
 void say_tool(SequenceStep& change, int tool, const Machine& machine);
 
+/// Tells a touch_off where the layer's slab must be found, as the programs count: its edges of least x and y
+/// (slab_left_mm, slab_front_mm) and its top (slab_top_mm).
+void say_touch_off(SequenceStep& touch, const Plan& plan, const Layer& layer, double top);
+
 /// Names every operation's program (program_file), with widths such that the names sort in the order of
 /// execution: "L003_02_rough_T2.ngc" of layer, order within it, kind and tool; where a program holds all that
 /// a tool does between two changes "L003_02_T2.ngc", where it holds a layer "L003.ngc" (machine.programs).

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "engine/sheet_proof/common_place.h"
 #include "kernels/polygons/pieces.h"
 
 namespace slabwright {
@@ -68,7 +69,7 @@ void SheetBodies::add_level(const Loops& made) {
         parents_.push_back(bodies.back());
         const bool is_sure = parts.size() == 1 && last_.size() == 1;
         for (std::size_t q = 0; q < last_.size(); ++q)
-            if (is_sure || !intersect(parts.regions[p], last_[q]).empty())
+            if (is_sure || have_common_place(parts.regions[p], last_[q]))
                 join_in(parents_, bodies.back(), last_bodies_[q]);
     }
     if (is_first) {

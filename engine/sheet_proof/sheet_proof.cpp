@@ -6,11 +6,15 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
+#include <span>
 
+#include "engine/sheet_proof/common_place.h"
 #include "engine/sheet_proof/hold_proof.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/border_distance.h"
 #include "kernels/polygons/loops.h"
+#include "kernels/polygons/pieces.h"
 #include "kernels/slicing/slicing.h"
 
 namespace slabwright {
@@ -59,8 +63,8 @@ std::vector<AxisPoint> at_depth(const std::vector<ReadHead>& way, double depth) 
 Point2 unit_point(double x, double y) { return {to_units(x), to_units(y)}; }
 
 /// What the cut takes of a level: about every piece of the axis, as far as half the kerf square to the
-/// surface that the axis sweeps. Outlines may overlap.
-Loops swept(const std::vector<AxisPoint>& axis, double kerf) {
+/// surface that the axis sweeps. Outlines overlap.
+Loops swept_by(std::span<const AxisPoint> axis, double kerf) {
     Loops loops;
     constexpr int around = 8;  // of each half circle
     for (std::size_t i = 0; i + 1 < axis.size(); ++i) {
@@ -88,6 +92,22 @@ Loops swept(const std::vector<AxisPoint>& axis, double kerf) {
         loops.close_loop();
     }
     return loops;
+}
+
+/// The same of a long axis. It is put together from halves: clipping is slow where many outlines lie one over
+/// the other, as they do where a head turns in one place.
+Loops swept(std::span<const AxisPoint> axis, double kerf) {
+    constexpr std::size_t at_once = 24;
+    if (axis.size() <= at_once) return unite(swept_by(axis, kerf), {});
+    const std::size_t half = axis.size() / 2;
+    return unite(swept(axis.first(half + 1), kerf), swept(axis.subspan(half), kerf));
+}
+
+/// Regions as one, put together from halves.
+Loops united(std::span<const Loops> regions) {
+    if (regions.size() == 1) return regions[0];
+    const std::size_t half = regions.size() / 2;
+    return unite(united(regions.first(half)), united(regions.subspan(half)));
 }
 
 /// A way at a level as a region: what it runs around. The way in is not part of its loop.
@@ -190,8 +210,13 @@ private:
         std::stable_sort(order.begin(), order.end(),
                          [](const auto& a, const auto& b) { return a.first > b.first; });
         Loops all;
-        for (const auto& [size, ring] : order)
-            all = ring->is_hole ? subtract(all, ring->region) : unite(all, ring->region);
+        for (std::size_t i = 0; i < order.size();) {
+            const bool is_hole = order[i].second->is_hole;
+            Loops alike;  // one after another: they are clipped at once
+            for (; i < order.size() && order[i].second->is_hole == is_hole; ++i)
+                append_loops(order[i].second->region, alike);
+            all = is_hole ? subtract(all, alike) : unite(all, alike);
+        }
         return all;
     }
 
@@ -201,21 +226,35 @@ private:
         return heads;
     }
 
-    void level(int k, const Loops& section) {
-        const double depth = program_.thickness * (1 - (k + 0.5) / kHeights);
-        const double step = program_.thickness / kHeights;
-        Loops made = held(depth);
+    /// What the cuts leave at a depth; the same at all of them where every cut is upright and goes through.
+    Loops made_at(double depth) {
+        if (same_at_all_depths_) return *same_at_all_depths_;
+        std::vector<Loops> taken;
+        bool is_same = true;
         for (const FineWay& way : ways_) {
             // A cut of another piece that comes near is one of this piece too.
             if (way.read->piece != piece_.number && !way.box.meets(box_)) continue;
+            is_same = is_same && std::all_of(way.heads.begin(), way.heads.end(),
+                                             [](const ReadHead& head) { return head.a == 0; });
+            is_same = is_same && (!program_.is_routed || way.read->deepest >= program_.thickness);
             if (program_.is_routed && way.read->deepest < depth) {
                 violate("sheets.depth",
                         fmt::format("the cut of line {} ends {:.3f} mm above the sheet's bottom",
                                     way.read->line, program_.thickness - way.read->deepest));
                 continue;
             }
-            made = subtract(made, swept(at_depth(own_frame(way), depth), program_.kerf));
+            taken.push_back(swept(at_depth(own_frame(way), depth), program_.kerf));
         }
+        const Loops whole = held(depth);
+        Loops made = taken.empty() ? whole : subtract(whole, united(taken));
+        if (is_same) same_at_all_depths_ = made;
+        return made;
+    }
+
+    void level(int k, const Loops& section) {
+        const double depth = program_.thickness * (1 - (k + 0.5) / kHeights);
+        const double step = program_.thickness / kHeights;
+        Loops made = made_at(depth);
         if (made.empty()) {
             violate("sheets.nothing", "its cuts leave nothing of it");
             return;
@@ -262,7 +301,7 @@ private:
             add(i);
             for (std::size_t h = 0; h < made.size(); ++h)
                 if (h < made.parents.size() && made.parents[h] == static_cast<std::int32_t>(i)) add(h);
-            if (intersect(part, section).empty()) {
+            if (!have_common_place(part, section)) {
                 has_waste = true;
                 continue;
             }
@@ -298,6 +337,7 @@ private:
     const SheetProofRules& rules_;
     ReadHold hold_;
     SheetBodies bodies_;
+    std::optional<Loops> same_at_all_depths_;
     PieceResult result_;
 
 public:

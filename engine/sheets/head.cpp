@@ -8,14 +8,15 @@ namespace slabwright {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr int kDeepest = 8;  ///< halvings of one piece
+constexpr int kDeepest = 8;          ///< halvings of one piece
+constexpr double kUpright = 0.0015;  ///< mm between the ends of an axis for which no head need turn
 
 /// The head with the jet from top to bottom; C as near to `before` as full turns allow.
 HeadPoint head_at(Point2 top, Point2 bottom, double thickness, double before) {
     const double vx = (double(bottom.x) - top.x) / kUnitsPerMm, vy = (double(bottom.y) - top.y) / kUnitsPerMm;
     const double aside = std::hypot(vx, vy);
     HeadPoint point{top, std::atan2(aside, thickness) / kDegree, before};
-    if (aside < 2 / kUnitsPerMm) {  // rounding of the ends
+    if (aside < kUpright) {
         point.a_deg = 0;
         return point;
     }

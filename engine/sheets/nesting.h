@@ -18,7 +18,8 @@ struct NestRules {
     double margin = 10;   ///< mm between pieces and the stock's edge
     std::vector<int> turns{0, 90, 180,
                            270};  ///< degrees that pieces may be turned by; 0 and 180 keep a grain
-    double cell = 2;              ///< mm: pieces stand on a grid so fine, and are taken to cover its cells
+    double cell = 1;              ///< mm: pieces stand on a grid so fine, and are taken to cover its cells
+    int tries = 64;               ///< orders in which pieces are laid; the best is kept
 };
 
 /// Where a piece lies: turned about its origin, then moved.
@@ -38,9 +39,14 @@ struct Nest {
 [[nodiscard]] Point2 placed(Point2 p, const NestPlace& place);
 [[nodiscard]] Loops placed(const Loops& loops, const NestPlace& place);
 
-/// Lays pieces from the largest down, each as low as it goes and then as far left, in the turn that ends
-/// lowest; on the first stock that has room: offcuts as they are given, then whole sheets. A piece may lie in
-/// a hole of another. The result depends on nothing but the arguments.
+/// Lays pieces one after another, each as low as it goes and then as far left, in the turn that ends lowest;
+/// on the first stock that has room: offcuts as they are given, then whole sheets. A piece may lie in a hole
+/// of another. Orders are tried: from the largest down by box, area, longer and shorter side, then changes of
+/// the best one. Kept is what takes the fewest sheets, then the least of the last. The result depends on
+/// nothing but the arguments. Time grows with tries.
+///
+///     Nest nest = nest_pieces(context, blanks, {2440, 1220}, {{600, 400}}, {.spacing = 8, .margin = 10});
+///     Loops lies = placed(blanks[0], nest.places[0]);  // on nest.stock[nest.places[0].stock]
 /// @param pieces outlines counter-clockwise, holes clockwise
 /// @param offcuts each is there once
 /// @throws Error(no_plan, "sheets.size") for a piece that no stock holds, Error(usage, "sheets.nest") for

@@ -149,6 +149,29 @@ void leave_out_beside_corners(std::vector<Sample>& samples, double whole) {
     });
 }
 
+/// Between two heights a part may begin anywhere that the head cannot follow: where what a place reaches
+/// changes faster than the head leans, the place and its neighbours keep clear of the farther of both ends at
+/// both of them. A corner of the part that runs along the outline between the two heights is spared so.
+void spare_what_the_head_cannot_follow(std::vector<Sample>& samples, const std::vector<double>& heights,
+                                       double most_slope) {
+    constexpr double rounding = 0.001;  // mm
+    const std::size_t n = samples.size();
+    std::vector<std::vector<double>> spared;
+    for (const Sample& s : samples) spared.push_back(s.reach);
+    for (std::size_t i = 0; i < n; ++i) {
+        const Sample& s = samples[i];
+        for (std::size_t k = 0; k + 1 < heights.size(); ++k) {
+            const double follows = most_slope * s.mitre * (heights[k + 1] - heights[k]) + rounding;
+            if (std::abs(s.reach[k + 1] - s.reach[k]) <= follows) continue;
+            const double farther = std::max(s.reach[k], s.reach[k + 1]) / s.mitre;
+            for (const std::size_t at : {(i + n - 1) % n, i, (i + 1) % n})
+                for (const std::size_t end : {k, k + 1})
+                    spared[at][end] = std::max(spared[at][end], farther * samples[at].mitre);
+        }
+    }
+    for (std::size_t i = 0; i < n; ++i) samples[i].reach = std::move(spared[i]);
+}
+
 /// The cuts of one loop, as many passes as `passes`, and how much they leave over the majorants.
 struct LoopPasses {
     std::vector<std::vector<StraightCut>> cuts;  ///< of every pass, of every sample
@@ -166,7 +189,7 @@ LoopPasses passes_of(const std::vector<Sample>& samples, const std::vector<doubl
         const std::vector<ProfilePoint> majorant = concave_majorant(profile);
         std::vector<StraightCut> own;
         for (int j = 0; j < passes; ++j) {
-            own.push_back(supporting_cut(majorant, z0 + (j + 0.5) / passes * height, most_slope * s.mitre));
+            own.push_back(supporting_cut(majorant, z0 + (j + 0.5) / passes * height, most_slope));
             result.cuts[static_cast<std::size_t>(j)].push_back(own.back());
         }
         for (const double z : heights) {
@@ -467,6 +490,7 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
             const double whole = samples.back().along + std::hypot(points[0].x - samples.back().at.x,
                                                                    points[0].y - samples.back().at.y);
             leave_out_beside_corners(samples, whole);
+            spare_what_the_head_cannot_follow(samples, sheet.heights, most_slope);
             for (Way& way : ways_of(samples, sheet, l, holes, rules)) {
                 for (int i = 0; i <= most_pushes; ++i) {
                     const double allowed = i < most_pushes ? rules.gouge / 4 : rules.gouge / 2;
@@ -517,7 +541,7 @@ std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh, const std::vecto
                                const std::vector<SheetStair>& stairs, const SheetCutRules& rules,
                                const std::vector<SheetHold>& holds, double dowel) {
     require_rules(rules);
-    const std::vector<std::vector<double>> heights = heights_to_fit(mesh, spans);
+    const std::vector<std::vector<double>> heights = heights_to_fit(mesh, spans, rules.most_tilt_deg);
     const double top = bounds(mesh).max.z;
     std::vector<Plane> planes;
     std::vector<std::size_t> starts;

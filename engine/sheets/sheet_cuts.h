@@ -40,6 +40,7 @@ struct SheetCuts {
 /// Tilted cuts are made to fit sections at the ends of so many even parts of a sheet, and at the heights of
 /// the mesh's vertices in it where those are no more than kMostVertexHeights.
 inline constexpr int kCutSections = 24;
+inline constexpr int kFinerSections = 4;  ///< of each where facets lean more than the head
 inline constexpr std::size_t kMostVertexHeights = 24;
 inline constexpr std::size_t kMostSteps = 32;  ///< heights of level facets that a sheet's cuts are fitted to
 

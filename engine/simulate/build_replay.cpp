@@ -111,24 +111,24 @@ private:
         (this->*act->second)();
     }
 
-    void expect_board_size(const char* code) {
-        expect(code, "length_mm", plan_.stock_max[0] - plan_.stock_min[0], kLength);
-        expect(code, "width_mm", plan_.stock_max[1] - plan_.stock_min[1], kLength);
+    void expect_size(const Blank& blank) {
+        expect("sequence.slab", "length_mm", blank.length(), kLength);
+        expect("sequence.slab", "width_mm", blank.width(), kLength);
     }
 
     void mount_board() {
         if (s_.board) complain("sequence.order", "a board is mounted already");
         expect_layer(0);
         expect_seconds(0, kSeconds);
-        expect_board_size("sequence.slab");
+        expect_size({plan_.stock_min, plan_.stock_max});
         if (plan_.job_stated) {
             const double thickness = plan_.job.machine.base_board_thickness;
             expect("sequence.slab", "thickness_mm", thickness, kLength);
-            expect("sequence.mass", "mass_kg", build_.slab_mass(thickness), kForce);
+            expect("sequence.mass", "mass_kg", build_.board_mass(thickness), kForce);
         }
         s_.board = s_.stack_ready = here();
         s_.board_thickness = number("thickness_mm").value_or(0);
-        s_.load_kg = build_.slab_mass(s_.board_thickness);
+        s_.load_kg = build_.board_mass(s_.board_thickness);
         check_load();
     }
 
@@ -151,24 +151,26 @@ private:
             complain("sequence.feed", fmt::format("loads {} slabs where the build still takes {}", count,
                                                   slabs_.size() - std::min(s_.taken, slabs_.size())));
         s_.in_feed = std::max(0, count);
-        s_.feed_height = 0;
+        double kg = s_.feed_height = 0;
         for (std::size_t i = s_.taken;
-             i < std::min(slabs_.size(), s_.taken + static_cast<std::size_t>(s_.in_feed)); ++i)
+             i < std::min(slabs_.size(), s_.taken + static_cast<std::size_t>(s_.in_feed)); ++i) {
             s_.feed_height += slabs_[i].thickness;
+            kg += slabs_[i].kg;
+        }
         expect("sequence.feed", "height_mm", s_.feed_height, kLength);
         if (plan_.job_stated) {
             const Machine& machine = plan_.job.machine;
-            expect("sequence.feed", "mass_kg", build_.slab_mass(s_.feed_height), kForce);
+            expect("sequence.feed", "mass_kg", kg, kForce);
             if (s_.feed_height > machine.feed_height + kLength)
                 complain("sequence.travel",
                          fmt::format("stacks {:.1f} mm in a feed chamber of {:.1f} mm", s_.feed_height,
                                      machine.feed_height),
                          s_.feed_height - machine.feed_height);
-            if (build_.slab_mass(s_.feed_height) > machine.feed_mass_kg + kForce)
+            if (kg > machine.feed_mass_kg + kForce)
                 complain("sequence.mass",
-                         fmt::format("loads {:.1f} kg on a feed table that bears {:.1f} kg",
-                                     build_.slab_mass(s_.feed_height), machine.feed_mass_kg),
-                         build_.slab_mass(s_.feed_height) - machine.feed_mass_kg);
+                         fmt::format("loads {:.1f} kg on a feed table that bears {:.1f} kg", kg,
+                                     machine.feed_mass_kg),
+                         kg - machine.feed_mass_kg);
         }
         s_.loaded = here();
     }
@@ -186,15 +188,14 @@ private:
             expect_word("sequence.slab", "material", plan_.job.material.name);
         }
         expect_job_seconds(plan_.job.bonding.handling_s / 3);
-        expect_board_size("sequence.slab");
         if (s_.taken >= slabs_.size()) {
             complain("sequence.order", "all slabs of the build have been taken");
         } else {
             const DueSlab& slab = slabs_[s_.taken];
             expect_layer(slab.layer);
+            expect_size(slab.blank);
             expect("sequence.slab", "thickness_mm", slab.thickness, kLength);
-            if (plan_.job_stated)
-                expect("sequence.mass", "mass_kg", build_.slab_mass(slab.thickness), kForce);
+            if (plan_.job_stated) expect("sequence.mass", "mass_kg", slab.kg, kForce);
             s_.feed_height = std::max(0.0, s_.feed_height - slab.thickness);
             ++s_.taken;
         }
@@ -224,9 +225,7 @@ private:
                                         ? "no board is mounted"
                                         : "the layer below is not done: its programs have not all run");
         else require(s_.pressed, "the slab below is not pressed");
-        const double area = number("area_mm2").value_or(0),
-                     whole_slab = (plan_.stock_max[0] - plan_.stock_min[0]) *
-                                  (plan_.stock_max[1] - plan_.stock_min[1]);
+        const double area = number("area_mm2").value_or(0), whole_slab = slab.blank.mm2();
         const double slack = 0.01 + 1e-6 * whole_slab;
         if (const PlannedJoint planned = build_.joint_of(slab); planned.glue_area_mm2)
             expect("sequence.glue", "area_mm2", *planned.glue_area_mm2, slack);
@@ -258,8 +257,8 @@ private:
             complain("sequence.glue",
                      fmt::format("its polygons have {:.3f} mm2, the step says {:.3f}", place.area_mm2, area));
         for (std::size_t k = 0; k < 2; ++k)
-            if (place.area_mm2 > 0 && (place.min[k] < plan_.stock_min[k] - kLength ||
-                                       place.max[k] > plan_.stock_max[k] + kLength)) {
+            if (place.area_mm2 > 0 &&
+                (place.min[k] < slab.blank.min[k] - kLength || place.max[k] > slab.blank.max[k] + kLength)) {
                 complain("sequence.glue", "its polygons reach beyond the slab");
                 break;
             }
@@ -272,11 +271,11 @@ private:
         require(s_.in_hand, "the material handler holds no slab");
         require(s_.clamped, "the slab is not clamped");
         require(s_.glued, "there is no glue on the stack");
-        expect("sequence.place", "x_mm", plan_.stock_min[0], kLength);
-        expect("sequence.place", "y_mm", plan_.stock_min[1], kLength);
+        expect("sequence.place", "x_mm", slab.blank.min[0], kLength);
+        expect("sequence.place", "y_mm", slab.blank.min[1], kLength);
         expect("sequence.place", "z_bottom_mm", slab.z_bottom, kLength);
         expect_job_seconds(plan_.job.bonding.handling_s / 3);
-        s_.load_kg += build_.slab_mass(slab.thickness);
+        s_.load_kg += slab.kg;
         if (plan_.job_stated) expect("sequence.mass", "table_load_kg", s_.load_kg, kForce);
         check_load();
         s_.placed = std::min(s_.placed + 1, slabs_.size());
@@ -340,6 +339,8 @@ private:
         if (s_.placed > 0) {
             const std::size_t l = slabs_[s_.placed - 1].layer;
             expect_layer(l);
+            for (const auto& [key, at] : build_.edges_of(slabs_[s_.placed - 1]))
+                if (number(key) || build_.has_own_zero()) expect("sequence.touch_off", key, at, kLength);
             expect("sequence.touch_off", "slab_top_mm", build_.stack_top(s_) - build_.origin_of(l), kLength);
             if (programs_left_[l] == 0) s_.stack_ready = here();
         }
@@ -452,8 +453,7 @@ private:
 
     /// What stands is what stood before the layer's first slab.
     void take_off(std::size_t layer) {
-        while (s_.placed > 0 && slabs_[s_.placed - 1].layer == layer)
-            s_.load_kg -= build_.slab_mass(slabs_[--s_.placed].thickness);
+        while (s_.placed > 0 && slabs_[s_.placed - 1].layer == layer) s_.load_kg -= slabs_[--s_.placed].kg;
         s_.taken = s_.placed;
         s_.next_program = 0;
         for (std::size_t p = 0; p < plan_.programs.size(); ++p) {

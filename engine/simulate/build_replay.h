@@ -29,6 +29,7 @@ struct LayerToBuild {
     int index = 0;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;  ///< mm, pattern-base; of all its slabs together
     int slabs = 1;
+    std::optional<Blank> blank{};  ///< what each of its slabs covers; none: the whole stock
     /// Of the joint under each of its slabs, upwards; what is not stated is not checked.
     std::vector<PlannedJoint> joints;
 };
@@ -51,6 +52,7 @@ struct BuildPlan {
     Frame frame = Frame::pattern_base;
     std::string pattern, sha256;
     std::array<double, 2> stock_min{}, stock_max{};
+    std::array<double, 2> zero{};  ///< mm, pattern-base: x 0, y 0 of the programs
     std::vector<LayerToBuild> layers;
     std::vector<PlannedProgram> programs;
     /// Programs that face spoilt layers off (engine/planner/remake.h); of the plan's own sequence none.

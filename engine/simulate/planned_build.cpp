@@ -16,8 +16,16 @@ PlannedBuild::PlannedBuild(const BuildPlan& plan) : plan_(plan) {
     for (std::size_t l = 0; l < plan.layers.size(); ++l) {
         const LayerToBuild& layer = plan.layers[l];
         const double each = layer.slab_thickness / layer.slabs;
+        const Blank blank = layer.blank.value_or(Blank{plan.stock_min, plan.stock_max});
+        const double kg = blank.mm2() * each * 1e-9 * plan.job.material.density_kg_m3;
         for (int k = 0; k < layer.slabs; ++k)
-            slabs_.push_back({l, k, each, layer.z_bottom + k * each, k == 0 ? l : between++});
+            slabs_.push_back({.layer = l,
+                              .number = k,
+                              .thickness = each,
+                              .z_bottom = layer.z_bottom + k * each,
+                              .blank = blank,
+                              .kg = kg,
+                              .glue = k == 0 ? l : between++});
     }
 }
 
@@ -27,7 +35,7 @@ std::size_t PlannedBuild::most_steps() const {
     return builds * (kStepsEach * (slabs_.size() + 2) + 2 * programs);
 }
 
-double PlannedBuild::slab_mass(double thickness) const {
+double PlannedBuild::board_mass(double thickness) const {
     return (plan_.stock_max[0] - plan_.stock_min[0]) * (plan_.stock_max[1] - plan_.stock_min[1]) * thickness *
            1e-9 * plan_.job.material.density_kg_m3;
 }
@@ -45,6 +53,11 @@ double PlannedBuild::origin_of(std::size_t layer) const {
 double PlannedBuild::bottom_at(std::size_t layer) const {
     const double risen = plan_.layers[layer].z_top - plan_.layers.front().z_top;
     return -origin_of(0) - (plan_.job.machine.table == BuildTable::moving ? risen : 0);
+}
+
+std::array<std::pair<const char*, double>, 2> PlannedBuild::edges_of(const DueSlab& slab) const {
+    return {{{"slab_left_mm", slab.blank.min[0] - plan_.zero[0]},
+             {"slab_front_mm", slab.blank.min[1] - plan_.zero[1]}}};
 }
 
 const Tool* PlannedBuild::tool_of(int number) const {

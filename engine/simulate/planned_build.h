@@ -2,8 +2,10 @@
 // it.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "engine/simulate/build_replay.h"
@@ -16,6 +18,8 @@ struct DueSlab {
     std::size_t layer = 0;               ///< index into the layers
     int number = 0;                      ///< within its layer, from 0
     double thickness = 0, z_bottom = 0;  ///< mm, pattern-base
+    Blank blank{};                       ///< what it covers
+    double kg = 0;
     std::size_t glue = 0;  ///< which of the sequence's: those under layers first, then those between slabs
 };
 
@@ -27,8 +31,8 @@ public:
     [[nodiscard]] const std::vector<DueSlab>& slabs() const { return slabs_; }  ///< bottom up
     /// No sequence of this build has more: of slabs and programs, and again for each layer made again.
     [[nodiscard]] std::size_t most_steps() const;
-    /// kg of a whole board or slab of this thickness, mm.
-    [[nodiscard]] double slab_mass(double thickness) const;
+    /// kg of a base board of this thickness, mm.
+    [[nodiscard]] double board_mass(double thickness) const;
     /// The joint under a slab.
     [[nodiscard]] PlannedJoint joint_of(const DueSlab& slab) const;
     /// Where a layer's programs have their z = 0, mm, pattern-base.
@@ -36,6 +40,10 @@ public:
     /// Where the pattern's bottom stands while a layer is cut, mm, from where the programs' z = 0 is in the
     /// first layer. A table that moves brings each layer's top to one height.
     [[nodiscard]] double bottom_at(std::size_t layer) const;
+    /// Where a slab's edges of least x and y must be found, as the programs count: what a touch_off says.
+    [[nodiscard]] std::array<std::pair<const char*, double>, 2> edges_of(const DueSlab& slab) const;
+    /// Whether the programs do not count x and y as the model does; a sequence must tell the edges then.
+    [[nodiscard]] bool has_own_zero() const { return plan_.zero != std::array<double, 2>{}; }
     [[nodiscard]] const Tool* tool_of(int number) const;
     /// Whether the control keeps tools' lengths; else each change of a tool is a touch-off.
     [[nodiscard]] bool keeps_lengths() const { return knows_tool_lengths(plan_.job.machine.post); }

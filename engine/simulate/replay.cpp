@@ -1,5 +1,6 @@
 #include "engine/simulate/replay.h"
 #include "engine/forces/cuts.h"
+#include "engine/simulate/laid_slabs.h"
 
 #include <algorithm>
 #include <cmath>
@@ -64,8 +65,7 @@ struct Replay::Impl {
 
     void add_slabs(std::size_t upto) {
         for (; slabs <= upto; ++slabs)
-            for (Stock& band : bands)
-                band.add_slab(input.layers[slabs].z_bottom, input.layers[slabs].slab_thickness);
+            for (Stock& band : bands) lay_slab(band, input.layers[slabs]);
     }
 };
 

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "engine/simulate/core_contact.h"
+#include "engine/simulate/laid_slabs.h"
 #include "engine/simulate/reach.h"
 #include "engine/simulate/simulation_memory.h"
 #include "engine/simulate/work.h"
@@ -50,28 +51,6 @@ struct PreparedProgram {
     double cut_mm = 0;  // of feed motions, seen from above
     std::vector<StepBox> blocks, parts;
 };
-
-/// The walls of a layer's flask and of the one below it, into which a cutter dips at a joint. Walls alone:
-/// what is cut far inside the flask shows in the stock.
-Mesh flask_walls(const std::vector<SimulatedLayer>& layers, std::size_t layer) {
-    Mesh walls;
-    for (std::size_t l = layer > 0 ? layer - 1 : 0; l <= layer; ++l) {
-        const auto low = static_cast<float>(layers[l].z_bottom), high = static_cast<float>(layers[l].z_top);
-        for (std::size_t k = 0; k < layers[l].flask.size(); ++k) {
-            const auto loop = layers[l].flask.loop(k);
-            for (std::size_t i = 0; i < loop.size(); ++i) {
-                const auto first = static_cast<std::uint32_t>(walls.vertices.size());
-                for (const Point2 p : {loop[i], loop[(i + 1) % loop.size()]})
-                    for (const float z : {low, high})
-                        walls.vertices.push_back(
-                            {static_cast<float>(to_mm(p.x)), static_cast<float>(to_mm(p.y)), z});
-                walls.facets.push_back({first, first + 2, first + 3});
-                walls.facets.push_back({first, first + 3, first + 1});
-            }
-        }
-    }
-    return walls;
-}
 
 void raise(Extreme& a, double size, const Point3& where) {
     if (size > a.size) a = {size, where};
@@ -143,7 +122,7 @@ private:
             TileProgram& p = known->programs[i];
             p.stock_top = p.top_after = i > 0 && input_.programs[i - 1].layer == layer
                                             ? known->programs[i - 1].top_after
-                                            : of.z_bottom + of.slab_thickness;
+                                            : laid_top(of, grid);
         }
         return known;
     }
@@ -219,6 +198,7 @@ private:
                         {}, lacking);
             below = layer.z_top;
         }
+        for (Violation& v : blanks_too_small(context_, input_)) report.violations.push_back(std::move(v));
     }
 
     /// Once the cells are known.
@@ -486,8 +466,8 @@ private:
         std::size_t next = 0;
         for (std::size_t l = 0; l < input_.layers.size(); ++l) {
             const SimulatedLayer& layer = input_.layers[l];
-            stock.add_slab(layer.z_bottom, layer.slab_thickness);
-            double top = layer.z_bottom + layer.slab_thickness;
+            lay_slab(stock, layer);
+            double top = laid_top(layer, grid);
             for (; next < prepared_.size() && static_cast<std::size_t>(prepared_[next].program->layer) == l;
                  ++next) {
                 result.programs[next].stock_top = top;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/job.h"
+#include "engine/plan.h"
 #include "engine/simulate/gouge.h"
 #include "engine/simulate/program.h"
 #include "kernels/mesh/mesh.h"
@@ -24,6 +25,7 @@ struct SimulatedLayer {
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
     Loops flask{};  ///< what of the slab is to stay around the pattern, over the layer's whole height; empty:
                     ///< no flask
+    std::optional<Blank> blank{};  ///< what its slabs cover; none: the whole stock
 };
 
 /// All that the simulation starts from. The programs stand in the order of execution, layers ascending.
@@ -55,12 +57,12 @@ struct Extreme {
 };
 
 /// Something that must not be. The code's family names the kind of fault:
-/// stack.short, stack.narrow, stack.gap, stack.thin, gouge.cutter, gouge.stock, gouge.flask, contact.shank,
-/// contact.holder, plunge.not_center_cutting, rapid.through_stock, rapid.unknown_start, flute.too_deep,
-/// cut.too_deep, spindle.off, travel.exceeded, board.too_deep, operation.empty, tool.wrong, tool.unknown,
-/// left.missed, left.too_much; and by io/verify program.order, program.unplanned, program.missing,
-/// those of io/posts/program_check, program.dialect, program.number, tool.table, sequence.no_file,
-/// sequence.unreadable and those of replay_build.
+/// stack.short, stack.narrow, stack.blank, stack.gap, stack.thin, gouge.cutter, gouge.stock, gouge.flask,
+/// contact.shank, contact.holder, plunge.not_center_cutting, rapid.through_stock, rapid.unknown_start,
+/// flute.too_deep, cut.too_deep, spindle.off, travel.exceeded, board.too_deep, operation.empty, tool.wrong,
+/// tool.unknown, left.missed, left.too_much; and by io/verify program.order, program.unplanned,
+/// program.missing, those of io/posts/program_check, program.dialect, program.number, tool.table,
+/// sequence.no_file, sequence.unreadable and those of replay_build.
 struct Violation {
     std::string code;
     std::string message;  ///< one line, sizes with units

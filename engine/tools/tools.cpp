@@ -14,6 +14,21 @@ const Tool& fixed_tool(const Job& job, ToolKind kind, double diameter) {
     return tool_of_kind(job, kind);
 }
 
+// Whether a stiffer twin took the tool's place.
+bool stiffen(const Job& job, Tool& tool) {
+    const Tool* stiffest = &tool;
+    for (const Tool& other : job.tools)
+        if (other.kind == tool.kind && std::abs(other.diameter - tool.diameter) < 1e-3 &&
+            other.stickout < stiffest->stickout - 1e-9)
+            stiffest = &other;
+    if (stiffest == &tool) return false;
+    const double least = tool.stepdown_min, most = tool.stepdown_max;
+    tool = *stiffest;
+    tool.stepdown_min = std::min(least, tool.stepdown_max);
+    tool.stepdown_max = std::min(most, tool.stepdown_max);
+    return true;
+}
+
 }  // namespace
 
 bool clears_on_contours(const Job& job) {
@@ -74,6 +89,15 @@ std::vector<Tool> luo_library() {
         }
     }
     return tools;
+}
+
+std::optional<LayerTools> stiffer_tools(const Job& job, const LayerTools& tools) {
+    LayerTools stiffer = tools;
+    bool changed = stiffen(job, stiffer.rough);
+    changed |= stiffen(job, stiffer.finish);
+    for (auto* more : {&stiffer.semi_rough, &stiffer.rest})
+        for (Tool& tool : *more) changed |= stiffen(job, tool);
+    return changed ? std::optional(stiffer) : std::nullopt;
 }
 
 LayerTools fixed_tools(const Job& job) {

@@ -1,6 +1,7 @@
 // The cutters of one layer and how deep they cut (LUO 5.5.3): which of the job's library does what.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "engine/job.h"
@@ -35,6 +36,10 @@ struct LayerTools {
 /// numbers 2 … 6 and 12 … 16, and the default face mill. Their flutes reach through a 19 mm slab; what LUO
 /// does not give is ours.
 [[nodiscard]] std::vector<Tool> luo_library();
+
+/// The set with the stiffest twin of each tool in its place: as wide, of its kind, with less stick-out; none
+/// where no tool has one. Stepdowns stay.
+[[nodiscard]] std::optional<LayerTools> stiffer_tools(const Job& job, const LayerTools& tools);
 
 /// What follows a finish tool and a roughing tool (mm across) so that nothing is left which a tool of the
 /// library reaches: the smaller flats and balls of the library, in falling size. Only the smallest of either

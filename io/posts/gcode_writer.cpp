@@ -55,8 +55,8 @@ void require_safe(const Layer& layer, const Operation& operation, const Tool* to
 /// Writes modal motion: a word appears when its value changes, and G when the kind of motion does.
 class MotionText {
 public:
-    MotionText(std::string& text, const Dialect& dialect, std::int64_t z_origin, std::size_t blocks)
-        : text_(text), dialect_(dialect), grid_(dialect), moves_(grid_, z_origin), blocks_(blocks) {}
+    MotionText(std::string& text, const Dialect& dialect, const ProgramOrigin& origin, std::size_t blocks)
+        : text_(text), dialect_(dialect), grid_(dialect), moves_(grid_, origin), blocks_(blocks) {}
 
     /// The first motion, in Z alone, by the dialect's template, which is given the height as a text.
     template <class Template>
@@ -244,6 +244,9 @@ std::string head_text(const Plan& plan, const Layer& layer, const Operation& ope
     comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index,
                         plan.layers.size(), decimal(layer.z_bottom, 4), decimal(layer.z_top, 4)));
     comment(fmt::format("z = 0 at {}", layer_top ? "the layer's top" : "the pattern's bottom"));
+    if (plan.job.machine.zero != WorkZero::model)
+        comment(fmt::format("x = y = 0 at the base board's {}",
+                            plan.job.machine.zero == WorkZero::corner ? "left front corner" : "middle"));
     for (const std::string& line : remarks(operation, tool)) comment(line);
     const std::string notes = templates.filled(dialect.notes);
     for (std::size_t at = 0; at < notes.size();) {
@@ -319,7 +322,7 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
     auto line = lines_before + static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
     if (dialect.conversational) text = in_blocks(text, lines_before);
     const std::int32_t clearance = to_units(operation.clearance_z);
-    MotionText motion(text, dialect, program_origin(plan.job, layer), line);
+    MotionText motion(text, dialect, program_origin(plan, layer), line);
     motion.begin(clearance, [&](const std::string& z) { return templates.filled(dialect.first, z); });
     ++line;
     if (lines != nullptr) lines->assign(moves.size(), 0);

@@ -77,19 +77,19 @@ std::string ProgramGrid::length(double mm) const {
     return number_text(std::floor(mm / kInch * kMillionths) / kMillionths, 6, dialect_->point);
 }
 
-std::int64_t WrittenMoves::height(std::int64_t z_units) { return z_ = grid_.steps(z_units - z_origin_); }
+std::int64_t WrittenMoves::height(std::int64_t z_units) { return z_ = grid_.steps(z_units - origin_.z); }
 
 WrittenMove WrittenMoves::next(const Move& to) {
     using Kind = WrittenMove::Kind;
     WrittenMove move;
-    move.x = grid_.steps(to.x);
-    move.y = grid_.steps(to.y);
-    move.z = grid_.steps(to.z - z_origin_);
+    move.x = grid_.steps(to.x - origin_.x);
+    move.y = grid_.steps(to.y - origin_.y);
+    move.z = grid_.steps(to.z - origin_.z);
     const bool moves = !known_ || move.x != x_ || move.y != y_ || move.z != z_;
     if (moves) move.kind = Kind::line;
     if (moves && to.is_arc()) {
-        move.cx = grid_.steps(ux_ + to.i);
-        move.cy = grid_.steps(uy_ + to.j);
+        move.cx = grid_.steps(ux_ + to.i - origin_.x);
+        move.cy = grid_.steps(uy_ + to.j - origin_.y);
         const std::int64_t dx = to.x - ux_, dy = to.y - uy_;
         // Against the clock where the centre lies left of the chord.
         const Kind turn = dx * to.j > dy * to.i ? Kind::counter_clockwise : Kind::clockwise;
@@ -124,33 +124,34 @@ FeedLength written_arc(double feed, const std::array<double, 3>& from, const std
 }  // namespace
 
 std::vector<FeedLength> written_feed_lengths(const Dialect& dialect, std::span<const Move> moves,
-                                             std::int64_t z_origin) {
+                                             const ProgramOrigin& origin) {
     const ProgramGrid grid(dialect);
     if (grid.exact() || moves.size() < 2) return feed_lengths(moves);
-    WrittenMoves written(grid, z_origin);
+    WrittenMoves written(grid, origin);
     std::vector<FeedLength> lengths;
-    const double up = to_mm(z_origin);
+    const double right = to_mm(origin.x), back = to_mm(origin.y), up = to_mm(origin.z);
     written.height(moves[0].z);
     // The way to the first place whose x and y are written begins nowhere that is known.
     const std::size_t first = moves[1].feed == 0 && moves[1].z == moves[0].z ? 2 : 1;
     std::array<double, 3> at{};
     for (std::size_t i = first - 1; i < moves.size(); ++i) {
         const WrittenMove w = written.next(moves[i]);
-        const std::array<double, 3> to{grid.mm(w.x), grid.mm(w.y), grid.mm(w.z) + up};
+        const std::array<double, 3> to{grid.mm(w.x) + right, grid.mm(w.y) + back, grid.mm(w.z) + up};
         using Kind = WrittenMove::Kind;
         FeedLength more;
         if (i >= first && w.kind == Kind::line) more = straight_length(moves[i].feed, at, to);
         else if (i >= first && w.kind != Kind::none)
-            more =
-                written_arc(moves[i].feed, at, to, grid.mm(w.cx), grid.mm(w.cy), w.kind == Kind::clockwise);
+            more = written_arc(moves[i].feed, at, to, grid.mm(w.cx) + right, grid.mm(w.cy) + back,
+                               w.kind == Kind::clockwise);
         if (more.mm > 0) add_length(lengths, more);
         at = to;
     }
     return lengths;
 }
 
-std::int64_t program_origin(const Job& job, const Layer& layer) {
-    return frame_of(job.machine) == Frame::layer_top ? to_units(layer.z_top) : 0;
+ProgramOrigin program_origin(const Plan& plan, const Layer& layer) {
+    const Point2 zero = work_zero(plan);
+    return {zero.x, zero.y, frame_of(plan.job.machine) == Frame::layer_top ? to_units(layer.z_top) : 0};
 }
 
 }  // namespace slabwright

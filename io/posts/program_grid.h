@@ -49,11 +49,15 @@ struct WrittenMove {
     enum class Kind { none, line, clockwise, counter_clockwise } kind = Kind::none;  ///< none: it stays there
 };
 
+/// What a program's coordinates count from, 0.1 µm, pattern-base.
+struct ProgramOrigin {
+    std::int64_t x = 0, y = 0, z = 0;
+};
+
 /// Rounds an operation's moves one after another.
 class WrittenMoves {
 public:
-    /// @param z_origin 0.1 µm: what the program's z counts from
-    WrittenMoves(const ProgramGrid& grid, std::int64_t z_origin) : grid_(grid), z_origin_(z_origin) {}
+    WrittenMoves(const ProgramGrid& grid, const ProgramOrigin& origin) : grid_(grid), origin_(origin) {}
 
     /// Takes up a height; x and y stay as they are.
     std::int64_t height(std::int64_t z_units);
@@ -63,19 +67,19 @@ public:
 
 private:
     const ProgramGrid& grid_;
-    std::int64_t z_origin_;
+    ProgramOrigin origin_;
     bool known_ = false;                  // x and y are
     std::int64_t ux_ = 0, uy_ = 0;        // 0.1 µm
     std::int64_t x_ = 0, y_ = 0, z_ = 0;  // steps
 };
 
 /// What plan.json says of a program: feed_lengths() of the moves as the dialect writes them.
-/// @param z_origin 0.1 µm, as for WrittenMoves; heights count from the pattern's bottom all the same
+/// @param origin as for WrittenMoves; places are pattern-base all the same
 [[nodiscard]] std::vector<FeedLength> written_feed_lengths(const Dialect& dialect,
                                                            std::span<const Move> moves,
-                                                           std::int64_t z_origin);
+                                                           const ProgramOrigin& origin);
 
-/// What a program's z counts from, 0.1 µm above the pattern's bottom.
-[[nodiscard]] std::int64_t program_origin(const Job& job, const Layer& layer);
+/// What the programs of a layer count from: machine.zero in x and y, machine.frame in z.
+[[nodiscard]] ProgramOrigin program_origin(const Plan& plan, const Layer& layer);
 
 }  // namespace slabwright

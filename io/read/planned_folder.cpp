@@ -307,6 +307,20 @@ void read_operation(const Field& op, std::size_t layer, std::set<std::string>& n
     folder.stepdowns.push_back(op.has("stepdown") ? std::optional(op["stepdown"].number()) : std::nullopt);
 }
 
+/// What a layer's slabs cover; none where that is the whole stock.
+std::optional<Blank> read_blank(const Field& blank, const BuildPlan& build) {
+    Blank read;
+    for (std::size_t k = 0; k < 2; ++k) {
+        read.min[k] = blank["min"][k].number();
+        read.max[k] = blank["max"][k].number();
+        if (!(read.max[k] > read.min[k])) blank.fail("is of no size");
+        if (read.min[k] < build.stock_min[k] - 1e-6 || read.max[k] > build.stock_max[k] + 1e-6)
+            blank.fail("reaches beyond the stock");
+    }
+    if (read == Blank{build.stock_min, build.stock_max}) return std::nullopt;
+    return read;
+}
+
 void read_layers(const Field& layers, PlannedFolder& folder) {
     std::set<std::string> named;
     if (layers.size() == 0) layers.fail("has no layer");
@@ -318,6 +332,8 @@ void read_layers(const Field& layers, PlannedFolder& folder) {
         layer.z_top = from["z_top"].number();
         layer.slab_thickness = from["slab_thickness"].number();
         folder.simulation.layers.push_back({layer.z_bottom, layer.z_top, layer.slab_thickness, {}});
+        if (from.has("blank")) layer.blank = read_blank(from["blank"], folder.build);
+        folder.simulation.layers.back().blank = layer.blank;
         if (from.has("slabs")) layer.slabs = from["slabs"].whole();
         if (layer.slabs < 1 || layer.slabs > 1000) from["slabs"].fail("is no count of slabs");
         if (from.has("joints"))
@@ -366,6 +382,13 @@ Program read_planned_program(const std::string& text, const std::string& file, c
     return std::move(read_planned_operations(text, file, job, 1).front());
 }
 
+void place_program(Program& program, const BuildPlan& build, std::size_t layer) {
+    // Programs count from there in whole 0.1 µm, as they were written.
+    const double up = build.frame == Frame::layer_top ? to_mm(to_units(build.layers[layer].z_top)) : 0;
+    for (ProgramStep& s : program.steps) s.x += build.zero[0], s.y += build.zero[1], s.z += up;
+    for (ProgramArc& a : program.arcs) a.arc.x += build.zero[0], a.arc.y += build.zero[1], a.arc.z += up;
+}
+
 PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refusal) {
     const std::string file = (out / "plan.json").string();
     const Refuse refuse{refusal, file};
@@ -393,9 +416,14 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
         build.stock_max[k] = plan["stock"]["max"][k].number();
         if (!(build.stock_max[k] > build.stock_min[k])) plan["stock"].fail("is of no size");
     }
+    for (std::size_t k = 0; k < 2 && plan.has("zero"); ++k) {
+        build.zero[k] = to_mm(to_units(plan["zero"][k].number()));
+        if (std::abs(build.zero[k]) > 200000) plan["zero"].fail("lies beyond 200 m");
+    }
     const Field tools = plan["tools"];
     for (std::size_t i = 0; i < tools.size(); ++i) build.tools.push_back(read_tool(tools[i]));
     read_layers(plan["layers"], folder);
+    folder.states_wood = plan.has("wood");
     SimulationInput& input = folder.simulation;
     input.machine = build.job.machine;
     input.stock_min = build.stock_min;
@@ -419,14 +447,10 @@ std::vector<Program> PlannedFolder::read_file(std::size_t begin, const FolderRef
     const std::string text =
         read_whole(path / file, {refusal.kind, refusal.program, kMostProgramBytes, "plan again"});
     std::vector<Program> programs = read_planned_operations(text, file, build.job, count);
-    // Programs count from the top in whole 0.1 µm, as they were written.
-    const std::size_t layer = build.programs[begin].layer;
-    const double up = build.frame == Frame::layer_top ? to_mm(to_units(simulation.layers[layer].z_top)) : 0;
     for (std::size_t k = 0; k < count; ++k) {
         Program& program = programs[k];
         const PlannedProgram& planned = build.programs[begin + k];
-        for (ProgramStep& s : program.steps) s.z += up;
-        for (ProgramArc& a : program.arcs) a.arc.z += up;
+        place_program(program, build, planned.layer);
         program.file = planned.file.substr(3);
         program.layer = static_cast<int>(planned.layer);
         program.kind = planned.kind;

@@ -29,6 +29,7 @@ struct PlannedFolder {
     BuildPlan build;             ///< its job, layers and programs; of these low and high are not set
     SimulationInput simulation;  ///< stock, layers with what of the flask stands in them, tools, machine;
                                  ///< neither mesh nor programs
+    bool states_wood = false;    ///< whether a cut list goes with it
     std::vector<ProgramPlan> sayings;              ///< what the plan says of each of build.programs
     std::vector<std::optional<double>> stepdowns;  ///< mm, of each of build.programs
 
@@ -57,6 +58,10 @@ inline constexpr const char* kForeignProgram = "program.dialect";
 /// @throws as read_planned_program(); Error(verification, "gcode.operations") where it holds another number
 [[nodiscard]] std::vector<Program> read_planned_operations(const std::string& text, const std::string& file,
                                                            const Job& job, std::size_t count);
+
+/// Moves a program from where its coordinates count from to the pattern's base: BuildPlan::zero in x and y,
+/// the layer's top or 0 in z. @param layer index
+void place_program(Program& program, const BuildPlan& build, std::size_t layer);
 
 /// How a plan's programs are read: chords that stand for an arc take next to nothing of the gouge tolerance
 /// that the paths were made for.

@@ -43,6 +43,9 @@ inline constexpr Word<BuildTable> kTableWords[] = {{"moving", BuildTable::moving
                                                    {"fixed", BuildTable::fixed}};
 inline constexpr Word<ProgramSpan> kProgramWords[] = {
     {"operation", ProgramSpan::operation}, {"tool", ProgramSpan::tool}, {"layer", ProgramSpan::layer}};
+inline constexpr Word<WorkZero> kZeroWords[] = {
+    {"model", WorkZero::model}, {"corner", WorkZero::corner}, {"centre", WorkZero::centre}};
+inline constexpr Word<Blanks> kBlankWords[] = {{"pattern", Blanks::pattern}, {"layer", Blanks::layer}};
 inline constexpr Word<Post> kPostWords[] = {{"linuxcnc", Post::linuxcnc}, {"fanuc", Post::fanuc},
                                             {"haas", Post::haas},         {"grbl", Post::grbl},
                                             {"mach", Post::mach},         {"iso", Post::iso},
@@ -176,10 +179,62 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
     visit.word("programs", machine.programs, kProgramWords,
                "what one program holds: an operation, a tool (all that it does in a layer between two "
                "changes), or a layer, which changes tools by itself");
+    visit.word("zero", machine.zero, kZeroWords,
+               "x 0, y 0 of the programs: model (as the model has it), corner (left front corner of the base "
+               "board) or centre (its middle)");
     visit.key("base_board_thickness", machine.base_board_thickness,
               "mm, the sacrificial board under the first layer");
     visit.key("base_board_cut", machine.base_board_cut,
               "mm that may be cut into it; negative: as deep as the finish tool overruns");
+}
+
+/// Walks the keys of what lies in stock.
+template <class SlabsLike, class Visit>
+void visit_slab_keys(SlabsLike& slabs, Visit& visit) {
+    visit.table("slabs", "what lies in stock");
+    visit.key("thicknesses", slabs.thicknesses, "mm, ascending");
+    visit.key("length", slabs.length, "mm in x, the largest slab");
+    visit.key("width", slabs.width, "mm in y");
+    visit.key("margin", slabs.margin, "mm of stock past the pattern, where the slab allows");
+    visit.key("facing_allowance", slabs.facing_allowance,
+              "mm that the face mill takes off at least, to find the whole slab");
+    visit.word("blanks", slabs.blanks, kBlankWords,
+               "pattern: every slab as large as the pattern with its margin; layer: each as its own layer, "
+               "with the same margin");
+    visit.key("board_length", slabs.board_length, "mm, of the boards that slabs are sawn from; 0: as length");
+    visit.key("board_width", slabs.board_width, "mm; 0: as width");
+    visit.key("kerf", slabs.kerf, "mm, of the saw");
+}
+
+/// Walks the keys of glue and press.
+template <class BondingLike, class Visit>
+void visit_bonding_keys(BondingLike& bonding, Visit& visit) {
+    visit.table("bonding", "glue and press");
+    visit.key("glue", bonding.glue, "");
+    visit.key("press_force", bonding.press_force, "N, at most");
+    visit.key("press_time_s", bonding.press_time_s, "s");
+    visit.key("open_time_s", bonding.open_time_s, "s, from the glue to the press; 0: not stated");
+    visit.key("max_pressure_mpa", bonding.max_pressure_mpa, "MPa on the glue, so that no rib is crushed");
+    visit.key("min_pressure_mpa", bonding.min_pressure_mpa,
+              "MPa that close a joint, by the glue; cyanoacrylate on RPM's machine: 17 kN on 1.2 m2");
+    visit.key("edge_setback", bonding.edge_setback, "mm that glue keeps from finished edges");
+    visit.key("handling_s", bonding.handling_s, "s, to fetch, clamp and place a slab");
+    visit.key("glue_s_per_m2", bonding.glue_s_per_m2, "s for each square metre of glue");
+    visit.key("glue_g_per_m2", bonding.glue_g_per_m2, "g for each square metre of glue; 0: not stated");
+    visit.key("accept_weak", bonding.accept_weak, "plan although a joint may not hold");
+}
+
+/// Walks the keys of what things cost.
+template <class PricesLike, class Visit>
+void visit_price_keys(PricesLike& prices, Visit& visit) {
+    visit.table("prices", "in your own currency; with a price of 0 nothing is reckoned");
+    visit.key("currency", prices.currency, "as it is to be printed");
+    visit.key("board_m2", prices.board_m2,
+              "of a square metre of board: one for all slabs.thicknesses, or one for each; []: not stated");
+    visit.key("base_board_m2", prices.base_board_m2,
+              "of a square metre of base board; 0: as slabs of its thickness, else not stated");
+    visit.key("glue_kg", prices.glue_kg, "of a kilogram of glue; needs bonding.glue_g_per_m2");
+    visit.key("machine_hour", prices.machine_hour, "of an hour of the whole build");
 }
 
 /// Walks every key of the job but the tools: first those of the top, then table by table.
@@ -211,28 +266,10 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.word("transform", job.material.transform, kTransformWords,
                "of the four to a helical edge: oblique, or printed (Luo 6.2.2, whose matrix repeats a row)");
 
-    visit.table("slabs", "what lies in stock");
-    visit.key("thicknesses", job.slabs.thicknesses, "mm, ascending");
-    visit.key("length", job.slabs.length, "mm in x, the largest slab");
-    visit.key("width", job.slabs.width, "mm in y");
-    visit.key("margin", job.slabs.margin, "mm of stock past the pattern, where the slab allows");
-    visit.key("facing_allowance", job.slabs.facing_allowance,
-              "mm that the face mill takes off at least, to find the whole slab");
-
+    visit_slab_keys(job.slabs, visit);
     visit_machine_keys(job.machine, visit);
 
-    visit.table("bonding", "glue and press");
-    visit.key("glue", job.bonding.glue, "");
-    visit.key("press_force", job.bonding.press_force, "N, at most");
-    visit.key("press_time_s", job.bonding.press_time_s, "s");
-    visit.key("open_time_s", job.bonding.open_time_s, "s, from the glue to the press; 0: not stated");
-    visit.key("max_pressure_mpa", job.bonding.max_pressure_mpa, "MPa on the glue, so that no rib is crushed");
-    visit.key("min_pressure_mpa", job.bonding.min_pressure_mpa,
-              "MPa that close a joint, by the glue; cyanoacrylate on RPM's machine: 17 kN on 1.2 m2");
-    visit.key("edge_setback", job.bonding.edge_setback, "mm that glue keeps from finished edges");
-    visit.key("handling_s", job.bonding.handling_s, "s, to fetch, clamp and place a slab");
-    visit.key("glue_s_per_m2", job.bonding.glue_s_per_m2, "s for each square metre of glue");
-    visit.key("accept_weak", job.bonding.accept_weak, "plan although a joint may not hold");
+    visit_bonding_keys(job.bonding, visit);
 
     visit.table("tolerances", "");
     visit.key("gouge", job.tolerances.gouge, "mm along the normal: no move cuts deeper into the part");
@@ -350,6 +387,7 @@ void visit_job_keys(JobLike& job, Visit& visit) {
     visit.key("wall", job.flask.wall, "mm, the thinnest wall around the opening");
     visit.key("draft_deg", job.flask.draft_deg,
               "degrees by which the opening widens upwards, in one step a layer");
+    visit_price_keys(job.prices, visit);
 }
 
 }  // namespace slabwright

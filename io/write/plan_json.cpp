@@ -8,6 +8,7 @@
 #include "io/posts/gcode_writer.h"
 #include "io/posts/program_grid.h"
 #include "io/text/job_keys.h"
+#include "io/write/wood_json.h"
 
 namespace slabwright {
 
@@ -129,8 +130,8 @@ void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const O
     json.key("spindle_rpm").rounded(operation.spindle_rpm, 0);
     json.key("blend").rounded(operation.blend, kLength);
     json.key("feeds").begin_array(Shape::line);
-    for (const FeedLength& f : written_feed_lengths(dialect_of(plan.job.machine), operation.moves,
-                                                    program_origin(plan.job, layer))) {
+    for (const FeedLength& f :
+         written_feed_lengths(dialect_of(plan.job.machine), operation.moves, program_origin(plan, layer))) {
         json.begin_object(Shape::line).key("feed").exact(f.feed).key("mm").rounded(f.mm, kExact);
         json.key("centre").begin_array(Shape::line);
         for (const double v : f.centre()) json.rounded(v, kExact);
@@ -213,6 +214,13 @@ void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     json.key("z_top").exact(layer.z_top);
     json.key("slab_thickness").exact(layer.slab_thickness);
     json.key("slabs").integer(layer.slabs);
+    json.key("blank").begin_object(Shape::line);
+    const Blank blank = slab_of(plan, layer);
+    json.key("min");
+    put_xy(json, blank.min);
+    json.key("max");
+    put_xy(json, blank.max);
+    json.end();
     json.key("reason").string(layer.reason);
     json.key("rounds").integer(layer.rounds);
     json.key("selection");
@@ -401,6 +409,8 @@ std::string plan_json(const Plan& plan) {
     json.key("max");
     put_xy(json, plan.stock_max);
     json.end();
+    const Point2 zero = work_zero(plan);
+    json.key("zero").begin_array(Shape::line).units(zero.x).units(zero.y).end();
     json.key("flask");
     put_flask(json, plan);
     json.key("supports").begin_array();
@@ -425,6 +435,11 @@ std::string plan_json(const Plan& plan) {
     json.end();
     json.key("totals");
     put_totals(json, plan.totals);
+    const CutList list = cut_list(plan);
+    json.key("wood");
+    put_wood(json, list, cut_list(plan, Blanks::pattern));
+    json.key("cost");
+    put_cost(json, plan.job, cost_of(plan.job, amounts_of(plan, list)));
     json.key("diagnostics");
     put_diagnostics(json, plan.diagnostics);
     json.end();

@@ -29,6 +29,8 @@ std::string told(const SequenceStep& step) {
     for (const auto& [key, value] : step.numbers) {
         if (step.action == "tool_change" && key == "tool") text += fmt::format(" T{:.0f}", value);
         if (key == "table_height_mm") text += " to " + mm(value) + " mm";
+        if (key == "slab_left_mm") text += " the slab's edges at x = " + mm(value) + " mm";
+        if (key == "slab_front_mm") text += ", y = " + mm(value) + " mm, its top";
         if (key == "slab_top_mm") text += " at z = " + mm(value) + " mm";
         if (key == "force_n") text += fmt::format(" with {:.0f} N", value);
     }

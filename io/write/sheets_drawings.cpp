@@ -1,25 +1,20 @@
 #include "io/write/sheets_drawings.h"
 
+#include <array>
+#include <string_view>
+
 #include <fmt/format.h>
 
 #include "io/text/decimal.h"
 #include "io/text/json_text.h"
+#include "io/write/dxf_text.h"
 #include "kernels/polygons/pieces.h"
 
 namespace slabwright {
 
 namespace {
 
-void append_group(std::string& text, int code, const std::string& value) {
-    text += std::to_string(code) + '\n' + value + '\n';
-}
-
-/// With a point, by which some readers tell real values.
-std::string real_mm(std::int64_t units) {
-    std::string text;
-    append_mm(text, units);
-    return text.find('.') == std::string::npos ? text + ".0" : text;
-}
+constexpr std::array<std::string_view, 4> kLayers{"CUT", "HOLE", "LABEL", "TAB"};
 
 std::string mm(std::int64_t units) {
     std::string text;
@@ -37,79 +32,28 @@ std::vector<Point2> loop_of(const SheetWay& way) {
 
 }  // namespace
 
-namespace {
-
-void append_words(std::string& text, std::initializer_list<std::pair<int, const char*>> words) {
-    for (const auto& [code, value] : words) append_group(text, code, value);
-}
-
-void append_head(std::string& text, Point2 low, Point2 high) {
-    append_words(text, {{0, "SECTION"}, {2, "HEADER"}, {9, "$ACADVER"}, {1, "AC1009"}});
-    append_words(text, {{9, "$INSUNITS"}, {70, "4"}, {9, "$EXTMIN"}});
-    append_group(text, 10, real_mm(low.x));
-    append_group(text, 20, real_mm(low.y));
-    append_group(text, 9, "$EXTMAX");
-    append_group(text, 10, real_mm(high.x));
-    append_group(text, 20, real_mm(high.y));
-    append_words(text, {{0, "ENDSEC"}, {0, "SECTION"}, {2, "TABLES"}, {0, "TABLE"}, {2, "LAYER"}, {70, "4"}});
-    int colour = 1;
-    for (const char* layer : {"CUT", "HOLE", "LABEL", "TAB"}) {
-        append_words(text, {{0, "LAYER"}, {2, layer}, {70, "0"}});
-        append_group(text, 62, std::to_string(colour++));
-        append_group(text, 6, "CONTINUOUS");
-    }
-    append_words(text, {{0, "ENDTAB"}, {0, "ENDSEC"}, {0, "SECTION"}, {2, "ENTITIES"}});
-}
-
-void append_loop(std::string& text, const char* layer, std::span<const Point2> points) {
-    append_words(text,
-                 {{0, "POLYLINE"}, {8, layer}, {66, "1"}, {10, "0.0"}, {20, "0.0"}, {30, "0.0"}, {70, "1"}});
-    for (const Point2 p : points) {
-        append_words(text, {{0, "VERTEX"}, {8, layer}});
-        append_group(text, 10, real_mm(p.x));
-        append_group(text, 20, real_mm(p.y));
-        append_group(text, 30, "0.0");
-    }
-    append_words(text, {{0, "SEQEND"}, {8, layer}});
-}
-
-void append_label(std::string& text, Point2 at, const std::string& words) {
-    append_words(text, {{0, "TEXT"}, {8, "LABEL"}});
-    append_group(text, 10, real_mm(at.x));
-    append_group(text, 20, real_mm(at.y));
-    append_group(text, 30, "0.0");
-    append_group(text, 40, "8.0");
-    append_group(text, 1, words);
-}
-
-}  // namespace
-
 std::string sheet_dxf(const SheetsPlan& plan, std::size_t index) {
     const SheetProgram& program = plan.programs[index];
-    std::string text;
-    append_head(text, {0, 0}, {to_units(program.stock.length), to_units(program.stock.width)});
-    for (const SheetWay& way : program.ways) append_loop(text, way.is_hole ? "HOLE" : "CUT", loop_of(way));
+    DxfText text({0, 0}, {to_units(program.stock.length), to_units(program.stock.width)}, kLayers);
+    for (const SheetWay& way : program.ways) text.loop(way.is_hole ? "HOLE" : "CUT", loop_of(way));
     for (const int number : program.pieces) {
         const SheetPiece& piece = plan.pieces[static_cast<std::size_t>(number) - 1];
-        append_label(text, piece.label, std::to_string(number));
+        text.label(piece.label, std::to_string(number));
         const Loops tabs = placed(piece.hold.added, piece.place);
-        for (std::size_t l = 0; l < tabs.size(); ++l) append_loop(text, "TAB", tabs.loop(l));
+        for (std::size_t l = 0; l < tabs.size(); ++l) text.loop("TAB", tabs.loop(l));
     }
-    append_words(text, {{0, "ENDSEC"}, {0, "EOF"}});
-    return text;
+    return text.take();
 }
 
 std::string loops_dxf(const Loops& loops, const std::string& label) {
-    std::string text;
     Box2 box;
     for (const Point2 p : loops.points) box.grow(p);
     if (loops.points.empty()) box.min = box.max = {0, 0};
-    append_head(text, box.min, box.max);
+    DxfText text(box.min, box.max, kLayers);
     for (std::size_t l = 0; l < loops.size(); ++l)
-        append_loop(text, signed_area(loops.loop(l)) < 0 ? "HOLE" : "CUT", loops.loop(l));
-    append_label(text, {box.min.x + to_units(5), box.min.y + to_units(5)}, label);
-    append_words(text, {{0, "ENDSEC"}, {0, "EOF"}});
-    return text;
+        text.loop(signed_area(loops.loop(l)) < 0 ? "HOLE" : "CUT", loops.loop(l));
+    text.label({box.min.x + to_units(5), box.min.y + to_units(5)}, label);
+    return text.take();
 }
 
 std::string sheet_svg(const SheetsPlan& plan, std::size_t index) {

@@ -89,4 +89,50 @@ Mesh part_between(Context& context, MeshView mesh, double low, double high) {
     return part;
 }
 
+namespace {
+
+/// Adds what of a facet lies between two heights.
+void grow(PlanBox& box, const std::array<Vec3f, 3>& corners, double low, double high) {
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3f &a = corners[k], &b = corners[(k + 1) % 3];
+        if (a.z >= low && a.z <= high) box.grow(a.x, a.y);
+        for (const double z : {low, high}) {
+            if (!((a.z < z && b.z > z) || (a.z > z && b.z < z))) continue;
+            const double share = (z - a.z) / (double{b.z} - a.z);
+            box.grow(a.x + share * (double{b.x} - a.x), a.y + share * (double{b.y} - a.y));
+        }
+    }
+}
+
+}  // namespace
+
+std::vector<PlanBox> boxes_between(Context& context, MeshView mesh,
+                                   std::span<const std::array<double, 2>> ranges) {
+    const std::vector<PlanBox> none(ranges.size());
+    return parallel_reduce(
+        context, mesh.facets.size(), std::size_t{1} << 16, none,
+        [&](std::size_t begin, std::size_t end) {
+            std::vector<PlanBox> boxes = none;
+            for (std::size_t f = begin; f < end; ++f) {
+                const std::array<Vec3f, 3> corners{mesh.vertices[mesh.facets[f][0]],
+                                                   mesh.vertices[mesh.facets[f][1]],
+                                                   mesh.vertices[mesh.facets[f][2]]};
+                const double low = std::min({corners[0].z, corners[1].z, corners[2].z}),
+                             high = std::max({corners[0].z, corners[1].z, corners[2].z});
+                auto range = std::partition_point(ranges.begin(), ranges.end(),
+                                                  [&](const auto& r) { return r[1] < low; });
+                for (; range != ranges.end() && (*range)[0] <= high; ++range)
+                    grow(boxes[static_cast<std::size_t>(range - ranges.begin())], corners, (*range)[0],
+                         (*range)[1]);
+            }
+            return boxes;
+        },
+        [](std::vector<PlanBox> a, const std::vector<PlanBox>& b) {
+            for (std::size_t i = 0; i < a.size(); ++i)
+                if (!b[i].is_empty())
+                    a[i].grow(b[i].min[0], b[i].min[1]), a[i].grow(b[i].max[0], b[i].max[1]);
+            return a;
+        });
+}
+
 }  // namespace slabwright

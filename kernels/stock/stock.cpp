@@ -28,6 +28,20 @@ void Stock::add_slab(double z_bottom, double thickness) {
     std::fill(block_tops_.begin(), block_tops_.end(), static_cast<float>(thickness));
 }
 
+void Stock::add_slab(double z_bottom, double thickness, const std::array<double, 2>& low,
+                     const std::array<double, 2>& high) {
+    add_slab(z_bottom, thickness);
+    std::vector<float>& height = slabs_.back().height;
+    std::size_t cell = 0;
+    for (int j = 0; j < grid_.ny; ++j) {
+        const double y = grid_.y(j);
+        for (int i = 0; i < grid_.nx; ++i, ++cell) {
+            const double x = grid_.x(i);
+            if (x < low[0] || x > high[0] || y < low[1] || y > high[1]) height[cell] = 0;
+        }
+    }
+}
+
 namespace {
 
 // What cells over a slab's bottom lost, told in eight places, so that a compiler sees that the order of cells

@@ -39,6 +39,10 @@ public:
 
     /// Bonds a slab of `thickness` mm with its bottom at z_bottom, at or above what was added before.
     void add_slab(double z_bottom, double thickness);
+    /// The same with a slab that covers less than the grid: where the middle of a cell lies outside of
+    /// [low, high] (mm, x and y), nothing of it stands.
+    void add_slab(double z_bottom, double thickness, const std::array<double, 2>& low,
+                  const std::array<double, 2>& high);
 
     /// Takes away what the cutter meets on its way. Cells that lose more than `deep` mm are counted. @param
     /// chain as for sweep_above: what another motion of the chain gets as low or lower is left to that one

@@ -1,9 +1,11 @@
-// A planned folder of which one file is another: verification and report give a verdict or one clear error.
+// A planned folder of which one file is another: verification gives a verdict, and an interrupted build its
+// state, or one clear error.
 // The first byte says which file; the rest is its text, or, where that begins with '~', edits of the good
 // one.
 #include <array>
 #include <string>
 
+#include "io/resume.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
 #include "io/write/stl_writer.h"
@@ -21,7 +23,7 @@ struct Planned {
     support::TemporaryFolder folder;
     Context context{{.threads = 1, .memory_bytes = std::uint64_t{1} << 30}};
     std::shared_ptr<Pattern> pattern;
-    std::array<std::string, 4> names{"plan.json", "sequence.json", "tool.tbl", ""}, good{};
+    std::array<std::string, 5> names{"plan.json", "sequence.json", "tool.tbl", "", "progress.json"}, good{};
 
     Planned() {
         const std::string stl = folder / "part.stl";
@@ -31,6 +33,7 @@ struct Planned {
         const Plan plan = slabwright::plan(context, *pattern, job);
         slabwright::write(context, plan, folder / "out");
         names[3] = "nc/" + plan.layers.front().operations.back().file;
+        (void)resume_build(context, folder / "out", {.after = 3, .remake = {}, .now_s = 1'000'000});
         for (std::size_t i = 0; i < names.size(); ++i) good[i] = support::slurp(folder / ("out/" + names[i]));
     }
 };
@@ -60,12 +63,20 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     support::spit(file, edits ? edited(planned.good[which], data + 2, size - 2)
                               : std::string(fuzz::text(data + 1, size - 1)));
     fuzz::expect_clear_error([&] {
-        const Verification verdict = verify_folder(
-            planned.context, planned.folder / "out",
-            {.source = planned.folder / "part.stl", .pattern = planned.pattern, .cell = 2, .write = false});
-        for (const Violation& v : verdict.report.violations)
-            fuzz::require(!v.code.empty(), "a violation without a code");
+        const ResumeStatus status = resume_build(planned.context, planned.folder / "out",
+                                                 {.after = {}, .remake = {}, .now_s = 1'000'600});
+        fuzz::require(!resume_json(status).empty(), "a status without words");
     });
+    if (planned.names[which] != "progress.json")
+        fuzz::expect_clear_error([&] {
+            const Verification verdict = verify_folder(planned.context, planned.folder / "out",
+                                                       {.source = planned.folder / "part.stl",
+                                                        .pattern = planned.pattern,
+                                                        .cell = 2,
+                                                        .write = false});
+            for (const Violation& v : verdict.report.violations)
+                fuzz::require(!v.code.empty(), "a violation without a code");
+        });
     support::spit(file, planned.good[which]);
     return 0;
 }

@@ -55,7 +55,7 @@ for (const [stl, options] of patterns) {
     check.that(`${name}: model within a stated error`, data.model.facets <= 80000 && data.model.error_mm < 0.002 * Math.max(...data.model.max.map((v, k) => v - data.model.min[k])), JSON.stringify(data.model.error_mm));
     const pages = pdfPages(await page.pdf({preferCSSPageSize: true}));
     // A layer with many programs or warnings may take a second page.
-    check.that(`${name}: a cover and a page for each layer`, pages > plan.layers.length && pages <= 2 * plan.layers.length + 2, `${pages} for ${plan.layers.length}`);
+    check.that(`${name}: a cover and a page for each layer`, pages > plan.layers.length && pages <= 2 * plan.layers.length + 2 + Math.ceil(plan.wood.boards.length / 4), `${pages} for ${plan.layers.length}`);
     // What stays filled is told once: the drawn boxes hold what verify.json says.
     if (verify) {
         const cells = data.filled.layers.reduce((sum, layer) => sum + layer.mm3, 0), {unmade_mm3: said} = verify.totals;

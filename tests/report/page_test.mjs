@@ -35,6 +35,12 @@ const refreshed = readFileSync(file);
 execFileSync(command, ['report', out, '--quiet', '--threads', '1']);
 check.that('verify leaves the page that report makes', refreshed.equals(readFileSync(file)));
 const verify = JSON.parse(readFileSync(`${out}/verify.json`, 'utf8'));
+// The command prints the sheets as the browser does: a cover, the cut list, and a page for each layer.
+{
+    execFileSync(command, ['report', out, '--quiet', '--pdf', `${work}/sheets.pdf`]);
+    const pages = pdfPages(readFileSync(`${work}/sheets.pdf`));
+    check.that('report --pdf: the sheets', pages >= layers + 2 && pages <= 2 * layers + 3, `${pages} pages for ${layers} layers`);
+}
 const {page, complaints, requests} = await open(started, file);
 const change = (selector, value) => page.locator(selector).evaluate((element, v) => {
     element.value = v;
@@ -83,7 +89,7 @@ const numbers = text => text.split(',').map(Number);
     const times = await cover.locator('table').last().locator('tbody tr td:last-child').allTextContents();
     check.equal('cover: the layers’ times add up', times.slice(0, -1).reduce((sum, t) => sum + minutesOf(t), 0), minutesOf(times[times.length - 1]));
     for (let l = 0; l < layers; ++l) {
-        const sheet = page.locator('.sheet').nth(l + 1), text = await sheet.textContent(), layer = plan.layers[l];
+        const sheet = page.locator('.sheet:not(.cutlist)').nth(l + 1), text = await sheet.textContent(), layer = plan.layers[l];
         check.that(`sheet ${l + 1}: every program`, layer.operations.every(o => text.includes(o.file.replace('nc/', ''))));
         check.that(`sheet ${l + 1}: speeds and stick-outs`, layer.operations.every(o => {
             const tool = plan.tools.find(t => t.number === o.tool);
@@ -94,13 +100,23 @@ const numbers = text => text.split(',').map(Number);
             && (await sheet.locator('.side-view').textContent()).includes(`z ${shown(layer.z_bottom - down)}`));
         check.that(`sheet ${l + 1}: the slab’s measures`, (await sheet.locator('.plan-view').textContent()).includes(`slab ${Number((plan.stock.max[0] - plan.stock.min[0]).toFixed(1))}`));
     }
+    // The cut list draws every piece of every board with its measures.
+    const cutlist = page.locator('.sheet.cutlist'), boards = plan.wood.boards;
+    check.equal('cut list: a drawing for each board', await cutlist.locator('svg').count(), boards.length);
+    for (const [b, board] of boards.entries()) {
+        const label = await cutlist.locator('svg').nth(b).getAttribute('aria-label'), size = v => Number(v.toFixed(1));
+        check.that(`cut list: board ${b + 1} names its pieces`, board.pieces.every(p => label.includes(`${p.layer ? `layer ${p.layer}` : 'base board'} ${size(p.length)} × ${size(p.width)}`)), label);
+        check.equal(`cut list: board ${b + 1} has its rectangles`, await cutlist.locator('svg').nth(b).locator('rect').count(), 1 + board.pieces.length + board.cuts.length + board.offcuts.length);
+    }
+    const counted = (await cutlist.locator('tbody tr td:first-child').allTextContents()).reduce((sum, text) => sum + Number(text), 0);
+    check.equal('cut list: counts all pieces', counted, boards.reduce((sum, board) => sum + board.pieces.length, 0));
     // Feeds are those of the programs.
     const {feeds} = await page.evaluate(() => JSON.parse(document.getElementById('slabwright-data').textContent));
     plan.layers.flatMap(layer => layer.operations).forEach((operation, i) => {
         const said = new Set([...readFileSync(`${out}/${operation.file}`, 'utf8').matchAll(/\bF([\d.]+)/g)].map(([, f]) => Math.round(Number(f))));
         check.that(`feeds of ${operation.file}`, said.has(feeds[i].low) && said.has(feeds[i].high) && Math.max(feeds[i].high, feeds[i].plunge ?? 0) === Math.max(...said), JSON.stringify(feeds[i]));
     });
-    const box = page.locator('.sheet').nth(1).locator('input[type=checkbox]').first();
+    const box = page.locator('.sheet:not(.cutlist)').nth(1).locator('input[type=checkbox]').first();
     await box.check();
     check.that('sheet: a check can be ticked', await box.isChecked());
     await box.uncheck();
@@ -269,7 +285,7 @@ check.equal('axe: no violations when narrow', await violations(page), []);
 check.that('narrow: no sideways scrolling', await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth + 1), await page.evaluate(() => document.documentElement.scrollWidth));
 await page.setViewportSize({width: 1280, height: 900});
 
-check.equal('print: a cover and one page for each layer', pdfPages(await page.pdf({preferCSSPageSize: true})), layers + 1);
+check.equal('print: a cover, the cut list and one page for each layer', pdfPages(await page.pdf({preferCSSPageSize: true})), layers + 2);
 check.equal('no complaints', complaints, []);
 check.equal('no request leaves the page', requests, []);
 check.that('size', statSync(file).size < 10e6);
@@ -281,7 +297,7 @@ execFileSync(command, ['report', out, '--quiet', '--no-3d']);
     const light = await open(started, file);
     check.that('light: smaller', statSync(file).size < 1e6, statSync(file).size);
     check.equal('light: no view', await light.page.locator('canvas').count(), 0);
-    check.equal('light: a cover and sheets', await light.page.locator('.sheet').count(), layers + 1);
+    check.equal('light: a cover, a cut list and sheets', await light.page.locator('.sheet').count(), layers + 2);
     check.equal('light: no complaints', light.complaints, []);
     check.equal('light: axe', await violations(light.page), []);
     await light.page.close();
@@ -334,5 +350,28 @@ check.equal('selection: no tables without a choice', await (async () => {
     await page.close();
     return count;
 })(), 0);
+// Supports stand on the sheets of the layers that they go through, and are sawn off in the end.
+{
+    const facets = [];
+    const box = (x0, y0, z0, x1, y1, z1) => {
+        const v = [[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0], [x0, y0, z1], [x1, y0, z1], [x1, y1, z1], [x0, y1, z1]];
+        for (const [a, b, c, d] of [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]) facets.push([v[a], v[b], v[c]], [v[a], v[c], v[d]]);
+    };
+    box(0, 0, 0, 60, 60, 50);
+    box(100, 0, 25, 140, 60, 50); // a leg that ends in the air
+    box(40, 20, 42, 120, 40, 50);
+    writeFileSync(`${work}/leg.stl`, `solid leg\n${facets.map(t => `facet normal 0 0 0\nouter loop\n${t.map(p => `vertex ${p.join(' ')}\n`).join('')}endloop\nendfacet\n`).join('')}endsolid leg\n`);
+    const built = `${work}/leg`;
+    execFileSync(command, ['plan', `${work}/leg.stl`, '-o', built, '--allow-undercut', '--quiet', '--no-verify']);
+    const {supports, layers: planned} = JSON.parse(readFileSync(`${built}/plan.json`, 'utf8'));
+    const {page, complaints} = await open(started, `${built}/report.html`);
+    check.that('supports: there is one', supports.length > 0);
+    for (const [l, layer] of planned.entries())
+        check.equal(`supports: on the sheet of layer ${layer.index}`, await page.locator(`#sheet-${l + 1} .plan-view path.support`).count(),
+            supports.filter(s => s.z_low < layer.z_top - 0.001 && s.z_high > layer.z_bottom + 0.001).length);
+    check.that('supports: sawn off in the end', (await page.locator('.cover .steps li:last-child').textContent()).includes(`saw off ${supports.length} support`));
+    check.equal('supports: no complaints', complaints, []);
+    await page.close();
+}
 await started.close();
 check.end();

@@ -1,11 +1,11 @@
 // The drawings of the setup sheets: the slab from above with its measures, and the stack from the side.
 
 import {figure, make} from './dom.js';
-import {data, flaskRings, plan} from './report.js';
+import {blankOf, data, flaskRings, plan} from './report.js';
 import {filledBoxes} from './wood.js';
 import {shownHeights} from './zero.js';
 
-const ink = '#1f252b', dim = '#525c66', red = '#b0141f', wood = '#f1e6d3', cutWood = '#d9bd8a', glueInk = '#8f6200';
+const ink = '#1f252b', dim = '#525c66', red = '#b0141f', wood = '#f1e6d3', cutWood = '#d9bd8a', glueInk = '#8f6200', purple = '#5b3a8e';
 
 function pathOf(loops) {
     const unit = data.outlines.unit_mm;
@@ -43,36 +43,45 @@ function stripes(id, color, ground, u, turn) {
         make('rect', {width: 2.4 * u, height: 2.4 * u, fill: ground}), make('path', {d: `M0 0V${2.4 * u}`, stroke: color, 'stroke-width': 0.7 * u}));
 }
 
+// Columns of stock that stand in a layer: they are left there, and sawn off when the pattern is done.
+export const supportsIn = l => (plan.supports ?? []).filter(s => s.z_low < plan.layers[l].z_top - 0.001 && s.z_high > plan.layers[l].z_bottom + 0.001);
+
 // The slab of layer l from above: slab, pattern, glue, zero, and their measures. paper: how large it is printed at most, mm.
 export function planView(l, paper) {
     const [x0, y0] = plan.stock.min, [x1, y1] = plan.stock.max, width = x1 - x0, depth = y1 - y0, layer = plan.layers[l];
     const {bottom, top, glue} = data.outlines.layers[l];
+    const {min: [sx0, sy0], max: [sx1, sy1]} = blankOf(l), smaller = sx1 - sx0 < width - 0.05 || sy1 - sy0 < depth - 0.05;
     // The margin holds the dimensions; what it takes in the drawing's units depends on its scale.
     const margin = {left: 19, right: 10, top: 12, bottom: 17};
     const u = Math.max(width / (paper[0] - margin.left - margin.right), depth / (paper[1] - margin.top - margin.bottom));
-    const zx = Math.min(x1 + 6 * u, Math.max(x0 - 6 * u, 0)), zy = -Math.min(y1 + 6 * u, Math.max(y0 - 6 * u, 0));
+    const [ox, oy] = plan.zero ?? [0, 0], zx = Math.min(x1 + 6 * u, Math.max(x0 - 6 * u, ox)), zy = -Math.min(y1 + 6 * u, Math.max(y0 - 6 * u, oy));
     const view = {x: x0 - margin.left * u, y: -y1 - margin.top * u, w: width + (margin.left + margin.right) * u, h: depth + (margin.top + margin.bottom) * u};
     const {min, max} = plan.input.bbox, px0 = min[0], px1 = max[0], py0 = min[1], py1 = max[1];
     const filled = filledBoxes(l);
-    const inside = 0 >= x0 && 0 <= x1 && 0 >= y0 && 0 <= y1;
+    const inside = ox >= sx0 - 0.001 && ox <= sx1 && oy >= sy0 - 0.001 && oy <= sy1;
     return make('svg', {class: 'plan-view', viewBox: `${view.x} ${view.y} ${view.w} ${view.h}`, role: 'img',
-        'aria-label': `Slab of layer ${layer.index} from above, ${figure(width, 1)} by ${figure(depth, 1)} mm; glue on ${figure(layer.glue_area_mm2 / 100, 1)} square centimetres; zero ${inside ? 'on' : 'beside'} the slab`},
+        'aria-label': `Slab of layer ${layer.index} from above, ${figure(sx1 - sx0, 1)} by ${figure(sy1 - sy0, 1)} mm${smaller ? `, ${figure(sx0 - x0, 1)} mm right of and ${figure(sy0 - y0, 1)} mm behind the base board’s corner` : ''}; glue on ${figure(layer.glue_area_mm2 / 100, 1)} square centimetres; zero ${inside ? 'on' : 'beside'} the slab`},
     make('defs', {}, stripes(`glue-${l}`, '#d69a1e', '#f9dfa0', u, 45), stripes(`air-${l}`, red, '#f4c3c3', u, -45)),
-    make('rect', {x: x0, y: -y1, width, height: depth, fill: wood, stroke: '#8a6a3a', 'stroke-width': 0.5 * u}),
+    smaller ? [make('rect', {x: x0, y: -y1, width, height: depth, fill: 'none', stroke: '#8a8375', 'stroke-width': 0.3 * u, 'stroke-dasharray': `${3 * u} ${1.5 * u}`}), label(x0 + 1.5 * u, -y1 + 4 * u, 'base board', 3 * u, {fill: dim})] : null,
+    make('rect', {x: sx0, y: -sy1, width: sx1 - sx0, height: sy1 - sy0, fill: wood, stroke: '#8a6a3a', 'stroke-width': 0.5 * u}),
     flaskRings(l).map(ring => make('path', {d: `M${ring.map(([x, y]) => `${x} ${-y}`).join('L')}Z`, fill: 'none', stroke: '#8a6a3a', 'stroke-width': 0.3 * u})),
     make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: cutWood, 'fill-rule': 'evenodd', stroke: 'none'}),
     glue.length ? make('path', {d: pathOf(glue), fill: `url(#glue-${l})`, 'fill-rule': 'evenodd', stroke: glueInk, 'stroke-width': 0.25 * u}) : null,
     filled.length ? make('path', {d: filled.map(b => `M${b.x0.toFixed(2)} ${(-b.y0).toFixed(2)}H${b.x1.toFixed(2)}V${(-b.y1).toFixed(2)}H${b.x0.toFixed(2)}Z`).join(''), fill: `url(#air-${l})`, stroke: 'none'}) : null,
     make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: 'none', stroke: ink, 'stroke-width': 0.45 * u}),
+    supportsIn(l).map(s => make('path', {class: 'support', d: `M${s.x - s.width / 2} ${-s.y - s.width / 2}h${s.width}v${s.width}h${-s.width}Zl${s.width} ${s.width}m0 ${-s.width}l${-s.width} ${s.width}`, fill: 'none', stroke: purple, 'stroke-width': 0.5 * u})),
     make('path', {d: pathOf(top.map(loop => loop.points)), fill: 'none', stroke: '#17636b', 'stroke-width': 0.4 * u, 'stroke-dasharray': `${2 * u} ${1.3 * u}`}),
     // Measures: the slab below and left, the pattern above and right.
-    extension(x0, -y0, x0, -y0 + 15 * u, u), extension(x1, -y0, x1, -y0 + 15 * u, u), extension(x0, -y0, x0 - 15 * u, -y0, u), extension(x0, -y1, x0 - 15 * u, -y1, u),
-    dimension(x0, x1, -y0 + 14 * u, false, `slab ${figure(width, 1)}`, u), dimension(-y0, -y1, x0 - 14 * u, true, `slab ${figure(depth, 1)}`, u),
+    extension(sx0, -sy0, sx0, -y0 + 15 * u, u), extension(sx1, -sy0, sx1, -y0 + 15 * u, u), extension(sx0, -sy0, x0 - 15 * u, -sy0, u), extension(sx0, -sy1, x0 - 15 * u, -sy1, u),
+    dimension(sx0, sx1, -y0 + 14 * u, false, `slab ${figure(sx1 - sx0, 1)}`, u), dimension(-sy0, -sy1, x0 - 14 * u, true, `slab ${figure(sy1 - sy0, 1)}`, u),
+    // Where it lies on the base board.
+    sx0 - x0 > 0.05 ? [extension(x0, -y0, x0, -y0 + 15 * u, u), dimension(x0, sx0, -y0 + 14 * u, false, figure(sx0 - x0, 1), u)] : null,
+    sy0 - y0 > 0.05 ? [extension(x0, -y0, x0 - 15 * u, -y0, u), dimension(-y0, -sy0, x0 - 14 * u, true, figure(sy0 - y0, 1), u)] : null,
     extension(px0, -py1, px0, -y1 - 7 * u, u), extension(px1, -py1, px1, -y1 - 7 * u, u), dimension(px0, px1, -y1 - 6 * u, false, `pattern ${figure(px1 - px0, 1)}`, u),
     extension(px1, -py0, x1 + 7.5 * u, -py0, u), extension(px1, -py1, x1 + 7.5 * u, -py1, u), dimension(-py0, -py1, x1 + 6.5 * u, true, `pattern ${figure(py1 - py0, 1)}`, u),
     // From the slab's corner to zero.
-    Math.abs(x0) > 0.05 ? [extension(zx, zy, zx, -y0 + 8 * u, u), extension(x0, -y0, x0, -y0 + 8 * u, u), dimension(x0, zx, -y0 + 7 * u, false, figure(Math.abs(x0), 2), u)] : null,
-    Math.abs(y0) > 0.05 ? [extension(zx, zy, x0 - 8 * u, zy, u), dimension(-y0, zy, x0 - 6 * u, true, figure(Math.abs(y0), 2), u)] : null,
+    Math.abs(sx0 - ox) > 0.05 ? [extension(zx, zy, zx, -y0 + 8 * u, u), extension(sx0, -sy0, sx0, -y0 + 8 * u, u), dimension(sx0, zx, -y0 + 7 * u, false, figure(Math.abs(sx0 - ox), 2), u)] : null,
+    Math.abs(sy0 - oy) > 0.05 ? [extension(zx, zy, x0 - 8 * u, zy, u), dimension(-sy0, zy, x0 - 6 * u, true, figure(Math.abs(sy0 - oy), 2), u)] : null,
     // Zero with its axes.
     make('path', {d: `M${zx} ${zy}h${13 * u}l${-2.2 * u} ${-1 * u}v${2 * u}l${2.2 * u} ${-1 * u}M${zx} ${zy}v${-13 * u}l${-1 * u} ${2.2 * u}h${2 * u}l${-1 * u} ${-2.2 * u}`, stroke: red, 'stroke-width': 0.6 * u, fill: red}),
     make('circle', {cx: zx, cy: zy, r: 2 * u, fill: '#fff', stroke: red, 'stroke-width': 0.6 * u}), make('circle', {cx: zx, cy: zy, r: 0.6 * u, fill: red}),
@@ -132,7 +141,7 @@ export function stackView(paper) {
     const svg = make('svg', {class: 'stack-view', viewBox: `${x0 - u} 0 ${width + 28 * u} ${height * taller + 6 * u}`, role: 'img', 'aria-label': `The stack from the front: ${plan.layers.length} layers on the base board`},
         make('defs', {}, stripes(air, red, '#f4c3c3', u, -45)),
         make('path', {d: box(x0, x1, -board, 0), fill: '#dedbd3', stroke: '#8a8375', 'stroke-width': 0.3 * u}),
-        plan.layers.map((layer, i) => make('path', {d: box(x0, x1, layer.z_bottom, layer.z_top), fill: i % 2 ? '#f3ead9' : '#f8f2e6', stroke: '#b59b6a', 'stroke-width': 0.3 * u})),
+        plan.layers.map((layer, i) => make('path', {d: box(blankOf(i).min[0], blankOf(i).max[0], layer.z_bottom, layer.z_top), fill: i % 2 ? '#f3ead9' : '#f8f2e6', stroke: '#b59b6a', 'stroke-width': 0.3 * u})),
         make('path', {d: rows, fill: cutWood}),
         filled.length ? make('path', {d: filled.map(b => box(b.x0, b.x1, b.z0, b.z1)).join(''), fill: `url(#${air})`}) : null,
         plan.layers.map((layer, l) => glueSpans(l).map(([a, b]) => make('path', {d: `M${a} ${y(layer.z_bottom)}H${b}`, stroke: '#d69a1e', 'stroke-width': 0.7 * u}))),

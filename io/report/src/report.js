@@ -61,6 +61,17 @@ export function sharedMinutes(list, total) {
     return whole.map(m => duration(m));
 }
 
+// What the slabs of layer l cover, {min, max}: its own blank, or the whole stock.
+export function blankOf(l) {
+    return plan.layers[l].blank ?? plan.stock;
+}
+
+// "500 × 400 mm" of layer l's slabs.
+export function blankSize(l) {
+    const {min, max} = blankOf(l);
+    return `${figure(max[0] - min[0], 1)} × ${figure(max[1] - min[1], 1)}`;
+}
+
 export function toolOf(number) {
     return plan.tools.find(tool => tool.number === number);
 }

@@ -1,8 +1,9 @@
 // What hangs at the machine: a cover with what to load and how long it takes, and one printed page for each layer.
 
 import {duration, figure, make, plural, words} from './dom.js';
-import {planView, sideView, stackView} from './drawing.js';
-import {data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
+import {boardsText, costText, cutListSheet} from './cutlist.js';
+import {planView, sideView, stackView, supportsIn} from './drawing.js';
+import {blankOf, blankSize, data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
 import {filledVolume} from './wood.js';
 import {tableHeight, zeroOf} from './zero.js';
 
@@ -97,7 +98,8 @@ function sheet(l, minutes) {
     const layer = plan.layers[l], programs = operations.filter(operation => operation.layer === l), zero = zeroOf(l), filled = filledVolume(l);
     const off = layer.z_bottom + layer.slab_thickness - layer.z_top, files = [...new Set(programs.map(o => fileOf(o).replace(/^nc\//, '')))], first = files[0], final = files[files.length - 1];
     const warnings = [...zero.warnings, ...(filled >= 1 ? [`${cubic(filled)} under overhangs stay filled in this layer (red in the drawing).`] : []), ...warningsOf(l)];
-    const glued = layer.glue_area_mm2 > 0;
+    const glued = layer.glue_area_mm2 > 0, {min} = blankOf(l), [bx, by] = [0, 1].map(k => min[k] - plan.stock.min[k]);
+    const laid = bx > 0.05 || by > 0.05 ? `, its corner ${figure(bx, 1)} mm right of and ${figure(by, 1)} mm behind the base board’s` : '';
     return make('article', {class: 'sheet', 'aria-label': `Setup sheet of layer ${layer.index}`},
         make('div', {class: 'top'},
             make('h3', {}, `Layer ${layer.index}`, make('small', {}, ` of ${plan.layers.length}`)),
@@ -106,10 +108,10 @@ function sheet(l, minutes) {
         warningBox(warnings, 5),
         make('div', {class: 'drawings'}, planView(l, [132, 92]), sideView(l, [58, 92])),
         make('p', {class: 'key'}, make('i', {class: 'glue'}), ' glue ', make('i', {class: 'solid'}), ' pattern at the bottom ', make('i', {class: 'dash'}), ' at the top ',
-            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
+            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, supportsIn(l).length ? [make('i', {class: 'support'}), ' support, stays till the end '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
         make('div', {class: 'facts'},
             fact('Zero', make('p', {}, zero.place), make('p', {}, make('strong', {}, 'XY: '), zero.xy, zero.after ? `; ${zero.after}` : null), make('p', {}, make('strong', {}, 'Z: '), zero.z), make('p', {}, make('strong', {}, 'Table: '), tableHeight(l))),
-            fact('Slab', make('p', {}, make('strong', {}, `${figure(plan.stock.max[0] - plan.stock.min[0], 1)} × ${figure(plan.stock.max[1] - plan.stock.min[1], 1)} × ${figure(layer.slab_thickness, 2)} mm`), ` ${plan.job.material.name}`),
+            fact('Slab', make('p', {}, make('strong', {}, `${blankSize(l)} × ${figure(layer.slab_thickness, 2)} mm`), ` ${plan.job.material.name}${laid}`),
                 make('p', {}, `pattern z ${figure(layer.z_bottom, 3)} to ${figure(layer.z_top, 3)}; facing takes ${figure(off, 2)} mm`), make('p', {class: 'soft'}, layer.reason)),
             fact(glued ? 'Glue and press' : 'No glue', glued
                 ? [make('p', {}, make('strong', {}, `${figure(layer.glue_area_mm2 / 100, 1)} cm²`), ` ${plan.job.bonding.glue}, on the yellow`),
@@ -132,8 +134,19 @@ function sheet(l, minutes) {
         make('p', {class: 'proof'}, make('strong', {}, 'Simulated: '), simulated(l).join('; ')));
 }
 
+// Slabs of one size, the largest first: {count, size, thickness}.
+function slabsToLay() {
+    const lines = new Map();
+    plan.layers.forEach((layer, l) => {
+        const size = blankSize(l), thickness = layer.slab_thickness / layer.slabs, key = `${size}:${thickness}`, {min, max} = blankOf(l);
+        if (!lines.has(key)) lines.set(key, {count: 0, size, thickness, area: (max[0] - min[0]) * (max[1] - min[1])});
+        lines.get(key).count += layer.slabs;
+    });
+    return [...lines.values()].sort((a, b) => b.area - a.area || b.thickness - a.thickness);
+}
+
 function cover(minutes) {
-    const stack = stackView([112, 84]);
+    const stack = stackView([112, 84]), cost = costText();
     const t = totals(), answer = verdict(), whole = warningsOf(-1), shown = sharedMinutes(minutes, plan.totals.build_minutes);
     const wide = `${figure(plan.stock.max[0] - plan.stock.min[0], 1)} × ${figure(plan.stock.max[1] - plan.stock.min[1], 1)} mm`;
     const used = toolUse().filter(({uses}) => uses.length > 0);
@@ -142,12 +155,14 @@ function cover(minutes) {
         make('div', {class: 'top'}, make('h3', {}, plan.input.file), make('p', {class: 'clock'}, make('strong', {}, duration(plan.totals.build_minutes)), make('br'), plural(plan.layers.length, 'layer'), ', ', plural(operations.length, 'program'))),
         make('p', {class: `answer ${answer.kind}`}, make('strong', {}, `${answer.title}. `), answer.text),
         warningBox(whole, 5),
+        cost ? make('p', {}, 'Cost ', make('strong', {}, cost.total), `: ${cost.parts}`) : null,
         make('div', {class: 'cols'},
             make('div', {}, stack.svg, make('p', {class: 'key'}, make('i', {class: 'wood'}), ' pattern ', make('i', {class: 'glue'}), ' glue ', make('i', {class: 'air'}), ' stays filled',
                 stack.taller > 1.01 ? `; heights drawn ${figure(stack.taller, 1)} times` : null)),
             fact('Lay out', make('div', {class: 'checks one'}, [
                 `base board ${wide} × ${figure(plan.job.machine.base_board_thickness, 1)} mm`,
-                ...t.slabs.map(s => `${plural(s.count, 'slab')} ${plan.job.material.name}, ${wide} × ${figure(s.thickness, 2)} mm`),
+                ...slabsToLay().map(s => `${plural(s.count, 'slab')} ${plan.job.material.name}, ${s.size} × ${figure(s.thickness, 2)} mm`),
+                ...(plan.wood ? [`sawn from ${boardsText()} (cut list below)`] : []),
                 `${plan.job.bonding.glue} for ${figure(t.glue_mm2 / 100, 0)} cm²`,
                 `${plural(used.length, 'tool')} as below, programs of nc/ on the control${control()}`,
                 `press up to ${figure(Math.max(...plan.layers.map(layer => layer.press_force_n)), 0)} N, ${figure(plan.job.bonding.press_time_s, 0)} s a joint`,
@@ -161,17 +176,17 @@ function cover(minutes) {
                 figure(layer.glue_area_mm2 / 100, 1), figure(layer.press_force_n, 0), String(layer.operations.length), perLayer[l] ? String(perLayer[l]) : '–', shown[l]]),
             ['', make('strong', {}, 'All'), '', '', '', figure(t.glue_mm2 / 100, 1), '', String(operations.length), '', make('strong', {}, duration(plan.totals.build_minutes))]], [2, 3, 4, 5, 6, 7, 8, 9]),
         make('h4', {}, 'Every layer goes'),
-        make('ol', {class: 'steps'}, ['Clean the joint, spread the glue, lay the slab, press.', 'Set the table, touch off as the layer’s sheet says.', 'Run its programs in the order of their names; the first faces the slab.', 'Measure the faced top, tick the sheet, go on to the next.'].map(s => make('li', {}, s))));
+        make('ol', {class: 'steps'}, ['Clean the joint, spread the glue, lay the slab, press.', 'Set the table, touch off as the layer’s sheet says.', 'Run its programs in the order of their names; the first faces the slab.', 'Measure the faced top, tick the sheet, go on to the next.', ...(plan.supports?.length ? [`When the last is done: saw off ${plural(plan.supports.length, 'support')}, at ${plan.supports.map(s => `x ${figure(s.x, 0)} y ${figure(s.y, 0)}`).slice(0, 6).join(', ')}${plan.supports.length > 6 ? ' …' : ''}.`] : [])].map(s => make('li', {}, s))));
 }
 
 export function buildSheets(section) {
     const minutes = layerMinutes().map(row => phases.reduce((sum, phase) => sum + row[phase.key], 0));
-    section.append(make('p', {class: 'note'}, 'Printing this page gives these sheets: a cover, and a page for each layer. Boxes that you tick stay ticked in this browser. ',
+    section.append(...[make('p', {class: 'note'}, 'Printing this page gives these sheets: a cover, the cut list, and a page for each layer. Boxes that you tick stay ticked in this browser. ',
         make('button', {class: 'act', type: 'button', onclick: () => window.print()}, 'Print')),
     make('nav', {class: 'jump', 'aria-label': 'Setup sheets'}, plan.layers.map((layer, l) => make('a', {href: `#sheet-${l + 1}`}, `Layer ${layer.index}`))),
-    cover(minutes), ...plan.layers.map((_, l) => {
+    cover(minutes), cutListSheet(), ...plan.layers.map((_, l) => {
         const made = sheet(l, minutes[l]);
         made.id = `sheet-${l + 1}`;
         return made;
-    }));
+    })].filter(part => part));
 }

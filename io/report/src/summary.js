@@ -1,6 +1,7 @@
 // The first screen: can it be made, how long, of what, with which tools.
 
 import {duration, figure, make, plural, words} from './dom.js';
+import {boardsText, costText} from './cutlist.js';
 import {stackView} from './drawing.js';
 import {layerMinutes, phases, plan, remarks, size, toolUse, totals, verdict, verify} from './report.js';
 
@@ -26,7 +27,7 @@ function entry(term, value, small, tone) {
 }
 
 export function buildSummary(section, show) {
-    const answer = verdict(), t = totals(), [sx, sy, sz] = size();
+    const cost = costText(), answer = verdict(), t = totals(), [sx, sy, sz] = size();
     const minutes = Object.fromEntries(phases.map(phase => [phase.key, 0]));
     for (const row of layerMinutes()) for (const phase of phases) minutes[phase.key] += row[phase.key];
     const stack = stackView([190, 56]);
@@ -48,7 +49,9 @@ export function buildSummary(section, show) {
         make('dl', {class: 'figures'},
             entry('Pattern', `${figure(sx, 1)} × ${figure(sy, 1)} × ${figure(sz, 1)} mm`, `${figure(plan.input.triangles, 0)} facets`),
             entry('Slabs', t.slabs.map(s => `${s.count} × ${figure(s.thickness, 3)} mm`).join(', '),
-                `${plan.job.material.name}, ${figure(plan.stock.max[0] - plan.stock.min[0], 1)} × ${figure(plan.stock.max[1] - plan.stock.min[1], 1)} mm; ${kg}`),
+                `${plan.job.material.name}, ${plan.job.slabs.blanks === 'layer' ? 'at most ' : ''}${figure(plan.stock.max[0] - plan.stock.min[0], 1)} × ${figure(plan.stock.max[1] - plan.stock.min[1], 1)} mm; ${kg}`),
+            plan.wood ? entry('Boards to buy', `${figure(plan.wood.bought_m2, 2)} m²`, `${boardsText()}; ${figure(plan.wood.sawn_m2, 2)} m² of it in slabs and base board`) : null,
+            cost ? entry('Cost', cost.total, cost.parts) : null,
             entry('Glue', `${figure(t.glue_mm2 / 100, 1)} cm²`, plan.job.bonding.glue),
             entry('Waste', `${figure(100 * t.waste_share, 1)} %`, `${figure((t.stock_volume_mm3 - t.part_volume_mm3) / 1e6, 2)} dm³ of ${figure(t.stock_volume_mm3 / 1e6, 2)} dm³`),
             entry('Worst gouge', verify ? `${figure(verify.totals.gouge_max_mm, 4)} mm` : 'not simulated', verify ? `${figure(verify.limits.gouge_mm, 4)} mm are allowed` : null),
