@@ -175,6 +175,10 @@ void validate_machine(const Machine& c) {
     require("machine.tool_change_s", c.tool_change_s, 0, 36000);
     require("machine.clearance", c.clearance, 1, 1000, Ends::closed,
             "rapids pass the stock at that height, on a machine that rounds its corners");
+    if (c.programs == ProgramSpan::layer && !changes_tools(c.post))
+        refuse("machine.programs",
+               "machine.programs is \"layer\", but a program for grbl cannot change a tool (no M6)",
+               "give \"tool\", one program for each tool of a layer, or \"operation\"");
     require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
     require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
 }
@@ -272,6 +276,7 @@ bool says_rounding(Post post) {
 }
 
 bool knows_tool_lengths(Post post) { return post != Post::grbl; }
+bool changes_tools(Post post) { return post != Post::grbl; }
 
 std::string program_file(Post post, const std::string& stem) {
     switch (post) {

@@ -28,6 +28,8 @@ enum class Frame : std::uint8_t { pattern_base, layer_top, automatic };
 enum class BuildTable : std::uint8_t { moving, fixed };
 /// The control that the programs are written for, and whose text is proven (io/posts/dialect.h).
 enum class Post : std::uint8_t { linuxcnc, fanuc, haas, grbl, mach, iso, siemens, heidenhain };
+/// What one program holds: an operation, all that one tool does without a change in a layer, or a layer.
+enum class ProgramSpan : std::uint8_t { operation, tool, layer };
 /// Which slopes level contours finish and which projected paths do (SHAPING 5): each its own side of the
 /// steep limit, one of them everything, or both everything, each in the steps that it needs at the limit.
 enum class FinishStrategy : std::uint8_t { split, levels, projection, both };
@@ -133,6 +135,7 @@ struct Machine {
     Frame frame = Frame::automatic;
     Post post = Post::linuxcnc;
     LengthUnit units = LengthUnit::mm;  ///< of the programs
+    ProgramSpan programs = ProgramSpan::operation;
     WorkZero zero = WorkZero::model;
     double base_board_thickness = 19;  ///< the sacrificial board under the first layer
     double base_board_cut = -1;        ///< how deep it may be cut; negative: the finish tool's overrun
@@ -324,6 +327,9 @@ struct Job {
 /// Whether a control measures tools or keeps their lengths; where it does not, the operator touches off each
 /// tool that is changed.
 [[nodiscard]] bool knows_tool_lengths(Post post);
+
+/// Whether a control changes tools within a program (M6, TOOL CALL); GRBL does not.
+[[nodiscard]] bool changes_tools(Post post);
 
 /// The file of a program as its control wants it named: "L003_02_rough_T2" is "L003_02_rough_T2.ngc" for
 /// LinuxCNC and "_L003_02_rough_T2.mpf" for Siemens, whose names begin with two letters.

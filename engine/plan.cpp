@@ -1,8 +1,10 @@
 #include "engine/plan.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <numbers>
+#include <system_error>
 
 #include "kernels/geometry/vectors.h"
 
@@ -38,6 +40,26 @@ std::string_view name(OperationKind kind) {
             return "edge";
     }
     return "";
+}
+
+std::string_view file_of(std::string_view program) { return program.substr(0, program.find('#')); }
+
+int part_of(std::string_view program) {
+    const std::size_t mark = program.find('#');
+    if (mark == std::string_view::npos) return 0;
+    int part = 0;
+    const auto [stop, status] =
+        std::from_chars(program.data() + mark + 1, program.data() + program.size(), part);
+    return status == std::errc{} && stop == program.data() + program.size() && part > 0 ? part : -1;
+}
+
+std::size_t file_end(const Layer& layer, std::size_t begin) {
+    const std::vector<Operation>& all = layer.operations;
+    std::size_t end = begin + 1;
+    while (end < all.size() && part_of(all[end].file) > 1 &&
+           file_of(all[end].file) == file_of(all[begin].file))
+        ++end;
+    return end;
 }
 
 double ArcShape::length() const { return radius * std::abs(sweep); }

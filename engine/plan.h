@@ -65,7 +65,8 @@ struct StepBand {
     friend bool operator==(const StepBand&, const StepBand&) = default;
 };
 
-/// One program: one tool, one purpose. Moves begin and end with a Z-only rapid at `clearance_z`.
+/// One tool, one purpose; a program of its own, or one of several in a program (file). Moves begin and end
+/// with a Z-only rapid at `clearance_z`.
 struct Operation {
     OperationKind kind{};
     std::string purpose;          ///< in words: "level contours", "projected raster", "walls", "floors"…
@@ -78,7 +79,7 @@ struct Operation {
     double spare = 0;          ///< mm that a semi-roughing leaves on the part for what follows
     double blend = kJunction;  ///< mm by which the machine may round the path's corners (G64 P)
     std::vector<Move> moves;
-    std::string file;  ///< name under nc/, "" until named
+    std::string file;  ///< name under nc/, "" until named; "L003.ngc#2": the second operation in L003.ngc
     int number = 0;    ///< of the program, for controls that number them (O0302); 0 until named
     double cutting_mm = 0, rapid_mm = 0, minutes = 0;
     double peak_force_n = 0, deflection_mm = 0;  ///< the largest of all its cuts
@@ -160,6 +161,14 @@ struct Layer {
                                  ///< between its slabs
     std::optional<Blank> blank;  ///< of each of its slabs (slabs.blanks = "layer"); none: the plan's stock
 };
+
+/// The file that holds a program: "L003.ngc" of "L003.ngc#2", and of itself.
+[[nodiscard]] std::string_view file_of(std::string_view program);
+/// Which of a file's operations it is, from 1; 0 where the file holds no other, -1 where what follows # is
+/// no such number.
+[[nodiscard]] int part_of(std::string_view program);
+/// Past the last of the layer's operations that share a file with the one at place `begin`.
+[[nodiscard]] std::size_t file_end(const Layer& layer, std::size_t begin);
 
 /// A step of the machine's sequence (METHOD.md section 12); `needs` are ids of the steps that must be done
 /// before.

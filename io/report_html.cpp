@@ -196,10 +196,10 @@ std::uint8_t left_over_code(float left, double gouge) {
         std::min(253.0, std::round(100 * std::sqrt(std::max(0.0, static_cast<double>(left))))));
 }
 
-/// Reads a program of OUT.
-Program read_program(const PlannedFolder& folder, std::size_t i) {
+/// Reads a file of OUT and its programs. @param first of them
+std::vector<Program> read_file(const PlannedFolder& folder, std::size_t first) {
     try {
-        return folder.read_program(i, kRefusal);
+        return folder.read_file(first, kRefusal);
     } catch (const Error& e) {
         throw Error(ErrorKind::input, "report.program", e.message(), e.place(), e.remedy());
     }
@@ -207,20 +207,9 @@ Program read_program(const PlannedFolder& folder, std::size_t i) {
 
 /// Between which feeds a program cuts, mm/min, in the plane and straight down; null where it never does.
 Json feeds_json(const Program& program) {
-    double low = HUGE_VAL, high = 0, plunge = 0;
-    for (std::size_t k = 1; k < program.steps.size(); ++k) {
-        const ProgramStep &from = program.steps[k - 1], &to = program.steps[k];
-        if (to.rapid() || !from.known() || !to.known()) continue;
-        if (from.x != to.x || from.y != to.y) {
-            low = std::min(low, to.feed);
-            high = std::max(high, to.feed);
-        } else if (to.z < from.z) {
-            plunge = std::max(plunge, to.feed);
-        }
-    }
-    return {{"low", high > 0 ? Json(rounded(low, 0)) : Json()},
-            {"high", high > 0 ? Json(rounded(high, 0)) : Json()},
-            {"plunge", plunge > 0 ? Json(rounded(plunge, 0)) : Json()}};
+    const CuttingFeeds feeds = cutting_feeds(program);
+    const auto json = [](double feed) { return feed > 0 ? Json(rounded(feed, 0)) : Json(); };
+    return {{"low", json(feeds.low)}, {"high", json(feeds.high)}, {"plunge", json(feeds.plunge)}};
 }
 
 /// What stands over in the end takes up to a fifth of the time of the replay: so many programs' steps.
@@ -247,11 +236,19 @@ void replay_programs(Context& context, const PlannedFolder& folder, const Simula
                folder.build.programs[end].layer == folder.build.programs[begin].layer)
             ++end;
         std::vector<Program> of_layer(end - begin);
-        parallel_each(context, of_layer.size(), [&](std::size_t i) {
-            const auto known = read.find(folder.build.programs[begin + i].file);
-            of_layer[i] = known != read.end() ? std::move(*known->second) : read_program(folder, begin + i);
-            if (part == nullptr) return;
-            figures.drawn.paths[begin + i] = path_of(of_layer[i], input.machine.rapid_feed, kPathTolerance);
+        std::vector<std::size_t> files;  // the first program of each
+        for (std::size_t p = begin; p < end; p = folder.file_end(p)) files.push_back(p);
+        parallel_each(context, files.size(), [&](std::size_t f) {
+            const std::size_t first = files[f], past = folder.file_end(first);
+            const bool known = read.contains(folder.build.programs[first].file);
+            std::vector<Program> fresh = known ? std::vector<Program>() : read_file(folder, first);
+            for (std::size_t p = first; p < past; ++p) {
+                Program& program = of_layer[p - begin];
+                program =
+                    known ? std::move(*read.at(folder.build.programs[p].file)) : std::move(fresh[p - first]);
+                if (part == nullptr) continue;
+                figures.drawn.paths[p] = path_of(program, input.machine.rapid_feed, kPathTolerance);
+            }
         });
         for (std::size_t i = 0; i < of_layer.size(); ++i) {
             figures.feeds.push_back(feeds_json(of_layer[i]));

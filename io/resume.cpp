@@ -184,7 +184,8 @@ private:
         loaded.build.face_offs.push_back(planned(loaded.face_offs.back()));
     }
 
-    /// Of the plan's own programs the heights that their steps state: `verify` has read the texts.
+    /// Of the plan's own programs the heights that their steps state: `verify` has read the texts. A step of
+    /// several programs states none of one of them.
     static void set_heights(Loaded& loaded) {
         const PlannedBuild heights(loaded.build);
         std::map<std::string, PlannedProgram*> programs;

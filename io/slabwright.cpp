@@ -176,26 +176,29 @@ namespace {
 // All of a plan but what is found about it, into a folder under way.
 // @param other for each layer whether its programs are other than those that the folder holds; empty: all are
 void fill(Context& context, const Plan& plan, const OutputFolder& out, const std::vector<bool>& other = {}) {
-    struct PlannedProgram {
+    struct PlannedFile {
         const Layer* layer;
-        const Operation* operation;
+        std::size_t begin;  // its first operation
+        std::string name;
     };
-    std::vector<PlannedProgram> programs;
+    std::vector<PlannedFile> files;
     const std::filesystem::path programs_folder = out.path() / "nc";
     std::filesystem::create_directory(programs_folder);
     std::set<std::string> stale;  // what the folder holds and the plan does not name
     for (const auto& entry : std::filesystem::directory_iterator(programs_folder))
         stale.insert(entry.path().filename().string());
     for (std::size_t l = 0; l < plan.layers.size(); ++l)
-        for (const Operation& operation : plan.layers[l].operations)
-            if (stale.erase(operation.file) == 0 || other.empty() || other[l])
-                programs.push_back({&plan.layers[l], &operation});
+        for (std::size_t o = 0; o < plan.layers[l].operations.size(); o = file_end(plan.layers[l], o)) {
+            const std::string name(file_of(plan.layers[l].operations[o].file));
+            if (stale.erase(name) == 0 || other.empty() || other[l])
+                files.push_back({&plan.layers[l], o, name});
+        }
     for (const std::string& file : stale) std::filesystem::remove(programs_folder / file);
-    context.begin_phase("writing", 0.985, 1.0, programs.size() + 1);
+    context.begin_phase("writing", 0.985, 1.0, files.size() + 1);
     // Each program is a file of its own, so threads cannot mix their texts.
-    parallel_each(context, programs.size(), [&](std::size_t i) {
-        OutputFile file(programs_folder, programs[i].operation->file);
-        write_program(plan, *programs[i].layer, *programs[i].operation, [&](std::string_view piece) {
+    parallel_each(context, files.size(), [&](std::size_t i) {
+        OutputFile file(programs_folder, files[i].name);
+        write_file(plan, *files[i].layer, files[i].begin, [&](std::string_view piece) {
             context.throw_if_cancelled();
             file.write(piece);
         });

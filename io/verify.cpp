@@ -115,16 +115,17 @@ void write_maps(const SimulationReport& report, const std::string& directory) {
 namespace {
 
 /// Two programs of one number: a control keeps the one that came last.
-void check_numbers(const std::vector<Program>& programs, std::vector<std::vector<Violation>>& found) {
+void check_numbers(const std::vector<std::vector<Program>>& files,
+                   std::vector<std::vector<Violation>>& found) {
     std::map<int, std::string> numbers;
-    for (std::size_t k = 0; k < programs.size(); ++k) {
-        const Program& program = programs[k];
-        if (program.number == 0) continue;
-        const auto [other, first] = numbers.emplace(program.number, program.file);
+    for (std::size_t k = 0; k < files.size(); ++k) {
+        if (files[k].empty() || files[k][0].number == 0) continue;
+        const std::string file(file_of(files[k][0].file));
+        const auto [other, first] = numbers.emplace(files[k][0].number, file);
         if (first) continue;
         const std::string what = fmt::format("is O{}, as {} is: the control would keep one of them",
-                                             program.number, other->second);
-        found[k].push_back({"program.number", what, program.file, 0, {}, 0});
+                                             files[k][0].number, other->second);
+        found[k].push_back({"program.number", what, file, 0, {}, 0});
     }
 }
 
@@ -132,10 +133,11 @@ void check_numbers(const std::vector<Program>& programs, std::vector<std::vector
 /// what the plan says of it. Those of another control are told and left out, as if they were missing.
 void read_programs(Context& context, const PlannedFolder& folder, const FolderRefusal& refusal,
                    std::vector<Program>& programs, std::vector<Violation>& violations) {
-    std::vector<std::size_t> present;
+    std::vector<std::size_t> present;  // the first programs of the files that are there
+    std::size_t count = 0;             // of programs in them
     std::string last;
-    for (std::size_t i = 0; i < folder.build.programs.size(); ++i) {
-        const std::string& planned = folder.build.programs[i].file;
+    for (std::size_t i = 0; i < folder.build.programs.size(); i = folder.file_end(i)) {
+        const std::string planned(file_of(folder.build.programs[i].file));
         const std::string file = planned.substr(3);
         if (file <= last)
             violations.push_back({"program.order",
@@ -145,35 +147,39 @@ void read_programs(Context& context, const PlannedFolder& folder, const FolderRe
                                   {},
                                   0});
         last = file;
-        if (std::error_code ignored; !fs::exists(folder.path / planned, ignored))
+        if (std::error_code ignored; !fs::exists(folder.path / planned, ignored)) {
             violations.push_back(
                 {"program.missing", "plan.json names it, nc/ does not hold it", file, 0, {}, 0});
-        else present.push_back(i);
+            continue;
+        }
+        present.push_back(i);
+        count += folder.file_end(i) - i;
     }
-    programs.resize(present.size());
+    std::vector<std::vector<Program>> files(present.size());
     std::vector<std::vector<Violation>> of_programs(present.size());
-    std::vector<char> foreign(present.size());
     parallel_each(context, present.size(), [&](std::size_t k) {
         try {
-            programs[k] = folder.read_program(present[k], refusal);
+            files[k] = folder.read_file(present[k], refusal);
         } catch (const Error& error) {
             if (error.code() != kForeignProgram) throw;
-            const std::string file = folder.build.programs[present[k]].file.substr(3);
-            of_programs[k].push_back({error.code(), error.message(), file, 0, {}, 0});
-            foreign[k] = 1;
+            const std::string file(file_of(folder.build.programs[present[k]].file));
+            of_programs[k].push_back({error.code(), error.message(), file.substr(3), 0, {}, 0});
             return;
         }
         const std::vector<Tool>& tools = folder.build.tools;
-        const auto tool = std::find_if(tools.begin(), tools.end(),
-                                       [&](const Tool& t) { return t.number == programs[k].tool; });
-        of_programs[k] = check_program(programs[k], folder.sayings[present[k]],
-                                       tool == tools.end() ? nullptr : &*tool, folder.build.job.machine);
+        for (std::size_t j = 0; j < files[k].size(); ++j) {
+            const auto tool = std::find_if(tools.begin(), tools.end(),
+                                           [&](const Tool& t) { return t.number == files[k][j].tool; });
+            const std::vector<Violation> found =
+                check_program(files[k][j], folder.sayings[present[k] + j],
+                              tool == tools.end() ? nullptr : &*tool, folder.build.job.machine);
+            of_programs[k].insert(of_programs[k].end(), found.begin(), found.end());
+        }
     });
-    check_numbers(programs, of_programs);
-    std::size_t kept = 0;
-    for (std::size_t k = 0; k < programs.size(); ++k)
-        if (foreign[k] == 0 && kept++ != k) programs[kept - 1] = std::move(programs[k]);
-    programs.resize(kept);
+    check_numbers(files, of_programs);
+    programs.reserve(count);
+    for (std::vector<Program>& file : files)
+        for (Program& program : file) programs.push_back(std::move(program));
     for (const std::vector<Violation>& found : of_programs)
         violations.insert(violations.end(), found.begin(), found.end());
 }
@@ -183,7 +189,8 @@ void find_strangers(const PlannedFolder& folder, std::vector<Violation>& violati
     const fs::path programs = folder.path / "nc";
     if (std::error_code ignored; !fs::is_directory(programs, ignored)) return;
     std::set<std::string> planned;
-    for (const PlannedProgram& program : folder.build.programs) planned.insert(program.file.substr(3));
+    for (const PlannedProgram& program : folder.build.programs)
+        planned.insert(std::string(file_of(program.file).substr(3)));
     std::vector<std::string> strangers;
     for (const auto& entry : fs::directory_iterator(programs))
         if (const std::string file = entry.path().filename().string(); !planned.contains(file))

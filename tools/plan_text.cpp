@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 namespace slabwright {
 
@@ -29,10 +30,14 @@ std::string told(const Diagnostic& d) {
 
 std::string summary(const Plan& plan, const std::string& out) {
     const Totals& t = plan.totals;
-    std::string text = fmt::format(
-        "{}: {} {}, {} programs, {} in all (cutting {}, bonding {}, tool changes {})\n", out, t.layers,
-        t.layers == 1 ? "layer" : "layers", t.operations, duration(t.build_minutes),
-        duration(t.cutting_minutes), duration(t.bonding_minutes), duration(t.tool_change_minutes));
+    int programs = 0;
+    for (const Layer& layer : plan.layers)
+        for (std::size_t o = 0; o < layer.operations.size(); o = file_end(layer, o)) ++programs;
+    std::string text =
+        fmt::format("{}: {} {}, {} {}, {} in all (cutting {}, bonding {}, tool changes {})\n", out, t.layers,
+                    t.layers == 1 ? "layer" : "layers", programs, programs == 1 ? "program" : "programs",
+                    duration(t.build_minutes), duration(t.cutting_minutes), duration(t.bonding_minutes),
+                    duration(t.tool_change_minutes));
     text += fmt::format("stock   {} x {} mm, {} kg with the base board\n",
                         number(plan.stock_max[0] - plan.stock_min[0], 1),
                         number(plan.stock_max[1] - plan.stock_min[1], 1), number(t.stack_mass_kg, 1));
@@ -43,13 +48,14 @@ std::string summary(const Plan& plan, const std::string& out) {
     text += wood_document(plan);
     for (const Tool& tool : plan.job.tools) {
         double minutes = 0;
-        int programs = 0;
+        std::set<std::string_view> used;  // the programs that it is used in
         for (const Layer& layer : plan.layers)
             for (const Operation& operation : layer.operations)
-                if (operation.tool == tool.number) minutes += operation.minutes, ++programs;
-        if (programs > 0)
+                if (operation.tool == tool.number)
+                    minutes += operation.minutes, used.insert(file_of(operation.file));
+        if (!used.empty())
             text += fmt::format("tool    T{} {}, {} in {} {}\n", tool.number, tool.name, duration(minutes),
-                                programs, programs == 1 ? "program" : "programs");
+                                used.size(), used.size() == 1 ? "program" : "programs");
     }
     for (const Layer& layer : plan.layers)
         text += fmt::format("layer   {}: {} to {} mm, {}\n", layer.index, number(layer.z_bottom, 3),

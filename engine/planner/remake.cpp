@@ -146,7 +146,7 @@ public:
         }
         SequenceStep& step = follow(layer.index, "face_off", operation.minutes * 60);
         step.numbers = {{"tool", operation.tool}};
-        add_heights(step, operation, heights.origin);
+        add_heights(step, {&operation, 1}, heights.origin);
         step.words = {{"program", request_.folder + operation.file}, {"purpose", operation.purpose}};
     }
 
@@ -214,6 +214,8 @@ private:
             say_tool(change, spindle_tool_, machine_);
             needs = {change.id};
         }
+        for (const auto& [key, value] : step.numbers)
+            if (key == "last_tool") spindle_tool_ = static_cast<int>(value);  // its program changes it
         if (own.action == "take_slab") take_slab(slabs);
         step.id = static_cast<int>(steps_.size()) + 1;
         step.needs = {needs.begin(), needs.end()};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/schedule/fit.h"
 
@@ -110,13 +111,18 @@ std::vector<int> feed_loads(const Machine& machine, std::span<const FeedSlab> sl
     return loads;
 }
 
-void add_heights(SequenceStep& step, const Operation& operation, double origin) {
-    if (operation.moves.empty()) return;
-    const auto [low, high] = std::minmax_element(operation.moves.begin(), operation.moves.end(),
-                                                 [](const Move& a, const Move& b) { return a.z < b.z; });
+void add_heights(SequenceStep& step, std::span<const Operation> operations, double origin) {
+    std::int32_t low = std::numeric_limits<std::int32_t>::max(),
+                 high = std::numeric_limits<std::int32_t>::min();
+    for (const Operation& operation : operations)
+        for (const Move& move : operation.moves) {
+            low = std::min(low, move.z);
+            high = std::max(high, move.z);
+        }
+    if (low > high) return;
     const std::int32_t zero = to_units(origin);
-    step.numbers.emplace_back("z_low_mm", to_mm(std::int64_t{low->z} - zero));
-    step.numbers.emplace_back("z_high_mm", to_mm(std::int64_t{high->z} - zero));
+    step.numbers.emplace_back("z_low_mm", to_mm(std::int64_t{low} - zero));
+    step.numbers.emplace_back("z_high_mm", to_mm(std::int64_t{high} - zero));
 }
 
 void check_chambers(const Plan& plan) {

@@ -48,8 +48,8 @@ struct FeedSlab {
 [[nodiscard]] std::vector<int> feed_loads(const Machine& machine, std::span<const FeedSlab> slabs);
 
 /// Tells a step the lowest and the highest z of its program, as the program counts them: z_low_mm, z_high_mm.
-/// @param origin of its z = 0, mm, pattern-base
-void add_heights(SequenceStep& step, const Operation& operation, double origin);
+/// @param operations that the program holds, @param origin of its z = 0, mm, pattern-base
+void add_heights(SequenceStep& step, std::span<const Operation> operations, double origin);
 
 /// Looks at layers and slabs alone, before any path is made.
 /// @throws Error(no_plan, "machine.build_height") where the table would have to sink farther than its

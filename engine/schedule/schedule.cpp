@@ -54,27 +54,82 @@ int width_of(std::size_t largest, int least) {
     return std::max(least, static_cast<int>(std::to_string(largest).size()));
 }
 
+/// Past the last of the operations that share a program with the one at place `begin`.
+std::size_t span_end(const Layer& layer, std::size_t begin, ProgramSpan span) {
+    const std::vector<Operation>& all = layer.operations;
+    if (span == ProgramSpan::operation) return begin + 1;
+    if (span == ProgramSpan::layer) return all.size();
+    std::size_t end = begin + 1;
+    while (end < all.size() && all[end].tool == all[begin].tool) ++end;
+    return end;
+}
+
+/// Adds an operation to the totals, with the change of tool before it where the spindle holds another.
+void count(Totals& totals, const Operation& operation, int& spindle_tool, const Machine& machine) {
+    ++totals.operations;
+    totals.cutting_mm += operation.cutting_mm;
+    totals.rapid_mm += operation.rapid_mm;
+    totals.cutting_minutes += operation.minutes;
+    if (operation.tool == spindle_tool) return;
+    spindle_tool = operation.tool;
+    ++totals.tool_changes;
+    totals.tool_change_minutes += machine.tool_change_s / 60;
+}
+
+/// What the step of a program says of the operations that it holds.
+void say_program(SequenceStep& step, const Layer& layer, std::size_t begin, std::size_t end, double origin,
+                 const Machine& machine) {
+    const std::vector<Operation>& all = layer.operations;
+    int changes = 0;
+    std::string purpose;
+    step.seconds = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+        step.seconds += all[i].minutes * 60;
+        purpose += (i == begin ? "" : ", ") + all[i].purpose;
+        if (i > begin && all[i].tool != all[i - 1].tool) ++changes;
+    }
+    step.seconds += changes * machine.tool_change_s;
+    step.numbers = {{"tool", all[begin].tool}};
+    if (end - begin > 1) {
+        step.numbers.emplace_back("last_tool", all[end - 1].tool);
+        step.numbers.emplace_back("operations", static_cast<double>(end - begin));
+        step.numbers.emplace_back("tool_changes", changes);
+    }
+    add_heights(step, {all.data() + begin, end - begin}, origin);
+    step.words = {{"program", "nc/" + std::string(file_of(all[begin].file))}, {"purpose", purpose}};
+}
+
 }  // namespace
 
 void name_programs(Plan& plan) {
+    const Machine& machine = plan.job.machine;
     std::size_t highest = 0, most = 0;
     for (const Layer& layer : plan.layers) {
         highest = std::max(highest, static_cast<std::size_t>(std::max(0, layer.index)));
         most = std::max(most, layer.operations.size());
     }
-    const int layer_width = width_of(highest, 3), operation_width = width_of(most, 2);
+    const int layer_width = width_of(highest, 3), file_width = width_of(most, 2);
     int running = 0;
-    for (Layer& layer : plan.layers)
-        for (std::size_t i = 0; i < layer.operations.size(); ++i) {
-            Operation& operation = layer.operations[i];
-            operation.file = program_file(
-                plan.job.machine.post, fmt::format("L{:0{}}_{:0{}}_{}_T{}", layer.index, layer_width, i + 1,
-                                                   operation_width, name(operation.kind), operation.tool));
+    for (Layer& layer : plan.layers) {
+        int files = 0;
+        for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
+            end = span_end(layer, begin, machine.programs);
+            const Operation& first = layer.operations[begin];
+            std::string stem = fmt::format("L{:0{}}", layer.index, layer_width);
+            ++files;
+            if (machine.programs != ProgramSpan::layer) stem += fmt::format("_{:0{}}", files, file_width);
+            if (machine.programs == ProgramSpan::operation) stem += fmt::format("_{}", name(first.kind));
+            if (machine.programs != ProgramSpan::layer) stem += fmt::format("_T{}", first.tool);
             // O0302 is layer 3's second, where all numbers fit below those of what is faced off again.
             ++running;
-            const auto by_place = 100 * layer.index + static_cast<int>(i) + 1;
-            operation.number = highest < 80 && most < 100 ? by_place : running;
+            const int number = highest < 80 && most < 100 ? 100 * layer.index + files : running;
+            for (std::size_t i = begin; i < end; ++i) {
+                layer.operations[i].file = program_file(machine.post, stem);
+                if (end - begin > 1) layer.operations[i].file += fmt::format("#{}", i - begin + 1);
+                layer.operations[i].number = number;
+            }
         }
+    }
 }
 
 void say_tool(SequenceStep& change, int tool, const Machine& machine) {
@@ -191,26 +246,21 @@ void schedule(Plan& plan) {
         say_touch_off(touch, plan, layer, layer.z_bottom + layer.slab_thickness - heights.origin);
         int last = touch.id;
 
-        for (const Operation& operation : layer.operations) {
-            ++totals.operations;
-            totals.cutting_mm += operation.cutting_mm;
-            totals.rapid_mm += operation.rapid_mm;
-            totals.cutting_minutes += operation.minutes;
-            if (operation.tool != spindle_tool) {
+        for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
+            end = file_end(layer, begin);
+            const Operation& first = layer.operations[begin];
+            if (first.tool != spindle_tool) {
                 // The program's own T and M6 then find the tool in the spindle, also when the build resumes
                 // at the program.
                 SequenceStep& change = add(layer.index, "tool_change", {last}, job.machine.tool_change_s);
-                say_tool(change, operation.tool, job.machine);
+                say_tool(change, first.tool, job.machine);
                 last = change.id;
-                spindle_tool = operation.tool;
-                ++totals.tool_changes;
-                totals.tool_change_minutes += job.machine.tool_change_s / 60;
             }
-            SequenceStep& mill = add(layer.index, operation.kind == OperationKind::face ? "face" : "mill",
-                                     {last}, operation.minutes * 60);
-            mill.numbers = {{"tool", operation.tool}};
-            add_heights(mill, operation, heights.origin);
-            mill.words = {{"program", "nc/" + operation.file}, {"purpose", operation.purpose}};
+            for (std::size_t i = begin; i < end; ++i)
+                count(totals, layer.operations[i], spindle_tool, job.machine);
+            const bool faces = end - begin == 1 && first.kind == OperationKind::face;
+            SequenceStep& mill = add(layer.index, faces ? "face" : "mill", {last}, 0);
+            say_program(mill, layer, begin, end, heights.origin, job.machine);
             last = mill.id;
         }
         stack_ready = last;

@@ -13,8 +13,10 @@ void say_tool(SequenceStep& change, int tool, const Machine& machine);
 /// (slab_left_mm, slab_front_mm) and its top (slab_top_mm).
 void say_touch_off(SequenceStep& touch, const Plan& plan, const Layer& layer, double top);
 
-/// Names every operation's program, "L003_02_rough_T2.ngc" (program_file): layer, order within it, kind and
-/// tool, with widths such that the names sort in the order of execution.
+/// Names every operation's program (program_file), with widths such that the names sort in the order of
+/// execution: "L003_02_rough_T2.ngc" of layer, order within it, kind and tool; where a program holds all that
+/// a tool does between two changes "L003_02_T2.ngc", where it holds a layer "L003.ngc" (machine.programs).
+/// Operations that share one are "L003.ngc#1", "L003.ngc#2" …, and have one number.
 void name_programs(Plan& plan);
 
 /// Names the programs and fills plan.sequence and plan.totals from the layers (part_volume_mm3 is left as it

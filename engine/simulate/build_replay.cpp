@@ -7,28 +7,23 @@
 #include <unordered_map>
 
 #include "engine/simulate/planned_build.h"
-#include "engine/simulate/sequence_findings.h"
+#include "engine/simulate/program_steps.h"
 #include "engine/simulate/step_order.h"
 
 namespace slabwright {
 
 namespace {
 
-constexpr double kLength = 1e-3;   // mm by which stated lengths may differ: both are rounded
-constexpr double kSeconds = 0.02;  // a program's minutes are rounded to four places
-constexpr double kForce = 0.01;    // N and kg
+constexpr double kForce = 0.01;  // N and kg
 constexpr double kLitres = 0.01;
 
-class BuildReplay : SequenceFindings {
+class BuildReplay : ProgramSteps {
 public:
     BuildReplay(const BuildPlan& plan, const BuildSequence& sequence, BuildState from)
-        : SequenceFindings(sequence.steps),
-          plan_(plan),
+        : ProgramSteps(plan, sequence.steps, std::move(from)),
           sequence_(sequence),
-          build_(plan),
           slabs_(build_.slabs()),
-          order_(sequence.steps),
-          s_(std::move(from)) {
+          order_(sequence.steps) {
         s_.ran_in.resize(plan.programs.size());
         s_.faced_off.resize(plan.face_offs.size());
         programs_left_.resize(plan.layers.size());
@@ -59,11 +54,6 @@ private:
     /// Seconds that only the job can tell.
     void expect_job_seconds(double planned) {
         if (plan_.job_stated) expect_seconds(planned, kSeconds);
-    }
-
-    void expect_layer(std::size_t layer) {
-        if (layer < plan_.layers.size() && step().layer != plan_.layers[layer].index)
-            complain("sequence.layer", fmt::format("belongs to layer {}", plan_.layers[layer].index));
     }
 
     /// The step presupposes what `cause` brought about; without it, the machine is not in a state for the
@@ -386,7 +376,7 @@ private:
             expect_layer(next->layer);
             if (tool && *tool != next->tool)
                 complain("sequence.tool", fmt::format("puts tool {} into the spindle; {} wants tool {}",
-                                                      *tool, next->file, next->tool));
+                                                      *tool, file_of(next->file), next->tool));
         }
         expect_job_seconds(plan_.job.machine.tool_change_s);
         if (!build_.keeps_lengths()) expect_word("sequence.tool_length", "length", "touch off");
@@ -395,49 +385,21 @@ private:
         s_.unused_change = true;
     }
 
-    /// The place of the program that the step names; none where the list has no such program.
-    std::optional<std::size_t> named_program(const std::vector<PlannedProgram>& programs) {
-        const std::optional<std::string> file = word("program");
-        if (!file) return std::nullopt;
-        for (std::size_t p = 0; p < programs.size(); ++p)
-            if (programs[p].file == *file) return p;
-        complain("sequence.program", fmt::format("{} is none of the plan's programs", *file));
-        return std::nullopt;
-    }
-
     void program() {
         s_.unused_change = false;
-        const std::optional<std::size_t> p = named_program(plan_.programs);
-        if (p) {
-            const PlannedProgram& planned = plan_.programs[*p];
-            if (s_.ran_in[*p])
-                complain("sequence.program",
-                         fmt::format("{} has run already, in {}", planned.file, title(*s_.ran_in[*p])));
-            else if (*p != s_.next_program && s_.next_program < plan_.programs.size())
-                complain("sequence.program", fmt::format("runs {} where {} is next", planned.file,
-                                                         plan_.programs[s_.next_program].file));
-            expect_layer(planned.layer);
-            if ((planned.kind == OperationKind::face) != (step().action == "face"))
-                complain("sequence.program",
-                         fmt::format("{} is a program to {}", planned.file, name(planned.kind)));
-            if (!planned.purpose.empty()) expect_word("sequence.program", "purpose", planned.purpose);
-            if (planned.minutes) expect_seconds(*planned.minutes * 60, kSeconds);
-            check_tool(planned);
-            const std::optional<std::size_t> l = build_.whole_layer(s_);
-            if (!l || *l != planned.layer)
-                complain("sequence.order",
-                         fmt::format("the slabs of layer {} are not placed and pressed, or lie under others",
-                                     plan_.layers[planned.layer].index));
-            check_heights(planned);
-        }
+        const std::optional<std::array<std::size_t, 2>> named = named_file();
+        if (named) check_file((*named)[0], (*named)[1]);
         require(s_.touched, "the slab's top has not been touched off");
         wait_for(s_.tool_in);
         wait_for(s_.last_cut);
         s_.last_cut = here();
-        if (!p || s_.ran_in[*p]) return;
-        s_.ran_in[*p] = here();
-        s_.next_program = *p + 1;
-        if (--programs_left_[plan_.programs[*p].layer] == 0) s_.stack_ready = here();
+        if (!named || s_.ran_in[(*named)[0]]) return;
+        for (std::size_t p = (*named)[0]; p < (*named)[1]; ++p) {
+            s_.ran_in[p] = here();
+            s_.next_program = p + 1;
+            if (--programs_left_[plan_.programs[p].layer] == 0) s_.stack_ready = here();
+        }
+        if ((*named)[1] - (*named)[0] > 1) s_.spindle_tool = plan_.programs[(*named)[1] - 1].tool;
     }
 
     /// By hand, after an interruption: the handler and the feed chamber are emptied, wet glue is wiped off.
@@ -461,7 +423,7 @@ private:
     /// A layer is milled away, down to the joint under it, to be made again.
     void face_off() {
         s_.unused_change = false;
-        const std::optional<std::size_t> p = named_program(plan_.face_offs);
+        const std::optional<std::size_t> p = named_face_off();
         require(s_.touched, "the stack's top has not been touched off");
         wait_for(s_.tool_in);
         wait_for(s_.last_cut);
@@ -474,7 +436,7 @@ private:
         s_.faced_off[*p] = here();
         expect_layer(planned.layer);
         check_tool(planned);
-        check_heights(planned);
+        check_heights({&planned, 1});
         const LayerToBuild& layer = plan_.layers[planned.layer];
         if (planned.low && !(std::abs(*planned.low - layer.z_bottom) <= kLength))
             complain("sequence.height", fmt::format("faces down to {:.3f} mm; the joint under layer {} is at "
@@ -503,44 +465,6 @@ private:
         s_.table_at.reset();
         s_.touched.reset();
         s_.stack_ready = here();
-    }
-
-    void check_tool(const PlannedProgram& planned) {
-        const std::optional<int> tool = whole("tool");
-        if (tool && !build_.tool_of(*tool))
-            complain("sequence.tool", fmt::format("tool {} is not in the library", *tool));
-        if (tool && *tool != planned.tool)
-            complain("sequence.tool",
-                     fmt::format("{} is made for tool {}, not {}", planned.file, planned.tool, *tool));
-        if (s_.spindle_tool != planned.tool)
-            complain("sequence.tool",
-                     s_.spindle_tool == 0
-                         ? fmt::format("no tool has been put into the spindle for {}", planned.file)
-                         : fmt::format("tool {} is in the spindle, {} is made for tool {}", s_.spindle_tool,
-                                       planned.file, planned.tool));
-    }
-
-    /// What the step says of the program's heights, and where they bring the spindle.
-    void check_heights(const PlannedProgram& planned) {
-        const double origin = build_.origin_of(planned.layer);
-        if (planned.low && planned.high) {
-            expect("sequence.height", "z_low_mm", *planned.low - origin, kLength);
-            expect("sequence.height", "z_high_mm", *planned.high - origin, kLength);
-        }
-        const Tool* tool = build_.tool_of(planned.tool);
-        if (!planned.low || !planned.high || !tool || !plan_.job_stated) return;
-        const double up = build_.bottom_at(planned.layer) + tool->stickout;
-        s_.lowest = std::min(s_.lowest, up + *planned.low);
-        s_.highest = std::max(s_.highest, up + *planned.high);
-        const double over = s_.highest - s_.lowest - plan_.job.machine.travel_z;
-        if (over > kLength && !spindle_told_) {
-            spindle_told_ = true;
-            complain("sequence.travel",
-                     fmt::format("up to here the spindle goes over {:.1f} mm, tools' lengths included; it "
-                                 "travels {:.1f} mm",
-                                 s_.highest - s_.lowest, plan_.job.machine.travel_z),
-                     over);
-        }
     }
 
     void unload() {
@@ -575,14 +499,10 @@ private:
         if (plan_.flask && !s_.boxed) complain("sequence.missing", "the moulding box is never made");
     }
 
-    const BuildPlan& plan_;
     const BuildSequence& sequence_;
-    const PlannedBuild build_;
     const std::vector<DueSlab>& slabs_;       // of the whole build, bottom up
     std::vector<std::size_t> programs_left_;  // of each layer
     StepOrder order_;
-    BuildState s_;
-    bool spindle_told_ = false;
 };
 
 }  // namespace

@@ -36,7 +36,7 @@ struct LayerToBuild {
 
 /// A program as the plan states it, in the order of execution, and how far it goes down and up.
 struct PlannedProgram {
-    std::string file;       ///< "nc/…"
+    std::string file;       ///< "nc/…"; with "#2" after it where its file holds several (file_of)
     std::size_t layer = 0;  ///< index into the layers
     OperationKind kind{};
     int tool = 0;

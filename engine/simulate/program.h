@@ -86,4 +86,11 @@ struct Program {
     }
 };
 
+/// Between which feeds a program cuts, mm/min: in the plane, and the fastest straight down; 0 where it never
+/// does.
+struct CuttingFeeds {
+    double low = 0, high = 0, plunge = 0;
+};
+[[nodiscard]] CuttingFeeds cutting_feeds(const Program& program);
+
 }  // namespace slabwright

@@ -18,12 +18,17 @@ using Words = std::vector<std::string_view>;
 
 class Reader {
 public:
-    Reader(std::string_view text, const std::string& file, const Dialect& dialect, const GcodeLimits& limits)
-        : text_(text), dialect_(dialect), place_{file, 0}, built_(text, dialect, limits, place_) {
+    Reader(std::string_view text, const std::string& file, const Dialect& dialect, const GcodeLimits& limits,
+           bool several)
+        : text_(text),
+          dialect_(dialect),
+          several_(several),
+          place_{file, 0},
+          built_(text, dialect, limits, place_) {
         built_.program.file = file;
     }
 
-    Program run() {
+    std::vector<Program> run() {
         for (std::size_t at = 0; at < text_.size();) {
             const std::size_t end = std::min(text_.find('\n', at), text_.size());
             ++place_.line;
@@ -34,8 +39,8 @@ public:
             at = end + 1;
         }
         if (!closed_) fail("gcode.no_end", "the program does not end with END PGM", "its end may be missing");
-        built_.program.tool = tool_;
-        return std::move(built_.program);
+        if (changing_) fail("gcode.tool", "a tool call that no operation follows");
+        return built_.take(tool_);
     }
 
 private:
@@ -112,12 +117,15 @@ private:
     }
 
     void tool_call() {
-        if (tool_ != 0) fail("gcode.tool", "a second tool call in one program");
+        if (tool_ != 0 && !several_) fail("gcode.tool", "a second tool call in one program");
         if (words_.size() != 5 || words_[1] != "CALL" || words_[3] != "Z" || words_[4].front() != 'S')
             fail("gcode.tool", "TOOL CALL needs a number, the axis Z and a speed S");
         const double tool = number(words_[2], words_[2]);
         if (!(tool >= 1 && tool <= 99999) || tool != std::floor(tool))
             fail("gcode.tool", "a tool call that names no tool");
+        if (tool_ != 0 && turning_ && static_cast<int>(tool) != tool_)
+            fail("gcode.tool", "a tool call while the spindle turns");
+        changing_ = tool_ != 0;
         tool_ = static_cast<int>(tool);
         speed_ = number(words_[4].substr(1), words_[4]);
         if (speed_ < 0) fail("gcode.number", "a negative spindle speed");
@@ -161,6 +169,8 @@ private:
     void m_word(std::string_view word) {
         if (word == "M3") {
             if (tool_ == 0) fail("gcode.tool", "the spindle (M3) before a tool is called");
+            if (several_) built_.begin_operation(tool_);
+            changing_ = false;
             if (!turning_) built_.spin_up();
             turning_ = true;
             built_.turn(speed_);
@@ -236,6 +246,7 @@ private:
 
     void require_for_motion(bool rapid) const {
         if (tool_ == 0) fail("gcode.tool", "a motion before a tool is called (TOOL CALL)");
+        if (changing_) fail("gcode.spindle", "a motion after a tool call before the spindle starts (M3)");
         if (!tolerance_)
             fail("gcode.unset", "a motion before how far the control may leave its path (CYCL DEF 32)",
                  "the machine would take what the program before left in force");
@@ -274,12 +285,13 @@ private:
 
     std::string_view text_;
     const Dialect& dialect_;
+    bool several_;
     GcodePlace place_;
     ProgramBuilder built_;
     Words words_;  // of the block, without its number
     std::string_view name_;
     bool begun_ = false, ended_ = false, closed_ = false;
-    bool uncompensated_ = false, tolerance_ = false, turning_ = false;
+    bool uncompensated_ = false, tolerance_ = false, turning_ = false, changing_ = false;
     int tool_ = 0, half_cycle_ = 0;
     double speed_ = 0, feed_ = 0;
     std::optional<std::array<double, 2>> pole_;
@@ -287,9 +299,9 @@ private:
 
 }  // namespace
 
-Program read_conversational(std::string_view text, const std::string& file, const Dialect& dialect,
-                            const GcodeLimits& limits) {
-    return Reader(text, file, dialect, limits).run();
+std::vector<Program> read_conversational(std::string_view text, const std::string& file,
+                                         const Dialect& dialect, const GcodeLimits& limits, bool several) {
+    return Reader(text, file, dialect, limits, several).run();
 }
 
 }  // namespace slabwright

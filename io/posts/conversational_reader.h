@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "io/posts/gcode_reader.h"
 
@@ -18,7 +19,10 @@ namespace slabwright {
 ///   gcode.no_end, gcode.units for another unit than the dialect's, gcode.unknown_word, gcode.number,
 ///   gcode.twice, gcode.tool, gcode.unset, gcode.feed, gcode.arc, gcode.spindle, gcode.unknown_place,
 ///   gcode.path_mode, gcode.dwell, gcode.after_end and those of check_characters()
-[[nodiscard]] Program read_conversational(std::string_view text, const std::string& file,
-                                          const Dialect& dialect, const GcodeLimits& limits);
+/// @param several it may hold one operation after another, as read_operations() takes them; else the list has
+///   one program
+[[nodiscard]] std::vector<Program> read_conversational(std::string_view text, const std::string& file,
+                                                       const Dialect& dialect, const GcodeLimits& limits,
+                                                       bool several);
 
 }  // namespace slabwright

@@ -33,6 +33,8 @@ Dialect linuxcnc() {
     d.head =
         "{unit} G17 G90 G94 G40 G49 G80\nG8 G97\nG64 P{blend} Q0\nG54\nT{tool} M6\nG43 H{tool}\nS{speed} "
         "M3\nG4 P{dwell}\n";
+    d.change = "M5\nT{tool} M6\nG43 H{tool}\n";
+    d.next = "S{speed} M3\nG64 P{blend} Q0\nG4 P{dwell}\n";
     d.first = "G0 Z{z}\n";
     d.end = "M5\nM2\n";
     d.centres = "G91.1\n";
@@ -54,6 +56,7 @@ Dialect with_points(std::string_view name) {
     d.capitals = true;
     d.longest_comment = 60;
     d.longest_line = 128;
+    d.change = "M5\nT{tool} M6\n";
     d.first = "G0 G43 H{tool} Z{z}\n";
     d.end = "M5\nM30\n%\n";
     d.percent = Dialect::Percent::must;
@@ -66,6 +69,7 @@ Dialect fanuc() {
     Dialect d = with_points("Fanuc");
     d.begin = "%\nO{number:04}\n";
     d.head = "{unit} G17 G90 G94 G40 G49 G80\nG64\nG54\nT{tool} M6\nS{speed} M3\nG4 P{dwell_ms}\n";
+    d.next = "S{speed} M3\nG4 P{dwell_ms}\n";
     d.notes = kCornerNote;
     d.numbered = true;
     d.dwell = Dialect::Dwell::p_milliseconds;
@@ -79,6 +83,7 @@ Dialect haas() {
     Dialect d = with_points("Haas");
     d.begin = "%\nO{number:05}\n";
     d.head = "{unit} G17 G90 G94 G40 G49 G80\nG187 P2 E{blend}\nG54\nT{tool} M6\nS{speed} M3\nG4 P{dwell}\n";
+    d.next = "S{speed} M3\nG187 P2 E{blend}\nG4 P{dwell}\n";
     d.numbered = true;
     d.dwell = Dialect::Dwell::p_by_point;
     d.rounding = Dialect::Rounding::g187;
@@ -91,6 +96,7 @@ Dialect iso() {
     Dialect d = with_points("ISO");
     d.begin = "%\n";
     d.head = "{unit} G17 G90 G94 G40 G49 G80\nG64\nG54\nT{tool} M6\nS{speed} M3\nG4 X{dwell}\n";
+    d.next = "S{speed} M3\nG4 X{dwell}\n";
     d.notes = kCornerNote;
     d.dwell = Dialect::Dwell::x_seconds;
     d.rounding = Dialect::Rounding::setting;
@@ -103,6 +109,8 @@ Dialect mach() {
     d.name = "Mach";
     d.longest_comment = 100;
     d.head = "{unit} G17 G90 G94 G40 G49 G80\nG64\nG54\nT{tool} M6\nS{speed} M3\nG4 P{dwell}\n";
+    d.change = "M5\nT{tool} M6\n";
+    d.next = "S{speed} M3\nG4 P{dwell}\n";
     d.notes = "set the control to round corners by 0.02 mm at most, and G4 to count seconds";
     d.first = "G0 G43 H{tool} Z{z}\n";
     d.end = "M5\nM30\n";
@@ -124,6 +132,7 @@ Dialect grbl() {
     d.longest_line = 79;
     d.forbidden = "?!~$";
     d.head = "{unit} G17 G90 G94 G40 G49 G80\nG61\nG54\nT{tool}\nS{speed} M3\nG4 P{dwell}\n";
+    d.next = "S{speed} M3\nG4 P{dwell}\n";
     d.notes =
         "before the start: tool {tool} in the spindle, its tip touched off\nsetting 11 at 0.02 mm at most, "
         "laser mode (32) off";
@@ -147,6 +156,8 @@ Dialect siemens() {
     d.head =
         "{unit} G17 G90 G94 G40\nG641 ADIS={blend} ADISPOS={blend}\nG54\nT{tool} M6\nD1\nS{speed} M3\nG4 "
         "F{dwell}\n";
+    d.change = "M5\nT{tool} M6\nD1\n";
+    d.next = "S{speed} M3\nG641 ADIS={blend} ADISPOS={blend}\nG4 F{dwell}\n";
     d.first = "G0 Z{z}\n";
     d.end = "M5\nM30\n";
     d.dwell = Dialect::Dwell::f_seconds;
@@ -172,6 +183,11 @@ Dialect heidenhain() {
         "TOOL CALL {tool} Z S{speed}\nCYCL DEF 32.0 TOLERANCE\nCYCL DEF 32.1 T{blend}\nM3\nCYCL DEF 9.0 "
         "DWELL "
         "TIME\nCYCL DEF 9.1 DWELL {dwell}\n";
+    d.change = "M5\nTOOL CALL {tool} Z S{speed}\n";
+    d.again = "TOOL CALL {tool} Z S{speed}\n";
+    d.next =
+        "M3\nCYCL DEF 32.0 TOLERANCE\nCYCL DEF 32.1 T{blend}\nCYCL DEF 9.0 DWELL TIME\nCYCL DEF 9.1 DWELL "
+        "{dwell}\n";
     d.notes = "the active preset is the zero that the setup sheet shows";
     d.first = "L Z{z} R0 FMAX\n";
     d.end = "M5\nM30\nEND PGM {name} {unit}\n";

@@ -59,9 +59,12 @@ struct Dialect {
 
     // What a program says: templates for fmt, with unit, number, tool, speed, dwell, dwell_ms, blend, name,
     // z.
-    std::string_view begin;  ///< before the comments
-    std::string_view head;   ///< after them
-    std::string_view first;  ///< the first motion, to the height z
+    std::string_view begin;   ///< before the comments
+    std::string_view head;    ///< after them
+    std::string_view change;  ///< within a program: another tool, from a spindle that turns
+    std::string_view again;   ///< within a program: the same tool for the next operation
+    std::string_view next;    ///< after either: what the next operation turns at and how it rounds corners
+    std::string_view first;   ///< the first motion, to the height z
     std::string_view end;
     std::string_view notes;           ///< comments on what the operator sets
     std::string_view centres;         ///< before the first motion of a program with arcs

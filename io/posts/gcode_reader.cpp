@@ -20,19 +20,20 @@ using Motion = ModalState::Motion;
 
 class Reader {
 public:
-    Reader(std::string_view text, const std::string& file, const Dialect& dialect, const GcodeLimits& limits)
+    Reader(std::string_view text, const std::string& file, const Dialect& dialect, const GcodeLimits& limits,
+           bool several)
         : text_(text),
           dialect_(dialect),
           limits_(limits),
+          several_(several),
           place_{file, 0},
           built_(text, dialect, limits, place_),
-          state_(dialect) {
+          state_(dialect, several) {
         built_.program.file = file;
     }
 
-    Program run() {
-        Program& program = built_.program;
-        program.steps.reserve(static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n')));
+    std::vector<Program> run() {
+        built_.program.steps.reserve(static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n')));
         GcodeLine line;
         std::size_t at = 0;
         while (at < text_.size()) {
@@ -48,10 +49,10 @@ public:
         }
         if (!ended_)
             fail("gcode.no_end", "the program does not end with M2 or M30", "its end may be missing");
+        if (changing_) fail("gcode.tool", "a change of tool (M6) that no operation follows");
         if (dialect_.percent == Dialect::Percent::must && !closed_)
             fail("gcode.no_end", "the program does not end with a % mark", "its end may be missing");
-        program.tool = state_.tool();
-        return std::move(program);
+        return built_.take(state_.tool());
     }
 
 private:
@@ -84,6 +85,12 @@ private:
         if (ended_)
             fail("gcode.after_end", "words after the program's end (M2): the machine never reads them");
         state_.apply(line, place_);
+        // A motion between a change of tool and the start of the spindle would be neither operation's.
+        if (several_ && line.m.has(60)) changing_ = true;
+        if (several_ && line.m.has(30)) {
+            built_.begin_operation(state_.tool());
+            changing_ = false;
+        }
         if (state_.spins_up()) built_.spin_up();
         if (const auto seconds = state_.dwell()) built_.dwell(*seconds);
         built_.turn(state_.turning() ? state_.speed() : 0);
@@ -101,6 +108,8 @@ private:
 
     void move(const GcodeLine& line, bool axes) {
         const Motion motion = state_.motion();
+        if (changing_ && (axes || motion == Motion::clockwise || motion == Motion::counter_clockwise))
+            fail("gcode.spindle", "a motion after a change of tool (M6) before the spindle starts (M3)");
         if (motion == Motion::none) fail("gcode.motion", "coordinates without a motion (G0 to G3)");
         state_.require_for_motion(place_);
         const bool is_arc = motion == Motion::clockwise || motion == Motion::counter_clockwise;
@@ -168,10 +177,11 @@ private:
     std::string_view text_;
     const Dialect& dialect_;
     GcodeLimits limits_;
+    bool several_;
     GcodePlace place_;
     ProgramBuilder built_;
     ModalState state_;
-    bool begun_ = false, ended_ = false, closed_ = false;
+    bool begun_ = false, ended_ = false, closed_ = false, changing_ = false;
 };
 
 }  // namespace
@@ -182,8 +192,15 @@ Program read_gcode(std::string_view text, const std::string& file, const GcodeLi
 
 Program read_program_text(std::string_view text, const std::string& file, const Dialect& dialect,
                           const GcodeLimits& limits) {
-    if (dialect.conversational) return read_conversational(text, file, dialect, limits);
-    return Reader(text, file, dialect, limits).run();
+    if (dialect.conversational)
+        return std::move(read_conversational(text, file, dialect, limits, false).front());
+    return std::move(Reader(text, file, dialect, limits, false).run().front());
+}
+
+std::vector<Program> read_operations(std::string_view text, const std::string& file, const Dialect& dialect,
+                                     const GcodeLimits& limits) {
+    if (dialect.conversational) return read_conversational(text, file, dialect, limits, true);
+    return Reader(text, file, dialect, limits, true).run();
 }
 
 std::string other_dialect(std::string_view text, const Dialect& expected) {
@@ -192,7 +209,7 @@ std::string other_dialect(std::string_view text, const Dialect& expected) {
                                 Post::siemens, Post::heidenhain}) {
             if (post == expected.post) continue;  // whose refusal tells of a wrong unit itself
             try {
-                (void)read_program_text(text, "", dialect_of(post, units));
+                (void)read_operations(text, "", dialect_of(post, units));
                 return in_words(post, units);
             } catch (const Error&) {
                 continue;  // none of its programs

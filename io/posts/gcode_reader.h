@@ -45,6 +45,15 @@ struct GcodeLimits {
 [[nodiscard]] Program read_program_text(std::string_view text, const std::string& file,
                                         const Dialect& dialect, const GcodeLimits& limits = {});
 
+/// The same of a program that holds one operation after another: each begins where the spindle is started,
+/// or started again (M3), and is a Program of its own, with lines counted from the text's first. What is in
+/// force stays so from one to the next; a tool may be changed between them while the spindle stands. The
+/// first motion of each is taken to come from anywhere.
+/// @throws as read_program_text(); gcode.tool for a change while the spindle turns, gcode.spindle for a
+///   motion between a change and the start of the spindle
+[[nodiscard]] std::vector<Program> read_operations(std::string_view text, const std::string& file,
+                                                   const Dialect& dialect, const GcodeLimits& limits = {});
+
 /// Which other control's dialect takes the whole text, as the job's words name it ("haas", "fanuc in inch");
 /// "" where none does.
 [[nodiscard]] std::string other_dialect(std::string_view text, const Dialect& expected);

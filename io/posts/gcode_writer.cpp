@@ -224,14 +224,22 @@ private:
     const Operation& operation_;
 };
 
-/// All that comes before the first motion.
+/// What a program says of the operation that follows.
+std::vector<std::string> remarks(const Operation& operation, const Tool& tool) {
+    return {fmt::format("{}: {}", name(operation.kind), operation.purpose),
+            fmt::format("tool {}: {}, diameter {} mm", tool.number, tool.name, decimal(tool.diameter, 4)),
+            fmt::format("cutting {} mm, {} min", decimal(operation.cutting_mm, 1),
+                        decimal(operation.minutes, 2))};
+}
+
+/// All that comes before the first motion of a program.
 std::string head_text(const Plan& plan, const Layer& layer, const Operation& operation, const Tool& tool,
                       const Dialect& dialect) {
     const bool layer_top = frame_of(plan.job.machine) == Frame::layer_top;
     const Templates templates(plan, operation, dialect);
     std::string text = templates.filled(dialect.begin);
     const auto comment = [&](const std::string& line) { text += comment_line(dialect, line); };
-    comment(fmt::format("Slabwright {}: {}", SLABWRIGHT_VERSION, operation.file));
+    comment(fmt::format("Slabwright {}: {}", SLABWRIGHT_VERSION, file_of(operation.file)));
     comment(fmt::format("pattern {}", plan.input.file));
     comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index,
                         plan.layers.size(), decimal(layer.z_bottom, 4), decimal(layer.z_top, 4)));
@@ -239,22 +247,45 @@ std::string head_text(const Plan& plan, const Layer& layer, const Operation& ope
     if (plan.job.machine.zero != WorkZero::model)
         comment(fmt::format("x = y = 0 at the base board's {}",
                             plan.job.machine.zero == WorkZero::corner ? "left front corner" : "middle"));
-    comment(fmt::format("{}: {}", name(operation.kind), operation.purpose));
-    comment(fmt::format("tool {}: {}, diameter {} mm", tool.number, tool.name, decimal(tool.diameter, 4)));
-    comment(fmt::format("cutting {} mm, {} min", decimal(operation.cutting_mm, 1),
-                        decimal(operation.minutes, 2)));
+    for (const std::string& line : remarks(operation, tool)) comment(line);
     const std::string notes = templates.filled(dialect.notes);
     for (std::size_t at = 0; at < notes.size();) {
         const std::size_t end = std::min(notes.find('\n', at), notes.size());
         comment(notes.substr(at, end - at));
         at = end + 1;
     }
-    text += templates.filled(dialect.head);
-    const std::vector<Move>& moves = operation.moves;
-    // Centres count from where an arc begins, whatever the program before has left in force.
-    if (std::any_of(moves.begin(), moves.end(), [](const Move& m) { return m.is_arc(); }))
-        text += dialect.centres;
-    return text;
+    return text + templates.filled(dialect.head);
+}
+
+/// All that comes before the first motion of a later operation of a program. @param before whose moves have
+/// just ended, at clearance height
+std::string next_text(const Plan& plan, const Operation& before, const Operation& operation, const Tool& tool,
+                      const Dialect& dialect) {
+    const Templates templates(plan, operation, dialect);
+    std::string text;
+    for (const std::string& line : remarks(operation, tool)) text += comment_line(dialect, line);
+    text += templates.filled(operation.tool != before.tool ? dialect.change : dialect.again);
+    return text + templates.filled(dialect.next);
+}
+
+/// The operation that comes before one in its program; none before the first.
+const Operation* before_in_file(const Layer& layer, const Operation& operation) {
+    if (part_of(operation.file) <= 1) return nullptr;
+    const std::string name = fmt::format("{}#{}", file_of(operation.file), part_of(operation.file) - 1);
+    const auto found = std::find_if(layer.operations.begin(), layer.operations.end(),
+                                    [&](const Operation& o) { return o.file == name; });
+    if (found == layer.operations.end())
+        throw Error(ErrorKind::no_plan, "program.unsafe",
+                    fmt::format("layer {} has nothing before {} in its program", layer.index, operation.file),
+                    operation.file, "report this with the pattern and the job");
+    return &*found;
+}
+
+bool is_last_of_file(const Layer& layer, const Operation& operation) {
+    if (part_of(operation.file) == 0) return true;
+    const std::string name = fmt::format("{}#{}", file_of(operation.file), part_of(operation.file) + 1);
+    return std::none_of(layer.operations.begin(), layer.operations.end(),
+                        [&](const Operation& o) { return o.file == name; });
 }
 
 /// Lines with numbers before them, from `first` on.
@@ -269,9 +300,10 @@ std::string in_blocks(const std::string& text, std::size_t first) {
 }
 
 // As write_program; stops before the first line after move `until`, with a piece that ends there.
+// @param lines_before that its program has before it
 // @param lines gets the line of each move, 0 where it has none; may be null
-void write_until(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink,
-                 std::size_t until, std::vector<std::uint32_t>* lines = nullptr) {
+void write_until(const Plan& plan, const Layer& layer, const Operation& operation, std::uint32_t lines_before,
+                 const TextSink& sink, std::size_t until, std::vector<std::uint32_t>* lines = nullptr) {
     const std::vector<Tool>& tools = plan.job.tools;
     const auto tool =
         std::find_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == operation.tool; });
@@ -280,10 +312,15 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
     const Templates templates(plan, operation, dialect);
     std::string text;
     text.reserve(kPiece + 4096);
-    text += head_text(plan, layer, operation, *tool, dialect);
-    auto line = static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
-    if (dialect.conversational) text = in_blocks(text, 0);
+    const Operation* before = before_in_file(layer, operation);
+    text += before == nullptr ? head_text(plan, layer, operation, *tool, dialect)
+                              : next_text(plan, *before, operation, *tool, dialect);
     const std::vector<Move>& moves = operation.moves;
+    // Centres count from where an arc begins, whatever the program before has left in force.
+    if (std::any_of(moves.begin(), moves.end(), [](const Move& m) { return m.is_arc(); }))
+        text += dialect.centres;
+    auto line = lines_before + static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
+    if (dialect.conversational) text = in_blocks(text, lines_before);
     const std::int32_t clearance = to_units(operation.clearance_z);
     MotionText motion(text, dialect, program_origin(plan, layer), line);
     motion.begin(clearance, [&](const std::string& z) { return templates.filled(dialect.first, z); });
@@ -306,27 +343,61 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
         }
     }
     motion.rapid_z(clearance);
-    const std::string end = templates.filled(dialect.end);
-    text += dialect.conversational ? in_blocks(end, motion.blocks()) : end;
+    if (is_last_of_file(layer, operation)) {
+        const std::string end = templates.filled(dialect.end);
+        text += dialect.conversational ? in_blocks(end, motion.blocks()) : end;
+    }
     sink(text);
+}
+
+std::uint32_t count_lines(std::string_view text) {
+    return static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
 }  // namespace
 
-void write_program(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink) {
-    write_until(plan, layer, operation, sink, operation.moves.size());
+std::uint32_t lines_before(const Plan& plan, const Layer& layer, const Operation& operation) {
+    const Operation* before = before_in_file(layer, operation);
+    if (before == nullptr) return 0;
+    const std::uint32_t first = lines_before(plan, layer, *before);
+    return first + line_count(plan, layer, *before, first);
 }
 
-std::size_t program_line(const Plan& plan, const Layer& layer, const Operation& operation, std::size_t move) {
+std::uint32_t line_count(const Plan& plan, const Layer& layer, const Operation& operation,
+                         std::uint32_t lines_before) {
+    std::uint32_t count = 0;
+    write_until(
+        plan, layer, operation, lines_before, [&](std::string_view piece) { count += count_lines(piece); },
+        operation.moves.size());
+    return count;
+}
+
+void write_program(const Plan& plan, const Layer& layer, const Operation& operation, const TextSink& sink) {
+    std::uint32_t before = lines_before(plan, layer, operation);
+    write_until(plan, layer, operation, before, sink, operation.moves.size());
+}
+
+void write_file(const Plan& plan, const Layer& layer, std::size_t begin, const TextSink& sink) {
+    std::uint32_t before = 0;
+    const std::size_t end = file_end(layer, begin);
+    for (std::size_t i = begin; i < end; ++i) {
+        const std::uint32_t written = before;
+        const auto count = [&](std::string_view piece) {
+            before += count_lines(piece);
+            sink(piece);
+        };
+        write_until(plan, layer, layer.operations[i], written, count, layer.operations[i].moves.size());
+    }
+}
+
+std::size_t program_line(const Plan& plan, const Layer& layer, const Operation& operation, std::size_t move,
+                         std::uint32_t lines_before) {
     if (move == 0 || move + 1 >= operation.moves.size()) return 0;
     const auto lines = [&](std::size_t until) {
-        std::size_t count = 0;
+        std::size_t count = lines_before;
         write_until(
-            plan, layer, operation,
-            [&](std::string_view piece) {
-                count += static_cast<std::size_t>(std::count(piece.begin(), piece.end(), '\n'));
-            },
-            until);
+            plan, layer, operation, lines_before,
+            [&](std::string_view piece) { count += count_lines(piece); }, until);
         return count;
     };
     const std::size_t line = lines(move);
@@ -336,7 +407,8 @@ std::size_t program_line(const Plan& plan, const Layer& layer, const Operation& 
 std::vector<std::uint32_t> move_lines(const Plan& plan, const Layer& layer, const Operation& operation) {
     std::vector<std::uint32_t> lines;
     write_until(
-        plan, layer, operation, [](std::string_view) {}, operation.moves.size(), &lines);
+        plan, layer, operation, lines_before(plan, layer, operation), [](std::string_view) {},
+        operation.moves.size(), &lines);
     return lines;
 }
 

@@ -130,7 +130,8 @@ void ModalState::apply(const GcodeLine& line, const GcodePlace& place) {
     check_words(line, place);
     speed_and_feed(line, place);
     if (line.has('T')) {
-        if (selected_ != 0 || loaded_ != 0) place.fail("gcode.tool", "a second tool in one program");
+        if (selected_ != 0 || (loaded_ != 0 && !several_))
+            place.fail("gcode.tool", "a second tool in one program");
         selected_ = whole(line['T'], 'T', place);
     }
     if (line.m.has(60)) change_tool(place);
@@ -199,9 +200,12 @@ void ModalState::speed_and_feed(const GcodeLine& line, const GcodePlace& place) 
 }
 
 void ModalState::change_tool(const GcodePlace& place) {
-    if (loaded_ != 0) place.fail("gcode.tool", "a second tool change (M6) in one program");
+    if (loaded_ != 0 && !several_) place.fail("gcode.tool", "a second tool change (M6) in one program");
     if (selected_ <= 0) place.fail("gcode.tool", "a tool change (M6) that names no tool");
+    if (loaded_ != 0 && spindle_ != Spindle::off)
+        place.fail("gcode.tool", "a tool change (M6) while the spindle turns");
     loaded_ = selected_;
+    if (several_) selected_ = 0;
     length_offset_ = false;
     spindle_ = Spindle::off;
 }

@@ -16,8 +16,11 @@ namespace slabwright {
 class ModalState {
 public:
     /// @param dialect must outlive it
-    explicit ModalState(const Dialect& dialect)
-        : dialect_(dialect), no_length_offset_(dialect.length == Dialect::Length::touch_off) {
+    /// @param several the program may change tools
+    explicit ModalState(const Dialect& dialect, bool several = false)
+        : dialect_(dialect),
+          several_(several && dialect.changes_tools),
+          no_length_offset_(dialect.length == Dialect::Length::touch_off) {
         if (dialect.centres_incremental) absolute_centres_ = false;
     }
 
@@ -84,6 +87,7 @@ private:
     double feed_of(double value, const GcodePlace& place) const;
 
     const Dialect& dialect_;
+    bool several_;
     Motion motion_ = Motion::none;
     std::array<int, 3> plane_{-1, -1, -1};
     double unit_ = 0;  // unknown

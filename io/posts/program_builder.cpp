@@ -26,6 +26,31 @@ ProgramBuilder::ProgramBuilder(std::string_view text, const Dialect& dialect, co
       level_radius_error_(std::max(2 * limits.arc_error, rounded_radii(dialect))),
       place_(place) {}
 
+void ProgramBuilder::begin_operation(int tool) {
+    if (program.steps.empty()) {
+        program.tool = tool;
+        return;
+    }
+    Program next;
+    next.file = program.file;
+    next.number = program.number;
+    next.tool = tool;
+    next.blend = program.blend;
+    next.strays = program.strays;
+    next.strays_line = program.strays_line;
+    done_.push_back(std::move(program));
+    program = std::move(next);
+    spin_up_s_ = 0;
+    spinning_up_ = blended_ = false;
+    at_ = {kUnknown, kUnknown, kUnknown};
+}
+
+std::vector<Program> ProgramBuilder::take(int tool) {
+    if (done_.empty()) program.tool = tool;
+    done_.push_back(std::move(program));
+    return std::move(done_);
+}
+
 void ProgramBuilder::turn(double rpm) {
     rpm_ = rpm;
     if (rpm > 0) program.spindle_rpm = std::max(program.spindle_rpm, rpm);

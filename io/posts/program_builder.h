@@ -5,6 +5,7 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "engine/simulate/program.h"
 #include "io/posts/gcode_line.h"
@@ -25,7 +26,14 @@ public:
     ProgramBuilder(std::string_view text, const Dialect& dialect, const GcodeLimits& limits,
                    const GcodePlace& place);
 
-    Program program;
+    Program program;  ///< that is being read
+
+    /// An operation begins: what was read so far is a program of its own from here on, unless it has no
+    /// motions. The new one begins anywhere, and rounds corners as the last one did until it says otherwise.
+    /// @param tool in the spindle
+    void begin_operation(int tool);
+    /// All operations, in their order; the last is `program`.
+    [[nodiscard]] std::vector<Program> take(int tool);
 
     /// How far the text has been read, bytes.
     void read_to(std::size_t bytes) { read_ = bytes; }
@@ -57,6 +65,7 @@ private:
     void make_room();
     void step(const std::array<double, 3>& to, double feed);
 
+    std::vector<Program> done_;
     std::string_view text_;
     GcodeLimits limits_;
     double level_radius_error_;  // mm by which the radii of a level arc may differ

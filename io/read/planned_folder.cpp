@@ -1,5 +1,7 @@
 #include "io/read/planned_folder.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -272,6 +274,16 @@ PlannedJoint read_joint(const Field& joint) {
     return planned;
 }
 
+/// Operations that share a file follow each other in it, in one layer: "#2" after "#1".
+void check_part(const Field& op, const std::set<std::string>& named, const PlannedProgram& program) {
+    const int part = part_of(program.file);
+    const std::string file(file_of(program.file));
+    if (part < 0) op["file"].fail("has no number after its #");
+    if (part > 1 && !named.contains(fmt::format("{}#{}", file, part - 1)))
+        op["file"].fail(fmt::format("comes before the part {} of its program", part - 1));
+    if (named.contains(file) && part > 0) op["file"].fail("is a part of a program that has none");
+}
+
 void read_operation(const Field& op, std::size_t layer, std::set<std::string>& named, PlannedFolder& folder) {
     PlannedProgram& program = folder.build.programs.emplace_back();
     program.file = op["file"].text();
@@ -280,7 +292,13 @@ void read_operation(const Field& op, std::size_t layer, std::set<std::string>& n
         program.file.find("..") != std::string::npos)
         op["file"].fail("is no file of nc/");
     if (!named.insert(program.file).second) op["file"].fail("names a program a second time");
+    check_part(op, named, program);
     program.layer = layer;
+    if (const std::size_t n = folder.build.programs.size(); part_of(program.file) > 1) {
+        const PlannedProgram& before = folder.build.programs[n - 2];
+        if (file_of(before.file) != file_of(program.file) || before.layer != layer)
+            op["file"].fail("does not follow the operation before it in its program");
+    }
     program.kind = operation_kind(op["kind"]);
     program.tool = op["tool"].whole();
     if (op.has("purpose")) program.purpose = op["purpose"].text();
@@ -337,10 +355,19 @@ GcodeLimits gcode_limits(const Tolerances& tolerances) {
     return limits;
 }
 
-Program read_planned_program(const std::string& text, const std::string& file, const Job& job) {
+std::vector<Program> read_planned_operations(const std::string& text, const std::string& file, const Job& job,
+                                             std::size_t count) {
     const Dialect dialect = dialect_of(job.machine);
     try {
-        return read_program_text(text, file, dialect, gcode_limits(job.tolerances));
+        std::vector<Program> programs;
+        if (count > 1) programs = read_operations(text, file, dialect, gcode_limits(job.tolerances));
+        else programs.push_back(read_program_text(text, file, dialect, gcode_limits(job.tolerances)));
+        if (programs.size() != count)
+            throw Error(ErrorKind::verification, "gcode.operations",
+                        fmt::format("starts the spindle for {} operations, the plan has {} in it",
+                                    programs.size(), count),
+                        file, "plan again");
+        return programs;
     } catch (const Error& error) {
         const std::string other = other_dialect(text, dialect);
         if (other.empty()) throw;
@@ -349,6 +376,10 @@ Program read_planned_program(const std::string& text, const std::string& file, c
                         in_words(dialect.post, dialect.units),
                     error.place(), "do not mix folders; plan again with the machine.post of your control");
     }
+}
+
+Program read_planned_program(const std::string& text, const std::string& file, const Job& job) {
+    return std::move(read_planned_operations(text, file, job, 1).front());
 }
 
 void place_program(Program& program, const BuildPlan& build, std::size_t layer) {
@@ -403,18 +434,35 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     return folder;
 }
 
-Program PlannedFolder::read_program(std::size_t i, const FolderRefusal& refusal) const {
-    const PlannedProgram& planned = build.programs[i];
+std::size_t PlannedFolder::file_end(std::size_t begin) const {
+    const std::vector<PlannedProgram>& all = build.programs;
+    std::size_t end = begin + 1;
+    while (end < all.size() && file_of(all[end].file) == file_of(all[begin].file)) ++end;
+    return end;
+}
+
+std::vector<Program> PlannedFolder::read_file(std::size_t begin, const FolderRefusal& refusal) const {
+    const std::string file(file_of(build.programs[begin].file));
+    const std::size_t count = file_end(begin) - begin;
     const std::string text =
-        read_whole(path / planned.file, {refusal.kind, refusal.program, kMostProgramBytes, "plan again"});
-    Program program = read_planned_program(text, planned.file, build.job);
-    place_program(program, build, planned.layer);
-    program.file = planned.file.substr(3);
-    program.layer = static_cast<int>(planned.layer);
-    program.kind = planned.kind;
-    program.planned_tool = planned.tool;
-    if (stepdowns[i]) program.planned_stepdown = *stepdowns[i];
-    return program;
+        read_whole(path / file, {refusal.kind, refusal.program, kMostProgramBytes, "plan again"});
+    std::vector<Program> programs = read_planned_operations(text, file, build.job, count);
+    for (std::size_t k = 0; k < count; ++k) {
+        Program& program = programs[k];
+        const PlannedProgram& planned = build.programs[begin + k];
+        place_program(program, build, planned.layer);
+        program.file = planned.file.substr(3);
+        program.layer = static_cast<int>(planned.layer);
+        program.kind = planned.kind;
+        program.planned_tool = planned.tool;
+        if (stepdowns[begin + k]) program.planned_stepdown = *stepdowns[begin + k];
+    }
+    return programs;
+}
+
+Program PlannedFolder::read_program(std::size_t i, const FolderRefusal& refusal) const {
+    const auto part = static_cast<std::size_t>(std::max(1, part_of(build.programs[i].file)));
+    return std::move(read_file(i + 1 - part, refusal)[part - 1]);
 }
 
 }  // namespace slabwright

@@ -36,6 +36,10 @@ struct PlannedFolder {
     /// Reads the program of build.programs[i]: file (without nc/), layer, kind, planned tool and stepdown
     /// set, heights from the pattern's bottom. @throws Error as `refusal` says, and as read_gcode()
     [[nodiscard]] Program read_program(std::size_t i, const FolderRefusal& refusal) const;
+    /// Past the last of build.programs that lie in the file of the one at place `begin`.
+    [[nodiscard]] std::size_t file_end(std::size_t begin) const;
+    /// The same of all programs of the file that begins with build.programs[begin].
+    [[nodiscard]] std::vector<Program> read_file(std::size_t begin, const FolderRefusal& refusal) const;
 };
 
 /// Reads OUT/plan.json. @throws Error as `refusal` says, with the first key that is missing or wrong: no
@@ -49,6 +53,11 @@ inline constexpr const char* kForeignProgram = "program.dialect";
 /// Reads a program of a plan in the dialect of its job's machine. @throws Error as read_program_text(), or
 /// kForeignProgram, which names both, where it is a whole program of another dialect
 [[nodiscard]] Program read_planned_program(const std::string& text, const std::string& file, const Job& job);
+
+/// The same of a file that holds `count` operations, one after another (read_operations).
+/// @throws as read_planned_program(); Error(verification, "gcode.operations") where it holds another number
+[[nodiscard]] std::vector<Program> read_planned_operations(const std::string& text, const std::string& file,
+                                                           const Job& job, std::size_t count);
 
 /// Moves a program from where its coordinates count from to the pattern's base: BuildPlan::zero in x and y,
 /// the layer's top or 0 in z. @param layer index

@@ -41,6 +41,8 @@ inline constexpr Word<Frame> kFrameWords[] = {
     {"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}, {"auto", Frame::automatic}};
 inline constexpr Word<BuildTable> kTableWords[] = {{"moving", BuildTable::moving},
                                                    {"fixed", BuildTable::fixed}};
+inline constexpr Word<ProgramSpan> kProgramWords[] = {
+    {"operation", ProgramSpan::operation}, {"tool", ProgramSpan::tool}, {"layer", ProgramSpan::layer}};
 inline constexpr Word<WorkZero> kZeroWords[] = {
     {"model", WorkZero::model}, {"corner", WorkZero::corner}, {"centre", WorkZero::centre}};
 inline constexpr Word<Blanks> kBlankWords[] = {{"pattern", Blanks::pattern}, {"layer", Blanks::layer}};
@@ -174,6 +176,9 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
                "heidenhain");
     visit.word("units", machine.units, kUnitWords,
                "of the programs: mm or inch; this file and plan.json stay in mm");
+    visit.word("programs", machine.programs, kProgramWords,
+               "what one program holds: an operation, a tool (all that it does in a layer between two "
+               "changes), or a layer, which changes tools by itself");
     visit.word("zero", machine.zero, kZeroWords,
                "x 0, y 0 of the programs: model (as the model has it), corner (left front corner of the base "
                "board) or centre (its middle)");

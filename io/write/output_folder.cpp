@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/plan.h"
 #include "io/read/input_file.h"
 #include "io/write/output_file.h"
 #include "kernels/errors.h"
@@ -149,7 +150,7 @@ std::optional<std::set<std::string>> programs_of(const fs::path& plan) {
         std::set<std::string> names;
         for (const json& layer : document.at("layers"))
             for (const json& operation : layer.at("operations"))
-                names.insert(fs::path(operation.at("file").get<std::string>()).filename().string());
+                names.insert(fs::path(file_of(operation.at("file").get<std::string>())).filename().string());
         return names;
     } catch (const json::exception&) {
         return std::nullopt;

@@ -104,7 +104,9 @@ void put_place(JsonText& json, const std::optional<std::array<double, 3>>& place
     json.end();
 }
 
-void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const Operation& operation) {
+/// @param lines that its program has before the operation
+void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const Operation& operation,
+                   std::uint32_t lines) {
     json.begin_object(Shape::line);
     json.key("kind").string(name(operation.kind));
     json.key("purpose").string(operation.purpose);
@@ -146,7 +148,7 @@ void put_operation(JsonText& json, const Plan& plan, const Layer& layer, const O
     put_place(json, operation.peak_at);
     json.key("peak_line");
     if (const std::size_t line =
-            operation.peak_move ? program_line(plan, layer, operation, *operation.peak_move) : 0;
+            operation.peak_move ? program_line(plan, layer, operation, *operation.peak_move, lines) : 0;
         line > 0)
         json.integer(static_cast<std::int64_t>(line));
     else json.null();
@@ -242,7 +244,12 @@ void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     }
     json.end();
     json.key("operations").begin_array();
-    for (const Operation& operation : layer.operations) put_operation(json, plan, layer, operation);
+    std::uint32_t lines = 0;  // of the program so far that the operation is a part of
+    for (const Operation& operation : layer.operations) {
+        if (part_of(operation.file) <= 1) lines = 0;
+        put_operation(json, plan, layer, operation, lines);
+        if (part_of(operation.file) > 0) lines += line_count(plan, layer, operation, lines);
+    }
     json.end().end();
 }
 

@@ -22,11 +22,14 @@ const ofAction = {
 const ofKind = {face: 'face', rough: 'rough', semi_rough: 'rough'};
 
 export const operations = plan.layers.flatMap((layer, l) => layer.operations.map((operation, o) => ({
-    ...operation, layer: l, place: o, name: operation.file.replace(/^nc\//, ''),
+    ...operation, layer: l, place: o, name: operation.file.replace(/^nc\//, '').replace('#', ' · '),
 })));
 // The programs of plan.layers, with their layer and number.
 operations.forEach((operation, i) => { operation.index = i; });
-const byFile = new Map(operations.map(operation => [operation.file, operation]));
+// Those of each program: nc/L003.ngc#1 and nc/L003.ngc#2 lie in nc/L003.ngc.
+export const fileOf = operation => operation.file.replace(/#.*/, '');
+const inFile = new Map();
+for (const operation of operations) inFile.set(fileOf(operation), [...(inFile.get(fileOf(operation)) ?? []), operation]);
 
 // Minutes of every layer by phase.
 export function layerMinutes() {
@@ -38,8 +41,13 @@ export function layerMinutes() {
     }
     for (const [index, action, seconds, program] of data.steps) {
         const row = rows[position.get(index) ?? 0];
-        const operation = program ? byFile.get(program) : undefined;
-        const phase = operation ? ofKind[operation.kind] ?? 'finish' : ofAction[action] ?? 'other';
+        const inside = (program && inFile.get(program)) ?? [];
+        if (inside.length > 1) {
+            for (const operation of inside) row[ofKind[operation.kind] ?? 'finish'] += operation.minutes;
+            row.tool_change += Math.max(0, seconds / 60 - inside.reduce((sum, operation) => sum + operation.minutes, 0));
+            continue;
+        }
+        const phase = inside.length === 1 ? ofKind[inside[0].kind] ?? 'finish' : ofAction[action] ?? 'other';
         row[phase] += seconds / 60;
     }
     return rows;
@@ -125,7 +133,7 @@ export function layerName(l) {
 }
 
 export function operationName(operation) {
-    return `${operation.name.replace(/\.(ngc|nc|gcode|tap|mpf|h)$/, '')}, ${words(operation.kind)}: ${operation.purpose}`;
+    return `${operation.name.replace(/\.(ngc|nc|gcode|tap|mpf|h)(?=$| ·)/, '')}, ${words(operation.kind)}: ${operation.purpose}`;
 }
 
 export const featureKinds = {

@@ -3,7 +3,7 @@
 import {duration, figure, make, plural, words} from './dom.js';
 import {boardsText, costText, cutListSheet} from './cutlist.js';
 import {planView, sideView, stackView, supportsIn} from './drawing.js';
-import {blankOf, blankSize, data, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
+import {blankOf, blankSize, data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
 import {filledVolume} from './wood.js';
 import {tableHeight, zeroOf} from './zero.js';
 
@@ -96,7 +96,7 @@ function simulated(l) {
 
 function sheet(l, minutes) {
     const layer = plan.layers[l], programs = operations.filter(operation => operation.layer === l), zero = zeroOf(l), filled = filledVolume(l);
-    const off = layer.z_bottom + layer.slab_thickness - layer.z_top, first = programs[0]?.name, final = programs[programs.length - 1]?.name;
+    const off = layer.z_bottom + layer.slab_thickness - layer.z_top, files = [...new Set(programs.map(o => fileOf(o).replace(/^nc\//, '')))], first = files[0], final = files[files.length - 1];
     const warnings = [...zero.warnings, ...(filled >= 1 ? [`${cubic(filled)} under overhangs stay filled in this layer (red in the drawing).`] : []), ...warningsOf(l)];
     const glued = layer.glue_area_mm2 > 0, {min} = blankOf(l), [bx, by] = [0, 1].map(k => min[k] - plan.stock.min[k]);
     const laid = bx > 0.05 || by > 0.05 ? `, its corner ${figure(bx, 1)} mm right of and ${figure(by, 1)} mm behind the base board’s` : '';
