@@ -69,7 +69,7 @@ export function planView(l, paper) {
     glue.length ? make('path', {d: pathOf(glue), fill: `url(#glue-${l})`, 'fill-rule': 'evenodd', stroke: glueInk, 'stroke-width': 0.25 * u}) : null,
     filled.length ? make('path', {d: filled.map(b => `M${b.x0.toFixed(2)} ${(-b.y0).toFixed(2)}H${b.x1.toFixed(2)}V${(-b.y1).toFixed(2)}H${b.x0.toFixed(2)}Z`).join(''), fill: `url(#air-${l})`, stroke: 'none'}) : null,
     make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: 'none', stroke: ink, 'stroke-width': 0.45 * u}),
-    supportsIn(l).map(s => make('path', {class: 'support', d: `M${s.x - s.width / 2} ${-s.y - s.width / 2}h${s.width}v${s.width}h${-s.width}Zl${s.width} ${s.width}m0 ${-s.width}l${-s.width} ${s.width}`, fill: '#fff', stroke: purple, 'stroke-width': 0.5 * u})),
+    supportsIn(l).map(s => make('path', {class: 'support', d: `M${s.x - s.width / 2} ${-s.y - s.width / 2}h${s.width}v${s.width}h${-s.width}Zl${s.width} ${s.width}m0 ${-s.width}l${-s.width} ${s.width}`, fill: 'none', stroke: purple, 'stroke-width': 0.5 * u})),
     make('path', {d: pathOf(top.map(loop => loop.points)), fill: 'none', stroke: '#17636b', 'stroke-width': 0.4 * u, 'stroke-dasharray': `${2 * u} ${1.3 * u}`}),
     // Measures: the slab below and left, the pattern above and right.
     extension(sx0, -sy0, sx0, -y0 + 15 * u, u), extension(sx1, -sy0, sx1, -y0 + 15 * u, u), extension(sx0, -sy0, x0 - 15 * u, -sy0, u), extension(sx0, -sy1, x0 - 15 * u, -sy1, u),
