@@ -9,6 +9,7 @@
 
 #include "tests/support/command.h"
 #include "tests/support/files.h"
+#include "tests/support/rs274.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -137,6 +138,31 @@ TEST(SheetsCommand, FeedIsTheFormulasAndATestCutFitsTheMaterial) {
     EXPECT_NEAR(document["energy_j_mm3"].get<double>(), 13.6 * 1835.75 * 6.35 / 12 / 500, 1e-2);
     EXPECT_NE(run_command({command, "feed", "6.35", "--tilt", "60"}).out.find("917.9"), std::string::npos);
     EXPECT_EQ(run_command({command, "feed", "0"}).exit, 2);
+}
+
+// Five parts of the corpus from the sheets in stock: the programs make the part, cut into it nowhere by more
+// than .02 mm, and LinuxCNC reads each of them.
+TEST(SheetsCommand, CorpusPartsPassTheirProofAndLinuxCncReadsTheirPrograms) {
+    const char* corpus = std::getenv("SLABWRIGHT_CORPUS");
+    if (corpus == nullptr) GTEST_SKIP() << "SLABWRIGHT_CORPUS names no folder of meshes";
+    for (const auto& [part, head] : {std::pair{"castings/bearing_block", "router"},
+                                     {"castings/mold_cavity_ktool", "router"},
+                                     {"castings/casting_cover", "laser"},
+                                     {"castings/robot_base_fanuc_cr35ia", "router"},
+                                     {"pool/fanuc_10", "laser"}}) {
+        const TemporaryFolder folder;
+        const std::string out = folder / "out";
+        const CommandResult made =
+            run_command({command, "sheets", std::string(corpus) + "/" + part + ".stl", "-o", out, "--stock",
+                         "2440", "1220", "--thickness", "6", "9", "12", "18", "--head", head});
+        ASSERT_EQ(made.exit, 0) << part << '\n' << made.out << made.err;
+        const auto verdict = nlohmann::json::parse(support::slurp(out + "/verify.json"));
+        EXPECT_TRUE(verdict["passed"].get<bool>()) << part;
+        EXPECT_LE(verdict["gouge_mm"].get<double>(), 0.02) << part;
+        for (const auto& entry : std::filesystem::directory_iterator(out + "/nc"))
+            EXPECT_TRUE(support::interpret_rs274(support::slurp(entry.path()), "T1 P1 D6 Z0\n").ended)
+                << part << ' ' << entry.path();
+    }
 }
 
 // The drawings as ezdxf, which many shops' programs are built on, sees them.

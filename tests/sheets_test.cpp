@@ -169,6 +169,30 @@ TEST(Sheets, TiltedCutsSpareAStepNearASheetsTop) {
     EXPECT_TRUE(proof.passed) << told(proof);
 }
 
+// Walls that lean far more than the head, between upright ones: their corners run along the outline from
+// section to section, as those of a horizontal bore do.
+TEST(Sheets, TiltedCutsSpareCornersThatRunAlongTheOutline) {
+    Context context;
+    std::mt19937 random(test::seed());
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (int round = 0; round < 8; ++round) {
+        std::vector<support::Ring> rings;
+        for (double z = 0; z < 18; z += 0.7 + 5 * unit(random)) {
+            const double x0 = 40 * unit(random), x1 = 60 + 40 * unit(random);
+            rings.push_back({z, {{x0, 0}, {x1, 0}, {x1, 30}, {x0, 30}}});
+        }
+        const Mesh mesh = loft(context, rings);
+        SheetJob job = job_of(SheetHead::jet);
+        job.slicing.thicknesses = {3, 6};
+        const SheetsPlan plan = plan_sheets(context, mesh, job);
+        const SheetProof proof = proof_of(context, mesh, texts_of(plan));
+        EXPECT_TRUE(proof.passed) << round << told(proof);
+        for (const SheetProgram& program : plan.programs)
+            for (const SheetWay& way : program.ways)
+                for (const HeadPoint& p : way.points) EXPECT_LE(p.a_deg, job.cutting.most_tilt_deg + 0.2);
+    }
+}
+
 TEST(Sheets, StacksAlongEveryAxis) {
     Context context;
     const Mesh mesh = loft(context, {circle(0, 20, 40), circle(36, 30, 40)});

@@ -11,7 +11,7 @@ namespace slabwright {
 namespace {
 
 /// Takes the cells that an edge passes.
-void take_edge(CellGrid& grid, Point2 low, std::int64_t cell, Point2 a, Point2 b) {
+void take_edge(NestGrid& grid, Point2 low, std::int64_t cell, Point2 a, Point2 b) {
     const auto column = [&](double x) { return static_cast<int>(std::floor((x - low.x) / double(cell))); };
     if (a.y > b.y) std::swap(a, b);
     const int r0 = static_cast<int>((std::int64_t{a.y} - low.y) / cell),
@@ -29,13 +29,13 @@ void take_edge(CellGrid& grid, Point2 low, std::int64_t cell, Point2 a, Point2 b
 
 }  // namespace
 
-CellGrid::CellGrid(int columns, int rows)
+NestGrid::NestGrid(int columns, int rows)
     : columns_(columns),
       rows_(rows),
       words_(static_cast<std::size_t>((columns + 63) / 64)),
       bits_(words_ * static_cast<std::size_t>(rows), 0) {}
 
-int CellGrid::last_taken(int row, int first, int last) const {
+int NestGrid::last_taken(int row, int first, int last) const {
     const std::uint64_t* words = bits_.data() + static_cast<std::size_t>(row) * words_;
     for (int w = last / 64; w >= first / 64; --w) {
         std::uint64_t bits = words[w];
@@ -46,7 +46,7 @@ int CellGrid::last_taken(int row, int first, int last) const {
     return -1;
 }
 
-void CellGrid::take(int row, int first, int last) {
+void NestGrid::take(int row, int first, int last) {
     first = std::max(first, 0), last = std::min(last, columns_ - 1);
     if (row < 0 || row >= rows_ || first > last) return;
     std::uint64_t* words = bits_.data() + static_cast<std::size_t>(row) * words_;
@@ -58,7 +58,7 @@ void CellGrid::take(int row, int first, int last) {
     }
 }
 
-void CellGrid::take(const CellShape& shape, int column, int row) {
+void NestGrid::take(const CellShape& shape, int column, int row) {
     for (const CellRun& run : shape.runs) take(row + run.row, column + run.first, column + run.last);
 }
 
@@ -69,7 +69,7 @@ CellShape cells_of(const Loops& region, std::int64_t cell) {
     shape.low = box.min;
     shape.columns = static_cast<int>((std::int64_t{box.max.x} - box.min.x) / cell) + 1;
     shape.rows = static_cast<int>((std::int64_t{box.max.y} - box.min.y) / cell) + 1;
-    CellGrid grid(shape.columns, shape.rows);
+    NestGrid grid(shape.columns, shape.rows);
     for (std::size_t i = 0; i < region.size(); ++i) {
         const auto loop = region.loop(i);
         for (std::size_t k = 0; k < loop.size(); ++k)
@@ -94,7 +94,7 @@ CellShape cells_of(const Loops& region, std::int64_t cell) {
     return shape;
 }
 
-std::optional<CellSpot> lowest_spot(const CellGrid& taken, const CellShape& shape, int most_rows) {
+std::optional<CellSpot> lowest_spot(const NestGrid& taken, const CellShape& shape, int most_rows) {
     const std::size_t n = shape.runs.size();
     std::size_t in_the_way = 0;  // the run that was last in the way is asked first
     for (int row = 0; row + shape.rows <= std::min(taken.rows(), most_rows); ++row)

@@ -27,9 +27,9 @@ struct CellShape {
 [[nodiscard]] CellShape cells_of(const Loops& region, std::int64_t cell);
 
 /// Which cells of a rectangle are taken, a bit each.
-class CellGrid {
+class NestGrid {
 public:
-    CellGrid(int columns, int rows);
+    NestGrid(int columns, int rows);
     [[nodiscard]] int columns() const { return columns_; }
     [[nodiscard]] int rows() const { return rows_; }
     /// The last taken cell of a row from column `first` to `last`, which are in the grid; −1: none is.
@@ -50,7 +50,7 @@ struct CellSpot {
 /// The lowest place at which a shape meets no taken cell, and there the leftmost. What is in its way says how
 /// far on the next place is, so few places are tried.
 /// @param most_rows the shape must end at this row of the grid or below
-[[nodiscard]] std::optional<CellSpot> lowest_spot(const CellGrid& taken, const CellShape& shape,
+[[nodiscard]] std::optional<CellSpot> lowest_spot(const NestGrid& taken, const CellShape& shape,
                                                   int most_rows);
 
 }  // namespace slabwright

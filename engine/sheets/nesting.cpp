@@ -40,7 +40,7 @@ struct Spot {
 };
 
 /// Of the turns the one that ends lowest, then leftmost, where it lies lowest.
-std::optional<Spot> spot_on(const CellGrid& taken, const std::vector<Turned>& turned) {
+std::optional<Spot> spot_on(const NestGrid& taken, const std::vector<Turned>& turned) {
     std::optional<Spot> best;
     const auto ends = [&](const Spot& spot) {
         return std::pair{spot.at.row + turned[spot.turn].cells.rows,
@@ -58,8 +58,8 @@ std::optional<Spot> spot_on(const CellGrid& taken, const std::vector<Turned>& tu
 /// What pieces are laid on and how; the same for all orders.
 struct NestTask {
     std::vector<std::vector<Turned>> turned;  ///< of every piece; empty for a piece that is nothing
-    std::vector<CellGrid> offcuts;
-    CellGrid sheet;
+    std::vector<NestGrid> offcuts;
+    NestGrid sheet;
 };
 
 /// How good a layout is, less is better: whole sheets, rows in use of the last, and how high pieces end on
@@ -77,7 +77,7 @@ struct Layout {
 Layout laid(const NestTask& task, const std::vector<std::size_t>& order) {
     Layout layout;
     layout.spots.resize(task.turned.size());
-    std::vector<CellGrid> taken = task.offcuts;
+    std::vector<NestGrid> taken = task.offcuts;
     for (const std::size_t i : order) {
         const std::vector<Turned>& turned = task.turned[i];
         if (turned.empty()) continue;
@@ -231,7 +231,7 @@ Nest nest_pieces(Context& context, const std::vector<Loops>& pieces, const Stock
     // Half of the spacing may reach into the margin.
     const double inset = std::max(0.0, rules.margin - rules.spacing / 2);
     const auto grid_of = [&](const StockSheet& s) {
-        return CellGrid(std::max(0, static_cast<int>((s.length - 2 * inset) / rules.cell)),
+        return NestGrid(std::max(0, static_cast<int>((s.length - 2 * inset) / rules.cell)),
                         std::max(0, static_cast<int>((s.width - 2 * inset) / rules.cell)));
     };
     NestTask task{std::vector<std::vector<Turned>>(pieces.size()), {}, grid_of(sheet)};
@@ -240,7 +240,7 @@ Nest nest_pieces(Context& context, const std::vector<Loops>& pieces, const Stock
         if (!pieces[i].points.empty()) task.turned[i] = turns_of(pieces[i], rules, cell);
     });
     for (std::size_t i = 0; i < pieces.size(); ++i) {
-        const auto fits = [&](const CellGrid& grid) { return spot_on(grid, task.turned[i]).has_value(); };
+        const auto fits = [&](const NestGrid& grid) { return spot_on(grid, task.turned[i]).has_value(); };
         if (!pieces[i].points.empty() && !fits(task.sheet) &&
             std::none_of(task.offcuts.begin(), task.offcuts.end(), fits))
             refuse(pieces[i], i, sheet);
