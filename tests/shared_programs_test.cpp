@@ -141,7 +141,7 @@ std::string verdict(const Plan& plan, const std::string& text) {
     try {
         std::vector<Program> programs =
             read_planned_operations(text, std::string(file_of(layer.operations[0].file)), plan.job, count);
-        const double up = to_mm(program_origin(plan, layer));
+        const double up = to_mm(program_origin(plan, layer).z);
         for (std::size_t k = 0; k < count; ++k) {
             const Operation& op = layer.operations[k];
             ProgramPlan said;
