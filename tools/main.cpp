@@ -154,6 +154,17 @@ void run_quote(const Options& options) {
     });
 }
 
+/// What is said of files that are written by now: where memory ends, they are no less written.
+template <class Text>
+std::string said(const Options& options, Text&& text) {
+    if (options.quiet) return {};
+    try {
+        return text();
+    } catch (const std::bad_alloc&) {
+        return {};
+    }
+}
+
 /// Returns the exit code: whether the programs make the part, as far as that was asked.
 int run_plan(const Options& options) {
     if (options.orient == "report") {
@@ -188,13 +199,17 @@ int run_plan(const Options& options) {
         if (options.no_verify) {
             pattern.reset();
             write(context, result, options.out, options.stl);
-            return options.json ? plan_summary_json(result, options.out, nullptr)
-                                : lies + summary(result, options.out);
+            return said(options, [&] {
+                return options.json ? plan_summary_json(result, options.out, nullptr)
+                                    : lies + summary(result, options.out);
+            });
         }
         found = write_proven(context, result, options.out, pattern, options.keep_failed, options.cell);
         if (!found.written) return std::string();
-        return options.json ? plan_summary_json(result, options.out, &found)
-                            : lies + summary(result, options.out) + verdict(found, options.out);
+        return said(options, [&] {
+            return options.json ? plan_summary_json(result, options.out, &found)
+                                : lies + summary(result, options.out) + verdict(found, options.out);
+        });
     });
     if (refused) return complain(*refused, false);
     const std::span<const Error> refusals(found.refusals);
