@@ -169,11 +169,14 @@ TEST(Place, APlanMovesWithItsPattern) {
         for (std::size_t s = 0; s < plan.sequence.size(); ++s)
             for (std::size_t n = 0; n < plan.sequence[s].numbers.size(); ++n) {
                 const auto& [name, number] = plan.sequence[s].numbers[n];
+                const bool in_x = name == "x_mm" || name == "slab_left_mm",
+                           in_y = name == "y_mm" || name == "slab_front_mm";
                 EXPECT_NEAR(moved.sequence[s].numbers[n].second,
-                            number + (name == "x_mm"   ? placing.dx
-                                      : name == "y_mm" ? placing.dy
-                                                       : 0),
-                            1e-6);
+                            number + (in_x   ? placing.dx
+                                      : in_y ? placing.dy
+                                             : 0),
+                            1e-6)
+                    << name;
             }
     }
 }
