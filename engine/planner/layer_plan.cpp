@@ -238,6 +238,7 @@ private:
                     fmt::format("cutter, spindle or a thin wall would bear {:.2f} times what they may",
                                 trial.planned.cuts.strain);
         }
+        strained_.push_back(trial.strained);
         // What holds is better than what is fast.
         if (!best_ || (trial.whole && !trial.leaves_more &&
                        std::pair(trial.strained, trial.minutes) < std::pair(best_->strained, best_->minutes)))
@@ -247,10 +248,9 @@ private:
     void give_reasons() {
         ToolSet& chosen = selection_->sets[chosen_];
         chosen.chosen = true;
-        const bool faster =
-            std::any_of(selection_->sets.begin(), selection_->sets.end(), [&](const ToolSet& s) {
-                return !s.chosen && s.minutes < chosen.minutes && s.reason.starts_with("cutter");
-            });
+        bool faster = false;  // one that does not hold
+        for (std::size_t s = 0; s < strained_.size(); ++s)
+            faster |= strained_[s] && s != chosen_ && selection_->sets[s].minutes < chosen.minutes;
         chosen.reason = sets_.size() == 1 ? "not compared"
                         : faster ? "takes the least time of those that leave no more and bear what they must"
                                  : "takes the least time of those that leave no more";
@@ -271,6 +271,7 @@ private:
     std::optional<WallMap> walls_;
     std::vector<NamedSet> sets_;
     std::optional<LayerSelection> selection_;
+    std::vector<bool> strained_;  // of the sets that were tried
     std::optional<Trial> best_;
     std::size_t chosen_ = 0;
     double allowed_left_ = 0;  // mm²
