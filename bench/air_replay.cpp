@@ -12,6 +12,7 @@
 #include <map>
 #include <numbers>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -153,8 +154,11 @@ private:
 
 int print(const std::string& out, double cell) {
     const Json plan = Json::parse(std::ifstream(out + "/plan.json"));
-    const Json& low = plan.at("stock").at("min");
-    const Json& high = plan.at("stock").at("max");
+    const Json& machine = plan.at("job").at("machine");
+    if (machine.at("post") != "linuxcnc" || machine.at("units") != "mm" ||
+        machine.value("programs", "operation") != "operation")
+        throw std::runtime_error("only LinuxCNC's programs in mm, one for each operation, are read");
+    const double zero_x = plan.at("zero").at(0), zero_y = plan.at("zero").at(1);
     const bool from_top = plan.at("frame") == "layer-top";
     std::map<int, Json> tools;
     for (const Json& tool : plan.at("tools")) tools[tool.at("number").get<int>()] = tool;
@@ -162,10 +166,15 @@ int print(const std::string& out, double cell) {
     Ways all;
     for (const Json& layer : plan.at("layers")) {
         const double bottom = layer.at("z_bottom"), origin = from_top ? layer.at("z_top").get<double>() : 0;
-        Wood wood(low.at(0), low.at(1), high.at(0), high.at(1), cell,
+        const Json &low = layer.at("blank").at("min"), &high = layer.at("blank").at("max");
+        Wood wood(low.at(0).get<double>() - zero_x, low.at(1).get<double>() - zero_y,
+                  high.at(0).get<double>() - zero_x, high.at(1).get<double>() - zero_y, cell,
                   static_cast<float>(bottom + layer.at("slab_thickness").get<double>() - origin));
         for (const Json& op : layer.at("operations")) {
             const Json& tool = tools.at(op.at("tool").get<int>());
+            const std::string shape = tool.at("kind");
+            if (shape != "flat" && shape != "face" && shape != "ball")
+                throw std::runtime_error("cutters other than flat, face and ball are not known: " + shape);
             std::ifstream text(out + "/" + op.at("file").get<std::string>());
             if (!text) {
                 std::fprintf(stderr, "air_replay: no %s\n", op.at("file").get<std::string>().c_str());
