@@ -158,6 +158,18 @@ void validate_motion(const Machine& c) {
         if (value != 0) require(key, value, 1, 1e6, Ends::closed, kNoRouter);
 }
 
+void validate_handler(const Machine& c) {
+    require("machine.handler_speed", c.handler_speed, 0, 1e6);
+    require("machine.handler_travel", c.handler_travel, 0, 100000);
+    require("machine.grip_s", c.grip_s, 0, 36000);
+    require("machine.glue_pitch", c.glue_pitch, 0.5, 1000);
+    require("machine.glue_speed", c.glue_speed, 1, 1e6);
+    require("machine.pump_g_min", c.pump_g_min, 0, 1e6);
+    if (c.glue_head == GlueHead::slab && !has_handler(c))
+        refuse("machine.glue_head", "machine.glue_head is \"slab\", but nothing carries the slab over it",
+               "give machine.handler_speed and machine.feed_height and a table that moves, or \"stack\"");
+}
+
 void validate_machine(const Machine& c) {
     require("machine.travel_x", c.travel_x, 1, 100000, Ends::closed, kNoRouter);
     require("machine.travel_y", c.travel_y, 1, 100000, Ends::closed, kNoRouter);
@@ -167,6 +179,7 @@ void validate_machine(const Machine& c) {
     require("machine.table_speed", c.table_speed, 1, 1e6, Ends::closed, kNoRouter);
     require("machine.feed_height", c.feed_height, 0, 100000);
     require("machine.feed_mass_kg", c.feed_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
+    validate_handler(c);
     validate_motion(c);
     require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
     require("machine.spindle_power_w", c.spindle_power_w, 0, 1e6);
@@ -250,6 +263,25 @@ Job with_tools_for(const Job& job, double height) {
 Frame frame_of(const Machine& machine) {
     if (machine.frame != Frame::automatic) return machine.frame;
     return machine.table == BuildTable::moving ? Frame::layer_top : Frame::pattern_base;
+}
+
+double level_acceleration(const Machine& machine) {
+    return machine.acceleration_y > 0 ? std::min(machine.acceleration, machine.acceleration_y)
+                                      : machine.acceleration;
+}
+
+bool has_handler(const Machine& machine) {
+    return machine.table == BuildTable::moving && machine.feed_height > 0 && machine.handler_speed > 0;
+}
+
+double handler_way(const Machine& machine) {
+    constexpr double kOfTravel = 1.4;  // slabs as long as the router's travel, and room for the head
+    return machine.handler_travel > 0 ? machine.handler_travel : kOfTravel * machine.travel_x;
+}
+
+GlueHead glue_head_of(const Machine& machine) {
+    if (machine.glue_head != GlueHead::automatic) return machine.glue_head;
+    return has_handler(machine) ? GlueHead::slab : GlueHead::none;
 }
 
 double max_layer_thickness(const Job& job) {

@@ -26,6 +26,10 @@ enum class LayerStrategy : std::uint8_t { printed, optimal, combined, uniform };
 enum class Frame : std::uint8_t { pattern_base, layer_top, automatic };
 /// Whether the build table sinks by every layer, so that all of them are cut at one height (RPM), or stays.
 enum class BuildTable : std::uint8_t { moving, fixed };
+/// Who puts the glue on, and where: by hand; the machine's head on the underside of the slab that the handler
+/// carries over it (RPM); a head beside the spindle on the stack's top; or, automatic, as RPM where the
+/// machine has a handler and by hand elsewhere (glue_head_of).
+enum class GlueHead : std::uint8_t { automatic, none, slab, stack };
 /// The control that the programs are written for, and whose text is proven (io/posts/dialect.h).
 enum class Post : std::uint8_t { linuxcnc, fanuc, haas, grbl, mach, iso, siemens, heidenhain };
 /// What one program holds: an operation, all that one tool does without a change in a layer, or a layer.
@@ -122,6 +126,13 @@ struct Machine {
     double build_mass_kg = 1440;
     double feed_height = 1200;  ///< of the feed chamber, from which slabs are taken; 0: laid by hand
     double feed_mass_kg = 1440;
+    double handler_speed = 6000;  ///< mm/min, of what carries slabs from chamber to chamber; 0: done by hand
+    double handler_travel = 0;    ///< mm, from one to the other; 0: 1.4 times travel_x (handler_way)
+    double grip_s = 10;           ///< its clamps close, or open
+    GlueHead glue_head = GlueHead::automatic;
+    double glue_pitch = 5;                          ///< mm, between beads
+    double glue_speed = 3000;                       ///< mm/min along the beads, at most
+    double pump_g_min = 300;                        ///< that the glue's pump gives at most; 0: no limit
     double max_feed = 9000, rapid_feed = 12000;     ///< mm/min, along the path; rapid_feed of x as well
     double rapid_y = 0, rapid_z = 0;                ///< mm/min, that these axes can do; 0: as x
     double acceleration = 1000;                     ///< mm/s², of x
@@ -154,7 +165,7 @@ struct Bonding {
     double handling_s = 60;     ///< fetch, clamp, place
     double open_time_s = 0;     ///< from the glue to the press at most; 0: not stated
     double glue_s_per_m2 = 60;
-    double glue_g_per_m2 = 0;  ///< 0: not stated
+    double glue_g_per_m2 = 100;  ///< .1 mm of cyanoacrylate; 0: not stated
 };
 
 /// What things cost, in the shop's own currency. A price of 0 is not stated, and nothing is reckoned with it.
@@ -297,6 +308,16 @@ struct Job {
 /// The frame of the programs, never `automatic`: the machine's, or else layer_top where its table moves and
 /// pattern_base where it is fixed.
 [[nodiscard]] Frame frame_of(const Machine& machine);
+
+/// mm/s² that the machine has in every direction of x and y: that of the slower axis.
+[[nodiscard]] double level_acceleration(const Machine& machine);
+
+/// Whether slabs are carried from the feed chamber to the table by the machine.
+[[nodiscard]] bool has_handler(const Machine& machine);
+/// How far it carries them, mm. The glue head, if there is one under its way, is half-way.
+[[nodiscard]] double handler_way(const Machine& machine);
+/// Who puts the glue on, automatic resolved.
+[[nodiscard]] GlueHead glue_head_of(const Machine& machine);
 
 /// The tallest layer this job can cut (LTmax, METHOD.md section 4): the thickest slab less the facing
 /// allowance, and for every tool its flutes less overrun and holder clearance.

@@ -128,6 +128,12 @@ struct LayerSelection {
     std::vector<ToolSet> sets;
 };
 
+/// A bead of the glue head, along x.
+struct GlueRun {
+    std::int32_t y = 0, from = 0, to = 0;  ///< 0.1 µm; laid from `from` to `to`
+    friend bool operator==(const GlueRun&, const GlueRun&) = default;
+};
+
 /// A joint under or within a layer. Glue under a layer goes where wood stands on both sides, held back from
 /// finished edges; between slabs that are bonded into one before any is cut it goes everywhere.
 struct Joint {
@@ -138,6 +144,7 @@ struct Joint {
     double force_n = 0;                    ///< of the press
     double pressure_mpa = 0;               ///< of that force on the glued area, its mean
     Loops glue;                            ///< where glue goes
+    std::vector<GlueRun> beads;            ///< of the machine's glue head, in their order; none: by hand
 };
 
 /// The corners of a slab as it is sawn and laid, mm, pattern-base.

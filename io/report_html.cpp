@@ -300,6 +300,28 @@ void replay_programs(Context& context, const PlannedFolder& folder, const Simula
     context.advance(left_over_steps(folder));
 }
 
+/// Where glue goes under each layer, and what the machine's glue head does there.
+void draw_glue(const Json& sequence, Json& layers) {
+    const Json& glue = sequence.at("glue");
+    for (std::size_t l = 0; l < std::min(glue.size(), layers.size()); ++l) {
+        for (const Json& loop : glue[l].at("loops")) {
+            std::vector<Point2> points;
+            for (const Json& p : loop)
+                points.push_back({to_units(p.at(0).get<double>()), to_units(p.at(1).get<double>())});
+            layers[l]["glue"].push_back(outline(points));
+        }
+        if (!glue[l].contains("beads")) continue;
+        Json& beads = layers[l]["beads"] = Json::array();
+        for (const Json& bead : glue[l].at("beads"))
+            for (const Json& at : bead) beads.push_back(std::llround(at.get<double>() * kHundredths));
+        const std::string pointer = "#/glue/" + std::to_string(l);
+        for (const Json& step : sequence.at("steps"))
+            if (step.at("action") == "glue" && step.value("polygons", "") == pointer)
+                for (const char* key : {"side", "bead_mm", "speed_mm_min", "glue_g", "pump_g_min"})
+                    if (step.contains(key)) layers[l]["glue_head"][key] = step.at(key);
+    }
+}
+
 /// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
 void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, const Json& sequence,
                   Json& data) {
@@ -327,16 +349,7 @@ void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, 
         layers.push_back({{"bottom", std::move(drawn[2 * l])},
                           {"top", std::move(drawn[2 * l + 1])},
                           {"glue", Json::array()}});
-    if (sequence.is_object()) {
-        const Json& glue = sequence.at("glue");
-        for (std::size_t l = 0; l < std::min(glue.size(), layers.size()); ++l)
-            for (const Json& loop : glue[l].at("loops")) {
-                std::vector<Point2> points;
-                for (const Json& p : loop)
-                    points.push_back({to_units(p.at(0).get<double>()), to_units(p.at(1).get<double>())});
-                layers[l]["glue"].push_back(outline(points));
-            }
-    }
+    if (sequence.is_object()) draw_glue(sequence, layers);
     data["outlines"] = {
         {"unit_mm", 1 / kHundredths}, {"tolerance_mm", kOutlineTolerance}, {"layers", std::move(layers)}};
     data["silhouette"] = {{"z0", rounded(box.min.z, 4)},

@@ -59,6 +59,9 @@ std::size_t place_of(const json& steps, const std::string& action, int n = 0) {
     return 0;
 }
 
+/// Adds to a coordinate.
+void move(json& bead, std::size_t k, double by) { bead[k] = bead[k].get<double>() + by; }
+
 /// Whether every step comes after those that it needs.
 bool keeps_needs(const json& steps) {
     std::map<int, bool> done;
@@ -164,6 +167,40 @@ TEST(BuildReplay, EachCorruptionIsToldAsWhatItIs) {
              for (json& point : sequence["glue"][1]["loops"][0]) point[0] = point[0].get<double>() + 150;
          },
          "sequence.glue"},
+        {"glue on the stack, not under the slab", set("glue", 1, "side", "stack"), "sequence.glue_side"},
+        {"other grams", set("glue", 1, "glue_g", 99), "sequence.glue_mass"},
+        {"no grams", [](json&, json& steps) { steps[place_of(steps, "glue", 1)].erase("glue_g"); },
+         "sequence.value"},
+        {"pump too fast", set("glue", 1, "pump_g_min", 5000), "sequence.pump"},
+        {"pump too slow", set("glue", 1, "pump_g_min", 1), "sequence.pump"},
+        {"head too fast", set("glue", 1, "speed_mm_min", 6000), "sequence.pump"},
+        {"length of beads", set("glue", 1, "bead_mm", 10), "sequence.glue_path"},
+        {"a bead moved along", [](json& sequence, json&) { move(sequence["glue"][1]["beads"][3], 1, 30); },
+         "sequence.glue_path"},
+        {"a bead beyond the joint",
+         [](json& sequence, json&) { move(sequence["glue"][1]["beads"][3], 1, 2); }, "sequence.glue_path"},
+        {"a bead between two rows",
+         [](json& sequence, json&) { move(sequence["glue"][1]["beads"][3], 0, 1); }, "sequence.glue_path"},
+        {"a bead in a row beside the joint",
+         [](json& sequence, json&) { sequence["glue"][1]["beads"][3][0] = 72.5; }, "sequence.glue_path"},
+        {"a bead left out", [](json& sequence, json&) { sequence["glue"][1]["beads"].erase(3); },
+         "sequence.glue_path"},
+        {"a bead twice",
+         [](json& sequence, json&) {
+             json& beads = sequence["glue"][1]["beads"];
+             beads.push_back(json(beads[3]));
+         },
+         "sequence.glue_path"},
+        {"no beads", [](json& sequence, json&) { sequence["glue"][1].erase("beads"); }, "sequence.glue_path"},
+        {"a slab of another stack", set("take_slab", 1, "stack", 1), "sequence.stack"},
+        {"a pile in another order", set("load_feed", 0, "pile", "1 x 12, 1 x 19"), "sequence.stack"},
+        {"handler elsewhere", set("take_slab", 1, "handler_mm", 100), "sequence.handler"},
+        {"slab not over the table", set("place", 1, "handler_mm", 1500), "sequence.handler"},
+        {"handler past its end", set("place", 1, "handler_mm", 2500), "sequence.travel"},
+        {"handler before its beginning", set("glue", 1, "handler_mm", -20), "sequence.travel"},
+        {"handler's time", set("place", 1, "seconds", 1), "sequence.time"},
+        {"gluing a slab that is not clamped", exchange("glue", 1, "clamp", 1), "sequence.order"},
+        {"fetching before the press", exchange("press", 0, "take_slab", 1), "sequence.order"},
         {"press too hard", set("press", 1, "force_n", 17000), "sequence.press"},
         {"press too short", set("press", 1, "time_s", 3), "sequence.press"},
         {"tool 99", set("mill", 1, "tool", 99), "sequence.tool"},
@@ -241,9 +278,26 @@ TEST(BuildReplay, LimitsOfTheMachineAreItsOwn) {
     EXPECT_EQ(codes([](Machine& m) { m.feed_height = 50; }), "sequence.travel");
     EXPECT_EQ(codes([](Machine& m) { m.build_mass_kg = 1; }), "sequence.mass");
     EXPECT_EQ(codes([](Machine& m) { m.feed_mass_kg = 1; }), "sequence.mass");
+    EXPECT_NE(codes([](Machine& m) { m.handler_travel = 90; }).find("sequence.travel"), std::string::npos)
+        << "100 mm of glue do not pass the head";
+    EXPECT_EQ(codes([](Machine& m) { m.pump_g_min = 10; }), "sequence.pump sequence.time");
     // The same programs on a table that stays: the sequence would have to move their zero.
     EXPECT_NE(codes([](Machine& m) { m.table = BuildTable::fixed; }).find("sequence.table"),
               std::string::npos);
+}
+
+// A router's table stays: nobody carries, glue goes on by hand, and nothing is said of beads.
+TEST(BuildReplay, ARoutersGlueGoesOnByHand) {
+    Job job;
+    job.machine.table = BuildTable::fixed;
+    job.machine.travel_z = 400;
+    const json sequence = json::parse(sequence_json(block(job, {3, 1, false})));
+    for (const json& step : sequence["steps"])
+        for (const char* key :
+             {"side", "bead_mm", "speed_mm_min", "glue_g", "pump_g_min", "handler_mm", "stack", "pile"})
+            EXPECT_FALSE(step.contains(key)) << step;
+    for (const json& glue : sequence["glue"]) EXPECT_FALSE(glue.contains("beads"));
+    EXPECT_NEAR(sequence["steps"][place_of(sequence["steps"], "glue")]["seconds"], 60 * .006, 0.005);
 }
 
 // Seeded corruptions of good sequences: each is told, or it changes nothing that the machine does.

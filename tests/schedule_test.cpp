@@ -101,7 +101,8 @@ TEST(Schedule, EachLayerGoesThroughTheMachineInOrder) {
     for (const SequenceStep& step : plan.sequence) {
         if (step.layer != 2) continue;
         if (step.action == "take_slab") {
-            EXPECT_EQ(by_id[step.needs[0]]->action, "place");
+            EXPECT_EQ(by_id[step.needs[0]]->action, "press")
+                << "the handler holds the slab against the table";
         }
         if (step.action == "glue") {
             EXPECT_EQ(by_id[step.needs[0]]->action, "mill");
@@ -110,8 +111,27 @@ TEST(Schedule, EachLayerGoesThroughTheMachineInOrder) {
     }
 }
 
+// Slabs that the machine carries take as long as its axes do.
+TEST(Schedule, TheHandlersAxisGivesItsTimes) {
+    Plan plan = plan_of_layers(2);
+    plan.job.machine.handler_speed = 3000;  // 50 mm/s
+    plan.job.machine.handler_travel = 1000;
+    plan.job.machine.grip_s = 7;
+    schedule(plan);
+    std::vector<std::pair<std::string, double>> times;
+    for (const SequenceStep& step : plan.sequence)
+        if (step.action == "take_slab" || step.action == "clamp" || step.action == "place" ||
+            step.action == "press")
+            times.emplace_back(step.action, step.seconds);
+    const std::vector<std::pair<std::string, double>> expected{
+        {"take_slab", 0},  {"clamp", 7}, {"place", 20}, {"press", 37},
+        {"take_slab", 20}, {"clamp", 7}, {"place", 20}, {"press", 37}};
+    EXPECT_EQ(times, expected) << "no glue is stated, so nothing passes the head";
+}
+
 TEST(Schedule, TotalsAddUp) {
     Plan plan = plan_of_layers(3);
+    plan.job.machine.handler_speed = 0;
     schedule(plan);
     const Totals& t = plan.totals;
     EXPECT_EQ(t.layers, 3);

@@ -89,7 +89,7 @@ std::vector<PathPoint> simplify(std::span<const PathPoint> line, double fine, do
 }
 
 double fast_turn(const Machine& machine, double feed, double blend) {
-    return std::sqrt(8 * machine.acceleration * blend) * 60 / feed;
+    return std::sqrt(8 * level_acceleration(machine) * blend) * 60 / feed;
 }
 
 }  // namespace slabwright

@@ -159,7 +159,7 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
         ArcFit how{.tolerance = arc_tolerance_units(cut.job, op.kind), .arcs = cut.job.cutting.arcs};
         // Roughing may round more off its corners (Operation::blend): where an arc would be run slower, its
         // chords are not.
-        if (op.kind == OperationKind::rough) how.acceleration = cut.job.machine.acceleration;
+        if (op.kind == OperationKind::rough) how.acceleration = level_acceleration(cut.job.machine);
         fit_arcs(op.moves, how);
     };
     auto minutes = [&](std::span<const Operation> operations) {

@@ -81,6 +81,8 @@ void leave_local_frame(Plan& plan, const std::array<double, 2>& by) {
         for (Joint& joint : layer.joints) {
             move(joint.centroid, by);
             move(joint.glue, units);
+            for (GlueRun& bead : joint.beads)
+                bead = {bead.y + units.y, bead.from + units.x, bead.to + units.x};
         }
     }
     // Edges count from the model's zero or from a place that moves with all else.

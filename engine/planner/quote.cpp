@@ -8,6 +8,7 @@
 #include "engine/plan.h"
 #include "engine/schedule/blanks.h"
 #include "engine/schedule/fit.h"
+#include "engine/schedule/glue_path.h"
 #include "engine/tools/tools.h"
 #include "kernels/cutting/cusp.h"
 #include "kernels/errors.h"
@@ -147,8 +148,11 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
         ways.roughing += std::max(0.0, stock_mm2 * height - solid_mm3) /
                          (tools.rough.diameter * tools.rough.stepover * tools.rough.stepdown_max);
         const double below = l == 0 ? area_at[0] : area(simplify(sections[3 * l - 1].loops));
-        result.glue_m2 += std::min(area_at[0], below) * 1e-6;
-        result.bonding_minutes += together * (job.bonding.handling_s + job.bonding.press_time_s) / 60;
+        const double glued = std::min(area_at[0], below);
+        result.glue_m2 += glued * 1e-6;
+        result.bonding_minutes += (bonding_seconds(job, glued, double{box.max.x} - box.min.x) +
+                                   (together - 1) * bonding_seconds(job, stock_mm2, result.stock[0])) /
+                                  60;
     }
     add_surface(mesh, job, tools, ways);
     for (const auto& [thickness, count] : slabs) result.slabs.push_back({thickness, count});
@@ -165,7 +169,6 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
     work("raster", ways.raster, tools.finish, kRates.raster);
     result.work.push_back({"places", ways.places, kRates.place * ways.places});
     for (const QuotedWork& w : result.work) result.cutting_minutes += w.minutes;
-    result.bonding_minutes += job.bonding.glue_s_per_m2 * result.glue_m2 / 60;
     result.tool_change_minutes = kChanges * layer_count * job.machine.tool_change_s / 60;
     result.build_minutes = result.cutting_minutes + result.bonding_minutes + result.tool_change_minutes;
     Amounts amounts = amounts_of(plan, result.boards);

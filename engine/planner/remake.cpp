@@ -12,8 +12,10 @@
 #include "engine/paths/operations/facing.h"
 #include "engine/paths/runs/layer_cut.h"
 #include "engine/planner/layer_plan.h"
+#include "engine/schedule/glue_path.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/schedule.h"
+#include "engine/schedule/slab_steps.h"
 #include "engine/simulate/planned_build.h"
 #include "kernels/errors.h"
 
@@ -119,7 +121,8 @@ public:
           plan_(plan),
           machine_(plan.job.machine),
           spindle_tool_(request.state.spindle_tool),
-          table_(request.state.table) {
+          table_(request.state.table),
+          handler_(request.state.handler) {
         const auto done = request.sequence.steps.begin() + static_cast<std::ptrdiff_t>(request.state.done);
         steps_.assign(request.sequence.steps.begin(), done);
         std::set<int> open;  // steps that no other one needs: all is done when these are
@@ -156,10 +159,9 @@ public:
         std::map<int, std::size_t> place;
         for (std::size_t l = 0; l < plan_.layers.size(); ++l) place[plan_.layers[l].index] = l;
         const std::vector<FeedSlab> slabs = feed_slabs(plan_, layer);
-        loads_ = feed_loads(machine_, slabs);
+        feed_ = FeedChamber(feed_loads(machine_, slabs), slabs);
         for (const SequenceStep& step : request_.own.steps)
-            if (const auto at = place.find(step.layer); at != place.end() && at->second >= layer)
-                build(step, slabs);
+            if (const auto at = place.find(step.layer); at != place.end() && at->second >= layer) build(step);
     }
 
     [[nodiscard]] std::vector<SequenceStep> take() { return std::move(steps_); }
@@ -187,7 +189,7 @@ private:
     }
 
     /// A plan's own step, with its needs in the new numbers. Loads and changes of tool are made anew.
-    void build(const SequenceStep& own, const std::vector<FeedSlab>& slabs) {
+    void build(const SequenceStep& own) {
         std::set<int> needs;
         for (const int need : own.needs) {
             const auto known = now_.find(need);
@@ -204,8 +206,14 @@ private:
         for (auto& [key, value] : step.numbers) {
             if (key == "table_height_mm") step.seconds = table_time(value);
             if (key == "feed_stack_mm") {
-                if (left_ == 0 && next_load_ < loads_.size()) needs.insert(load(own.layer, slabs));
-                value = feed_height_;
+                if (feed_.is_empty()) needs.insert(load(own.layer));
+                value = feed_.take();
+            }
+            if (key == "stack") value = feed_.stack();
+            if (key == "handler_mm") {
+                // Only where the first slab is fetched from is not as it was.
+                if (own.action == "take_slab") step.seconds = handler_seconds(machine_, handler_, value);
+                handler_ = value;
             }
             if (key != "tool" || static_cast<int>(value) == spindle_tool_) continue;
             spindle_tool_ = static_cast<int>(value);
@@ -216,7 +224,6 @@ private:
         }
         for (const auto& [key, value] : step.numbers)
             if (key == "last_tool") spindle_tool_ = static_cast<int>(value);  // its program changes it
-        if (own.action == "take_slab") take_slab(slabs);
         step.id = static_cast<int>(steps_.size()) + 1;
         step.needs = {needs.begin(), needs.end()};
         now_[own.id] = {step.id};
@@ -224,22 +231,10 @@ private:
         steps_.push_back(std::move(step));
     }
 
-    int load(int layer, const std::vector<FeedSlab>& slabs) {
-        left_ = loads_[next_load_++];
-        feed_height_ = 0;
-        double kg = 0;
-        for (int k = 0; k < left_; ++k) {
-            feed_height_ += slabs[next_slab_ + static_cast<std::size_t>(k)].thickness;
-            kg += slabs[next_slab_ + static_cast<std::size_t>(k)].kg;
-        }
+    int load(int layer) {
         SequenceStep& step = add(layer, "load_feed", {last_taken_ == 0 ? base_ : last_taken_}, 0);
-        step.numbers = {{"slabs", left_}, {"height_mm", feed_height_}, {"mass_kg", kg}};
+        feed_.load(step, machine_);
         return step.id;
-    }
-
-    void take_slab(const std::vector<FeedSlab>& slabs) {
-        if (left_ > 0) feed_height_ = --left_ == 0 ? 0 : feed_height_ - slabs[next_slab_].thickness;
-        ++next_slab_;
     }
 
     const RemakeRequest& request_;
@@ -249,10 +244,8 @@ private:
     int spindle_tool_ = 0, last_ = 0, base_ = 0, last_taken_ = 0;
     std::optional<double> table_;
     std::map<int, std::vector<int>> now_;  // what a step of the plan's own sequence is now
-    std::vector<int> loads_;
-    std::size_t next_load_ = 0, next_slab_ = 0;
-    int left_ = 0;
-    double feed_height_ = 0;
+    FeedChamber feed_{{}, {}};
+    double handler_;  // mm, where it stands
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "engine/schedule/fit.h"
+#include "engine/schedule/glue_path.h"
 
 namespace slabwright {
 
@@ -139,6 +140,7 @@ void check_chambers(const Plan& plan) {
                     fmt::format("layer {}", layer.index), "split the pattern, or use a thinner base board");
         }
     (void)feed_loads(plan);
+    check_handler(plan);
 }
 
 void check_spindle(const Plan& plan) {

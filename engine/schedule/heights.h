@@ -53,7 +53,8 @@ void add_heights(SequenceStep& step, std::span<const Operation> operations, doub
 
 /// Looks at layers and slabs alone, before any path is made.
 /// @throws Error(no_plan, "machine.build_height") where the table would have to sink farther than its
-/// chamber, "machine.feed_height" or "machine.feed_mass" where a slab is more than the feed chamber takes
+/// chamber, "machine.feed_height" or "machine.feed_mass" where a slab is more than the feed chamber takes;
+/// and as check_handler
 void check_chambers(const Plan& plan);
 
 /// Every program of every layer against the spindle's travel, with what its tool sticks out: the lengths of

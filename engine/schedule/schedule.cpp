@@ -5,49 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/schedule/glue_path.h"
 #include "engine/schedule/heights.h"
+#include "engine/schedule/slab_steps.h"
 
 namespace slabwright {
 
 namespace {
-
-/// The slabs in the feed chamber, in the order in which they are taken. Where they are laid by hand, none lie
-/// there and nothing is loaded.
-class FeedChamber {
-public:
-    explicit FeedChamber(const Plan& plan) : loads_(feed_loads(plan)), slabs_(feed_slabs(plan)) {}
-    [[nodiscard]] bool is_empty() const { return left_ == 0 && next_load_ < loads_.size(); }
-    /// Fills the chamber and says with what.
-    std::vector<std::pair<std::string, double>> load() {
-        left_ = loads_[next_load_++];
-        height_ = 0;
-        double kg = 0;
-        for (int k = 0; k < left_; ++k) {
-            const FeedSlab& slab = slabs_[next_slab_ + static_cast<std::size_t>(k)];
-            height_ += slab.thickness;
-            kg += slab.kg;
-        }
-        return {{"slabs", left_}, {"height_mm", height_}, {"mass_kg", kg}};
-    }
-    /// Takes the next slab. @returns the height of the stack that it lay on top of, itself included, mm
-    double take() {
-        const double stack = height_;
-        if (left_ > 0) {
-            --left_;
-            height_ = left_ == 0 ? 0 : height_ - slabs_[next_slab_].thickness;
-        }
-        ++next_slab_;
-        return stack;
-    }
-    int last_taken = 0;  ///< the step that took the slab before; 0: none
-
-private:
-    std::vector<int> loads_;
-    std::vector<FeedSlab> slabs_;  // of the whole build
-    std::size_t next_load_ = 0, next_slab_ = 0;
-    int left_ = 0;
-    double height_ = 0;
-};
 
 /// Digits of a number, at least `least`.
 int width_of(std::size_t largest, int least) {
@@ -156,14 +120,7 @@ void schedule(Plan& plan) {
     steps.clear();
     const auto add = [&](int layer, const char* action, std::vector<int> needs,
                          double seconds) -> SequenceStep& {
-        SequenceStep step;
-        step.id = static_cast<int>(steps.size()) + 1;
-        step.layer = layer;
-        step.action = action;
-        step.needs = std::move(needs);
-        step.seconds = seconds;
-        steps.push_back(std::move(step));
-        return steps.back();
+        return add_step(steps, layer, action, std::move(needs), seconds);
     };
 
     const int first_layer = plan.layers.empty() ? 0 : plan.layers.front().index;
@@ -172,66 +129,17 @@ void schedule(Plan& plan) {
                      {"length_mm", stock.length()},
                      {"width_mm", stock.width()},
                      {"mass_kg", board_mass_kg(plan)}};
-    FeedChamber feed(plan);
-    double carried_kg = board_mass_kg(plan);
+    SlabSteps slabs(plan);
     double table_height = 0;     // of the layer before
     int stack_ready = board.id;  // the step after which the stack's top is ready for the next slab
-    int handler_free = 0;        // the step after which the material handler is free; 0: from the start
     int spindle_tool = 0;
-    const double third = job.bonding.handling_s / 3;
 
     for (const Layer& layer : plan.layers) {
         ++totals.layers;
-        const Blank blank = slab_of(plan, layer);
-        totals.stock_volume_mm3 += blank.mm2() * layer.slab_thickness;
-
+        totals.stock_volume_mm3 += slab_of(plan, layer).mm2() * layer.slab_thickness;
         // A layer of several slabs: each is bonded to the one below before any is cut.
-        const double slab = layer.slab_thickness / layer.slabs;
-        int pressed = 0;
-        for (int k = 0; k < layer.slabs; ++k) {
-            static const Joint kNone;  // of a layer that nobody has bonded
-            const auto at = static_cast<std::size_t>(k);
-            const Joint& joint = at < layer.joints.size() ? layer.joints[at] : kNone;
-            const double area = joint.area_mm2;
-            // Fetching the slab and clamping it only needs the handler; it may go on while the layer below is
-            // being milled.
-            std::vector<int> needs;
-            if (feed.is_empty()) {
-                SequenceStep& load =
-                    add(layer.index, "load_feed",
-                        feed.last_taken == 0 ? std::vector<int>{} : std::vector<int>{feed.last_taken}, 0);
-                load.numbers = feed.load();
-                needs.push_back(load.id);
-            }
-            if (handler_free != 0) needs.push_back(handler_free);
-            SequenceStep& take = add(layer.index, "take_slab", std::move(needs), third);
-            take.numbers = {{"thickness_mm", slab},
-                            {"length_mm", blank.length()},
-                            {"width_mm", blank.width()},
-                            {"mass_kg", slab_mass_kg(plan, blank, slab)},
-                            {"feed_stack_mm", feed.take()}};
-            take.words = {{"material", job.material.name}};
-            const int taken = feed.last_taken = take.id;
-            const int clamped = add(layer.index, "clamp", {taken}, third).id;
-            SequenceStep& glue = add(layer.index, "glue", {k == 0 ? stack_ready : pressed},
-                                     job.bonding.glue_s_per_m2 * area * 1e-6);
-            glue.numbers = {{"area_mm2", area}, {"setback_mm", k == 0 ? job.bonding.edge_setback : 0}};
-            glue.words = {{"glue", job.bonding.glue}};
-            const int glued = glue.id;
-            SequenceStep& place = add(layer.index, "place", {clamped, glued}, third);
-            carried_kg += slab_mass_kg(plan, blank, slab);
-            place.numbers = {{"x_mm", blank.min[0]},
-                             {"y_mm", blank.min[1]},
-                             {"z_bottom_mm", layer.z_bottom + k * slab},
-                             {"table_load_kg", carried_kg}};
-            handler_free = place.id;
-            SequenceStep& press = add(layer.index, "press", {handler_free}, job.bonding.press_time_s);
-            press.numbers = {{"force_n", joint.force_n}, {"time_s", job.bonding.press_time_s}};
-            pressed = press.id;
-            totals.bonding_minutes += (job.bonding.handling_s + job.bonding.glue_s_per_m2 * area * 1e-6 +
-                                       job.bonding.press_time_s) /
-                                      60;
-        }
+        int pressed = stack_ready;
+        for (int k = 0; k < layer.slabs; ++k) pressed = slabs.bond(layer, k, pressed);
 
         // Where the table moves, it sinks until this layer's top will be cut where the first one's was.
         const LayerHeights heights = layer_heights(job.machine, plan.layers.front().z_top, layer.z_top);
@@ -277,11 +185,13 @@ void schedule(Plan& plan) {
             {"sand_litres", std::max(0.0, plan.flask->opening_mm3 - totals.part_volume_mm3) * 1e-6}};
     }
 
+    totals.bonding_minutes = slabs.minutes();
     totals.build_minutes =
         totals.cutting_minutes + totals.bonding_minutes + totals.tool_change_minutes + totals.table_minutes;
     totals.stack_mass_kg = (totals.stock_volume_mm3 + stock.mm2() * job.machine.base_board_thickness) * 1e-9 *
                            job.material.density_kg_m3;
     plan.totals = totals;
+    note_missed_glue(plan);
 }
 
 }  // namespace slabwright

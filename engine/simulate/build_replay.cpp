@@ -6,8 +6,8 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "engine/simulate/glue_steps.h"
 #include "engine/simulate/planned_build.h"
-#include "engine/simulate/program_steps.h"
 #include "engine/simulate/step_order.h"
 
 namespace slabwright {
@@ -17,10 +17,10 @@ namespace {
 constexpr double kForce = 0.01;  // N and kg
 constexpr double kLitres = 0.01;
 
-class BuildReplay : ProgramSteps {
+class BuildReplay : GlueSteps {
 public:
     BuildReplay(const BuildPlan& plan, const BuildSequence& sequence, BuildState from)
-        : ProgramSteps(plan, sequence.steps, std::move(from)),
+        : GlueSteps(plan, sequence.steps, std::move(from)),
           sequence_(sequence),
           slabs_(build_.slabs()),
           order_(sequence.steps) {
@@ -172,11 +172,17 @@ private:
                                      machine.feed_mass_kg),
                          kg - machine.feed_mass_kg);
         }
+        if (handled()) {
+            const std::size_t from = std::min(s_.taken, slabs_.size());
+            check_pile(
+                {slabs_.data() + from, std::min(static_cast<std::size_t>(s_.in_feed), slabs_.size() - from)});
+        }
         s_.loaded = here();
     }
 
     void take_slab() {
-        if (s_.in_hand) complain("sequence.order", "the material handler holds a slab already");
+        if (s_.in_hand || (handled() && s_.to_press))
+            complain("sequence.order", "the material handler holds a slab already");
         wait_for(s_.hand_free);
         const bool from_feed = !plan_.job_stated || plan_.job.machine.feed_height > 0;
         if (from_feed && plan_.job_stated) {
@@ -187,7 +193,11 @@ private:
             expect("sequence.feed", "feed_stack_mm", from_feed ? s_.feed_height : 0, kLength);
             expect_word("sequence.slab", "material", plan_.job.material.name);
         }
-        expect_job_seconds(plan_.job.bonding.handling_s / 3);
+        if (handled()) {
+            if (s_.loaded && s_.in_feed > 0)
+                expect("sequence.stack", "stack", sequence_.steps[*s_.loaded].id, 0);
+            move_handler(0);
+        } else expect_job_seconds(plan_.job.bonding.handling_s / 3);
         if (s_.taken >= slabs_.size()) {
             complain("sequence.order", "all slabs of the build have been taken");
         } else {
@@ -208,7 +218,7 @@ private:
         require(s_.in_hand, "the material handler holds no slab");
         if (s_.clamped) complain("sequence.order", "the slab is clamped already");
         if (s_.taken > 0) expect_layer(slabs_[s_.taken - 1].layer);
-        expect_job_seconds(plan_.job.bonding.handling_s / 3);
+        expect_job_seconds(handled() ? plan_.job.machine.grip_s : plan_.job.bonding.handling_s / 3);
         s_.clamped = here();
     }
 
@@ -237,8 +247,14 @@ private:
             const Bonding& bonding = plan_.job.bonding;
             expect_word("sequence.glue", "glue", bonding.glue);
             expect("sequence.glue", "setback_mm", slab.number == 0 ? bonding.edge_setback : 0, kLength);
-            expect_seconds(bonding.glue_s_per_m2 * area * 1e-6, kSeconds);
+            if (head() == GlueHead::none) expect_seconds(bonding.glue_s_per_m2 * area * 1e-6, kSeconds);
         }
+        if (head() == GlueHead::slab) {
+            require(s_.in_hand, "the material handler holds no slab over the glue head");
+            require(s_.clamped, "the slab over the glue head is not clamped");
+        }
+        if (head() != GlueHead::none && slab.glue < sequence_.glue.size())
+            check_beads(sequence_.glue[slab.glue]);
         s_.glued = here();
     }
 
@@ -274,7 +290,8 @@ private:
         expect("sequence.place", "x_mm", slab.blank.min[0], kLength);
         expect("sequence.place", "y_mm", slab.blank.min[1], kLength);
         expect("sequence.place", "z_bottom_mm", slab.z_bottom, kLength);
-        expect_job_seconds(plan_.job.bonding.handling_s / 3);
+        if (handled()) move_handler(handler_way(plan_.job.machine));
+        else expect_job_seconds(plan_.job.bonding.handling_s / 3);
         s_.load_kg += slab.kg;
         if (plan_.job_stated) expect("sequence.mass", "table_load_kg", s_.load_kg, kForce);
         check_load();
@@ -302,9 +319,10 @@ private:
             if (number("force_n").value_or(0) > plan_.job.bonding.press_force + kForce)
                 complain("sequence.press", "presses harder than the machine's press can");
         }
-        expect_job_seconds(plan_.job.bonding.press_time_s);
+        expect_job_seconds(plan_.job.bonding.press_time_s + (handled() ? plan_.job.machine.grip_s : 0));
         s_.to_press.reset();
         s_.pressed = here();
+        if (handled()) s_.hand_free = here();  // it has held the slab against the table
     }
 
     void table() {

@@ -69,6 +69,8 @@ struct StatedGlue {
     std::array<double, 2> min{0, 0}, max{0, 0};  ///< of its points, mm
     double z = 0;                                ///< of the joint, mm, pattern-base; 0 where it is not stated
     std::vector<std::vector<std::array<double, 2>>> loops{};  ///< mm
+    /// Of the machine's glue head, in the order in which they are laid: y, then x from and to, mm.
+    std::vector<std::array<double, 3>> beads{};
 };
 
 /// A sequence as it was read.
@@ -85,7 +87,9 @@ struct BuildSequence {
 ///
 /// Codes: sequence.pattern, sequence.frame (another plan's), sequence.length (far too many steps),
 /// sequence.id, sequence.needs, sequence.action (unknown), sequence.order (the machine is not in a state for
-/// the step), sequence.layer, sequence.feed, sequence.slab, sequence.glue, sequence.place, sequence.press,
+/// the step), sequence.layer, sequence.feed, sequence.stack (a slab from another pile), sequence.handler (its
+/// place), sequence.slab, sequence.glue, sequence.glue_side, sequence.glue_path, sequence.glue_mass,
+/// sequence.pump, sequence.place, sequence.press,
 /// sequence.table, sequence.touch_off, sequence.tool, sequence.program, sequence.height (of a program),
 /// sequence.mass, sequence.travel, sequence.time, sequence.value (a quantity that is missing or not what the
 /// plan says), sequence.missing (what was not done in the end).

@@ -25,6 +25,7 @@ struct BuildState {
     int spindle_tool = 0;               ///< 0: none
     bool unused_change = false;         ///< no program has run since the tool was put in
     double feed_height = 0;             ///< mm, of the stack in the feed chamber
+    double handler = 0;                 ///< mm, of the material handler from the feed chamber's middle
     double load_kg = 0;                 ///< on the build table: board and whole slabs
     double board_thickness = 0;         ///< mm
     std::optional<double> table;        ///< mm, the table's surface; none: it has not been moved yet

@@ -185,6 +185,10 @@ void read_job(const Field& job, BuildPlan& build) {
     for (const char* key :
          {"glue", "press_force", "press_time_s", "edge_setback", "handling_s", "glue_s_per_m2"})
         (void)job["bonding"][key];
+    if (!job["machine"].has("glue_head")) {  // planned by a version that knew no such thing
+        build.job.machine.handler_speed = 0;
+        build.job.machine.glue_head = GlueHead::none;
+    }
     for (const char* key : {"gouge", "cusp", "weld"}) (void)job["tolerances"][key];
     const Machine& m = build.job.machine;
     if (!(m.acceleration > 0) || !(m.rapid_feed > 0) || !(m.max_feed > 0))

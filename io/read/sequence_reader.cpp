@@ -123,6 +123,14 @@ StatedGlue read_glue(const Json& from, std::size_t place) {
         glue.area_mm2 += doubled / 2;
         glue.loops.push_back(std::move(points));
     }
+    if (from.contains("beads"))
+        for (const Json& bead : list_of(from["beads"], kMostSteps, of + ".beads")) {
+            if (!bead.is_array() || bead.size() != 3) refuse(of + ".beads has one that is no three numbers");
+            std::array<double, 3>& b = glue.beads.emplace_back();
+            for (std::size_t k = 0; k < 3; ++k)
+                if (b[k] = number_of(bead[k], of + ".beads"); std::abs(b[k]) > kFarthest)
+                    refuse(of + ".beads reaches beyond 200 m");
+        }
     return glue;
 }
 

@@ -41,6 +41,10 @@ inline constexpr Word<Frame> kFrameWords[] = {
     {"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}, {"auto", Frame::automatic}};
 inline constexpr Word<BuildTable> kTableWords[] = {{"moving", BuildTable::moving},
                                                    {"fixed", BuildTable::fixed}};
+inline constexpr Word<GlueHead> kGlueHeadWords[] = {{"auto", GlueHead::automatic},
+                                                    {"none", GlueHead::none},
+                                                    {"slab", GlueHead::slab},
+                                                    {"stack", GlueHead::stack}};
 inline constexpr Word<ProgramSpan> kProgramWords[] = {
     {"operation", ProgramSpan::operation}, {"tool", ProgramSpan::tool}, {"layer", ProgramSpan::layer}};
 inline constexpr Word<WorkZero> kZeroWords[] = {
@@ -143,6 +147,22 @@ void visit_motion_keys(MachineLike& machine, Visit& visit) {
     visit.key("acceleration_z", machine.acceleration_z, "mm/s^2; 0: as x");
 }
 
+/// Walks the keys of what carries slabs and glues them.
+template <class MachineLike, class Visit>
+void visit_handler_keys(MachineLike& machine, Visit& visit) {
+    visit.key("handler_speed", machine.handler_speed,
+              "mm/min, of what carries slabs from the feed to the build chamber; 0: done by hand");
+    visit.key("handler_travel", machine.handler_travel,
+              "mm between the chambers' middles, the glue head half-way; 0: 1.4 times travel_x");
+    visit.key("grip_s", machine.grip_s, "s, to close or to open its clamps");
+    visit.word("glue_head", machine.glue_head, kGlueHeadWords,
+               "slab (on the underside of the slab that the handler carries over it), stack (beside the "
+               "spindle, on the stack's top), none (by hand), or auto: slab where there is a handler");
+    visit.key("glue_pitch", machine.glue_pitch, "mm between its beads");
+    visit.key("glue_speed", machine.glue_speed, "mm/min along its beads, at most");
+    visit.key("pump_g_min", machine.pump_g_min, "g/min that its pump gives at most; 0: no limit");
+}
+
 /// Walks the keys of the router.
 template <class MachineLike, class Visit>
 void visit_machine_keys(MachineLike& machine, Visit& visit) {
@@ -160,6 +180,7 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
     visit.key("feed_height", machine.feed_height,
               "mm, of the feed chamber, which slabs are taken from; 0: they are laid by hand");
     visit.key("feed_mass_kg", machine.feed_mass_kg, "kg that the feed table carries");
+    visit_handler_keys(machine, visit);
     visit_motion_keys(machine, visit);
     visit.key("max_rpm", machine.max_rpm, "turns a minute");
     visit.key("spindle_power_w", machine.spindle_power_w,
@@ -218,8 +239,8 @@ void visit_bonding_keys(BondingLike& bonding, Visit& visit) {
     visit.key("min_pressure_mpa", bonding.min_pressure_mpa,
               "MPa that close a joint, by the glue; cyanoacrylate on RPM's machine: 17 kN on 1.2 m2");
     visit.key("edge_setback", bonding.edge_setback, "mm that glue keeps from finished edges");
-    visit.key("handling_s", bonding.handling_s, "s, to fetch, clamp and place a slab");
-    visit.key("glue_s_per_m2", bonding.glue_s_per_m2, "s for each square metre of glue");
+    visit.key("handling_s", bonding.handling_s, "s, to fetch, clamp and place a slab by hand");
+    visit.key("glue_s_per_m2", bonding.glue_s_per_m2, "s for each square metre of glue, put on by hand");
     visit.key("glue_g_per_m2", bonding.glue_g_per_m2, "g for each square metre of glue; 0: not stated");
     visit.key("accept_weak", bonding.accept_weak, "plan although a joint may not hold");
 }

@@ -31,6 +31,7 @@ void visit_state(State& s, Visitor& visit) {
     visit.number("table_load_kg", s.load_kg);
     visit.number("board_thickness_mm", s.board_thickness);
     visit.maybe("table_height_mm", s.table);
+    visit.number("handler_mm", s.handler);
     visit.number("spindle_low_mm", s.lowest);
     visit.number("spindle_high_mm", s.highest);
     visit.cause("board", s.board);

@@ -72,7 +72,14 @@ std::string sequence_json(const Plan& plan) {
             for (const Point2 p : g.joint->glue.loop(i)) json.begin_array().units(p.x).units(p.y).end();
             json.end();
         }
-        json.end().end();
+        json.end();
+        if (!g.joint->beads.empty()) {
+            json.key("beads").begin_array(Shape::line);
+            for (const GlueRun& b : g.joint->beads)
+                json.begin_array().units(b.y).units(b.from).units(b.to).end();
+            json.end();
+        }
+        json.end();
     }
     json.end().end();
     return json.take();
@@ -106,7 +113,14 @@ std::string sequence_json(const BuildSequence& sequence) {
             for (const auto& [x, y] : loop) json.begin_array().rounded(x, 4).rounded(y, 4).end();
             json.end();
         }
-        json.end().end();
+        json.end();
+        if (!g.beads.empty()) {
+            json.key("beads").begin_array(Shape::line);
+            for (const auto& [y, a, b] : g.beads)
+                json.begin_array().rounded(y, 4).rounded(a, 4).rounded(b, 4).end();
+            json.end();
+        }
+        json.end();
     }
     json.end().end();
     return json.take();

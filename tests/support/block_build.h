@@ -109,6 +109,11 @@ inline Job random_job(std::mt19937& random) {
     job.machine.frame = static_cast<Frame>(random() % 3);
     job.machine.travel_z = 400;
     job.machine.feed_height = random() % 3 == 0 ? 0 : random() % 2 ? 1200 : 40;
+    if (random() % 5 == 0) job.machine.handler_speed = 0;
+    job.machine.glue_pitch = 1 + static_cast<double>(random() % 20);
+    job.machine.pump_g_min = random() % 2 ? 0 : 30;
+    if (random() % 3 == 0) job.machine.glue_head = random() % 2 ? GlueHead::stack : GlueHead::none;
+    if (random() % 4 == 0) job.bonding.glue_g_per_m2 = 0;
     return job;
 }
 

@@ -46,10 +46,18 @@ function stripes(id, color, ground, u, turn) {
 // Columns of stock that stand in a layer: they are left there, and sawn off when the pattern is done.
 export const supportsIn = l => (plan.supports ?? []).filter(s => s.z_low < plan.layers[l].z_top - 0.001 && s.z_high > plan.layers[l].z_bottom + 0.001);
 
+// The glue head's beads: y, x from and to of each.
+function beadsOf(beads) {
+    const at = beads.map(v => (v * data.outlines.unit_mm).toFixed(2));
+    let d = '';
+    for (let i = 0; i < at.length; i += 3) d += `M${at[i + 1]} ${-at[i]}H${at[i + 2]}`;
+    return d;
+}
+
 // The slab of layer l from above: slab, pattern, glue, zero, and their measures. paper: how large it is printed at most, mm.
 export function planView(l, paper) {
     const [x0, y0] = plan.stock.min, [x1, y1] = plan.stock.max, width = x1 - x0, depth = y1 - y0, layer = plan.layers[l];
-    const {bottom, top, glue} = data.outlines.layers[l];
+    const {bottom, top, glue, beads = []} = data.outlines.layers[l];
     const {min: [sx0, sy0], max: [sx1, sy1]} = blankOf(l), smaller = sx1 - sx0 < width - 0.05 || sy1 - sy0 < depth - 0.05;
     // The margin holds the dimensions; what it takes in the drawing's units depends on its scale.
     const margin = {left: 19, right: 10, top: 12, bottom: 17};
@@ -67,6 +75,7 @@ export function planView(l, paper) {
     flaskRings(l).map(ring => make('path', {d: `M${ring.map(([x, y]) => `${x} ${-y}`).join('L')}Z`, fill: 'none', stroke: '#8a6a3a', 'stroke-width': 0.3 * u})),
     make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: cutWood, 'fill-rule': 'evenodd', stroke: 'none'}),
     glue.length ? make('path', {d: pathOf(glue), fill: `url(#glue-${l})`, 'fill-rule': 'evenodd', stroke: glueInk, 'stroke-width': 0.25 * u}) : null,
+    beads.length ? make('path', {class: 'beads', d: beadsOf(beads), fill: 'none', stroke: glueInk, 'stroke-width': 0.35 * u}) : null,
     filled.length ? make('path', {d: filled.map(b => `M${b.x0.toFixed(2)} ${(-b.y0).toFixed(2)}H${b.x1.toFixed(2)}V${(-b.y1).toFixed(2)}H${b.x0.toFixed(2)}Z`).join(''), fill: `url(#air-${l})`, stroke: 'none'}) : null,
     make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: 'none', stroke: ink, 'stroke-width': 0.45 * u}),
     supportsIn(l).map(s => make('path', {class: 'support', d: `M${s.x - s.width / 2} ${-s.y - s.width / 2}h${s.width}v${s.width}h${-s.width}Zl${s.width} ${s.width}m0 ${-s.width}l${-s.width} ${s.width}`, fill: 'none', stroke: purple, 'stroke-width': 0.5 * u})),

@@ -94,6 +94,14 @@ function simulated(l) {
     return lines;
 }
 
+// What the machine's glue head does on layer l's joint; by hand: nothing.
+function glueHead(l) {
+    const head = data.outlines.layers[l].glue_head;
+    if (!head) return null;
+    const grams = head.glue_g === undefined ? '' : `${figure(head.glue_g, 1)} g, pump ${figure(head.pump_g_min, 0)} g/min, `;
+    return make('p', {class: 'glue-head'}, `by the head on the ${head.side === 'slab' ? 'slab’s underside' : 'stack’s top'}: ${grams}${figure(head.bead_mm / 1000, 2)} m of beads at ${figure(head.speed_mm_min, 0)} mm/min`);
+}
+
 function sheet(l, minutes) {
     const layer = plan.layers[l], programs = operations.filter(operation => operation.layer === l), zero = zeroOf(l), filled = filledVolume(l);
     const off = layer.z_bottom + layer.slab_thickness - layer.z_top, files = [...new Set(programs.map(o => fileOf(o).replace(/^nc\//, '')))], first = files[0], final = files[files.length - 1];
@@ -114,7 +122,7 @@ function sheet(l, minutes) {
             fact('Slab', make('p', {}, make('strong', {}, `${blankSize(l)} × ${figure(layer.slab_thickness, 2)} mm`), ` ${plan.job.material.name}${laid}`),
                 make('p', {}, `pattern z ${figure(layer.z_bottom, 3)} to ${figure(layer.z_top, 3)}; facing takes ${figure(off, 2)} mm`), make('p', {class: 'soft'}, layer.reason)),
             fact(glued ? 'Glue and press' : 'No glue', glued
-                ? [make('p', {}, make('strong', {}, `${figure(layer.glue_area_mm2 / 100, 1)} cm²`), ` ${plan.job.bonding.glue}, on the yellow`),
+                ? [make('p', {}, make('strong', {}, `${figure(layer.glue_area_mm2 / 100, 1)} cm²`), ` ${plan.job.bonding.glue}, on the yellow`), glueHead(l),
                     make('p', {}, make('strong', {}, `${figure(layer.press_force_n, 0)} N`), ` for ${figure(plan.job.bonding.press_time_s, 0)} s`)]
                 : make('p', {}, 'clamp the slab'))),
         make('div', {class: 'lists'},
