@@ -46,6 +46,7 @@ struct LayerJob {
     Loops opening;                     ///< of the flask in this layer; empty: no flask
     std::vector<DrilledHole> drilled;  ///< closed in the mesh: nothing else cuts them
     std::vector<Flat> flats;           ///< strictly between z_bottom and z_top
+    bool walls_first = false;  ///< vertical walls are finished, level by level, before the floors beside them
     ProgressPart* progress =
         nullptr;             ///< told how far the paths are, up to kPathsShare; the rest is the caller's
     std::vector<Flat> feet;  ///< on which walls of this layer may stand: `flats` and those just below

@@ -16,6 +16,7 @@
 #include "io/posts/tool_table.h"
 #include "kernels/errors.h"
 #include "kernels/mesh/weld.h"
+#include "tests/data/models.h"
 #include "tests/data/sweep.h"
 #include "tests/support/rs274.h"
 #include "tests/support/seed.h"
@@ -254,6 +255,29 @@ TEST(Arcs, AreNoneWhereTheyWouldBeRunSlower) {
         EXPECT_GT(arcs_in(always), 0);
         fit_arcs(moves, {.tolerance = 1000, .acceleration = 500});
         EXPECT_EQ(arcs_in(moves) > 0, fitted) << r << " mm at " << feed;
+    }
+}
+
+// Along y as along x: a machine whose y axis is the slower one is asked for no arc that this axis cannot run.
+TEST(Arcs, OfRoughingAreRunByTheSlowerAxisToo) {
+    Context context;
+    const Mesh mesh = weld(context, half_sphere());
+    for (const bool slow_y : {true, false}) {
+        Job job;
+        job.cutting.engagement = Engagement::nominal;
+        (slow_y ? job.machine.acceleration_y : job.machine.acceleration) = 250;
+        if (!slow_y) job.machine.acceleration_y = 1000;
+        EXPECT_EQ(level_acceleration(job.machine), 250);
+        int arcs = 0;
+        for (const Layer& layer : make_plan(context, mesh, {}, job).layers)
+            for (const Operation& op : layer.operations)
+                for (const Move& m : op.moves) {
+                    if (op.kind != OperationKind::rough || (m.i == 0 && m.j == 0)) continue;
+                    const double v = m.feed / 60.0;
+                    EXPECT_LE(v * v / std::hypot(to_mm(m.i), to_mm(m.j)), 250.1) << op.purpose;
+                    ++arcs;
+                }
+        std::printf("%d arcs\n", arcs);
     }
 }
 

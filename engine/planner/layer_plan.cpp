@@ -26,15 +26,27 @@ constexpr double kStrained = 1.03;       // of a limit: within that, what a plan
 constexpr double kFirstSetsShare =
     0.4;  // of what then remains, the sets of the choice; those that they lead to take the rest
 
+// None may leave more than the first set, but for what differently fine cells see.
+constexpr double kMore = 1.1, kFew = 5;  // mm²
+
 // A layer as one set of tools makes it, with the forces of its programs and the feeds that they allow.
 struct Trial {
     PlannedLayer planned;
-    double minutes = 0;              // of its programs and the changes of tool between them
+    double minutes = 0;  // of its programs and the changes of tool between them, where it is asked for
+    bool floors_slowed = false;      // what thin walls bear made its floors take notably longer
     std::optional<double> left_mm2;  // none: given up before all its paths were planned
     bool leaves_more = false;        // than the first set
     bool whole = true;               // false: given up, its feeds were not adapted
     bool strained = false;           // cutter, spindle or a thin wall bear more than they may
 };
+
+// Of the programs of finish_floors.
+double floor_minutes(const Layer& layer, const Machine& machine) {
+    double minutes = 0;
+    for (const Operation& op : layer.operations)
+        if (op.purpose == "floors") minutes += motion_time(op.moves, machine, op.blend).minutes;
+    return minutes;
+}
 
 double minutes_of(const Layer& layer, const Machine& machine) {
     double minutes = 0;
@@ -168,9 +180,26 @@ private:
         }
     }
 
+    // A floor's cutter takes what roughing has left on the walls beside it at once, up to their tops: for all
+    // walls that bear it the quickest. Where thin ones do not, and its feed falls or it goes in several
+    // passes, the walls are tried first: level by level, around them and so from both sides, and nothing of
+    // them is left to the floors.
+    Trial plan_with(const LayerTools& tools, double most, ProgressPart& part) {
+        Trial trial = plan_once(tools, most, part);
+        if (!walls_ || !trial.floors_slowed) return trial;
+        work_.walls_first = true;
+        Trial other = plan_once(tools, most, part);
+        work_.walls_first = false;
+        if (!other.whole || other.leaves_more ||
+            (other.left_mm2 && trial.left_mm2 && *other.left_mm2 > kMore * *trial.left_mm2 + kFew))
+            return trial;
+        return std::pair(other.strained, other.minutes) < std::pair(trial.strained, trial.minutes) ? other
+                                                                                                   : trial;
+    }
+
     // @param most minutes: where the paths alone take longer at the feeds they are planned with, they are not
     // followed any further
-    Trial plan_with(const LayerTools& tools, double most, ProgressPart& part) {
+    Trial plan_once(const LayerTools& tools, double most, ProgressPart& part) {
         const Job& job = ground_.plan.job;
         work_.tools = tools;
         work_.progress = &part;
@@ -190,8 +219,6 @@ private:
         layer.operations = std::move(result.operations);
         for (Operation& op : layer.operations) limit_feeds(op, job);
         trial.planned.diagnostics = std::move(result.diagnostics);
-        // None may leave more than the first set, but for what differently fine cells see.
-        constexpr double kMore = 1.1, kFew = 5;  // mm²
         if (!best_) allowed_left_ = kMore * result.left_mm2 + kFew;
         if (!result.given_up) trial.left_mm2 = result.left_mm2;
         trial.leaves_more = best_ && !result.given_up && result.left_mm2 > allowed_left_;
@@ -206,10 +233,13 @@ private:
         trial.whole = !result.given_up && trial.minutes <= most;
         if (!trial.whole || trial.leaves_more || job.cutting.engagement != Engagement::simulated)
             return trial;
+        const double floors = walls_ ? floor_minutes(layer, job.machine) : 0;
         trial.planned.cuts = adapt_layer(context_, layer, ground_.plan,
                                          {overhang_ ? &*overhang_ : nullptr, walls_ ? &*walls_ : nullptr},
                                          trial.planned.diagnostics, ground_.known_cuts);
-        if (compared) trial.minutes = minutes_of(layer, job.machine);
+        constexpr double kSlowed = 1.1;
+        trial.floors_slowed = walls_ && floor_minutes(layer, job.machine) > kSlowed * floors;
+        if (compared || walls_) trial.minutes = minutes_of(layer, job.machine);
         trial.strained = trial.planned.cuts.strain > kStrained;
         return trial;
     }
