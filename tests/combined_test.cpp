@@ -162,7 +162,7 @@ TEST(Combined, IsNeverSlowerThanTheOtherStrategies) {
     }
     EXPECT_EQ(slabs, std::count_if(plan.sequence.begin(), plan.sequence.end(),
                                    [](const SequenceStep& s) { return s.action == "press"; }));
-    EXPECT_GE(plan.totals.bonding_minutes, slabs * (job.bonding.handling_s + job.bonding.press_time_s) / 60);
+    EXPECT_GE(plan.totals.bonding_minutes, slabs * (2 * job.machine.grip_s + job.bonding.press_time_s) / 60);
     std::printf("%d layers of %d slabs, %.1f min; the others at best %.1f\n", plan.totals.layers, slabs,
                 plan.totals.build_minutes, best);
 }

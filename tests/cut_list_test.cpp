@@ -304,6 +304,7 @@ TEST(CutList, ReckonsWithStatedPricesOnly) {
     job.prices.base_board_m2 = 9;
     EXPECT_NEAR(cost()->base_board.value(), 9, 1e-9);
     job.prices.glue_kg = 40;
+    job.bonding.glue_g_per_m2 = 0;
     EXPECT_FALSE(cost()->glue) << "nobody knows how much glue goes on a square metre";
     job.bonding.glue_g_per_m2 = 150;
     EXPECT_NEAR(cost()->glue.value(), 0.1 * 0.150 * 40, 1e-9);

@@ -140,8 +140,9 @@ TEST(Resume, NoPartOfTheStateIsIdle) {
     const UnderWay build{stated(plan), read_sequence(sequence_json(plan))};
     const std::size_t count = build.sequence.steps.size();
     const BuildState whole = state_after(build, count);
-    const std::set<std::string> quantities{"slabs_taken",    "slabs_placed", "programs_begun", "feed_slabs",
-                                           "feed_height_mm", "tool",         "table_load_kg"};
+    const std::set<std::string> quantities{"slabs_taken", "slabs_placed",   "programs_begun",
+                                           "feed_slabs",  "feed_height_mm", "handler_mm",
+                                           "tool",        "table_load_kg"};
     std::map<std::string, int> matters;
     for (std::size_t k = 0; k <= count; ++k) {
         BuildProgress progress;
@@ -165,7 +166,7 @@ TEST(Resume, NoPartOfTheStateIsIdle) {
             matters[key] += !rest.violations.empty() || rest.state != whole;
         }
     }
-    EXPECT_EQ(matters.size(), 29U);
+    EXPECT_EQ(matters.size(), 30U);
     for (const auto& [key, times] : matters) EXPECT_GT(times, 0) << key;
 }
 
