@@ -183,9 +183,8 @@ LayerResult plan_layer_paths(Context& context, const LayerJob& layer) {
     reached(0.01);
     for (Operation& op : rough_layer(cut)) take(std::move(op));
     reached(0.21);
-    if (layer.walls_first) take(finish_walls(cut));
-    take(finish_floors(cut));
-    if (!layer.walls_first) take(finish_walls(cut));
+    for (const bool floors : {!layer.walls_first, layer.walls_first})
+        take(floors ? finish_floors(cut) : finish_walls(cut));
     reached(0.24);
     auto finish = [&](auto&& done) {
         Operation levels = finish_levels(cut, result.diagnostics);

@@ -93,6 +93,13 @@ void add_surface(MeshView mesh, const Job& job, const LayerTools& tools, Ways& w
     }
 }
 
+/// Of a layer's slabs. @param glued mm² of the joint under it; those between its slabs are glued all over
+double bonding_minutes(const Job& job, const Box3& box, double glued, const Blank& slab, int slabs) {
+    return (bonding_seconds(job, glued, double{box.max.x} - box.min.x) +
+            (slabs - 1) * bonding_seconds(job, slab.mm2(), slab.length())) /
+           60;
+}
+
 }  // namespace
 
 Quote quote(Context& context, MeshView mesh, const Job& job) {
@@ -150,9 +157,7 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
         const double below = l == 0 ? area_at[0] : area(simplify(sections[3 * l - 1].loops));
         const double glued = std::min(area_at[0], below);
         result.glue_m2 += glued * 1e-6;
-        result.bonding_minutes += (bonding_seconds(job, glued, double{box.max.x} - box.min.x) +
-                                   (together - 1) * bonding_seconds(job, stock_mm2, result.stock[0])) /
-                                  60;
+        result.bonding_minutes += bonding_minutes(job, box, glued, slab_of(plan, layer), together);
     }
     add_surface(mesh, job, tools, ways);
     for (const auto& [thickness, count] : slabs) result.slabs.push_back({thickness, count});
