@@ -153,6 +153,7 @@ TEST(GluePath, WhatLiesBetweenTheRowsIsTold) {
 
 TEST(GluePath, ASlabThatIsTooLongForTheWayIsRefused) {
     Plan plan = stock_of(GlueHead::slab);
+    plan.layers.emplace_back().index = 4;
     plan.job.machine.handler_travel = 260;
     EXPECT_NO_THROW(check_handler(plan));
     plan.job.machine.handler_travel = 259;
@@ -161,7 +162,8 @@ TEST(GluePath, ASlabThatIsTooLongForTheWayIsRefused) {
         FAIL();
     } catch (const Error& e) {
         EXPECT_EQ(e.code(), "machine.handler_travel");
-        EXPECT_NE(e.message().find("1.0 mm too long"), std::string::npos) << e.message();
+        EXPECT_NE(e.message().find("0.5 mm before all of it"), std::string::npos) << e.message();
+        EXPECT_EQ(e.place(), "layer 4");
     }
     plan.job.machine.glue_head = GlueHead::none;
     EXPECT_NO_THROW(check_handler(plan));

@@ -84,6 +84,8 @@ struct Walked {
     double deepest = 0;                                       // table under the plane of the layers' tops
     double feed_height = 0, feed_mass = 0;                    // most at a time
     int by_hand = 0;                                          // slabs taken from an empty chamber
+    double handler_low = 0, handler_high = 0;                 // from the feed chamber's middle
+    double pump = 0;                                          // g/min at most
 };
 
 Walked walk(const Plan& plan) {
@@ -93,6 +95,12 @@ Walked walk(const Plan& plan) {
     std::map<int, double> tops;
     for (const Layer& layer : plan.layers) tops[layer.index] = layer.z_top;
     for (const SequenceStep& step : plan.sequence) {
+        for (const auto& [key, value] : step.numbers) {
+            if (key == "pump_g_min") w.pump = std::max(w.pump, value);
+            if (key != "handler_mm") continue;
+            w.handler_low = std::min(w.handler_low, value);
+            w.handler_high = std::max(w.handler_high, value);
+        }
         if (step.action == "load_feed") {
             EXPECT_EQ(in_feed, 0) << "the chamber is loaded when it is empty";
             in_feed = static_cast<int>(number(step, "slabs"));
@@ -115,6 +123,17 @@ Walked walk(const Plan& plan) {
         }
     }
     EXPECT_EQ(in_feed, 0);
+    // Where the handler stands as each bead begins and ends over the head.
+    const double head = handler_way(plan.job.machine) / 2,
+                 middle = (plan.stock_min[0] + plan.stock_max[0]) / 2;
+    if (glue_head_of(plan.job.machine) == GlueHead::slab)
+        for (const Layer& layer : plan.layers)
+            for (const Joint& joint : layer.joints)
+                for (const GlueRun& bead : joint.beads)
+                    for (const std::int32_t x : {bead.from, bead.to}) {
+                        w.handler_low = std::min(w.handler_low, head + middle - to_mm(x));
+                        w.handler_high = std::max(w.handler_high, head + middle - to_mm(x));
+                    }
     return w;
 }
 
@@ -216,6 +235,9 @@ TEST(Heights, EveryAxisStaysWithinItsTravelOrThePlanIsRefused) {
         job.machine.feed_height = random() % 4 == 0 ? 0 : pick(20, 400);
         job.machine.feed_mass_kg = pick(0.3, 20);
         job.machine.clearance = pick(1, 20);
+        job.machine.handler_travel = pick(120, 400);
+        job.machine.pump_g_min = pick(1, 60);
+        job.machine.glue_head = random() % 4 == 0 ? GlueHead::stack : GlueHead::automatic;
         for (Tool& tool : job.tools) tool.stickout = pick(30, 90);
         Plan plan;
         plan.job = job;
@@ -227,6 +249,12 @@ TEST(Heights, EveryAxisStaysWithinItsTravelOrThePlanIsRefused) {
             const int slabs = random() % 5 == 0 ? 2 : 1;
             const double height = slab * slabs - pick(0.1, 5);
             plan.layers.push_back(layer_at(i, bottom, height, slab, slabs, job));
+            for (int k = 0; k < slabs; ++k) {
+                Joint& joint = plan.layers.back().joints.at(static_cast<std::size_t>(k));
+                const std::int32_t left = to_units(pick(0, 80)), right = to_units(pick(100, 200));
+                joint.glue.points = {{left, 100}, {right, 100}, {right, 900'000}, {left, 900'000}};
+                joint.glue.close_loop();
+            }
             bottom += height;
         }
         const std::string refused = refusal_of(plan);
@@ -236,6 +264,11 @@ TEST(Heights, EveryAxisStaysWithinItsTravelOrThePlanIsRefused) {
                 const double slab = l.slab_thickness / l.slabs;
                 return slab > job.machine.feed_height || slab * 200 * 100 * 750e-9 > job.machine.feed_mass_kg;
             })) << round;
+            continue;
+        }
+        if (refused == "machine.handler_travel") {
+            EXPECT_EQ(glue_head_of(job.machine), GlueHead::slab);
+            EXPECT_LT(job.machine.handler_travel, 200);
             continue;
         }
         if (!refused.empty()) plan.job.machine.feed_height = 0;  // so that it can be scheduled at all
@@ -255,6 +288,15 @@ TEST(Heights, EveryAxisStaysWithinItsTravelOrThePlanIsRefused) {
             }
             EXPECT_LE(w.feed_height, job.machine.feed_height + 1e-3) << round;
             EXPECT_LE(w.feed_mass, job.machine.feed_mass_kg + 1e-9) << round;
+            EXPECT_GE(w.handler_low, 0) << round;
+            EXPECT_LE(w.handler_high, job.machine.handler_travel + 1e-9) << round;
+            EXPECT_LE(w.pump, job.machine.pump_g_min + 1e-9) << round;
+            if (has_handler(job.machine)) {
+                EXPECT_NEAR(w.handler_high, job.machine.handler_travel, 1e-9) << "over the table";
+            }
+            if (glue_head_of(job.machine) != GlueHead::none) {
+                EXPECT_GT(w.pump, 0) << round;
+            }
         }
     }
     for (const auto& [code, count] : seen)
@@ -262,4 +304,5 @@ TEST(Heights, EveryAxisStaysWithinItsTravelOrThePlanIsRefused) {
     EXPECT_GE(seen[""], 100);
     EXPECT_GE(seen["machine.travel_z"], 100);
     EXPECT_GE(seen["machine.build_height"], 100);
+    EXPECT_GE(seen["machine.handler_travel"], 50);
 }

@@ -177,14 +177,20 @@ void note_missed_glue(Plan& plan) {
 
 void check_handler(const Plan& plan) {
     const Machine& machine = plan.job.machine;
-    const double length = plan.stock_max[0] - plan.stock_min[0], way = handler_way(machine);
-    if (glue_head_of(machine) != GlueHead::slab || length <= way) return;
-    throw refusal(
-        "machine.handler_travel",
-        fmt::format("slabs of {:.1f} mm would have to pass a glue head half-way of {:.1f} mm; they are "
-                    "{:.1f} mm too long",
-                    length, way, length - way),
-        "slab", "give the machine's own machine.handler_travel, or machine.glue_head = \"none\"");
+    if (glue_head_of(machine) != GlueHead::slab) return;
+    const double way = handler_way(machine), middle = (plan.stock_min[0] + plan.stock_max[0]) / 2;
+    for (const Layer& layer : plan.layers) {
+        const Blank slab = slab_of(plan, layer);
+        const double over = std::max(slab.max[0] - middle, middle - slab.min[0]) - way / 2;
+        if (over <= 0) continue;
+        throw refusal(
+            "machine.handler_travel",
+            fmt::format("the slab of layer {} is {:.1f} mm long; the handler, which carries it {:.1f} mm, "
+                        "ends {:.1f} mm before all of it has passed the glue head half-way",
+                        layer.index, slab.length(), way, over),
+            fmt::format("layer {}", layer.index),
+            "give the machine's own machine.handler_travel, or machine.glue_head = \"none\"");
+    }
 }
 
 }  // namespace slabwright

@@ -10,10 +10,12 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kLeastBead = 1;  // mm, that a head lays; what is left open may be as short
-constexpr double kEnds = 0.01;    // mm of a bead: both its ends are rounded
-constexpr double kMass = 1e-3;    // g
-constexpr double kRate = 1e-2;    // mm/min and g/min
+constexpr double kLeastBead = 1;                    // mm, that a head lays; what is left open may be as short
+constexpr double kEnds = 0.01;                      // mm of a bead: both its ends are rounded
+constexpr double kMass = 1e-3;                      // g
+constexpr double kFarthest = 2e5;                   // mm: farther away nothing of a build lies
+constexpr std::size_t kMostCrossings = 20'000'000;  // of the rows with the joint's border
+constexpr double kRate = 1e-2;                      // mm/min and g/min
 
 using Stretch = std::pair<double, double>;
 
@@ -50,16 +52,23 @@ public:
     [[nodiscard]] double y(double row) const { return std::round((low_ + (row + 0.5) * pitch_) * 1e4) / 1e4; }
     [[nodiscard]] double nearest(double height) const { return std::round((height - low_) / pitch_ - 0.5); }
 
-    [[nodiscard]] std::map<double, Row> rows(const StatedGlue& joint) const {
+    /// None where a joint is so large, or has so many corners, that no head would lay it.
+    [[nodiscard]] std::optional<std::map<double, Row>> rows(const StatedGlue& joint) const {
         std::map<double, Row> rows;
+        std::size_t crossings = 0;
+        if (!(std::abs(low_) <= kFarthest && std::abs(joint.min[1]) <= kFarthest &&
+              std::abs(joint.max[1]) <= kFarthest))
+            return std::nullopt;
         for (const auto& loop : joint.loops)
             for (std::size_t i = 0; i < loop.size(); ++i) {
                 const auto &a = loop[i], &b = loop[(i + 1) % loop.size()];
                 const double low = std::min(a[1], b[1]), high = std::max(a[1], b[1]);
-                for (double row = nearest(low) - 1; y(row) < high; ++row)
-                    if (y(row) >= low)
-                        rows[row].crossed.emplace_back(a[0] + (y(row) - a[1]) / (b[1] - a[1]) * (b[0] - a[0]),
-                                                       a[1] > b[1] ? 1 : -1);
+                for (double row = nearest(low) - 1; y(row) < high; ++row) {
+                    if (y(row) < low) continue;
+                    if (++crossings > kMostCrossings) return std::nullopt;
+                    rows[row].crossed.emplace_back(a[0] + (y(row) - a[1]) / (b[1] - a[1]) * (b[0] - a[0]),
+                                                   a[1] > b[1] ? 1 : -1);
+                }
             }
         for (auto& [number, row] : rows) row.find_inside();
         for (const auto& [height, from, to] : joint.beads)
@@ -125,7 +134,12 @@ void GlueSteps::check_cover(const StatedGlue& joint) {
             return;
         }
     double off = 0, open = 0, twice = 0;
-    for (auto& [number, row] : head.rows(joint)) {
+    std::optional<std::map<double, Row>> rows = head.rows(joint);
+    if (!rows) {
+        complain("sequence.glue_path", "its polygons are more than any head lays");
+        return;
+    }
+    for (auto& [number, row] : *rows) {
         std::sort(row.beads.begin(), row.beads.end());
         std::vector<double> covered(row.inside.size());
         double reached = -INFINITY;

@@ -184,7 +184,7 @@ function cover(minutes) {
                 figure(layer.glue_area_mm2 / 100, 1), figure(layer.press_force_n, 0), String(layer.operations.length), perLayer[l] ? String(perLayer[l]) : '–', shown[l]]),
             ['', make('strong', {}, 'All'), '', '', '', figure(t.glue_mm2 / 100, 1), '', String(operations.length), '', make('strong', {}, duration(plan.totals.build_minutes))]], [2, 3, 4, 5, 6, 7, 8, 9]),
         make('h4', {}, 'Every layer goes'),
-        make('ol', {class: 'steps'}, ['Clean the joint, spread the glue, lay the slab, press.', 'Set the table, touch off as the layer’s sheet says.', 'Run its programs in the order of their names; the first faces the slab.', 'Measure the faced top, tick the sheet, go on to the next.', ...(plan.supports?.length ? [`When the last is done: saw off ${plural(plan.supports.length, 'support')}, at ${plan.supports.map(s => `x ${figure(s.x, 0)} y ${figure(s.y, 0)}`).slice(0, 6).join(', ')}${plan.supports.length > 6 ? ' …' : ''}.`] : [])].map(s => make('li', {}, s))));
+        make('ol', {class: 'steps'}, [glueHead(0) ? 'Clean the joint; the machine glues, lays and presses the slab.' : 'Clean the joint, spread the glue, lay the slab, press.', 'Set the table, touch off as the layer’s sheet says.', 'Run its programs in the order of their names; the first faces the slab.', 'Measure the faced top, tick the sheet, go on to the next.', ...(plan.supports?.length ? [`When the last is done: saw off ${plural(plan.supports.length, 'support')}, at ${plan.supports.map(s => `x ${figure(s.x, 0)} y ${figure(s.y, 0)}`).slice(0, 6).join(', ')}${plan.supports.length > 6 ? ' …' : ''}.`] : [])].map(s => make('li', {}, s))));
 }
 
 export function buildSheets(section) {
