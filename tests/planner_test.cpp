@@ -15,6 +15,7 @@
 #include "tests/data/models.h"
 #include "tests/support/files.h"
 #include "tests/support/height_field.h"
+#include "tests/support/loft.h"
 #include "tests/support/temporary_folder.h"
 
 namespace slabwright {
@@ -207,6 +208,25 @@ TEST(Planner, RapidsAreAFractionOfTheCuts) {
             EXPECT_LT(op.rapid_mm, most * op.cutting_mm) << op.purpose << " of layer " << layer.index;
         }
     EXPECT_LT(rapid, 0.2 * cutting);
+}
+
+// A block with one sloping side: the ball goes along that side, and not around the rim of the vertical walls,
+// which a lower level and the flat end mill make.
+TEST(Planner, LevelsDoNotRoundTheRimsOfVerticalWalls) {
+    Context context;
+    constexpr double ramp = 10, high = 15;
+    const std::vector<support::Ring> rings{{0, {{0, 0}, {80, 0}, {80, 50}, {0, 50}}},
+                                           {high, {{ramp, 0}, {80, 0}, {80, 50}, {ramp, 50}}}};
+    const Mesh mesh = support::loft(context, rings);
+    double levels = 0;
+    for (const Layer& layer : make_plan(context, mesh, {}, Job{}).layers)
+        for (const Operation& op : layer.operations) {
+            if (op.purpose != "level contours") continue;
+            levels += op.cutting_mm;
+            for (const Move& m : op.moves)
+                if (m.feed != 0) EXPECT_LT(to_mm(m.x), 2 * ramp) << to_mm(m.y) << ' ' << to_mm(m.z);
+        }
+    EXPECT_GT(levels, 500.0);
 }
 
 // The ball crosses the floors that no flat end mill finishes, and those only.

@@ -127,6 +127,71 @@ std::vector<double> foot_floors(const LayerCut& cut) {
     return floors;
 }
 
+// What a ball touches on an edge that stands out, above a wall: a lower level that touches the same edge goes
+// round it closer to the wall and cuts all that this one would, and so does a flat end mill on a wall that is
+// vertical.
+class EdgeContacts {
+public:
+    /// @param flat the flat end mill of radius `flat_r`, a little narrower; null: there is no vertical wall
+    /// @param stepdown mm, of the flat end mill's levels along walls
+    EdgeContacts(const DropIndex& ball, const DropIndex* flat, double flat_r, double stepdown, double bottom)
+        : ball_(ball), flat_(flat), flat_r_(flat_r), stepdown_(stepdown), bottom_(bottom) {}
+
+    /// @param at of the ball's middle on a level, mm; @param out away from the part there
+    /// @param nz upwards part of the normal in the contact; @param below tip of the next level
+    [[nodiscard]] bool made_below(const std::array<double, 2>& at, const std::array<double, 2>& out,
+                                  double nz, double tip, std::optional<double> below) const {
+        const double r = ball_.cutter().radius, beside = r * std::sqrt(1 - nz * nz);
+        if (below) {
+            // The ball about the same point of the edge, one level lower.
+            const double lower_nz = nz - (tip - *below) / r;
+            if (lower_nz > 0) {
+                const double more = r * std::sqrt(1 - lower_nz * lower_nz) - beside;
+                if (!ball_.stands_over(at[0] + more * out[0], at[1] + more * out[1], *below + kTouch))
+                    return true;
+            }
+        }
+        if (flat_ == nullptr) return false;
+        const double contact = tip + r * (1 - nz), foot = std::max(bottom_, contact - stepdown_),
+                     more = flat_r_ - beside;
+        return contact - foot > kLowEdge &&
+               !flat_->stands_over(at[0] + more * out[0], at[1] + more * out[1], foot);
+    }
+
+private:
+    static constexpr double kTouch = 1e-4;    // mm
+    static constexpr double kLowEdge = 0.05;  // mm over the bottom of the layer: there is no wall to be seen
+    const DropIndex& ball_;
+    const DropIndex* flat_;
+    double flat_r_, stepdown_, bottom_;
+};
+
+// Takes stretches that are spared out of what is wanted of a closed contour: all at the ends of what is
+// wanted, others where leaving the contour and coming back takes no longer.
+void spare_long(std::span<const Point2> contour, const std::vector<char>& spared, std::vector<char>& wanted) {
+    constexpr double kWorthLeaving = 20;  // mm
+    const std::size_t n = contour.size();
+    std::size_t start = n;
+    for (std::size_t k = 0; k < n && start == n; ++k)
+        if (spared[k] == 0) start = k;
+    if (start == n) {
+        std::fill(wanted.begin(), wanted.end(), char{0});
+        return;
+    }
+    for (std::size_t k = 1; k <= n; ++k) {
+        if (spared[(start + k) % n] == 0) continue;
+        const std::size_t first = k;
+        double way = 0;
+        for (; spared[(start + k) % n] != 0; ++k) {
+            const Point2 a = contour[(start + k - 1) % n], b = contour[(start + k) % n];
+            way += std::hypot(to_mm(std::int64_t{b.x} - a.x), to_mm(std::int64_t{b.y} - a.y));
+        }
+        const bool between = wanted[(start + first - 1) % n] != 0 && wanted[(start + k) % n] != 0;
+        if (between && way < kWorthLeaving) continue;
+        for (std::size_t i = first; i < k; ++i) wanted[(start + i) % n] = 0;
+    }
+}
+
 }  // namespace
 
 Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostics) {
@@ -188,13 +253,17 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         flat_r = cut.layer.tools.rough.diameter / 2;
         flat = std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
     }
-    // What of a level is cut: `above`, the tip one level higher, where there is one; `floor`, on whose walls'
-    // feet alone, where it is for them.
+    const DropIndex& part = cut.drops(cutter);
+    const EdgeContacts edges(part, flat.get(), flat_r, cut.layer.tools.rough.stepdown_max,
+                             cut.layer.z_bottom);
+    // What of a level is cut: `above` and `below`, the tips one level higher and lower, where there are such;
+    // `floor`, on whose walls' feet alone, where it is for them.
     auto append_wanted = [&](const Contours& level, double tip, std::optional<double> above,
-                             const NearFloor* floor, std::vector<LevelRun>& out) {
+                             std::optional<double> below, const NearFloor* floor,
+                             std::vector<LevelRun>& out) {
         for (std::size_t c = 0; c < level.size(); ++c) {
             const std::size_t first = level.starts[c], n = level.starts[c + 1] - first;
-            std::vector<char> wanted(n, 0);
+            std::vector<char> wanted(n, 0), spared(n, 0);
             for (std::size_t k = 0; k < n; ++k) {
                 const double nz = std::max(0.0F, level.nz[first + k]), contact = tip + r * (1 - nz);
                 if (nz > std::cos(split) || contact > cut.layer.z_top + 1e-6) continue;
@@ -204,24 +273,28 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                     continue;
                 if (floor && (nz < foot_nz || !(*floor)(level.points[first + k]))) continue;
                 wanted[k] = 1;
-                if (!flat || nz > vertical) continue;
                 const Point2 a = level.points[first + (k + n - 1) % n], p = level.points[first + k],
                              b = level.points[first + (k + 1) % n];
                 const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y,
                              l = std::hypot(dx, dy);
                 if (l == 0) continue;
                 // The solid is on the right, so the free side is on the left.
-                if (!flat->stands_over(to_mm(p.x) - dy / l * (flat_r - r), to_mm(p.y) + dx / l * (flat_r - r),
-                                       contact))
+                const std::array<double, 2> out_of{-dy / l, dx / l};
+                if (nz > vertical) {
+                    spared[k] = !cut.job.cutting.uniform_steps &&
+                                edges.made_below({to_mm(p.x), to_mm(p.y)}, out_of, nz, tip, below);
+                } else if (flat && !flat->stands_over(to_mm(p.x) + out_of[0] * (flat_r - r),
+                                                      to_mm(p.y) + out_of[1] * (flat_r - r), contact))
                     wanted[k] = 0;
             }
+            spare_long(std::span(level.points).subspan(first, n), spared, wanted);
             append_level_runs(level, c, to_units(tip), wanted, simplify_tolerance_units(gouge), out);
         }
     };
     std::vector<std::vector<LevelRun>> runs(tips.size());
     parallel_each(cut.context, tips.size(), [&](std::size_t i) {
-        append_wanted(contours[i], tips[i], i > 0 ? std::optional(tips[i - 1]) : std::nullopt, nullptr,
-                      runs[i]);
+        append_wanted(contours[i], tips[i], i > 0 ? std::optional(tips[i - 1]) : std::nullopt,
+                      i + 1 < tips.size() ? std::optional(tips[i + 1]) : std::nullopt, nullptr, runs[i]);
     });
     // The foot of a wall on a floor is a hollow: the ball turns from wall to floor within a small part of a
     // step. Levels close above every floor cut what lies there, and only that.
@@ -257,7 +330,7 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
         const std::size_t begin = feet.size();
         for (const double tip : close) feet.push_back({tip, {}});
         parallel_each(cut.context, close.size(), [&](std::size_t i) {
-            append_wanted(level[i], close[i], std::nullopt, &near, feet[begin + i].runs);
+            append_wanted(level[i], close[i], std::nullopt, std::nullopt, &near, feet[begin + i].runs);
         });
     }
     std::stable_sort(feet.begin(), feet.end(),
@@ -267,7 +340,6 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     op.bands = bands_of(cut, spaced, slopes.levels_keep, tool.stepdown_max);
     PathBuilder path(op, tool, std::min(cut.job.cutting.finish_feed, cut.job.machine.max_feed),
                      cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + 2);
-    const DropIndex& part = cut.drops(cutter);
     path.set_surroundings(cut.around(tool, &part));
     cut_levels(path, cut, tool, part, runs, true);
     path.finish();
