@@ -129,12 +129,13 @@ std::vector<double> foot_floors(const LayerCut& cut) {
 
 // What a ball touches on an edge that stands out, above a wall: a lower level that touches the same edge goes
 // round it closer to the wall and cuts all that this one would, and so does a flat end mill on a wall that is
-// vertical.
+// vertical. Only where the flat end mill stands beside the edge: elsewhere waste stands, which is cut in
+// steps.
 class EdgeContacts {
 public:
-    /// @param flat the flat end mill of radius `flat_r`, a little narrower; null: there is no vertical wall
+    /// @param flat the flat end mill of radius `flat_r`, a little narrower
     /// @param stepdown mm, of the flat end mill's levels along walls
-    EdgeContacts(const DropIndex& ball, const DropIndex* flat, double flat_r, double stepdown, double bottom)
+    EdgeContacts(const DropIndex& ball, const DropIndex& flat, double flat_r, double stepdown, double bottom)
         : ball_(ball), flat_(flat), flat_r_(flat_r), stepdown_(stepdown), bottom_(bottom) {}
 
     /// @param at of the ball's middle on a level, mm; @param out away from the part there
@@ -142,6 +143,11 @@ public:
     [[nodiscard]] bool made_below(const std::array<double, 2>& at, const std::array<double, 2>& out,
                                   double nz, double tip, std::optional<double> below) const {
         const double r = ball_.cutter().radius, beside = r * std::sqrt(1 - nz * nz);
+        const auto flat_stands = [&](double z) {
+            const double more = flat_r_ - beside;
+            return !flat_.stands_over(at[0] + more * out[0], at[1] + more * out[1], z);
+        };
+        if (!flat_stands(tip)) return false;
         if (below) {
             // The ball about the same point of the edge, one level lower.
             const double lower_nz = nz - (tip - *below) / r;
@@ -151,18 +157,14 @@ public:
                     return true;
             }
         }
-        if (flat_ == nullptr) return false;
-        const double contact = tip + r * (1 - nz), foot = std::max(bottom_, contact - stepdown_),
-                     more = flat_r_ - beside;
-        return contact - foot > kLowEdge &&
-               !flat_->stands_over(at[0] + more * out[0], at[1] + more * out[1], foot);
+        const double contact = tip + r * (1 - nz), foot = std::max(bottom_, contact - stepdown_);
+        return contact - foot > kLowEdge && flat_stands(foot);
     }
 
 private:
     static constexpr double kTouch = 1e-4;    // mm
     static constexpr double kLowEdge = 0.05;  // mm over the bottom of the layer: there is no wall to be seen
-    const DropIndex& ball_;
-    const DropIndex* flat_;
+    const DropIndex &ball_, &flat_;
     double flat_r_, stepdown_, bottom_;
 };
 
@@ -203,12 +205,10 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const double split = slopes.levels_from;
     if (split > std::numbers::pi / 2) return op;
     double low = kUnbounded, high = -kUnbounded;
-    bool any_vertical = false;
     for (const SolidFacet& f : cut.solid.facets) {
         if (f.nz > std::cos(split) || f.z_max <= cut.layer.z_bottom ||
             (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0))
             continue;
-        any_vertical |= f.nz <= vertical;
         low = std::min(low, std::max(f.z_min, cut.layer.z_bottom));
         high = std::max(high, f.z_max);
     }
@@ -247,15 +247,10 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const FibreGrid grid = fibre_grid(cut.solid, cutter, safe_pitch(r, gouge));
     const std::vector<Contours> contours = cut.contours(cutter, tips, grid.pitch);
     // A vertical wall belongs to the flat end mill wherever that can stand against the place of contact.
-    std::unique_ptr<DropIndex> flat;
-    double flat_r = 0;
-    if (any_vertical) {
-        flat_r = cut.layer.tools.rough.diameter / 2;
-        flat = std::make_unique<DropIndex>(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
-    }
+    const double flat_r = cut.layer.tools.rough.diameter / 2;
+    const DropIndex flat(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
     const DropIndex& part = cut.drops(cutter);
-    const EdgeContacts edges(part, flat.get(), flat_r, cut.layer.tools.rough.stepdown_max,
-                             cut.layer.z_bottom);
+    const EdgeContacts edges(part, flat, flat_r, cut.layer.tools.rough.stepdown_max, cut.layer.z_bottom);
     // What of a level is cut: `above` and `below`, the tips one level higher and lower, where there are such;
     // `floor`, on whose walls' feet alone, where it is for them.
     auto append_wanted = [&](const Contours& level, double tip, std::optional<double> above,
@@ -283,8 +278,8 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 if (nz > vertical) {
                     spared[k] = !cut.job.cutting.uniform_steps &&
                                 edges.made_below({to_mm(p.x), to_mm(p.y)}, out_of, nz, tip, below);
-                } else if (flat && !flat->stands_over(to_mm(p.x) + out_of[0] * (flat_r - r),
-                                                      to_mm(p.y) + out_of[1] * (flat_r - r), contact))
+                } else if (!flat.stands_over(to_mm(p.x) + out_of[0] * (flat_r - r),
+                                             to_mm(p.y) + out_of[1] * (flat_r - r), contact))
                     wanted[k] = 0;
             }
             spare_long(std::span(level.points).subspan(first, n), spared, wanted);
