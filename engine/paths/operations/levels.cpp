@@ -127,51 +127,65 @@ std::vector<double> foot_floors(const LayerCut& cut) {
     return floors;
 }
 
-// What a ball touches on an edge that stands out, above a wall: a lower level that touches the same edge goes
-// round it closer to the wall and cuts all that this one would, and so does a flat end mill on a wall that is
-// vertical. Only where the flat end mill stands beside the edge: elsewhere waste stands, which is cut in
+constexpr double kNarrower = 0.02;  // mm, than the flat end mill: what stands beside it within its chords
+
+// What a ball touches on an edge that stands out, above a wall. Of the levels that touch one edge the highest
+// shapes what lies above it, and the lowest, or a flat end mill on a wall that is vertical, what lies below:
+// near the edge each cuts one side of a plane through it, and what one between them would cut, one of these
+// two does. Only where the flat end mill stands beside the edge: elsewhere waste stands, which is cut in
 // steps.
 class EdgeContacts {
 public:
     /// @param flat the flat end mill of radius `flat_r`, a little narrower
     /// @param stepdown mm, of the flat end mill's levels along walls
-    EdgeContacts(const DropIndex& ball, const DropIndex& flat, double flat_r, double stepdown, double bottom)
-        : ball_(ball), flat_(flat), flat_r_(flat_r), stepdown_(stepdown), bottom_(bottom) {}
+    /// @param least_wall mm: of a lower one `flat` does not tell whether it is vertical
+    /// @param flattest upwards part of the normal from which on levels do not cut
+    EdgeContacts(const DropIndex& ball, const DropIndex& flat, double flat_r, double stepdown, double bottom,
+                 double least_wall, double flattest)
+        : ball_(ball),
+          flat_(flat),
+          flat_r_(flat_r),
+          stepdown_(stepdown),
+          bottom_(bottom),
+          least_wall_(least_wall),
+          flattest_(flattest) {}
 
     /// @param at of the ball's middle on a level, mm; @param out away from the part there
-    /// @param nz upwards part of the normal in the contact; @param below tip of the next level
-    [[nodiscard]] bool made_below(const std::array<double, 2>& at, const std::array<double, 2>& out,
-                                  double nz, double tip, std::optional<double> below) const {
+    /// @param nz upwards part of the normal in the contact; @param above, @param below tips of the next
+    /// levels
+    [[nodiscard]] bool made_by_others(const std::array<double, 2>& at, const std::array<double, 2>& out,
+                                      double nz, double tip, std::optional<double> above,
+                                      std::optional<double> below) const {
         const double r = ball_.cutter().radius, beside = r * std::sqrt(1 - nz * nz);
         const auto flat_stands = [&](double z) {
             const double more = flat_r_ - beside;
             return !flat_.stands_over(at[0] + more * out[0], at[1] + more * out[1], z);
         };
-        if (!flat_stands(tip)) return false;
-        if (below) {
-            // The ball about the same point of the edge, one level lower.
-            const double lower_nz = nz - (tip - *below) / r;
-            if (lower_nz > 0) {
-                const double more = r * std::sqrt(1 - lower_nz * lower_nz) - beside;
-                if (!ball_.stands_over(at[0] + more * out[0], at[1] + more * out[1], *below + kTouch))
-                    return true;
-            }
-        }
+        // The ball about the same point of the edge, on another level, or where it begins to cut flatter
+        // slopes.
+        const auto ball_stands = [&](double level) {
+            const double level_nz = std::min(nz + (level - tip) / r, flattest_);
+            if (level_nz <= 0) return false;
+            const double more = r * std::sqrt(1 - level_nz * level_nz) - beside;
+            return !ball_.stands_over(at[0] + more * out[0], at[1] + more * out[1],
+                                      tip + (level_nz - nz) * r + kTouch);
+        };
+        if (!ball_stands(above.value_or(kUnbounded)) || !flat_stands(tip)) return false;
+        if (below && ball_stands(*below)) return true;
         const double contact = tip + r * (1 - nz), foot = std::max(bottom_, contact - stepdown_);
-        return contact - foot > kLowEdge && flat_stands(foot);
+        return contact - foot >= least_wall_ && flat_stands(foot);
     }
 
 private:
-    static constexpr double kTouch = 1e-4;    // mm
-    static constexpr double kLowEdge = 0.05;  // mm over the bottom of the layer: there is no wall to be seen
+    static constexpr double kTouch = 1e-4;  // mm
     const DropIndex &ball_, &flat_;
-    double flat_r_, stepdown_, bottom_;
+    double flat_r_, stepdown_, bottom_, least_wall_, flattest_;
 };
 
 // Takes stretches that are spared out of what is wanted of a closed contour: all at the ends of what is
 // wanted, others where leaving the contour and coming back takes no longer.
 void spare_long(std::span<const Point2> contour, const std::vector<char>& spared, std::vector<char>& wanted) {
-    constexpr double kWorthLeaving = 20;  // mm
+    constexpr double kWorthLeaving = 80;  // mm, a second at a feed of 5000 mm/min
     const std::size_t n = contour.size();
     std::size_t start = n;
     for (std::size_t k = 0; k < n && start == n; ++k)
@@ -205,10 +219,12 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const double split = slopes.levels_from;
     if (split > std::numbers::pi / 2) return op;
     double low = kUnbounded, high = -kUnbounded;
+    bool any_vertical = false;  // else nothing goes along walls before, and edges are all that is as steep
     for (const SolidFacet& f : cut.solid.facets) {
         if (f.nz > std::cos(split) || f.z_max <= cut.layer.z_bottom ||
             (f.normal[0] == 0 && f.normal[1] == 0 && f.nz >= 0))
             continue;
+        any_vertical |= f.nz <= vertical;
         low = std::min(low, std::max(f.z_min, cut.layer.z_bottom));
         high = std::max(high, f.z_max);
     }
@@ -248,9 +264,12 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
     const std::vector<Contours> contours = cut.contours(cutter, tips, grid.pitch);
     // A vertical wall belongs to the flat end mill wherever that can stand against the place of contact.
     const double flat_r = cut.layer.tools.rough.diameter / 2;
-    const DropIndex flat(cut.solid, Cutter{Cutter::Profile::flat, flat_r - 0.02});
+    const DropIndex flat(cut.solid, Cutter{Cutter::Profile::flat, flat_r - kNarrower});
     const DropIndex& part = cut.drops(cutter);
-    const EdgeContacts edges(part, flat, flat_r, cut.layer.tools.rough.stepdown_max, cut.layer.z_bottom);
+    // So high a wall of the least slope that is called vertical leans out by as much as `flat` is narrower.
+    const double least_wall = kNarrower / std::tan((90 - cut.job.cutting.vertical_deg) * degree);
+    const EdgeContacts edges(part, flat, flat_r, cut.layer.tools.rough.stepdown_max, cut.layer.z_bottom,
+                             least_wall, std::cos(split));
     // What of a level is cut: `above` and `below`, the tips one level higher and lower, where there are such;
     // `floor`, on whose walls' feet alone, where it is for them.
     auto append_wanted = [&](const Contours& level, double tip, std::optional<double> above,
@@ -277,9 +296,9 @@ Operation finish_levels(const LayerCut& cut, std::vector<Diagnostic>& diagnostic
                 const std::array<double, 2> out_of{-dy / l, dx / l};
                 if (nz > vertical) {
                     spared[k] = !cut.job.cutting.uniform_steps &&
-                                edges.made_below({to_mm(p.x), to_mm(p.y)}, out_of, nz, tip, below);
-                } else if (!flat.stands_over(to_mm(p.x) + out_of[0] * (flat_r - r),
-                                             to_mm(p.y) + out_of[1] * (flat_r - r), contact))
+                                edges.made_by_others({to_mm(p.x), to_mm(p.y)}, out_of, nz, tip, above, below);
+                } else if (any_vertical && !flat.stands_over(to_mm(p.x) + out_of[0] * (flat_r - r),
+                                                             to_mm(p.y) + out_of[1] * (flat_r - r), contact))
                     wanted[k] = 0;
             }
             spare_long(std::span(level.points).subspan(first, n), spared, wanted);
