@@ -162,6 +162,7 @@ void validate_handler(const Machine& c) {
     require("machine.handler_speed", c.handler_speed, 0, 1e6);
     require("machine.handler_travel", c.handler_travel, 0, 100000);
     require("machine.grip_s", c.grip_s, 0, 36000);
+    require("machine.press_lift", c.press_lift, 0, 100000);
     require("machine.glue_pitch", c.glue_pitch, 0.5, 1000);
     require("machine.glue_speed", c.glue_speed, 1, 1e6);
     require("machine.pump_g_min", c.pump_g_min, 0, 1e6);

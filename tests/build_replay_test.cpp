@@ -203,6 +203,7 @@ TEST(BuildReplay, EachCorruptionIsToldAsWhatItIs) {
         {"fetching before the press", exchange("press", 0, "take_slab", 1), "sequence.order"},
         {"press too hard", set("press", 1, "force_n", 17000), "sequence.press"},
         {"press too short", set("press", 1, "time_s", 3), "sequence.press"},
+        {"table not up to the press", set("press", 1, "lift_mm", 3), "sequence.press"},
         {"tool 99", set("mill", 1, "tool", 99), "sequence.tool"},
         {"tool 99 changed in", set("tool_change", 1, "tool", 99), "sequence.tool"},
         {"another program's tool", set("mill", 1, "tool", 2), "sequence.tool"},

@@ -117,6 +117,8 @@ TEST(Schedule, TheHandlersAxisGivesItsTimes) {
     plan.job.machine.handler_speed = 3000;  // 50 mm/s
     plan.job.machine.handler_travel = 1000;
     plan.job.machine.grip_s = 7;
+    plan.job.machine.press_lift = 50;
+    plan.job.machine.table_speed = 600;  // 10 mm/s, up and down again
     schedule(plan);
     std::vector<std::pair<std::string, double>> times;
     for (const SequenceStep& step : plan.sequence)
@@ -124,8 +126,8 @@ TEST(Schedule, TheHandlersAxisGivesItsTimes) {
             step.action == "press")
             times.emplace_back(step.action, step.seconds);
     const std::vector<std::pair<std::string, double>> expected{
-        {"take_slab", 0},  {"clamp", 7}, {"place", 20}, {"press", 37},
-        {"take_slab", 20}, {"clamp", 7}, {"place", 20}, {"press", 37}};
+        {"take_slab", 0},  {"clamp", 7}, {"place", 20}, {"press", 47},
+        {"take_slab", 20}, {"clamp", 7}, {"place", 20}, {"press", 47}};
     EXPECT_EQ(times, expected) << "no glue is stated, so nothing passes the head";
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "engine/schedule/fit.h"
+#include "engine/schedule/heights.h"
 #include "kernels/polygons/loops.h"
 
 namespace slabwright {
@@ -144,9 +145,9 @@ double handler_seconds(const Machine& machine, double from, double to) {
 double bonding_seconds(const Job& job, double glue_mm2, double length) {
     const Machine& machine = job.machine;
     const Bonding& bonding = job.bonding;
-    double seconds = bonding.press_time_s;
+    double seconds = press_seconds(job);
     if (has_handler(machine))
-        seconds += 2 * handler_seconds(machine, 0, handler_way(machine)) + 2 * machine.grip_s;
+        seconds += 2 * handler_seconds(machine, 0, handler_way(machine)) + machine.grip_s;
     else seconds += bonding.handling_s;
     switch (glue_head_of(machine)) {
         case GlueHead::slab:

@@ -53,6 +53,12 @@ double table_seconds(const Machine& machine, double from, double to) {
     return machine.table == BuildTable::moving ? std::abs(to - from) / machine.table_speed * 60 : 0;
 }
 
+double press_seconds(const Job& job) {
+    const Machine& machine = job.machine;
+    if (!has_handler(machine)) return job.bonding.press_time_s;
+    return job.bonding.press_time_s + machine.grip_s + 2 * table_seconds(machine, 0, machine.press_lift);
+}
+
 double slab_mass_kg(const Plan& plan, const Blank& blank, double thickness) {
     return blank.mm2() * thickness * 1e-9 * plan.job.material.density_kg_m3;
 }

@@ -74,12 +74,12 @@ int SlabSteps::bond(const Layer& layer, int k, int ready) {
     const int glued = glue(layer, k, ready, clamped);
     const int placed = place(layer, k, {clamped, glued}, blank);
     // The handler holds the slab against the rising table (RPM) and lets go of it then.
-    SequenceStep& press =
-        add(layer, "press", {placed}, bonding.press_time_s + (handled_ ? machine_.grip_s : 0));
+    SequenceStep& press = add(layer, "press", {placed}, press_seconds(plan_.job));
     handler_free_ = handled_ ? press.id : placed;
     const auto at = static_cast<std::size_t>(k);
     press.numbers = {{"force_n", at < layer.joints.size() ? layer.joints[at].force_n : 0},
                      {"time_s", bonding.press_time_s}};
+    if (handled_) press.numbers.emplace_back("lift_mm", machine_.press_lift);
     return press.id;
 }
 

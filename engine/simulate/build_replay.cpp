@@ -319,7 +319,10 @@ private:
             if (number("force_n").value_or(0) > plan_.job.bonding.press_force + kForce)
                 complain("sequence.press", "presses harder than the machine's press can");
         }
-        expect_job_seconds(plan_.job.bonding.press_time_s + (handled() ? plan_.job.machine.grip_s : 0));
+        const double lift = handled() ? plan_.job.machine.press_lift : 0;
+        if (lift > 0) expect("sequence.press", "lift_mm", lift, kLength);
+        expect_job_seconds(plan_.job.bonding.press_time_s + 120 * lift / plan_.job.machine.table_speed +
+                           (handled() ? plan_.job.machine.grip_s : 0));
         s_.to_press.reset();
         s_.pressed = here();
         if (handled()) s_.hand_free = here();  // it has held the slab against the table

@@ -189,6 +189,7 @@ void read_job(const Field& job, BuildPlan& build) {
         build.job.machine.handler_speed = 0;
         build.job.machine.glue_head = GlueHead::none;
     }
+    if (!job["machine"].has("press_lift")) build.job.machine.press_lift = 0;  // as above
     for (const char* key : {"gouge", "cusp", "weld"}) (void)job["tolerances"][key];
     const Machine& m = build.job.machine;
     if (!(m.glue_pitch >= 0.1) || !(m.glue_speed > 0) || !(m.handler_speed >= 0) || !(m.pump_g_min >= 0))

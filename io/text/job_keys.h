@@ -155,6 +155,8 @@ void visit_handler_keys(MachineLike& machine, Visit& visit) {
     visit.key("handler_travel", machine.handler_travel,
               "mm between the chambers' middles, the glue head half-way; 0: 1.4 times travel_x");
     visit.key("grip_s", machine.grip_s, "s, to close or to open its clamps");
+    visit.key("press_lift", machine.press_lift,
+              "mm that the table rises to press a slab against it, and sinks again");
     visit.word("glue_head", machine.glue_head, kGlueHeadWords,
                "slab (on the underside of the slab that the handler carries over it), stack (beside the "
                "spindle, on the stack's top), none (by hand), or auto: slab where there is a handler");
