@@ -129,7 +129,7 @@ struct Machine {
     double handler_speed = 6000;  ///< mm/min, of what carries slabs from chamber to chamber; 0: done by hand
     double handler_travel = 0;    ///< mm, from one to the other; 0: 1.4 times travel_x (handler_way)
     double grip_s = 10;           ///< its clamps close, or open
-    double press_lift = 100;      ///< mm that a moving table rises to press a slab against it, and sinks again
+    double press_lift = 100;  ///< mm that a moving table rises to press a slab against it, and sinks again
     GlueHead glue_head = GlueHead::automatic;
     double glue_pitch = 5;                          ///< mm, between beads
     double glue_speed = 3000;                       ///< mm/min along the beads, at most

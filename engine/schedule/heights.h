@@ -26,8 +26,8 @@ struct LayerHeights {
 /// Seconds that the table takes from one height to another; 0 where it is fixed.
 [[nodiscard]] double table_seconds(const Machine& machine, double from, double to);
 
-/// Seconds that pressing a slab takes: glue under pressure and, where a handler holds the slab, the table's way
-/// up to it and back, and its clamps.
+/// Seconds that pressing a slab takes: glue under pressure and, where a handler holds the slab, the table's
+/// way up to it and back, and its clamps.
 [[nodiscard]] double press_seconds(const Job& job);
 
 /// kg of a slab of this size and thickness.
