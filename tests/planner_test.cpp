@@ -224,9 +224,60 @@ TEST(Planner, LevelsDoNotRoundTheRimsOfVerticalWalls) {
             if (op.purpose != "level contours") continue;
             levels += op.cutting_mm;
             for (const Move& m : op.moves)
-                if (m.feed != 0) EXPECT_LT(to_mm(m.x), 2 * ramp) << to_mm(m.y) << ' ' << to_mm(m.z);
+                if (m.feed != 0) {
+                    EXPECT_LT(to_mm(m.x), 2 * ramp) << to_mm(m.y) << ' ' << to_mm(m.z);
+                }
         }
     EXPECT_GT(levels, 500.0);
+}
+
+// What the face mill takes beside a block: replayed on a grid of its own, hardly any of its way is in air.
+// The stock ends where a ring around the block already reaches.
+TEST(Planner, OpenWasteMeetsWood) {
+    for (const double margin : {40.0, 50.0, 55.0, 60.0, 70.0}) {
+        SCOPED_TRACE(margin);
+        Context context;
+        const std::vector<support::Ring> rings{{0, {{0, 0}, {160, 0}, {160, 90}, {0, 90}}},
+                                               {30, {{0, 0}, {160, 0}, {160, 90}, {0, 90}}}};
+        Job job;
+        job.slabs.margin = margin;
+        const Plan plan = make_plan(context, support::loft(context, rings), {}, job);
+        double feed = 0, air = 0;
+        for (const Layer& layer : plan.layers)
+            for (const Operation& op : layer.operations) {
+                if (op.purpose != "open waste") continue;
+                const double r = job.tools[0].diameter / 2;
+                const int nx = static_cast<int>(plan.stock_max[0] - plan.stock_min[0]),
+                          ny = static_cast<int>(plan.stock_max[1] - plan.stock_min[1]);
+                std::vector<double> top(static_cast<std::size_t>(nx * ny), layer.z_top);
+                for (std::size_t k = 1; k < op.moves.size(); ++k) {
+                    const Move &a = op.moves[k - 1], &b = op.moves[k];
+                    if (b.feed == 0 || a.z != b.z || b.is_arc()) continue;
+                    const double length = std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y));
+                    const int steps = 1 + static_cast<int>(length);
+                    for (int step = 1; step <= steps; ++step) {
+                        const double t = static_cast<double>(step) / steps,
+                                     x = to_mm(a.x) + t * to_mm(b.x - a.x) - plan.stock_min[0],
+                                     y = to_mm(a.y) + t * to_mm(b.y - a.y) - plan.stock_min[1];
+                        bool met = false;
+                        for (int j = std::max(0, static_cast<int>(y - r)); j < std::min<double>(ny, y + r);
+                             ++j)
+                            for (int i = std::max(0, static_cast<int>(x - r));
+                                 i < std::min<double>(nx, x + r); ++i) {
+                                double& h = top[static_cast<std::size_t>(j * nx + i)];
+                                if (std::hypot(i + 0.5 - x, j + 0.5 - y) >= r || h <= to_mm(b.z)) continue;
+                                h = to_mm(b.z);
+                                met = true;
+                            }
+                        feed += length / steps;
+                        if (!met) air += length / steps;
+                    }
+                }
+            }
+        EXPECT_GT(feed, 500.0);
+        EXPECT_LT(air, 0.1 * feed) << feed;
+        std::printf("margin %.1f mm: %.0f of %.0f mm in air\n", margin, air, feed);
+    }
 }
 
 // The ball crosses the floors that no flat end mill finishes, and those only.

@@ -13,9 +13,10 @@ namespace {
 
 constexpr double kBesideSteps =
     1.2;  // steps between rings that lie next to each other, at most, where they are nearest
-constexpr double kWedgeStep = 7.5;  // mm: where rings are a smaller step apart, what stays where one closes
-                                    // is no more than a chip (kChip)
-constexpr double kSlide = 1.2;      // steps along the next ring that the way to it slants
+constexpr double kWedgeStep = 7.5;    // mm: where rings are a smaller step apart, what stays where one closes
+                                      // is no more than a chip (kChip)
+constexpr double kSameHeight = 1e-3;  // mm
+constexpr double kSlide = 1.2;        // steps along the next ring that the way to it slants
 
 // Where a piece may begin.
 struct Start {
@@ -350,6 +351,37 @@ private:
     std::vector<const RingPlan::Piece*> beside_{};  // those that have been cut, as far off and a step farther
 };
 
+// The stretches of a piece under which something may stand; those between them are left out where they are
+// long enough for it.
+std::vector<std::vector<PathPoint>> standing_runs(const Standing& standing, double radius,
+                                                  std::span<const PathPoint> points) {
+    constexpr double kWorthLeaving = 1000;  // mm: six seconds of feed, or of going up, over and down again
+    const double look = radius / 2;         // mm of way that are looked at together
+    std::vector<std::vector<PathPoint>> runs;
+    double clear = kUnbounded;  // mm since something stood
+    std::vector<PathPoint> since;
+    for (std::size_t k = 1; k < points.size(); ++k) {
+        const double length = plan_length(points[k - 1], points[k]) / kUnitsPerMm;
+        const int parts = std::max(1, static_cast<int>(std::ceil(length / look)));
+        for (int part = 0; part < parts; ++part) {
+            const PathPoint a = between(points[k - 1], points[k], static_cast<double>(part) / parts),
+                            b = between(points[k - 1], points[k], static_cast<double>(part + 1) / parts);
+            if (standing.top(radius, {to_mm(a.x), to_mm(a.y)}, {to_mm(b.x), to_mm(b.y)}) <=
+                to_mm(a.z) + kSameHeight) {
+                clear += length / parts;
+                since.push_back(b);
+                continue;
+            }
+            if (clear < kWorthLeaving) runs.back().insert(runs.back().end(), since.begin(), since.end());
+            else runs.push_back({a});
+            clear = 0;
+            since.clear();
+            runs.back().push_back(b);
+        }
+    }
+    return runs;
+}
+
 }  // namespace
 
 void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
@@ -393,9 +425,15 @@ void clear_from_afar(PathBuilder& path, const LayerCut& cut, RingPlan plan) {
         }
         if (piece.closed) piece.points = started_at(piece.points, start.segment, start.at);
         else if (start.reversed) std::reverse(piece.points.begin(), piece.points.end());
-        if (along)
+        if (plan.from_open && cut.standing != nullptr) {
+            // A ring between two that have been cut may have nothing left to do.
+            for (const std::vector<PathPoint>& run : standing_runs(*cut.standing, plan.radius, piece.points))
+                path.follow(run);
+        } else if (along) {
             for (const PathPoint& p : piece.points) path.cut({p.x, p.y}, z);
-        else path.follow(piece.points);
+        } else {
+            path.follow(piece.points);
+        }
         ring = on;
         turns.cut(chosen);
         if (plan.hold) cut_already.push_back(chosen);

@@ -23,8 +23,9 @@ constexpr double kOffLine = 0.2;     // mm that offsets, rounded corners and fit
 // the radius. An end mill's lie no farther apart than its rings: what it takes then overhanging wood bears at
 // full feed.
 constexpr double kFaceShare = 0.6;
-constexpr double kBeside = 0.5;  // mm of air between the stock and a cutter that goes down beside it
-constexpr double kOnEdge = 0.1;  // mm
+constexpr double kMostBreadth = 0.8;  // of its diameter
+constexpr double kBeside = 0.5;       // mm of air between the stock and a cutter that goes down beside it
+constexpr double kOnEdge = 0.1;       // mm
 constexpr std::size_t kRingsBesideStrips =
     2;  // steps from the forbidden region to the farthest ring, where strips lie beyond
 constexpr double kMostBetweenStrips = 0.1;  // of the strips' length: the ways between them
@@ -343,15 +344,29 @@ bool go_round(RingPlan& plan, const std::array<double, 4>& stands, double r, con
     return true;
 }
 
+// What stands, and how much of it a ring takes beyond its own line, mm, so that no farther ring is cut for
+// it.
+struct Beyond {
+    Loops stands{};
+    double takes = 0, radius = 0;
+
+    // Where the next ring is of use.
+    [[nodiscard]] Loops next(const Loops& region) const {
+        return offset_outline(subtract(stands, offset_outline(region, takes, kFineRing)), radius, kFineRing);
+    }
+};
+
 // Where rings around a region are of use.
 struct Use {
-    Loops border, others;  // of the ring on the region's border, and of all others
-    double shortest = 0;   // mm of the border: shorter pieces are left out
+    Loops border, others;            // of the ring on the region's border, and of all others
+    double shortest = 0;             // mm of the border: shorter pieces are left out
+    std::optional<Beyond> beyond{};  // of those others that take something else than the ring before
 };
 
 // Rings around a region, a step apart, as far as they are of use; no farther than `last` steps.
 void append_rings(RingPlan& plan, const LayerCut& cut, const Thinning& thinning, Loops region, const Use& use,
                   std::size_t last) {
+    Loops others = use.others;
     for (std::size_t ring = 0; ring <= last; ++ring) {
         cut.context.throw_if_cancelled();
         // Around the region, so that it is on the right: its loops are turned over.
@@ -362,7 +377,7 @@ void append_rings(RingPlan& plan, const LayerCut& cut, const Thinning& thinning,
             around.close_loop();
         }
         const std::size_t first = plan.pieces.size();
-        for (const RunInside& run : runs_inside(around, ring == 0 ? use.border : use.others)) {
+        for (const RunInside& run : runs_inside(around, ring == 0 ? use.border : others)) {
             std::vector<PathPoint> points;
             for (const Point2 p : run.points) points.push_back({p.x, p.y, plan.z});
             if (run.closed) points.push_back(points.front());
@@ -376,6 +391,7 @@ void append_rings(RingPlan& plan, const LayerCut& cut, const Thinning& thinning,
         }
         if (plan.pieces.size() == first && ring > 0) return;
         cut.context.throw_if_cancelled();
+        if (use.beyond) others = intersect(use.others, use.beyond->next(region));
         region = thinning.of(offset_outline(region, plan.step, kFineRing));
     }
 }
@@ -394,6 +410,18 @@ double ring_step(const Tool& tool) {
 }
 
 double ring_tolerance(const Tool& tool) { return std::max(kFineRing, kRingShare * tool.diameter); }
+
+namespace {
+
+// What a face mill's ring takes beyond its line, where a farther one would find little: more than it may meet
+// at full feed, for to go a little slower costs less than another ring.
+Beyond beyond_of(const LayerCut& cut, const Tool& tool, const std::array<double, 4>& stands) {
+    const double r = tool.diameter / 2, sure = r - 2 * ring_tolerance(tool) - kOffLine;
+    return {rectangle(stands[0], stands[1], stands[2], stands[3]),
+            std::min(sure, (2 * std::max(kMostBreadth, cut.job.cutting.max_engagement) - 1) * r), r};
+}
+
+}  // namespace
 
 RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidden, double tip_z, double blend,
                     bool hold) {
@@ -422,8 +450,9 @@ RingPlan plan_rings(const LayerCut& cut, const Tool& tool, const Loops& forbidde
     const Thinning thinning(cut, tool, blend);
     if (!hold) {
         const bool round = go_round(plan, stands, r, forbidden, useful);
-        append_rings(plan, cut, thinning, forbidden, {useful, useful, 0},
-                     round ? kRingsBesideStrips : SIZE_MAX);
+        Use use{useful, useful};
+        if (tool.kind == ToolKind::face) use.beyond = beyond_of(cut, tool, stands);
+        append_rings(plan, cut, thinning, forbidden, use, round ? kRingsBesideStrips : SIZE_MAX);
         return plan;
     }
     Loops nearer_free;
