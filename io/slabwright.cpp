@@ -21,7 +21,7 @@
 #include "engine/simulate/simulation_memory.h"
 #include "engine/simulate/work.h"
 #include "engine/tool_choice/access_map.h"
-#include "engine/tools/tools.h"
+#include "engine/tools/libraries.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/tool_table.h"
 #include "io/proof.h"
@@ -112,11 +112,13 @@ Job job_from_toml(std::string_view toml, const std::string& name, const Job& bas
 
 std::string default_job_toml(std::string_view library) {
     return guarded([&] {
+        std::optional<std::vector<Tool>> tools = named_library(library);
+        if (!tools)
+            throw Error(ErrorKind::usage, "job.library",
+                        quoting_line(fmt::format("there is no tool library \"{}\"", library.substr(0, 60))),
+                        "", fmt::format("name {}", kLibraryNames));
         Job job;
-        if (library == "luo") job.tools = luo_library();
-        else if (library != "default")
-            throw Error(ErrorKind::usage, "job.library", "there is no tool library of that name",
-                        std::string(library), "default or luo");
+        job.tools = std::move(*tools);
         return job_toml(job);
     });
 }
