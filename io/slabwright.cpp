@@ -18,6 +18,7 @@
 #include "engine/planner/planner.h"
 #include "engine/planner/replan.h"
 #include "engine/schedule/cut_list.h"
+#include "engine/schedule/magazine.h"
 #include "engine/simulate/simulation_memory.h"
 #include "engine/simulate/work.h"
 #include "engine/tool_choice/access_map.h"
@@ -207,7 +208,9 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out, const std
         file.close();
         context.advance();
     });
-    if (plan.job.machine.post == Post::linuxcnc) write_file_in(out.path(), "tool.tbl", tool_table(plan.job));
+    if (plan.job.machine.post == Post::linuxcnc)
+        write_file_in(out.path(), "tool.tbl",
+                      tool_table(plan.job, magazine_at_start(plan.sequence, plan.job.machine.magazine)));
     write_file_in(out.path(), "sequence.json", sequence_json(plan));
     const CutList list = cut_list(plan);
     write_file_in(out.path(), "cut_list.csv", cut_list_csv(list));
