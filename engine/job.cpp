@@ -187,6 +187,13 @@ void validate_machine(const Machine& c) {
     require("machine.spindle_torque_nm", c.spindle_torque_nm, 0, 1e4);
     require("machine.spindle_dwell_s", c.spindle_dwell_s, 0, 600);
     require("machine.tool_change_s", c.tool_change_s, 0, 36000);
+    require("machine.magazine", c.magazine, 0, 1000);
+    require("machine.magazine_swap_s", c.magazine_swap_s, 0, 36000);
+    if (c.magazine > 0 && !changes_tools(c.post))
+        refuse("machine.magazine",
+               fmt::format("machine.magazine is {}, but a program for grbl cannot change a tool (no M6)",
+                           c.magazine),
+               "leave it out: its tools are changed by hand");
     require("machine.clearance", c.clearance, 1, 1000, Ends::closed,
             "rapids pass the stock at that height, on a machine that rounds its corners");
     if (c.programs == ProgramSpan::layer && !changes_tools(c.post))

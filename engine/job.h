@@ -143,7 +143,9 @@ struct Machine {
     double spindle_torque_nm = 0;  ///< likewise
     double spindle_dwell_s = 3;
     double tool_change_s = 15;
-    double clearance = 10;  ///< mm of air between a rapid and the highest stock
+    int magazine = 0;  ///< places for tools in its magazine; 0: tools are changed by hand, no limit
+    double magazine_swap_s = 60;  ///< by hand: one tool out of a place, another in
+    double clearance = 10;        ///< mm of air between a rapid and the highest stock
     Frame frame = Frame::automatic;
     Post post = Post::linuxcnc;
     LengthUnit units = LengthUnit::mm;  ///< of the programs

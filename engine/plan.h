@@ -183,7 +183,8 @@ struct SequenceStep {
     int id = 0;
     int layer = 0;
     std::string action;  ///< "mount_board", "load_feed", "take_slab", "clamp", "glue", "place", "press",
-                         ///< "table", "touch_off", "tool_change", "face", "mill", "unload", "mould_box"
+                         ///< "table", "touch_off", "load_tool", "tool_change", "face", "mill", "unload",
+                         ///< "mould_box"
     std::vector<int> needs;
     std::vector<std::pair<std::string, double>> numbers;     ///< named quantities, names end in their unit
     std::vector<std::pair<std::string, std::string>> words;  ///< programs, materials
@@ -212,9 +213,10 @@ struct Support {
 
 struct Totals {
     int layers = 0, operations = 0, tool_changes = 0;
+    int magazine_swaps = 0;  ///< a tool of the magazine taken out for another
     double cutting_mm = 0, rapid_mm = 0;
     double cutting_minutes = 0, bonding_minutes = 0, tool_change_minutes = 0, table_minutes = 0,
-           build_minutes = 0;
+           magazine_minutes = 0, build_minutes = 0;
     double stock_volume_mm3 = 0, part_volume_mm3 = 0, stack_mass_kg = 0;
 };
 

@@ -18,10 +18,11 @@
 #include "engine/planner/planner.h"
 #include "engine/planner/replan.h"
 #include "engine/schedule/cut_list.h"
+#include "engine/schedule/magazine.h"
 #include "engine/simulate/simulation_memory.h"
 #include "engine/simulate/work.h"
 #include "engine/tool_choice/access_map.h"
-#include "engine/tools/tools.h"
+#include "engine/tools/libraries.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/tool_table.h"
 #include "io/proof.h"
@@ -112,11 +113,13 @@ Job job_from_toml(std::string_view toml, const std::string& name, const Job& bas
 
 std::string default_job_toml(std::string_view library) {
     return guarded([&] {
+        std::optional<std::vector<Tool>> tools = named_library(library);
+        if (!tools)
+            throw Error(ErrorKind::usage, "job.library",
+                        quoting_line(fmt::format("there is no tool library \"{}\"", library.substr(0, 60))),
+                        "", fmt::format("name {}", kLibraryNames));
         Job job;
-        if (library == "luo") job.tools = luo_library();
-        else if (library != "default")
-            throw Error(ErrorKind::usage, "job.library", "there is no tool library of that name",
-                        std::string(library), "default or luo");
+        job.tools = std::move(*tools);
         return job_toml(job);
     });
 }
@@ -205,7 +208,9 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out, const std
         file.close();
         context.advance();
     });
-    if (plan.job.machine.post == Post::linuxcnc) write_file_in(out.path(), "tool.tbl", tool_table(plan.job));
+    if (plan.job.machine.post == Post::linuxcnc)
+        write_file_in(out.path(), "tool.tbl",
+                      tool_table(plan.job, magazine_at_start(plan.sequence, plan.job.machine.magazine)));
     write_file_in(out.path(), "sequence.json", sequence_json(plan));
     const CutList list = cut_list(plan);
     write_file_in(out.path(), "cut_list.csv", cut_list_csv(list));

@@ -37,7 +37,8 @@ namespace slabwright {
 [[nodiscard]] SLABWRIGHT_API std::string pattern_formats();
 
 /// Reads a job file (TOML), "" for none, and the tool library that it names beside it.
-/// @param tool_library a file of tools instead of [tools] library (io/JOB.md)
+/// @param tool_library a file of tools, or the name of a library of the house, instead of [tools] library
+/// (io/JOB.md)
 /// @throws Error(usage) with file, line and the nearest known key
 [[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path, const std::string& tool_library = {});
 
@@ -47,9 +48,10 @@ namespace slabwright {
 [[nodiscard]] SLABWRIGHT_API Job job_from_toml(std::string_view toml, const std::string& name,
                                                const Job& base = {});
 
-/// All keys with their defaults and comments, as a job file. @param library "default", or "luo" for the tools
-/// of LUO table 5.4
-[[nodiscard]] SLABWRIGHT_API std::string default_job_toml(std::string_view library = "default");
+/// All keys with their defaults and comments, as a job file. @param library whose tools it lists: "fixed"
+/// (the default), "shop", "metric", or "luo" for the tools of LUO table 5.4 (io/JOB.md)
+/// @throws Error(usage, "job.library") for another name
+[[nodiscard]] SLABWRIGHT_API std::string default_job_toml(std::string_view library = "fixed");
 
 /// Reads the pattern and plans the build. @throws Error(input | no_plan | cancelled | usage)
 [[nodiscard]] SLABWRIGHT_API Plan plan(Context& context, const PatternSource& source, const Job& job);

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "engine/base_board.h"
+#include "engine/schedule/magazine.h"
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table_check.h"
 #include "io/read/cut_list_check.h"
@@ -67,6 +68,18 @@ void check_sequence(const fs::path& path, const BuildPlan& build, std::vector<Vi
     } catch (const Error& e) {
         if (e.code() != "verify.sequence") throw;
         violations.push_back({"sequence.unreadable", e.message(), file, 0, {}, 0});
+    }
+}
+
+/// The tools in the magazine when the sequence begins; none where the sequence cannot be read.
+std::optional<std::vector<int>> stated_magazine(const fs::path& sequence, int places) {
+    if (std::error_code failed; places == 0 || !fs::exists(sequence, failed)) return std::vector<int>();
+    try {
+        const std::string text = read_file(sequence, "verify.sequence_file", kLargestSequence);
+        return magazine_at_start(read_sequence(text).steps, places);
+    } catch (const Error& e) {
+        if (e.code() != "verify.sequence") throw;
+        return std::nullopt;
     }
 }
 
@@ -228,8 +241,9 @@ Verification verify_folder(Context& context, const std::string& directory, const
     std::vector<Violation> violations;
     if (job.machine.post == Post::linuxcnc) {  // the others' tables are kept at the control
         const fs::path table = out / "tool.tbl";
-        violations = check_tool_table(read_file(table, "verify.tool_table", kMostToolTableBytes),
-                                      table.string(), input.tools);
+        const std::string text = read_file(table, "verify.tool_table", kMostToolTableBytes);
+        if (const auto magazine = stated_magazine(out / "sequence.json", job.machine.magazine))
+            violations = check_tool_table(text, table.string(), input.tools, *magazine);
     }
     read_programs(context, folder, refusal, input.programs, violations);
     find_strangers(folder, violations);

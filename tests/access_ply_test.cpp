@@ -12,7 +12,7 @@
 
 #include "engine/planner/planner.h"
 #include "engine/tool_choice/access_map.h"
-#include "engine/tools/tools.h"
+#include "engine/tools/libraries.h"
 #include "io/write/access_ply.h"
 #include "kernels/errors.h"
 #include "tests/support/height_field.h"

@@ -54,6 +54,7 @@ const std::vector<Kind> kinds{
     {"default", ""},
     {"pattern base", "[machine]\nframe = \"pattern-base\"\n"},
     {"layer top, fixed table", "[machine]\ntable = \"fixed\"\nframe = \"layer-top\"\ntravel_z = 300.0\n"},
+    {"a magazine of two places", "[machine]\nmagazine = 2\n"},
     {"combined, little feed",
      "[layers]\nstrategy = \"combined\"\n[slabs]\nthicknesses = [12.0]\n[machine]\nfeed_height = 40.0\n"},
     {"flask", "[flask]\nenabled = true\n"}};

@@ -8,7 +8,8 @@
 #include <functional>
 #include <random>
 
-#include "engine/tools/tools.h"
+#include "engine/tools/libraries.h"
+#include "io/read/job_toml.h"
 #include "io/slabwright.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
@@ -179,6 +180,61 @@ TEST(ToolLibrary, WhatCannotBeTakenIsRefusedWithItsLine) {
               "tools.missing");
     EXPECT_EQ(error_of([&] { (void)job_from_toml("[tools]\nlibrary = \"a.csv\"\n", "line"); }).substr(0, 14),
               "tools.no_files");
+}
+
+TEST(ToolLibrary, TheHousesOwnAreKnownByName) {
+    for (const std::string name : {"fixed", "shop", "metric", "luo"}) {
+        const std::vector<Tool> listed = job_from_toml(default_job_toml(name), name).tools;
+        const std::vector<Tool> named = job_from_toml("[tools]\nlibrary = \"" + name + "\"\n", name).tools;
+        const std::vector<Tool> option = read_job("", name).tools;
+        ASSERT_EQ(named.size(), listed.size()) << name;
+        ASSERT_EQ(option.size(), listed.size()) << name;
+        for (std::size_t i = 0; i < named.size(); ++i) {
+            Job one, two, three;
+            one.tools = {named[i]};
+            two.tools = {listed[i]};
+            three.tools = {option[i]};
+            EXPECT_EQ(job_toml(one), job_toml(two)) << name;
+            EXPECT_EQ(job_toml(one), job_toml(three)) << name;
+        }
+    }
+    EXPECT_EQ(job_toml(Job{}), default_job_toml("fixed")) << "the default, unchanged";
+    EXPECT_EQ(default_job_toml(), default_job_toml("fixed"));
+}
+
+TEST(ToolLibrary, AListedToolGoesBeforeTheHousesOwn) {
+    const std::string own =
+        "[[tool]]\nnumber = 6\nstickout = 42.5\n"
+        "[[tool]]\nnumber = 20\nkind = \"drill\"\ndiameter = 6.0\nflute_length = 40.0\nstickout = 50.0\n"
+        "shank_diameter = 6.0\nholder_diameter = 30.0\nstepdown_max = 6.0\n";
+    const Job job = job_from_toml("[tools]\nlibrary = \"shop\"\nnumbers = [1, 2, 3, 6]\n" + own, "job");
+    ASSERT_EQ(job.tools.size(), 5u);
+    EXPECT_EQ(job.tools[3].number, 6);
+    EXPECT_EQ(job.tools[3].stickout, 42.5);
+    EXPECT_EQ(job.tools[3].diameter, shop_library()[5].diameter);
+    EXPECT_EQ(job.tools[2].stickout, shop_library()[2].stickout);
+    EXPECT_EQ(job.tools[4].kind, ToolKind::drill);
+
+    const auto of = [](const std::string& text, const std::string& library = {}) {
+        return error_of([&] {
+            const TemporaryFolder folder;
+            spit(folder / "job.toml", text);
+            (void)read_job(folder / "job.toml", library);
+        });
+    };
+    EXPECT_EQ(of("\n[tools]\nlibrary = \"shoppe\"\n"),
+              "tools.library job.toml:3: there is no tool library \"shoppe\"");
+    EXPECT_EQ(of("", "default"), "tools.library : there is no tool library \"default\"");
+    EXPECT_EQ(of("", "shop.csv").substr(0, 13), "tools.missing") << "a file by its ending";
+    EXPECT_EQ(of("", "./shop").substr(0, 12), "tools.format") << "a file by its folder";
+    EXPECT_EQ(of("[tools]\nlibrary = \"shop\"\nstickout = 40.0\n"),
+              "tools.conflict job.toml:3: the library shop states stickout of every tool");
+    EXPECT_EQ(of("[tools]\nlibrary = \"shop\"\nnumbers = [1, 2, 3, 12]\n"),
+              "tools.number shop: it has no tool 12");
+    EXPECT_EQ(of("[tools]\nlibrary = \"shop\"\n[[tool]]\nnumber = 6\ndiameter = \"wide\"\n"),
+              "job.type job.toml:5: tool[6].diameter is a text, not a number");
+    EXPECT_EQ(error_of([&] { (void)default_job_toml("default"); }),
+              "job.library : there is no tool library \"default\"");
 }
 
 TEST(ToolLibrary, DamagedFilesAreReadOrRefused) {

@@ -8,6 +8,7 @@
 
 #include "engine/planner/planner.h"
 #include "engine/tool_choice/select.h"
+#include "engine/tools/libraries.h"
 #include "kernels/errors.h"
 #include "tests/support/height_field.h"
 
@@ -46,6 +47,44 @@ TEST(Tools, LuosLibrary) {
     EXPECT_EQ(tools.rest[2].kind, ToolKind::ball);
     EXPECT_EQ(next_wider_ball(job, tools.finish)->diameter, 12.7);
     EXPECT_FALSE(next_wider_ball(job, luo_library().back()).has_value());
+}
+
+// The shop's libraries reach through a 19 mm slab as the default set does, so that nobody pays for a small
+// tool with layers; and their fixed set is print's, in metric the nearest to it.
+TEST(Tools, TheShopsLibraries) {
+    for (const std::vector<Tool>& tools : {shop_library(), metric_library()}) {
+        Job job;
+        job.tools = tools;
+        EXPECT_NO_THROW(validate(job));
+        EXPECT_DOUBLE_EQ(max_layer_thickness(job), max_layer_thickness(Job{}));
+        EXPECT_TRUE(selects_tools(job));
+        const LayerTools fixed = fixed_tools(job);
+        EXPECT_EQ(fixed.rough.number, 2);
+        EXPECT_EQ(fixed.finish.number, 3);
+        for (std::size_t i = 0; i < tools.size(); ++i) {
+            EXPECT_EQ(tools[i].number, static_cast<int>(i) + 1);
+            EXPECT_GT(tools[i].stickout, tools[i].flute_length);
+            EXPECT_LE(tools[i].shank_diameter, tools[i].diameter) << "a thicker shank would touch walls";
+        }
+        const auto count = [&](ToolKind kind) {
+            return std::count_if(tools.begin(), tools.end(), [&](const Tool& t) { return t.kind == kind; });
+        };
+        EXPECT_EQ(count(ToolKind::face), 1);
+        EXPECT_EQ(count(ToolKind::flat), 4);
+        EXPECT_EQ(count(ToolKind::ball), 3);
+    }
+    const std::vector<Tool> shop = shop_library(), luo = luo_library(), fixed = Job{}.tools;
+    for (std::size_t i = 0; i < fixed.size(); ++i) {
+        EXPECT_EQ(shop[i].name, fixed[i].name);
+        EXPECT_EQ(shop[i].stickout, fixed[i].stickout);
+    }
+    for (const Tool& tool : shop)
+        for (const Tool& printed : luo)
+            if (tool.kind == printed.kind && std::abs(tool.diameter - printed.diameter) < 1e-9) {
+                EXPECT_EQ(tool.stepdown_min, printed.stepdown_min) << tool.name;
+                EXPECT_EQ(tool.stepdown_max, printed.stepdown_max) << tool.name;
+            }
+    EXPECT_NEAR(metric_library()[3].stepdown_max, 6.25, 1e-12);  // 25 mm at a quarter, as 1 in
 }
 
 TEST(Tools, LevelsAreEvenDownToEveryFloor) {

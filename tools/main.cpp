@@ -351,7 +351,9 @@ void add_reading(CLI::App& command, Options& options) {
 void add_common(CLI::App& command, Options& options) {
     add_limits(command, options);
     command.add_option("--job", options.job_file, "job file; `slabwright job --defaults` prints one");
-    command.add_option("--tools", options.tools, "tool library: .tbl, .fctl, .fctb or .csv (io/JOB.md)");
+    command.add_option(
+        "--tools", options.tools,
+        "tool library: fixed, shop, metric, luo, or a file .tbl, .fctl, .fctb or .csv (io/JOB.md)");
     add_reading(command, options);
     command
         .add_flag("--repair{mend}", options.repair,
@@ -527,8 +529,8 @@ int command(int argc, char** argv) {
     CLI::App* job_command = app.add_subcommand("job", "job files");
     job_command->add_flag("--defaults", options.defaults, "print every key with its default and a comment")
         ->required();
-    job_command->add_option("--library", options.library, "with these tools: default, or luo (Luo table 5.4)")
-        ->check(CLI::IsMember({"default", "luo"}));
+    job_command->add_option("--library", options.library,
+                            "with these tools: fixed, shop, metric, or luo (Luo table 5.4)");
     job_command->add_flag("--json", options.json, "errors as JSON on stderr");
 
     // An error of the command line comes before its options are known, so --json is looked for by hand.
@@ -567,7 +569,7 @@ int command(int argc, char** argv) {
             return run_sheets(options, sheets_options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*feed_command) print(run_feed(feed_options));
         else if (*bond_command) print(run_bond(bond_options));
-        else print(default_job_toml(options.library.empty() ? "default" : options.library));
+        else print(default_job_toml(options.library.empty() ? "fixed" : options.library));
         return 0;
     } catch (const Error& error) {
         return complain(error, options.json || bond_options.json || feed_options.json);

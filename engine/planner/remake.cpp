@@ -14,6 +14,7 @@
 #include "engine/planner/layer_plan.h"
 #include "engine/schedule/glue_path.h"
 #include "engine/schedule/heights.h"
+#include "engine/schedule/magazine.h"
 #include "engine/schedule/schedule.h"
 #include "engine/schedule/slab_steps.h"
 #include "engine/simulate/planned_build.h"
@@ -113,13 +114,31 @@ Operation face_off(Context& context, const Plan& plan, const Layer& layer, doubl
     return operation;
 }
 
+/// The tools of the programs to come, in the order of execution: those that face layers off, and the plan's
+/// own from a layer on.
+std::vector<ProgramTools> tools_to_come(const RemakeRequest& request, const Spoilt& spoilt, int face_mill) {
+    std::vector<ProgramTools> programs(spoilt.top - spoilt.layer + 1, {{face_mill}, face_mill});
+    const std::vector<PlannedProgram>& all = request.plan.programs;
+    for (std::size_t p = 0; p < all.size(); ++p) {
+        if (all[p].layer < spoilt.layer) continue;
+        if (p == 0 || file_of(all[p].file) != file_of(all[p - 1].file)) programs.emplace_back();
+        ProgramTools& program = programs.back();
+        program.last = all[p].tool;
+        if (std::find(program.tools.begin(), program.tools.end(), program.last) == program.tools.end())
+            program.tools.push_back(program.last);
+    }
+    return programs;
+}
+
 /// The steps of the new sequence, one after another.
 class RemadeSteps {
 public:
-    RemadeSteps(const RemakeRequest& request, const Plan& plan)
+    RemadeSteps(const RemakeRequest& request, const Plan& plan, std::vector<ProgramTools> programs)
         : request_(request),
           plan_(plan),
           machine_(plan.job.machine),
+          magazine_(steps_, machine_, std::move(programs), request.state.magazine,
+                    request.state.spindle_tool),
           spindle_tool_(request.state.spindle_tool),
           table_(request.state.table),
           handler_(request.state.handler) {
@@ -132,7 +151,10 @@ public:
         last_ = add(plan.layers[0].index, "clear", {open.begin(), open.end()}, 0).id;
     }
 
-    void clear_for(const Layer& layer) { steps_.back().layer = layer.index; }
+    void clear_for(const Layer& layer) {
+        steps_.back().layer = layer.index;
+        magazine_.fill(layer.index, {last_});
+    }
 
     /// @param set whether the table is at the layer's height already, @param touched and its top found
     void face_off(const Layer& layer, const Operation& operation, double top, bool set, bool touched) {
@@ -143,11 +165,12 @@ public:
         }
         if (!set || !touched)
             say_touch_off(follow(layer.index, "touch_off", 0), plan_, layer, top - heights.origin);
-        if (spindle_tool_ != operation.tool) {
-            say_tool(follow(layer.index, "tool_change", machine_.tool_change_s), operation.tool, machine_);
-            spindle_tool_ = operation.tool;
-        }
-        SequenceStep& step = follow(layer.index, "face_off", operation.minutes * 60);
+        std::set<int> needs{last_};
+        magazine_.load_for(next_program_++, layer.index, needs);
+        if (spindle_tool_ != operation.tool) change_tool(layer.index, operation.tool, needs);
+        SequenceStep& step =
+            add(layer.index, "face_off", {needs.begin(), needs.end()}, operation.minutes * 60);
+        last_ = step.id;
         step.numbers = {{"tool", operation.tool}};
         add_heights(step, {&operation, 1}, heights.origin);
         step.words = {{"program", request_.folder + operation.file}, {"purpose", operation.purpose}};
@@ -182,6 +205,14 @@ private:
         last_ = step.id;
         return step;
     }
+    /// @param needs of the step, then of what follows it
+    void change_tool(int layer, int tool, std::set<int>& needs) {
+        SequenceStep& change =
+            add(layer, "tool_change", {needs.begin(), needs.end()}, machine_.tool_change_s);
+        say_tool(change, tool, machine_, magazine_.place_of(tool));
+        spindle_tool_ = tool;
+        needs = {change.id};
+    }
     double table_time(double to) {
         const double seconds = table_ ? table_seconds(machine_, *table_, to) : 0;
         table_ = to;
@@ -196,13 +227,16 @@ private:
             if (known == now_.end()) needs.insert(base_);  // of what was faced off, or lies under it
             else needs.insert(known->second.begin(), known->second.end());
         }
-        if (own.action == "mount_board" || own.action == "load_feed" || own.action == "tool_change") {
+        if (own.action == "mount_board" || own.action == "load_feed" || own.action == "load_tool" ||
+            own.action == "tool_change") {
             if (needs.empty()) needs.insert(base_);
             now_[own.id] = {needs.begin(), needs.end()};
             return;
         }
         if (needs.empty()) needs.insert(base_);
         SequenceStep step = own;
+        if (own.action == "face" || own.action == "mill")
+            magazine_.load_for(next_program_++, own.layer, needs);
         for (auto& [key, value] : step.numbers) {
             if (key == "table_height_mm") step.seconds = table_time(value);
             if (key == "feed_stack_mm") {
@@ -216,11 +250,7 @@ private:
                 handler_ = value;
             }
             if (key != "tool" || static_cast<int>(value) == spindle_tool_) continue;
-            spindle_tool_ = static_cast<int>(value);
-            SequenceStep& change =
-                add(own.layer, "tool_change", {needs.begin(), needs.end()}, machine_.tool_change_s);
-            say_tool(change, spindle_tool_, machine_);
-            needs = {change.id};
+            change_tool(own.layer, static_cast<int>(value), needs);
         }
         for (const auto& [key, value] : step.numbers)
             if (key == "last_tool") spindle_tool_ = static_cast<int>(value);  // its program changes it
@@ -241,6 +271,8 @@ private:
     const Plan& plan_;
     const Machine& machine_;
     std::vector<SequenceStep> steps_;
+    MagazineSteps magazine_;
+    std::size_t next_program_ = 0;
     int spindle_tool_ = 0, last_ = 0, base_ = 0, last_taken_ = 0;
     std::optional<double> table_;
     std::map<int, std::vector<int>> now_;  // what a step of the plan's own sequence is now
@@ -256,8 +288,9 @@ Remake remake_layer(Context& context, const RemakeRequest& request) {
     Remake remake;
     Plan& plan = remake.plan = bare_plan(request.plan);
     validate(plan.job);
-    remake.most_mm = face_step(plan.job, tool_of_kind(plan.job, ToolKind::face));
-    RemadeSteps steps(request, plan);
+    const Tool& face_mill = tool_of_kind(plan.job, ToolKind::face);
+    remake.most_mm = face_step(plan.job, face_mill);
+    RemadeSteps steps(request, plan, tools_to_come(request, spoilt, face_mill.number));
     steps.clear_for(plan.layers[spoilt.top]);
     for (std::size_t l = spoilt.top + 1; l-- > spoilt.layer;) {
         Layer& layer = plan.layers[l];

@@ -7,6 +7,7 @@
 
 #include "engine/schedule/glue_path.h"
 #include "engine/schedule/heights.h"
+#include "engine/schedule/magazine.h"
 #include "engine/schedule/slab_steps.h"
 
 namespace slabwright {
@@ -63,6 +64,23 @@ void say_program(SequenceStep& step, const Layer& layer, std::size_t begin, std:
     step.words = {{"program", "nc/" + std::string(file_of(all[begin].file))}, {"purpose", purpose}};
 }
 
+/// The tools of every program, in the order of execution.
+std::vector<ProgramTools> tools_of_programs(const Plan& plan) {
+    std::vector<ProgramTools> programs;
+    for (const Layer& layer : plan.layers)
+        for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
+            end = file_end(layer, begin);
+            ProgramTools& program = programs.emplace_back();
+            for (std::size_t i = begin; i < end; ++i) {
+                program.last = layer.operations[i].tool;
+                if (std::find(program.tools.begin(), program.tools.end(), program.last) ==
+                    program.tools.end())
+                    program.tools.push_back(program.last);
+            }
+        }
+    return programs;
+}
+
 }  // namespace
 
 void name_programs(Plan& plan) {
@@ -96,8 +114,9 @@ void name_programs(Plan& plan) {
     }
 }
 
-void say_tool(SequenceStep& change, int tool, const Machine& machine) {
+void say_tool(SequenceStep& change, int tool, const Machine& machine, int place) {
     change.numbers = {{"tool", tool}};
+    if (place != 0) change.numbers.emplace_back("place", place);
     if (!knows_tool_lengths(machine.post)) change.words = {{"length", "touch off"}};
 }
 
@@ -129,10 +148,14 @@ void schedule(Plan& plan) {
                      {"length_mm", stock.length()},
                      {"width_mm", stock.width()},
                      {"mass_kg", board_mass_kg(plan)}};
+    const int mounted = board.id;
+    MagazineSteps magazine(steps, job.machine, tools_of_programs(plan));
+    magazine.fill(first_layer, {});
     SlabSteps slabs(plan);
-    double table_height = 0;     // of the layer before
-    int stack_ready = board.id;  // the step after which the stack's top is ready for the next slab
+    double table_height = 0;    // of the layer before
+    int stack_ready = mounted;  // the step after which the stack's top is ready for the next slab
     int spindle_tool = 0;
+    std::size_t program = 0;
 
     for (const Layer& layer : plan.layers) {
         ++totals.layers;
@@ -157,17 +180,20 @@ void schedule(Plan& plan) {
         for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
             end = file_end(layer, begin);
             const Operation& first = layer.operations[begin];
+            std::set<int> needs{last};
+            magazine.load_for(program++, layer.index, needs);
             if (first.tool != spindle_tool) {
                 // The program's own T and M6 then find the tool in the spindle, also when the build resumes
                 // at the program.
-                SequenceStep& change = add(layer.index, "tool_change", {last}, job.machine.tool_change_s);
-                say_tool(change, first.tool, job.machine);
-                last = change.id;
+                SequenceStep& change =
+                    add(layer.index, "tool_change", {needs.begin(), needs.end()}, job.machine.tool_change_s);
+                say_tool(change, first.tool, job.machine, magazine.place_of(first.tool));
+                needs = {change.id};
             }
             for (std::size_t i = begin; i < end; ++i)
                 count(totals, layer.operations[i], spindle_tool, job.machine);
             const bool faces = end - begin == 1 && first.kind == OperationKind::face;
-            SequenceStep& mill = add(layer.index, faces ? "face" : "mill", {last}, 0);
+            SequenceStep& mill = add(layer.index, faces ? "face" : "mill", {needs.begin(), needs.end()}, 0);
             say_program(mill, layer, begin, end, heights.origin, job.machine);
             last = mill.id;
         }
@@ -186,8 +212,10 @@ void schedule(Plan& plan) {
     }
 
     totals.bonding_minutes = slabs.minutes();
-    totals.build_minutes =
-        totals.cutting_minutes + totals.bonding_minutes + totals.tool_change_minutes + totals.table_minutes;
+    totals.magazine_swaps = magazine.swaps();
+    totals.magazine_minutes = magazine.swaps() * job.machine.magazine_swap_s / 60;
+    totals.build_minutes = totals.cutting_minutes + totals.bonding_minutes + totals.tool_change_minutes +
+                           totals.table_minutes + totals.magazine_minutes;
     totals.stack_mass_kg = (totals.stock_volume_mm3 + stock.mm2() * job.machine.base_board_thickness) * 1e-9 *
                            job.material.density_kg_m3;
     plan.totals = totals;

@@ -7,7 +7,8 @@ namespace slabwright {
 
 /// Says which tool a tool_change puts in; for a control that keeps no lengths (knows_tool_lengths) also
 /// "length": "touch off", by which the operator brings the new tip to where the last one's was touched off.
-void say_tool(SequenceStep& change, int tool, const Machine& machine);
+/// @param place of the magazine that the tool stands in; 0: there is no magazine
+void say_tool(SequenceStep& change, int tool, const Machine& machine, int place);
 
 /// Tells a touch_off where the layer's slab must be found, as the programs count: its edges of least x and y
 /// (slab_left_mm, slab_front_mm) and its top (slab_top_mm).

@@ -20,13 +20,12 @@ constexpr double kLitres = 0.01;
 class BuildReplay : GlueSteps {
 public:
     BuildReplay(const BuildPlan& plan, const BuildSequence& sequence, BuildState from)
-        : GlueSteps(plan, sequence.steps, std::move(from)),
-          sequence_(sequence),
-          slabs_(build_.slabs()),
-          order_(sequence.steps) {
+        : GlueSteps(plan, sequence.steps, std::move(from)), sequence_(sequence), slabs_(build_.slabs()) {
         s_.ran_in.resize(plan.programs.size());
         s_.faced_off.resize(plan.face_offs.size());
         programs_left_.resize(plan.layers.size());
+        if (plan.job_stated) s_.magazine.resize(static_cast<std::size_t>(plan.job.machine.magazine), 0);
+        s_.magazine_set.resize(s_.magazine.size());
         for (std::size_t p = 0; p < plan.programs.size(); ++p)
             if (!s_.ran_in[p]) ++programs_left_[plan.programs[p].layer];
     }
@@ -63,13 +62,6 @@ private:
         else wait_for(cause);
     }
 
-    /// Where `cause` has happened, the step must not begin before it.
-    void wait_for(Cause cause) {
-        if (cause && !full() && !order_.last_waits_for(*cause))
-            complain("sequence.needs",
-                     fmt::format("does not need {}, before which it must not begin", title(*cause)));
-    }
-
     // --- the steps
 
     void check_head() {
@@ -95,6 +87,7 @@ private:
                                                                {"table", &BuildReplay::table},
                                                                {"touch_off", &BuildReplay::touch_off},
                                                                {"tool_change", &BuildReplay::tool_change},
+                                                               {"load_tool", &BuildReplay::load_tool},
                                                                {"face", &BuildReplay::program},
                                                                {"mill", &BuildReplay::program},
                                                                {"clear", &BuildReplay::clear},
@@ -399,11 +392,58 @@ private:
                 complain("sequence.tool", fmt::format("puts tool {} into the spindle; {} wants tool {}",
                                                       *tool, file_of(next->file), next->tool));
         }
+        if (tool && !s_.magazine.empty()) {
+            if (const std::optional<std::size_t> place = place_of(*tool)) {
+                expect("sequence.magazine", "place", static_cast<double>(*place) + 1, 0);
+                wait_for(s_.magazine_set[*place]);
+            } else
+                complain("sequence.magazine",
+                         fmt::format("tool {} stands in no place of the magazine", *tool));
+        }
         expect_job_seconds(plan_.job.machine.tool_change_s);
         if (!build_.keeps_lengths()) expect_word("sequence.tool_length", "length", "touch off");
         s_.spindle_tool = tool.value_or(0);
         s_.tool_in = here();
         s_.unused_change = true;
+    }
+
+    /// By hand: a tool is put into a place of the magazine, the one that stood there is taken out.
+    void load_tool() {
+        if (const std::optional<const PlannedProgram*> user = tool_user(); user && *user)
+            expect_layer((*user)->layer);
+        const std::optional<int> place = whole("place"), tool = whole("tool");
+        if (tool && !build_.tool_of(*tool))
+            complain("sequence.tool", fmt::format("tool {} is not in the library", *tool));
+        const auto places = static_cast<int>(s_.magazine.size());
+        if (!place || *place < 1 || *place > places) {
+            if (place && plan_.job_stated)
+                complain("sequence.magazine",
+                         fmt::format("fills place {} of a magazine of {} places", *place, places));
+            return;
+        }
+        const auto at = static_cast<std::size_t>(*place) - 1;
+        const int out = s_.magazine[at], told = states("tool_out") ? whole("tool_out").value_or(0) : 0;
+        if (told != out)
+            complain("sequence.magazine",
+                     fmt::format("takes tool {} out of place {}, where tool {} stands (0: none)", told,
+                                 *place, out));
+        if (const std::optional<std::size_t> other = place_of(tool.value_or(0)))
+            complain("sequence.magazine",
+                     fmt::format("puts in tool {}, which stands in place {} already", *tool, *other + 1));
+        if (out != 0) {
+            wait_for(s_.magazine_set[at]);
+            wait_for(s_.last_cut);
+        }
+        if (out != 0 && out == s_.spindle_tool) {
+            expect_word("sequence.magazine", "from", "spindle");
+            wait_for(s_.tool_in);
+            s_.spindle_tool = 0;
+        } else if (has_word("from"))
+            complain("sequence.magazine",
+                     fmt::format("takes out of the spindle what is not in it: tool {} is", s_.spindle_tool));
+        expect_job_seconds(out != 0 ? plan_.job.machine.magazine_swap_s : 0);
+        s_.magazine[at] = tool.value_or(0);
+        s_.magazine_set[at] = here();
     }
 
     void program() {
@@ -457,6 +497,7 @@ private:
         s_.faced_off[*p] = here();
         expect_layer(planned.layer);
         check_tool(planned);
+        check_magazine({&planned, 1});
         check_heights({&planned, 1});
         const LayerToBuild& layer = plan_.layers[planned.layer];
         if (planned.low && !(std::abs(*planned.low - layer.z_bottom) <= kLength))
@@ -523,7 +564,6 @@ private:
     const BuildSequence& sequence_;
     const std::vector<DueSlab>& slabs_;       // of the whole build, bottom up
     std::vector<std::size_t> programs_left_;  // of each layer
-    StepOrder order_;
 };
 
 }  // namespace

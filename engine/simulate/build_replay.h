@@ -90,7 +90,8 @@ struct BuildSequence {
 /// the step), sequence.layer, sequence.feed, sequence.stack (a slab from another pile), sequence.handler (its
 /// place), sequence.slab, sequence.glue, sequence.glue_side, sequence.glue_path, sequence.glue_mass,
 /// sequence.pump, sequence.place, sequence.press,
-/// sequence.table, sequence.touch_off, sequence.tool, sequence.program, sequence.height (of a program),
+/// sequence.table, sequence.touch_off, sequence.tool, sequence.magazine (a tool that does not stand where it
+/// is wanted, a place that is none or holds another), sequence.program, sequence.height (of a program),
 /// sequence.mass, sequence.travel, sequence.time, sequence.value (a quantity that is missing or not what the
 /// plan says), sequence.missing (what was not done in the end).
 [[nodiscard]] std::vector<Violation> replay_build(const BuildPlan& plan, const BuildSequence& sequence);

@@ -32,7 +32,9 @@ PlannedBuild::PlannedBuild(const BuildPlan& plan) : plan_(plan) {
 std::size_t PlannedBuild::most_steps() const {
     const std::size_t programs = plan_.programs.size() + plan_.face_offs.size();
     const std::size_t builds = 1 + std::min(plan_.face_offs.size(), kMostRemakes);
-    return builds * (kStepsEach * (slabs_.size() + 2) + 2 * programs);
+    // A program may have a change of tool and a load of the magazine before it; its places are filled too.
+    const auto places = static_cast<std::size_t>(plan_.job_stated ? plan_.job.machine.magazine : 0);
+    return builds * (kStepsEach * (slabs_.size() + 2) + 3 * programs + places);
 }
 
 double PlannedBuild::board_mass(double thickness) const {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -56,6 +57,7 @@ void ProgramSteps::check_file(std::size_t begin, std::size_t end) {
         complain("sequence.order",
                  fmt::format("the slabs of layer {} are not placed and pressed, or lie under others",
                              plan_.layers[planned.layer].index));
+    check_magazine({plan_.programs.data() + begin, end - begin});
     check_heights({plan_.programs.data() + begin, end - begin});
 }
 
@@ -93,6 +95,27 @@ void ProgramSteps::check_tool(const PlannedProgram& planned) {
                      ? fmt::format("no tool has been put into the spindle for {}", file_of(planned.file))
                      : fmt::format("tool {} is in the spindle, {} is made for tool {}", s_.spindle_tool,
                                    planned.file, planned.tool));
+}
+
+std::optional<std::size_t> ProgramSteps::place_of(int tool) const {
+    const auto found = std::find(s_.magazine.begin(), s_.magazine.end(), tool);
+    if (tool == 0 || found == s_.magazine.end()) return std::nullopt;
+    return static_cast<std::size_t>(found - s_.magazine.begin());
+}
+
+void ProgramSteps::check_magazine(std::span<const PlannedProgram> programs) {
+    if (s_.magazine.empty()) return;
+    std::vector<int> told;
+    for (const PlannedProgram& planned : programs) {
+        if (std::find(told.begin(), told.end(), planned.tool) != told.end()) continue;
+        told.push_back(planned.tool);
+        const std::optional<std::size_t> place = place_of(planned.tool);
+        if (place) wait_for(s_.magazine_set[*place]);
+        else
+            complain("sequence.magazine",
+                     fmt::format("{} wants tool {}, which stands in no place of the magazine", planned.file,
+                                 planned.tool));
+    }
 }
 
 void ProgramSteps::check_heights(std::span<const PlannedProgram> programs) {

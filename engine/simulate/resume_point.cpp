@@ -59,6 +59,20 @@ void say_touch_off(ResumePoint& point, const PlannedBuild& build, const BuildSta
                     with, mm(*point.touch_off_mm), mm(-origin), mm(*point.work_offset_mm)));
 }
 
+/// Where the tools stand, and which of them is in the spindle.
+void say_magazine(ResumePoint& point) {
+    std::string places;
+    for (std::size_t i = 0; i < point.magazine.size(); ++i) {
+        if (point.magazine[i] == 0) continue;
+        places += fmt::format("{}T{} in place {}{}", places.empty() ? "" : ", ", point.magazine[i], i + 1,
+                              point.magazine[i] == point.tool ? " (now in the spindle)" : "");
+    }
+    if (!point.magazine.empty())
+        point.checks.push_back(places.empty()
+                                   ? "the magazine is empty"
+                                   : fmt::format("the magazine has {}, and no other tool", places));
+}
+
 }  // namespace
 
 std::string_view name(GlueState state) {
@@ -84,6 +98,7 @@ ResumePoint resume_point(const BuildPlan& plan, const BuildSequence& sequence, c
     point.in_feed = state.in_feed;
     point.in_hand = state.in_hand.has_value();
     point.tool = state.spindle_tool;
+    point.magazine = state.magazine;
     point.table_mm = state.table;
     point.glue = state.to_press ? GlueState::unpressed : state.glued ? GlueState::spread : GlueState::none;
     if (state.unloaded) {
@@ -96,6 +111,7 @@ ResumePoint resume_point(const BuildPlan& plan, const BuildSequence& sequence, c
     }
     point.checks.emplace_back(state.in_hand ? "the clamps hold the base board, and the handler its slab"
                                             : "the clamps hold the base board");
+    say_magazine(point);
     double thickest = 0;
     std::size_t layer = 0;
     if (state.placed > 0) {

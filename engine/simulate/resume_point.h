@@ -19,16 +19,17 @@ enum class GlueState : std::uint8_t {
 [[nodiscard]] std::string_view name(GlueState state);
 
 struct ResumePoint {
-    int layer = 0;            ///< that lies on top; 0: none is placed
-    int slabs = 0;            ///< on the stack
-    double bonded_mm = 0;     ///< the stack's height above the base board
-    double stack_mm = 0;      ///< above the build table, base board included
-    double tolerance_mm = 0;  ///< by which a measured height may differ
-    bool faced = false;       ///< the layer on top has been faced
-    double load_kg = 0;       ///< on the build table
-    int in_feed = 0;          ///< slabs in the feed chamber
-    bool in_hand = false;     ///< the material handler holds one
-    int tool = 0;             ///< in the spindle; 0: none
+    int layer = 0;                ///< that lies on top; 0: none is placed
+    int slabs = 0;                ///< on the stack
+    double bonded_mm = 0;         ///< the stack's height above the base board
+    double stack_mm = 0;          ///< above the build table, base board included
+    double tolerance_mm = 0;      ///< by which a measured height may differ
+    bool faced = false;           ///< the layer on top has been faced
+    double load_kg = 0;           ///< on the build table
+    int in_feed = 0;              ///< slabs in the feed chamber
+    bool in_hand = false;         ///< the material handler holds one
+    int tool = 0;                 ///< in the spindle; 0: none
+    std::vector<int> magazine{};  ///< the tool in each place, 0 for none; empty: there is no magazine
     GlueState glue = GlueState::none;
     bool glue_lost = false;                ///< it has waited longer than its open time
     std::optional<double> table_mm;        ///< the table's surface (LayerHeights::table); none: not moved yet

@@ -26,6 +26,11 @@ bool SequenceFindings::states(std::string_view key) const {
                        [&](const auto& number) { return number.first == key; });
 }
 
+bool SequenceFindings::has_word(std::string_view key) const {
+    return std::any_of(step().words.begin(), step().words.end(),
+                       [&](const auto& word) { return word.first == key; });
+}
+
 std::optional<double> SequenceFindings::number(const char* key) {
     for (const auto& [name, value] : step().numbers)
         if (name == key) return value;

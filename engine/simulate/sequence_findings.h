@@ -28,6 +28,7 @@ public:
 
     /// Whether the step has such a quantity; no complaint where it has none.
     [[nodiscard]] bool states(std::string_view key) const;
+    [[nodiscard]] bool has_word(std::string_view key) const;
     /// A quantity or a word of the step; none, and a complaint, where it has no such thing.
     std::optional<double> number(const char* key);
     std::optional<std::string> word(const char* key);

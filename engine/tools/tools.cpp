@@ -59,38 +59,6 @@ std::vector<Tool> rest_tools(const Job& job, double rough_diameter, double finis
     return rest;
 }
 
-std::vector<Tool> luo_library() {
-    struct Size {
-        const char* name;
-        double inches, low, high;        // diameter and stepdowns
-        double flute, stickout, holder;  // mm
-    };
-    constexpr Size sizes[] = {{"1/8 in", 0.125, 0, 0.0625, 25, 40, 32},
-                              {"1/4 in", 0.25, 0.0625, 0.125, 30, 45, 32},
-                              {"1/2 in", 0.5, 0.1, 0.15, 32, 60, 40},
-                              {"3/4 in", 0.75, 0.12, 0.2, 38, 65, 50},
-                              {"1 in", 1.0, 0.16, 0.25, 45, 75, 50}};
-    std::vector<Tool> tools{Job{}.tools.front()};
-    for (const ToolKind kind : {ToolKind::flat, ToolKind::ball}) {
-        int number = kind == ToolKind::flat ? 2 : 12;
-        for (const Size& size : sizes) {
-            Tool tool;
-            tool.number = number++;
-            tool.kind = kind;
-            tool.name = std::string(kind == ToolKind::flat ? "flat end mill " : "ball end mill ") + size.name;
-            tool.diameter = tool.shank_diameter = size.inches * kInch;
-            tool.flute_length = size.flute;
-            tool.stickout = size.stickout;
-            tool.holder_diameter = size.holder;
-            tool.stepdown_min = size.low * kInch;
-            tool.stepdown_max = size.high * kInch;
-            tool.plunges = plunges_by_default(kind);
-            tools.push_back(tool);
-        }
-    }
-    return tools;
-}
-
 std::optional<LayerTools> stiffer_tools(const Job& job, const LayerTools& tools) {
     LayerTools stiffer = tools;
     bool changed = stiffen(job, stiffer.rough);

@@ -32,11 +32,6 @@ struct LayerTools {
 /// over is a sliver that tears off when it is cut.
 [[nodiscard]] double least_slab(const Tool& tool);
 
-/// The library of LUO table 5.4: flat and ball end mills of 1/8, 1/4, 1/2, 3/4 and 1 in with their stepdowns,
-/// numbers 2 … 6 and 12 … 16, and the default face mill. Their flutes reach through a 19 mm slab; what LUO
-/// does not give is ours.
-[[nodiscard]] std::vector<Tool> luo_library();
-
 /// The set with the stiffest twin of each tool in its place: as wide, of its kind, with less stick-out; none
 /// where no tool has one. Stepdowns stay.
 [[nodiscard]] std::optional<LayerTools> stiffer_tools(const Job& job, const LayerTools& tools);

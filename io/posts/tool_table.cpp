@@ -9,13 +9,18 @@
 
 namespace slabwright {
 
-std::string tool_table(const Job& job) {
+std::string tool_table(const Job& job, const std::vector<int>& magazine) {
     std::vector<const Tool*> tools;
     for (const Tool& tool : job.tools) tools.push_back(&tool);
     std::sort(tools.begin(), tools.end(), [](const Tool* a, const Tool* b) { return a->number < b->number; });
     std::string text;
+    std::size_t outside = magazine.size();  // the last pocket that was given
     for (const Tool* tool : tools) {
-        text += fmt::format("T{0} P{0} D", tool->number);
+        const auto place = std::find(magazine.begin(), magazine.end(), tool->number);
+        auto pocket = static_cast<std::size_t>(tool->number);
+        if (place != magazine.end()) pocket = static_cast<std::size_t>(place - magazine.begin()) + 1;
+        else if (!magazine.empty()) pocket = ++outside;
+        text += fmt::format("T{} P{} D", tool->number, pocket);
         append_rounded(text, tool->diameter, 4);
         text += fmt::format(" Z0 ;{}\n", comment_text(tool->name));
     }

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <set>
 #include <system_error>
 
@@ -20,8 +21,13 @@ constexpr std::size_t kLongestRow = 250;  // characters; LinuxCNC reads rows of 
 
 class TableChecker {
 public:
-    TableChecker(std::string_view text, const std::string& file, const std::vector<Tool>& tools)
-        : text_(text), path_(file), file_(std::filesystem::path(file).filename().string()), tools_(tools) {}
+    TableChecker(std::string_view text, const std::string& file, const std::vector<Tool>& tools,
+                 const std::vector<int>& magazine)
+        : text_(text),
+          path_(file),
+          file_(std::filesystem::path(file).filename().string()),
+          tools_(tools),
+          magazine_(magazine) {}
 
     std::vector<Violation> run() {
         for (std::size_t at = 0; at < text_.size();) {
@@ -91,6 +97,22 @@ private:
     [[nodiscard]] double value(char letter) const { return values_[static_cast<std::size_t>(letter - 'A')]; }
     [[nodiscard]] bool given(char letter) const { return given_[static_cast<std::size_t>(letter - 'A')]; }
 
+    void pocket(int tool, double pocket) {
+        if (const int first = pockets_.emplace(pocket, tool).first->second;
+            !magazine_.empty() && first != tool)
+            complain(fmt::format("tools {} and {} are said to be in one pocket, {}", first, tool, pocket), 0);
+        const auto place = std::find(magazine_.begin(), magazine_.end(), tool);
+        const auto places = static_cast<double>(magazine_.size());
+        const bool right = magazine_.empty() ? pocket == tool
+                           : place == magazine_.end()
+                               ? pocket > places
+                               : pocket == static_cast<double>(place - magazine_.begin()) + 1;
+        if (!right)
+            complain(fmt::format("tool {} is said to be in pocket {}; a changer would fetch another", tool,
+                                 pocket),
+                     0);
+    }
+
     void tool() {
         if (!given('T')) return complain("a row that names no tool", 0);
         const double t = value('T');
@@ -99,10 +121,7 @@ private:
         if (tool == tools_.end()) return complain(fmt::format("tool {} is not in the plan", t), 0);
         if (!seen_.insert(tool->number).second) complain(fmt::format("a second row for tool {}", t), 0);
         if (!given('P')) complain(fmt::format("tool {} has no pocket (P)", t), 0);
-        else if (value('P') != t)
-            complain(fmt::format("tool {} is said to be in pocket {}; a changer would fetch another", t,
-                                 value('P')),
-                     0);
+        else pocket(tool->number, value('P'));
         if (const double wrong = std::abs(value('D') - tool->diameter); !(wrong <= kDiameter))
             complain(fmt::format("tool {} has the diameter {} where the plan says {}", t, value('D'),
                                  tool->diameter),
@@ -125,7 +144,9 @@ private:
     std::string file_;
     const std::vector<Tool>& tools_;
     std::vector<Violation> found_;
+    const std::vector<int>& magazine_;
     std::set<int> seen_;
+    std::map<double, int> pockets_;
     std::uint32_t line_ = 0;
     std::vector<double> values_;
     std::vector<bool> given_;
@@ -134,8 +155,8 @@ private:
 }  // namespace
 
 std::vector<Violation> check_tool_table(std::string_view text, const std::string& file,
-                                        const std::vector<Tool>& tools) {
-    return TableChecker(text, file, tools).run();
+                                        const std::vector<Tool>& tools, const std::vector<int>& magazine) {
+    return TableChecker(text, file, tools, magazine).run();
 }
 
 }  // namespace slabwright

@@ -194,6 +194,8 @@ void read_job(const Field& job, BuildPlan& build) {
     const Machine& m = build.job.machine;
     if (!(m.glue_pitch >= 0.1) || !(m.glue_speed > 0) || !(m.handler_speed >= 0) || !(m.pump_g_min >= 0))
         job["machine"].fail("states a glue head or a handler that does not work");
+    if (m.magazine < 0 || m.magazine > 1000 || !(m.magazine_swap_s >= 0))
+        job["machine"].fail("states a magazine of no number of places");
     if (!(m.acceleration > 0) || !(m.rapid_feed > 0) || !(m.max_feed > 0))
         job["machine"].fail("states a machine that does not move");
 }

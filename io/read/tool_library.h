@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -18,6 +19,15 @@ using StatedValue = std::pair<std::string, std::variant<double, std::int64_t, bo
 struct LibraryTool {
     std::string place;                ///< file:line
     std::vector<StatedValue> values;  ///< each key once
+};
+
+/// Where a job's tools come from besides its [[tool]].
+struct ToolSource {
+    /// Reads the file that [tools] library names, of these numbers (none: of all); none: files are refused,
+    /// the house's own libraries are not.
+    std::function<std::vector<LibraryTool>(const std::string& name, const std::vector<std::int64_t>& wanted)>
+        read;
+    std::string library = {};  ///< a file or a name instead of [tools] library; "": as the job says
 };
 
 /// Reads a library by the end of its name: .tbl (LinuxCNC, in mm: number, diameter, remark as name), .fctl

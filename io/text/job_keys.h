@@ -190,6 +190,10 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
     visit.key("spindle_torque_nm", machine.spindle_torque_nm, "Nm, likewise");
     visit.key("spindle_dwell_s", machine.spindle_dwell_s, "s, from spindle start to the first motion");
     visit.key("tool_change_s", machine.tool_change_s, "s");
+    visit.key("magazine", machine.magazine,
+              "places for tools in its magazine; 0: tools are changed by hand, no limit");
+    visit.key("magazine_swap_s", machine.magazine_swap_s,
+              "s, by hand: one tool out of a place of the magazine, another in");
     visit.key("clearance", machine.clearance, "mm of air between a rapid and the highest stock");
     visit.word("frame", machine.frame, kFrameWords,
                "pattern-base (z = 0 at the pattern's bottom), layer-top (z = 0 at the layer's top), or auto: "

@@ -154,6 +154,18 @@ public:
         if (found == place_of_.end()) text_.refuse(fmt::format("{} names a step that does not exist", key));
         return found->second;
     }
+    /// Of each place of the magazine its tool and the step that put it in, 0 for none.
+    void magazine(std::size_t places, BuildState& state) const {
+        if (places == 0) return;
+        const Json& from = text_.at(state_, "magazine");
+        if (!from.is_array() || from.size() != places) text_.refuse("magazine has not the machine's places");
+        for (const Json& entry : from) {
+            if (!entry.is_array() || entry.size() != 2) text_.refuse("magazine has a place that is no pair");
+            state.magazine.push_back(static_cast<int>(text_.whole(entry[0], "magazine")));
+            const bool set = text_.whole(entry[1], "magazine") != 0;
+            state.magazine_set.push_back(set ? Cause(place(entry[1], "magazine")) : std::nullopt);
+        }
+    }
     /// What of the programs ran, and in which step.
     void programs(const BuildPlan& plan, BuildState& state) const {
         const Json& ran = text_.at(state_, "programs");
@@ -220,6 +232,15 @@ std::string progress_json(const BuildProgress& progress, const BuildPlan& plan,
     json.key("state").begin_object();
     StateWriter writer(json, sequence);
     visit_state(progress.state, writer);
+    if (!progress.state.magazine.empty()) {
+        json.key("magazine").begin_array(JsonText::Shape::line);
+        for (std::size_t i = 0; i < progress.state.magazine.size(); ++i) {
+            const Cause& since = progress.state.magazine_set[i];
+            json.begin_array().integer(progress.state.magazine[i]);
+            json.integer(since ? sequence.steps[*since].id : 0).end();
+        }
+        json.end();
+    }
     json.key("programs").begin_object();
     const auto put = [&](const std::vector<PlannedProgram>& programs, const std::vector<Cause>& ran) {
         for (std::size_t p = 0; p < ran.size(); ++p)
@@ -254,6 +275,7 @@ BuildState parse_progress_state(std::string_view text, const BuildPlan& plan, co
     state.faced_off.resize(plan.face_offs.size());
     StateReader reader(from, sequence);
     visit_state(state, reader);
+    if (plan.job_stated) reader.magazine(static_cast<std::size_t>(plan.job.machine.magazine), state);
     reader.programs(plan, state);
     return state;
 }

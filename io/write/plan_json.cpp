@@ -284,12 +284,14 @@ void put_totals(JsonText& json, const Totals& totals) {
     json.key("layers").integer(totals.layers);
     json.key("operations").integer(totals.operations);
     json.key("tool_changes").integer(totals.tool_changes);
+    json.key("magazine_swaps").integer(totals.magazine_swaps);
     json.key("cutting_mm").rounded(totals.cutting_mm, kLength);
     json.key("rapid_mm").rounded(totals.rapid_mm, kLength);
     json.key("cutting_minutes").rounded(totals.cutting_minutes, kMinutes);
     json.key("bonding_minutes").rounded(totals.bonding_minutes, kMinutes);
     json.key("tool_change_minutes").rounded(totals.tool_change_minutes, kMinutes);
     json.key("table_minutes").rounded(totals.table_minutes, kMinutes);
+    json.key("magazine_minutes").rounded(totals.magazine_minutes, kMinutes);
     json.key("build_minutes").rounded(totals.build_minutes, kMinutes);
     json.key("stock_volume_mm3").rounded(totals.stock_volume_mm3, kArea);
     json.key("part_volume_mm3").rounded(totals.part_volume_mm3, kArea);

@@ -27,7 +27,10 @@ std::string told(const SequenceStep& step) {
     for (const auto& [key, value] : step.words)
         if (key == "program") text += " " + value;
     for (const auto& [key, value] : step.numbers) {
-        if (step.action == "tool_change" && key == "tool") text += fmt::format(" T{:.0f}", value);
+        if ((step.action == "tool_change" || step.action == "load_tool") && key == "tool")
+            text += fmt::format(" T{:.0f}", value);
+        if (step.action == "load_tool" && key == "place") text += fmt::format(" place {:.0f}:", value);
+        if (step.action == "load_tool" && key == "tool_out") text += fmt::format(" for T{:.0f}", value);
         if (key == "table_height_mm") text += " to " + mm(value) + " mm";
         if (key == "slab_left_mm") text += " the slab's edges at x = " + mm(value) + " mm";
         if (key == "slab_front_mm") text += ", y = " + mm(value) + " mm, its top";
@@ -70,6 +73,11 @@ std::string resume_json(const ResumeStatus& status) {
     json.key("feed_slabs").integer(p.in_feed);
     json.key("in_hand").boolean(p.in_hand);
     json.key("tool").integer(p.tool);
+    if (!p.magazine.empty()) {
+        json.key("magazine").begin_array(JsonText::Shape::line);
+        for (const int tool : p.magazine) json.integer(tool);
+        json.end();
+    }
     json.key("glue").string(name(p.glue));
     json.key("glue_lost").boolean(p.glue_lost);
     put(json, "table_height_mm", p.table_mm);

@@ -27,7 +27,7 @@
 #include "engine/layers/candidates.h"
 #include "engine/layers/tool_map.h"
 #include "engine/planner/planner.h"
-#include "engine/tools/tools.h"
+#include "engine/tools/libraries.h"
 #include "kernels/features/section_areas.h"
 #include "kernels/mesh/weld.h"
 #include "tests/data/models.h"

@@ -114,6 +114,7 @@ inline Job random_job(std::mt19937& random) {
     job.machine.pump_g_min = random() % 2 ? 0 : 30;
     if (random() % 3 == 0) job.machine.glue_head = random() % 2 ? GlueHead::stack : GlueHead::none;
     if (random() % 4 == 0) job.bonding.glue_g_per_m2 = 0;
+    if (random() % 2) job.machine.magazine = 1 + static_cast<int>(random() % 4);
     return job;
 }
 

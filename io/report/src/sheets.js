@@ -102,6 +102,16 @@ function glueHead(l) {
     return make('p', {class: 'glue-head'}, `by the head on the ${head.side === 'slab' ? 'slab’s underside' : 'stack’s top'}: ${grams}${figure(head.bead_mm / 1000, 2)} m of beads at ${figure(head.speed_mm_min, 0)} mm/min`);
 }
 
+// What is put into the machine's magazine for layer l: at the start all of it, then what is swapped before which program.
+function magazine(l) {
+    const loads = (data.magazine ?? []).filter(load => load.layer === plan.layers[l].index);
+    if (!loads.length) return null;
+    const rows = loads.map(({place, tool, out, from_spindle, before}, i) => [
+        tick(`L${l}:M${i}`, `T${tool} in place ${place}`, true), figure(place, 0), make('strong', {}, `T${tool}`), toolOf(tool)?.name ?? '',
+        out ? `T${out}${from_spindle ? ', out of the spindle' : ''}` : 'empty', before ? make('code', {}, before.replace(/^nc\//, '')) : 'the start']);
+    return make('div', {}, make('h4', {}, `Magazine of ${plan.job.machine.magazine} places`), table(['✓', 'Place', 'Put in', 'Tool', 'In place of', 'Before'], rows, [1]));
+}
+
 function sheet(l, minutes) {
     const layer = plan.layers[l], programs = operations.filter(operation => operation.layer === l), zero = zeroOf(l), filled = filledVolume(l);
     const off = layer.z_bottom + layer.slab_thickness - layer.z_top, files = [...new Set(programs.map(o => fileOf(o).replace(/^nc\//, '')))], first = files[0], final = files[files.length - 1];
@@ -127,6 +137,7 @@ function sheet(l, minutes) {
                 : make('p', {}, 'clamp the slab'))),
         make('div', {class: 'lists'},
             make('div', {}, make('h4', {}, 'Tools'), table(toolHead, toolRows(programs, `L${l}`), [3, 4, 5, 6, 7])),
+            magazine(l),
             make('div', {}, make('h4', {}, 'Programs, in this order'), table(['✓', 'Program', 'Work', 'Tool', 'rpm', 'Feed mm/min', 'Time'], programs.map(o => [
                 tick(`L${l}:${o.name}`, `${o.name} done`, true), make('code', {}, o.name), `${words(o.kind)}: ${o.purpose}`, make('strong', {}, `T${o.tool}`), figure(o.spindle_rpm, 0), feedsOf([o]), duration(o.minutes)]), [4, 5, 6]))),
         make('h4', {}, 'Checks'),

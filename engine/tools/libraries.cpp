@@ -1,0 +1,97 @@
+#include "engine/tools/libraries.h"
+
+#include <string>
+
+namespace slabwright {
+
+namespace {
+
+/// A size of end mills, mm.
+struct Size {
+    const char* name;
+    double diameter, stepdown_min, stepdown_max;
+    double flute, stickout, holder;
+};
+
+Tool end_mill(int number, ToolKind kind, const Size& size) {
+    Tool tool;
+    tool.number = number;
+    tool.kind = kind;
+    tool.name = std::string(kind == ToolKind::flat ? "flat end mill " : "ball end mill ") + size.name;
+    tool.diameter = tool.shank_diameter = size.diameter;
+    tool.flute_length = size.flute;
+    tool.stickout = size.stickout;
+    tool.holder_diameter = size.holder;
+    tool.stepdown_min = size.stepdown_min;
+    tool.stepdown_max = size.stepdown_max;
+    tool.plunges = plunges_by_default(kind);
+    return tool;
+}
+
+/// A row of LUO table 5.4, inches: the diameter, and the range of its stepdown.
+struct LuoRow {
+    double diameter, low, high;
+};
+constexpr LuoRow kEighth{0.125, 0, 0.0625}, kQuarter{0.25, 0.0625, 0.125}, kHalf{0.5, 0.1, 0.15},
+    kThreeQuarters{0.75, 0.12, 0.2}, kWhole{1.0, 0.16, 0.25};
+
+Size in_inches(const char* name, const LuoRow& row, double flute, double stickout, double holder) {
+    return {name, row.diameter * kInch, row.low * kInch, row.high * kInch, flute, stickout, holder};
+}
+
+/// A size in mm that steps in proportion to its diameter as the row's does.
+Size in_mm(const char* name, double diameter, const LuoRow& row, double flute, double stickout,
+           double holder) {
+    const double scale = diameter / row.diameter;
+    return {name, diameter, row.low * scale, row.high * scale, flute, stickout, holder};
+}
+
+}  // namespace
+
+std::vector<Tool> luo_library() {
+    const Size sizes[] = {in_inches("1/8 in", kEighth, 25, 40, 32), in_inches("1/4 in", kQuarter, 30, 45, 32),
+                          in_inches("1/2 in", kHalf, 32, 60, 40),
+                          in_inches("3/4 in", kThreeQuarters, 38, 65, 50),
+                          in_inches("1 in", kWhole, 45, 75, 50)};
+    std::vector<Tool> tools{Job{}.tools.front()};
+    for (const ToolKind kind : {ToolKind::flat, ToolKind::ball}) {
+        int number = kind == ToolKind::flat ? 2 : 12;
+        for (const Size& size : sizes) tools.push_back(end_mill(number++, kind, size));
+    }
+    return tools;
+}
+
+std::vector<Tool> shop_library() {
+    std::vector<Tool> tools = Job{}.tools;
+    tools.push_back(end_mill(4, ToolKind::flat, in_inches("1 in", kWhole, 50.8, 75, 50)));
+    tools.push_back(end_mill(5, ToolKind::flat, in_inches("1/4 in", kQuarter, 30, 45, 32)));
+    tools.push_back(end_mill(6, ToolKind::flat, in_inches("1/8 in", kEighth, 25.4, 38, 32)));
+    tools.push_back(end_mill(7, ToolKind::ball, in_inches("1/2 in", kHalf, 32, 50, 40)));
+    tools.push_back(end_mill(8, ToolKind::ball, in_inches("1/8 in", kEighth, 25.4, 38, 32)));
+    return tools;
+}
+
+std::vector<Tool> metric_library() {
+    const Size three = in_mm("3 mm", 3, kEighth, 24, 38, 32);
+    const Size six = in_mm("6 mm", 6, kQuarter, 30, 45, 32);
+    const Size twelve = in_mm("12 mm", 12, kHalf, 32, 50, 40);
+    std::vector<Tool> tools{Job{}.tools.front()};
+    tools.push_back(end_mill(2, ToolKind::flat, twelve));
+    tools.push_back(end_mill(3, ToolKind::ball, six));
+    tools.push_back(end_mill(4, ToolKind::flat, in_mm("25 mm", 25, kWhole, 50, 75, 50)));
+    tools.push_back(end_mill(5, ToolKind::flat, six));
+    tools.push_back(end_mill(6, ToolKind::flat, three));
+    tools.push_back(end_mill(7, ToolKind::ball, twelve));
+    tools.push_back(end_mill(8, ToolKind::ball, three));
+    return tools;
+}
+
+std::optional<std::vector<Tool>> named_library(std::string_view name) {
+    if (name == "fixed") return Job{}.tools;
+    if (name == "shop") return shop_library();
+    if (name == "metric") return metric_library();
+    if (name == "luo") return luo_library();
+    return std::nullopt;
+}
+
+}  // namespace slabwright

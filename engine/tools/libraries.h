@@ -1,0 +1,33 @@
+// The libraries of tools that the house knows by name.
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "engine/job.h"
+
+namespace slabwright {
+
+/// The library of LUO table 5.4: flat and ball end mills of 1/8, 1/4, 1/2, 3/4 and 1 in with their stepdowns,
+/// numbers 2 … 6 and 12 … 16, and the default face mill. Their flutes reach through a 19 mm slab; what LUO
+/// does not give is ours.
+[[nodiscard]] std::vector<Tool> luo_library();
+
+/// What a shop that mills wood has: the three tools of the fixed set, unchanged and with their numbers, then
+/// flat end mills of 1, 1/4 and 1/8 in and ball end mills of 1/2 and 1/8 in, numbers 4 … 8. Stepdowns are
+/// those of LUO table 5.4; lengths, holders and which sizes there are, are ours (METHOD.md section 7).
+[[nodiscard]] std::vector<Tool> shop_library();
+
+/// The same in millimetres: face mill 50, flat 12 and ball 6 with the numbers of the fixed set, then flat end
+/// mills of 25, 6 and 3 and ball end mills of 12 and 3. Stepdowns are LUO's of the nearest size in inches, in
+/// proportion to the diameter; the rest is ours.
+[[nodiscard]] std::vector<Tool> metric_library();
+
+/// The names that named_library() knows, for people: "fixed, shop, metric or luo".
+inline constexpr std::string_view kLibraryNames = "fixed, shop, metric or luo";
+
+/// A library by its name: `fixed` is what a job has that names no tools. None where no library has the name.
+[[nodiscard]] std::optional<std::vector<Tool>> named_library(std::string_view name);
+
+}  // namespace slabwright
