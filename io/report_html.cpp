@@ -27,7 +27,6 @@
 #include "io/write/output_file.h"
 #include "io/write/report_as_built.h"
 #include "io/write/report_outlines.h"
-#include "io/write/report_steps.h"
 #include "io/write/thinned_path.h"
 #include "kernels/access/deviation.h"
 #include "kernels/errors.h"
@@ -569,8 +568,12 @@ std::string report_html(Context& context, const std::string& directory, const Re
     figures.data = {
         {"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", plan}, {"verify", verify}};
     const auto draw = [&] {
-        figures.data["steps"] = step_times(sequence);
-        figures.data["magazine"] = magazine_loads(sequence);
+        Json& steps = figures.data["steps"] = Json::array();
+        if (sequence.is_object())
+            for (const Json& step : sequence.at("steps"))
+                steps.push_back({step.at("layer").get<int>(), step.at("action").get<std::string>(),
+                                 step.at("seconds").get<double>(),
+                                 step.value("program", step["action"] == "load_tool" ? step : Json())});
         draw_figures(context, mesh, folder, sequence, figures.data);
         return 0;
     };
