@@ -274,27 +274,6 @@ void draw_glue(const Json& sequence, Json& layers) {
 }
 
 /// Sections at the layers' ends, glue, silhouettes, slopes: what pictures are drawn from.
-/// The steps that put tools into the magazine, each with the program that comes next; of what fills an empty
-/// place before the first program none is told.
-Json magazine_loads(const Json& sequence) {
-    Json loads = Json::array();
-    const Json& steps = sequence.at("steps");
-    std::string next;
-    for (auto step = steps.rbegin(); step != steps.rend(); ++step) {
-        if (step->contains("program")) next = step->at("program").get<std::string>();
-        if (step->at("action") != "load_tool") continue;
-        const bool swaps = step->contains("tool_out");
-        loads.push_back({{"layer", step->at("layer").get<int>()},
-                         {"place", step->at("place").get<int>()},
-                         {"tool", step->at("tool").get<int>()},
-                         {"out", swaps ? step->at("tool_out").get<int>() : 0},
-                         {"from_spindle", step->contains("from")},
-                         {"before", swaps ? next : std::string()}});
-    }
-    std::reverse(loads.begin(), loads.end());
-    return loads;
-}
-
 void draw_figures(Context& context, MeshView mesh, const PlannedFolder& folder, const Json& sequence,
                   Json& data) {
     const SimulationInput& input = folder.simulation;
@@ -589,14 +568,12 @@ std::string report_html(Context& context, const std::string& directory, const Re
     figures.data = {
         {"schema", "slabwright.report/1"}, {"three_d", options.three_d}, {"plan", plan}, {"verify", verify}};
     const auto draw = [&] {
-        Json steps = Json::array();
+        Json& steps = figures.data["steps"] = Json::array();
         if (sequence.is_object())
             for (const Json& step : sequence.at("steps"))
                 steps.push_back({step.at("layer").get<int>(), step.at("action").get<std::string>(),
                                  step.at("seconds").get<double>(),
-                                 step.contains("program") ? step.at("program") : Json()});
-        figures.data["steps"] = std::move(steps);
-        if (sequence.is_object()) figures.data["magazine"] = magazine_loads(sequence);
+                                 step.value("program", step["action"] == "load_tool" ? step : Json())});
         draw_figures(context, mesh, folder, sequence, figures.data);
         return 0;
     };

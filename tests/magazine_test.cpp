@@ -317,7 +317,7 @@ TEST(Magazine, AFolderProvesItself) {
     const VerifyResult wrong = verify(context, out, PatternSource(pattern));
     EXPECT_FALSE(wrong.passed);
     const std::string page = support::slurp(out + "/report.html");
-    EXPECT_NE(page.find("\"from_spindle\":"), std::string::npos);
+    EXPECT_NE(page.find("\"from\":\"spindle\""), std::string::npos);
 }
 
 }  // namespace

@@ -359,6 +359,8 @@ TEST(SharedPrograms, TheSequenceRunsFiles) {
     for (int round = 0; round < 30; ++round)
         for (const ProgramSpan span : {ProgramSpan::tool, ProgramSpan::layer}) {
             Job job = support::random_job(random);
+            int& places = job.machine.magazine;
+            if (span == ProgramSpan::layer && places > 0) places = std::max(places, 3);  // a layer's tools
             const Plan single = support::block(job, support::random_shape(random));
             job.machine.programs = span;
             Plan plan = single;

@@ -38,6 +38,9 @@ std::string summary(const Plan& plan, const std::string& out) {
                     t.layers == 1 ? "layer" : "layers", programs, programs == 1 ? "program" : "programs",
                     duration(t.build_minutes), duration(t.cutting_minutes), duration(t.bonding_minutes),
                     duration(t.tool_change_minutes));
+    if (t.magazine_swaps > 0)
+        text += fmt::format("swaps   {} of a tool in the magazine for another, {} of the time\n",
+                            t.magazine_swaps, duration(t.magazine_minutes));
     text += fmt::format("stock   {} x {} mm, {} kg with the base board\n",
                         number(plan.stock_max[0] - plan.stock_min[0], 1),
                         number(plan.stock_max[1] - plan.stock_min[1], 1), number(t.stack_mass_kg, 1));

@@ -115,7 +115,7 @@ MagazineSteps::MagazineSteps(std::vector<SequenceStep>& steps, const Machine& ma
     loads_ = plan_tool_loads(programs_, in_place_, spindle);
 }
 
-SequenceStep& MagazineSteps::load(int layer, const ToolLoad& load, std::set<int> needs) {
+SequenceStep& MagazineSteps::load(int layer, const ToolLoad& load, const std::set<int>& needs) {
     const bool swaps = load.tool_out != 0;
     SequenceStep& step = add_step(steps_, layer, "load_tool", {needs.begin(), needs.end()},
                                   swaps ? machine_.magazine_swap_s : 0);

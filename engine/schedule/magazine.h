@@ -62,7 +62,7 @@ public:
     [[nodiscard]] int swaps() const { return swaps_; }
 
 private:
-    SequenceStep& load(int layer, const ToolLoad& load, std::set<int> needs);
+    SequenceStep& load(int layer, const ToolLoad& load, const std::set<int>& needs);
 
     std::vector<SequenceStep>& steps_;
     const Machine& machine_;

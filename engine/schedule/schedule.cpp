@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "engine/schedule/glue_path.h"
 #include "engine/schedule/heights.h"
@@ -128,6 +129,62 @@ void say_touch_off(SequenceStep& touch, const Plan& plan, const Layer& layer, do
                      {"slab_top_mm", top}};
 }
 
+namespace {
+
+/// Adds the steps that run programs to plan.sequence, with the swaps and changes of tools before them, and
+/// counts them.
+class ProgramRuns {
+public:
+    /// @param plan, totals outlive this
+    ProgramRuns(Plan& plan, Totals& totals)
+        : steps_(plan.sequence),
+          machine_(plan.job.machine),
+          totals_(totals),
+          magazine_(steps_, machine_, tools_of_programs(plan)) {}
+
+    void fill_magazine(int layer) { magazine_.fill(layer, {}); }
+    [[nodiscard]] int swaps() const { return magazine_.swaps(); }
+
+    /// The programs of a layer. @param origin mm, of their z = 0. @param last the step before them. @returns
+    /// the last one's
+    int run(const Layer& layer, double origin, int last) {
+        for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
+            end = file_end(layer, begin);
+            const Operation& first = layer.operations[begin];
+            std::set<int> needs{last};
+            magazine_.load_for(program_++, layer.index, needs);
+            if (first.tool != spindle_tool_) {
+                // The program's own T and M6 then find the tool in the spindle, also when the build resumes
+                // at the program.
+                SequenceStep& change = add(layer, "tool_change", needs, machine_.tool_change_s);
+                say_tool(change, first.tool, machine_, magazine_.place_of(first.tool));
+                needs = {change.id};
+            }
+            for (std::size_t i = begin; i < end; ++i)
+                count(totals_, layer.operations[i], spindle_tool_, machine_);
+            const bool faces = end - begin == 1 && first.kind == OperationKind::face;
+            SequenceStep& mill = add(layer, faces ? "face" : "mill", needs, 0);
+            say_program(mill, layer, begin, end, origin, machine_);
+            last = mill.id;
+        }
+        return last;
+    }
+
+private:
+    SequenceStep& add(const Layer& layer, const char* action, const std::set<int>& needs, double seconds) {
+        return add_step(steps_, layer.index, action, {needs.begin(), needs.end()}, seconds);
+    }
+
+    std::vector<SequenceStep>& steps_;
+    const Machine& machine_;
+    Totals& totals_;
+    MagazineSteps magazine_;
+    std::size_t program_ = 0;
+    int spindle_tool_ = 0;
+};
+
+}  // namespace
+
 void schedule(Plan& plan) {
     name_programs(plan);
     const Job& job = plan.job;
@@ -149,13 +206,11 @@ void schedule(Plan& plan) {
                      {"width_mm", stock.width()},
                      {"mass_kg", board_mass_kg(plan)}};
     const int mounted = board.id;
-    MagazineSteps magazine(steps, job.machine, tools_of_programs(plan));
-    magazine.fill(first_layer, {});
+    ProgramRuns runs(plan, totals);
+    runs.fill_magazine(first_layer);
     SlabSteps slabs(plan);
     double table_height = 0;    // of the layer before
     int stack_ready = mounted;  // the step after which the stack's top is ready for the next slab
-    int spindle_tool = 0;
-    std::size_t program = 0;
 
     for (const Layer& layer : plan.layers) {
         ++totals.layers;
@@ -175,29 +230,7 @@ void schedule(Plan& plan) {
         // What the touch-off has to find: the raw slab's top, in the programs' frame.
         SequenceStep& touch = add(layer.index, "touch_off", {table.id}, 0);
         say_touch_off(touch, plan, layer, layer.z_bottom + layer.slab_thickness - heights.origin);
-        int last = touch.id;
-
-        for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
-            end = file_end(layer, begin);
-            const Operation& first = layer.operations[begin];
-            std::set<int> needs{last};
-            magazine.load_for(program++, layer.index, needs);
-            if (first.tool != spindle_tool) {
-                // The program's own T and M6 then find the tool in the spindle, also when the build resumes
-                // at the program.
-                SequenceStep& change =
-                    add(layer.index, "tool_change", {needs.begin(), needs.end()}, job.machine.tool_change_s);
-                say_tool(change, first.tool, job.machine, magazine.place_of(first.tool));
-                needs = {change.id};
-            }
-            for (std::size_t i = begin; i < end; ++i)
-                count(totals, layer.operations[i], spindle_tool, job.machine);
-            const bool faces = end - begin == 1 && first.kind == OperationKind::face;
-            SequenceStep& mill = add(layer.index, faces ? "face" : "mill", {needs.begin(), needs.end()}, 0);
-            say_program(mill, layer, begin, end, heights.origin, job.machine);
-            last = mill.id;
-        }
-        stack_ready = last;
+        stack_ready = runs.run(layer, heights.origin, touch.id);
     }
     const int last_layer = plan.layers.empty() ? 0 : plan.layers.back().index;
     const int unloaded = add(last_layer, "unload", {stack_ready}, 0).id;
@@ -212,8 +245,8 @@ void schedule(Plan& plan) {
     }
 
     totals.bonding_minutes = slabs.minutes();
-    totals.magazine_swaps = magazine.swaps();
-    totals.magazine_minutes = magazine.swaps() * job.machine.magazine_swap_s / 60;
+    totals.magazine_swaps = runs.swaps();
+    totals.magazine_minutes = runs.swaps() * job.machine.magazine_swap_s / 60;
     totals.build_minutes = totals.cutting_minutes + totals.bonding_minutes + totals.tool_change_minutes +
                            totals.table_minutes + totals.magazine_minutes;
     totals.stack_mass_kg = (totals.stock_volume_mm3 + stock.mm2() * job.machine.base_board_thickness) * 1e-9 *

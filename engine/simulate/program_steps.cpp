@@ -97,6 +97,12 @@ void ProgramSteps::check_tool(const PlannedProgram& planned) {
                                    planned.file, planned.tool));
 }
 
+void ProgramSteps::wait_for(Cause cause) {
+    if (cause && !full() && !order_.last_waits_for(*cause))
+        complain("sequence.needs",
+                 fmt::format("does not need {}, before which it must not begin", title(*cause)));
+}
+
 std::optional<std::size_t> ProgramSteps::place_of(int tool) const {
     const auto found = std::find(s_.magazine.begin(), s_.magazine.end(), tool);
     if (tool == 0 || found == s_.magazine.end()) return std::nullopt;

@@ -1,8 +1,6 @@
 // What the steps that run programs must say of them, and what of the machine they ask.
 #pragma once
 
-#include <fmt/format.h>
-
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -36,11 +34,7 @@ protected:
     /// The place of the program that a face_off names; none where the list has no such program.
     std::optional<std::size_t> named_face_off();
     /// Where `cause` has happened, the step must not begin before it.
-    void wait_for(Cause cause) {
-        if (cause && !full() && !order_.last_waits_for(*cause))
-            complain("sequence.needs",
-                     fmt::format("does not need {}, before which it must not begin", title(*cause)));
-    }
+    void wait_for(Cause cause);
     /// Holds the step against the programs [begin, end) of its file.
     void check_file(std::size_t begin, std::size_t end);
     /// The tool that the step names, and the one in the spindle, against the program that runs first.

@@ -5,13 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <tuple>
 #include <utility>
+#include <variant>
 #include <vector>
 
-#include "io/read/job_tools.h"
-#include "io/read/key_reader.h"
-#include "io/text/decimal.h"
+#include "engine/tools/libraries.h"
 #include "io/text/job_keys.h"
 #include "io/text/json_text.h"
 #include "kernels/errors.h"
@@ -19,6 +20,38 @@
 namespace slabwright {
 
 namespace {
+
+constexpr std::size_t kShownLetters = 60;  ///< of what is wrong, that an error repeats
+
+/// Levenshtein's distance, letters without case.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+    const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+    std::vector<std::size_t> row(b.size() + 1);
+    for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        std::size_t diagonal = row[0];
+        row[0] = i;
+        for (std::size_t j = 1; j <= b.size(); ++j) {
+            const std::size_t change = diagonal + (lower(a[i - 1]) == lower(b[j - 1]) ? 0 : 1);
+            diagonal = row[j];
+            row[j] = std::min({row[j] + 1, row[j - 1] + 1, change});
+        }
+    }
+    return row.back();
+}
+
+std::string nearest_word(std::string_view wanted, const std::vector<std::string>& known) {
+    std::string best;
+    std::size_t best_distance = ~std::size_t{0};
+    for (const std::string& candidate : known) {
+        const std::size_t distance = edit_distance(wanted, candidate);
+        if (distance < best_distance) {
+            best = candidate;
+            best_distance = distance;
+        }
+    }
+    return best;
+}
 
 /// Lists the keys, "table.key", in the order of the table.
 struct KeyNames {
@@ -38,6 +71,151 @@ struct KeyNames {
         names.push_back(prefix + name);
     }
     void degrees(const char* name, double, const char*) { names.push_back(prefix + name); }
+};
+
+/// Fills a job from one parsed document, walking the table of keys; remembers the line of each key it meets.
+class KeyReader {
+public:
+    KeyReader(const toml::table& root, const std::string& file) : file_(file), table_(&root) {}
+
+    /// Goes on with a table of its own: one of the [[tool]] entries.
+    void enter(const toml::table* values, std::string prefix) {
+        table_ = values;
+        prefix_ = std::move(prefix);
+    }
+    void enter_root_table(const toml::table& root, const char* name) {
+        prefix_ = std::string(name) + ".";
+        table_ = nullptr;
+        const toml::node* node = root.get(name);
+        if (node == nullptr) return;
+        table_ = node->as_table();
+        if (table_ == nullptr)
+            fail(*node, "job.type", fmt::format("{} is {}, not a table", name, type_name(*node)),
+                 fmt::format("write [{}] on a line of its own", name));
+    }
+
+    void required() { required_ = true; }
+    void set_missing_remedy(const char* remedy) { missing_remedy_ = remedy; }
+
+    void key(const char* name, double& value, const char*) {
+        if (const toml::node* node = find(name)) value = number(*node, prefix_ + name);
+    }
+    void key(const char* name, int& value, const char*) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        const auto integer = node->value_exact<std::int64_t>();
+        if (!integer || *integer < -2147483647 || *integer > 2147483647)
+            wrong_type(*node, prefix_ + name, "a whole number");
+        value = static_cast<int>(*integer);
+    }
+    void key(const char* name, bool& value, const char*) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        const auto truth = node->value_exact<bool>();
+        if (!truth) wrong_type(*node, prefix_ + name, "true or false");
+        value = *truth;
+    }
+    void key(const char* name, std::string& value, const char*) {
+        if (const toml::node* node = find(name)) value = text(*node, prefix_ + name);
+    }
+    void key(const char* name, std::vector<double>& value, const char*) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        const toml::array* array = node->as_array();
+        if (array == nullptr) wrong_type(*node, prefix_ + name, "a list of numbers");
+        value.clear();
+        for (const toml::node& element : *array) value.push_back(number(element, prefix_ + name));
+    }
+    void degrees(const char* name, double& radians, const char*) {
+        if (const toml::node* node = find(name))
+            radians = number(*node, prefix_ + name) * std::numbers::pi / 180;
+    }
+    template <class Enum, std::size_t N>
+    void word(const char* name, Enum& value, const Word<Enum> (&words)[N], const char*) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        const std::string given = text(*node, prefix_ + name).substr(0, kShownLetters);
+        std::vector<std::string> known;
+        for (const Word<Enum>& w : words) {
+            if (given == w.text) {
+                value = w.value;
+                return;
+            }
+            known.emplace_back(w.text);
+        }
+        fail(*node, "job.word",
+             fmt::format("{}{} is \"{}\", none of {}", prefix_, name, given, fmt::join(known, ", ")),
+             fmt::format("did you mean \"{}\"?", nearest_word(given, known)));
+    }
+
+    [[nodiscard]] const std::map<std::string, std::string>& places() const { return places_; }
+    void learn_places(const KeyReader& other) { places_.insert(other.places_.begin(), other.places_.end()); }
+    [[nodiscard]] std::string place_of(const toml::node& node) const {
+        return node.source().begin.line > 0 ? fmt::format("{}:{}", file_, node.source().begin.line) : file_;
+    }
+    [[noreturn]] void fail(const toml::node& node, const char* code, const std::string& message,
+                           const std::string& remedy) const {
+        throw Error(ErrorKind::usage, code, quoting_line(message), place_of(node), remedy);
+    }
+    static const char* type_name(const toml::node& node) {
+        switch (node.type()) {
+            case toml::node_type::string:
+                return "a text";
+            case toml::node_type::integer:
+                return "a whole number";
+            case toml::node_type::floating_point:
+                return "a number";
+            case toml::node_type::boolean:
+                return "true or false";
+            case toml::node_type::array:
+                return "a list";
+            case toml::node_type::table:
+                return "a table";
+            default:
+                return "a date or time";
+        }
+    }
+
+protected:
+    const toml::node* find(const char* name) {
+        const bool required = std::exchange(required_, false);
+        const toml::node* node = table_ != nullptr ? table_->get(name) : nullptr;
+        if (node != nullptr) places_[prefix_ + name] = place_of(*node);
+        else if (required)
+            fail(*table_, "job.missing_key", fmt::format("{}{} is missing", prefix_, name), missing_remedy_);
+        return node;
+    }
+    double number(const toml::node& node, const std::string& key) const {
+        if (const auto real = node.value_exact<double>()) {
+            if (!std::isfinite(*real)) wrong_type(node, key, "a finite number");
+            return *real;
+        }
+        if (const auto integer = node.value_exact<std::int64_t>()) return static_cast<double>(*integer);
+        wrong_type(node, key, "a number");
+    }
+    std::string text(const toml::node& node, const std::string& key) const {
+        const auto value = node.value_exact<std::string>();
+        if (!value) wrong_type(node, key, "a text in quotes");
+        return *value;
+    }
+    [[noreturn]] void wrong_type(const toml::node& node, const std::string& key, const char* wanted) const {
+        fail(node, "job.type", fmt::format("{} is {}, not {}", key, type_name(node), wanted),
+             fmt::format("give {}", wanted));
+    }
+
+private:
+    std::string file_, prefix_;
+    const toml::table* table_;
+    bool required_ = false;
+    const char* missing_remedy_ = "every [[tool]] needs it; see `slabwright job --defaults`";
+    std::map<std::string, std::string> places_;
+};
+
+/// The walk over a tool whose every key has a value already.
+class OverridingReader : public KeyReader {
+public:
+    using KeyReader::KeyReader;
+    void required() {}
 };
 
 /// The same walk over the whole job: table() moves to the next [table].
@@ -143,63 +321,6 @@ void refuse_unknown(const toml::table& values, const std::string& prefix, const 
     }
 }
 
-/// Prints keys as lines of TOML with their comments in one column.
-struct Printer {
-    std::string text;
-    void table(const char* name, const char* comment) {
-        text += fmt::format("\n[{}]", name);
-        if (*comment != '\0') text += fmt::format("  # {}", comment);
-        text += '\n';
-    }
-    void required() {}
-    void line(const char* name, const std::string& value, const char* comment) {
-        std::string entry = fmt::format("{} = {}", name, value);
-        if (*comment != '\0') entry = fmt::format("{:<36}  # {}", entry, comment);
-        text += entry + '\n';
-    }
-    static std::string real(double value) {
-        std::string digits;
-        append_decimal(digits, value);
-        if (digits.find('.') == std::string::npos) digits += ".0";
-        return digits;
-    }
-    static std::string quoted(const std::string& value) {
-        std::string out = "\"";
-        for (const char c : value) {
-            if (c == '"' || c == '\\') (out += '\\') += c;
-            else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F)
-                out += fmt::format("\\u{:04X}", static_cast<unsigned>(c));
-            else out += c;
-        }
-        return out + '"';
-    }
-    void key(const char* name, double value, const char* comment) { line(name, real(value), comment); }
-    void key(const char* name, int value, const char* comment) { line(name, std::to_string(value), comment); }
-    void key(const char* name, bool value, const char* comment) {
-        line(name, value ? "true" : "false", comment);
-    }
-    void key(const char* name, const std::string& value, const char* comment) {
-        line(name, quoted(value), comment);
-    }
-    void key(const char* name, const std::vector<double>& values, const char* comment) {
-        std::string list;
-        for (const double value : values) list += (list.empty() ? "" : ", ") + real(value);
-        line(name, "[" + list + "]", comment);
-    }
-    void degrees(const char* name, double radians, const char* comment) {
-        // Degrees that come out of radians carry rounding in the last digits; nine decimals bring 30 back
-        // as 30.
-        std::string digits;
-        append_rounded(digits, radians * 180 / std::numbers::pi, 9);
-        if (digits.find('.') == std::string::npos) digits += ".0";
-        line(name, digits, comment);
-    }
-    template <class Enum, std::size_t N>
-    void word(const char* name, Enum value, const Word<Enum> (&words)[N], const char* comment) {
-        line(name, quoted(word_of(words, value)), comment);
-    }
-};
-
 std::vector<const toml::table*> listed_tools(const toml::table& root, const KeyReader& reader,
                                              const KeyNames& known) {
     std::vector<const toml::table*> listed;
@@ -213,6 +334,189 @@ std::vector<const toml::table*> listed_tools(const toml::table& root, const KeyR
     for (const toml::node& entry : *tools) listed.push_back(entry.as_table());
     for (const toml::table* const values : listed) refuse_unknown(*values, "tool.", known, reader);
     return listed;
+}
+
+Tool tool_of(const toml::table& values, KeyReader& reader) {
+    Tool tool;
+    visit_tool_keys(tool, reader);
+    if (values.get("plunges") == nullptr) tool.plunges = plunges_by_default(tool.kind);
+    return tool;
+}
+
+// Whether two values of a key are the same, whole numbers and others alike.
+bool are_same(const toml::node& a, const toml::node& b) {
+    const auto x = a.value<double>(), y = b.value<double>();
+    if (x && y) return *x == *y;
+    const auto p = a.value_exact<std::string>(), q = b.value_exact<std::string>();
+    if (p && q) return *p == *q;
+    const auto s = a.value_exact<bool>(), t = b.value_exact<bool>();
+    return s && t && *s == *t;
+}
+
+// The tools of a library, each completed by the [[tool]] of its number, then by [tools]; then the [[tool]]
+// that it does not have. A library is a file, or one that the house knows by name.
+class LibraryTools {
+public:
+    LibraryTools(const toml::node* shared, std::vector<const toml::table*> listed, KeyReader& reader,
+                 const std::string& file)
+        : listed_(std::move(listed)), is_used_(listed_.size(), false), reader_(reader), file_(file) {
+        if (shared == nullptr) return;
+        shared_ = shared->as_table();
+        if (shared_ == nullptr)
+            reader.fail(*shared, "job.type",
+                        fmt::format("tools is {}, not a table", KeyReader::type_name(*shared)),
+                        "write [tools] on a line of its own");
+    }
+
+    std::vector<Tool> of(const ToolSource& source) {
+        const std::string library = source.library.empty() ? named() : source.library;
+        const std::vector<std::int64_t> wanted = numbers();
+        // A file is known by its ending, so a word without one is a name.
+        const bool is_file = library.find_first_of("./\\") != std::string::npos;
+        std::vector<Tool> tools =
+            is_file ? read(source, library, wanted) : known(library, wanted, !source.library.empty());
+        for (const std::int64_t number : wanted)
+            if (std::none_of(tools.begin(), tools.end(), [&](const Tool& t) { return t.number == number; }))
+                throw Error(ErrorKind::usage, "tools.number", fmt::format("it has no tool {}", number),
+                            library, "correct [tools] numbers");
+        for (std::size_t i = 0; i < listed_.size(); ++i) {
+            if (is_used_[i]) continue;
+            reader_.enter(listed_[i], fmt::format("tool[{}].", tools.size() + 1));
+            tools.push_back(tool_of(*listed_[i], reader_));
+        }
+        return tools;
+    }
+
+private:
+    std::vector<Tool> read(const ToolSource& source, const std::string& library,
+                           const std::vector<std::int64_t>& wanted) {
+        if (!source.read)
+            throw Error(ErrorKind::usage, "tools.no_files", "a job that is no file has no tool library",
+                        file_, fmt::format("list the tools as [[tool]], or name {}", kLibraryNames));
+        std::vector<Tool> tools;
+        for (const LibraryTool& stated : source.read(library, wanted))
+            tools.push_back(completed(stated, tools.size() + 1));
+        return tools;
+    }
+
+    // A library of the house states every key; a [[tool]] of a tool's number says otherwise for that one.
+    std::vector<Tool> known(const std::string& library, const std::vector<std::int64_t>& wanted,
+                            bool by_option) {
+        const std::optional<std::vector<Tool>> found = named_library(library);
+        if (!found) {
+            const toml::node* const node = by_option ? nullptr : shared_->get("library");
+            const std::string shown = library.substr(0, kShownLetters);
+            throw Error(
+                ErrorKind::usage, "tools.library",
+                quoting_line(fmt::format("there is no tool library \"{}\"", shown)),
+                node != nullptr ? reader_.place_of(*node) : "",
+                fmt::format("name {}, or a file that ends in .tbl, .fctl, .fctb or .csv", kLibraryNames));
+        }
+        if (shared_ != nullptr)
+            for (auto&& [key, node] : *shared_)
+                if (key.str() != "library" && key.str() != "numbers")
+                    reader_.fail(node, "tools.conflict",
+                                 fmt::format("the library {} states {} of every tool", library,
+                                             std::string(key.str()).substr(0, kShownLetters)),
+                                 "change it in a [[tool]] of the tool's number");
+        std::vector<Tool> tools;
+        for (Tool tool : *found) {
+            if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), tool.number) == wanted.end())
+                continue;
+            for (std::size_t i = 0; i < listed_.size(); ++i)
+                if (const toml::node* const number = listed_[i]->get("number");
+                    number != nullptr && number->value_exact<std::int64_t>() == tool.number) {
+                    is_used_[i] = true;
+                    change(tool, *listed_[i], tools.size() + 1);
+                }
+            tools.push_back(std::move(tool));
+        }
+        return tools;
+    }
+
+    void change(Tool& tool, const toml::table& values, std::size_t position) {
+        OverridingReader own(values, file_);
+        own.enter(&values, fmt::format("tool[{}].", position));
+        visit_tool_keys(tool, own);
+        if (values.contains("kind") && !values.contains("plunges"))
+            tool.plunges = plunges_by_default(tool.kind);
+        reader_.learn_places(own);
+    }
+
+    std::string named() const {
+        const toml::node* const node = shared_ != nullptr ? shared_->get("library") : nullptr;
+        if (node == nullptr)
+            throw Error(ErrorKind::usage, "job.missing_key", "tools.library is missing",
+                        shared_ != nullptr ? reader_.place_of(*shared_) : file_,
+                        fmt::format("name {}, a file, or list the tools as [[tool]]", kLibraryNames));
+        const auto name = node->value_exact<std::string>();
+        if (!name)
+            reader_.fail(
+                *node, "job.type",
+                fmt::format("tools.library is {}, not a text in quotes", KeyReader::type_name(*node)),
+                "give the file's name in quotes");
+        return *name;
+    }
+
+    std::vector<std::int64_t> numbers() const {
+        std::vector<std::int64_t> wanted;
+        const toml::node* const node = shared_ != nullptr ? shared_->get("numbers") : nullptr;
+        if (node == nullptr) return wanted;
+        const toml::array* const list = node->as_array();
+        if (list != nullptr)
+            for (const toml::node& element : *list)
+                if (const auto number = element.value_exact<std::int64_t>()) wanted.push_back(*number);
+        if (list == nullptr || wanted.empty() || wanted.size() != list->size())
+            reader_.fail(*node, "job.type", "tools.numbers is not a list of whole numbers",
+                         "write [1, 2, 5]; leave it out for all tools");
+        return wanted;
+    }
+
+    Tool completed(const LibraryTool& stated, std::size_t position) {
+        toml::table values;
+        for (const StatedValue& value : stated.values)
+            std::visit([&](const auto& v) { values.insert_or_assign(value.first, v); }, value.second);
+        const auto number_of = [](const toml::table& table) {
+            const toml::node* const node = table.get("number");
+            return node != nullptr ? node->value_exact<std::int64_t>() : std::nullopt;
+        };
+        if (!values.contains("number") && shared_ != nullptr && shared_->contains("number"))
+            values.insert_or_assign("number", *shared_->get("number"));
+        for (std::size_t i = 0; i < listed_.size(); ++i) {
+            if (!number_of(values) || number_of(*listed_[i]) != number_of(values)) continue;
+            is_used_[i] = true;
+            for (auto&& [key, node] : *listed_[i]) {
+                const toml::node* const there = values.get(key.str());
+                if (there != nullptr && !are_same(*there, node))
+                    reader_.fail(node, "tools.conflict",
+                                 fmt::format("{} is not what {} states of this tool",
+                                             std::string(key.str()).substr(0, kShownLetters), stated.place),
+                                 "say it in one of both places only");
+                if (there == nullptr) values.insert_or_assign(key.str(), node);
+            }
+        }
+        if (shared_ != nullptr)
+            for (auto&& [key, node] : *shared_)
+                if (key.str() != "library" && key.str() != "numbers" && !values.contains(key.str()))
+                    values.insert_or_assign(key.str(), node);
+        KeyReader own(values, stated.place);
+        own.set_missing_remedy("state it in a [[tool]] of this number, or for all tools in [tools]");
+        own.enter(&values, fmt::format("tool[{}].", position));
+        Tool tool = tool_of(values, own);
+        reader_.learn_places(own);
+        return tool;
+    }
+
+    std::vector<const toml::table*> listed_;
+    std::vector<bool> is_used_;
+    KeyReader& reader_;
+    const std::string& file_;
+    const toml::table* shared_ = nullptr;
+};
+
+std::vector<Tool> library_tools(const toml::node* shared, std::vector<const toml::table*> listed,
+                                KeyReader& reader, const std::string& file, const ToolSource& source) {
+    return LibraryTools(shared, std::move(listed), reader, file).of(source);
 }
 
 }  // namespace
@@ -254,19 +558,6 @@ Job parse_job(std::string_view text, const std::string& file, const Job& base, c
                     place != reader.places().end() ? place->second : file, error.remedy());
     }
     return job;
-}
-
-std::string job_toml(const Job& job) {
-    Printer printer;
-    printer.text =
-        "# A job of Slabwright. Every key may be left out; lengths in mm, forces in N, angles in degrees.\n";
-    visit_job_keys(job, printer);
-    printer.text += "\n# The tool library. Any [[tool]] replaces the whole default library.\n";
-    for (const Tool& tool : job.tools) {
-        printer.text += "\n[[tool]]\n";
-        visit_tool_keys(tool, printer);
-    }
-    return std::move(printer.text);
 }
 
 }  // namespace slabwright

@@ -104,11 +104,16 @@ function glueHead(l) {
 
 // What is put into the machine's magazine for layer l: at the start all of it, then what is swapped before which program.
 function magazine(l) {
-    const loads = (data.magazine ?? []).filter(load => load.layer === plan.layers[l].index);
+    const loads = [];
+    let next = '';
+    for (const [layer, action, , detail] of [...data.steps].reverse()) {
+        if (typeof detail === 'string') next = detail;
+        if (action === 'load_tool' && layer === plan.layers[l].index) loads.unshift({...detail, before: next});
+    }
     if (!loads.length) return null;
-    const rows = loads.map(({place, tool, out, from_spindle, before}, i) => [
+    const rows = loads.map(({place, tool, tool_out: out, from, before}, i) => [
         tick(`L${l}:M${i}`, `T${tool} in place ${place}`, true), figure(place, 0), make('strong', {}, `T${tool}`), toolOf(tool)?.name ?? '',
-        out ? `T${out}${from_spindle ? ', out of the spindle' : ''}` : 'empty', before ? make('code', {}, before.replace(/^nc\//, '')) : 'the start']);
+        out ? `T${out}${from ? ', out of the spindle' : ''}` : 'empty', out ? make('code', {}, before.replace(/^nc\//, '')) : 'the start']);
     return make('div', {}, make('h4', {}, `Magazine of ${plan.job.machine.magazine} places`), table(['✓', 'Place', 'Put in', 'Tool', 'In place of', 'Before'], rows, [1]));
 }
 
