@@ -13,6 +13,7 @@
 #include "engine/paths/operations/semi_rough.h"
 #include "engine/planner/planner.h"
 #include "engine/tool_choice/select.h"
+#include "engine/tools/libraries.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
 #include "kernels/mesh/weld.h"

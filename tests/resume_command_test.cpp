@@ -380,7 +380,7 @@ TEST_F(ResumeCommand, AJointOutOfTheFaceMillsReachIsRefusedAndNothingIsWritten) 
     for (json& tool : plan["tools"])
         if (tool["kind"] == "face") tool["holder"]["stickout"] = tool["flute_length"];
     double travel = 30;
-    for (CommandResult said{1}; said.exit != 0 && travel < 150;) {
+    for (CommandResult said{.exit = 1, .out = {}, .err = {}}; said.exit != 0 && travel < 150;) {
         plan["job"]["machine"]["travel_z"] = travel += 2;
         spit(out_ + "/plan.json", plan.dump());
         said = resume();

@@ -63,19 +63,20 @@ void ProgramSteps::check_file(std::size_t begin, std::size_t end) {
 
 void ProgramSteps::check_contents(std::size_t begin, std::size_t end) {
     std::string purpose;
-    std::optional<double> seconds = 0;
+    double seconds = 0;
+    bool timed = true;
     int changes = 0;
     for (std::size_t p = begin; p < end; ++p) {
         const PlannedProgram& planned = plan_.programs[p];
         purpose += (p == begin ? "" : ", ") + planned.purpose;
         if (p > begin && planned.tool != plan_.programs[p - 1].tool) ++changes;
-        if (!planned.minutes) seconds.reset();
-        else if (seconds) *seconds += *planned.minutes * 60;
+        timed = timed && planned.minutes.has_value();
+        seconds += planned.minutes.value_or(0) * 60;
     }
     const auto count = static_cast<double>(end - begin);
     if (!plan_.programs[begin].purpose.empty()) expect_word("sequence.program", "purpose", purpose);
-    if (seconds && (changes == 0 || plan_.job_stated))
-        expect_seconds(*seconds + changes * plan_.job.machine.tool_change_s, kSeconds * count);
+    if (timed && (changes == 0 || plan_.job_stated))
+        expect_seconds(seconds + changes * plan_.job.machine.tool_change_s, kSeconds * count);
     if (end - begin == 1) return;
     expect("sequence.program", "operations", count, 0);
     expect("sequence.tool", "tool_changes", changes, 0);

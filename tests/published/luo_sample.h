@@ -5,6 +5,7 @@
 
 #include "engine/job.h"
 #include "engine/layer_job.h"
+#include "engine/tools/libraries.h"
 #include "kernels/features/features.h"
 #include "kernels/mesh/mesh.h"
 
