@@ -39,6 +39,7 @@
 #include "io/write/access_ply.h"
 #include "io/write/cut_list_files.h"
 #include "io/write/inspect_json.h"
+#include "io/write/job_toml.h"
 #include "io/write/output_file.h"
 #include "io/write/output_folder.h"
 #include "io/write/plan_json.h"

@@ -12,6 +12,7 @@
 
 #include "io/read/job_toml.h"
 #include "io/text/job_keys.h"
+#include "io/write/job_toml.h"
 #include "kernels/errors.h"
 #include "tests/support/seed.h"
 

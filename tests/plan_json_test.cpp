@@ -1,5 +1,6 @@
 // plan.json and sequence.json keep their contracts (the schemas beside the writers), and OUT is all or
 // nothing.
+#include "io/write/job_toml.h"
 #include "io/write/plan_json.h"
 
 #include <gtest/gtest.h>

@@ -9,8 +9,8 @@
 #include <random>
 
 #include "engine/tools/libraries.h"
-#include "io/read/job_toml.h"
 #include "io/slabwright.h"
+#include "io/write/job_toml.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/seed.h"

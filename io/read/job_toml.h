@@ -1,5 +1,4 @@
-// The job file: TOML in, and the defaults out with a comment for every key. The keys are those of
-// io/text/job_keys.h.
+// The job file, read from TOML. Its keys are those of io/text/job_keys.h.
 #pragma once
 
 #include <string>
@@ -17,14 +16,9 @@ namespace slabwright {
 /// number goes before what the library says.
 /// @param file names the text in errors
 /// @throws Error(usage) with file:line: not TOML, unknown key (names the nearest known one), wrong type,
-/// unknown word,
-///         missing key of a tool, whatever validate() and read_tool_library() refuse, "tools.conflict" where
-///         a
-///         [[tool]] says other than the library, "tools.library" for a name that no library has
+/// unknown word, missing key of a tool, whatever validate() and read_tool_library() refuse, "tools.conflict"
+/// where a [[tool]] says other than the library, "tools.library" for a name that no library has
 [[nodiscard]] Job parse_job(std::string_view text, const std::string& file, const Job& base = {},
                             const ToolSource& tools = {});
-
-/// A job file with every key of `job`, commented. parse_job() of it gives `job` again.
-[[nodiscard]] std::string job_toml(const Job& job);
 
 }  // namespace slabwright

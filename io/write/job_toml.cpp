@@ -1,5 +1,4 @@
-// A job as the text of a job file.
-#include "io/read/job_toml.h"
+#include "io/write/job_toml.h"
 
 #include <fmt/format.h>
 

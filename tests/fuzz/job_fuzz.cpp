@@ -1,5 +1,6 @@
 // Job files: any text is a job that is written and read again as itself, or one clear error.
 #include "io/read/job_toml.h"
+#include "io/write/job_toml.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace slabwright;

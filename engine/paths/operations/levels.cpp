@@ -151,8 +151,8 @@ public:
           flattest_(flattest) {}
 
     /// @param at of the ball's middle on a level, mm; @param out away from the part there
-    /// @param nz upwards part of the normal in the contact; @param above, @param below tips of the next
-    /// levels
+    /// @param nz upwards part of the normal in the contact
+    /// @param above, below tips of the next levels, where there are such
     [[nodiscard]] bool made_by_others(const std::array<double, 2>& at, const std::array<double, 2>& out,
                                       double nz, double tip, std::optional<double> above,
                                       std::optional<double> below) const {
