@@ -1,6 +1,5 @@
 // plan.json and sequence.json keep their contracts (the schemas beside the writers), and OUT is all or
 // nothing.
-#include "io/write/job_toml.h"
 #include "io/write/plan_json.h"
 
 #include <gtest/gtest.h>
@@ -26,6 +25,7 @@
 #include "io/read/job_toml.h"
 #include "io/slabwright.h"
 #include "io/text/json_text.h"
+#include "io/write/job_toml.h"
 #include "io/write/sequence_json.h"
 #include "kernels/errors.h"
 #include "tests/support/comma_locale.h"
