@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 
 #include "kernels/errors.h"
 #include "kernels/features/section_areas.h"
@@ -137,6 +138,121 @@ std::vector<SheetSpan> printed_stack(Context& context, MeshView mesh, double hei
     return spans;
 }
 
+/// ∫ area dz over a sheet, and of the part above it nothing. Section areas are quadratic between the
+/// heights of vertices, so Simpson's rule on fine pieces is close, and exact for prisms, cones and spheres.
+double volume_between(const SectionAreas& areas, double low, double high) {
+    constexpr int pieces = 4 * kStairSamples;
+    const double h = (high - low) / pieces, inside = 1e-7 * (high - low);
+    double sum = 0;
+    for (int i = 0; i < pieces; ++i) {
+        const double a = low + i * h;
+        sum += areas(a + inside) + 4 * areas(a + h / 2) + areas(a + h - inside);
+    }
+    return sum * h / 6;
+}
+
+/// Measures the stairs of sheets, kAtOnce of them together: their sections are in memory only until they are
+/// measured, since those of all sheets that a stack might have are larger than the mesh.
+class StairMeter {
+public:
+    StairMeter(Context& context, MeshView mesh, StairSide side, bool with_inset)
+        : context_(context),
+          mesh_(mesh),
+          side_(side),
+          with_inset_(with_inset),
+          height_(bounds(mesh).max.z),
+          areas_(context, mesh) {}
+
+    /// @param take (index of the span, its stair, which may be moved away): called in the order of the spans
+    template <class Take>
+    void measure(std::span<const SheetSpan> spans, const Take& take) {
+        for (std::size_t first = 0; first < spans.size(); first += kAtOnce) {
+            const std::size_t count = std::min(kAtOnce, spans.size() - first);
+            std::vector<SheetStair> stairs = measure_some(spans.subspan(first, count));
+            for (std::size_t i = 0; i < count; ++i) take(first + i, stairs[i]);
+        }
+    }
+
+private:
+    static constexpr std::size_t kAtOnce = 32;
+
+    /// Of a sheet's samples the k-th, at the middle of the k-th of equal parts, mm.
+    [[nodiscard]] double sample_height(const SheetSpan& span, int k) const {
+        return std::min(span.bottom + (k + 0.5) / kStairSamples * (span.top - span.bottom),
+                        height_ - kSame / 2);
+    }
+
+    [[nodiscard]] std::vector<SheetStair> measure_some(std::span<const SheetSpan> spans) {
+        cut_sections(spans);
+        std::vector<SheetStair> stairs(spans.size());
+        if (side_ == StairSide::outside) {
+            std::vector<HeightRange> ranges;
+            for (const SheetSpan& span : spans) ranges.push_back({span.bottom, std::min(span.top, height_)});
+            std::vector<Loops> outlines = shadows(context_, mesh_, ranges);
+            for (std::size_t i = 0; i < spans.size(); ++i) stairs[i].outline = std::move(outlines[i]);
+        }
+        parallel_each(context_, spans.size(), [&](std::size_t i) { measure_one(spans[i], stairs[i]); });
+        return stairs;
+    }
+
+    void cut_sections(std::span<const SheetSpan> spans) {
+        planes_.clear();
+        sections_.clear();
+        for (const SheetSpan& span : spans)
+            for (int k = 0; k < kStairSamples; ++k) planes_.push_back({sample_height(span, k), Side::above});
+        std::sort(planes_.begin(), planes_.end(), [](const Plane& a, const Plane& b) { return a.z < b.z; });
+        planes_.erase(std::unique(planes_.begin(), planes_.end(),
+                                  [](const Plane& a, const Plane& b) { return b.z - a.z < kSame / 10; }),
+                      planes_.end());
+        sections_ = slice(context_, mesh_, planes_);
+    }
+
+    [[nodiscard]] const Loops& section_at(double z) const {
+        auto at = std::lower_bound(planes_.begin(), planes_.end(), z - kSame / 5,
+                                   [](const Plane& p, double value) { return p.z < value; });
+        if (at == planes_.end()) --at;
+        return sections_[static_cast<std::size_t>(at - planes_.begin())].loops;
+    }
+
+    void measure_one(const SheetSpan& span, SheetStair& stair) const {
+        std::vector<const Loops*> inside;
+        for (int k = 0; k < kStairSamples; ++k) inside.push_back(&section_at(sample_height(span, k)));
+        if (side_ == StairSide::middle) {
+            stair.outline = *inside[kStairSamples / 2];
+        } else if (side_ == StairSide::inside) {
+            stair.outline = *inside[0];
+            for (const Loops* section : inside)
+                if (section != inside[0]) stair.outline = intersect(stair.outline, *section);
+        }
+        const double thickness = span.top - span.bottom;
+        const double part = volume_between(areas_, span.bottom, std::min(span.top, height_));
+        const double cut = area(stair.outline) * thickness;
+        if (side_ == StairSide::outside) {
+            stair.volume_mm3 = std::max(0.0, cut - part);
+        } else {
+            double common = 0;
+            for (const Loops* section : inside)
+                common += area(intersect(stair.outline, *section)) * thickness / kStairSamples;
+            stair.volume_mm3 = std::max(0.0, cut + part - 2 * common);
+        }
+        if (!with_inset_ || stair.outline.empty()) return;
+        constexpr double step = 1;
+        const BorderDistance border(stair.outline);
+        for (const int k : {0, kStairSamples / 2, kStairSamples - 1})
+            stair.inset = std::max(stair.inset,
+                                   farthest_from_border(*inside[static_cast<std::size_t>(k)], border, step));
+    }
+
+    Context& context_;
+    MeshView mesh_;
+    StairSide side_;
+    bool with_inset_;
+    double height_;
+    SectionAreas areas_;
+    std::vector<Plane> planes_;      ///< of the sheets that are measured now, ascending
+    std::vector<Section> sections_;  ///< by plane
+};
+
 /// A stack under way in the dynamic program.
 struct Reached {
     double error = std::numeric_limits<double>::infinity();
@@ -235,14 +351,12 @@ private:
                 spans.push_back(span);
                 choices.push_back({h, to, t, 0});
             }
-        const std::vector<SheetStair> stairs =
-            stairs_of(context_, mesh_, spans, rules_.side, rules_.most_inset > 0);
-        for (std::size_t i = 0; i < choices.size(); ++i) {
-            if (rules_.most_inset > 0 && choices[i].stock > 0 && stairs[i].inset > rules_.most_inset)
-                continue;
-            choices[i].error = stairs[i].volume_mm3;
+        StairMeter meter(context_, mesh_, rules_.side, rules_.most_inset > 0);
+        meter.measure(spans, [&](std::size_t i, const SheetStair& stair) {
+            if (rules_.most_inset > 0 && choices[i].stock > 0 && stair.inset > rules_.most_inset) return;
+            choices[i].error = stair.volume_mm3;
             choices_.push_back(choices[i]);
-        }
+        });
     }
 
     /// The highest that a stack reaches.
@@ -293,19 +407,6 @@ void require_rules(const SheetRules& rules) {
         refuse("bond and tolerances must be 0 or more", "see `slabwright sheets --help`");
 }
 
-/// ∫ area dz over a sheet, and of the part above it nothing. Section areas are quadratic between the
-/// heights of vertices, so Simpson's rule on fine pieces is close, and exact for prisms, cones and spheres.
-double volume_between(const SectionAreas& areas, double low, double high) {
-    constexpr int pieces = 4 * kStairSamples;
-    const double h = (high - low) / pieces, inside = 1e-7 * (high - low);
-    double sum = 0;
-    for (int i = 0; i < pieces; ++i) {
-        const double a = low + i * h;
-        sum += areas(a + inside) + 4 * areas(a + h / 2) + areas(a + h - inside);
-    }
-    return sum * h / 6;
-}
-
 }  // namespace
 
 bool printed_tests_pass(const Loops& first, const Loops& before_last, const Loops& last, const Loops& other,
@@ -326,68 +427,11 @@ bool printed_tests_pass(const Loops& first, const Loops& before_last, const Loop
 
 std::vector<SheetStair> stairs_of(Context& context, MeshView mesh, const std::vector<SheetSpan>& spans,
                                   StairSide side, bool with_inset) {
-    std::vector<SheetStair> stairs(spans.size());
+    std::vector<SheetStair> stairs;
     if (spans.empty()) return stairs;
-    const double height = bounds(mesh).max.z;
-    // The sections of each sheet, kStairSamples to it, at the middles of equal parts.
-    std::vector<Plane> planes;
-    for (const SheetSpan& span : spans)
-        for (int k = 0; k < kStairSamples; ++k)
-            planes.push_back({std::min(span.bottom + (k + 0.5) / kStairSamples * (span.top - span.bottom),
-                                       height - kSame / 2),
-                              Side::above});
-    std::sort(planes.begin(), planes.end(), [](const Plane& a, const Plane& b) { return a.z < b.z; });
-    planes.erase(std::unique(planes.begin(), planes.end(),
-                             [](const Plane& a, const Plane& b) { return b.z - a.z < kSame / 10; }),
-                 planes.end());
-    const std::vector<Section> sections = slice(context, mesh, planes);
-    const auto section_at = [&](double z) -> const Loops& {
-        auto at = std::lower_bound(planes.begin(), planes.end(), z - kSame / 5,
-                                   [](const Plane& p, double value) { return p.z < value; });
-        if (at == planes.end()) --at;
-        return sections[static_cast<std::size_t>(at - planes.begin())].loops;
-    };
-    if (side == StairSide::outside) {
-        std::vector<HeightRange> ranges;
-        for (const SheetSpan& span : spans) ranges.push_back({span.bottom, std::min(span.top, height)});
-        std::vector<Loops> outlines = shadows(context, mesh, ranges);
-        for (std::size_t i = 0; i < spans.size(); ++i) stairs[i].outline = std::move(outlines[i]);
-    }
-    const SectionAreas areas(context, mesh);
-    parallel_each(context, spans.size(), [&](std::size_t i) {
-        const SheetSpan& span = spans[i];
-        SheetStair& stair = stairs[i];
-        std::vector<const Loops*> inside;
-        for (int k = 0; k < kStairSamples; ++k)
-            inside.push_back(&section_at(std::min(
-                span.bottom + (k + 0.5) / kStairSamples * (span.top - span.bottom), height - kSame / 2)));
-        if (side == StairSide::middle) {
-            stair.outline = *inside[kStairSamples / 2];
-        } else if (side == StairSide::inside) {
-            stair.outline = *inside[0];
-            for (const Loops* section : inside)
-                if (section != inside[0]) stair.outline = intersect(stair.outline, *section);
-        }
-        const double thickness = span.top - span.bottom;
-        const double part = volume_between(areas, span.bottom, std::min(span.top, height));
-        const double cut = area(stair.outline) * thickness;
-        if (side == StairSide::outside) {
-            stair.volume_mm3 = std::max(0.0, cut - part);
-        } else {
-            double common = 0;
-            for (const Loops* section : inside)
-                common += area(intersect(stair.outline, *section)) * thickness / kStairSamples;
-            stair.volume_mm3 = std::max(0.0, cut + part - 2 * common);
-        }
-        if (!with_inset) return;
-        if (stair.outline.empty()) return;
-        const BorderDistance border(stair.outline);
-        for (const int k : {0, kStairSamples / 2, kStairSamples - 1}) {
-            const double step = 1;
-            stair.inset = std::max(stair.inset,
-                                   farthest_from_border(*inside[static_cast<std::size_t>(k)], border, step));
-        }
-    });
+    stairs.reserve(spans.size());
+    StairMeter meter(context, mesh, side, with_inset);
+    meter.measure(spans, [&](std::size_t, SheetStair& stair) { stairs.push_back(std::move(stair)); });
     return stairs;
 }
 
