@@ -755,6 +755,32 @@ TEST(SectionAreas, AgreeWithSlicing) {
     }
 }
 
+TEST(SectionAreas, VolumesAgreeWithSlicesByTheHundred) {
+    std::mt19937 random(12);
+    Field h(12, std::vector<float>(12));
+    for (auto& row : h)
+        for (float& z : row) z = 1.0f + static_cast<float>(random() % 1000) / 100.0f;
+    Context context;
+    for (const Facets& t : {under(h), bridge(), leaning(5, 30)}) {
+        const Mesh mesh = weld(context, t);
+        const SectionAreas areas(context, mesh.view());
+        for (const auto& [low, high] : {std::pair{-3.0, 1000.0}, {0.0, 4.3}, {2.17, 9.4}, {5.5, 5.6}}) {
+            constexpr int pieces = 4000;
+            const double top = std::min<double>(high, bounds(mesh.view()).max.z), bottom = std::max(low, 0.0);
+            std::vector<Plane> planes;
+            for (int i = 0; i < pieces; ++i)
+                planes.push_back({bottom + (i + 0.5) / pieces * (top - bottom), Side::above});
+            double sum = 0;
+            for (const Section& s : slice(context, mesh.view(), planes)) sum += area(s.loops);
+            sum *= std::max(0.0, top - bottom) / pieces;
+            EXPECT_NEAR(areas.volume_between(low, high), sum, 1e-3 * sum + 1e-6) << low << " to " << high;
+        }
+        EXPECT_EQ(areas.volume_between(4, 4), 0);
+        EXPECT_EQ(areas.volume_between(4, 3), 0);
+        EXPECT_EQ(areas.volume_between(1000, 2000), 0);
+    }
+}
+
 TEST(FeaturesCorpus, RealPartsAreFoundQuicklyAndMeasured) {
     const char* corpus = std::getenv("SLABWRIGHT_CORPUS");
     if (!corpus) {

@@ -439,7 +439,6 @@ SheetProof prove_sheets(Context& context, MeshView mesh, const std::vector<ReadS
     };
     std::vector<std::vector<FineWay>> ways(programs.size());
     std::vector<Task> tasks;
-    std::vector<Plane> planes;
     for (std::size_t p = 0; p < programs.size(); ++p) {
         const ReadSheetProgram& program = programs[p];
         for (const ReadWay& way : program.ways) {
@@ -456,25 +455,33 @@ SheetProof prove_sheets(Context& context, MeshView mesh, const std::vector<ReadS
             ways[p].push_back(std::move(f));
         }
         require_ways(program, ways[p], proof.violations);
-        for (const ReadPiece& piece : program.pieces) {
-            tasks.push_back({&program, &piece, &ways[p]});
+        for (const ReadPiece& piece : program.pieces) tasks.push_back({&program, &piece, &ways[p]});
+    }
+    std::vector<PieceResult> results(tasks.size());
+    // Some pieces at a time: the sections of all of them are larger than the mesh.
+    constexpr std::size_t at_once = 16;
+    for (std::size_t first = 0; first < tasks.size(); first += at_once) {
+        const std::size_t end = std::min(first + at_once, tasks.size());
+        std::vector<Plane> planes;
+        for (std::size_t i = first; i < end; ++i)
             for (int k = 0; k < kHeights; ++k)
                 planes.push_back(
-                    {std::min(piece.low + (k + 0.5) / kHeights * program.thickness, height), Side::above});
-        }
+                    {std::min(tasks[i].piece->low + (k + 0.5) / kHeights * tasks[i].program->thickness,
+                              height),
+                     Side::above});
+        const std::vector<Section> sections = slice(context, mesh, planes);
+        parallel_each(context, end - first, [&](std::size_t at) {
+            const Task& task = tasks[first + at];
+            std::vector<const Section*> own;
+            for (int k = 0; k < kHeights; ++k)
+                own.push_back(&sections[at * kHeights + static_cast<std::size_t>(k)]);
+            PieceProof piece(*task.program, *task.piece, *task.ways, rules);
+            for (const FineWay& way : *task.ways)
+                if (way.read->piece == task.piece->number)
+                    piece.box_.add(way.box.x0, way.box.y0, 0), piece.box_.add(way.box.x1, way.box.y1, 0);
+            results[first + at] = piece.run(own);
+        });
     }
-    const std::vector<Section> sections = slice(context, mesh, planes);
-    std::vector<PieceResult> results(tasks.size());
-    parallel_each(context, tasks.size(), [&](std::size_t i) {
-        std::vector<const Section*> own;
-        for (int k = 0; k < kHeights; ++k)
-            own.push_back(&sections[i * kHeights + static_cast<std::size_t>(k)]);
-        PieceProof piece(*tasks[i].program, *tasks[i].piece, *tasks[i].ways, rules);
-        for (const FineWay& way : *tasks[i].ways)
-            if (way.read->piece == tasks[i].piece->number)
-                piece.box_.add(way.box.x0, way.box.y0, 0), piece.box_.add(way.box.x1, way.box.y1, 0);
-        results[i] = piece.run(own);
-    });
     std::vector<PieceHold> holds;
     for (const PieceResult& result : results) {
         proof.made_mm3 += result.made_mm3;

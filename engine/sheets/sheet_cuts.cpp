@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "engine/sheets/fitted_heights.h"
 #include "engine/sheets/majorant.h"
@@ -515,6 +516,35 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
     return result;
 }
 
+/// The cuts of one sheet.
+/// @param sections at its heights and more
+/// @param hold what holds it; none: nothing does
+SheetCuts cuts_of_one(Fitted sheet, std::span<const Section> sections, const SheetCutRules& rules,
+                      const SheetHold* hold, double dowel) {
+    std::vector<Loops> held;  // what is to stay, with its tabs and without its holes
+    if (hold != nullptr)
+        for (std::size_t k = 0; k < sheet.heights.size(); ++k)
+            held.push_back(with_hold(sections[k].loops, *hold, dowel));
+    for (std::size_t k = 0; k < sheet.heights.size(); ++k)
+        sheet.sections.push_back(hold == nullptr ? &sections[k].loops : &held[k]);
+    bool gave_up_tilt = false;
+    if (rules.most_tilt_deg > 0) {
+        Tilted tilted = tilted_cuts(sheet, rules);
+        if (tilted.spares && !tilted.cuts.upright) return std::move(tilted.cuts);
+        gave_up_tilt = !tilted.spares;
+    }
+    SheetCuts cuts = upright_cuts(sheet.outline, rules);
+    cuts.gave_up_tilt = gave_up_tilt;
+    Loops axis;
+    for (const AxisLoop& loop : cuts.loops) {
+        axis.points.insert(axis.points.end(), loop.top.begin(), loop.top.end());
+        axis.close_loop();
+    }
+    const Loops left = rules.kerf > 0 ? offset(axis, -rules.kerf / 2, kArcTolerance) : axis;
+    cuts.deviation = deviation_of(LeftAtHeights(sheet.heights.size(), left), sheet);
+    return cuts;
+}
+
 void require_rules(const SheetCutRules& rules) {
     if (!(rules.kerf >= 0) || rules.kerf > 100 || !(rules.most_tilt_deg >= 0) || rules.most_tilt_deg > 80 ||
         !(rules.leave > 0) || rules.most_passes < 1 || rules.most_passes > 100 || !(rules.gouge > 0) ||
@@ -543,43 +573,26 @@ std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh, const std::vecto
     require_rules(rules);
     const std::vector<std::vector<double>> heights = heights_to_fit(mesh, spans, rules.most_tilt_deg);
     const double top = bounds(mesh).max.z;
-    std::vector<Plane> planes;
-    std::vector<std::size_t> starts;
-    for (std::size_t i = 0; i < spans.size(); ++i) {
-        starts.push_back(planes.size());
-        for (const double z : heights[i])
-            planes.push_back(z >= std::min(spans[i].top, top) ? Plane{std::min(z, top), Side::below}
-                                                              : Plane{z, Side::above});
-    }
-    const std::vector<Section> sections = slice(context, mesh, planes);
     std::vector<SheetCuts> cuts(spans.size());
-    parallel_each(context, spans.size(), [&](std::size_t i) {
-        Fitted sheet{stairs[i].outline, heights[i], {}};
-        std::vector<Loops> held;  // what is to stay, with its tabs and without its holes
-        if (!holds.empty())
-            for (std::size_t k = 0; k < heights[i].size(); ++k)
-                held.push_back(with_hold(sections[starts[i] + k].loops, holds[i], dowel));
-        for (std::size_t k = 0; k < heights[i].size(); ++k)
-            sheet.sections.push_back(holds.empty() ? &sections[starts[i] + k].loops : &held[k]);
-        if (rules.most_tilt_deg > 0) {
-            Tilted tilted = tilted_cuts(sheet, rules);
-            cuts[i].gave_up_tilt = !tilted.spares;
-            if (tilted.spares && !tilted.cuts.upright) {
-                cuts[i] = std::move(tilted.cuts);
-                return;
-            }
+    // Some sheets at a time: the sections of all of them are larger than the mesh.
+    constexpr std::size_t at_once = 8;
+    for (std::size_t first = 0; first < spans.size(); first += at_once) {
+        const std::size_t end = std::min(first + at_once, spans.size());
+        std::vector<Plane> planes;
+        std::vector<std::size_t> starts;
+        for (std::size_t i = first; i < end; ++i) {
+            starts.push_back(planes.size());
+            for (const double z : heights[i])
+                planes.push_back(z >= std::min(spans[i].top, top) ? Plane{std::min(z, top), Side::below}
+                                                                  : Plane{z, Side::above});
         }
-        const bool gave_up = cuts[i].gave_up_tilt;
-        cuts[i] = upright_cuts(stairs[i].outline, rules);
-        cuts[i].gave_up_tilt = gave_up;
-        Loops axis;
-        for (const AxisLoop& loop : cuts[i].loops) {
-            axis.points.insert(axis.points.end(), loop.top.begin(), loop.top.end());
-            axis.close_loop();
-        }
-        const Loops left = rules.kerf > 0 ? offset(axis, -rules.kerf / 2, kArcTolerance) : axis;
-        cuts[i].deviation = deviation_of(LeftAtHeights(sheet.heights.size(), left), sheet);
-    });
+        const std::vector<Section> sections = slice(context, mesh, planes);
+        parallel_each(context, end - first, [&](std::size_t k) {
+            const std::size_t i = first + k;
+            cuts[i] = cuts_of_one({stairs[i].outline, heights[i], {}}, std::span(sections).subspan(starts[k]),
+                                  rules, holds.empty() ? nullptr : &holds[i], dowel);
+        });
+    }
     return cuts;
 }
 

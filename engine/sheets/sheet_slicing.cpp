@@ -138,19 +138,6 @@ std::vector<SheetSpan> printed_stack(Context& context, MeshView mesh, double hei
     return spans;
 }
 
-/// ∫ area dz over a sheet, and of the part above it nothing. Section areas are quadratic between the
-/// heights of vertices, so Simpson's rule on fine pieces is close, and exact for prisms, cones and spheres.
-double volume_between(const SectionAreas& areas, double low, double high) {
-    constexpr int pieces = 4 * kStairSamples;
-    const double h = (high - low) / pieces, inside = 1e-7 * (high - low);
-    double sum = 0;
-    for (int i = 0; i < pieces; ++i) {
-        const double a = low + i * h;
-        sum += areas(a + inside) + 4 * areas(a + h / 2) + areas(a + h - inside);
-    }
-    return sum * h / 6;
-}
-
 /// Measures the stairs of sheets, kAtOnce of them together: their sections are in memory only until they are
 /// measured, since those of all sheets that a stack might have are larger than the mesh.
 class StairMeter {
@@ -225,7 +212,7 @@ private:
                 if (section != inside[0]) stair.outline = intersect(stair.outline, *section);
         }
         const double thickness = span.top - span.bottom;
-        const double part = volume_between(areas_, span.bottom, std::min(span.top, height_));
+        const double part = areas_.volume_between(span.bottom, std::min(span.top, height_));
         const double cut = area(stair.outline) * thickness;
         if (side_ == StairSide::outside) {
             stair.volume_mm3 = std::max(0.0, cut - part);
@@ -456,7 +443,7 @@ SheetStack stack_of_sheets(Context& context, MeshView mesh, const SheetRules& ru
                 budget += stair.volume_mm3;
             // Higher than print's stack: what it leaves on top would be error too.
             const SectionAreas areas(context, mesh);
-            budget += volume_between(areas, std::min(height, stack.sheets.back().top), height);
+            budget += areas.volume_between(std::min(height, stack.sheets.back().top), height);
             const std::vector<SheetSpan> best = search->best(budget);
             if (!best.empty()) stack.sheets = best;
         }
