@@ -6,6 +6,7 @@
 #include <set>
 
 #include "io/posts/sheet_gcode.h"
+#include "io/posts/sheet_reader.h"
 #include "io/read/input_file.h"
 #include "io/read/pattern.h"
 #include "io/sheets_html.h"
@@ -146,7 +147,7 @@ SheetsResult make_sheets(Context& context, const std::string& pattern, const Job
     const ReadingOptions options = reading_options(reading);
     PatternMesh read = read_pattern_mesh(context, pattern, options);
     require_solid(context, read, pattern);
-    const Mesh along = along_axis(read.mesh, job.axis);
+    const Mesh along = along_axis(std::move(read.mesh), job.axis);
     context.share_progress(0.3, 0.8);
     SheetsResult result;
     try {
@@ -190,7 +191,8 @@ SheetProof verify_sheets(Context& context, const std::string& directory, const s
     const SheetsFolder folder = read_folder(directory);
     const std::shared_ptr<Pattern> read =
         read_planned_pattern(context, directory, folder.pattern, pattern, "verify");
-    return prove_folder(context, directory, along_axis(read->read.mesh, folder.axis), read->place, rules);
+    const Mesh along = along_axis(std::move(read->read.mesh), folder.axis);
+    return prove_folder(context, directory, along, read->place, rules);
 }
 
 }  // namespace slabwright

@@ -9,6 +9,7 @@
 #include "engine/sheets/sheet_cost.h"
 #include "engine/sheets/sheet_plan.h"
 #include "io/posts/sheet_gcode.h"
+#include "io/posts/sheet_reader.h"
 #include "kernels/errors.h"
 #include "kernels/polygons/border_distance.h"
 #include "kernels/slicing/slicing.h"

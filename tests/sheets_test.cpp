@@ -7,6 +7,7 @@
 #include "engine/sheet_proof/sheet_proof.h"
 #include "engine/sheets/sheet_plan.h"
 #include "io/posts/sheet_gcode.h"
+#include "io/posts/sheet_reader.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/loft.h"

@@ -55,6 +55,29 @@ void add_alignment_options(CLI::App& command, SheetsOptions& options) {
     command.add_flag("--crate", options.crate, "draw an egg crate under the part too");
 }
 
+void add_engraving_options(CLI::App& command, SheetsOptions& options) {
+    const CLI::Range length(0.0, 1e5), over_0(1e-6, 1e6);
+    command
+        .add_option("--engrave", options.engrave,
+                    "mm deep: numbers and match marks, where the next sheet covers them; 0: none")
+        ->check(length);
+    command
+        .add_option("--engrave-width", options.engrave_width, "mm of a stroke; 1 of a router, else the kerf")
+        ->check(over_0);
+    command.add_option("--digits", options.digits, "mm: height of digits, at most; 10")->check(over_0);
+    command
+        .add_option("--engrave-tool", options.engrave_tool,
+                    "router's tool number for it; that of --tool: strokes as wide as the kerf")
+        ->check(CLI::Range(1, 9999));
+    command.add_option("--engrave-feed", options.engrave_feed, "mm/min, router and laser")->check(over_0);
+    command.add_option("--engrave-power", options.engrave_power, "S word of a laser that engraves")
+        ->check(over_0);
+    command.add_option("--power", options.power, "S word of a laser that cuts, where it engraves too")
+        ->check(over_0);
+    command.add_option("--on", options.on, "what switches a laser or a jet on: M3, or like \"M62 P0\"");
+    command.add_option("--off", options.off, "what switches it off: M5, or like \"M63 P0\"");
+}
+
 void add_cost_options(CLI::App& command, SheetsOptions& options) {
     const CLI::Range length(0.0, 1e5), over_0(1e-6, 1e6);
     command.add_option("--material", options.material, "of the sheets: mdf, plywood, aluminium, steel")
@@ -115,12 +138,30 @@ void add_sheets_options(CLI::App& command, SheetsOptions& options) {
     command.add_option("--tool", options.tool, "router's tool number")->check(CLI::Range(1, 9999));
     add_jet_options(command, options);
     add_alignment_options(command, options);
+    add_engraving_options(command, options);
     add_cost_options(command, options);
     command
         .add_option("--tolerance", options.tolerance,
                     "mm that the proof lets the sheets stand over the part; any if not given")
         ->check(length);
 }
+
+namespace {
+
+EngraveRules engraving_of(const SheetsOptions& options, double kerf) {
+    EngraveRules rules;
+    rules.depth = options.engrave;
+    const bool is_cutter = options.head != "router" || options.engrave_tool == options.tool;
+    rules.width = options.engrave_width > 0 ? options.engrave_width : is_cutter ? kerf : 1;
+    rules.height = options.digits;
+    rules.least = std::min(rules.least, rules.height);
+    rules.tool = options.engrave_tool;
+    rules.feed = options.engrave_feed;
+    rules.power = options.engrave_power;
+    return rules;
+}
+
+}  // namespace
 
 SheetJob sheet_job(const SheetsOptions& options) {
     SheetJob job;
@@ -150,6 +191,10 @@ SheetJob sheet_job(const SheetsOptions& options) {
     job.cutting.most_tilt_deg = options.tilt >= 0                                  ? options.tilt
                                 : is_jet && job.slicing.side == StairSide::outside ? 55
                                                                                    : 0;
+    job.engraving = engraving_of(options, job.cutting.kerf);
+    job.power = options.power;
+    job.on = options.on;
+    job.off = options.off;
     job.cutting.leave = options.leave;
     job.nesting.spacing = options.gap;
     job.nesting.margin = options.margin;
@@ -269,6 +314,8 @@ std::string sheets_summary(const SheetsResult& result, const std::string& out, b
     if (result.proof.dowels > 0)
         text += fmt::format("held    {} holes for dowels and rods; {} islands are held by nothing\n",
                             result.proof.dowels, result.proof.islands);
+    if (result.proof.engraved > 0)
+        text += fmt::format("marked  {} numbers and match marks are engraved\n", result.proof.engraved);
     for (const SheetCost& cost : result.costs) {
         text += fmt::format("{:<9}", cost.way);
         if (!cost.why_not.empty()) {

@@ -22,6 +22,9 @@ struct SheetsOptions {
     double tolerance = 0;
     std::string align = "none", material = "mdf", bonding;
     double dowel = 8, wall = 4, tab = 24, neck = 6, tab_gap = 6;
+    double engrave = 0, engrave_width = -1, digits = 10, engrave_feed = 1500, engrave_power = 20, power = 100;
+    int engrave_tool = 2;
+    std::string on = "M3", off = "M5";
     std::vector<double> offcuts;  ///< thickness, length and width, one after another
     double price = 0, rate = 0;
     bool compare = false, nest = false, crate = false;

@@ -7,10 +7,13 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <span>
 
 #include "engine/sheet_proof/common_place.h"
+#include "engine/sheet_proof/engraving_proof.h"
 #include "engine/sheet_proof/hold_proof.h"
+#include "engine/sheet_proof/swept.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/border_distance.h"
 #include "kernels/polygons/loops.h"
@@ -25,11 +28,6 @@ constexpr int kHeights = 9;  ///< at which a sheet is looked at: the middles of 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kFinestTurn = 1.5;  ///< degrees of the head between two places that are looked at
 constexpr double kArcTolerance = 0.002;
-
-/// Where the axis is at a level, and how it leans there, mm aside for each mm down.
-struct AxisPoint {
-    double x = 0, y = 0, lean_x = 0, lean_y = 0;
-};
 
 /// The places of a way between its points too: x, y, A and C all change evenly along a move.
 std::vector<ReadHead> fine(const std::vector<ReadHead>& points) {
@@ -60,49 +58,6 @@ std::vector<AxisPoint> at_depth(const std::vector<ReadHead>& way, double depth) 
     return points;
 }
 
-Point2 unit_point(double x, double y) { return {to_units(x), to_units(y)}; }
-
-/// What the cut takes of a level: about every piece of the axis, as far as half the kerf square to the
-/// surface that the axis sweeps. Outlines overlap.
-Loops swept_by(std::span<const AxisPoint> axis, double kerf) {
-    Loops loops;
-    constexpr int around = 8;  // of each half circle
-    for (std::size_t i = 0; i + 1 < axis.size(); ++i) {
-        const AxisPoint &p = axis[i], &q = axis[i + 1];
-        double dx = q.x - p.x, dy = q.y - p.y;
-        const double l = std::hypot(dx, dy);
-        double half = kerf / 2;
-        if (l > 1e-6) {
-            dx /= l, dy /= l;
-            const double lean =
-                std::max(std::abs(p.lean_x * dy - p.lean_y * dx), std::abs(q.lean_x * dy - q.lean_y * dx));
-            half *= std::hypot(1, lean);
-        } else {
-            dx = 1, dy = 0;
-        }
-        const double first = std::atan2(dx, -dy);  // the left normal
-        for (int k = 0; k <= around; ++k) {
-            const double a = first + std::numbers::pi * k / around;
-            loops.points.push_back(unit_point(p.x + half * std::cos(a), p.y + half * std::sin(a)));
-        }
-        for (int k = 0; k <= around; ++k) {
-            const double a = first + std::numbers::pi * (1 + double(k) / around);
-            loops.points.push_back(unit_point(q.x + half * std::cos(a), q.y + half * std::sin(a)));
-        }
-        loops.close_loop();
-    }
-    return loops;
-}
-
-/// The same of a long axis. It is put together from halves: clipping is slow where many outlines lie one over
-/// the other, as they do where a head turns in one place.
-Loops swept(std::span<const AxisPoint> axis, double kerf) {
-    constexpr std::size_t at_once = 24;
-    if (axis.size() <= at_once) return unite(swept_by(axis, kerf), {});
-    const std::size_t half = axis.size() / 2;
-    return unite(swept(axis.first(half + 1), kerf), swept(axis.subspan(half), kerf));
-}
-
 /// Regions as one, put together from halves.
 Loops united(std::span<const Loops> regions) {
     if (regions.size() == 1) return regions[0];
@@ -118,20 +73,6 @@ Loops around(const std::vector<AxisPoint>& axis, std::size_t first, bool is_hole
     if (is_hole) std::reverse(loop.points.begin(), loop.points.end());
     loop.close_loop();
     return unite(loop, {});
-}
-
-ReadHead unplaced(const ReadHead& head, const ReadPiece& piece) {
-    const double x = head.x - piece.x, y = head.y - piece.y;
-    switch (((piece.turn % 360) + 360) % 360) {
-        case 90:
-            return {y, -x, head.a, head.c - 90};
-        case 180:
-            return {-x, -y, head.a, head.c - 180};
-        case 270:
-            return {-y, x, head.a, head.c - 270};
-        default:
-            return {x, y, head.a, head.c};
-    }
 }
 
 struct WayBox {
@@ -158,6 +99,7 @@ struct PieceResult {
     int islands = 0;
     PieceHold hold;
     std::vector<Diagnostic> violations;
+    Loops top, bottom;  ///< what stays there, where engravings ask for it
 };
 
 class PieceProof {
@@ -171,8 +113,10 @@ public:
           hold_(read_hold(piece)),
           bodies_(piece) {}
 
-    PieceResult run(const std::vector<const Section*>& sections) {
+    PieceResult run(const std::vector<const Section*>& sections, bool wants_top, bool wants_bottom) {
         for (int k = 0; k < kHeights; ++k) level(k, sections[static_cast<std::size_t>(k)]->loops);
+        if (wants_top) result_.top = made_at(0);
+        if (wants_bottom) result_.bottom = made_at(program_.thickness);
         result_.hold = hold_of(piece_, program_.file, bodies_);
         return std::move(result_);
     }
@@ -344,6 +288,23 @@ public:
     WayBox box_;  ///< of the piece's own cuts, on the stock
 };
 
+std::vector<FineWay> fine_ways(const ReadSheetProgram& program) {
+    std::vector<FineWay> ways;
+    for (const ReadWay& way : program.ways) {
+        FineWay f;
+        f.read = &way;
+        f.heads = fine(way.points);
+        const std::vector<ReadHead> in(
+            way.points.begin(), way.points.begin() + std::min<long>(2, static_cast<long>(way.points.size())));
+        f.loop_from = fine(in).size() - 1;
+        for (const double depth : {0.0, program.thickness})
+            for (const AxisPoint& a : at_depth(f.heads, depth))
+                f.box.add(a.x, a.y, program.kerf / 2 * std::hypot(1, std::hypot(a.lean_x, a.lean_y)));
+        ways.push_back(std::move(f));
+    }
+    return ways;
+}
+
 void require_ways(const ReadSheetProgram& program, const std::vector<FineWay>& ways,
                   std::vector<Diagnostic>& violations) {
     const auto violate = [&](const char* code, const ReadWay& way, const std::string& message) {
@@ -441,22 +402,11 @@ SheetProof prove_sheets(Context& context, MeshView mesh, const std::vector<ReadS
     std::vector<Task> tasks;
     for (std::size_t p = 0; p < programs.size(); ++p) {
         const ReadSheetProgram& program = programs[p];
-        for (const ReadWay& way : program.ways) {
-            FineWay f;
-            f.read = &way;
-            f.heads = fine(way.points);
-            const std::vector<ReadHead> in(
-                way.points.begin(),
-                way.points.begin() + std::min<long>(2, static_cast<long>(way.points.size())));
-            f.loop_from = fine(in).size() - 1;
-            for (const double depth : {0.0, program.thickness})
-                for (const AxisPoint& a : at_depth(f.heads, depth))
-                    f.box.add(a.x, a.y, program.kerf / 2 * std::hypot(1, std::hypot(a.lean_x, a.lean_y)));
-            ways[p].push_back(std::move(f));
-        }
+        ways[p] = fine_ways(program);
         require_ways(program, ways[p], proof.violations);
         for (const ReadPiece& piece : program.pieces) tasks.push_back({&program, &piece, &ways[p]});
     }
+    const std::set<int> engraved = engraved_pieces(programs);
     std::vector<PieceResult> results(tasks.size());
     // Some pieces at a time: the sections of all of them are larger than the mesh.
     constexpr std::size_t at_once = 16;
@@ -479,7 +429,8 @@ SheetProof prove_sheets(Context& context, MeshView mesh, const std::vector<ReadS
             for (const FineWay& way : *task.ways)
                 if (way.read->piece == task.piece->number)
                     piece.box_.add(way.box.x0, way.box.y0, 0), piece.box_.add(way.box.x1, way.box.y1, 0);
-            results[first + at] = piece.run(own);
+            const int number = task.piece->number;
+            results[first + at] = piece.run(own, engraved.count(number) > 0, engraved.count(number - 1) > 0);
         });
     }
     std::vector<PieceHold> holds;
@@ -492,6 +443,11 @@ SheetProof prove_sheets(Context& context, MeshView mesh, const std::vector<ReadS
         holds.push_back(result.hold);
         proof.violations.insert(proof.violations.end(), result.violations.begin(), result.violations.end());
     }
+    std::vector<EngravedPiece> faces;
+    for (std::size_t i = 0; i < tasks.size(); ++i)
+        faces.push_back(
+            {tasks[i].program, tasks[i].piece, std::move(results[i].top), std::move(results[i].bottom)});
+    proof.engraved = require_engravings(programs, faces, proof.violations);
     if (proof.dowels > 0) proof.islands = require_held(holds, proof.violations);
     proof.passed = proof.violations.empty();
     return proof;

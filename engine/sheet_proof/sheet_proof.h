@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,21 @@ struct ReadPiece {
     std::vector<std::array<double, 8>> tabs;   ///< corners of tabs and necks, which are cut off later
 };
 
+/// A number or a match mark that is engraved.
+struct ReadEngraving {
+    int piece = 0;
+    std::string text;                            ///< as the comment before it says; "mark" of a match mark
+    std::vector<std::vector<ReadHead>> strokes;  ///< on the stock
+    double deepest = 0;                          ///< mm below the sheet's top; of laser and jet, as stated
+    std::uint32_t line = 0;                      ///< of the program, where it begins
+};
+
+/// With what a program engraves, as it states: a router's tool, a laser's power or a jet's feed; mm.
+struct ReadEngraver {
+    int tool = 0;
+    double power = 0, feed = 0, width = 0, depth = 0;
+};
+
 /// What one program says.
 struct ReadSheetProgram {
     std::string file;
@@ -46,6 +62,8 @@ struct ReadSheetProgram {
     bool is_routed = false;
     std::vector<ReadPiece> pieces;
     std::vector<ReadWay> ways;
+    std::optional<ReadEngraver> engraver;
+    std::vector<ReadEngraving> engravings;
 };
 
 struct SheetProof {
@@ -54,9 +72,10 @@ struct SheetProof {
     double gouge = 0;        ///< mm: the greatest distance of the part's border within what was cut away
     double left_over = 0;    ///< mm: the greatest distance of what was made from the part
     double left_on_top = 0;  ///< mm of the part above the last sheet
-    int islands = 0;  ///< parts of sheets that nothing but the glue holds in place: where the programs tell
-                      ///< of no dowel, those beyond one for each sheet
-    int dowels = 0;   ///< holes of dowels and rods, of all sheets
+    int islands = 0;   ///< parts of sheets that nothing but the glue holds in place: where the programs tell
+                       ///< of no dowel, those beyond one for each sheet
+    int dowels = 0;    ///< holes of dowels and rods, of all sheets
+    int engraved = 0;  ///< numbers and match marks
     std::vector<Diagnostic> violations;
 };
 

@@ -7,6 +7,7 @@
 
 #include "engine/sheets/fitted_heights.h"
 #include "engine/sheets/majorant.h"
+#include "engine/sheets/near_part.h"
 #include "kernels/errors.h"
 #include "kernels/parallel/parallel.h"
 #include "kernels/polygons/border_distance.h"
@@ -245,126 +246,12 @@ SheetCuts upright_cuts(const Loops& outline, const SheetCutRules& rules) {
     return cuts;
 }
 
-/// One sheet's surroundings: its outline and the sections at the heights that cuts are made to fit.
-struct Fitted {
-    const Loops& outline;
-    std::vector<double> heights;
-    std::vector<const Loops*> sections;
-};
-
 /// One closed way under way: the places it is made of and its cut at each.
 struct Way {
     const std::vector<Sample>& samples;
     std::vector<StraightCut> cuts;
     AxisLoop axis;
 };
-
-struct Nearest {
-    std::size_t edge = 0;
-    double distance = 1e300;  ///< mm
-};
-
-Nearest nearest_edge(const std::vector<Point2>& axis, Point2 p) {
-    Nearest best;
-    for (std::size_t k = 0; k < axis.size(); ++k) {
-        const Vec2 a = to_vec(axis[k]), b = to_vec(axis[(k + 1) % axis.size()]), v = to_vec(p);
-        const double dx = b.x - a.x, dy = b.y - a.y, l2 = dx * dx + dy * dy;
-        const double t = l2 > 0 ? std::clamp(((v.x - a.x) * dx + (v.y - a.y) * dy) / l2, 0.0, 1.0) : 0;
-        const double d = std::hypot(v.x - a.x - t * dx, v.y - a.y - t * dy);
-        if (d < best.distance) best = {k, d};
-    }
-    return best;
-}
-
-/// By how much the axis leans at a place, mm aside for each mm up.
-Vec2 lean_of(const AxisLoop& axis, std::size_t i, double height) {
-    const Vec2 top = to_vec(axis.top[i]), bottom = to_vec(axis.bottom[i]);
-    return {(top.x - bottom.x) / height, (top.y - bottom.y) / height};
-}
-
-/// How far in the level the part must lie from a piece of the axis: half a kerf square to the surface that
-/// the axis sweeps there. @param level the axis' points at a height
-double need_beside(const AxisLoop& axis, const std::vector<Point2>& level, std::size_t i, double height,
-                   double kerf) {
-    const std::size_t next = (i + 1) % level.size();
-    const Vec2 a = to_vec(level[i]), b = to_vec(level[next]);
-    const double l = std::max(1e-6, std::hypot(b.x - a.x, b.y - a.y));
-    double most = 0;
-    for (const std::size_t end : {i, next}) {
-        const Vec2 lean = lean_of(axis, end, height);
-        most = std::max(most, std::abs(lean.x * (b.y - a.y) - lean.y * (b.x - a.x)) / l);
-    }
-    return kerf / 2 * std::hypot(1, most);
-}
-
-/// Of each point whether the region winds around it; those on its border count as either.
-std::vector<bool> wound_around(const Loops& region, std::span<const Point2> points) {
-    std::vector<std::size_t> order(points.size());
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-        return points[a].y != points[b].y ? points[a].y < points[b].y : a < b;
-    });
-    std::vector<double> heights;
-    for (const std::size_t i : order)
-        if (heights.empty() || heights.back() != points[i].y) heights.push_back(points[i].y);
-    const std::vector<std::vector<Span>> spans = line_spans(region, heights);
-    std::vector<bool> inside(points.size(), false);
-    std::size_t row = 0;
-    for (const std::size_t i : order) {
-        while (heights[row] < points[i].y) ++row;
-        const auto& line = spans[row];
-        const auto after = std::upper_bound(line.begin(), line.end(), double(points[i].x),
-                                            [](double x, const Span& span) { return x < span.low; });
-        inside[i] = after != line.begin() && points[i].x <= std::prev(after)->high;
-    }
-    return inside;
-}
-
-/// By how much each place of a way lies too near to the part, mm square to the outline: 0 where it does not.
-/// The part's corners need not lie on the rays that found it. Two polygons are nearest, and enter each other
-/// deepest, at a corner of one of them, so corners are all that is asked.
-std::vector<double> too_near(const Way& way, const Fitted& sheet, const std::vector<BorderDistance>& borders,
-                             const std::vector<std::size_t>& owners_of_vertices, double kerf,
-                             double allowed) {
-    const double height = sheet.heights.back() - sheet.heights.front();
-    const std::size_t n = way.samples.size();
-    std::vector<double> lacks(n, 0);
-    double widest = 0;
-    for (std::size_t i = 0; i < n; ++i)
-        widest = std::max(widest, kerf / 2 * std::hypot(1, length(lean_of(way.axis, i, height))));
-    std::size_t vertex = 0;
-    for (std::size_t k = 0; k < sheet.heights.size(); ++k) {
-        Loops own;
-        own.points = axis_at(way.axis, (sheet.heights[k] - sheet.heights.front()) / height);
-        own.close_loop();
-        const BorderDistance to_axis(own);
-        Loops around = own;  // what an outline holds, what a hole takes away
-        if (way.axis.is_hole) std::reverse(around.points.begin(), around.points.end());
-        const std::vector<bool> is_around = wound_around(around, sheet.sections[k]->points);
-        const std::vector<bool> is_in_part = wound_around(*sheet.sections[k], own.points);
-        for (std::size_t v = 0; v < sheet.sections[k]->points.size(); ++v) {
-            const Point2 p = sheet.sections[k]->points[v];
-            const bool is_own = owners_of_vertices[vertex++] == static_cast<std::size_t>(way.axis.loop);
-            const bool stays = !is_own || is_around[v] != way.axis.is_hole;
-            if (stays && to_axis(p) >= widest - allowed) continue;
-            const Nearest near = nearest_edge(own.points, p);
-            const std::size_t next = (near.edge + 1) % own.points.size();
-            const double need = need_beside(way.axis, own.points, near.edge, height, kerf);
-            const double more = need + (stays ? -near.distance : near.distance);
-            if (more <= allowed) continue;
-            lacks[near.edge] = std::max(lacks[near.edge], more);
-            lacks[next] = std::max(lacks[next], more);
-        }
-        for (std::size_t i = 0; i < own.points.size(); ++i) {
-            const double distance = borders[k](own.points[i]);
-            const double need = std::max(need_beside(way.axis, own.points, i, height, kerf),
-                                         need_beside(way.axis, own.points, (i + n - 1) % n, height, kerf));
-            const double more = need + (is_in_part[i] ? distance : -distance);
-            if (more > allowed) lacks[i] = std::max(lacks[i], more);
-        }
-    }
-    return lacks;
-}
 
 /// Moves the places of a way outwards by what they lack.
 void push_out(Way& way, const std::vector<double>& lacks, double height, double kerf) {
@@ -375,30 +262,6 @@ void push_out(Way& way, const std::vector<double>& lacks, double height, double 
     const AxisLoop fresh = axis_loop(way.samples, way.cuts, height, kerf);
     way.axis.bottom = fresh.bottom;
     way.axis.top = fresh.top;
-}
-
-/// Of every vertex of every section, section by section, the loop of the outline that is nearest.
-std::vector<std::size_t> nearest_loops(const Fitted& sheet) {
-    std::vector<Loops> single(sheet.outline.size());
-    std::vector<BorderDistance> borders;
-    for (std::size_t l = 0; l < single.size(); ++l) {
-        const auto loop = sheet.outline.loop(l);
-        single[l].points.assign(loop.begin(), loop.end());
-        single[l].close_loop();
-        borders.emplace_back(single[l]);
-    }
-    std::vector<std::size_t> owners;
-    for (const Loops* section : sheet.sections)
-        for (const Point2 p : section->points) {
-            std::size_t owner = 0;
-            double nearest = 1e300;
-            for (std::size_t l = 0; l < borders.size(); ++l) {
-                const double d = borders.size() == 1 ? 0 : borders[l](p);
-                if (d < nearest) nearest = d, owner = l;
-            }
-            owners.push_back(owner);
-        }
-    return owners;
 }
 
 /// The ways of one loop of the outline, one for each pass.
@@ -474,9 +337,7 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
     SheetCuts& cuts = result.cuts;
     const double height = sheet.heights.back() - sheet.heights.front();
     const double most_slope = std::tan(rules.most_tilt_deg * std::numbers::pi / 180);
-    std::vector<BorderDistance> borders;
-    for (const Loops* section : sheet.sections) borders.emplace_back(*section);
-    const std::vector<std::size_t> owners = nearest_loops(sheet);
+    const NearPart part(sheet, rules.kerf);
     std::vector<AxisLoop> edges;
     for (const bool holes : {true, false})
         for (std::size_t l = 0; l < sheet.outline.size(); ++l) {
@@ -487,7 +348,7 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
             for (Sample& s : samples)
                 for (std::size_t k = 0; k < sheet.sections.size(); ++k)
                     s.reach.push_back(
-                        reach_of(s, *sheet.sections[k], borders[k], most_slope * height * s.mitre));
+                        reach_of(s, *sheet.sections[k], part.border(k), most_slope * height * s.mitre));
             const double whole = samples.back().along + std::hypot(points[0].x - samples.back().at.x,
                                                                    points[0].y - samples.back().at.y);
             leave_out_beside_corners(samples, whole);
@@ -495,8 +356,7 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
             for (Way& way : ways_of(samples, sheet, l, holes, rules)) {
                 for (int i = 0; i <= most_pushes; ++i) {
                     const double allowed = i < most_pushes ? rules.gouge / 4 : rules.gouge / 2;
-                    const std::vector<double> lacks =
-                        too_near(way, sheet, borders, owners, rules.kerf, allowed);
+                    const std::vector<double> lacks = part.too_near(way.axis, allowed);
                     const bool is_clear =
                         std::all_of(lacks.begin(), lacks.end(), [](double lack) { return lack == 0; });
                     if (is_clear) break;
@@ -516,20 +376,69 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
     return result;
 }
 
-/// The cuts of one sheet.
-/// @param sections at its heights and more
-/// @param hold what holds it; none: nothing does
-SheetCuts cuts_of_one(Fitted sheet, std::span<const Section> sections, const SheetCutRules& rules,
-                      const SheetHold* hold, double dowel) {
+/// Heights halfway between those that cuts are fitted to, where these are not next to each other.
+std::vector<double> halfway(const std::vector<double>& heights) {
+    constexpr double next_to = 0.02;  // mm
+    std::vector<double> between;
+    for (std::size_t k = 0; k + 1 < heights.size(); ++k)
+        if (heights[k + 1] - heights[k] > next_to) between.push_back((heights[k] + heights[k + 1]) / 2);
+    return between;
+}
+
+/// One sheet with what is known of it. Sections of tilted cuts are at its heights, then halfway.
+struct Sheet {
+    const Loops& outline;
+    const std::vector<double>& heights;
+    std::vector<double> between;
+    std::span<const Section> sections;
+    const SheetHold* hold = nullptr;
+};
+
+/// Tilted cuts that are fitted to the sections at the heights and spare those halfway; if they do not, they
+/// are fitted to all of them.
+Tilted tilted_cuts_of(const Sheet& sheet, const std::vector<const Loops*>& sections,
+                      const SheetCutRules& rules) {
+    const std::size_t n = sheet.heights.size();
+    Fitted fitted{sheet.outline, sheet.heights, {sections.begin(), sections.begin() + static_cast<long>(n)}};
+    Tilted tilted = tilted_cuts(fitted, rules);
+    if (!tilted.spares || tilted.cuts.upright || sheet.between.empty()) return tilted;
+    std::vector<std::pair<double, const Loops*>> all;
+    for (std::size_t k = 0; k < n; ++k) all.emplace_back(sheet.heights[k], sections[k]);
+    Fitted beside{sheet.outline, {sheet.heights.front()}, {sections[0]}};
+    for (std::size_t k = 0; k < sheet.between.size(); ++k) {
+        all.emplace_back(sheet.between[k], sections[n + k]);
+        beside.heights.push_back(sheet.between[k]);
+        beside.sections.push_back(sections[n + k]);
+    }
+    beside.heights.push_back(sheet.heights.back());
+    beside.sections.push_back(sections[n - 1]);
+    const NearPart part(beside, rules.kerf);
+    const bool spares =
+        std::all_of(tilted.cuts.loops.begin(), tilted.cuts.loops.end(), [&](const AxisLoop& axis) {
+            const std::vector<double> lacks = part.too_near(axis, rules.gouge);
+            return std::all_of(lacks.begin(), lacks.end(), [](double lack) { return lack == 0; });
+        });
+    if (spares) return tilted;
+    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    Fitted finer{sheet.outline, {}, {}};
+    for (const auto& [z, section] : all) {
+        finer.heights.push_back(z);
+        finer.sections.push_back(section);
+    }
+    return tilted_cuts(finer, rules);
+}
+
+SheetCuts cuts_of_one(const Sheet& sheet, const SheetCutRules& rules, double dowel) {
     std::vector<Loops> held;  // what is to stay, with its tabs and without its holes
-    if (hold != nullptr)
-        for (std::size_t k = 0; k < sheet.heights.size(); ++k)
-            held.push_back(with_hold(sections[k].loops, *hold, dowel));
-    for (std::size_t k = 0; k < sheet.heights.size(); ++k)
-        sheet.sections.push_back(hold == nullptr ? &sections[k].loops : &held[k]);
+    if (sheet.hold != nullptr)
+        for (const Section& section : sheet.sections)
+            held.push_back(with_hold(section.loops, *sheet.hold, dowel));
+    std::vector<const Loops*> sections;
+    for (std::size_t k = 0; k < sheet.sections.size(); ++k)
+        sections.push_back(sheet.hold == nullptr ? &sheet.sections[k].loops : &held[k]);
     bool gave_up_tilt = false;
     if (rules.most_tilt_deg > 0) {
-        Tilted tilted = tilted_cuts(sheet, rules);
+        Tilted tilted = tilted_cuts_of(sheet, sections, rules);
         if (tilted.spares && !tilted.cuts.upright) return std::move(tilted.cuts);
         gave_up_tilt = !tilted.spares;
     }
@@ -541,7 +450,9 @@ SheetCuts cuts_of_one(Fitted sheet, std::span<const Section> sections, const She
         axis.close_loop();
     }
     const Loops left = rules.kerf > 0 ? offset(axis, -rules.kerf / 2, kArcTolerance) : axis;
-    cuts.deviation = deviation_of(LeftAtHeights(sheet.heights.size(), left), sheet);
+    sections.resize(sheet.heights.size());
+    cuts.deviation = deviation_of(LeftAtHeights(sheet.heights.size(), left),
+                                  {sheet.outline, sheet.heights, std::move(sections)});
     return cuts;
 }
 
@@ -580,17 +491,25 @@ std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh, const std::vecto
         const std::size_t end = std::min(first + at_once, spans.size());
         std::vector<Plane> planes;
         std::vector<std::size_t> starts;
+        std::vector<std::vector<double>> between(end - first);
         for (std::size_t i = first; i < end; ++i) {
             starts.push_back(planes.size());
-            for (const double z : heights[i])
+            if (rules.most_tilt_deg > 0) between[i - first] = halfway(heights[i]);
+            const auto cut = [&](double z) {
                 planes.push_back(z >= std::min(spans[i].top, top) ? Plane{std::min(z, top), Side::below}
                                                                   : Plane{z, Side::above});
+            };
+            std::for_each(heights[i].begin(), heights[i].end(), cut);
+            std::for_each(between[i - first].begin(), between[i - first].end(), cut);
         }
+        starts.push_back(planes.size());
         const std::vector<Section> sections = slice(context, mesh, planes);
         parallel_each(context, end - first, [&](std::size_t k) {
             const std::size_t i = first + k;
-            cuts[i] = cuts_of_one({stairs[i].outline, heights[i], {}}, std::span(sections).subspan(starts[k]),
-                                  rules, holds.empty() ? nullptr : &holds[i], dowel);
+            const std::span own = std::span(sections).subspan(starts[k], starts[k + 1] - starts[k]);
+            cuts[i] = cuts_of_one({stairs[i].outline, heights[i], std::move(between[k]), own,
+                                   holds.empty() ? nullptr : &holds[i]},
+                                  rules, dowel);
         });
     }
     return cuts;

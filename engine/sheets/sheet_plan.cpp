@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -41,6 +42,19 @@ void require_job(const SheetJob& job) {
                    "give its thickness to --thickness too");
     if (job.head == SheetHead::router && !(job.cutting.kerf > 0))
         refuse("a router's cutter has a diameter", "give --kerf");
+    if (!is_switch(job.on) || !is_switch(job.off) || job.on == job.off)
+        refuse(
+            "a laser or a jet is switched by two M words (3 to 5, 7 to 9, 62 to 65, 100 to 199), each with a "
+            "P word or none",
+            "give --on and --off like \"M62 P0\" and \"M63 P0\"");
+    if (job.engraving.depth == 0) return;
+    if (!(job.engraving.depth <= job.slicing.thicknesses.front() / 2))
+        refuse("what is engraved is deeper than half of the thinnest sheet", "give less to --engrave");
+    for (const double value : {job.engraving.feed, job.engraving.power, job.power})
+        if (!(value > 0) || value > 1e6) refuse("the feed and powers of an engraver must be over 0", "");
+    if (job.head == SheetHead::laser && job.engraving.power >= job.power)
+        refuse("a laser that engraves at its cutting power cuts", "give less to --engrave-power");
+    (void)engraving_feed(job);
 }
 
 /// Where a way begins and from where it is led in: the first place with room for the whole lead in the waste,
@@ -122,6 +136,20 @@ double length_of(const SheetWay& way) {
     return mm;
 }
 
+double engraving_minutes(const SheetPiece& piece, const SheetJob& job) {
+    constexpr double each = 0.02;  // down, up and to the next
+    double minutes = 0;
+    for (const Engraving& engraving : piece.engravings)
+        for (const std::vector<Point2>& stroke : engraving.strokes) {
+            minutes += each;
+            for (std::size_t i = 1; i < stroke.size(); ++i)
+                minutes += std::hypot(to_mm(stroke[i].x) - to_mm(stroke[i - 1].x),
+                                      to_mm(stroke[i].y) - to_mm(stroke[i - 1].y)) /
+                           engraving_feed(job);
+        }
+    return minutes;
+}
+
 /// What a piece takes of its stock: the outside of its cuts with their leads, holes filled.
 Loops blank_of(const SheetCuts& cuts, const SheetJob& job) {
     Loops outside;
@@ -162,6 +190,21 @@ void tell(SheetsPlan& plan, Severity severity, const char* code, std::string mes
     plan.diagnostics.push_back({severity, code, std::move(message), {}});
 }
 
+/// Sheets that have no room for their number.
+void tell_unmarked(SheetsPlan& plan) {
+    if (plan.job.engraving.depth == 0) return;
+    std::string numbers;
+    for (const SheetPiece& piece : plan.pieces) {
+        const auto is_number = [](const Engraving& e) { return !e.text.empty(); };
+        if (std::count_if(piece.engravings.begin(), piece.engravings.end(), is_number) < piece.islands)
+            numbers += fmt::format("{}{}", numbers.empty() ? "" : ", ", piece.number);
+    }
+    if (!numbers.empty())
+        tell(plan, Severity::note, "sheets.unmarked",
+             fmt::format("not engraved, or not on every island, for want of a covered place: sheet {}",
+                         numbers));
+}
+
 void tell_findings(SheetsPlan& plan, const std::vector<SheetCuts>& cuts, int on_the_way) {
     if (plan.stack.left_on_top > 0)
         tell(plan, Severity::warning, "sheets.left_on_top",
@@ -177,6 +220,7 @@ void tell_findings(SheetsPlan& plan, const std::vector<SheetCuts>& cuts, int on_
             tell(plan, Severity::warning, "sheets.upright",
                  fmt::format("sheet {} is cut upright: tilted cuts would enter the part", piece.number));
     }
+    tell_unmarked(plan);
     if (on_the_way > 0)
         tell(plan, Severity::warning, "sheets.pierce",
              fmt::format("{} cuts have no room for a lead and begin on the edge of the part", on_the_way));
@@ -201,21 +245,47 @@ std::vector<SheetHold> hold_sheets(Context& context, MeshView mesh, const std::v
     return holds;
 }
 
-/// Where each sheet touches the next: upright ones where their outlines cover each other, tilted ones in the
-/// part's section between them.
+/// Where each sheet touches the next: upright ones where their outlines cover each other, tilted ones where
+/// the part's sections just below and just above do.
 std::vector<Loops> bonded_faces(Context& context, MeshView mesh, const SheetJob& job,
                                 const std::vector<SheetSpan>& spans, const std::vector<SheetStair>& stairs) {
     std::vector<Loops> faces;
     if (job.cutting.most_tilt_deg > 0) {
         std::vector<Plane> planes;
-        for (std::size_t i = 0; i + 1 < spans.size(); ++i)
-            planes.push_back({(spans[i].top + spans[i + 1].bottom) / 2, Side::below});
-        for (Section& section : slice(context, mesh, planes)) faces.push_back(std::move(section.loops));
+        for (std::size_t i = 0; i + 1 < spans.size(); ++i) {
+            planes.push_back({spans[i].top, Side::below});
+            planes.push_back({spans[i + 1].bottom, Side::above});
+        }
+        const std::vector<Section> sections = slice(context, mesh, planes);
+        for (std::size_t k = 0; k < sections.size(); k += 2)
+            faces.push_back(intersect(sections[k].loops, sections[k + 1].loops));
         return faces;
     }
     for (std::size_t i = 0; i + 1 < stairs.size(); ++i)
         faces.push_back(intersect(stairs[i].outline, stairs[i + 1].outline));
     return faces;
+}
+
+/// Numbers and match marks of the pieces, where they are asked for.
+void engrave(Context& context, SheetsPlan& plan, const std::vector<Loops>& faces,
+             const std::vector<SheetHold>& holds, const std::vector<SheetStair>& stairs) {
+    const SheetJob& job = plan.job;
+    if (job.engraving.depth == 0) return;
+    const double dowel = job.alignment.dowel;
+    const auto hold = [&](std::size_t i) { return i < holds.size() ? holds[i] : SheetHold{}; };
+    std::vector<EngravedFace> engraved(stairs.size());
+    for (std::size_t i = 0; i < stairs.size(); ++i) {
+        EngravedFace& face = engraved[i];
+        face.outline = stairs[i].outline;
+        face.tabs = with_hold(unite(hold(i).added, {}), {{}, hold(i).holes}, dowel);
+        if (i + 1 == stairs.size()) continue;  // nothing covers it
+        face.covered = with_hold(faces[i], {{}, hold(i).holes}, dowel);
+        face.covered = with_hold(face.covered, {{}, hold(i + 1).holes}, dowel);
+        face.next = job.cutting.most_tilt_deg > 0 ? with_hold(faces[i], {hold(i + 1).added, {}}, dowel)
+                                                  : stairs[i + 1].outline;
+    }
+    auto all = engravings_of(context, engraved, job.engraving);
+    for (std::size_t i = 0; i < all.size(); ++i) plan.pieces[i].engravings = std::move(all[i]);
 }
 
 /// Indices of cuts, those that more others run around first: what stands in a hole is cut free before the
@@ -265,6 +335,7 @@ int lay_pieces(Context& context, SheetsPlan& plan, std::size_t t, const std::vec
         piece.program = static_cast<int>(first) + piece.place.stock;
         SheetProgram& program = plan.programs[static_cast<std::size_t>(piece.program)];
         program.pieces.push_back(piece.number);
+        program.minutes += engraving_minutes(piece, job);
         const SheetCuts& own_cuts = cuts[own[k]];
         for (const std::size_t l : from_inside(own_cuts)) {
             const AxisLoop& loop = own_cuts.loops[l];
@@ -286,24 +357,56 @@ int lay_pieces(Context& context, SheetsPlan& plan, std::size_t t, const std::vec
                 mm * depths / way.feed + (job.head == SheetHead::router ? 0.05 : job.pierce_s / 60);
             program.ways.push_back(std::move(way));
         }
-        piece.label = program.ways.back().points[0].top;
+        piece.label = piece.engravings.empty() ? program.ways.back().points[0].top
+                                               : placed(piece.engravings[0].middle, piece.place);
     }
     return on_the_way;
 }
 
 }  // namespace
 
-Mesh along_axis(const Mesh& mesh, char axis) {
+bool is_switch(std::string_view text) {
+    const auto number = [&](std::size_t digits) {
+        int value = 0;
+        const char* const end = text.data() + std::min(text.size(), digits);
+        const auto [at, error] = std::from_chars(text.data(), end, value);
+        if (error != std::errc() || value < 0) return -1;
+        text.remove_prefix(static_cast<std::size_t>(at - text.data()));
+        return value;
+    };
+    if (text.empty() || text[0] != 'M') return false;
+    text.remove_prefix(1);
+    const int m = number(3);
+    const bool is_known = (m >= 3 && m <= 9 && m != 6) || (m >= 62 && m <= 65) || (m >= 100 && m <= 199);
+    if (!is_known || text.empty()) return is_known;
+    if (text.substr(0, 2) != " P") return false;
+    text.remove_prefix(2);
+    return number(3) >= 0 && text.empty();
+}
+
+double engraving_feed(const SheetJob& job) {
+    if (job.head != SheetHead::jet) return job.engraving.feed;
+    constexpr double most = 15000;
+    const double feed = jet_feed(job.jet, job.engraving.depth);
+    if (feed > most)
+        throw Error(
+            ErrorKind::usage, "sheets.engrave",
+            fmt::format("a jet that enters no deeper than {:.4g} mm runs at {:.0f} mm/min, over {:.0f}",
+                        job.engraving.depth, feed, most),
+            "", "give more to --engrave");
+    return feed;
+}
+
+Mesh along_axis(Mesh mesh, char axis) {
     if (axis != 'x' && axis != 'y' && axis != 'z')
         throw Error(ErrorKind::usage, "sheets.axis", "sheets are stacked along x, y or z", "",
                     "give one of these");
-    Mesh turned = mesh;
-    for (Vec3f& v : turned.vertices)
-        v = axis == 'x' ? Vec3f{v.y, v.z, v.x} : axis == 'y' ? Vec3f{v.z, v.x, v.y} : v;
-    const float low = bounds(turned.view()).min.z;
+    if (axis != 'z')
+        for (Vec3f& v : mesh.vertices) v = axis == 'x' ? Vec3f{v.y, v.z, v.x} : Vec3f{v.z, v.x, v.y};
+    const float low = bounds(mesh.view()).min.z;
     if (low != 0)
-        for (Vec3f& v : turned.vertices) v.z -= low;
-    return turned;
+        for (Vec3f& v : mesh.vertices) v.z -= low;
+    return mesh;
 }
 
 SheetsPlan plan_sheets(Context& context, const Mesh& mesh, const SheetJob& job) {
@@ -328,6 +431,7 @@ SheetsPlan plan_sheets(Context& context, const Mesh& mesh, const SheetJob& job) 
         cuts_of(context, mesh.view(), spans, stairs, job.cutting, holds, job.alignment.dowel);
     add_pieces(plan, stairs, cuts);
     for (std::size_t i = 0; i < holds.size(); ++i) plan.pieces[i].hold = holds[i];
+    engrave(context, plan, faces, holds, stairs);
     for (std::size_t i = 0; i < pins.size(); ++i) {
         plan.pieces[i].pins = pins[i];
         if (i >= faces.size()) continue;

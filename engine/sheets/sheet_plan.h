@@ -2,10 +2,12 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/plan.h"
 #include "engine/sheets/alignment.h"
+#include "engine/sheets/engraving.h"
 #include "engine/sheets/head.h"
 #include "engine/sheets/jet_feed.h"
 #include "engine/sheets/nesting.h"
@@ -28,6 +30,7 @@ struct SheetJob {
     SheetRules slicing;
     SheetCutRules cutting;  ///< its kerf is the router's cutter
     AlignmentRules alignment;
+    EngraveRules engraving;
     NestRules nesting;  ///< spacing is between kerfs and leads
     StockSheet stock{1220, 1220};
     std::vector<SheetOffcut> offcuts;
@@ -40,6 +43,8 @@ struct SheetJob {
     double plunge_feed = 800, stepdown = 6, rpm = 18000;  ///< router
     double through = 0.2;                                 ///< mm that a router cuts under the sheet
     int tool = 1;
+    double power = 100;                 ///< laser: its S word while it cuts; stated where it engraves too
+    std::string on = "M3", off = "M5";  ///< what switches a laser or a jet: is_switch()
     AbrasiveJet jet;
 };
 
@@ -62,10 +67,19 @@ struct SheetPiece {
     int islands = 1;
     double joint_mm2 = 0;  ///< that are bonded to the sheet above
     double stair_mm3 = 0, deviation = 0, tilt_deg = 0, area_mm2 = 0;
-    Point2 label;                ///< a place inside, on the stock
-    SheetHold hold;              ///< in the stack's frame
-    std::array<Point2, 4> pins;  ///< pins_of() its outline, in the stack's frame
+    Point2 label;                       ///< a place inside, on the stock
+    SheetHold hold;                     ///< in the stack's frame
+    std::vector<Engraving> engravings;  ///< in the stack's frame
+    std::array<Point2, 4> pins;         ///< pins_of() its outline, in the stack's frame
 };
+
+/// mm/min: given, or of a jet what enters as deep as is engraved. @throws Error(usage, "sheets.engrave")
+/// where a jet would have to run faster than 15 m/min
+[[nodiscard]] double engraving_feed(const SheetJob& job);
+
+/// Whether a text is an M word that may switch a laser or a jet, with a P word or without: M3, M4, M5, M7,
+/// M8, M9, M62 to M65, M100 to M199.
+[[nodiscard]] bool is_switch(std::string_view text);
 
 /// What is cut from one stock sheet.
 struct SheetProgram {
@@ -88,7 +102,7 @@ struct SheetsPlan {
 
 /// The solid turned so that `axis` points up, on z = 0. X: (y, z, x); Y: (z, x, y). @throws
 /// Error(usage, "sheets.axis") for other letters
-[[nodiscard]] Mesh along_axis(const Mesh& mesh, char axis);
+[[nodiscard]] Mesh along_axis(Mesh mesh, char axis);
 
 /// @param mesh as along_axis() makes it, with neighbours
 /// @throws as stack_of_sheets(), cuts_of() and nest_pieces(), Error(usage, "sheets.job") for values out of

@@ -45,8 +45,15 @@ DxfText::DxfText(Point2 low, Point2 high, std::span<const std::string_view> laye
     words({{0, "ENDTAB"}, {0, "ENDSEC"}, {0, "SECTION"}, {2, "ENTITIES"}});
 }
 
-void DxfText::loop(std::string_view layer, std::span<const Point2> points) {
-    words({{0, "POLYLINE"}, {8, layer}, {66, "1"}, {10, "0.0"}, {20, "0.0"}, {30, "0.0"}, {70, "1"}});
+void DxfText::loop(std::string_view layer, std::span<const Point2> points) { polyline(layer, points, true); }
+
+void DxfText::open_line(std::string_view layer, std::span<const Point2> points) {
+    polyline(layer, points, false);
+}
+
+void DxfText::polyline(std::string_view layer, std::span<const Point2> points, bool is_closed) {
+    words({{0, "POLYLINE"}, {8, layer}, {66, "1"}, {10, "0.0"}, {20, "0.0"}, {30, "0.0"}});
+    group(70, is_closed ? "1" : "0");
     for (const Point2 p : points) {
         words({{0, "VERTEX"}, {8, layer}});
         group(10, real_mm(p.x));

@@ -16,12 +16,14 @@ public:
     /// @param low, high corners of all that is drawn. @param layers in the order of their colours, from 1
     DxfText(Point2 low, Point2 high, std::span<const std::string_view> layers);
     void loop(std::string_view layer, std::span<const Point2> points);
+    void open_line(std::string_view layer, std::span<const Point2> points);
     /// Words at a place, 8 mm high unless told otherwise.
     void label(Point2 at, const std::string& words, double height_mm = 8);
     /// The whole text; nothing can be added after it.
     [[nodiscard]] std::string take();
 
 private:
+    void polyline(std::string_view layer, std::span<const Point2> points, bool is_closed);
     void group(int code, std::string_view value);
     void words(std::initializer_list<std::pair<int, std::string_view>> groups);
     std::string text_;

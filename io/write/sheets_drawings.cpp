@@ -30,6 +30,17 @@ std::vector<Point2> loop_of(const SheetWay& way) {
     return points;
 }
 
+/// Strokes of what is engraved into a piece, on the stock.
+std::vector<std::vector<Point2>> engraved(const SheetPiece& piece) {
+    std::vector<std::vector<Point2>> strokes;
+    for (const Engraving& engraving : piece.engravings)
+        for (std::vector<Point2> stroke : engraving.strokes) {
+            for (Point2& p : stroke) p = placed(p, piece.place);
+            strokes.push_back(std::move(stroke));
+        }
+    return strokes;
+}
+
 }  // namespace
 
 std::string sheet_dxf(const SheetsPlan& plan, std::size_t index) {
@@ -38,7 +49,8 @@ std::string sheet_dxf(const SheetsPlan& plan, std::size_t index) {
     for (const SheetWay& way : program.ways) text.loop(way.is_hole ? "HOLE" : "CUT", loop_of(way));
     for (const int number : program.pieces) {
         const SheetPiece& piece = plan.pieces[static_cast<std::size_t>(number) - 1];
-        text.label(piece.label, std::to_string(number));
+        if (piece.engravings.empty()) text.label(piece.label, std::to_string(number));
+        for (const std::vector<Point2>& stroke : engraved(piece)) text.open_line("LABEL", stroke);
         const Loops tabs = placed(piece.hold.added, piece.place);
         for (std::size_t l = 0; l < tabs.size(); ++l) text.loop("TAB", tabs.loop(l));
     }
@@ -72,9 +84,19 @@ std::string sheet_svg(const SheetsPlan& plan, std::size_t index) {
             text += fmt::format("L{} {}", mm(p.top.x), mm(-std::int64_t{p.top.y}));
         text += "\"/>\n";
     }
+    for (const int number : program.pieces)
+        for (const std::vector<Point2>& stroke :
+             engraved(plan.pieces[static_cast<std::size_t>(number) - 1])) {
+            text += "<path class=\"engraved\" stroke=\"#060\" d=\"";
+            for (std::size_t i = 0; i < stroke.size(); ++i)
+                text += fmt::format("{}{} {}", i == 0 ? 'M' : 'L', mm(stroke[i].x),
+                                    mm(-std::int64_t{stroke[i].y}));
+            text += "\"/>\n";
+        }
     text += "</g>\n<g font-family=\"sans-serif\" font-size=\"8\">\n";
     for (const int number : program.pieces) {
         const SheetPiece& piece = plan.pieces[static_cast<std::size_t>(number) - 1];
+        if (!piece.engravings.empty()) continue;
         text += fmt::format("<text x=\"{}\" y=\"{}\">{}</text>\n", mm(piece.label.x),
                             mm(-std::int64_t{piece.label.y}), number);
     }

@@ -77,6 +77,21 @@ void put_hold(JsonText& json, const SheetPiece& piece) {
     json.end();
 }
 
+void put_engravings(JsonText& json, const SheetPiece& piece) {
+    json.key("engraved").begin_array(JsonText::Shape::line);
+    for (const Engraving& engraving : piece.engravings) {
+        json.begin_object(JsonText::Shape::line).key("text").string(engraving.text);
+        json.key("strokes").begin_array(JsonText::Shape::line);
+        for (const std::vector<Point2>& stroke : engraving.strokes) {
+            json.begin_array(JsonText::Shape::line);
+            for (const Point2 p : stroke) put_point(json, p);
+            json.end();
+        }
+        json.end().end();
+    }
+    json.end();
+}
+
 void put_costs(JsonText& json, const std::vector<SheetCost>& costs, bool has_weight) {
     json.key("ways").begin_array();
     for (const SheetCost& cost : costs) {
@@ -154,6 +169,7 @@ std::string sheets_json(const SheetsPlan& plan, const InputInfo& input, const Re
         json.key("deviation").rounded(piece.deviation, 4).key("tilt_deg").rounded(piece.tilt_deg, 2);
         json.key("joint_mm2").rounded(piece.joint_mm2, 2);
         put_hold(json, piece);
+        put_engravings(json, piece);
         json.end();
     }
     json.end().key("programs").begin_array();
@@ -197,7 +213,7 @@ std::string sheets_verify_json(const SheetProof& proof, const std::string& patte
     json.key("part_mm3").rounded(proof.part_mm3, 2).key("made_mm3").rounded(proof.made_mm3, 2);
     json.key("gouge_mm").rounded(proof.gouge, 4).key("left_over_mm").rounded(proof.left_over, 4);
     json.key("left_on_top_mm").rounded(proof.left_on_top, 4).key("islands").integer(proof.islands);
-    json.key("dowels").integer(proof.dowels);
+    json.key("dowels").integer(proof.dowels).key("engraved").integer(proof.engraved);
     json.key("violations");
     put_diagnostics(json, proof.violations);
     json.end();

@@ -64,17 +64,19 @@ BorderDistance::BorderDistance(const Loops& loops) : loops_(loops) {
         each_cell(e, [&](std::size_t cell) { edges_[next[cell]++] = static_cast<std::uint32_t>(e); });
 }
 
-double BorderDistance::nearest_in(std::int64_t column, std::int64_t row, Point2 p) const {
-    double nearest = std::numeric_limits<double>::infinity();
+void BorderDistance::look_in(std::int64_t column, std::int64_t row, Point2 p, Square& nearest) const {
     const auto cell = static_cast<std::size_t>(row * columns_ + column);
-    for (std::uint32_t i = starts_[cell]; i < starts_[cell + 1]; ++i)
-        nearest = std::min(nearest, to_edge2(p, loops_.points[edges_[i]], loops_.points[ends_[edges_[i]]]));
-    return nearest;
+    for (std::uint32_t i = starts_[cell]; i < starts_[cell + 1]; ++i) {
+        const std::uint32_t edge = edges_[i];
+        const double square = to_edge2(p, loops_.points[edge], loops_.points[ends_[edge]]);
+        if (square < nearest.distance || (square == nearest.distance && edge < nearest.edge))
+            nearest = {square, edge};
+    }
 }
 
-double BorderDistance::operator()(Point2 p) const {
-    double nearest = std::numeric_limits<double>::infinity();
-    if (ends_.empty()) return nearest;
+NearestEdge BorderDistance::nearest(Point2 p) const {
+    Square nearest{std::numeric_limits<double>::infinity(), 0};
+    if (ends_.empty()) return {0, nearest.distance};
     const auto floor_div = [&](std::int64_t v) { return v >= 0 ? v / cell_ : -((-v + cell_ - 1) / cell_); };
     const std::int64_t column = floor_div(p.x - x0_), row = floor_div(p.y - y0_);
     // Rings of cells around that of p, from the first that meets the grid; what lies in ring k + 1 or
@@ -85,21 +87,21 @@ double BorderDistance::operator()(Point2 p) const {
         {std::abs(column), std::abs(column - (columns_ - 1)), std::abs(row), std::abs(row - (rows_ - 1))});
     for (std::int64_t ring = first; ring <= last; ++ring) {
         const double seen = double(std::max<std::int64_t>(ring - 1, 0)) * double(cell_);
-        if (nearest <= seen * seen) break;
+        if (nearest.distance <= seen * seen) break;
         const std::int64_t r0 = std::max<std::int64_t>(row - ring, 0), r1 = std::min(row + ring, rows_ - 1);
         for (std::int64_t r = r0; r <= r1; ++r) {
             const bool whole = r == row - ring || r == row + ring;
             const std::int64_t c0 = column - ring, c1 = column + ring;
             if (whole) {
                 for (std::int64_t c = std::max<std::int64_t>(c0, 0); c <= std::min(c1, columns_ - 1); ++c)
-                    nearest = std::min(nearest, nearest_in(c, r, p));
+                    look_in(c, r, p, nearest);
             } else {
-                if (c0 >= 0 && c0 < columns_) nearest = std::min(nearest, nearest_in(c0, r, p));
-                if (c1 >= 0 && c1 < columns_) nearest = std::min(nearest, nearest_in(c1, r, p));
+                if (c0 >= 0 && c0 < columns_) look_in(c0, r, p, nearest);
+                if (c1 >= 0 && c1 < columns_) look_in(c1, r, p, nearest);
             }
         }
     }
-    return std::sqrt(nearest) / kUnitsPerMm;
+    return {nearest.edge, std::sqrt(nearest.distance) / kUnitsPerMm};
 }
 
 double farthest_from_border(const Loops& from, const BorderDistance& to, double step_mm) {

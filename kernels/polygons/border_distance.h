@@ -8,16 +8,27 @@
 
 namespace slabwright {
 
+/// An edge begins at the point of its index.
+struct NearestEdge {
+    std::uint32_t edge = 0;
+    double distance = 0;  ///< mm; infinite where there are no loops
+};
+
 /// Answers "how far is the nearest edge of these loops" from any thread, in about the time that the edges of
 /// a few grid cells take. Keeps a view of the loops. Memory: some 16 bytes an edge.
 class BorderDistance {
 public:
     explicit BorderDistance(const Loops& loops);
     /// mm; infinite where there are no loops.
-    [[nodiscard]] double operator()(Point2 p) const;
+    [[nodiscard]] double operator()(Point2 p) const { return nearest(p).distance; }
+    [[nodiscard]] NearestEdge nearest(Point2 p) const;  ///< of several found at once the first
 
 private:
-    [[nodiscard]] double nearest_in(std::int64_t column, std::int64_t row, Point2 p) const;
+    struct Square {
+        double distance = 0;  ///< the square of it, in units
+        std::uint32_t edge = 0;
+    };
+    void look_in(std::int64_t column, std::int64_t row, Point2 p, Square& nearest) const;
     const Loops& loops_;
     std::vector<std::uint32_t> ends_;  ///< of each edge, the index of its second point
     std::int64_t x0_ = 0, y0_ = 0, cell_ = 1, columns_ = 0, rows_ = 0;

@@ -164,10 +164,10 @@ function buildCuts(section) {
 }
 
 function buildNests(section) {
-    const flat = points => {
+    const flat = (points, end = 'Z') => {
         let text = '';
         for (let i = 0; i < points.length; i += 2) text += `${i ? 'L' : 'M'}${points[i] / 100} ${-points[i + 1] / 100}`;
-        return `${text}Z`;
+        return text + end;
     };
     section.append(make('div', {class: 'nests'}, sheets.programs.map((program, i) => {
         const thin = Math.max(program.length, program.width) / 700, size = Math.max(program.length, program.width) / 32;
@@ -186,8 +186,9 @@ function buildNests(section) {
             make('svg', {viewBox: `${-2 * thin} ${-program.width - 2 * thin} ${program.length + 4 * thin} ${program.width + 4 * thin}`, role: 'img', 'aria-label': `Pieces ${program.pieces.join(', ')} on a sheet of ${figure(program.length)} by ${figure(program.width)} mm`},
                 make('rect', {class: 'stock', x: 0, y: -program.width, width: program.length, height: program.width, 'stroke-width': thin}),
                 own.flatMap(piece => piece.tabs.map(tab => make('path', {class: 'tab', d: flat(tab.flatMap(on(piece))), 'stroke-width': thin / 2}))),
+                own.flatMap(piece => piece.engraved.flatMap(({strokes}) => strokes.map(stroke => make('path', {class: 'engraved', d: flat(stroke.flatMap(on(piece)), ''), 'stroke-width': thin})))),
                 ways[i].map(way => make('path', {class: way.hole ? 'way hole' : 'way', d: flat(way.top), 'stroke-width': thin})), own.map(label)),
-            make('figcaption', {}, `${plural(program.pieces.length, 'piece')}, ${figure(program.length)} × ${figure(program.width)} mm. Zero is the lower left corner, x to the right. Red: outlines; blue: holes${own.some(p => p.tabs.length) ? '; orange: tabs' : ''}.`));
+            make('figcaption', {}, `${plural(program.pieces.length, 'piece')}, ${figure(program.length)} × ${figure(program.width)} mm. Zero is the lower left corner, x to the right. Red: outlines; blue: holes${own.some(p => p.tabs.length) ? '; orange: tabs' : ''}${own.some(p => p.engraved.length) ? '; green: engraved' : ''}.`));
     })));
 }
 

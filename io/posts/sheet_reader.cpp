@@ -1,0 +1,347 @@
+#include "io/posts/sheet_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "engine/sheets/sheet_plan.h"
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+namespace {
+
+/// Reads one program line by line.
+class SheetReader {
+public:
+    explicit SheetReader(const std::string& file) { program_.file = file; }
+
+    void line(std::string_view text, std::uint32_t number) {
+        number_ = number;
+        if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
+        if (ended_ && !text.empty()) fail("gcode.after_end", "words after the program's end");
+        if (!text.empty() && text.front() == '(') comment(text);
+        else if (!text.empty()) words(text);
+    }
+
+    ReadSheetProgram take() {
+        if (!has_stock_) fail("gcode.no_stock", "no comment says which stock it is for");
+        if (!ended_) fail("gcode.no_end", "the program ends without M2");
+        return std::move(program_);
+    }
+
+private:
+    [[noreturn]] void fail(const char* code, const std::string& message) const {
+        throw Error(ErrorKind::verification, code, message, fmt::format("{}:{}", program_.file, number_),
+                    "write the programs again with `slabwright sheets`");
+    }
+
+    double number_of(std::string_view text) const {
+        double value = 0;
+        const auto [end, error] =
+            std::from_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
+        if (error != std::errc() || end != text.data() + text.size() || !(std::abs(value) < 1e6))
+            fail("gcode.number", "\"" + std::string(text.substr(0, 40)) + "\" is no number");
+        return value;
+    }
+
+    static std::vector<std::string_view> split(std::string_view text) {
+        std::vector<std::string_view> parts;
+        std::size_t i = 0;
+        while (i < text.size()) {
+            while (i < text.size() && text[i] == ' ') ++i;
+            const std::size_t begin = i;
+            while (i < text.size() && text[i] != ' ') ++i;
+            if (i > begin) parts.push_back(text.substr(begin, i - begin));
+        }
+        return parts;
+    }
+
+    void comment(std::string_view text) {
+        if (text.back() != ')') fail("gcode.comment", "a comment that does not end in its line");
+        const auto w = split(text.substr(1, text.size() - 2));
+        const auto value = [&](std::size_t i) { return number_of(w[i]); };
+        const auto whole = [&](std::size_t i) {
+            const double v = value(i);
+            if (v != std::floor(v)) fail("gcode.number", "\"" + std::string(w[i]) + "\" is not whole");
+            return static_cast<int>(v);
+        };
+        if (w.size() == 9 && w[0] == "stock" && w[2] == "x" && w[4] == "thickness" && w[6] == "kerf") {
+            if (has_stock_) fail("gcode.twice", "a second stock");
+            has_stock_ = true;
+            program_.length = value(1), program_.width = value(3);
+            program_.thickness = value(5), program_.kerf = value(7);
+            program_.is_routed = w[8] == "router";
+            if (!(program_.thickness > 0) || !(program_.kerf >= 0))
+                fail("gcode.number", "a thickness or kerf of nothing");
+        } else if (w.size() == 11 && w[0] == "piece" && w[2] == "from" && w[4] == "to" && w[6] == "turn" &&
+                   w[8] == "at") {
+            ReadPiece piece{whole(1), value(3), value(5), whole(7), value(9), value(10), {}, {}};
+            if (piece.turn % 90 != 0) fail("gcode.number", "a turn that is no quarter");
+            program_.pieces.push_back(piece);
+        } else if (w.size() == 9 && w[0] == "dowel" && w[2] == "piece" && w[4] == "at") {
+            const double diameter = value(8);
+            if (!(diameter > 0)) fail("gcode.comment", "a dowel without a diameter");
+            piece_of(whole(3)).holes.push_back({value(5), value(6), diameter});
+        } else if (w.size() == 12 && w[0] == "tab" && w[2] == "piece") {
+            std::array<double, 8> corners{};
+            for (std::size_t i = 0; i < 8; ++i) corners[i] = value(4 + i);
+            piece_of(whole(3)).tabs.push_back(corners);
+        } else if (w.size() == 7 && w[0] == "engraver" && w[3] == "width" && w[5] == "depth") {
+            engraver({w[1], value(2), value(4), value(6)});
+        } else if (w.size() == 5 && w[0] == "engraving" && w[2] == "piece") {
+            if (!program_.engraver) fail("gcode.engraver", "an engraving, and no comment says with what");
+            program_.engravings.push_back({whole(3), std::string(w[4]), {}, 0, number_});
+            is_engraving_ = true;
+        } else if (w.size() >= 5 && w[0] == "head" && w[1] == "on") {
+            switches(text.substr(1, text.size() - 2));
+        } else if (w.size() == 9 && w[0] == "cut" && w[2] == "piece" && w[4] == "loop" && w[6] == "pass") {
+            if (w[8] != "hole" && w[8] != "outline")
+                fail("gcode.comment", "a cut that is neither hole nor outline");
+            next_ = ReadWay{whole(3), whole(5), whole(7), w[8] == "hole", {}, 0, number_};
+            named_ = true;
+            is_engraving_ = false;
+        }
+    }
+
+    struct Stated {
+        std::string_view by;
+        double value = 0, width = 0, depth = 0;
+    };
+
+    void engraver(const Stated& stated) {
+        if (program_.engraver) fail("gcode.twice", "a second engraver");
+        if (!has_stock_) fail("gcode.no_stock", "no comment says which stock it is for");
+        ReadEngraver engraver;
+        engraver.width = stated.width;
+        engraver.depth = stated.depth;
+        if (stated.by == "tool" && program_.is_routed) engraver.tool = static_cast<int>(stated.value);
+        else if (stated.by == "power" && !program_.is_routed) engraver.power = stated.value;
+        else if (stated.by == "feed" && !program_.is_routed) engraver.feed = stated.value;
+        else
+            fail("gcode.engraver",
+                 "engraved by \"" + std::string(stated.by) + "\", which is no such thing here");
+        if (!(stated.value > 0) || !(stated.width > 0) || !(stated.depth > 0))
+            fail("gcode.number", "an engraver of nothing");
+        program_.engraver = engraver;
+    }
+
+    /// "head on M62 P0 off M63 P0"
+    void switches(std::string_view text) {
+        const std::size_t off = text.find(" off ");
+        if (off == std::string_view::npos || off < 8 || program_.is_routed || is_set_)
+            fail("gcode.switch", "a comment that does not say what switches the head");
+        on_text_ = text.substr(8, off - 8);
+        off_text_ = text.substr(off + 5);
+        if (!is_switch(on_text_) || !is_switch(off_text_) || on_text_ == off_text_)
+            fail("gcode.switch", "words that do not switch a head");
+    }
+
+    ReadPiece& piece_of(int number) {
+        for (ReadPiece& piece : program_.pieces)
+            if (piece.number == number) return piece;
+        fail("gcode.comment", fmt::format("piece {} is not placed before it is spoken of", number));
+    }
+
+    struct Block {
+        double x = 0, y = 0, z = 0, a = 0, c = 0;
+        double feed = -1, tool = -1, length = -1;
+        bool moves = false, moves_z = false, changes = false, offsets = false;
+    };
+
+    void words(std::string_view text) {
+        if (!has_stock_) fail("gcode.no_stock", "no comment says which stock it is for");
+        if (!program_.is_routed && (text == on_text_ || text == off_text_)) return switched(text == on_text_);
+        Block block{x_, y_, z_, a_, c_};
+        for (const std::string_view word : split(text)) take(word, block);
+        if (block.changes || block.offsets) change_tool(block);
+        if (block.feed >= 0 && !(block.feed > 0)) fail("gcode.feed", "a feed of nothing");
+        if (block.feed > 0) feed_ = block.feed;
+        if (inverse_ && !rapid_ && block.moves && block.feed < 0)
+            fail("gcode.feed", "a move without its time while G93 is in force");
+        if (block.moves || block.moves_z) motion(block.x, block.y, block.z, block.a, block.c);
+    }
+
+    void take(std::string_view word, Block& block) {
+        const double v = number_of(word.substr(1));
+        switch (word[0]) {
+            case 'G':
+                g(v);
+                block.offsets = block.offsets || v == 43;
+                break;
+            case 'M':
+                m(v);
+                block.changes = block.changes || v == 6;
+                break;
+            case 'X':
+                block.x = v, block.moves = true;
+                break;
+            case 'Y':
+                block.y = v, block.moves = true;
+                break;
+            case 'Z':
+                block.z = v, block.moves_z = true;
+                break;
+            case 'A':
+                block.a = v, block.moves = true;
+                break;
+            case 'C':
+                block.c = v, block.moves = true;
+                break;
+            case 'F':
+                block.feed = v;
+                break;
+            case 'T':
+                block.tool = v;
+                break;
+            case 'H':
+                block.length = v;
+                break;
+            case 'S':
+                power_ = v;
+                break;
+            case 'P':
+                break;
+            default:
+                fail("gcode.unknown_word", std::string("no word ") + word[0] + " is known here");
+        }
+    }
+
+    void change_tool(const Block& block) {
+        if (block.changes) {
+            if (!program_.is_routed) fail("gcode.unknown_word", "M6, and only a router changes its tool");
+            if (z_ < 0) fail("gcode.tool", "a tool change with the cutter in the sheet");
+            if (block.tool < 1) fail("gcode.tool", "a tool change that names no tool");
+            tool_ = static_cast<int>(block.tool);
+            has_length_ = on_ = false;
+        }
+        if (!block.offsets) return;
+        if (block.length != tool_)
+            fail("gcode.tool_length", "the length of a tool that is not in the spindle");
+        has_length_ = true;
+    }
+
+    void motion(double x, double y, double z, double a, double c) {
+        if (!is_set_) fail("gcode.unset", "a motion before units, plane and distances are stated");
+        if (!rapid_ && !(feed_ > 0)) fail("gcode.feed", "a cut without a feed");
+        if (program_.is_routed && !has_length_)
+            fail("gcode.tool_length", "a motion without the tool's length");
+        const bool cuts = program_.is_routed ? z < 0 || z_ < 0 : on_;
+        if (cuts && rapid_ && !(program_.is_routed && x == x_ && y == y_ && z >= z_))
+            fail("gcode.rapid", "a rapid that cuts");
+        if (cuts && !on_) fail("gcode.spindle", "a cut with the spindle at rest");
+        if (cuts && (!program_.is_routed && z != 0))
+            fail("gcode.height", "the jet is on away from the sheet's top");
+        if (program_.is_routed && (a != 0 || c != 0)) fail("gcode.head", "a router's head that leans");
+        if (!(a >= 0) || a >= 85) fail("gcode.head", "the head leans to an angle that it cannot have");
+        if (program_.is_routed && z < 0 && z_ >= 0) begin(x_, y_, a_, c_);
+        x_ = x, y_ = y, z_ = z, a_ = a, c_ = c;
+        if (!cuts || (program_.is_routed && rapid_)) return;  // or out of the sheet
+        if (is_engraving_) engraved({x, y, a, c}, z);
+        else cut({x, y, a, c}, z);
+    }
+
+    void cut(const ReadHead& head, double z) {
+        if (const auto& engraver = program_.engraver; engraver) {
+            if (program_.is_routed && tool_ == engraver->tool && engraver->width != program_.kerf)
+                fail("gcode.tool", "a cut with the engraver's tool");
+            if (engraver->power > 0 && power_ <= engraver->power)
+                fail("gcode.power", "a cut with no more power than the engraver's");
+        }
+        ReadWay& way = program_.ways.back();
+        const ReadHead& last = way.points.back();
+        if (program_.is_routed && -z > way.deepest) {
+            // The next depth begins where the cutter went in; only the last one is the cut.
+            if (std::hypot(head.x - way.points[0].x, head.y - way.points[0].y) > 1e-9)
+                fail("gcode.plunge", "the cutter goes deeper beside where it went in");
+            way.deepest = -z;
+            way.points.resize(1);
+            return;
+        }
+        const bool moved = last.x != head.x || last.y != head.y || last.a != head.a || last.c != head.c;
+        if (moved || way.points.size() == 1) way.points.push_back(head);
+    }
+
+    void engraved(const ReadHead& head, double z) {
+        const ReadEngraver& engraver = *program_.engraver;
+        if (head.a != 0) fail("gcode.head", "an engraving with the head leaned");
+        if (program_.is_routed && tool_ != engraver.tool)
+            fail("gcode.tool", "an engraving with a tool that is not the engraver's");
+        if (engraver.power > 0 && power_ != engraver.power)
+            fail("gcode.power", "an engraving at another power than the engraver's");
+        if (engraver.feed > 0 && feed_ != engraver.feed)
+            fail("gcode.feed", "an engraving at another feed than the engraver's");
+        ReadEngraving& engraving = program_.engravings.back();
+        engraving.deepest = std::max(engraving.deepest, program_.is_routed ? -z : engraver.depth);
+        engraving.strokes.back().push_back(head);
+    }
+
+    void switched(bool on) {
+        if (on && on_) fail("gcode.switch", "the head is switched on twice");
+        if (on) begin(x_, y_, a_, c_);
+        on_ = on;
+    }
+
+    void begin(double x, double y, double a, double c) {
+        if (is_engraving_) {
+            program_.engravings.back().strokes.push_back({{x, y, a, c}});
+            return;
+        }
+        if (!named_) fail("gcode.unnamed", "a cut that no comment names");
+        named_ = false;
+        next_.points = {{x, y, a, c}};
+        program_.ways.push_back(next_);
+    }
+
+    void g(double v) {
+        static constexpr double known[] = {4, 17, 21, 40, 43, 49, 54, 64, 80, 90};
+        if (v == 0) rapid_ = true;
+        else if (v == 1) rapid_ = false;
+        else if (v == 93) inverse_ = true;
+        else if (v == 94) inverse_ = false;
+        else if (std::find(std::begin(known), std::end(known), v) == std::end(known))
+            fail("gcode.unknown_word", fmt::format("G{} is none of these programs' words", v));
+        if (v == 21) has_mm_ = true;
+        if (v == 90) has_absolute_ = true;
+        is_set_ = has_mm_ && has_absolute_;
+    }
+
+    void m(double v) {
+        if (v == 2) {
+            if (on_ && !program_.is_routed) fail("gcode.left_on", "the program ends with the jet on");
+            ended_ = true;
+        } else if (program_.is_routed && (v == 3 || v == 5)) {
+            on_ = v == 3;
+        } else if (v != 6) {
+            fail("gcode.unknown_word", fmt::format("M{} is none of these programs' words", v));
+        }
+    }
+
+    ReadSheetProgram program_;
+    ReadWay next_;
+    std::uint32_t number_ = 0;
+    double x_ = 0, y_ = 0, z_ = 1e9, a_ = 0, c_ = 0, feed_ = 0, power_ = 0;
+    int tool_ = 0;
+    std::string on_text_ = "M3", off_text_ = "M5";
+    bool has_stock_ = false, ended_ = false, named_ = false, rapid_ = true, on_ = false, inverse_ = false;
+    bool has_mm_ = false, has_absolute_ = false, is_set_ = false, has_length_ = false;
+    bool is_engraving_ = false;
+};
+
+}  // namespace
+
+ReadSheetProgram read_sheet_program(std::string_view text, const std::string& file) {
+    SheetReader reader(file);
+    std::uint32_t number = 0;
+    while (!text.empty()) {
+        const std::size_t end = std::min(text.find('\n'), text.size());
+        reader.line(text.substr(0, end), ++number);
+        text.remove_prefix(std::min(end + 1, text.size()));
+    }
+    return reader.take();
+}
+
+}  // namespace slabwright
