@@ -102,9 +102,13 @@ Job job_of(const Options& options) {
     return keys.empty() ? job : job_from_toml(keys, "command line", job);
 }
 
-/// Runs a body with a context that Ctrl-C cancels and whose progress a terminal sees.
+/// Memory that was given back may stay with the process up to so much, for the next array; half of the limit
+/// at most. Sheets' arrays differ from sheet to sheet, so that more would only grow.
+constexpr std::uint64_t kKeptForSheets = std::uint64_t{3} << 29;
+
+/// Runs a body with a context that Ctrl-C cancels and whose progress a terminal sees. @param kept bytes
 template <class Body>
-void with_context(const Options& options, Body&& body) {
+void with_context(const Options& options, Body&& body, [[maybe_unused]] std::uint64_t kept = UINT64_MAX) {
     ProgressBar bar;
     Context::Options settings;
     settings.threads = options.threads;
@@ -114,7 +118,7 @@ void with_context(const Options& options, Body&& body) {
         settings.progress = [&](const Progress& progress) { bar.show(progress); };
     Context context(std::move(settings));
 #ifdef SLABWRIGHT_JEMALLOC
-    const KeptWithin kept(context.memory_limit() / 2);
+    const KeptWithin keeper(std::min<std::uint64_t>(context.memory_limit() / 2, kept));
 #endif
     running = &context;
     std::signal(SIGINT, on_signal);
@@ -238,23 +242,29 @@ bool run_sheets(const Options& options, const SheetsOptions& asked) {
     const Job reading = job_of(options);
     const SheetJob job = sheet_job(asked);
     bool passed = false;
-    with_context(options, [&](Context& context) {
-        const SheetsResult result = make_sheets(context, options.stl, reading, job, options.out,
-                                                {.left_over = asked.tolerance}, sheet_extras(asked));
-        passed = result.proof.passed;
-        return sheets_summary(result, options.out, options.json);
-    });
+    with_context(
+        options,
+        [&](Context& context) {
+            const SheetsResult result = make_sheets(context, options.stl, reading, job, options.out,
+                                                    {.left_over = asked.tolerance}, sheet_extras(asked));
+            passed = result.proof.passed;
+            return sheets_summary(result, options.out, options.json);
+        },
+        kKeptForSheets);
     return passed;
 }
 
 bool run_verify(const Options& options) {
     bool passed = false;
     if (holds_sheets(options.out)) {
-        with_context(options, [&](Context& context) {
-            const SheetProof proof = verify_sheets(context, options.out, options.stl, {});
-            passed = proof.passed;
-            return sheets_verdict(proof, options.out);
-        });
+        with_context(
+            options,
+            [&](Context& context) {
+                const SheetProof proof = verify_sheets(context, options.out, options.stl, {});
+                passed = proof.passed;
+                return sheets_verdict(proof, options.out);
+            },
+            kKeptForSheets);
         return passed;
     }
     with_context(options, [&](Context& context) {

@@ -197,7 +197,6 @@ private:
 
     void level(int k, const Loops& section) {
         const double depth = program_.thickness * (1 - (k + 0.5) / kHeights);
-        const double step = program_.thickness / kHeights;
         Loops made = made_at(depth);
         if (made.empty()) {
             violate("sheets.nothing", "its cuts leave nothing of it");
@@ -210,21 +209,34 @@ private:
             for (std::size_t i = 0; i < made.size(); ++i) parts += signed_area(made.loop(i)) > 0;
             result_.islands = std::max(0, parts - 1);
         }
-        bodies_.add_level(made);
         require_walls(section, depth);
-        // Dowels fill their holes, and tabs come off.
-        if (!hold_.holes.empty()) made = unite(made, hold_.holes);
-        if (!hold_.tabs.empty()) made = subtract(made, subtract(hold_.tabs, section));
-        result_.made_mm3 += area(made) * step;
-        const BorderDistance to_made(made), to_section(section);
-        const Loops gouged = subtract(section, made), left = beside_tabs(subtract(made, section));
-        result_.gouge = std::max(result_.gouge, farthest_from_border(gouged, to_made, 0.5));
+        const bool is_as_below = k > 0 && made.points == cut_.points && made.starts == cut_.starts;
+        if (!is_as_below) bodies_.add_level(made);
+        if (!is_as_below || !hold_.tabs.empty()) {
+            cut_ = made;
+            // Dowels fill their holes, and tabs come off.
+            if (!hold_.holes.empty()) made = unite(made, hold_.holes);
+            if (!hold_.tabs.empty()) made = subtract(made, subtract(hold_.tabs, section));
+            made_ = std::move(made);
+            to_made_.emplace(made_);
+        }
+        result_.made_mm3 += area(made_) * program_.thickness / kHeights;
+        compare(section, depth);
+    }
+
+    /// What is made at a level, with what should be there.
+    void compare(const Loops& section, double depth) {
+        const BorderDistance to_section(section);
+        const Loops gouged = subtract(section, made_), left = beside_tabs(subtract(made_, section));
+        const double deepest = farthest_from_border(gouged, *to_made_, 0.5);
+        result_.gouge = std::max(result_.gouge, deepest);
         if (!section.empty())  // else there is no border to be far from; the volume tells
             result_.left_over = std::max(result_.left_over, farthest_from_border(left, to_section, 0.5));
-        if (!rules_.part_may_lose && !subtract(section, offset(made, rules_.gouge, kArcTolerance)).empty())
+        if (!rules_.part_may_lose && !gouged.empty() &&
+            !subtract(gouged, offset(made_, rules_.gouge, kArcTolerance)).empty())
             violate("sheets.gouge",
                     fmt::format("a cut enters the part by {:.3f} mm, {:.3f} mm below the sheet's top",
-                                farthest_from_border(gouged, to_made, 0.5), depth));
+                                deepest, depth));
         if (rules_.left_over > 0 && !subtract(left, offset(section, rules_.left_over, kArcTolerance)).empty())
             violate("sheets.left_over", fmt::format("{:.3f} mm are left, {:.3f} mm below the sheet's top",
                                                     farthest_from_border(left, to_section, 0.5), depth));
@@ -282,6 +294,8 @@ private:
     ReadHold hold_;
     SheetBodies bodies_;
     std::optional<Loops> same_at_all_depths_;
+    Loops cut_, made_;  ///< of the level below: as cut, and with holes filled and tabs off
+    std::optional<BorderDistance> to_made_;
     PieceResult result_;
 
 public:

@@ -19,11 +19,6 @@ Box2 box_of(std::span<const Point2> points) {
 
 }  // namespace
 
-void Box2::grow(Point2 p) {
-    min = {std::min(min.x, p.x), std::min(min.y, p.y)};
-    max = {std::max(max.x, p.x), std::max(max.y, p.y)};
-}
-
 void append_loops(const Loops& loops, Loops& to) {
     for (std::size_t i = 0; i < loops.size(); ++i) append_loop(loops.loop(i), to);
 }

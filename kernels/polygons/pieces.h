@@ -1,6 +1,7 @@
 // A region piece by piece: each outer loop with its holes.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -10,7 +11,10 @@ namespace slabwright {
 
 struct Box2 {
     Point2 min{INT32_MAX, INT32_MAX}, max{INT32_MIN, INT32_MIN};
-    void grow(Point2 p);
+    void grow(Point2 p) {
+        min = {std::min(min.x, p.x), std::min(min.y, p.y)};
+        max = {std::max(max.x, p.x), std::max(max.y, p.y)};
+    }
     [[nodiscard]] bool meets(const Box2& o) const {
         return min.x <= o.max.x && o.min.x <= max.x && min.y <= o.max.y && o.min.y <= max.y;
     }
