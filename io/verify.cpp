@@ -239,6 +239,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     Verification result;
     result.input = folder.simulation;
     SimulationInput& input = result.input;
+    if (options.keep_outs != nullptr) input.machine.keep_outs = *options.keep_outs;
     std::vector<Violation> violations;
     if (job.machine.post == Post::linuxcnc) {  // the others' tables are kept at the control
         const fs::path table = out / "tool.tbl";

@@ -2,9 +2,12 @@
 // one.
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
 
@@ -12,6 +15,7 @@
 #include "engine/schedule/keep_outs.h"
 #include "engine/simulate/keep_out_check.h"
 #include "io/read/job_toml.h"
+#include "io/resume.h"
 #include "io/slabwright.h"
 #include "io/verify.h"
 #include "io/write/job_toml.h"
@@ -500,6 +504,28 @@ TEST(KeepOuts, AClampStandsOnTheFrameOfAFlask) {
     for (const Operation& op : planned.layers[0].operations) EXPECT_NE(op.kind, OperationKind::face);
 }
 
+// The programs that face a spoilt layer off go over the bolt too.
+TEST(KeepOuts, RemadeLayersKeepClear) {
+    Context context;
+    const support::TemporaryFolder folder;
+    ASSERT_TRUE(write_block(context, job_with_bolt(150, 40, 55), folder).passed);
+    const std::filesystem::path out = folder / "out";
+    const nlohmann::json sequence = nlohmann::json::parse(support::slurp(out / "sequence.json"));
+    int last = 0;  // step of layer 1
+    for (const nlohmann::json& step : sequence["steps"])
+        if (step["layer"] == 1) last = step["id"];
+    ResumeOptions options;
+    options.after = last;
+    (void)resume_build(context, out.string(), options);
+    options = {};
+    options.remake = 1;
+    const ResumeStatus status = resume_build(context, out.string(), options);
+    ASSERT_EQ(status.programs.size(), 1u);
+    const std::string text = support::slurp(out / status.programs[0]);
+    const Plan planned = plan(context, folder / "block.stl", job_with_bolt(150, 40, 55));
+    EXPECT_NE(text.find(fmt::format("G0 Z{:g}\n", 61 - planned.layers[0].z_top)), std::string::npos) << text;
+}
+
 TEST(KeepOuts, WithoutThemNothingChanges) {
     Context context;
     const Mesh mesh = block(context);
@@ -551,6 +577,13 @@ TEST(KeepOuts, VerifyFindsABoltThatCameLaterAndAProgramThatWasEdited) {
     EXPECT_NE(find(found, "keep_out.approach"), nullptr);
     EXPECT_EQ(find(found, "keep_out.cut"), nullptr) << "beyond all programs";
     support::spit(out / "plan.json", plan);
+    // A job file's, in place of the plan's.
+    const std::vector<KeepOut> later = job_with_bolt(105, 40, 55).machine.keep_outs;
+    const VerifyResult verified = verify(context, out.string(), {}, {}, 1.0, &later);
+    EXPECT_FALSE(verified.passed);
+    ASSERT_FALSE(verified.violations.empty());
+    EXPECT_EQ(verified.violations[0].code, "keep_out.cut");
+    EXPECT_TRUE(verify(context, out.string(), {}, {}, 1.0).passed);
     // A rapid runs through the bolt.
     const std::filesystem::path file = std::filesystem::directory_iterator(out / "nc")->path();
     const std::string text = support::slurp(file);

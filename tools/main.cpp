@@ -258,7 +258,9 @@ bool run_verify(const Options& options) {
         return passed;
     }
     with_context(options, [&](Context& context) {
-        const VerifyResult result = verify(context, options.out, options.stl, options.maps, options.cell);
+        const std::vector<KeepOut> keep_outs = job_of(options).machine.keep_outs;
+        const VerifyResult result = verify(context, options.out, options.stl, options.maps, options.cell,
+                                           options.job_file.empty() ? nullptr : &keep_outs);
         passed = result.passed;
         return verdict(result, options.out) + renew_report(context, options);
     });
@@ -490,6 +492,8 @@ int command(int argc, char** argv) {
             ->check(CLI::Range(0.01, 10.0));
     verify_command->add_option("--maps", options.maps,
                                "folder for a picture of each layer: left over, missed, unreachable, gouged");
+    verify_command->add_option("--keep-outs", options.job_file,
+                               "job file whose [[machine.keep_out]] stand on the table, not the plan's");
     add_limits(*verify_command, options);
 
     ResumeOptions resume_options;

@@ -46,7 +46,8 @@ function stripes(id, color, ground, u, turn) {
 // Columns of stock that stand in a layer: they are left there, and sawn off when the pattern is done.
 export const supportsIn = l => (plan.supports ?? []).filter(s => s.z_low < plan.layers[l].z_top - 0.001 && s.z_high > plan.layers[l].z_bottom + 0.001);
 
-// What no tool may run into in a layer, in the places of the pattern: its outline as a path, its box, and what it is called.
+// What no tool may run into in a layer, in the places of the pattern: its outline as a path, its box, and its name
+// with its height, briefly and at length.
 export function keepOutsIn(l) {
     const [ox, oy] = plan.zero ?? [0, 0], {min, max} = blankOf(l);
     return (plan.keep_outs ?? []).map(k => {
@@ -54,7 +55,7 @@ export function keepOutsIn(l) {
         const corners = k.circle.length ? [[cx - r, cy - r], [cx + r, cy + r]] : k.rectangle.length ? [[ax, ay], [bx, ay], [bx, by], [ax, by]] : k.polygon;
         const xs = corners.map(c => c[0] + ox), ys = corners.map(c => c[1] + oy), box = [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
         const d = k.circle.length ? `M${cx + ox - r} ${-cy - oy}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0Z` : `M${xs.map((x, i) => `${x} ${-ys[i]}`).join('L')}Z`;
-        return {name: k.name, d, box, slab: k.from === 'slab', says: `${k.name}, ${figure(k.height, 1)} mm ${k.from === 'slab' ? 'over the slab' : 'over the board'}`};
+        return {name: k.name, d, box, slab: k.from === 'slab', brief: `${k.name}, ${figure(k.height, 1)} mm`, says: `${k.name}, ${figure(k.height, 1)} mm ${k.from === 'slab' ? 'over the slab' : 'over the board'}`};
     }).filter(k => !k.slab || (k.box[0] < max[0] && k.box[2] > min[0] && k.box[1] < max[1] && k.box[3] > min[1]));
 }
 
@@ -95,7 +96,7 @@ export function planView(l, paper) {
     make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: 'none', stroke: ink, 'stroke-width': 0.45 * u}),
     supportsIn(l).map(s => make('path', {class: 'support', d: `M${s.x - s.width / 2} ${-s.y - s.width / 2}h${s.width}v${s.width}h${-s.width}Zl${s.width} ${s.width}m0 ${-s.width}l${-s.width} ${s.width}`, fill: 'none', stroke: purple, 'stroke-width': 0.5 * u})),
     make('path', {d: pathOf(top.map(loop => loop.points)), fill: 'none', stroke: '#17636b', 'stroke-width': 0.4 * u, 'stroke-dasharray': `${2 * u} ${1.3 * u}`}),
-    kept.map(k => [make('path', {class: 'keep-out', d: k.d, fill: `url(#kept-${l})`, stroke: ink, 'stroke-width': 0.5 * u}), label((k.box[0] + k.box[2]) / 2, -k.box[3] - 1.2 * u, k.says, 3 * u, {'text-anchor': 'middle'})]),
+    kept.map(k => [make('path', {class: 'keep-out', d: k.d, fill: `url(#kept-${l})`, stroke: ink, 'stroke-width': 0.5 * u}), k.box[0] + 1.8 * k.brief.length * u < view.x + view.w ? label(k.box[0], -k.box[3] - 1.2 * u, k.brief, 3 * u) : label(k.box[2], -k.box[3] - 1.2 * u, k.brief, 3 * u, {'text-anchor': 'end'})]),
     // Measures: the slab below and left, the pattern above and right.
     extension(sx0, -sy0, sx0, -y0 + 15 * u, u), extension(sx1, -sy0, sx1, -y0 + 15 * u, u), extension(sx0, -sy0, x0 - 15 * u, -sy0, u), extension(sx0, -sy1, x0 - 15 * u, -sy1, u),
     dimension(sx0, sx1, -y0 + 14 * u, false, `slab ${figure(sx1 - sx0, 1)}`, u), dimension(-sy0, -sy1, x0 - 14 * u, true, `slab ${figure(sy1 - sy0, 1)}`, u),
