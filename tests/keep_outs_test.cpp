@@ -23,6 +23,7 @@
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/height_field.h"
+#include "tests/support/schema.h"
 #include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
@@ -438,6 +439,9 @@ TEST(KeepOuts, APlanBesideABoltVerifiesAndPassesOverIt) {
     const support::TemporaryFolder folder;
     const VerifyResult result = write_block(context, job_with_bolt(150, 40, 55), folder);
     EXPECT_TRUE(result.passed) << result.violations.size();
+    EXPECT_EQ(support::schema_complaint(support::slurp(folder / "out/plan.json"),
+                                        SLABWRIGHT_SOURCE_DIR "/io/plan.schema.json"),
+              "");
     // All programs begin and end over the bolt, whose top lies 55 mm over the board.
     const Verification found = verify_folder(context, folder / "out", {.source = {}, .write = false});
     ASSERT_FALSE(found.input.programs.empty());
@@ -447,6 +451,25 @@ TEST(KeepOuts, APlanBesideABoltVerifiesAndPassesOverIt) {
         EXPECT_NEAR(program.steps.front().z, 61, 1e-9) << program.file;
     }
     EXPECT_EQ(found.input.machine.keep_outs, job_with_bolt(150, 40, 55).machine.keep_outs);
+}
+
+TEST(KeepOuts, EveryControlsProgramsPassOverTheBolt) {
+    Context context;
+    for (const Post post : {Post::fanuc, Post::grbl, Post::siemens, Post::heidenhain}) {
+        const support::TemporaryFolder folder;
+        Job job = job_with_bolt(150 - 90.8 / 2, 0, 55);
+        job.machine.post = post;
+        job.machine.zero = WorkZero::centre;
+        job.machine.table = BuildTable::fixed;
+        if (post != Post::grbl) job.machine.programs = ProgramSpan::layer;
+        const VerifyResult result = write_block(context, job, folder);
+        for (const Diagnostic& v : result.violations) ADD_FAILURE() << v.code << ": " << v.message;
+        // The same bolt 45 mm nearer is in the way of each.
+        job.machine.keep_outs[0].circle[0] -= 45;
+        const VerifyResult nearer = verify(context, folder / "out", {}, {}, 1.0, &job.machine.keep_outs);
+        EXPECT_TRUE(std::any_of(nearer.violations.begin(), nearer.violations.end(),
+                                [](const Diagnostic& v) { return v.code == "keep_out.cut"; }));
+    }
 }
 
 TEST(KeepOuts, ABoltInTheWayIsRefused) {
