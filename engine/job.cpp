@@ -202,6 +202,7 @@ void validate_machine(const Machine& c) {
                "give \"tool\", one program for each tool of a layer, or \"operation\"");
     require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
     require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
+    validate_keep_outs(c.keep_outs);
 }
 
 void validate_prepare(const PrepareJob& p) {

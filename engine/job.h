@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/keep_out.h"
 #include "kernels/features/features.h"
 #include "kernels/forces/forces.h"
 #include "kernels/geometry/cutter_shape.h"
@@ -153,6 +154,7 @@ struct Machine {
     WorkZero zero = WorkZero::model;
     double base_board_thickness = 19;  ///< the sacrificial board under the first layer
     double base_board_cut = -1;        ///< how deep it may be cut; negative: the finish tool's overrun
+    std::vector<KeepOut> keep_outs;    ///< what no tool may run into
 };
 
 struct Bonding {

@@ -107,6 +107,8 @@ std::string_view remedy(std::string_view code) {
         return "give a tool with longer flutes, or a smaller stepdown";
     if (code.starts_with("travel.") || code.starts_with("stack."))
         return "turn or split the pattern, or choose other slabs";
+    if (code.starts_with("keep_out."))
+        return "move the keep-out farther from the stock, make it lower, or hold the slab in another way";
     if (code == "board.too_deep") return "allow a deeper machine.base_board_cut";
     return "give other tools";
 }
@@ -116,7 +118,7 @@ std::string_view remedy(std::string_view code) {
 bool is_of_the_part(const SimulationReport& report) {
     return std::all_of(report.violations.begin(), report.violations.end(), [](const Violation& v) {
         for (const char* family : {"gouge.", "contact.", "plunge.", "rapid.through", "flute.", "cut.",
-                                   "board.", "operation.", "left.", "travel.", "stack."})
+                                   "board.", "operation.", "left.", "travel.", "stack.", "keep_out."})
             if (v.code.starts_with(family)) return true;
         return false;
     });

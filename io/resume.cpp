@@ -11,6 +11,7 @@
 #include "engine/paths/operations/facing.h"
 #include "engine/planner/remake.h"
 #include "engine/simulate/face_off_proof.h"
+#include "engine/simulate/keep_out_check.h"
 #include "engine/simulate/planned_build.h"
 #include "engine/simulate/resume_point.h"
 #include "io/posts/gcode_writer.h"
@@ -232,7 +233,8 @@ private:
                 const BlockToFaceOff block{build.stock_min, build.stock_max,
                                            build.layers[static_cast<std::size_t>(program.layer)].z_bottom,
                                            planned.stack_top(before), face_step(build.job, *tool)};
-                const std::vector<Violation> found = check_face_off(program, *tool, block);
+                std::vector<Violation> found = check_face_off(program, *tool, block);
+                if (found.empty()) found = entered_keep_outs(program, block.top);
                 if (found.empty()) continue;
                 throw Error(ErrorKind::verification, "resume.program", found[0].message,
                             fmt::format("{}:{}", (out_ / program.file).string(), found[0].line),
@@ -240,6 +242,16 @@ private:
                             "away and remake the layer again");
             }
         }
+    }
+
+    /// What of the table a program that faces a layer off runs into. @param top mm, what the layer stands up
+    /// to
+    [[nodiscard]] std::vector<Violation> entered_keep_outs(const Program& program, double top) const {
+        SimulationInput input = folder_.simulation;
+        SimulatedLayer& layer = input.layers[static_cast<std::size_t>(program.layer)];
+        layer.slab_thickness = top - layer.z_bottom;
+        input.programs = {program};
+        return check_keep_outs(context_, input, folder_.build.zero);
     }
 
     void read_progress() {
@@ -357,6 +369,7 @@ private:
         found = check_face_off(
             program, *tool,
             {made.plan.stock_min, made.plan.stock_max, layer.z_bottom, made.tops[k], made.most_mm});
+        if (found.empty()) found = entered_keep_outs(program, made.tops[k]);
         if (!found.empty()) refuse_remake(found[0]);
         return program;
     }

@@ -434,10 +434,13 @@ void refresh_report(Context& context, const std::string& directory, const Patter
 }
 
 VerifyResult verify(Context& context, const std::string& directory, const PatternSource& source,
-                    const std::string& maps_directory, double cell_mm) {
+                    const std::string& maps_directory, double cell_mm,
+                    const std::vector<KeepOut>* keep_outs) {
     return guarded([&] {
         check_cell(cell_mm);
+        if (keep_outs != nullptr) validate_keep_outs(*keep_outs);
         VerifyOptions options;
+        options.keep_outs = keep_outs;
         options.source = source;
         options.cell = cell_mm;
         options.maps_directory = maps_directory;

@@ -180,12 +180,14 @@ struct VerifyResult {
 /// for. The check of every move
 ///        for gouges needs no cells and is as exact with any; with coarser ones than that an operation that
 ///        takes nothing is not told
+/// @param keep_outs what stands on the table, in place of what the plan's job says; null: that
 /// @throws Error(verification) when the folder cannot be understood, Error(input) when the STL is missing or
 /// another one, Error(usage)
-///         on another cell
+///         on another cell or as validate_keep_outs()
 [[nodiscard]] SLABWRIGHT_API VerifyResult verify(Context& context, const std::string& directory,
                                                  const PatternSource& source = {},
-                                                 const std::string& maps_directory = {}, double cell_mm = 0);
+                                                 const std::string& maps_directory = {}, double cell_mm = 0,
+                                                 const std::vector<KeepOut>* keep_outs = nullptr);
 
 /// Makes the report.html that lies in a folder again, as light or as full as it was; a folder without one is
 /// left as it is. @throws as report()

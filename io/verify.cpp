@@ -12,6 +12,7 @@
 
 #include "engine/base_board.h"
 #include "engine/schedule/magazine.h"
+#include "engine/simulate/keep_out_check.h"
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table_check.h"
 #include "io/read/cut_list_check.h"
@@ -238,6 +239,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     Verification result;
     result.input = folder.simulation;
     SimulationInput& input = result.input;
+    if (options.keep_outs != nullptr) input.machine.keep_outs = *options.keep_outs;
     std::vector<Violation> violations;
     if (job.machine.post == Post::linuxcnc) {  // the others' tables are kept at the control
         const fs::path table = out / "tool.tbl";
@@ -247,6 +249,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
     }
     read_programs(context, folder, refusal, input.programs, violations);
     find_strangers(folder, violations);
+    const std::vector<Violation> entered = check_keep_outs(context, input, folder.build.zero);
+    violations.insert(violations.end(), entered.begin(), entered.end());
     BuildPlan build = folder.build;
     set_heights(build, input.programs);
     check_sequence(out / "sequence.json", build, violations);

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "engine/simulate/missing_tools.h"
 #include "engine/simulate/simulate.h"
@@ -21,6 +22,7 @@ struct VerifyOptions {
     std::string maps_directory{};        ///< "": none; write layer_01.ppm and so on there (write_maps())
     bool write = true;                   ///< write OUT/verify.json
     SimulationMemory* memory = nullptr;  ///< of the verification before of the same folder (simulate())
+    const std::vector<KeepOut>* keep_outs = nullptr;  ///< in place of those that plan.json states
     bool faults = false;  ///< list every faulty motion in the report (SimulationOptions::faults)
 };
 

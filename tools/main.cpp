@@ -268,7 +268,9 @@ bool run_verify(const Options& options) {
         return passed;
     }
     with_context(options, [&](Context& context) {
-        const VerifyResult result = verify(context, options.out, options.stl, options.maps, options.cell);
+        const std::vector<KeepOut> keep_outs = job_of(options).machine.keep_outs;
+        const VerifyResult result = verify(context, options.out, options.stl, options.maps, options.cell,
+                                           options.job_file.empty() ? nullptr : &keep_outs);
         passed = result.passed;
         return verdict(result, options.out) + renew_report(context, options);
     });
@@ -488,8 +490,7 @@ int command(int argc, char** argv) {
     app.require_subcommand(1);
 
     CLI::App* plan_command = add_plan_command(app, options);
-    CLI::App* verify_command =
-        app.add_subcommand("verify", "simulate the programs of a plan against the pattern");
+    CLI::App* verify_command = app.add_subcommand("verify", "simulate a plan's programs on the pattern");
     verify_command->add_option("OUT", options.out, "folder of the plan")->required();
     verify_command->add_option("--stl", options.stl,
                                "the pattern; the file that plan.json names, if not given");
@@ -500,6 +501,7 @@ int command(int argc, char** argv) {
             ->check(CLI::Range(0.01, 10.0));
     verify_command->add_option("--maps", options.maps,
                                "folder for a picture of each layer: left over, missed, unreachable, gouged");
+    verify_command->add_option("--keep-outs", options.job_file, "job file of what stands on the table");
     add_limits(*verify_command, options);
 
     ResumeOptions resume_options;

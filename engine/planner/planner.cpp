@@ -25,6 +25,7 @@
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
+#include "engine/schedule/keep_outs.h"
 #include "engine/schedule/schedule.h"
 #include "engine/schedule/standing_walls.h"
 #include "engine/schedule/supports.h"
@@ -265,9 +266,11 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
 // The programs of all layers, with their diagnostics.
 // @param joints what each layer lies on is that of its first
 // @param feet   of each layer's thin walls
+// @param origin of the frame that places are told in
 void cut_layers(Context& context, Plan& plan, MeshView pattern,
                 const std::vector<std::vector<JointWood>>& joints,
-                const std::vector<std::vector<StandingFoot>>& feet, ProgressShare share) {
+                const std::vector<std::vector<StandingFoot>>& feet, ProgressShare share,
+                const std::array<double, 2>& origin) {
     const Job& job = plan.job;
     const DrillPlan drilling = plan_drilling(context, pattern, plan);
     plan.diagnostics.insert(plan.diagnostics.end(), drilling.diagnostics.begin(), drilling.diagnostics.end());
@@ -313,6 +316,7 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
     std::vector<std::vector<Diagnostic>> rated(planned.size());
     if (job.cutting.engagement == Engagement::simulated)
         rated = rate_layers(context, plan, cuts, solver.solver());
+    keep_clear(plan, origin);
     parallel_each(context, planned.size(), [&](std::size_t i) {
         for (Operation& op : plan.layers[i].operations) {
             context.throw_if_cancelled();
@@ -393,10 +397,11 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     std::vector<std::vector<JointWood>> joints = wood_at_joints(context, pattern, plan);
     const std::optional<Mesh> propped = prop(context, plan, pattern, joints);
     if (propped) pattern = propped->view();
+    place_keep_outs(plan, origin);
     (void)cut_list(plan);  // every slab is on a board
     bond_layers(context, plan, joints, origin);
     const std::vector<std::vector<StandingFoot>> feet = standing_feet(context, plan, joints);
-    cut_layers(context, plan, pattern, joints, feet, share);
+    cut_layers(context, plan, pattern, joints, feet, share, origin);
 
     context.begin_phase("schedule", share.at(0.99), share.at(1));
     load_joints(context, plan, joints, origin);

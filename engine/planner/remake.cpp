@@ -14,6 +14,7 @@
 #include "engine/planner/layer_plan.h"
 #include "engine/schedule/glue_path.h"
 #include "engine/schedule/heights.h"
+#include "engine/schedule/keep_outs.h"
 #include "engine/schedule/magazine.h"
 #include "engine/schedule/schedule.h"
 #include "engine/schedule/slab_steps.h"
@@ -107,6 +108,7 @@ Operation face_off(Context& context, const Plan& plan, const Layer& layer, doubl
     std::vector<Diagnostic> unused;  // of feeds that were lowered
     if (plan.job.cutting.engagement == Engagement::simulated) rate_layer(context, faced, plan, unused);
     Operation operation = std::move(faced.operations[0]);
+    keep_clear(plan, faced, top, operation, keep_outs_in(plan, faced));
     const MotionTime time = motion_time(operation.moves, plan.job.machine, operation.blend);
     operation.cutting_mm = time.cutting_mm;
     operation.rapid_mm = time.rapid_mm;

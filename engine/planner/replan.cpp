@@ -11,6 +11,7 @@
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
+#include "engine/schedule/keep_outs.h"
 #include "engine/schedule/schedule.h"
 #include "engine/schedule/standing_walls.h"
 #include "kernels/parallel/parallel.h"
@@ -93,6 +94,7 @@ std::vector<bool> Replanner::mend(Plan& plan, std::span<const LayerFaults> fault
         plan.diagnostics.insert(plan.diagnostics.end(), told[k].begin(), told[k].end());
     }
     if (std::none_of(other.begin(), other.end(), [](bool b) { return b; })) return {};
+    keep_clear(plan, {}, other);
     std::vector<std::vector<WeakJoint>> weak(plan.layers.size());
     for (std::size_t l = 0; l < plan.layers.size(); ++l) {
         if (!other[l]) continue;

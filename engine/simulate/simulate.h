@@ -61,7 +61,8 @@ struct Extreme {
 /// contact.shank, contact.holder, plunge.not_center_cutting, rapid.through_stock, rapid.unknown_start,
 /// flute.too_deep, cut.too_deep, spindle.off, travel.exceeded, board.too_deep, operation.empty, tool.wrong,
 /// tool.unknown, left.missed, left.too_much; and by io/verify program.order, program.unplanned,
-/// program.missing, those of io/posts/program_check, program.dialect, program.number, tool.table,
+/// program.missing, those of io/posts/program_check and
+/// engine/simulate/keep_out_check, program.dialect, program.number, tool.table,
 /// sequence.no_file, sequence.unreadable and those of replay_build.
 struct Violation {
     std::string code;

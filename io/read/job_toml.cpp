@@ -15,6 +15,7 @@
 #include "engine/tools/libraries.h"
 #include "io/text/job_keys.h"
 #include "io/text/json_text.h"
+#include "io/text/nearest_word.h"
 #include "kernels/errors.h"
 
 namespace slabwright {
@@ -22,36 +23,6 @@ namespace slabwright {
 namespace {
 
 constexpr std::size_t kShownLetters = 60;  ///< of what is wrong, that an error repeats
-
-/// Levenshtein's distance, letters without case.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-    const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
-    std::vector<std::size_t> row(b.size() + 1);
-    for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-    for (std::size_t i = 1; i <= a.size(); ++i) {
-        std::size_t diagonal = row[0];
-        row[0] = i;
-        for (std::size_t j = 1; j <= b.size(); ++j) {
-            const std::size_t change = diagonal + (lower(a[i - 1]) == lower(b[j - 1]) ? 0 : 1);
-            diagonal = row[j];
-            row[j] = std::min({row[j] + 1, row[j - 1] + 1, change});
-        }
-    }
-    return row.back();
-}
-
-std::string nearest_word(std::string_view wanted, const std::vector<std::string>& known) {
-    std::string best;
-    std::size_t best_distance = ~std::size_t{0};
-    for (const std::string& candidate : known) {
-        const std::size_t distance = edit_distance(wanted, candidate);
-        if (distance < best_distance) {
-            best = candidate;
-            best_distance = distance;
-        }
-    }
-    return best;
-}
 
 /// Lists the keys, "table.key", in the order of the table.
 struct KeyNames {
@@ -125,6 +96,18 @@ public:
         if (array == nullptr) wrong_type(*node, prefix_ + name, "a list of numbers");
         value.clear();
         for (const toml::node& element : *array) value.push_back(number(element, prefix_ + name));
+    }
+    void key(const char* name, std::vector<std::array<double, 2>>& value, const char*) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        constexpr const char* kPoints = "a list of points [x, y]";
+        if (node->as_array() == nullptr) wrong_type(*node, prefix_ + name, kPoints);
+        value.clear();
+        for (const toml::node& element : *node->as_array()) {
+            const toml::array* const point = element.as_array();
+            if (point == nullptr || point->size() != 2) wrong_type(*node, prefix_ + name, kPoints);
+            value.push_back({number((*point)[0], prefix_ + name), number((*point)[1], prefix_ + name)});
+        }
     }
     void degrees(const char* name, double& radians, const char*) {
         if (const toml::node* node = find(name))
@@ -269,6 +252,10 @@ KeyNames all_keys() {
     const Job job;
     KeyNames names;
     visit_job_keys(job, names);
+    names.names.emplace_back("machine.keep_out");
+    names.prefix = "machine.keep_out.";
+    const KeepOut none;
+    visit_keep_out_keys(none, names);
     names.table("tool", "");
     visit_tool_keys(job.tools.front(), names);
     names.table("tools", "");
@@ -321,19 +308,35 @@ void refuse_unknown(const toml::table& values, const std::string& prefix, const 
     }
 }
 
-std::vector<const toml::table*> listed_tools(const toml::table& root, const KeyReader& reader,
-                                             const KeyNames& known) {
+/// The tables of a list, [[name]]; none where there is no such key.
+/// @param node the list. @param name its full name
+std::vector<const toml::table*> listed_tables(const toml::node* node, const std::string& name,
+                                              const KeyReader& reader, const KeyNames& known) {
     std::vector<const toml::table*> listed;
-    const toml::node* const node = root.get("tool");
     if (node == nullptr) return listed;
-    const toml::array* const tools = node->as_array();
-    if (tools == nullptr || !tools->is_array_of_tables())
+    const toml::array* const tables = node->as_array();
+    if (tables == nullptr || (!tables->empty() && !tables->is_array_of_tables()))
         reader.fail(*node, "job.type",
-                    fmt::format("tool is {}, not a list of tables", KeyReader::type_name(*node)),
-                    "write [[tool]] in double brackets");
-    for (const toml::node& entry : *tools) listed.push_back(entry.as_table());
-    for (const toml::table* const values : listed) refuse_unknown(*values, "tool.", known, reader);
+                    fmt::format("{} is {}, not a list of tables", name, KeyReader::type_name(*node)),
+                    fmt::format("write [[{}]] in double brackets", name));
+    for (const toml::node& entry : *tables) listed.push_back(entry.as_table());
+    for (const toml::table* const values : listed) refuse_unknown(*values, name + ".", known, reader);
     return listed;
+}
+
+/// What [[machine.keep_out]] lists, in place of what the job had.
+void read_keep_outs(const toml::table& root, const std::string& file, const KeyNames& known,
+                    KeyReader& reader, std::vector<KeepOut>& keep_outs) {
+    const toml::node* const list = root["machine"]["keep_out"].node();
+    if (list == nullptr) return;
+    keep_outs.clear();
+    KeyReader own(root, file);
+    own.set_missing_remedy("every [[machine.keep_out]] needs it: a name, a shape and a height");
+    for (const toml::table* const values : listed_tables(list, "machine.keep_out", reader, known)) {
+        own.enter(values, fmt::format("machine.keep_out[{}].", keep_outs.size() + 1));
+        visit_keep_out_keys(keep_outs.emplace_back(), own);
+    }
+    reader.learn_places(own);
 }
 
 Tool tool_of(const toml::table& values, KeyReader& reader) {
@@ -537,7 +540,8 @@ Job parse_job(std::string_view text, const std::string& file, const Job& base, c
     const KeyNames known = all_keys();
     refuse_unknown(root, "", known, reader);
     visit_job_keys(job, reader);
-    const std::vector<const toml::table*> listed = listed_tools(root, reader, known);
+    read_keep_outs(root, file, known, reader, job.machine.keep_outs);
+    const std::vector<const toml::table*> listed = listed_tables(root.get("tool"), "tool", reader, known);
     const toml::node* const shared = root.get("tools");
     if (shared != nullptr || !tools.library.empty()) {
         job.tools = library_tools(shared, listed, reader, file, tools);

@@ -155,6 +155,13 @@ public:
         values.clear();
         for (std::size_t i = 0; i < list.size(); ++i) values.push_back(list[i].number());
     }
+    void key(const char* name, std::vector<std::array<double, 2>>& points, const char*) {
+        if (!has(name)) return;
+        const Field list = (*table_)[name];
+        points.clear();
+        for (std::size_t i = 0; i < list.size(); ++i)
+            points.push_back({list[i][std::size_t{0}].number(), list[i][std::size_t{1}].number()});
+    }
     void degrees(const char* name, double& radians, const char*) {
         if (has(name)) radians = (*table_)[name].number() * std::numbers::pi / 180;
     }
@@ -198,6 +205,24 @@ void read_job(const Field& job, BuildPlan& build) {
         job["machine"].fail("states a magazine of no number of places");
     if (!(m.acceleration > 0) || !(m.rapid_feed > 0) || !(m.max_feed > 0))
         job["machine"].fail("states a machine that does not move");
+}
+
+/// The keep-outs that a plan states; a plan that states none has none.
+std::vector<KeepOut> read_keep_outs(const Field& plan) {
+    std::vector<KeepOut> keep_outs;
+    if (!plan.has("keep_outs")) return keep_outs;
+    const Field all = plan["keep_outs"];
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        const Field stated = all[i];
+        StatedKeys keys(stated);
+        visit_keep_out_keys(keep_outs.emplace_back(), keys);
+    }
+    try {
+        validate_keep_outs(keep_outs);
+    } catch (const Error& error) {
+        all.fail("are none: " + error.message());
+    }
+    return keep_outs;
 }
 
 /// How the pattern was read: as the job says, placed by the very numbers that the plan states.
@@ -417,6 +442,7 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     build.frame = enumerator(kFrameWords, plan["frame"]);
     if (build.frame == Frame::automatic) plan["frame"].fail("names no frame");
     if (plan.has("job")) read_job(plan["job"], build);
+    build.job.machine.keep_outs = read_keep_outs(plan);
     build.pattern = plan["input"]["file"].text();
     build.sha256 = plan["input"]["sha256"].text();
     folder.pattern = {build.pattern, build.sha256, read_reading(plan["input"], build), read_supports(plan)};

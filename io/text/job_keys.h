@@ -66,6 +66,8 @@ inline constexpr Word<RoughLimit> kRoughLimitWords[] = {{"smaller", RoughLimit::
 inline constexpr Word<ToolKind> kToolWords[] = {
     {"flat", ToolKind::flat}, {"ball", ToolKind::ball}, {"face", ToolKind::face}, {"drill", ToolKind::drill}};
 
+inline constexpr Word<KeepOutBase> kKeepOutWords[] = {{"board", KeepOutBase::board},
+                                                      {"slab", KeepOutBase::slab}};
 inline constexpr Word<MirrorAxis> kMirrorWords[] = {
     {"none", MirrorAxis::none}, {"x", MirrorAxis::x}, {"y", MirrorAxis::y}, {"z", MirrorAxis::z}};
 
@@ -114,6 +116,21 @@ void visit_tool_keys(ToolLike& tool, Visit& visit) {
     visit.key("ramp_deg", tool.ramp_deg,
               "degrees, steepest ramp into stock; negative: 10 of a flat, 2 of a face mill, any of what "
               "plunges");
+}
+
+/// Walks the keys of one keep-out.
+template <class KeepOutLike, class Visit>
+void visit_keep_out_keys(KeepOutLike& keep_out, Visit& visit) {
+    visit.required();
+    visit.key("name", keep_out.name, "its own, by which messages name it");
+    visit.key("rectangle", keep_out.rectangle, "mm, [x0, y0, x1, y1]; or polygon or circle");
+    visit.key("polygon", keep_out.polygon, "mm, [[x, y], ...], its corners in turn");
+    visit.key("circle", keep_out.circle, "mm, [x, y, radius]");
+    visit.required();
+    visit.key("height", keep_out.height, "mm that it stands up from its base");
+    visit.word("from", keep_out.from, kKeepOutWords,
+               "its base: board (the base board's top) or slab (the top of the layer's slab before facing)");
+    visit.key("clearance", keep_out.clearance, "mm that tools keep away from it");
 }
 
 /// Walks the keys of what is done to the model before it is planned.
@@ -264,7 +281,7 @@ void visit_price_keys(PricesLike& prices, Visit& visit) {
     visit.key("machine_hour", prices.machine_hour, "of an hour of the whole build");
 }
 
-/// Walks every key of the job but the tools: first those of the top, then table by table.
+/// Walks every key of the job but the tools and the keep-outs: first those of the top, then table by table.
 template <class JobLike, class Visit>
 void visit_job_keys(JobLike& job, Visit& visit) {
     visit.word("units", job.units, kUnitWords, "of the STL: mm or in; every length in this file is in mm");

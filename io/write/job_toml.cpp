@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -58,6 +59,12 @@ struct Printer {
         for (const double value : values) list += (list.empty() ? "" : ", ") + real(value);
         line(name, "[" + list + "]", comment);
     }
+    void key(const char* name, const std::vector<std::array<double, 2>>& points, const char* comment) {
+        std::string list;
+        for (const auto& [x, y] : points)
+            list += fmt::format("{}[{}, {}]", list.empty() ? "" : ", ", real(x), real(y));
+        line(name, "[" + list + "]", comment);
+    }
     void degrees(const char* name, double radians, const char* comment) {
         // Degrees that come out of radians carry rounding in the last digits; nine decimals bring 30 back
         // as 30.
@@ -79,6 +86,14 @@ std::string job_toml(const Job& job) {
     printer.text =
         "# A job of Slabwright. Every key may be left out; lengths in mm, forces in N, angles in degrees.\n";
     visit_job_keys(job, printer);
+    printer.text +=
+        "\n# What no tool may run into, bolts and clamps: any number of [[machine.keep_out]], each with "
+        "name,\n"
+        "# height and one of rectangle, polygon and circle.\n";
+    for (const KeepOut& keep_out : job.machine.keep_outs) {
+        printer.text += "\n[[machine.keep_out]]\n";
+        visit_keep_out_keys(keep_out, printer);
+    }
     printer.text += "\n# The tool library. Any [[tool]] replaces the whole default library.\n";
     for (const Tool& tool : job.tools) {
         printer.text += "\n[[tool]]\n";

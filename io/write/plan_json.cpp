@@ -46,6 +46,11 @@ struct JobPrinter {
         for (const double value : values) json.exact(value);
         json.end();
     }
+    void key(const char* name, const std::vector<std::array<double, 2>>& points, const char*) {
+        json.key(name).begin_array(Shape::line);
+        for (const std::array<double, 2>& point : points) put_xy(json, point);
+        json.end();
+    }
     void degrees(const char* name, double radians, const char*) {
         json.key(name).rounded(radians * 180 / std::numbers::pi, 9);
     }
@@ -91,6 +96,19 @@ void put_tool(JsonText& json, const Plan& plan, const Tool& tool) {
     json.key("allowed_length");
     if (allowed > 0) json.rounded(allowed, kLength);
     else json.null();
+    json.end();
+}
+
+/// Those of the job; nothing where it has none.
+void put_keep_outs(JsonText& json, const std::vector<KeepOut>& keep_outs) {
+    if (keep_outs.empty()) return;
+    json.key("keep_outs").begin_array();
+    for (const KeepOut& keep_out : keep_outs) {
+        json.begin_object(Shape::line);
+        JobPrinter keys{json};
+        visit_keep_out_keys(keep_out, keys);
+        json.end();
+    }
     json.end();
 }
 
@@ -427,6 +445,7 @@ std::string plan_json(const Plan& plan) {
         json.end();
     }
     json.end();
+    put_keep_outs(json, plan.job.machine.keep_outs);
     json.key("tools").begin_array();
     for (const Tool& tool : plan.job.tools) put_tool(json, plan, tool);
     json.end();

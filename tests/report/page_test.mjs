@@ -362,7 +362,9 @@ check.equal('selection: no tables without a choice', await (async () => {
     box(40, 20, 42, 120, 40, 50);
     writeFileSync(`${work}/leg.stl`, `solid leg\n${facets.map(t => `facet normal 0 0 0\nouter loop\n${t.map(p => `vertex ${p.join(' ')}\n`).join('')}endloop\nendfacet\n`).join('')}endsolid leg\n`);
     const built = `${work}/leg`;
-    execFileSync(command, ['plan', `${work}/leg.stl`, '-o', built, '--allow-undercut', '--quiet', '--no-verify']);
+    writeFileSync(`${work}/leg.toml`, ['name = "bolt"\ncircle = [230, 30, 8]\nheight = 20', 'name = "fence"\nrectangle = [-120, 0, -100, 60]\nheight = 55.5',
+        'name = "stop"\npolygon = [[230, 60], [250, 60], [230, 90]]\nheight = 5'].map(k => `[[machine.keep_out]]\n${k}\n`).join(''));
+    execFileSync(command, ['plan', `${work}/leg.stl`, '-o', built, '--job', `${work}/leg.toml`, '--allow-undercut', '--quiet', '--no-verify']);
     const {supports, layers: planned} = JSON.parse(readFileSync(`${built}/plan.json`, 'utf8'));
     const {page, complaints} = await open(started, `${built}/report.html`);
     check.that('supports: there is one', supports.length > 0);
@@ -371,6 +373,16 @@ check.equal('selection: no tables without a choice', await (async () => {
             supports.filter(s => s.z_low < layer.z_top - 0.001 && s.z_high > layer.z_bottom + 0.001).length);
     check.that('supports: sawn off in the end', (await page.locator('.cover .steps li:last-child').textContent()).includes(`saw off ${supports.length} support`));
     check.equal('supports: no complaints', complaints, []);
+    // So are bolts and fences, within the drawing; the first sheet asks for them.
+    check.equal('keep-outs: on all sheets', await page.locator('.plan-view path.keep-out').count(), 3 * planned.length);
+    check.that('keep-outs: within the drawing', await page.locator('#sheet-1 .plan-view').evaluate(view => {
+        const all = view.viewBox.baseVal;
+        return [...view.querySelectorAll('path.keep-out')].every(path => {
+            const {x, y, width, height} = path.getBBox();
+            return x >= all.x && y >= all.y && x + width <= all.x + all.width && y + height <= all.y + all.height;
+        });
+    }));
+    check.equal('keep-outs: asked for once', await page.locator('.sheet .checks', {hasText: 'fence, 55.5 mm over the board'}).count(), 1);
     await page.close();
 }
 await started.close();

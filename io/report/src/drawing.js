@@ -46,6 +46,19 @@ function stripes(id, color, ground, u, turn) {
 // Columns of stock that stand in a layer: they are left there, and sawn off when the pattern is done.
 export const supportsIn = l => (plan.supports ?? []).filter(s => s.z_low < plan.layers[l].z_top - 0.001 && s.z_high > plan.layers[l].z_bottom + 0.001);
 
+// What no tool may run into in a layer, in the places of the pattern: its outline as a path, its box, and its name
+// with its height, briefly and at length.
+export function keepOutsIn(l) {
+    const [ox, oy] = plan.zero ?? [0, 0], {min, max} = blankOf(l);
+    return (plan.keep_outs ?? []).map(k => {
+        const [cx, cy, r] = k.circle, [ax, ay, bx, by] = k.rectangle;
+        const corners = k.circle.length ? [[cx - r, cy - r], [cx + r, cy + r]] : k.rectangle.length ? [[ax, ay], [bx, ay], [bx, by], [ax, by]] : k.polygon;
+        const xs = corners.map(c => c[0] + ox), ys = corners.map(c => c[1] + oy), box = [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+        const d = k.circle.length ? `M${cx + ox - r} ${-cy - oy}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0Z` : `M${xs.map((x, i) => `${x} ${-ys[i]}`).join('L')}Z`;
+        return {name: k.name, d, box, slab: k.from === 'slab', brief: `${k.name}, ${figure(k.height, 1)} mm`, says: `${k.name}, ${figure(k.height, 1)} mm ${k.from === 'slab' ? 'over the slab' : 'over the board'}`};
+    }).filter(k => !k.slab || (k.box[0] < max[0] && k.box[2] > min[0] && k.box[1] < max[1] && k.box[3] > min[1]));
+}
+
 // The glue head's beads: y, x from and to of each.
 function beadsOf(beads) {
     const at = beads.map(v => (v * data.outlines.unit_mm).toFixed(2));
@@ -61,15 +74,18 @@ export function planView(l, paper) {
     const {min: [sx0, sy0], max: [sx1, sy1]} = blankOf(l), smaller = sx1 - sx0 < width - 0.05 || sy1 - sy0 < depth - 0.05;
     // The margin holds the dimensions; what it takes in the drawing's units depends on its scale.
     const margin = {left: 19, right: 10, top: 12, bottom: 17};
-    const u = Math.max(width / (paper[0] - margin.left - margin.right), depth / (paper[1] - margin.top - margin.bottom));
+    // What stands beside the stock is drawn as far away as the stock is large.
+    const kept = keepOutsIn(l), beside = (at, own, size, sign) => Math.max(own, ...kept.map(k => Math.min(sign * k.box[at], own + size)));
+    const left = -beside(0, -x0, width, -1), right = beside(2, x1, width, 1), front = -beside(1, -y0, depth, -1), back = beside(3, y1, depth, 1);
+    const u = Math.max((right - left) / (paper[0] - margin.left - margin.right), (back - front) / (paper[1] - margin.top - margin.bottom));
     const [ox, oy] = plan.zero ?? [0, 0], zx = Math.min(x1 + 6 * u, Math.max(x0 - 6 * u, ox)), zy = -Math.min(y1 + 6 * u, Math.max(y0 - 6 * u, oy));
-    const view = {x: x0 - margin.left * u, y: -y1 - margin.top * u, w: width + (margin.left + margin.right) * u, h: depth + (margin.top + margin.bottom) * u};
+    const view = {x: left - margin.left * u, y: -back - margin.top * u, w: right - left + (margin.left + margin.right) * u, h: back - front + (margin.top + margin.bottom) * u};
     const {min, max} = plan.input.bbox, px0 = min[0], px1 = max[0], py0 = min[1], py1 = max[1];
     const filled = filledBoxes(l);
     const inside = ox >= sx0 - 0.001 && ox <= sx1 && oy >= sy0 - 0.001 && oy <= sy1;
     return make('svg', {class: 'plan-view', viewBox: `${view.x} ${view.y} ${view.w} ${view.h}`, role: 'img',
         'aria-label': `Slab of layer ${layer.index} from above, ${figure(sx1 - sx0, 1)} by ${figure(sy1 - sy0, 1)} mm${smaller ? `, ${figure(sx0 - x0, 1)} mm right of and ${figure(sy0 - y0, 1)} mm behind the base board’s corner` : ''}; glue on ${figure(layer.glue_area_mm2 / 100, 1)} square centimetres; zero ${inside ? 'on' : 'beside'} the slab`},
-    make('defs', {}, stripes(`glue-${l}`, '#d69a1e', '#f9dfa0', u, 45), stripes(`air-${l}`, red, '#f4c3c3', u, -45)),
+    make('defs', {}, stripes(`glue-${l}`, '#d69a1e', '#f9dfa0', u, 45), stripes(`air-${l}`, red, '#f4c3c3', u, -45), kept.length ? stripes(`kept-${l}`, ink, '#dfe2e5', u, 90) : null),
     smaller ? [make('rect', {x: x0, y: -y1, width, height: depth, fill: 'none', stroke: '#8a8375', 'stroke-width': 0.3 * u, 'stroke-dasharray': `${3 * u} ${1.5 * u}`}), label(x0 + 1.5 * u, -y1 + 4 * u, 'base board', 3 * u, {fill: dim})] : null,
     make('rect', {x: sx0, y: -sy1, width: sx1 - sx0, height: sy1 - sy0, fill: wood, stroke: '#8a6a3a', 'stroke-width': 0.5 * u}),
     flaskRings(l).map(ring => make('path', {d: `M${ring.map(([x, y]) => `${x} ${-y}`).join('L')}Z`, fill: 'none', stroke: '#8a6a3a', 'stroke-width': 0.3 * u})),
@@ -80,6 +96,7 @@ export function planView(l, paper) {
     make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: 'none', stroke: ink, 'stroke-width': 0.45 * u}),
     supportsIn(l).map(s => make('path', {class: 'support', d: `M${s.x - s.width / 2} ${-s.y - s.width / 2}h${s.width}v${s.width}h${-s.width}Zl${s.width} ${s.width}m0 ${-s.width}l${-s.width} ${s.width}`, fill: 'none', stroke: purple, 'stroke-width': 0.5 * u})),
     make('path', {d: pathOf(top.map(loop => loop.points)), fill: 'none', stroke: '#17636b', 'stroke-width': 0.4 * u, 'stroke-dasharray': `${2 * u} ${1.3 * u}`}),
+    kept.map(k => [make('path', {class: 'keep-out', d: k.d, fill: `url(#kept-${l})`, stroke: ink, 'stroke-width': 0.5 * u}), k.box[0] + 1.8 * k.brief.length * u < view.x + view.w ? label(k.box[0], -k.box[3] - 1.2 * u, k.brief, 3 * u) : label(k.box[2], -k.box[3] - 1.2 * u, k.brief, 3 * u, {'text-anchor': 'end'})]),
     // Measures: the slab below and left, the pattern above and right.
     extension(sx0, -sy0, sx0, -y0 + 15 * u, u), extension(sx1, -sy0, sx1, -y0 + 15 * u, u), extension(sx0, -sy0, x0 - 15 * u, -sy0, u), extension(sx0, -sy1, x0 - 15 * u, -sy1, u),
     dimension(sx0, sx1, -y0 + 14 * u, false, `slab ${figure(sx1 - sx0, 1)}`, u), dimension(-sy0, -sy1, x0 - 14 * u, true, `slab ${figure(sy1 - sy0, 1)}`, u),

@@ -2,7 +2,7 @@
 
 import {duration, figure, make, plural, words} from './dom.js';
 import {boardsText, costText, cutListSheet} from './cutlist.js';
-import {planView, sideView, stackView, supportsIn} from './drawing.js';
+import {keepOutsIn, planView, sideView, stackView, supportsIn} from './drawing.js';
 import {blankOf, blankSize, data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
 import {filledVolume} from './wood.js';
 import {tableHeight, zeroOf} from './zero.js';
@@ -131,7 +131,7 @@ function sheet(l, minutes) {
         warningBox(warnings, 5),
         make('div', {class: 'drawings'}, planView(l, [132, 92]), sideView(l, [58, 92])),
         make('p', {class: 'key'}, make('i', {class: 'glue'}), ' glue ', make('i', {class: 'solid'}), ' pattern at the bottom ', make('i', {class: 'dash'}), ' at the top ',
-            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, supportsIn(l).length ? [make('i', {class: 'support'}), ' support, stays till the end '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
+            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, supportsIn(l).length ? [make('i', {class: 'support'}), ' support, stays till the end '] : null, keepOutsIn(l).length ? [make('i', {class: 'keep-out'}), ' no tool enters '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
         make('div', {class: 'facts'},
             fact('Zero', make('p', {}, zero.place), make('p', {}, make('strong', {}, 'XY: '), zero.xy, zero.after ? `; ${zero.after}` : null), make('p', {}, make('strong', {}, 'Z: '), zero.z), make('p', {}, make('strong', {}, 'Table: '), tableHeight(l))),
             fact('Slab', make('p', {}, make('strong', {}, `${blankSize(l)} × ${figure(layer.slab_thickness, 2)} mm`), ` ${plan.job.material.name}${laid}`),
@@ -149,6 +149,7 @@ function sheet(l, minutes) {
         make('div', {class: 'checks'}, [
             l === 0 ? `base board ${figure(plan.job.machine.base_board_thickness, 1)} mm mounted and level` : `layer ${plan.layers[l - 1].index} faced, free of dust where the glue goes`,
             `slab at least ${figure(layer.slab_thickness, 2)} mm thick all over, no warp`,
+            ...keepOutsIn(l).filter(k => k.slab || l === 0).map(k => `stands where it is drawn, no higher: ${k.says}`),
             ...(glued ? [`glue on, pressed ${figure(plan.job.bonding.press_time_s, 0)} s`] : []),
             'XY and Z touched off as above',
             ...(plan.job.machine.post === 'grbl' ? ['at each change of tool: the new tip touched off where the last one was'] : []),
