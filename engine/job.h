@@ -4,10 +4,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <vector>
 
+#include "engine/own_post.h"
 #include "kernels/features/features.h"
 #include "kernels/forces/forces.h"
 #include "kernels/geometry/cutter_shape.h"
@@ -148,7 +150,8 @@ struct Machine {
     double clearance = 10;        ///< mm of air between a rapid and the highest stock
     Frame frame = Frame::automatic;
     Post post = Post::linuxcnc;
-    LengthUnit units = LengthUnit::mm;  ///< of the programs
+    std::shared_ptr<const OwnPost> own_post;  ///< what it writes otherwise than `post`; null: nothing
+    LengthUnit units = LengthUnit::mm;        ///< of the programs
     ProgramSpan programs = ProgramSpan::operation;
     WorkZero zero = WorkZero::model;
     double base_board_thickness = 19;  ///< the sacrificial board under the first layer
@@ -358,6 +361,8 @@ struct Job {
 /// The file of a program as its control wants it named: "L003_02_rough_T2" is "L003_02_rough_T2.ngc" for
 /// LinuxCNC and "_L003_02_rough_T2.mpf" for Siemens, whose names begin with two letters.
 [[nodiscard]] std::string program_file(Post post, const std::string& stem);
+/// The same for a machine, whose own post may have another ending.
+[[nodiscard]] std::string program_file(const Machine& machine, const std::string& stem);
 
 /// By how much arcs and longer chords of roughing paths may leave what they are fitted to, mm: a fifteenth of
 /// what roughing leaves.

@@ -50,7 +50,7 @@ struct Options {
     PrepareOptions prepare;
     std::string pdf;  ///< of the setup sheets; "": none
     std::string orient, repair, stl, out, maps, access_maps, job_file, tools, units, strategy, finder, device,
-        library;
+        library, post, post_file;
     int threads = 0, plans = 3;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
@@ -82,7 +82,7 @@ void print(std::string_view text) {
 }
 
 Job job_of(const Options& options) {
-    const Job job = read_job(options.job_file, options.tools);
+    const Job job = read_job(options.job_file, options.tools, options.post);
     // An option is a key of the job, and says so in TOML. The words are checked already.
     std::string keys;
     const auto put = [&](std::string_view key, const std::string& value) {
@@ -354,6 +354,10 @@ void add_common(CLI::App& command, Options& options) {
     command.add_option(
         "--tools", options.tools,
         "tool library: fixed, shop, metric, luo, or a file .tbl, .fctl, .fctb or .csv (io/JOB.md)");
+    command.add_option(
+        "--post", options.post,
+        "instead of machine.post: linuxcnc, fanuc, haas, grbl, mach, iso, siemens, heidenhain, or "
+        "a post of your own, a file (io/FORMATS.md)");
     add_reading(command, options);
     command
         .add_flag("--repair{mend}", options.repair,
@@ -457,6 +461,23 @@ CLI::App* add_sheets_command(CLI::App& app, Options& options, SheetsOptions& ask
     return command;
 }
 
+void add_job_command(CLI::App& app, Options& options) {
+    CLI::App* command = app.add_subcommand("job", "job files, and posts of your own to begin with");
+    CLI::Option_group* what = command->add_option_group("what");
+    what->add_flag("--defaults", options.defaults, "print every key with its default and a comment");
+    what->add_option("--post-file", options.post_file,
+                     "print a post file that writes as this control's own dialect does");
+    what->require_option(1);
+    command->add_option("--library", options.library,
+                        "with these tools: fixed, shop, metric, or luo (Luo table 5.4)");
+    command->add_flag("--json", options.json, "errors as JSON on stderr");
+}
+
+std::string job_text(const Options& options) {
+    if (!options.post_file.empty()) return post_file_toml(options.post_file);
+    return default_job_toml(options.library.empty() ? "fixed" : options.library);
+}
+
 /// Reads the command line and does what it asks for. @return the exit code
 int command(int argc, char** argv) {
 #if defined(__x86_64__) && defined(__AVX2__)
@@ -526,12 +547,7 @@ int command(int argc, char** argv) {
     BondOptions bond_options;
     CLI::App* bond_command = add_bond_command(app, bond_options);
 
-    CLI::App* job_command = app.add_subcommand("job", "job files");
-    job_command->add_flag("--defaults", options.defaults, "print every key with its default and a comment")
-        ->required();
-    job_command->add_option("--library", options.library,
-                            "with these tools: fixed, shop, metric, or luo (Luo table 5.4)");
-    job_command->add_flag("--json", options.json, "errors as JSON on stderr");
+    add_job_command(app, options);
 
     // An error of the command line comes before its options are known, so --json is looked for by hand.
     const bool json_wanted = std::any_of(
@@ -569,7 +585,7 @@ int command(int argc, char** argv) {
             return run_sheets(options, sheets_options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*feed_command) print(run_feed(feed_options));
         else if (*bond_command) print(run_bond(bond_options));
-        else print(default_job_toml(options.library.empty() ? "fixed" : options.library));
+        else print(job_text(options));
         return 0;
     } catch (const Error& error) {
         return complain(error, options.json || bond_options.json || feed_options.json);

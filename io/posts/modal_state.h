@@ -79,6 +79,8 @@ private:
     void path_mode(const GcodeLine& line, const GcodePlace& place);
     void speed_and_feed(const GcodeLine& line, const GcodePlace& place);
     void check_words(const GcodeLine& line, const GcodePlace& place) const;
+    [[nodiscard]] bool is_switch(int m) const;
+    void check_switch(const GcodeLine& line, const GcodePlace& place) const;
     void rounding_187(const GcodeLine& line, const GcodePlace& place);
     void rounding_adis(const GcodeLine& line, const GcodePlace& place);
     void dwell(const GcodeLine& line, const GcodePlace& place);
