@@ -129,9 +129,7 @@ Plan probe_plan(const Machine& machine, double dwell_s) {
         Operation& operation = layer.operations[i];
         const std::size_t first = i / one_file * one_file, last = std::min<std::size_t>(3, first + one_file);
         operation.number = 301 + static_cast<int>(first);
-        operation.file = program_file(machine, fmt::format("L003_{:02}_T{}", first + 1, operation.tool));
-        if (first > 0 || one_file != 3)
-            operation.file = program_file(machine, fmt::format("L003_{:02}", first + 1));
+        operation.file = program_file(machine, fmt::format("L003_{:02}_probe", first + 1));
         if (last - first > 1) operation.file += fmt::format("#{}", i - first + 1);
     }
     return plan;
@@ -202,7 +200,10 @@ public:
         machine.units = LengthUnit::mm;
         meant_ = probe_plan(machine, dwell_s);
         for (Plan* plan : {&plan_, &meant_})
-            for (Tool& tool : plan->job.tools) tool.max_feed = 10000;
+            for (Tool& tool : plan->job.tools) {
+                tool.max_feed = 10000;
+                tool.max_rpm = 18000;
+            }
     }
 
     void run() {
@@ -262,7 +263,7 @@ private:
         planned.feeds = written_feed_lengths(dialect_of(plan_.job.machine), operation.moves, origin);
         const Tool& tool = plan_.job.tools[i / 2];
         for (const Violation& v : check_program(read, planned, &tool, plan_.job.machine))
-            refuse(v.line, "it " + v.message);
+            refuse(v.line, v.message);
     }
 
     [[noreturn]] void refuse(std::uint32_t line, const std::string& what) const {
