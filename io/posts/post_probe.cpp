@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "io/posts/gcode_reader.h"
@@ -18,10 +19,10 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kNear = 1.3e-3;      // mm: half a step of 0.001 mm, or of 0.0001 in
-constexpr double kNearCentre = 0.02;  // mm: what coarse steps move an arc's centre
-constexpr double kTop = 37;           // mm, of the probes' layer
-constexpr double kAbove = 10;         // mm, clearance over it
+constexpr double kNear = 1.3e-3;             // mm: half a step of 0.001 mm, or of 0.0001 in
+constexpr double kNearCentre = 0.02;         // mm: what coarse steps move an arc's centre
+constexpr double kTop = 37;                  // mm, of the probes' layer
+constexpr double kAbove[] = {10, 10, 12.5};  // mm over it: the clearance of each operation
 constexpr int kTools[] = {7, 12};
 
 /// A motion as a program makes it; an arc is one, however many lines or chords it has.
@@ -35,7 +36,10 @@ struct ProbeMotion {
 /// Moves from place to place, mm from the layer's top.
 class ProbeMoves {
 public:
-    ProbeMoves(double x, double y) : at_{units(x), units(y), units(kTop + kAbove)} { moves_ = {at_, at_}; }
+    ProbeMoves(double above, double x, double y)
+        : above_(above), at_{units(x), units(y), units(kTop + above)} {
+        moves_ = {at_, at_};
+    }
     ProbeMoves& to(double x, double y, double z, std::uint32_t feed) {
         at_ = {units(x), units(y), units(kTop + z), feed};
         moves_.push_back(at_);
@@ -54,7 +58,7 @@ public:
         return *this;
     }
     std::vector<Move> end() {
-        at_.z = units(kTop + kAbove);
+        at_.z = units(kTop + above_);
         at_.feed = 0;
         moves_.push_back(at_);
         return moves_;
@@ -62,14 +66,16 @@ public:
 
 private:
     static std::int32_t units(double mm) { return static_cast<std::int32_t>(to_units(mm)); }
+    double above_;
     std::vector<Move> moves_;
     Move at_;
 };
 
 std::vector<Move> moves_of(int operation) {
+    const double above = kAbove[operation];
     switch (operation) {
         case 0:  // signs, decimals, whole numbers, all axes
-            return ProbeMoves(-12.3456, 7)
+            return ProbeMoves(above, -12.3456, 7)
                 .to(-12.3456, 7, 0.003, 0)
                 .to(-12.3456, 7, -0.003, 777)
                 .to(100, 7, -0.003, 9000)
@@ -80,7 +86,7 @@ std::vector<Move> moves_of(int operation) {
                 .to(-2134.5684, -1134.5684, -18.4324, 8999)
                 .end();
         case 1:  // arcs
-            return ProbeMoves(10, -3)
+            return ProbeMoves(above, 10, -3)
                 .to(10, -3, -2, 500)
                 .arc(10, 0, 90, 3000)
                 .arc(25.4, 200, -171, 3000)
@@ -89,7 +95,7 @@ std::vector<Move> moves_of(int operation) {
                 .arc(812.3, -10, -20, 4000)
                 .end();
         default:
-            return ProbeMoves(-1, -1).to(-1, -1, -3.25, 1200).to(1, 1, -3.25, 1200).end();
+            return ProbeMoves(above, -1, -1).to(-1, -1, -3.25, 1200).to(1, 1, -3.25, 1200).end();
     }
 }
 
@@ -117,7 +123,7 @@ Plan probe_plan(const Machine& machine, double dwell_s) {
         operation.purpose = "probe";
         operation.tool = kTools[i / 2];
         operation.spindle_rpm = kSpeeds[i];
-        operation.clearance_z = kTop + kAbove;
+        operation.clearance_z = kTop + kAbove[i];
         operation.blend = i == 1 && says_rounding(machine.post) ? 0.1 : kJunction;
         operation.moves = moves_of(i);
         layer.operations.push_back(std::move(operation));
@@ -158,8 +164,12 @@ std::vector<ProbeMotion> motions_of(const Program& program) {
     return motions;
 }
 
+/// Where it ends, of the axes that are known.
 std::string place_text(const ProbeMotion& m) {
-    return fmt::format("x {:.4f} y {:.4f} z {:.4f}", m.x, m.y, m.z);
+    std::string text;
+    for (const auto& [letter, value] : {std::pair{'x', m.x}, std::pair{'y', m.y}, std::pair{'z', m.z}})
+        if (std::isfinite(value)) text += fmt::format("{}{} {:.4f}", text.empty() ? "" : " ", letter, value);
+    return text.empty() ? "no place" : text;
 }
 
 /// What two motions differ in; "" where they do not.

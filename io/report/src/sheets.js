@@ -151,7 +151,7 @@ function sheet(l, minutes) {
             `slab at least ${figure(layer.slab_thickness, 2)} mm thick all over, no warp`,
             ...(glued ? [`glue on, pressed ${figure(plan.job.bonding.press_time_s, 0)} s`] : []),
             'XY and Z touched off as above',
-            ...(plan.job.machine.post === 'grbl' ? ['at each change of tool: the new tip touched off where the last one was'] : []),
+            ...((plan.post ? plan.post.base : plan.job.machine.post) === 'grbl' ? ['at each change of tool: the new tip touched off where the last one was'] : []),
             'dust extraction on',
             `after facing: top measured at z ${figure(plan.frame === 'layer-top' ? 0 : layer.z_top, 2)}`,
         ].map((text, i) => tick(`L${l}:check${i}`, text))),
