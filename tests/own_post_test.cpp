@@ -5,14 +5,18 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "engine/schedule/schedule.h"
 #include "io/posts/gcode_reader.h"
 #include "io/posts/gcode_writer.h"
+#include "io/posts/program_check.h"
 #include "io/posts/program_grid.h"
 #include "io/read/own_post.h"
 #include "io/read/planned_folder.h"
@@ -23,6 +27,7 @@
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/schema.h"
+#include "tests/support/seed.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace slabwright;
@@ -199,6 +204,98 @@ TEST(OwnPost, SaysWhatItSaysOtherwise) {
             line_count(plan, layer, layer.operations[2], lines_before(plan, layer, layer.operations[2])));
 }
 
+TEST(OwnPost, ArcsByRadiusReadBackAsTheArcsThatWereMeant) {
+    std::mt19937 random(test::seed());
+    const auto share = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    for (const Post base : {Post::linuxcnc, Post::haas, Post::grbl})
+        for (const LengthUnit units : kUnits) {
+            Machine machine;
+            machine.post = base;
+            machine.units = units;
+            machine.own_post = post_of(based_on(word_of(kPostWords, base), "[program]\narcs = \"radius\"\n"));
+            Plan plan = plan_for(machine);
+            Operation& op = plan.layers[0].operations[0];
+            std::vector<Move> moves(op.moves.begin(), op.moves.begin() + 3);
+            Move at = moves.back();
+            at.feed = 3000;
+            for (int n = 0; n < 3000; ++n) {
+                const double size = std::pow(10, share(1, 6.5)), begin = share(-3.1, 3.1),
+                             turn = share(-3.1, 3.1);
+                const Move from = at;
+                at.i = static_cast<std::int32_t>(std::lround(-size * std::cos(begin)));
+                at.j = static_cast<std::int32_t>(std::lround(-size * std::sin(begin)));
+                at.x += at.i + static_cast<std::int32_t>(std::lround(size * std::cos(begin + turn)));
+                at.y += at.j + static_cast<std::int32_t>(std::lround(size * std::sin(begin + turn)));
+                const bool none = (at.x == from.x && at.y == from.y) || !at.is_arc();
+                const double sweep = none ? 0 : arc_shape(from, at).sweep;
+                const bool far = std::max(std::abs(at.x), std::abs(at.y)) > 100000000;
+                if (none || far || std::abs(sweep) > 3.1 || (sweep > 0) != (turn > 0)) at = from;
+                else moves.push_back(at);
+            }
+            at.i = at.j = 0;
+            at.feed = 0;
+            at.z = 470000;
+            moves.push_back(at);
+            op.moves = std::move(moves);
+            const Dialect dialect = dialect_of(machine);
+            Program program = read_program_text(program_text(plan, plan.layers[0], op), op.file, dialect);
+            EXPECT_GT(program.arcs.size(), 1000u);
+            const std::vector<std::uint32_t> lines = move_lines(plan, plan.layers[0], op);
+            std::map<std::uint32_t, std::size_t> move_at;  // by the last of its lines
+            for (std::size_t i = 0; i < lines.size(); ++i)
+                if (lines[i] != 0) move_at.emplace(lines[i], i);
+            for (const ProgramArc& arc : program.arcs) {
+                const std::uint32_t line = program.steps[arc.begin].line;
+                const std::size_t i = move_at.lower_bound(line)->second;
+                const ArcShape meant = arc_shape(op.moves[i - 1], op.moves[i]);
+                for (const double part : {0.0, 0.5, 1.0}) {
+                    const auto [x, y] = arc.at(part);
+                    EXPECT_LT(std::abs(std::hypot(x - meant.x, y - meant.y) - meant.radius), 2.5e-3)
+                        << in_words(base, units) << " line " << line;
+                }
+                EXPECT_GT(arc.arc.turn * meant.sweep, 0) << line;
+            }
+            for (ProgramStep& step : program.steps) step.z += 37;
+            for (ProgramArc& arc : program.arcs) arc.arc.z += 37;
+            ProgramPlan said;
+            said.spindle_rpm = op.spindle_rpm;
+            said.feeds = written_feed_lengths(dialect, op.moves, program_origin(plan, plan.layers[0]));
+            for (const Violation& v : check_program(program, said, &plan.job.tools[1], plan.job.machine))
+                ADD_FAILURE() << in_words(base, units) << " " << v.code << " " << v.message;
+        }
+}
+
+TEST(OwnPost, DamagedPostsAreRefusedClearlyOrWriteWhatIsMeant) {
+    std::mt19937 random(test::seed());
+    const auto pick = [&](std::size_t most) {
+        return std::uniform_int_distribution<std::size_t>(0, most)(random);
+    };
+    const std::string alphabet = "{}[]()%;,.:=\"\\\n GMTSXYZIJRFHPNO0123456789tolespd";
+    int taken = 0;
+    for (int round = 0; round < 1500; ++round) {
+        std::string text = round % 3 == 0 ? post_toml(kBases[pick(6)]) : kRouter;
+        for (std::size_t n = 0; n <= pick(2); ++n) {
+            const std::size_t at = pick(text.size() - 1);
+            const char c = alphabet[pick(alphabet.size() - 1)];
+            if (pick(2) == 0) text.erase(at, 1 + pick(3));
+            else if (pick(1) == 0) text.insert(at, 1, c);
+            else text[at] = c;
+        }
+        try {
+            (void)post_of(text);
+            ++taken;
+        } catch (const Error& error) {
+            EXPECT_EQ(error.kind(), ErrorKind::usage) << error.what() << "\n" << text;
+            EXPECT_EQ(error.code().substr(0, 5), "post.") << error.what();
+            EXPECT_EQ(error.place().substr(0, 7), "my.toml") << error.what();
+        }
+    }
+    EXPECT_GT(taken, 100);
+    EXPECT_LT(taken, 1400);
+}
+
 TEST(OwnPost, LineNumbersBeginAnewWhereFiveDigitsEnd) {
     Machine machine;
     machine.post = Post::linuxcnc;
@@ -337,6 +434,7 @@ TEST(OwnPost, ProbesTellWhatAPostLoses) {
              Loss{"mach", "[control]\ndwell = \"x_seconds\"\n", "G4"},
              Loss{"mach", "[program]\nend = [\"M5\"]\n", "does not end"},
              Loss{"mach", "[program]\nend = [\"M5\", \"M30\", \"M5\"]\n", "after the program's end"},
+             Loss{"siemens", "[program]\narcs = \"radius\"\n", "a word R"},
              Loss{"mach", "[program]\ncentres = []\n", "G91.1"},
              Loss{"mach", "[text]\nforbidden = \"-\"\n", "acts on"},
              Loss{"mach", "[text]\nforbidden = \"G\"\n", "acts on"},
@@ -414,7 +512,7 @@ TEST(OwnPost, NothingIsInjectedByALine) {
         EXPECT_EQ(refusal(text), "post.template my.toml:5") << line << message(text);
     }
     EXPECT_EQ(refusal(based_on("linuxcnc", "[program]\nnotes = [\"a\\nM30\"]\n")), "post.template my.toml:4");
-    EXPECT_EQ(refusal(based_on("linuxcnc", "[text]\nforbidden = \"\\n\"\n")).substr(0, 10), "post.range");
+    EXPECT_EQ(refusal(based_on("linuxcnc", "[text]\nforbidden = \"\\n\"\n")), "post.range my.toml:4");
 }
 
 TEST(OwnPost, KeysAndValuesAreHeldToTheTable) {
@@ -449,6 +547,11 @@ TEST(OwnPost, KeysAndValuesAreHeldToTheTable) {
                    "post.type my.toml:4"},
              Wrong{"base = \"fanuc\"\nname = \"a\"\n[program]\nend = \"M5\"\n", "post.type my.toml:4"},
              Wrong{"base = \"fanuc\"\nname = \"a\"\n[program]\nend = [5]\n", "post.type my.toml:4"},
+             Wrong{"base = \"fanuc\"\nname = \"a\"\n[text]\ncomments = \"both\"\n", "post.range my.toml:4"},
+             Wrong{"base = \"siemens\"\nname = \"a\"\n[text]\ncomments = \"parentheses\"\n",
+                   "post.range my.toml:4"},
+             Wrong{"base = \"grbl\"\nname = \"a\"\n[text]\nlongest_line = 100\n", "post.range my.toml:4"},
+             Wrong{"base = \"grbl\"\nname = \"a\"\n[text]\nlongest_comment = 71\n", "post.range my.toml:4"},
              Wrong{"base = \"fanuc\nname = \"a\"\n", "post.syntax my.toml:1"},
              Wrong{"a.b.c.d.e.f.g.h.i.j.k = 1\n", "post.syntax my.toml:1"},
          })

@@ -98,9 +98,9 @@ WrittenMove WrittenMoves::next(const Move& to) {
         const std::int64_t dx = to.x - ux_, dy = to.y - uy_;
         // Against the clock where the centre lies left of the chord.
         const Kind turn = dx * to.j > dy * to.i ? Kind::counter_clockwise : Kind::clockwise;
-        const bool turns =
-            grid_.exact() || std::hypot(static_cast<double>(move.x - x_), static_cast<double>(move.y - y_)) >=
-                                 static_cast<double>(kShortestArc);
+        const bool turns = (grid_.exact() && !grid_.by_radius()) ||
+                           std::hypot(static_cast<double>(move.x - x_), static_cast<double>(move.y - y_)) >=
+                               static_cast<double>(kShortestArc);
         if (turns) move.kind = turn;
     }
     known_ = true;

@@ -19,6 +19,8 @@ public:
 
     /// Whether its steps are the plan's own, 0.1 µm: nothing is rounded.
     [[nodiscard]] bool exact() const { return exact_; }
+    /// Whether arcs are written by their radius.
+    [[nodiscard]] bool by_radius() const { return dialect_->radius_arcs; }
     /// The nearest step to a place in 0.1 µm, halves away from zero: off by half a step at most.
     [[nodiscard]] std::int64_t steps(std::int64_t units) const { return exact_ ? units : rounded(units); }
     /// Where a step lies, mm.

@@ -4,8 +4,8 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <map>
 #include <optional>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -269,21 +269,42 @@ std::string ending_of(const PostReader& reader, const toml::table& root) {
     return ending;
 }
 
+/// What a control takes for comments, and how long its lines may be, is the base's to say: a post keeps
+/// within.
+void require_known_text(const Dialect& d, const Dialect& base, PostReader& reader) {
+    reader.table("text");
+    for (const auto& [known, wanted, mark] :
+         {std::tuple{base.parentheses, d.parentheses, "( … )"}, std::tuple{base.semicolon, d.semicolon, ";"}})
+        if (wanted && !known)
+            reader.fail(reader.find("comments"), "post.range",
+                        fmt::format("{} takes no {} for a comment", base.name, mark),
+                        "base the post on a control that does, or write none");
+    for (const auto& [key, most, wanted] :
+         {std::tuple{"longest_comment", base.longest_comment, d.longest_comment},
+          std::tuple{"longest_line", base.longest_line, d.longest_line}})
+        if (wanted > most)
+            reader.fail(reader.find(key), "post.range",
+                        fmt::format("text.{} is {}, more than {} takes", key, wanted, base.name),
+                        fmt::format("give {} at most", most));
+    for (const char c : d.forbidden)
+        if (c < ' ' || c > '~')
+            reader.fail(reader.find("forbidden"), "post.range",
+                        "text.forbidden holds what no line may hold anyway",
+                        "give printing ASCII characters");
+}
+
 /// What a post makes of its base, in one unit. @param stated gets its lines
 Dialect own_dialect(const toml::table& root, const std::string& file, Post base, LengthUnit units,
                     std::vector<StatedLine>& stated) {
-    Dialect d = dialect_of(base, units);
+    const Dialect built_in = dialect_of(base, units);
+    Dialect d = built_in;
     d.own = true;
-    const std::string acted_on = d.forbidden;
     PostReader reader(root, file);
     visit_post_keys(d, reader);
     ExtraLines extra;
     visit_extra_keys(extra, reader);
-    for (const char c : d.forbidden)
-        if (c < ' ' || c > '~')
-            throw Error(ErrorKind::usage, "post.range", "text.forbidden holds what no line may hold anyway",
-                        file, "give printing ASCII characters");
-    d.forbidden += acted_on;
+    require_known_text(d, built_in, reader);
+    d.forbidden += built_in.forbidden;
     d.head += extra.start;
     d.change = extra.before_change + d.change + extra.after_change;
     d.end = extra.end + d.end;
