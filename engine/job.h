@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "engine/own_post.h"
 #include "kernels/features/features.h"
 #include "kernels/forces/forces.h"
 #include "kernels/geometry/cutter_shape.h"
@@ -117,6 +116,21 @@ struct Slabs {
     /// Of the boards that slabs are sawn from; 0: as large as the largest slab.
     double board_length = 0, board_width = 0;
     double kerf = 4;  ///< of the saw
+};
+
+/// A post of the user's own, as far as the engine knows of it: it names program files by it and hands it on
+/// to those who write and read programs (OwnDialect of io/posts/dialect.h).
+struct OwnPost {
+    std::string name;    ///< in messages
+    std::string text;    ///< the bytes of its file, which a plan's folder keeps
+    std::string ending;  ///< of its program files, ".nc"; "": as its base has it
+
+    virtual ~OwnPost() = default;
+
+protected:
+    OwnPost() = default;
+    OwnPost(const OwnPost&) = default;
+    OwnPost& operator=(const OwnPost&) = default;
 };
 
 struct Machine {

@@ -296,6 +296,13 @@ TEST(OwnPost, DamagedPostsAreRefusedClearlyOrWriteWhatIsMeant) {
     EXPECT_LT(taken, 1400);
 }
 
+TEST(OwnPost, TheExampleOfTheFormatsPageIsTaken) {
+    const std::string page = slurp(SLABWRIGHT_SOURCE_DIR "/io/FORMATS.md");
+    const std::size_t begin = page.find("```toml\nbase = ");
+    ASSERT_NE(begin, std::string::npos);
+    EXPECT_EQ(message(page.substr(begin + 8, page.find("\n```", begin + 8) - begin - 8)), "");
+}
+
 TEST(OwnPost, LineNumbersBeginAnewWhereFiveDigitsEnd) {
     Machine machine;
     machine.post = Post::linuxcnc;

@@ -26,6 +26,7 @@
 #include "io/ways_out.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
+#include "tools/job_command.h"
 #include "tools/plan_text.h"
 #include "tools/prepare_command.h"
 #include "tools/print_pdf.h"
@@ -50,11 +51,11 @@ struct Options {
     PrepareOptions prepare;
     std::string pdf;  ///< of the setup sheets; "": none
     std::string orient, repair, stl, out, maps, access_maps, job_file, tools, units, strategy, finder, device,
-        library, post, post_file;
+        post;
     int threads = 0, plans = 3;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
-         quiet = false, defaults = false, weld_given = false, no_3d = false, rebuild = false;
+         quiet = false, weld_given = false, no_3d = false, rebuild = false;
 };
 
 /// @param also further errors of the same kind, which JSON names in the same object
@@ -461,23 +462,6 @@ CLI::App* add_sheets_command(CLI::App& app, Options& options, SheetsOptions& ask
     return command;
 }
 
-void add_job_command(CLI::App& app, Options& options) {
-    CLI::App* command = app.add_subcommand("job", "job files, and posts of your own to begin with");
-    CLI::Option_group* what = command->add_option_group("what");
-    what->add_flag("--defaults", options.defaults, "print every key with its default and a comment");
-    what->add_option("--post-file", options.post_file,
-                     "print a post file that writes as this control's own dialect does");
-    what->require_option(1);
-    command->add_option("--library", options.library,
-                        "with these tools: fixed, shop, metric, or luo (Luo table 5.4)");
-    command->add_flag("--json", options.json, "errors as JSON on stderr");
-}
-
-std::string job_text(const Options& options) {
-    if (!options.post_file.empty()) return post_file_toml(options.post_file);
-    return default_job_toml(options.library.empty() ? "fixed" : options.library);
-}
-
 /// Reads the command line and does what it asks for. @return the exit code
 int command(int argc, char** argv) {
 #if defined(__x86_64__) && defined(__AVX2__)
@@ -547,7 +531,8 @@ int command(int argc, char** argv) {
     BondOptions bond_options;
     CLI::App* bond_command = add_bond_command(app, bond_options);
 
-    add_job_command(app, options);
+    JobOptions job_options;
+    add_job_command(app, job_options);
 
     // An error of the command line comes before its options are known, so --json is looked for by hand.
     const bool json_wanted = std::any_of(
@@ -585,10 +570,10 @@ int command(int argc, char** argv) {
             return run_sheets(options, sheets_options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*feed_command) print(run_feed(feed_options));
         else if (*bond_command) print(run_bond(bond_options));
-        else print(job_text(options));
+        else print(run_job(job_options));
         return 0;
     } catch (const Error& error) {
-        return complain(error, options.json || bond_options.json || feed_options.json);
+        return complain(error, options.json || bond_options.json || feed_options.json || job_options.json);
     } catch (const std::exception& error) {
         return complain(
             Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"),

@@ -261,7 +261,7 @@ std::string name_of(const PostReader& reader, const toml::table& root) {
 std::string ending_of(const PostReader& reader, const toml::table& root) {
     const toml::node* node = root.get("ending");
     if (node == nullptr) return {};
-    const std::string ending = reader.required_text("ending", "");
+    std::string ending = reader.required_text("ending", "");
     if (std::find(kProgramEndings.begin(), kProgramEndings.end(), ending) == kProgramEndings.end())
         reader.fail(node, "post.word",
                     fmt::format("ending is \"{}\", which ends no programs", ending.substr(0, kShownLetters)),
