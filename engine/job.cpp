@@ -339,6 +339,12 @@ std::string program_file(Post post, const std::string& stem) {
     return stem;
 }
 
+std::string program_file(const Machine& machine, const std::string& stem) {
+    const std::string file = program_file(machine.post, stem);
+    if (!machine.own_post || machine.own_post->ending.empty()) return file;
+    return file.substr(0, file.rfind('.')) + machine.own_post->ending;
+}
+
 double rough_blend(const Job& job) {
     return says_rounding(job.machine.post) ? rough_blend(job.cutting) : kJunction;
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -118,6 +119,21 @@ struct Slabs {
     double kerf = 4;  ///< of the saw
 };
 
+/// A post of the user's own, as far as the engine knows of it: it names program files by it and hands it on
+/// to those who write and read programs (OwnDialect of io/posts/dialect.h).
+struct OwnPost {
+    std::string name;    ///< in messages
+    std::string text;    ///< the bytes of its file, which a plan's folder keeps
+    std::string ending;  ///< of its program files, ".nc"; "": as its base has it
+
+    virtual ~OwnPost() = default;
+
+protected:
+    OwnPost() = default;
+    OwnPost(const OwnPost&) = default;
+    OwnPost& operator=(const OwnPost&) = default;
+};
+
 struct Machine {
     std::string name = "RPM 1160";
     double travel_x = 1220, travel_y = 1220, travel_z = 150;  ///< of the spindle
@@ -149,7 +165,8 @@ struct Machine {
     double clearance = 10;        ///< mm of air between a rapid and the highest stock
     Frame frame = Frame::automatic;
     Post post = Post::linuxcnc;
-    LengthUnit units = LengthUnit::mm;  ///< of the programs
+    std::shared_ptr<const OwnPost> own_post;  ///< what it writes otherwise than `post`; null: nothing
+    LengthUnit units = LengthUnit::mm;        ///< of the programs
     ProgramSpan programs = ProgramSpan::operation;
     WorkZero zero = WorkZero::model;
     double base_board_thickness = 19;  ///< the sacrificial board under the first layer
@@ -360,6 +377,8 @@ struct Job {
 /// The file of a program as its control wants it named: "L003_02_rough_T2" is "L003_02_rough_T2.ngc" for
 /// LinuxCNC and "_L003_02_rough_T2.mpf" for Siemens, whose names begin with two letters.
 [[nodiscard]] std::string program_file(Post post, const std::string& stem);
+/// The same for a machine, whose own post may have another ending.
+[[nodiscard]] std::string program_file(const Machine& machine, const std::string& stem);
 
 /// By how much arcs and longer chords of roughing paths may leave what they are fitted to, mm: a fifteenth of
 /// what roughing leaves.

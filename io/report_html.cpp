@@ -78,7 +78,7 @@ double rounded(double value, int decimals) {
 }
 
 /// What a report is refused with.
-const FolderRefusal kRefusal{ErrorKind::input, "report.plan", "report.program"};
+const FolderRefusal kRefusal{ErrorKind::input, "report.plan", "report.program", "report.post"};
 
 /// Loops with the loop that is around each, or −1.
 Json outlines(const Loops& loops) {

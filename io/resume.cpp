@@ -82,7 +82,8 @@ public:
         : context_(context),
           out_(directory),
           options_(options),
-          folder_(read_planned_folder(out_, {ErrorKind::input, "resume.plan", "resume.program"})),
+          folder_(
+              read_planned_folder(out_, {ErrorKind::input, "resume.plan", "resume.program", "resume.post"})),
           place_((out_ / kProgress).string()) {}
 
     ResumeStatus run() {

@@ -23,17 +23,20 @@
 #include "engine/simulate/work.h"
 #include "engine/tool_choice/access_map.h"
 #include "engine/tools/libraries.h"
+#include "io/posts/dialect.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/tool_table.h"
 #include "io/proof.h"
 #include "io/read/input_file.h"
 #include "io/read/job_toml.h"
 #include "io/read/mesh_format.h"
+#include "io/read/own_post.h"
 #include "io/read/pattern.h"
 #include "io/read/pattern_mesh.h"
 #include "io/read/repair.h"
 #include "io/read/tool_library.h"
 #include "io/report_html.h"
+#include "io/text/job_keys.h"
 #include "io/text/json_text.h"
 #include "io/verify.h"
 #include "io/write/access_ply.h"
@@ -91,20 +94,32 @@ std::string pattern_formats() {
     return missing.empty() ? built : built + "; not built: " + missing;
 }
 
-Job read_job(const std::string& path, const std::string& tool_library) {
+Job read_job(const std::string& path, const std::string& tool_library, const std::string& post) {
     return guarded([&] {
         const std::string text = path.empty()
                                      ? std::string()
                                      : read_whole(path, {ErrorKind::usage, "job.unreadable", kMostJobBytes,
                                                          "check the path after --job"});
         // What a job names lies beside it; what was asked for, where it was asked.
-        const std::filesystem::path folder =
-            tool_library.empty() ? std::filesystem::path(path).parent_path() : std::filesystem::path();
+        const std::filesystem::path beside = std::filesystem::path(path).parent_path();
+        const std::filesystem::path folder = tool_library.empty() ? beside : std::filesystem::path();
+        const std::filesystem::path posts = post.empty() ? beside : std::filesystem::path();
         return parse_job(text, path, {},
                          {[&](const std::string& name, const std::vector<std::int64_t>& wanted) {
                               return read_tool_library(folder / name, wanted);
                           },
-                          tool_library});
+                          tool_library},
+                         {[&](const std::string& name) { return read_own_post(posts / name); }, post});
+    });
+}
+
+std::string post_file_toml(std::string_view control) {
+    return guarded([&] {
+        for (const Word<Post>& word : kPostWords)
+            if (control == word.text) return post_toml(word.value);
+        throw Error(ErrorKind::usage, "post.base",
+                    quoting_line(fmt::format("there is no control \"{}\"", control.substr(0, 60))), "",
+                    "name linuxcnc, fanuc, haas, grbl, mach, iso or siemens");
     });
 }
 
@@ -212,6 +227,7 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out, const std
     if (plan.job.machine.post == Post::linuxcnc)
         write_file_in(out.path(), "tool.tbl",
                       tool_table(plan.job, magazine_at_start(plan.sequence, plan.job.machine.magazine)));
+    if (plan.job.machine.own_post) write_file_in(out.path(), kOwnPostFile, plan.job.machine.own_post->text);
     write_file_in(out.path(), "sequence.json", sequence_json(plan));
     const CutList list = cut_list(plan);
     write_file_in(out.path(), "cut_list.csv", cut_list_csv(list));

@@ -36,11 +36,18 @@ namespace slabwright {
 /// "; not built: STEP".
 [[nodiscard]] SLABWRIGHT_API std::string pattern_formats();
 
-/// Reads a job file (TOML), "" for none, and the tool library that it names beside it.
+/// Reads a job file (TOML), "" for none, and the tool library and the post file that it names beside it.
 /// @param tool_library a file of tools, or the name of a library of the house, instead of [tools] library
 /// (io/JOB.md)
-/// @throws Error(usage) with file, line and the nearest known key
-[[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path, const std::string& tool_library = {});
+/// @param post a control, or a post file (io/FORMATS.md), instead of machine.post
+/// @throws Error(usage) with file, line and the nearest known key; "post.…" where a post file cannot be used
+[[nodiscard]] SLABWRIGHT_API Job read_job(const std::string& path, const std::string& tool_library = {},
+                                          const std::string& post = {});
+
+/// A post file that writes just as the dialect of a control does, every key with a comment (io/FORMATS.md).
+/// @param control a word of machine.post. @throws Error(usage, "post.base") for another, or a conversational
+/// one
+[[nodiscard]] SLABWRIGHT_API std::string post_file_toml(std::string_view control);
 
 /// A job with the keys that a text in TOML states, the others as in `base`. @param name of the text, for
 /// errors

@@ -26,6 +26,7 @@
 #include "io/ways_out.h"
 #include "tools/allocator.h"
 #include "tools/bond_command.h"
+#include "tools/job_command.h"
 #include "tools/plan_text.h"
 #include "tools/prepare_command.h"
 #include "tools/print_pdf.h"
@@ -50,11 +51,11 @@ struct Options {
     PrepareOptions prepare;
     std::string pdf;  ///< of the setup sheets; "": none
     std::string orient, repair, stl, out, maps, access_maps, job_file, tools, units, strategy, finder, device,
-        library;
+        post;
     int threads = 0, plans = 3;
     double memory_gib = 0, weld = 0, every = 0, size_limit_mb = 10, cell = 0;
     bool allow_undercut = false, accept_weak = false, no_verify = false, keep_failed = false, json = false,
-         quiet = false, defaults = false, weld_given = false, no_3d = false, rebuild = false;
+         quiet = false, weld_given = false, no_3d = false, rebuild = false;
 };
 
 /// @param also further errors of the same kind, which JSON names in the same object
@@ -82,7 +83,7 @@ void print(std::string_view text) {
 }
 
 Job job_of(const Options& options) {
-    const Job job = read_job(options.job_file, options.tools);
+    const Job job = read_job(options.job_file, options.tools, options.post);
     // An option is a key of the job, and says so in TOML. The words are checked already.
     std::string keys;
     const auto put = [&](std::string_view key, const std::string& value) {
@@ -102,13 +103,13 @@ Job job_of(const Options& options) {
     return keys.empty() ? job : job_from_toml(keys, "command line", job);
 }
 
-/// Memory that was given back may stay with the process up to so much, for the next array; half of the limit
-/// at most. Sheets' arrays differ from sheet to sheet, so that more would only grow.
+/// Bytes of memory that the process keeps for the next array, of sheets: theirs differ from one to the next.
 constexpr std::uint64_t kKeptForSheets = std::uint64_t{3} << 29;
 
-/// Runs a body with a context that Ctrl-C cancels and whose progress a terminal sees. @param kept bytes
+/// Runs a body with a context that Ctrl-C cancels and whose progress a terminal sees. @param kept bytes at
+/// most
 template <class Body>
-void with_context(const Options& options, Body&& body, [[maybe_unused]] std::uint64_t kept = UINT64_MAX) {
+void with_context(const Options& options, [[maybe_unused]] std::uint64_t kept, Body&& body) {
     ProgressBar bar;
     Context::Options settings;
     settings.threads = options.threads;
@@ -139,6 +140,11 @@ void with_context(const Options& options, Body&& body, [[maybe_unused]] std::uin
         output = body(context);
     }
     if (!options.quiet) print(output);
+}
+
+template <class Body>
+void with_context(const Options& options, Body&& body) {
+    with_context(options, UINT64_MAX, std::forward<Body>(body));
 }
 
 void run_orient(const Options& options) {
@@ -242,29 +248,23 @@ bool run_sheets(const Options& options, const SheetsOptions& asked) {
     const Job reading = job_of(options);
     const SheetJob job = sheet_job(asked);
     bool passed = false;
-    with_context(
-        options,
-        [&](Context& context) {
-            const SheetsResult result = make_sheets(context, options.stl, reading, job, options.out,
-                                                    {.left_over = asked.tolerance}, sheet_extras(asked));
-            passed = result.proof.passed;
-            return sheets_summary(result, options.out, options.json);
-        },
-        kKeptForSheets);
+    with_context(options, kKeptForSheets, [&](Context& context) {
+        const SheetsResult result = make_sheets(context, options.stl, reading, job, options.out,
+                                                {.left_over = asked.tolerance}, sheet_extras(asked));
+        passed = result.proof.passed;
+        return sheets_summary(result, options.out, options.json);
+    });
     return passed;
 }
 
 bool run_verify(const Options& options) {
     bool passed = false;
     if (holds_sheets(options.out)) {
-        with_context(
-            options,
-            [&](Context& context) {
-                const SheetProof proof = verify_sheets(context, options.out, options.stl, {});
-                passed = proof.passed;
-                return sheets_verdict(proof, options.out);
-            },
-            kKeptForSheets);
+        with_context(options, kKeptForSheets, [&](Context& context) {
+            const SheetProof proof = verify_sheets(context, options.out, options.stl, {});
+            passed = proof.passed;
+            return sheets_verdict(proof, options.out);
+        });
         return passed;
     }
     with_context(options, [&](Context& context) {
@@ -298,13 +298,7 @@ void run_repair(const Options& options) {
     with_context(options, [&](Context& context) {
         const RepairResult result = repair(context, options.stl, options.out, job);
         if (options.json) return repair_summary_json(result, options.out);
-        std::string text;
-        for (const Diagnostic& d : result.diagnostics) text += told(d);
-        return text + fmt::format("{}: {}, {} facets, {} cm3\n", options.out,
-                                  result.repair.how == "none"   ? "needed no repair"
-                                  : result.repair.how == "mend" ? "mended"
-                                                                : "made anew",
-                                  result.repair.triangles, number(result.volume_mm3 / 1000, 2));
+        return repair_text(result, options.out);
     });
 }
 
@@ -366,6 +360,10 @@ void add_common(CLI::App& command, Options& options) {
     command.add_option(
         "--tools", options.tools,
         "tool library: fixed, shop, metric, luo, or a file .tbl, .fctl, .fctb or .csv (io/JOB.md)");
+    command.add_option(
+        "--post", options.post,
+        "instead of machine.post: linuxcnc, fanuc, haas, grbl, mach, iso, siemens, heidenhain, or "
+        "a post of your own, a file (io/FORMATS.md)");
     add_reading(command, options);
     command
         .add_flag("--repair{mend}", options.repair,
@@ -538,12 +536,8 @@ int command(int argc, char** argv) {
     BondOptions bond_options;
     CLI::App* bond_command = add_bond_command(app, bond_options);
 
-    CLI::App* job_command = app.add_subcommand("job", "job files");
-    job_command->add_flag("--defaults", options.defaults, "print every key with its default and a comment")
-        ->required();
-    job_command->add_option("--library", options.library,
-                            "with these tools: fixed, shop, metric, or luo (Luo table 5.4)");
-    job_command->add_flag("--json", options.json, "errors as JSON on stderr");
+    JobOptions job_options;
+    add_job_command(app, job_options);
 
     // An error of the command line comes before its options are known, so --json is looked for by hand.
     const bool json_wanted = std::any_of(
@@ -581,10 +575,10 @@ int command(int argc, char** argv) {
             return run_sheets(options, sheets_options) ? 0 : static_cast<int>(ErrorKind::verification);
         else if (*feed_command) print(run_feed(feed_options));
         else if (*bond_command) print(run_bond(bond_options));
-        else print(default_job_toml(options.library.empty() ? "fixed" : options.library));
+        else print(run_job(job_options));
         return 0;
     } catch (const Error& error) {
-        return complain(error, options.json || bond_options.json || feed_options.json);
+        return complain(error, options.json || bond_options.json || feed_options.json || job_options.json);
     } catch (const std::exception& error) {
         return complain(
             Error(ErrorKind::no_plan, "internal", error.what(), "", "report this with the command line"),

@@ -114,4 +114,14 @@ std::string verdict(const VerifyResult& result, const std::string& out) {
     return text;
 }
 
+std::string repair_text(const RepairResult& result, const std::string& out) {
+    std::string text;
+    for (const Diagnostic& d : result.diagnostics) text += told(d);
+    return text + fmt::format("{}: {}, {} facets, {} cm3\n", out,
+                              result.repair.how == "none"   ? "needed no repair"
+                              : result.repair.how == "mend" ? "mended"
+                                                            : "made anew",
+                              result.repair.triangles, number(result.volume_mm3 / 1000, 2));
+}
+
 }  // namespace slabwright

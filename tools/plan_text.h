@@ -20,4 +20,7 @@ namespace slabwright {
 /// What the simulation of the programs says.
 [[nodiscard]] std::string verdict(const VerifyResult& result, const std::string& out);
 
+/// What was done to a mesh that was repaired. @param out the file that holds it
+[[nodiscard]] std::string repair_text(const RepairResult& result, const std::string& out);
+
 }  // namespace slabwright

@@ -300,7 +300,7 @@ Remake remake_layer(Context& context, const RemakeRequest& request) {
         const double top = on_top ? build.stack_top(request.state) : layer.z_top;
         Operation operation = face_off(context, plan, layer, top);
         operation.file = program_file(
-            plan.job.machine.post,
+            plan.job.machine,
             fmt::format("F{:03}_L{:03}_face_off_T{}", remake.layers.size() + 1, layer.index, operation.tool));
         operation.number = kFaceOffNumbers + static_cast<int>(remake.layers.size()) + 1;
         steps.face_off(layer, operation, top, on_top && request.state.table_at.has_value(),

@@ -107,7 +107,7 @@ void name_programs(Plan& plan) {
             ++running;
             const int number = highest < 80 && most < 100 ? 100 * layer.index + files : running;
             for (std::size_t i = begin; i < end; ++i) {
-                layer.operations[i].file = program_file(machine.post, stem);
+                layer.operations[i].file = program_file(machine, stem);
                 if (end - begin > 1) layer.operations[i].file += fmt::format("#{}", i - begin + 1);
                 layer.operations[i].number = number;
             }

@@ -52,7 +52,7 @@ Dialect with_points(std::string_view name) {
     Dialect d;
     d.name = name;
     d.decimals = 3;
-    d.point = true;
+    d.point = d.needs_point = true;
     d.capitals = true;
     d.longest_comment = 60;
     d.longest_line = 128;
@@ -232,10 +232,19 @@ Dialect dialect_of(Post post, LengthUnit units) {
     return d;
 }
 
-Dialect dialect_of(const Machine& machine) { return dialect_of(machine.post, machine.units); }
+Dialect dialect_of(const Machine& machine) {
+    if (!machine.own_post) return dialect_of(machine.post, machine.units);
+    const auto& own = dynamic_cast<const OwnDialect&>(*machine.own_post);
+    return machine.units == LengthUnit::inch ? own.inch : own.mm;
+}
 
 std::string in_words(Post post, LengthUnit units) {
     return std::string(word_of(kPostWords, post)) + (units == LengthUnit::inch ? " in inch" : "");
+}
+
+std::string in_words(const Dialect& dialect) {
+    if (!dialect.own) return in_words(dialect.post, dialect.units);
+    return '"' + dialect.name + '"' + (dialect.inch() ? " in inch" : "");
 }
 
 }  // namespace slabwright

@@ -107,7 +107,7 @@ private:
             if (dialect_.letters.find(letter) == std::string_view::npos)
                 place_.fail("gcode.unknown_word",
                             fmt::format("a word {}, which this reader does not know", letter));
-            if (dialect_.point && !pointed &&
+            if (dialect_.needs_point && !pointed &&
                 std::string_view("EFIJKRXYZ").find(letter) != std::string_view::npos)
                 place_.fail("gcode.decimal_point",
                             fmt::format("the word {} without its decimal point: {} counts in its least steps",

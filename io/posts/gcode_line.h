@@ -46,6 +46,10 @@ public:
     [[nodiscard]] bool has_beside(char letter) const {
         return (given_ & ~(1u << (letter - 'A'))) != 0 || g.count > 0 || m.count > 0;
     }
+    /// Whether it has another letter than that, G, M and N aside.
+    [[nodiscard]] bool has_letter_beside(char letter) const {
+        return (given_ & ~(1u << (letter - 'A'))) != 0;
+    }
     /// Whether its number has a decimal point.
     [[nodiscard]] bool pointed(char letter) const { return (pointed_ >> (letter - 'A') & 1u) != 0; }
     /// Whether it says nothing: blank, or a comment.

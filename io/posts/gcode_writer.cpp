@@ -95,7 +95,8 @@ private:
                            : w.kind == Kind::counter_clockwise ? 3
                            : w.kind == Kind::clockwise         ? 2
                                                                : 1;
-        if (motion != motion_) {
+        if (motion > 1 && dialect_.radius_arcs) return by_radius(to, w, motion);
+        if (motion != motion_ || dialect_.repeat_motion) {
             text_ += 'G';
             text_ += static_cast<char>('0' + motion);
             text_ += ' ';
@@ -112,6 +113,22 @@ private:
         if (motion != 0) feed(to.feed);
         text_ += '\n';
         return 1;
+    }
+    std::uint32_t by_radius(const Move& to, const WrittenMove& w, int motion) {
+        const std::vector<RadiusArc> arcs = radius_arcs(x_, y_, w);
+        for (const RadiusArc& arc : arcs) {
+            if (motion != motion_ || dialect_.repeat_motion) text_ += fmt::format("G{} ", motion);
+            motion_ = motion;
+            const std::size_t start = text_.size();
+            if (arc.x != x_) word('X', arc.x, start);
+            if (arc.y != y_) word('Y', arc.y, start);
+            word('R', arc.radius, start);
+            feed(to.feed);
+            text_ += '\n';
+            x_ = arc.x;
+            y_ = arc.y;
+        }
+        return static_cast<std::uint32_t>(arcs.size());
     }
     /// An arc is a block with its centre and one with its end.
     std::uint32_t conversational(const Move& to, const WrittenMove& w) {
@@ -180,6 +197,7 @@ namespace {
 
 /// A comment as a dialect takes it.
 std::string comment_line(const Dialect& dialect, std::string_view text) {
+    if (!dialect.parentheses && !dialect.semicolon) return {};
     std::string inside = comment_text(text);
     if (inside.size() > dialect.longest_comment) inside.resize(dialect.longest_comment);
     for (char& c : inside) {
@@ -299,6 +317,43 @@ std::string in_blocks(const std::string& text, std::size_t first) {
     return out;
 }
 
+/// What a dialect puts around lines, whatever they say: numbers before them, carriage returns behind.
+class LineDress {
+public:
+    /// @param line that the next one is, from 0
+    LineDress(const Dialect& dialect, std::uint32_t line) : dialect_(dialect), line_(line) {}
+
+    /// @param text whole lines. @returns what stands in the file, valid until the next call or as long as
+    /// text
+    std::string_view operator()(const std::string& text) {
+        if (dialect_.line_numbers == 0 && !dialect_.carriage_returns) return text;
+        dressed_.clear();
+        for (std::size_t at = 0; at < text.size();) {
+            const std::size_t end = text.find('\n', at);
+            if (dialect_.line_numbers != 0 && takes_number(text[at]))
+                dressed_ += fmt::format("N{} ", number());
+            dressed_.append(text, at, end - at);
+            dressed_ += dialect_.carriage_returns ? "\r\n" : "\n";
+            ++line_;
+            at = end + 1;
+        }
+        return dressed_;
+    }
+
+private:
+    /// Words do; comments, % marks and the program's own number do not.
+    static bool takes_number(char first) { return first >= 'A' && first <= 'Z' && first != 'O'; }
+    /// Five digits are what every control takes; after the last it begins anew.
+    [[nodiscard]] std::uint32_t number() const {
+        constexpr std::uint32_t kHighest = 99999;
+        const auto step = static_cast<std::uint32_t>(dialect_.line_numbers);
+        return step * (1 + line_ % (kHighest / step));
+    }
+    const Dialect& dialect_;
+    std::uint32_t line_;
+    std::string dressed_;
+};
+
 // As write_program; stops before the first line after move `until`, with a piece that ends there.
 // @param lines_before that its program has before it
 // @param lines gets the line of each move, 0 where it has none; may be null
@@ -323,6 +378,7 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
     if (dialect.conversational) text = in_blocks(text, lines_before);
     const std::int32_t clearance = to_units(operation.clearance_z);
     MotionText motion(text, dialect, program_origin(plan, layer), line);
+    LineDress dressed(dialect, lines_before);
     motion.begin(clearance, [&](const std::string& z) { return templates.filled(dialect.first, z); });
     ++line;
     if (lines != nullptr) lines->assign(moves.size(), 0);
@@ -337,7 +393,7 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
     for (std::size_t i = 1; i + 1 < moves.size(); ++i) {
         write(i);
         if (text.size() >= kPiece || i == until) {
-            sink(text);
+            sink(dressed(text));
             text.clear();
             if (i == until) return;
         }
@@ -347,7 +403,7 @@ void write_until(const Plan& plan, const Layer& layer, const Operation& operatio
         const std::string end = templates.filled(dialect.end);
         text += dialect.conversational ? in_blocks(end, motion.blocks()) : end;
     }
-    sink(text);
+    sink(dressed(text));
 }
 
 std::uint32_t count_lines(std::string_view text) {

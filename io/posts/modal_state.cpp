@@ -126,6 +126,10 @@ void ModalState::apply(const GcodeLine& line, const GcodePlace& place) {
     named_path_mode_.reset();
     dwell_.reset();
     if (line.g.count > 0) check_groups(line.g, 'G', group_of_g, dialect_.g, place);
+    if (std::any_of(line.m.begin(), line.m.end(), [&](int m) { return is_switch(m); })) {
+        check_switch(line, place);
+        return;
+    }
     if (line.m.count > 0) check_groups(line.m, 'M', group_of_m, dialect_.m, place);
     check_words(line, place);
     speed_and_feed(line, place);
@@ -144,6 +148,18 @@ void ModalState::apply(const GcodeLine& line, const GcodePlace& place) {
     if (line.g.has(640)) path_mode(line, place);
     if (line.g.has(1870)) rounding_187(line, place);
     if (line.g.has(6410)) rounding_adis(line, place);
+}
+
+bool ModalState::is_switch(int m) const {
+    const std::vector<int>& known = dialect_.switches;
+    return m % 10 == 0 && std::find(known.begin(), known.end(), m / 10) != known.end();
+}
+
+/// Which output it switches (P) is all that a switch may be told: nothing of the state depends on it.
+void ModalState::check_switch(const GcodeLine& line, const GcodePlace& place) const {
+    if (line.g.count > 0 || line.m.count > 1 || line.has_letter_beside('P'))
+        place.fail("gcode.switch", fmt::format("M{} beside other words: a switch stands on a line of its own",
+                                               gcode_number(*line.m.begin())));
 }
 
 void ModalState::dwell(const GcodeLine& line, const GcodePlace& place) {

@@ -32,8 +32,8 @@ public:
     /// path mode, distances.
     /// @throws Error(verification): gcode.twice for two words of one group, gcode.unknown_word for a G or M
     ///   number that is none of this project's, gcode.number, gcode.unused_word, gcode.unset for a length
-    ///   before its unit, gcode.tool, gcode.offset, gcode.spindle, gcode.coolant, gcode.pause, gcode.dwell,
-    ///   gcode.path_mode
+    ///   before its unit, gcode.tool, gcode.offset, gcode.spindle, gcode.coolant, gcode.pause, gcode.switch,
+    ///   gcode.dwell, gcode.path_mode
     void apply(const GcodeLine& line, const GcodePlace& place);
 
     /// @throws Error(verification): gcode.tool, gcode.offset or gcode.unset that name what the program has
@@ -79,6 +79,8 @@ private:
     void path_mode(const GcodeLine& line, const GcodePlace& place);
     void speed_and_feed(const GcodeLine& line, const GcodePlace& place);
     void check_words(const GcodeLine& line, const GcodePlace& place) const;
+    [[nodiscard]] bool is_switch(int m) const;
+    void check_switch(const GcodeLine& line, const GcodePlace& place) const;
     void rounding_187(const GcodeLine& line, const GcodePlace& place);
     void rounding_adis(const GcodeLine& line, const GcodePlace& place);
     void dwell(const GcodeLine& line, const GcodePlace& place);

@@ -19,10 +19,13 @@ public:
 
     /// Whether its steps are the plan's own, 0.1 µm: nothing is rounded.
     [[nodiscard]] bool exact() const { return exact_; }
+    /// Whether arcs are written by their radius.
+    [[nodiscard]] bool by_radius() const { return dialect_->radius_arcs; }
     /// The nearest step to a place in 0.1 µm, halves away from zero: off by half a step at most.
     [[nodiscard]] std::int64_t steps(std::int64_t units) const { return exact_ ? units : rounded(units); }
     /// Where a step lies, mm.
     [[nodiscard]] double mm(std::int64_t steps) const;
+    [[nodiscard]] double mm(double steps) const;
     /// Appends a place as the dialect spells it: "-1.25", "29." where points are needed, "+29" for
     /// HEIDENHAIN.
     void append(std::string& text, std::int64_t steps) const {
@@ -48,6 +51,18 @@ struct WrittenMove {
     std::int64_t cx = 0, cy = 0;                                                     ///< of an arc's centre
     enum class Kind { none, line, clockwise, counter_clockwise } kind = Kind::none;  ///< none: it stays there
 };
+
+/// An arc, or half of one, as a line with R says it.
+struct RadiusArc {
+    std::int64_t x = 0, y = 0;  ///< its end, steps
+    std::int64_t radius = 0;    ///< steps
+    double cx = 0, cy = 0;      ///< where a reader finds the centre, steps
+};
+
+/// A written arc by radius, steps. One that turns by more than 100 degrees comes in two halves: the nearer an
+/// arc is to half a circle, the further the last decimal of its radius moves the centre.
+/// @param x,y where it begins
+[[nodiscard]] std::vector<RadiusArc> radius_arcs(std::int64_t x, std::int64_t y, const WrittenMove& arc);
 
 /// What a program's coordinates count from, 0.1 µm, pattern-base.
 struct ProgramOrigin {

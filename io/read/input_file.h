@@ -23,6 +23,7 @@ struct ReadRule {
 
 inline constexpr std::uint64_t kMebibyte = std::uint64_t{1} << 20;
 inline constexpr std::uint64_t kMostJobBytes = kMebibyte;                ///< job files have some kilobytes
+inline constexpr std::uint64_t kMostPostBytes = kMebibyte / 16;          ///< as above
 inline constexpr std::uint64_t kMostToolTableBytes = kMebibyte;          ///< a line for each tool
 inline constexpr std::uint64_t kMostDocumentBytes = 64 * kMebibyte;      ///< plan.json has some megabytes
 inline constexpr std::uint64_t kMostProgramBytes = 1024 * kMebibyte;     ///< one operation's G-code

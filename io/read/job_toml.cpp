@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "engine/tools/libraries.h"
+#include "io/read/toml_text.h"
 #include "io/text/job_keys.h"
 #include "io/text/json_text.h"
 #include "io/text/nearest_word.h"
@@ -131,6 +132,20 @@ public:
              fmt::format("did you mean \"{}\"?", nearest_word(given, known)));
     }
 
+    /// The control that programs are for; a file is kept for whoever can read it.
+    template <std::size_t N>
+    void word(const char* name, Post& value, const Word<Post> (&words)[N], const char* comment) {
+        const toml::node* node = find(name);
+        if (node == nullptr) return;
+        post_ = text(*node, prefix_ + name);
+        if (!is_post_file(post_)) word<Post, N>(name, value, words, comment);
+    }
+    /// What machine.post says; "" where it says nothing.
+    [[nodiscard]] const std::string& post() const { return post_; }
+    static bool is_post_file(const std::string& post) {
+        return post.find_first_of("./\\") != std::string::npos;
+    }
+
     [[nodiscard]] const std::map<std::string, std::string>& places() const { return places_; }
     void learn_places(const KeyReader& other) { places_.insert(other.places_.begin(), other.places_.end()); }
     [[nodiscard]] std::string place_of(const toml::node& node) const {
@@ -190,6 +205,7 @@ private:
     std::string file_, prefix_;
     const toml::table* table_;
     bool required_ = false;
+    std::string post_;
     const char* missing_remedy_ = "every [[tool]] needs it; see `slabwright job --defaults`";
     std::map<std::string, std::string> places_;
 };
@@ -210,43 +226,6 @@ public:
 private:
     const toml::table& root_;
 };
-
-constexpr std::size_t kMostKeyParts = 8;  ///< those of a job have two; a number or a date has one point
-
-/// Refuses keys of many parts before they are parsed: the parser calls itself for each part.
-void require_shallow_keys(std::string_view text, const std::string& file) {
-    std::size_t line = 1, points = 0;
-    for (std::size_t at = 0; at < text.size(); ++at) {
-        const char c = text[at];
-        if (c == '#') {
-            at = std::min(text.find('\n', at), text.size()) - 1;
-        } else if (c == '"' || c == '\'') {
-            // A text in one or three quotes, in which only " knows \. An unclosed one is the parser's to
-            // tell.
-            const std::string three(3, c);
-            const std::size_t quotes = text.substr(at, 3) == three ? 3 : 1;
-            std::size_t end = at + quotes;
-            while (end < text.size() && text.substr(end, quotes) != three.substr(0, quotes) &&
-                   (quotes == 3 || text[end] != '\n')) {
-                if (c == '"' && text[end] == '\\') ++end;
-                if (end < text.size() && text[end] == '\n') ++line;
-                ++end;
-            }
-            at = end + quotes - 1;
-            if (quotes == 3)  // two more may stand before the closing three
-                while (at + 1 < text.size() && at < end + 4 && text[at + 1] == c) ++at;
-            if (quotes == 1 && end < text.size() && text[end] == '\n') at = end - 1;
-        } else if (c == '.') {
-            if (++points < kMostKeyParts) continue;
-            throw Error(ErrorKind::usage, "job.syntax",
-                        fmt::format("a key of more than {} parts", kMostKeyParts),
-                        fmt::format("{}:{}", file, line), "keys have two parts, as in machine.clearance");
-        } else if (c == '\n' || c == '=' || c == ',' || c == '[' || c == ']' || c == '{' || c == '}') {
-            points = 0;
-            line += c == '\n' ? 1 : 0;
-        }
-    }
-}
 
 KeyNames all_keys() {
     const Job job;
@@ -522,10 +501,37 @@ std::vector<Tool> library_tools(const toml::node* shared, std::vector<const toml
     return LibraryTools(shared, std::move(listed), reader, file).of(source);
 }
 
+/// Takes the post that a job names, or the one that is asked for in its place.
+void take_post(Machine& machine, const std::string& named, const std::string& file,
+               const PostSource& source) {
+    const std::string& post = source.post.empty() ? named : source.post;
+    if (post.empty()) return;
+    machine.own_post = nullptr;
+    if (KeyReader::is_post_file(post)) {
+        if (!source.read)
+            throw Error(ErrorKind::usage, "post.no_files", "a job that is no file has no post file", file,
+                        "name a control: linuxcnc, fanuc, haas, grbl, mach, iso, siemens or heidenhain");
+        const std::shared_ptr<const OwnDialect> own = source.read(post);
+        machine.post = own->base;
+        machine.own_post = own;
+        return;
+    }
+    for (const Word<Post>& word : kPostWords) {
+        if (post != word.text) continue;
+        machine.post = word.value;
+        return;
+    }
+    throw Error(
+        ErrorKind::usage, "job.word",
+        quoting_line(fmt::format("there is no post \"{}\"", post.substr(0, kShownLetters))), "--post",
+        "name linuxcnc, fanuc, haas, grbl, mach, iso, siemens or heidenhain, or a file that ends in .toml");
+}
+
 }  // namespace
 
-Job parse_job(std::string_view text, const std::string& file, const Job& base, const ToolSource& tools) {
-    require_shallow_keys(text, file);
+Job parse_job(std::string_view text, const std::string& file, const Job& base, const ToolSource& tools,
+              const PostSource& posts) {
+    require_shallow_keys(text, file, "job.syntax");
     toml::table root;
     try {
         root = toml::parse(text, file);
@@ -540,6 +546,7 @@ Job parse_job(std::string_view text, const std::string& file, const Job& base, c
     const KeyNames known = all_keys();
     refuse_unknown(root, "", known, reader);
     visit_job_keys(job, reader);
+    take_post(job.machine, reader.post(), file, posts);
     read_keep_outs(root, file, known, reader, job.machine.keep_outs);
     const std::vector<const toml::table*> listed = listed_tables(root.get("tool"), "tool", reader, known);
     const toml::node* const shared = root.get("tools");

@@ -7,10 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
+#include <span>
 
 #include "io/read/input_file.h"
+#include "io/read/own_post.h"
 #include "io/text/job_keys.h"
 #include "io/text/json_text.h"
+#include "io/text/sha256.h"
 
 namespace slabwright {
 
@@ -131,6 +134,8 @@ Tool read_tool(const Field& t) {
 /// Takes the keys of one table of the job that plan.json states; the others keep their default.
 class StatedKeys {
 public:
+    bool own_post = false;  ///< machine.post is the folder's file
+
     explicit StatedKeys(const Field& job) : job_(job), table_(job) {}
     void table(const char* name, const char*) {
         stated_ = job_.has(name);
@@ -165,6 +170,12 @@ public:
     void degrees(const char* name, double& radians, const char*) {
         if (has(name)) radians = (*table_)[name].number() * std::numbers::pi / 180;
     }
+    template <std::size_t N>
+    void word(const char* name, Post& value, const Word<Post> (&words)[N], const char*) {
+        if (!has(name)) return;
+        own_post = (*table_)[name].text() == kOwnPostFile;
+        if (!own_post) value = enumerator(words, (*table_)[name]);
+    }
     template <class Enum, std::size_t N>
     void word(const char* name, Enum& value, const Word<Enum> (&words)[N], const char*) {
         if (has(name)) value = enumerator(words, (*table_)[name]);
@@ -177,8 +188,27 @@ private:
     bool stated_ = true;
 };
 
+/// The post of the user's own that lies beside plan.json, with the very bytes that it was planned with.
+void read_post(const Field& plan, const fs::path& out, const FolderRefusal& refusal, Machine& machine) {
+    const fs::path file = out / kOwnPostFile;
+    const std::string sha256_planned = plan["post"]["sha256"].text(),
+                      text = read_whole(file, {refusal.kind, refusal.post, kMostPostBytes,
+                                               "put it back as it was written, or plan again"});
+    if (sha256(std::as_bytes(std::span(text))) != sha256_planned)
+        throw Error(refusal.kind, refusal.post, "is not the post that the programs were written with",
+                    file.string(), "put it back as it was written, or plan again");
+    try {
+        const std::shared_ptr<const OwnDialect> post = parse_own_post(text, file.string());
+        machine.post = post->base;
+        machine.own_post = post;
+    } catch (const Error& error) {
+        throw Error(refusal.kind, refusal.post, error.message(), error.place(), error.remedy());
+    }
+}
+
 /// The job that a plan states. What the proof cannot do without must be there.
-void read_job(const Field& job, BuildPlan& build) {
+/// @returns whether its post is a file of the folder
+bool read_job(const Field& job, BuildPlan& build) {
     build.job_stated = true;
     StatedKeys keys(job);
     visit_job_keys(build.job, keys);
@@ -205,6 +235,7 @@ void read_job(const Field& job, BuildPlan& build) {
         job["machine"].fail("states a magazine of no number of places");
     if (!(m.acceleration > 0) || !(m.rapid_feed > 0) || !(m.max_feed > 0))
         job["machine"].fail("states a machine that does not move");
+    return keys.own_post;
 }
 
 /// The keep-outs that a plan states; a plan that states none has none.
@@ -406,8 +437,7 @@ std::vector<Program> read_planned_operations(const std::string& text, const std:
         const std::string other = other_dialect(text, dialect);
         if (other.empty()) throw;
         throw Error(error.kind(), kForeignProgram,
-                    "is a program for " + other + " where the plan's are for " +
-                        in_words(dialect.post, dialect.units),
+                    "is a program for " + other + " where the plan's are for " + in_words(dialect),
                     error.place(), "do not mix folders; plan again with the machine.post of your control");
     }
 }
@@ -441,7 +471,7 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     BuildPlan& build = folder.build;
     build.frame = enumerator(kFrameWords, plan["frame"]);
     if (build.frame == Frame::automatic) plan["frame"].fail("names no frame");
-    if (plan.has("job")) read_job(plan["job"], build);
+    if (plan.has("job") && read_job(plan["job"], build)) read_post(plan, out, refusal, build.job.machine);
     build.job.machine.keep_outs = read_keep_outs(plan);
     build.pattern = plan["input"]["file"].text();
     build.sha256 = plan["input"]["sha256"].text();

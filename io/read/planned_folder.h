@@ -19,6 +19,7 @@ namespace slabwright {
 struct FolderRefusal {
     ErrorKind kind = ErrorKind::verification;
     std::string plan = "verify.plan", program = "verify.program";  ///< codes
+    std::string post = "verify.post";                              ///< of the post of the user's own
 };
 
 /// plan.json as far as figures are made from it. A job that it does not state is the default one.
@@ -43,7 +44,8 @@ struct PlannedFolder {
 };
 
 /// Reads OUT/plan.json. @throws Error as `refusal` says, with the first key that is missing or wrong: no
-/// file, no JSON, another schema than slabwright.plan/1, a value that no plan can have
+/// file, no JSON, another schema than slabwright.plan/1, a value that no plan can have, a post file other
+/// than the one planned with
 [[nodiscard]] PlannedFolder read_planned_folder(const std::filesystem::path& out,
                                                 const FolderRefusal& refusal);
 

@@ -217,7 +217,7 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
                "layer-top where the table moves");
     visit.word("post", machine.post, kPostWords,
                "the control that the programs are for: linuxcnc, fanuc, haas, grbl, mach, iso, siemens or "
-               "heidenhain");
+               "heidenhain; or a file, a post of your own");
     visit.word("units", machine.units, kUnitWords,
                "of the programs: mm or inch; this file and plan.json stay in mm");
     visit.word("programs", machine.programs, kProgramWords,

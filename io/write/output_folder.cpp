@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "engine/plan.h"
+#include "io/posts/dialect.h"
 #include "io/read/input_file.h"
 #include "io/write/output_file.h"
 #include "kernels/errors.h"
@@ -35,16 +36,15 @@ constexpr const char* kRemedy = "give another folder after -o, or make room and 
 constexpr const char* kMoveAway = "move that away, or give another folder after -o";
 constexpr std::string_view kPartial = "partial", kOld = "old";
 /// The files of a plan folder beside its programs.
-constexpr std::array<std::string_view, 9> kFiles{"plan.json",     "tool.tbl",     "sequence.json",
-                                                 "report.html",   "verify.json",  "sheets.json",
-                                                 "assembly.html", "cut_list.csv", "cut_list.dxf"};
+constexpr std::array<std::string_view, 10> kFiles{
+    kOwnPostFile,  "plan.json",   "tool.tbl",      "sequence.json", "report.html",
+    "verify.json", "sheets.json", "assembly.html", "cut_list.csv",  "cut_list.dxf"};
 /// Its folders, and how the names in them end.
 struct Inner {
     std::string_view folder, ending;
 };
-constexpr std::array<Inner, 9> kInner{Inner{"nc", ".ngc"},  Inner{"nc", ".nc"},   Inner{"nc", ".gcode"},
-                                      Inner{"nc", ".tap"},  Inner{"nc", ".mpf"},  Inner{"nc", ".h"},
-                                      Inner{"dxf", ".dxf"}, Inner{"svg", ".svg"}, Inner{"fixture", ".dxf"}};
+constexpr std::array<Inner, 4> kInner{Inner{"nc", ".ngc"}, Inner{"dxf", ".dxf"}, Inner{"svg", ".svg"},
+                                      Inner{"fixture", ".dxf"}};
 
 [[noreturn]] void refuse(const char* code, const fs::path& place, const std::string& what,
                          const std::string& remedy = kRemedy) {
@@ -92,12 +92,14 @@ bool is_file_of_ours(const std::string& name) {
 
 /// Whether a name in an inner folder of a folder under way is that of a file of ours.
 bool is_program_name(const std::string& name) {
-    return std::any_of(kInner.begin(), kInner.end(), [&](const Inner& inner) {
-        const std::size_t ending = name.rfind(inner.ending);
+    const auto has = [&](std::string_view known) {
+        const std::size_t ending = name.rfind(known);
         return ending != std::string::npos &&
-               (name.size() == ending + inner.ending.size() ||
-                maker_of(name, name.substr(1, ending + inner.ending.size() - 1), kPartial));
-    });
+               (name.size() == ending + known.size() ||
+                maker_of(name, name.substr(1, ending + known.size() - 1), kPartial));
+    };
+    return std::any_of(kInner.begin(), kInner.end(), [&](const Inner& inner) { return has(inner.ending); }) ||
+           std::any_of(kProgramEndings.begin(), kProgramEndings.end(), has);
 }
 
 /// The first entry of a folder that a plan folder cannot hold. @param is_program of names in inner folders

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <numbers>
+#include <span>
 
 #include "engine/forces/feeds.h"
 #include "engine/moves/feed_lengths.h"
 #include "io/posts/gcode_writer.h"
 #include "io/posts/program_grid.h"
 #include "io/text/job_keys.h"
+#include "io/text/sha256.h"
 #include "io/write/wood_json.h"
 
 namespace slabwright {
@@ -26,6 +28,7 @@ void put_xy(JsonText& json, const std::array<double, 2>& xy) {
 /// Writes the keys of a job as they are spelled in the job file.
 struct JobPrinter {
     JsonText& json;
+    const OwnPost* own_post;  // null: none
     bool in_table = false;
     void table(const char* name, const char*) {
         close();
@@ -53,6 +56,11 @@ struct JobPrinter {
     }
     void degrees(const char* name, double radians, const char*) {
         json.key(name).rounded(radians * 180 / std::numbers::pi, 9);
+    }
+    /// A post of the user's own is a file in the plan's folder.
+    template <std::size_t N>
+    void word(const char* name, Post value, const Word<Post> (&words)[N], const char*) {
+        json.key(name).string(own_post != nullptr ? kOwnPostFile : word_of(words, value));
     }
     template <class Enum, std::size_t N>
     void word(const char* name, Enum value, const Word<Enum> (&words)[N], const char*) {
@@ -378,6 +386,14 @@ void put_input(JsonText& json, const InputInfo& input) {
     json.end();
 }
 
+void put_post(JsonText& json, const Machine& machine) {
+    const std::string& text = machine.own_post->text;
+    json.key("post").begin_object(Shape::line).key("file").string(kOwnPostFile);
+    json.key("name").string(machine.own_post->name);
+    json.key("base").string(word_of(kPostWords, machine.post));
+    json.key("sha256").string(sha256(std::as_bytes(std::span(text)))).end();
+}
+
 void put_features(JsonText& json, const std::vector<Feature>& features) {
     json.begin_array();
     for (const Feature& feature : features) {
@@ -419,10 +435,11 @@ std::string plan_json(const Plan& plan) {
     json.key("input");
     put_input(json, plan.input);
     json.key("job").begin_object();
-    JobPrinter job{json};
+    JobPrinter job{json, plan.job.machine.own_post.get()};
     visit_job_keys(plan.job, job);
     job.close();
     json.end();
+    if (plan.job.machine.own_post) put_post(json, plan.job.machine);
     json.key("stock").begin_object(Shape::line);
     json.key("min");
     put_xy(json, plan.stock_min);

@@ -133,7 +133,7 @@ export function layerName(l) {
 }
 
 export function operationName(operation) {
-    return `${operation.name.replace(/\.(ngc|nc|gcode|tap|mpf|h)(?=$| ·)/, '')}, ${words(operation.kind)}: ${operation.purpose}`;
+    return `${operation.name.replace(/\.(ngc|nc|gcode|tap|mpf|h|cnc|txt|eia|iso|min|din|anc|fnc|pim|g)(?=$| ·)/, '')}, ${words(operation.kind)}: ${operation.purpose}`;
 }
 
 export const featureKinds = {

@@ -152,7 +152,7 @@ function sheet(l, minutes) {
             ...keepOutsIn(l).filter(k => k.slab || l === 0).map(k => `stands where it is drawn, no higher: ${k.says}`),
             ...(glued ? [`glue on, pressed ${figure(plan.job.bonding.press_time_s, 0)} s`] : []),
             'XY and Z touched off as above',
-            ...(plan.job.machine.post === 'grbl' ? ['at each change of tool: the new tip touched off where the last one was'] : []),
+            ...((plan.post ? plan.post.base : plan.job.machine.post) === 'grbl' ? ['at each change of tool: the new tip touched off where the last one was'] : []),
             'dust extraction on',
             `after facing: top measured at z ${figure(plan.frame === 'layer-top' ? 0 : layer.z_top, 2)}`,
         ].map((text, i) => tick(`L${l}:check${i}`, text))),
