@@ -1,7 +1,10 @@
 // A part as sheets, from the plan to the text of its programs and back to the part.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "engine/sheet_proof/sheet_proof.h"
@@ -148,6 +151,98 @@ TEST(Sheets, ProofFindsWhatIsWrongInTheText) {
     refuses("X", "X1e", "gcode.number");
     refuses("(cut of", "(cat of", "gcode.unnamed");
     refuses("(stock ", "(stack ", "gcode.no_stock");
+}
+
+// A control that knows no tip is told where the pivot goes: the tip runs as with one that does.
+TEST(Sheets, PivotsMoveSoThatTipsStayOnTheirWays) {
+    Context context;
+    const Mesh mesh = vase(context);
+    SheetJob job = job_of(SheetHead::jet);
+    job.pivot = 180;
+    const std::vector<std::string> texts = texts_of(plan_sheets(context, mesh, job));
+    const SheetProof proof = proof_of(context, mesh, texts);
+    EXPECT_TRUE(proof.passed) << told(proof);
+    job.pivot = 0;
+    const SheetProof plain = proof_of(context, mesh, texts_of(plan_sheets(context, mesh, job)));
+    EXPECT_NEAR(proof.made_mm3, plain.made_mm3, 1e-4 * plain.made_mm3);
+    EXPECT_TRUE(support::interpret_rs274(texts[0], "").ended);
+    const auto says = [&](const std::string& from, const std::string& to) -> std::string {
+        std::string text = texts[0];
+        const std::size_t at = text.find(from);
+        if (at == std::string::npos) return "not there";
+        text.replace(at, from.size(), to);
+        try {
+            (void)read_sheet_program(text, "x");
+        } catch (const Error& error) {
+            return error.code();
+        }
+        return "passes";
+    };
+    EXPECT_EQ(says("(pivot 180)", "(pivot 180)"), "passes");
+    EXPECT_EQ(says("(pivot 180)\n", ""), "gcode.height");
+    EXPECT_EQ(says("(pivot 180)", "(pivot 0)"), "gcode.pivot");
+    EXPECT_EQ(says("(pivot 180)", "(pivot 190)"), "gcode.height");
+    // Moves left out, so that the head turns far in one.
+    std::string text = texts[0];
+    const std::size_t first = text.find("G93\n") + 4;
+    std::size_t end = first;
+    for (int i = 0; i < 12; ++i) end = text.find('\n', end) + 1;
+    EXPECT_EQ(says(text.substr(first, end - first), ""), "gcode.pivot");
+}
+
+// Along a square with rounded corners, and along a circle: only corners are slow, by as far as they reach.
+TEST(Sheets, JetsSlowDownAtCorners) {
+    const auto way_around = [](const std::vector<std::array<double, 2>>& corners) {
+        AxisLoop loop;
+        for (const auto& [x, y] : corners) loop.top.push_back({to_units(x), to_units(y)});
+        loop.bottom = loop.top;
+        return head_way(loop, 10, 0.005);
+    };
+    const auto slow_mm = [](const PacedWay& paced) {
+        double slow = 0;
+        for (std::size_t i = 1; i < paced.points.size(); ++i)
+            if (paced.shares[i] < 1)
+                slow += std::hypot(to_mm(paced.points[i].top.x) - to_mm(paced.points[i - 1].top.x),
+                                   to_mm(paced.points[i].top.y) - to_mm(paced.points[i - 1].top.y));
+        return slow;
+    };
+    const auto square = way_around({{0, 0}, {30, 0}, {30, 30}, {0, 30}});
+    const PacedWay paced = slowed_at_corners(square, {.share = 0.5, .reach = 2});
+    EXPECT_NEAR(slow_mm(paced), 4 * 2 * 2, 1e-3);
+    EXPECT_EQ(paced.points.size(), paced.shares.size());
+    EXPECT_EQ(paced.points.front().top, paced.points.back().top);
+    // The same way: every point of the square is there, and nothing is off it.
+    for (const HeadPoint& p : square)
+        EXPECT_TRUE(std::any_of(paced.points.begin(), paced.points.end(),
+                                [&](const HeadPoint& q) { return q.top == p.top; }));
+    for (const HeadPoint& p : paced.points) {
+        const double x = to_mm(p.top.x), y = to_mm(p.top.y);
+        EXPECT_LT(std::min({std::abs(x), std::abs(y), std::abs(x - 30), std::abs(y - 30)}), 1e-3);
+    }
+    std::vector<std::array<double, 2>> round, small;
+    for (int k = 0; k < 90; ++k) {
+        const double a = k * 4 * std::numbers::pi / 180;
+        round.push_back({40 * std::cos(a), 40 * std::sin(a)});
+        small.push_back({0.4 * std::cos(a), 0.4 * std::sin(a)});
+    }
+    EXPECT_EQ(slow_mm(slowed_at_corners(way_around(round), {})), 0);
+    EXPECT_NEAR(slow_mm(slowed_at_corners(way_around(small), {})), 2 * std::numbers::pi * 0.4, 0.02);
+    EXPECT_EQ(slow_mm(slowed_at_corners(square, {.share = 1})), 0);
+    EXPECT_EQ(slowed_at_corners(square, {.share = 1}).points.size(), square.size());
+    // In the programs: half of the feed, twice the time, there.
+    Context context;
+    const Mesh box = loft(
+        context, {{0, {{0, 0}, {40, 0}, {40, 40}, {0, 40}}}, {12, {{0, 0}, {40, 0}, {40, 40}, {0, 40}}}});
+    SheetJob job = job_of(SheetHead::jet);
+    const SheetsPlan slowed = plan_sheets(context, box, job);
+    job.corners.share = 1;
+    const SheetsPlan even = plan_sheets(context, box, job);
+    EXPECT_GT(slowed.programs[0].minutes, even.programs[0].minutes);
+    const double feed = slowed.programs[0].ways[0].feed;
+    const double more_mm = (slowed.programs[0].minutes - even.programs[0].minutes) * feed;
+    EXPECT_GE(more_mm, 4 * 2);
+    EXPECT_LE(more_mm, 4 * (2 + 0.7)) << "with the rounds of the kerf at the corners";
+    EXPECT_TRUE(proof_of(context, box, texts_of(slowed)).passed);
 }
 
 TEST(Sheets, LinuxCncReadsEveryProgram) {

@@ -40,6 +40,21 @@ AbrasiveJet jet_of(const SheetsOptions& options) {
     return jet;
 }
 
+void add_head_options(CLI::App& command, SheetsOptions& options) {
+    command.add_option("--on", options.on, "what switches a laser or a jet on: M3, or like \"M62 P0\"");
+    command.add_option("--off", options.off, "what switches it off: M5, or like \"M63 P0\"");
+    command
+        .add_option(
+            "--pivot", options.pivot,
+            "mm from where a jet's head turns to the sheet's top, if the control does not keep its tip "
+            "in place")
+        ->check(CLI::Range(0.0, 2000.0));
+    command.add_option("--corner-feed", options.corner_feed, "percent of a jet's feed at corners; 50")
+        ->check(CLI::Range(1.0, 100.0));
+    command.add_option("--corner", options.corner, "mm before and after a corner at that feed; 1")
+        ->check(CLI::Range(0.0, 1000.0));
+}
+
 void add_alignment_options(CLI::App& command, SheetsOptions& options) {
     const CLI::Range length(0.0, 1e5), over_0(1e-6, 1e6);
     command
@@ -74,8 +89,6 @@ void add_engraving_options(CLI::App& command, SheetsOptions& options) {
         ->check(over_0);
     command.add_option("--power", options.power, "S word of a laser that cuts, where it engraves too")
         ->check(over_0);
-    command.add_option("--on", options.on, "what switches a laser or a jet on: M3, or like \"M62 P0\"");
-    command.add_option("--off", options.off, "what switches it off: M5, or like \"M63 P0\"");
 }
 
 void add_cost_options(CLI::App& command, SheetsOptions& options) {
@@ -137,6 +150,7 @@ void add_sheets_options(CLI::App& command, SheetsOptions& options) {
     command.add_option("--rpm", options.rpm, "router")->check(over_0);
     command.add_option("--tool", options.tool, "router's tool number")->check(CLI::Range(1, 9999));
     add_jet_options(command, options);
+    add_head_options(command, options);
     add_alignment_options(command, options);
     add_engraving_options(command, options);
     add_cost_options(command, options);
@@ -194,6 +208,9 @@ SheetJob sheet_job(const SheetsOptions& options) {
     job.engraving = engraving_of(options, job.cutting.kerf);
     job.power = options.power;
     job.on = options.on;
+    job.pivot = options.pivot;
+    job.corners.share = options.corner_feed / 100;
+    job.corners.reach = options.corner;
     job.off = options.off;
     job.cutting.leave = options.leave;
     job.nesting.spacing = options.gap;

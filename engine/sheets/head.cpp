@@ -34,17 +34,32 @@ struct Ends {
     Point2 top, bottom;
 };
 
-void append_between(std::vector<HeadPoint>& way, const Ends& from, const Ends& to, double thickness,
-                    double tolerance, int depth) {
+/// How a way is made of points.
+struct HeadRules {
+    double thickness = 0, tolerance = 0, pivot = 0;
+};
+
+/// mm by which the top leaves its line in the middle of a move of the pivot.
+double swing_of(const HeadPoint& p, const HeadPoint& q, double pivot) {
+    if (pivot == 0) return 0;
+    const PivotPlace a = pivot_place({}, p.a_deg, p.c_deg, pivot),
+                     b = pivot_place({}, q.a_deg, q.c_deg, pivot);
+    const PivotPlace m = pivot_place({}, (p.a_deg + q.a_deg) / 2, (p.c_deg + q.c_deg) / 2, pivot);
+    return std::hypot(m.x - (a.x + b.x) / 2, m.y - (a.y + b.y) / 2, m.z - (a.z + b.z) / 2);
+}
+
+void append_between(std::vector<HeadPoint>& way, const Ends& from, const Ends& to, const HeadRules& rules,
+                    int depth) {
     const HeadPoint last = way.back();
-    const HeadPoint next = head_at(to.top, to.bottom, thickness, last.c_deg);
+    const HeadPoint next = head_at(to.top, to.bottom, rules.thickness, last.c_deg);
     const Ends half{middle(from.top, to.top), middle(from.bottom, to.bottom)};
     const HeadPoint even{half.top, (last.a_deg + next.a_deg) / 2, (last.c_deg + next.c_deg) / 2};
-    const Point2 swung = bottom_of(even, thickness);
+    const Point2 swung = bottom_of(even, rules.thickness);
     const double off = std::hypot(double(swung.x) - half.bottom.x, double(swung.y) - half.bottom.y);
-    if (off > tolerance * kUnitsPerMm && depth < kDeepest) {
-        append_between(way, from, half, thickness, tolerance, depth + 1);
-        append_between(way, half, to, thickness, tolerance, depth + 1);
+    if ((off > rules.tolerance * kUnitsPerMm || swing_of(last, next, rules.pivot) > rules.tolerance) &&
+        depth < kDeepest) {
+        append_between(way, from, half, rules, depth + 1);
+        append_between(way, half, to, rules, depth + 1);
         return;
     }
     way.push_back(next);
@@ -58,7 +73,13 @@ Point2 bottom_of(const HeadPoint& point, double thickness) {
             to_units(to_mm(point.top.y) + aside * std::sin(point.c_deg * kDegree))};
 }
 
-std::vector<HeadPoint> head_way(const AxisLoop& loop, double thickness, double tolerance) {
+PivotPlace pivot_place(Point2 top, double a_deg, double c_deg, double pivot) {
+    const double aside = pivot * std::sin(a_deg * kDegree);
+    return {to_mm(top.x) - aside * std::cos(c_deg * kDegree),
+            to_mm(top.y) - aside * std::sin(c_deg * kDegree), pivot * (std::cos(a_deg * kDegree) - 1)};
+}
+
+std::vector<HeadPoint> head_way(const AxisLoop& loop, double thickness, double tolerance, double pivot) {
     std::vector<HeadPoint> way;
     const std::size_t n = loop.top.size();
     if (n == 0) return way;
@@ -74,8 +95,8 @@ std::vector<HeadPoint> head_way(const AxisLoop& loop, double thickness, double t
     way.push_back(head_at(loop.top[0], loop.bottom[0], thickness, c));
     for (std::size_t i = 0; i < n; ++i) {
         const std::size_t next = (i + 1) % n;
-        append_between(way, {loop.top[i], loop.bottom[i]}, {loop.top[next], loop.bottom[next]}, thickness,
-                       tolerance, 0);
+        append_between(way, {loop.top[i], loop.bottom[i]}, {loop.top[next], loop.bottom[next]},
+                       {thickness, tolerance, pivot}, 0);
     }
     return way;
 }

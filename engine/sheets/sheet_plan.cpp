@@ -32,9 +32,11 @@ void require_job(const SheetJob& job) {
         refuse("tilted cuts follow the outside of the part", "give --side outside, or --tilt 0");
     for (const double value : {job.feed, job.plunge_feed, job.stepdown, job.rpm, job.clearance})
         if (!(value > 0) || value > 1e6) refuse("feeds, stepdown, speed and clearance must be over 0", "");
-    for (const double value : {job.lead, job.pierce_s, job.through})
-        if (!(value >= 0) || value > 1000)
-            refuse("lead, pierce and depth under the sheet must be 0 or more", "");
+    if (job.pivot > 0 && job.head != SheetHead::jet)
+        refuse("only a jet's head has a pivot", "give no --pivot");
+    for (const double value : {job.lead, job.pierce_s, job.through, job.pivot})
+        if (!(value >= 0) || value > 2000)
+            refuse("lead, pierce, pivot and depth under the sheet must be 0 or more", "");
     for (const SheetOffcut& offcut : job.offcuts)
         if (std::none_of(job.slicing.thicknesses.begin(), job.slicing.thicknesses.end(),
                          [&](double t) { return std::abs(t - offcut.thickness) < 1e-6; }))
@@ -47,6 +49,8 @@ void require_job(const SheetJob& job) {
             "a laser or a jet is switched by two M words (3 to 5, 7 to 9, 62 to 65, 100 to 199), each with a "
             "P word or none",
             "give --on and --off like \"M62 P0\" and \"M63 P0\"");
+    if (!(job.corners.share > 0) || job.corners.share > 1 || !(job.corners.reach >= 0))
+        refuse("at corners the feed is over 0 and no more than the whole", "give --corner-feed in percent");
     if (job.engraving.depth == 0) return;
     if (!(job.engraving.depth <= job.slicing.thicknesses.front() / 2))
         refuse("what is engraved is deeper than half of the thinnest sheet", "give less to --engrave");
@@ -108,7 +112,8 @@ double feed_of(const SheetJob& job, double thickness, double tilt_deg) {
     return jet_feed(job.jet, thickness / std::cos(tilt_deg * std::numbers::pi / 180));
 }
 
-SheetWay way_of(const AxisLoop& loop, const Start& start, const NestPlace& place, double thickness) {
+SheetWay way_of(const AxisLoop& loop, const Start& start, const NestPlace& place, double thickness,
+                const SheetJob& job) {
     AxisLoop turned = loop;
     std::rotate(turned.top.begin(), turned.top.begin() + static_cast<long>(start.at), turned.top.end());
     std::rotate(turned.bottom.begin(), turned.bottom.begin() + static_cast<long>(start.at),
@@ -122,18 +127,30 @@ SheetWay way_of(const AxisLoop& loop, const Start& start, const NestPlace& place
     way.loop = loop.loop;
     way.pass = loop.pass;
     way.is_hole = loop.is_hole;
-    way.points = head_way(turned, thickness, kHeadTolerance);
+    PacedWay paced = slowed_at_corners(head_way(turned, thickness, kHeadTolerance, job.pivot),
+                                       job.head == SheetHead::jet ? job.corners : CornerRules{.share = 1});
+    way.points = std::move(paced.points);
+    way.shares = std::move(paced.shares);
     way.pierce = placed(pierce, place);
     return way;
 }
 
-double length_of(const SheetWay& way) {
-    double mm = std::hypot(to_mm(way.pierce.x) - to_mm(way.points[0].top.x),
-                           to_mm(way.pierce.y) - to_mm(way.points[0].top.y));
-    for (std::size_t i = 1; i < way.points.size(); ++i)
-        mm += std::hypot(to_mm(way.points[i].top.x) - to_mm(way.points[i - 1].top.x),
-                         to_mm(way.points[i].top.y) - to_mm(way.points[i - 1].top.y));
-    return mm;
+struct WayLength {
+    double mm = 0, paced = 0;  ///< paced: at the whole feed it would be so long
+};
+
+WayLength length_of(const SheetWay& way) {
+    const auto apart = [](Point2 p, Point2 q) {
+        return std::hypot(to_mm(p.x) - to_mm(q.x), to_mm(p.y) - to_mm(q.y));
+    };
+    WayLength length;
+    length.mm = length.paced = apart(way.pierce, way.points[0].top);
+    for (std::size_t i = 1; i < way.points.size(); ++i) {
+        const double mm = apart(way.points[i].top, way.points[i - 1].top);
+        length.mm += mm;
+        length.paced += mm / way.shares[i];
+    }
+    return length;
 }
 
 double engraving_minutes(const SheetPiece& piece, const SheetJob& job) {
@@ -343,18 +360,18 @@ int lay_pieces(Context& context, SheetsPlan& plan, std::size_t t, const std::vec
             const BorderDistance to_top(top), to_bottom(bottom);
             const Start start = start_of(loop, {&to_top, &to_bottom}, {&top, &bottom}, job.lead);
             on_the_way += start.lead == 0 && job.lead > 0;
-            SheetWay way = way_of(loop, start, piece.place, program.thickness);
+            SheetWay way = way_of(loop, start, piece.place, program.thickness, job);
             way.piece = piece.number;
             double tilt = 0;
             for (const HeadPoint& p : way.points) tilt = std::max(tilt, p.a_deg);
             way.feed = feed_of(job, program.thickness, tilt);
-            const double mm = length_of(way);
+            const WayLength length = length_of(way);
             const double depths = job.head == SheetHead::router
                                       ? std::ceil((program.thickness + job.through) / job.stepdown)
                                       : 1;
-            program.cut_mm += mm * depths;
+            program.cut_mm += length.mm * depths;
             program.minutes +=
-                mm * depths / way.feed + (job.head == SheetHead::router ? 0.05 : job.pierce_s / 60);
+                length.paced * depths / way.feed + (job.head == SheetHead::router ? 0.05 : job.pierce_s / 60);
             program.ways.push_back(std::move(way));
         }
         piece.label = piece.engravings.empty() ? program.ways.back().points[0].top

@@ -7,6 +7,7 @@
 
 #include "engine/plan.h"
 #include "engine/sheets/alignment.h"
+#include "engine/sheets/corners.h"
 #include "engine/sheets/engraving.h"
 #include "engine/sheets/head.h"
 #include "engine/sheets/jet_feed.h"
@@ -31,15 +32,18 @@ struct SheetJob {
     SheetCutRules cutting;  ///< its kerf is the router's cutter
     AlignmentRules alignment;
     EngraveRules engraving;
-    NestRules nesting;  ///< spacing is between kerfs and leads
+    CornerRules corners;  ///< of a jet
+    NestRules nesting;    ///< spacing is between kerfs and leads
     StockSheet stock{1220, 1220};
     std::vector<SheetOffcut> offcuts;
     SheetHead head = SheetHead::router;
-    char axis = 'z';                                      ///< along which sheets are stacked
-    double lead = 3;                                      ///< mm of waste in which a cut begins
-    double pierce_s = 0.5;                                ///< jet, laser: dwell before the head moves
-    double clearance = 5;                                 ///< mm over the stock
-    double feed = 3000;                                   ///< mm/min, router and laser
+    char axis = 'z';        ///< along which sheets are stacked
+    double lead = 3;        ///< mm of waste in which a cut begins
+    double pierce_s = 0.5;  ///< jet, laser: dwell before the head moves
+    double clearance = 5;   ///< mm over the stock
+    double pivot = 0;    ///< mm from where a jet's head turns to the sheet's top, for a control that does not
+                         ///< keep the jet's tip in place; 0: it does
+    double feed = 3000;  ///< mm/min, router and laser
     double plunge_feed = 800, stepdown = 6, rpm = 18000;  ///< router
     double through = 0.2;                                 ///< mm that a router cuts under the sheet
     int tool = 1;
@@ -54,6 +58,7 @@ struct SheetWay {
     int loop = 0, pass = 0;
     bool is_hole = false;
     std::vector<HeadPoint> points;  ///< the last at the place of the first
+    std::vector<double> shares;     ///< of the feed, of the move to each point
     Point2 pierce;                  ///< at the sheet's top: in the waste, as far as there is room
     double feed = 0;                ///< mm/min at the top of the sheet
 };

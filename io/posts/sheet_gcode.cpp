@@ -90,15 +90,29 @@ private:
         text_ += fmt::format("G0 Z{}\n", decimal(job_.clearance, 4));
     }
 
+    /// X and Y that the control is told for the head where its axis meets the sheet's top.
+    [[nodiscard]] std::string at_head(Point2 top, const HeadPoint& head) const {
+        if (job_.pivot == 0) return at(top);
+        const PivotPlace place = pivot_place(top, head.a_deg, head.c_deg, job_.pivot);
+        return at({to_units(place.x), to_units(place.y)});
+    }
+    [[nodiscard]] std::string height_of(const HeadPoint& head) const {
+        return decimal(pivot_place({}, head.a_deg, head.c_deg, job_.pivot).z, 4);
+    }
+
     void jetted(const SheetWay& way) {
         const bool leans = job_.cutting.most_tilt_deg > 0;
         const HeadPoint& first = way.points[0];
-        text_ += fmt::format("G0 {}", at(way.pierce));
+        text_ += "G0 " + at_head(way.pierce, first);
         if (leans) text_ += fmt::format(" A{} C{}", decimal(first.a_deg, 4), decimal(first.c_deg, 4));
-        text_ += fmt::format("\nG0 Z0\n{}\nG4 P{}\n", job_.on, decimal(job_.pierce_s, 3));
-        text_ += fmt::format("G1 {} F{}\n", at(first.top), decimal(way.feed, 1));
+        text_ += fmt::format("\nG0 Z{}\n{}\nG4 P{}\n", height_of(first), job_.on, decimal(job_.pierce_s, 3));
+        text_ += fmt::format("G1 {} F{}\n", at_head(first.top, first), decimal(way.feed, 1));
         if (!turns(way)) {
-            for (std::size_t i = 1; i < way.points.size(); ++i) text_ += at(way.points[i].top) + '\n';
+            for (std::size_t i = 1; i < way.points.size(); ++i) {
+                text_ += at_head(way.points[i].top, first);
+                if (way.shares[i] != way.shares[i - 1]) text_ += " F" + decimal(way.feed * way.shares[i], 1);
+                text_ += '\n';
+            }
         } else {
             text_ += "G93\n";
             for (std::size_t i = 1; i < way.points.size(); ++i) turned(way, i);
@@ -117,9 +131,10 @@ private:
         const double mm = std::max(apart(p.top, q.top),
                                    apart(bottom_of(p, program_.thickness), bottom_of(q, program_.thickness)));
         const double degrees = std::max(std::abs(q.a_deg - p.a_deg), std::abs(q.c_deg - p.c_deg));
-        const double minutes = std::max({mm / way.feed, degrees / 1800, 2e-6});
-        text_ += fmt::format("G1 {} A{} C{} F{}\n", at(q.top), decimal(q.a_deg, 4), decimal(q.c_deg, 4),
-                             decimal(1 / minutes, 4));
+        const double minutes = std::max({mm / way.feed / way.shares[i], degrees / 1800, 2e-6});
+        const std::string height = job_.pivot > 0 ? " Z" + height_of(q) : "";
+        text_ += fmt::format("G1 {}{} A{} C{} F{}\n", at_head(q.top, q), height, decimal(q.a_deg, 4),
+                             decimal(q.c_deg, 4), decimal(1 / minutes, 4));
     }
 
     std::string& text_;
@@ -186,6 +201,7 @@ std::string sheet_program_text(const SheetsPlan& plan, std::size_t index) {
         append_hold(text, plan.pieces[static_cast<std::size_t>(number) - 1], job.alignment.dowel);
     const bool is_router = job.head == SheetHead::router, engraves = is_engraved(plan, program);
     if (engraves) text += engraver(job);
+    if (job.pivot > 0) text += fmt::format("(pivot {})\n", decimal(job.pivot, 4));
     if (!is_router && (job.on != "M3" || job.off != "M5"))
         text += fmt::format("(head on {} off {})\n", job.on, job.off);
     text += "G21 G17 G90 G94 G40 G49 G80\nG64 P0.005\nG54\n";

@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <numbers>
 
 #include "engine/sheets/sheet_plan.h"
 #include "kernels/errors.h"
@@ -13,6 +14,9 @@
 namespace slabwright {
 
 namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kAtTop = 1e-3;  ///< mm: heights are written in steps
 
 /// Reads one program line by line.
 class SheetReader {
@@ -96,6 +100,9 @@ private:
             if (!program_.engraver) fail("gcode.engraver", "an engraving, and no comment says with what");
             program_.engravings.push_back({whole(3), std::string(w[4]), {}, 0, number_});
             is_engraving_ = true;
+        } else if (w.size() == 2 && w[0] == "pivot") {
+            if (program_.is_routed || is_set_ || !(value(1) > 0)) fail("gcode.pivot", "a pivot out of place");
+            pivot_ = value(1);
         } else if (w.size() >= 5 && w[0] == "head" && w[1] == "on") {
             switches(text.substr(1, text.size() - 2));
         } else if (w.size() == 9 && w[0] == "cut" && w[2] == "piece" && w[4] == "loop" && w[6] == "pass") {
@@ -233,15 +240,30 @@ private:
         if (cuts && rapid_ && !(program_.is_routed && x == x_ && y == y_ && z >= z_))
             fail("gcode.rapid", "a rapid that cuts");
         if (cuts && !on_) fail("gcode.spindle", "a cut with the spindle at rest");
-        if (cuts && (!program_.is_routed && z != 0))
+        if (cuts && !program_.is_routed && std::abs(z + pivot_ * (1 - std::cos(a * kDegree))) > kAtTop)
             fail("gcode.height", "the jet is on away from the sheet's top");
         if (program_.is_routed && (a != 0 || c != 0)) fail("gcode.head", "a router's head that leans");
         if (!(a >= 0) || a >= 85) fail("gcode.head", "the head leans to an angle that it cannot have");
         if (program_.is_routed && z < 0 && z_ >= 0) begin(x_, y_, a_, c_);
         x_ = x, y_ = y, z_ = z, a_ = a, c_ = c;
         if (!cuts || (program_.is_routed && rapid_)) return;  // or out of the sheet
-        if (is_engraving_) engraved({x, y, a, c}, z);
-        else cut({x, y, a, c}, z);
+        if (is_engraving_) engraved(head_at(x, y, a, c), z);
+        else cut(head_at(x, y, a, c), z);
+    }
+
+    /// The head by where its axis meets the sheet's top, from where its pivot is.
+    [[nodiscard]] ReadHead head_at(double x, double y, double a, double c) const {
+        const double aside = pivot_ * std::sin(a * kDegree);
+        return {x + aside * std::cos(c * kDegree), y + aside * std::sin(c * kDegree), a, c};
+    }
+
+    /// Between two places of the pivot the tip swings off its line by no more than the proof sees.
+    void require_steady(const ReadHead& p, const ReadHead& q) const {
+        constexpr double most = 0.01;  // mm
+        const double turn =
+            std::hypot(q.a - p.a, std::sin(std::max(p.a, q.a) * kDegree) * (q.c - p.c)) * kDegree;
+        if (pivot_ * turn * turn / 8 > most)
+            fail("gcode.pivot", "the head turns so far in one move that its tip leaves the line");
     }
 
     void cut(const ReadHead& head, double z) {
@@ -253,6 +275,7 @@ private:
         }
         ReadWay& way = program_.ways.back();
         const ReadHead& last = way.points.back();
+        require_steady(last, head);
         if (program_.is_routed && -z > way.deepest) {
             // The next depth begins where the cutter went in; only the last one is the cut.
             if (std::hypot(head.x - way.points[0].x, head.y - way.points[0].y) > 1e-9)
@@ -287,12 +310,12 @@ private:
 
     void begin(double x, double y, double a, double c) {
         if (is_engraving_) {
-            program_.engravings.back().strokes.push_back({{x, y, a, c}});
+            program_.engravings.back().strokes.push_back({head_at(x, y, a, c)});
             return;
         }
         if (!named_) fail("gcode.unnamed", "a cut that no comment names");
         named_ = false;
-        next_.points = {{x, y, a, c}};
+        next_.points = {head_at(x, y, a, c)};
         program_.ways.push_back(next_);
     }
 
@@ -324,6 +347,7 @@ private:
     ReadWay next_;
     std::uint32_t number_ = 0;
     double x_ = 0, y_ = 0, z_ = 1e9, a_ = 0, c_ = 0, feed_ = 0, power_ = 0;
+    double pivot_ = 0;  // mm
     int tool_ = 0;
     std::string on_text_ = "M3", off_text_ = "M5";
     bool has_stock_ = false, ended_ = false, named_ = false, rapid_ = true, on_ = false, inverse_ = false;
