@@ -153,6 +153,48 @@ TEST(Sheets, ProofFindsWhatIsWrongInTheText) {
     refuses("(stock ", "(stack ", "gcode.no_stock");
 }
 
+// A cut that narrows: a head that tilts leans by it and leaves upright walls, one that does not leaves as
+// much more at the bottom, and neither enters the part.
+TEST(Sheets, TaperIsLeanedOutOrKeptClearOf) {
+    Context context;
+    const support::Ring square{0, {{0, 0}, {60, 0}, {60, 60}, {0, 60}}};
+    support::Ring top = square;
+    top.z = 24;
+    const Mesh box = loft(context, {square, top});
+    for (const double taper : {1.5, -1.5})
+        for (const double tilt : {30.0, 0.0}) {
+            SheetJob job = job_of(SheetHead::jet);
+            job.slicing.thicknesses = {12};
+            job.cutting.taper_deg = taper;
+            job.cutting.most_tilt_deg = tilt;
+            const SheetsPlan plan = plan_sheets(context, box, job);
+            const std::vector<std::string> texts = texts_of(plan);
+            const SheetProof proof = proof_of(context, box, texts);
+            EXPECT_TRUE(proof.passed) << taper << ' ' << tilt << '\n' << told(proof);
+            // Middles of nine levels: the outermost is 12 * 17 / 18 from the end where the cut is widest.
+            const double stays = 12 * std::tan(1.5 * std::numbers::pi / 180);
+            if (tilt > 0) EXPECT_LT(proof.left_over, 0.03);
+            else EXPECT_NEAR(proof.left_over, stays * 17 / 18, 0.02);
+            double most = 0;
+            for (const HeadPoint& p : plan.programs[0].ways[0].points) most = std::max(most, p.a_deg);
+            EXPECT_NEAR(most, tilt > 0 ? 1.5 * std::sqrt(2) : 0, 0.1) << "at the corners";
+            // Left out of the text: the proof sees the other walls.
+            std::string untold = texts[0];
+            const std::size_t at = untold.find("(taper");
+            untold.erase(at, untold.find('\n', at) + 1 - at);
+            const SheetProof other = proof_of(context, box, {untold});
+            if (tilt > 0) EXPECT_EQ(other.passed, taper < 0) << "leaned towards the part";
+            else EXPECT_LT(other.left_over, taper < 0 ? stays + 0.02 : 0.02);
+        }
+    const Mesh mesh = vase(context);
+    SheetJob job = job_of(SheetHead::jet);
+    job.cutting.taper_deg = 0.8;
+    const SheetProof proof = proof_of(context, mesh, texts_of(plan_sheets(context, mesh, job)));
+    EXPECT_TRUE(proof.passed) << told(proof);
+    job.cutting.taper_deg = 5;  // .8 mm wide, closed after 4.6 mm
+    EXPECT_THROW((void)plan_sheets(context, mesh, job), Error);
+}
+
 // A control that knows no tip is told where the pivot goes: the tip runs as with one that does.
 TEST(Sheets, PivotsMoveSoThatTipsStayOnTheirWays) {
     Context context;

@@ -49,6 +49,11 @@ void add_head_options(CLI::App& command, SheetsOptions& options) {
             "mm from where a jet's head turns to the sheet's top, if the control does not keep its tip "
             "in place")
         ->check(CLI::Range(0.0, 2000.0));
+    command
+        .add_option(
+            "--taper", options.taper,
+            "degrees that each side of a jet's or laser's cut leans, narrower below; --kerf is at the top")
+        ->check(CLI::Range(-10.0, 10.0));
     command.add_option("--corner-feed", options.corner_feed, "percent of a jet's feed at corners; 50")
         ->check(CLI::Range(1.0, 100.0));
     command.add_option("--corner", options.corner, "mm before and after a corner at that feed; 1")
@@ -208,6 +213,7 @@ SheetJob sheet_job(const SheetsOptions& options) {
     job.engraving = engraving_of(options, job.cutting.kerf);
     job.power = options.power;
     job.on = options.on;
+    job.cutting.taper_deg = options.taper;
     job.pivot = options.pivot;
     job.corners.share = options.corner_feed / 100;
     job.corners.reach = options.corner;

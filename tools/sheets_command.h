@@ -23,7 +23,7 @@ struct SheetsOptions {
     std::string align = "none", material = "mdf", bonding;
     double dowel = 8, wall = 4, tab = 24, neck = 6, tab_gap = 6;
     double engrave = 0, engrave_width = -1, digits = 10, engrave_feed = 1500, engrave_power = 20, power = 100;
-    double pivot = 0, corner_feed = 50, corner = 1;
+    double taper = 0, pivot = 0, corner_feed = 50, corner = 1;
     int engrave_tool = 2;
     std::string on = "M3", off = "M5";
     std::vector<double> offcuts;  ///< thickness, length and width, one after another

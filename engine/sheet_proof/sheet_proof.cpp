@@ -174,7 +174,7 @@ private:
     Loops made_at(double depth) {
         if (same_at_all_depths_) return *same_at_all_depths_;
         std::vector<Loops> taken;
-        bool is_same = true;
+        bool is_same = program_.taper == 0;
         for (const FineWay& way : ways_) {
             // A cut of another piece that comes near is one of this piece too.
             if (way.read->piece != piece_.number && !way.box.meets(box_)) continue;
@@ -187,7 +187,8 @@ private:
                                     way.read->line, program_.thickness - way.read->deepest));
                 continue;
             }
-            taken.push_back(swept(at_depth(own_frame(way), depth), program_.kerf));
+            taken.push_back(swept(at_depth(own_frame(way), depth),
+                                  std::max(0.0, program_.kerf - 2 * depth * program_.taper)));
         }
         const Loops whole = held(depth);
         Loops made = taken.empty() ? whole : subtract(whole, united(taken));
@@ -303,6 +304,7 @@ public:
 };
 
 std::vector<FineWay> fine_ways(const ReadSheetProgram& program) {
+    const double widest = program.kerf + 2 * std::max(0.0, -program.taper) * program.thickness;
     std::vector<FineWay> ways;
     for (const ReadWay& way : program.ways) {
         FineWay f;
@@ -313,7 +315,7 @@ std::vector<FineWay> fine_ways(const ReadSheetProgram& program) {
         f.loop_from = fine(in).size() - 1;
         for (const double depth : {0.0, program.thickness})
             for (const AxisPoint& a : at_depth(f.heads, depth))
-                f.box.add(a.x, a.y, program.kerf / 2 * std::hypot(1, std::hypot(a.lean_x, a.lean_y)));
+                f.box.add(a.x, a.y, widest / 2 * std::hypot(1, std::hypot(a.lean_x, a.lean_y)));
         ways.push_back(std::move(f));
     }
     return ways;

@@ -59,6 +59,7 @@ struct ReadEngraver {
 struct ReadSheetProgram {
     std::string file;
     double thickness = 0, kerf = 0, length = 0, width = 0;  ///< mm
+    double taper = 0;  ///< mm by which each side of a cut leans inwards for each mm down
     bool is_routed = false;
     std::vector<ReadPiece> pieces;
     std::vector<ReadWay> ways;

@@ -85,7 +85,7 @@ std::vector<std::size_t> nearest_loops(const Fitted& sheet) {
 
 }  // namespace
 
-NearPart::NearPart(const Fitted& sheet, double kerf)
+NearPart::NearPart(const Fitted& sheet, const Kerf& kerf)
     : sheet_(sheet), kerf_(kerf), owners_(nearest_loops(sheet)) {
     for (const Loops* section : sheet.sections) borders_.emplace_back(*section);
 }
@@ -96,11 +96,12 @@ std::vector<double> NearPart::too_near(const AxisLoop& axis, double allowed) con
     std::vector<double> lacks(n, 0);
     double widest = 0;
     for (std::size_t i = 0; i < n; ++i)
-        widest = std::max(widest, kerf_ / 2 * std::hypot(1, length(lean_of(axis, i, height))));
+        widest = std::max(widest, kerf_.widest() / 2 * std::hypot(1, length(lean_of(axis, i, height))));
     std::size_t vertex = 0;
     for (std::size_t k = 0; k < sheet_.heights.size(); ++k) {
         Loops own;
-        own.points = axis_at(axis, (sheet_.heights[k] - sheet_.heights.front()) / height);
+        const double share = (sheet_.heights[k] - sheet_.heights.front()) / height, kerf = kerf_.at(share);
+        own.points = axis_at(axis, share);
         own.close_loop();
         const BorderDistance to_axis(own);
         Loops around = own;  // what an outline holds, what a hole takes away
@@ -114,7 +115,7 @@ std::vector<double> NearPart::too_near(const AxisLoop& axis, double allowed) con
             const NearestEdge near = to_axis.nearest(p);
             if (stays && near.distance >= widest - allowed) continue;
             const std::size_t next = (near.edge + 1) % own.points.size();
-            const double need = need_beside(axis, own.points, near.edge, height, kerf_);
+            const double need = need_beside(axis, own.points, near.edge, height, kerf);
             const double more = need + (stays ? -near.distance : near.distance);
             if (more <= allowed) continue;
             lacks[near.edge] = std::max(lacks[near.edge], more);
@@ -122,8 +123,8 @@ std::vector<double> NearPart::too_near(const AxisLoop& axis, double allowed) con
         }
         for (std::size_t i = 0; i < own.points.size(); ++i) {
             const double distance = borders_[k](own.points[i]);
-            const double need = std::max(need_beside(axis, own.points, i, height, kerf_),
-                                         need_beside(axis, own.points, (i + n - 1) % n, height, kerf_));
+            const double need = std::max(need_beside(axis, own.points, i, height, kerf),
+                                         need_beside(axis, own.points, (i + n - 1) % n, height, kerf));
             const double more = need + (is_in_part[i] ? distance : -distance);
             if (more > allowed) lacks[i] = std::max(lacks[i], more);
         }

@@ -18,7 +18,7 @@ struct Fitted {
 /// Keeps a view of the sheet and of its sections.
 class NearPart {
 public:
-    NearPart(const Fitted& sheet, double kerf);
+    NearPart(const Fitted& sheet, const Kerf& kerf);
     /// The border of the section at a height.
     [[nodiscard]] const BorderDistance& border(std::size_t height) const { return borders_[height]; }
     /// By how much each place of an axis lies too near to the part, mm square to the outline: 0 where it does
@@ -29,7 +29,7 @@ public:
 
 private:
     const Fitted& sheet_;
-    double kerf_ = 0;
+    Kerf kerf_;
     std::vector<BorderDistance> borders_;
     std::vector<std::size_t> owners_;
 };

@@ -205,17 +205,19 @@ LoopPasses passes_of(const std::vector<Sample>& samples, const std::vector<doubl
 }
 
 AxisLoop axis_loop(const std::vector<Sample>& samples, const std::vector<StraightCut>& cuts, double height,
-                   double kerf) {
+                   const Kerf& kerf) {
     AxisLoop loop;
+    const double taper = (kerf.top - kerf.bottom) / 2 / height;
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const Sample& s = samples[i];
-        const double lean = (cuts[i].top - cuts[i].bottom) / s.mitre / height;
-        const double aside = kerf / 2 * std::sqrt(1 + lean * lean) * s.mitre;
-        const auto at = [&](double r) {
+        const double lean = (cuts[i].top - cuts[i].bottom) / s.mitre / height + taper;
+        const double square = std::sqrt(1 + lean * lean) * s.mitre;
+        const auto at = [&](double r, double wide) {
+            const double aside = wide / 2 * square;
             return to_point({s.at.x + (r + aside) * s.out.x, s.at.y + (r + aside) * s.out.y});
         };
-        loop.bottom.push_back(at(cuts[i].bottom));
-        loop.top.push_back(at(cuts[i].top));
+        loop.bottom.push_back(at(cuts[i].bottom, kerf.bottom));
+        loop.top.push_back(at(cuts[i].top, kerf.top));
     }
     return loop;
 }
@@ -229,9 +231,9 @@ double tilt_of(const AxisLoop& loop, double height) {
     return std::atan(most);
 }
 
-SheetCuts upright_cuts(const Loops& outline, const SheetCutRules& rules) {
+SheetCuts upright_cuts(const Loops& outline, double kerf) {
     SheetCuts cuts;
-    const Loops axis = rules.kerf > 0 ? offset(outline, rules.kerf / 2, kArcTolerance) : outline;
+    const Loops axis = kerf > 0 ? offset(outline, kerf / 2, kArcTolerance) : outline;
     for (const bool holes : {true, false})
         for (std::size_t i = 0; i < axis.size(); ++i) {
             if ((signed_area(axis.loop(i)) < 0) != holes) continue;
@@ -254,7 +256,7 @@ struct Way {
 };
 
 /// Moves the places of a way outwards by what they lack.
-void push_out(Way& way, const std::vector<double>& lacks, double height, double kerf) {
+void push_out(Way& way, const std::vector<double>& lacks, double height, const Kerf& kerf) {
     for (std::size_t i = 0; i < lacks.size(); ++i) {
         way.cuts[i].bottom += lacks[i] * way.samples[i].mitre;
         way.cuts[i].top += lacks[i] * way.samples[i].mitre;
@@ -268,7 +270,9 @@ void push_out(Way& way, const std::vector<double>& lacks, double height, double 
 std::vector<Way> ways_of(const std::vector<Sample>& samples, const Fitted& sheet, std::size_t loop,
                          bool is_hole, const SheetCutRules& rules) {
     const double height = sheet.heights.back() - sheet.heights.front();
-    const double most_slope = std::tan(rules.most_tilt_deg * std::numbers::pi / 180);
+    // The head leans by the taper on top of what a cut leans.
+    const double most_slope = std::tan(rules.most_tilt_deg * std::numbers::pi / 180) -
+                              std::abs(std::tan(rules.taper_deg * std::numbers::pi / 180));
     LoopPasses found;
     for (int passes = 1; passes <= rules.most_passes; ++passes) {
         found = passes_of(samples, sheet.heights, passes, most_slope);
@@ -276,7 +280,7 @@ std::vector<Way> ways_of(const std::vector<Sample>& samples, const Fitted& sheet
     }
     std::vector<Way> ways;
     for (std::size_t j = 0; j < found.cuts.size(); ++j) {
-        AxisLoop axis = axis_loop(samples, found.cuts[j], height, rules.kerf);
+        AxisLoop axis = axis_loop(samples, found.cuts[j], height, kerf_through(rules, height));
         axis.loop = static_cast<int>(loop);
         axis.pass = static_cast<int>(j);
         axis.is_hole = is_hole;
@@ -337,7 +341,8 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
     SheetCuts& cuts = result.cuts;
     const double height = sheet.heights.back() - sheet.heights.front();
     const double most_slope = std::tan(rules.most_tilt_deg * std::numbers::pi / 180);
-    const NearPart part(sheet, rules.kerf);
+    const Kerf kerf = kerf_through(rules, height);
+    const NearPart part(sheet, kerf);
     std::vector<AxisLoop> edges;
     for (const bool holes : {true, false})
         for (std::size_t l = 0; l < sheet.outline.size(); ++l) {
@@ -360,12 +365,12 @@ Tilted tilted_cuts(const Fitted& sheet, const SheetCutRules& rules) {
                     const bool is_clear =
                         std::all_of(lacks.begin(), lacks.end(), [](double lack) { return lack == 0; });
                     if (is_clear) break;
-                    if (i < most_pushes) push_out(way, lacks, height, rules.kerf);
+                    if (i < most_pushes) push_out(way, lacks, height, kerf);
                     else result.spares = false;
                 }
                 cuts.most_tilt_deg =
                     std::max(cuts.most_tilt_deg, tilt_of(way.axis, height) * 180 / std::numbers::pi);
-                edges.push_back(axis_loop(samples, way.cuts, height, 0));
+                edges.push_back(axis_loop(samples, way.cuts, height, {}));
                 edges.back().loop = way.axis.loop;
                 edges.back().pass = way.axis.pass;
                 cuts.loops.push_back(std::move(way.axis));
@@ -412,7 +417,7 @@ Tilted tilted_cuts_of(const Sheet& sheet, const std::vector<const Loops*>& secti
     }
     beside.heights.push_back(sheet.heights.back());
     beside.sections.push_back(sections[n - 1]);
-    const NearPart part(beside, rules.kerf);
+    const NearPart part(beside, kerf_through(rules, sheet.heights.back() - sheet.heights.front()));
     const bool spares =
         std::all_of(tilted.cuts.loops.begin(), tilted.cuts.loops.end(), [&](const AxisLoop& axis) {
             const std::vector<double> lacks = part.too_near(axis, rules.gouge);
@@ -442,29 +447,38 @@ SheetCuts cuts_of_one(const Sheet& sheet, const SheetCutRules& rules, double dow
         if (tilted.spares && !tilted.cuts.upright) return std::move(tilted.cuts);
         gave_up_tilt = !tilted.spares;
     }
-    SheetCuts cuts = upright_cuts(sheet.outline, rules);
+    const Kerf kerf = kerf_through(rules, sheet.heights.back() - sheet.heights.front());
+    SheetCuts cuts = upright_cuts(sheet.outline, kerf.widest());
     cuts.gave_up_tilt = gave_up_tilt;
     Loops axis;
     for (const AxisLoop& loop : cuts.loops) {
         axis.points.insert(axis.points.end(), loop.top.begin(), loop.top.end());
         axis.close_loop();
     }
-    const Loops left = rules.kerf > 0 ? offset(axis, -rules.kerf / 2, kArcTolerance) : axis;
+    const Loops left = kerf.widest() > 0 ? offset(axis, -kerf.widest() / 2, kArcTolerance) : axis;
     sections.resize(sheet.heights.size());
     cuts.deviation = deviation_of(LeftAtHeights(sheet.heights.size(), left),
-                                  {sheet.outline, sheet.heights, std::move(sections)});
+                                  {sheet.outline, sheet.heights, std::move(sections)}) +
+                     std::abs(kerf.top - kerf.bottom) / 2;
     return cuts;
 }
 
 void require_rules(const SheetCutRules& rules) {
     if (!(rules.kerf >= 0) || rules.kerf > 100 || !(rules.most_tilt_deg >= 0) || rules.most_tilt_deg > 80 ||
         !(rules.leave > 0) || rules.most_passes < 1 || rules.most_passes > 100 || !(rules.gouge > 0) ||
-        !(rules.step > 0))
-        throw Error(ErrorKind::usage, "sheets.cut", "kerf, tilt, tolerances or passes are out of range", "",
-                    "kerf 0 to 100 mm, tilt 0 to 80 degrees, tolerances over 0, passes 1 to 100");
+        !(rules.step > 0) || !(std::abs(rules.taper_deg) <= 10) ||
+        (rules.most_tilt_deg > 0 && rules.most_tilt_deg < 2 * std::abs(rules.taper_deg)))
+        throw Error(ErrorKind::usage, "sheets.cut",
+                    "kerf, taper, tilt, tolerances or passes are out of range", "",
+                    "kerf 0 to 100 mm, tilt 0 to 80 degrees, taper to 10 and half of the tilt, tolerances "
+                    "over 0, passes 1 to 100");
 }
 
 }  // namespace
+
+Kerf kerf_through(const SheetCutRules& rules, double thickness) {
+    return {rules.kerf, rules.kerf - 2 * thickness * std::tan(rules.taper_deg * std::numbers::pi / 180)};
+}
 
 std::vector<Point2> axis_at(const AxisLoop& loop, double share) {
     std::vector<Point2> points;
@@ -482,6 +496,10 @@ std::vector<SheetCuts> cuts_of(Context& context, MeshView mesh, const std::vecto
                                const std::vector<SheetStair>& stairs, const SheetCutRules& rules,
                                const std::vector<SheetHold>& holds, double dowel) {
     require_rules(rules);
+    for (const SheetSpan& span : spans)
+        if (rules.taper_deg != 0 && !(kerf_through(rules, span.top - span.bottom).bottom > 0))
+            throw Error(ErrorKind::usage, "sheets.cut", "a cut of that taper closes above the sheet's bottom",
+                        "", "give less to --taper, or thinner sheets");
     const std::vector<std::vector<double>> heights = heights_to_fit(mesh, spans, rules.most_tilt_deg);
     const double top = bounds(mesh).max.z;
     std::vector<SheetCuts> cuts(spans.size());

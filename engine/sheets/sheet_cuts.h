@@ -9,14 +9,26 @@
 
 namespace slabwright {
 
+/// The width of a cut where it goes through a sheet, mm.
+struct Kerf {
+    double top = 0, bottom = 0;
+    /// @param share of the sheet's thickness, from its bottom
+    [[nodiscard]] double at(double share) const { return bottom + share * (top - bottom); }
+    [[nodiscard]] double widest() const { return top > bottom ? top : bottom; }
+};
+
 struct SheetCutRules {
-    double kerf = 0.8;         ///< mm: the width of the cut, or the diameter of the cutter
+    double kerf = 0.8;     ///< mm: the width of the cut at the sheet's top, or the diameter of the cutter
+    double taper_deg = 0;  ///< by which each side of a jet's or a laser's cut leans: narrower below over 0
     double most_tilt_deg = 0;  ///< of the head from upright; 0: it does not tilt
     double leave = 0.05;       ///< mm that tilted cuts may leave over a convex wall before another pass pays
     int most_passes = 6;       ///< along one loop
     double gouge = 0.01;       ///< mm that a cut may enter the part
     double step = 2;           ///< mm: longest piece of a loop that is cut at one angle or between two
 };
+
+/// @param thickness mm of the sheet
+[[nodiscard]] Kerf kerf_through(const SheetCutRules& rules, double thickness);
 
 /// One closed way of the axis. Material that stays lies on its left: outlines run counter-clockwise, holes
 /// clockwise. At the i-th point the axis leaves the sheet's bottom at bottom[i] and its top at top[i];
@@ -46,7 +58,8 @@ inline constexpr std::size_t kMostSteps = 32;  ///< heights of level facets that
 
 /// The cuts of sheets of a part. Upright ones run outside of the outline by half a kerf. Tilted ones follow
 /// the concave majorant of the sections in the normal plane of each piece of the outline, and none enters a
-/// section by more than rules.gouge; where one would, the sheet is cut upright.
+/// section by more than rules.gouge; where one would, the sheet is cut upright. A head that tilts leans by
+/// the taper too, so that walls do not; one that does not keeps clear by half the widest kerf.
 /// @param stairs of the same spans: stairs_of(). Tilted cuts need those of StairSide::outside; outlines hold
 /// what `holds` adds and leave out its holes
 /// @param holds of the same spans, or none; their holes are of `dowel` mm

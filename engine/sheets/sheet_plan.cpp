@@ -32,6 +32,8 @@ void require_job(const SheetJob& job) {
         refuse("tilted cuts follow the outside of the part", "give --side outside, or --tilt 0");
     for (const double value : {job.feed, job.plunge_feed, job.stepdown, job.rpm, job.clearance})
         if (!(value > 0) || value > 1e6) refuse("feeds, stepdown, speed and clearance must be over 0", "");
+    if (job.cutting.taper_deg != 0 && job.head == SheetHead::router)
+        refuse("a router's cut does not taper", "give no --taper");
     if (job.pivot > 0 && job.head != SheetHead::jet)
         refuse("only a jet's head has a pivot", "give no --pivot");
     for (const double value : {job.lead, job.pierce_s, job.through, job.pivot})
@@ -168,7 +170,8 @@ double engraving_minutes(const SheetPiece& piece, const SheetJob& job) {
 }
 
 /// What a piece takes of its stock: the outside of its cuts with their leads, holes filled.
-Loops blank_of(const SheetCuts& cuts, const SheetJob& job) {
+Loops blank_of(const SheetCuts& cuts, const SheetJob& job, double thickness) {
+    const double widest = kerf_through(job.cutting, thickness).widest();
     Loops outside;
     for (const bool top : {true, false})
         for (const AxisLoop& loop : cuts.loops) {
@@ -177,7 +180,7 @@ Loops blank_of(const SheetCuts& cuts, const SheetJob& job) {
             outside.points.insert(outside.points.end(), points.begin(), points.end());
             outside.close_loop();
         }
-    return offset(unite(outside, {}), job.cutting.kerf / 2 + job.lead, 0.05);
+    return offset(unite(outside, {}), widest / 2 + job.lead, 0.05);
 }
 
 /// The sheets of the stack with what is known of them before they have a place.
@@ -458,7 +461,8 @@ SheetsPlan plan_sheets(Context& context, const Mesh& mesh, const SheetJob& job) 
         plan.pieces[i].joint_mm2 = area(bonded);
     }
     std::vector<Loops> blanks;
-    for (const SheetCuts& own : cuts) blanks.push_back(blank_of(own, job));
+    for (std::size_t i = 0; i < cuts.size(); ++i)
+        blanks.push_back(blank_of(cuts[i], job, spans[i].top - spans[i].bottom));
     context.begin_phase("nesting", 0.8, 1);
     int on_the_way = 0;
     for (std::size_t t = 0; t < job.slicing.thicknesses.size(); ++t)

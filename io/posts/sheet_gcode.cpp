@@ -201,6 +201,7 @@ std::string sheet_program_text(const SheetsPlan& plan, std::size_t index) {
         append_hold(text, plan.pieces[static_cast<std::size_t>(number) - 1], job.alignment.dowel);
     const bool is_router = job.head == SheetHead::router, engraves = is_engraved(plan, program);
     if (engraves) text += engraver(job);
+    if (job.cutting.taper_deg != 0) text += fmt::format("(taper {})\n", decimal(job.cutting.taper_deg, 4));
     if (job.pivot > 0) text += fmt::format("(pivot {})\n", decimal(job.pivot, 4));
     if (!is_router && (job.on != "M3" || job.off != "M5"))
         text += fmt::format("(head on {} off {})\n", job.on, job.off);

@@ -100,6 +100,10 @@ private:
             if (!program_.engraver) fail("gcode.engraver", "an engraving, and no comment says with what");
             program_.engravings.push_back({whole(3), std::string(w[4]), {}, 0, number_});
             is_engraving_ = true;
+        } else if (w.size() == 2 && w[0] == "taper") {
+            if (program_.is_routed || is_set_ || !(std::abs(value(1)) <= 10))
+                fail("gcode.taper", "a taper out of place");
+            program_.taper = std::tan(value(1) * kDegree);
         } else if (w.size() == 2 && w[0] == "pivot") {
             if (program_.is_routed || is_set_ || !(value(1) > 0)) fail("gcode.pivot", "a pivot out of place");
             pivot_ = value(1);
