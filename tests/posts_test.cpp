@@ -31,6 +31,7 @@
 #include "kernels/errors.h"
 #include "tests/support/block_build.h"
 #include "tests/support/files.h"
+#include "tests/support/grbl_toolpath.h"
 #include "tests/support/rs274.h"
 #include "tests/support/schema.h"
 #include "tests/support/seed.h"
@@ -302,6 +303,9 @@ TEST(Posts, ProgramsOfPartsReadBackTheSame) {
         if (castings.size() > 5) castings.resize(5);
         parts.insert(parts.end(), castings.begin(), castings.end());
     }
+    const bool has_toolpath = support::has_grbl_toolpath();
+    if (!has_toolpath)
+        std::printf("  gcode-toolpath is not here: GRBL's programs are read by our reader alone\n");
     for (const std::string& part : parts) {
         Context context;
         Plan made = plan(context, PatternSource(part),
@@ -313,15 +317,27 @@ TEST(Posts, ProgramsOfPartsReadBackTheSame) {
                 name_programs(made);
                 std::set<int> numbers;
                 std::size_t checked = 0;
+                std::map<std::string, std::string> texts;
                 for (const Layer& layer : made.layers)
                     for (Operation op : layer.operations) {
                         if (!says_rounding(post)) op.blend = kJunction;
                         EXPECT_EQ(difference(made, layer, op), "")
                             << part << " " << op.file << " " << name_of(post, units);
                         EXPECT_TRUE(numbers.insert(op.number).second) << op.file;
+                        if (post == Post::grbl)
+                            texts[std::to_string(op.number)] = program_text(made, layer, op);
                         ++checked;
                     }
                 EXPECT_GT(checked, 4u);
+                if (post != Post::grbl || !has_toolpath) continue;
+                const auto run = support::grbl_toolpaths(texts);
+                for (const Layer& layer : made.layers)
+                    for (const Operation& op : layer.operations) {
+                        const auto found = run.find(std::to_string(op.number));
+                        ASSERT_NE(found, run.end()) << part;
+                        EXPECT_EQ(support::grbl_difference(made, layer, op, found->second, kNear), "")
+                            << part << " " << op.file << " " << name_of(post, units) << ", by gcode-toolpath";
+                    }
             }
     }
 }
