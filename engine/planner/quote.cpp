@@ -13,6 +13,7 @@
 #include "kernels/cutting/cusp.h"
 #include "kernels/errors.h"
 #include "kernels/features/facet_classes.h"
+#include "kernels/parallel/parallel.h"
 #include "kernels/polygons/loops.h"
 #include "kernels/slicing/slicing.h"
 
@@ -74,23 +75,45 @@ std::vector<Layer> slabbed_layers(const Slabs& slabs, const std::vector<double>&
     return layers;
 }
 
-/// The surface's ways by its slope.
-void add_surface(MeshView mesh, const Job& job, const LayerTools& tools, Ways& ways) {
-    const double ball = tools.finish.diameter / 2, cusp = job.tolerances.cusp;
-    for (std::uint32_t f = 0; f < mesh.size(); ++f) {
-        const Vec3d n = area_normal(mesh, f);
-        const double twice = length(n);
-        if (!(twice > 0)) continue;
-        const double mm2 = twice / 2, slope = std::acos(std::clamp(n[2] / twice, -1.0, 1.0));
-        const double degrees = slope * 180 / std::numbers::pi;
-        if (degrees >= kUpright || degrees <= kLevel) continue;
-        if (degrees > kSteep) {
-            const double down = std::min(tools.finish.stepdown_max, ball_level_stepdown(ball, slope, cusp));
-            ways.contours += mm2 * std::sin(slope) / down;
-        } else {
-            ways.raster += mm2 / raster_stepover(ball, cusp, 0);
-        }
-    }
+/// mm² of the surface over the distance between its ways, by its slope.
+struct SurfaceWays {
+    double contours = 0, raster = 0;  // mm
+};
+
+void add_surface(Context& context, MeshView mesh, const Job& job, const LayerTools& tools, Ways& ways) {
+    const double ball = tools.finish.diameter / 2, cusp = job.tolerances.cusp,
+                 most = tools.finish.stepdown_max;
+    constexpr std::size_t grain = std::size_t{1} << 14;
+    const SurfaceWays sum = parallel_reduce(
+        context, mesh.size(), grain, SurfaceWays{},
+        [&](std::size_t begin, std::size_t end) {
+            SurfaceWays part;
+            for (std::size_t f = begin; f < end; ++f) {
+                const Vec3d n = area_normal(mesh, static_cast<std::uint32_t>(f));
+                const double twice = length(n);
+                if (!(twice > 0)) continue;
+                const double mm2 = twice / 2, slope = std::acos(std::clamp(n[2] / twice, -1.0, 1.0));
+                const double degrees = slope * 180 / std::numbers::pi;
+                if (degrees >= kUpright || degrees <= kLevel) continue;
+                if (degrees > kSteep) {
+                    // The cusp grows with the stepdown: mostly the largest one leaves little enough.
+                    const double down = ball_level_cusp(ball, slope, most) <= cusp
+                                            ? most
+                                            : std::min(most, ball_level_stepdown(ball, slope, cusp));
+                    part.contours += mm2 * std::sin(slope) / down;
+                } else {
+                    part.raster += mm2 / raster_stepover(ball, cusp, 0);
+                }
+            }
+            return part;
+        },
+        [](SurfaceWays x, const SurfaceWays& y) {
+            x.contours += y.contours;
+            x.raster += y.raster;
+            return x;
+        });
+    ways.contours += sum.contours;
+    ways.raster += sum.raster;
 }
 
 /// Of a layer's slabs. @param glued mm² of the joint under it; those between its slabs are glued all over
@@ -159,7 +182,7 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
         result.glue_m2 += glued * 1e-6;
         result.bonding_minutes += bonding_minutes(job, box, glued, slab_of(plan, layer), together);
     }
-    add_surface(mesh, job, tools, ways);
+    add_surface(context, mesh, job, tools, ways);
     for (const auto& [thickness, count] : slabs) result.slabs.push_back({thickness, count});
     const double layer_count = static_cast<double>(layers.tops.size());
     result.mass_kg = (stack_mm3 + result.stock[0] * result.stock[1] * job.machine.base_board_thickness) *

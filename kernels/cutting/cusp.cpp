@@ -23,16 +23,14 @@ double ball_level_cusp(double r, double alpha, double stepdown) {
 
 double ball_level_stepdown(double r, double alpha, double cusp) {
     const double printed = ball_level_stepdown_printed(r, alpha, cusp);
-    if (printed <= 2 * (r - cusp) * std::cos(alpha)) return printed;
-    if (std::cos(alpha) < 1e-12)
-        return std::numeric_limits<double>::infinity();  // a vertical wall keeps no cusp
-    // The cusp grows with the stepdown, from print's value at the border of the two cases: halve.
-    double low = printed, high = 2 * r * std::tan(alpha);
-    for (int i = 0; i < 200 && high - low > 1e-12 * high; ++i) {
-        const double middle = 0.5 * (low + high);
-        (ball_level_cusp(r, alpha, middle) <= cusp ? low : high) = middle;
-    }
-    return low;
+    const double s = std::sin(alpha), c = std::cos(alpha);
+    if (printed <= 2 * (r - cusp) * c) return printed;
+    if (c < 1e-12) return std::numeric_limits<double>::infinity();  // a vertical wall keeps no cusp
+    // The second case solved for SD, with t = cot α and K = (L − R(1 − sin α)) / cos α: of
+    // SD²(1 + t²) − 2 SD (K + R t) + K² = 0 the larger root, where the cusp grows with the stepdown.
+    const double t = c / s, k = (cusp - r * (1 - s)) / c, half = k + r * t;
+    const double root = std::sqrt(std::max(0.0, half * half - (1 + t * t) * k * k));
+    return std::min((half + root) / (1 + t * t), 2 * r * s / c);
 }
 
 double ball_level_stepdown_printed(double r, double alpha, double cusp) {
