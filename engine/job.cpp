@@ -340,7 +340,7 @@ std::string program_file(Post post, const std::string& stem) {
 }
 
 std::string program_file(const Machine& machine, const std::string& stem) {
-    const std::string file = program_file(machine.post, stem);
+    std::string file = program_file(machine.post, stem);
     if (!machine.own_post || machine.own_post->ending.empty()) return file;
     return file.substr(0, file.rfind('.')) + machine.own_post->ending;
 }
