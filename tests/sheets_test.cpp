@@ -9,16 +9,20 @@
 
 #include "engine/sheet_proof/sheet_proof.h"
 #include "engine/sheets/sheet_plan.h"
-#include "io/posts/sheet_gcode.h"
 #include "io/posts/sheet_reader.h"
 #include "kernels/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/loft.h"
 #include "tests/support/rs274.h"
 #include "tests/support/seed.h"
+#include "tests/support/sheet_proofs.h"
 
 namespace slabwright {
 namespace {
+
+using support::proof_of;
+using support::texts_of;
+using support::told;
 
 using support::circle;
 using support::loft;
@@ -37,25 +41,6 @@ SheetJob job_of(SheetHead head) {
     }
     if (head == SheetHead::jet) job.cutting.most_tilt_deg = 55;
     return job;
-}
-
-std::vector<std::string> texts_of(const SheetsPlan& plan) {
-    std::vector<std::string> texts;
-    for (std::size_t i = 0; i < plan.programs.size(); ++i) texts.push_back(sheet_program_text(plan, i));
-    return texts;
-}
-
-SheetProof proof_of(Context& context, const Mesh& mesh, const std::vector<std::string>& texts) {
-    std::vector<ReadSheetProgram> programs;
-    for (std::size_t i = 0; i < texts.size(); ++i)
-        programs.push_back(read_sheet_program(texts[i], "sheet_" + std::to_string(i + 1) + ".ngc"));
-    return prove_sheets(context, mesh.view(), programs, {});
-}
-
-std::string told(const SheetProof& proof) {
-    std::string text;
-    for (const Diagnostic& d : proof.violations) text += d.code + ": " + d.message + '\n';
-    return text;
 }
 
 Mesh vase(Context& context) {
