@@ -32,32 +32,49 @@ struct Patch {
     double nearest;  // mm from the centre to the nearest obstacle known
 };
 
-/// Points, and how near the nearest of them is to a place, several at once.
+/// Obstacles about one point, several at once. All places that are asked for lie on the tool's sphere about
+/// the point (a flat end mill's: on discs about it, level with it).
 class Near {
 public:
+    Near(const Point3& point, bool ball) : point_(point), ball_(ball) {}
     void add(const Point3& q) {
         if (count_ % kLanes == 0)
-            groups_.push_back({Doubles4{} + kFar, Doubles4{} + kFar, Doubles4{} + kFar});
-        for (int k = 0; k < 3; ++k) groups_[count_ / kLanes][k][count_ % kLanes] = q[k];
+            groups_.push_back({Doubles4{} + kFar, Doubles4{} + kFar, Doubles4{} + kFar, Doubles4{}});
+        const double dx = q[0] - point_[0], dy = q[1] - point_[1], dz = ball_ ? q[2] - point_[2] : 0;
+        const std::array<double, 4> all{q[0], q[1], q[2], std::sqrt(dx * dx + dy * dy + dz * dz)};
+        for (int k = 0; k < 4; ++k) groups_[count_ / kLanes][k][count_ % kLanes] = all[k];
         ++count_;
     }
-    /// mm²; what lies higher than a ball's centre counts as even with it, and all counts so for a flat end
-    /// mill.
-    [[nodiscard]] double distance2(const Point3& c, bool ball) const {
-        Doubles4 least = Doubles4{} + std::numeric_limits<double>::infinity();
-        for (const auto& [x, y, z] : groups_) {
+    struct Distances {
+        double nearest;  ///< mm² from a place to the nearest obstacle
+        double most;  ///< mm² that no place within `spread` of it and as far from the point exceeds, of one
+                      ///< obstacle
+    };
+    /// What lies higher than a ball's centre counts as even with it, and all counts so for a flat end mill.
+    /// Of places c and c' as far from the point p, and an obstacle o, |c' − o|² − |c − o|² = 2 (c − c')·(o −
+    /// p).
+    [[nodiscard]] Distances distances(const Point3& c, double spread) const {
+        Doubles4 least = Doubles4{} + std::numeric_limits<double>::infinity(), most = least;
+        for (const auto& [x, y, z, off] : groups_) {
             const Doubles4 dx = c[0] - x, dy = c[1] - y, below = c[2] - z,
-                           dz = ball ? (below > 0.0 ? below : Doubles4{}) : Doubles4{};
-            const Doubles4 d2 = dx * dx + dy * dy + dz * dz;
+                           dz = ball_ ? (below > 0.0 ? below : Doubles4{}) : Doubles4{};
+            const Doubles4 d2 = dx * dx + dy * dy + dz * dz, far = d2 + 2 * spread * off;
             least = d2 < least ? d2 : least;
+            most = far < most ? far : most;
         }
-        return std::min(std::min(least[0], least[1]), std::min(least[2], least[3]));
+        const auto smallest = [](const Doubles4& v) {
+            return std::min(std::min(v[0], v[1]), std::min(v[2], v[3]));
+        };
+        return {smallest(least), smallest(most)};
     }
 
 private:
     static constexpr std::size_t kLanes = 4;
     static constexpr double kFar = 1e100;  // mm
-    std::vector<std::array<Doubles4, 3>> groups_;
+    Point3 point_;
+    bool ball_;
+    std::vector<std::array<Doubles4, 4>>
+        groups_;  // x, y, z, distance from the point (a higher one's counts all the more)
     std::size_t count_ = 0;
 };
 
@@ -87,8 +104,17 @@ bool Reach::reachable(const Point3& point) {
         found_ = place;
         return true;
     }
-    for (std::size_t tool = 0; tool < tools_.size(); ++tool)
-        if (by(tool, point)) return true;
+    // In a larger ball that covers the point lies a smaller one that covers it too, with its middle on the
+    // way to the larger one's; in a flat end mill's cylinder likewise. So what blocks the cutter of the
+    // smaller blocks the larger.
+    bool ball_blocked = false, flat_blocked = false;
+    for (std::size_t tool = 0; tool < tools_.size(); ++tool) {
+        bool& blocked = tools_[tool].kind == ToolKind::ball ? ball_blocked : flat_blocked;
+        if (blocked) continue;
+        const Found found = by(tool, point);
+        if (found == Found::covers) return true;
+        blocked = found == Found::blocked && point[2] >= z_bottom_;
+    }
     return false;
 }
 
@@ -119,14 +145,14 @@ bool Reach::holder_free(const Tool& tool, const Point3& tip) const {
 // above it, which blocks every place nearer to it than the radius: patches that lie wholly in one obstacle's
 // sphere are gone, others are halved. Obstacles hold for all points and tools of the layer, so those of the
 // neighbours mostly decide before the part itself is asked.
-bool Reach::by(std::size_t index, const Point3& point) {
+Reach::Found Reach::by(std::size_t index, const Point3& point) {
     const Tool& tool = tools_[index];
     const double R = tool.diameter / 2;
     const bool ball = tool.kind == ToolKind::ball;
     const double floor = ball ? std::max(lowest_, z_bottom_ - R) + R : std::max(lowest_, z_bottom_);
-    if (point[2] + (ball ? R : 0) < floor) return false;
+    if (point[2] + (ball ? R : 0) < floor) return Found::held;
 
-    Near near;  // obstacles that can be in the way
+    Near near(point, ball);  // obstacles that can be in the way
     auto add = [&](const Point3& q) {
         const double dx = q[0] - point[0], dy = q[1] - point[1], dz = q[2] - point[2];
         if (ball ? dx * dx + dy * dy + std::pow(std::max(0.0, -dz), 2) < 4 * R * R
@@ -142,7 +168,7 @@ bool Reach::by(std::size_t index, const Point3& point) {
         const Point3 q{c[0] - found.away[0], c[1] - found.away[1],
                        ball ? c[2] - found.away[2] : c[2] + kRests};
         remember(q);
-        add(q);
+        near.add(q);
         return q;
     };
     auto takes = [&](const Point3& c) {
@@ -152,35 +178,46 @@ bool Reach::by(std::size_t index, const Point3& point) {
         else places_[next_place_++ % kPlaces] = {index, c};
         return true;
     };
-    auto at = [&](double u, double v) {
-        if (ball)
-            return Point3{point[0] + R * std::sin(u) * std::cos(v), point[1] + R * std::sin(u) * std::sin(v),
-                          point[2] + R * std::cos(u)};
-        return Point3{point[0] + u * std::cos(v), point[1] + u * std::sin(v), point[2]};
+    // The place at a polar angle or distance u, of sine `sine`, and an azimuth v.
+    auto at = [&](double u, double sine, double v) {
+        const double out = ball ? R * sine : u;
+        return Point3{point[0] + out * std::cos(v), point[1] + out * std::sin(v),
+                      point[2] + (ball ? R * std::cos(u) : 0)};
     };
     std::vector<Patch> heap;  // the farthest from what is known to be in the way first
     const double scale = ball ? R : 1,
                  u_end = ball ? std::acos(std::clamp((floor - point[2]) / R, 0.0, 1.0)) : R;
+    // Whether one obstacle blocks all of a patch, by what is known now.
+    auto hidden = [&](Patch& p) {
+        const auto [nearest, most] = near.distances(p.centre, p.spread);
+        p.nearest = std::sqrt(nearest);
+        // A flat end mill's places are up to the patch's outer edge from the point.
+        const double farther = ball ? 0 : std::min(p.u + p.du, R) * std::min(p.u + p.du, R) - p.u * p.u;
+        return p.nearest + p.spread < R - kTouch || most + farther < (R - kTouch) * (R - kTouch);
+    };
     // Puts a patch among those to look at unless one obstacle blocks all of it.
     auto consider = [&](Patch p) {
         const double u_most = std::min(p.u + p.du, ball ? std::numbers::pi / 2 : R),
-                     width = ball ? std::sin(u_most) * std::sin(p.u) : u_most * p.u;
-        p.centre = at(p.u, p.v);
+                     sine = ball ? std::sin(p.u) : p.u, width = (ball ? std::sin(u_most) : u_most) * sine;
+        p.centre = at(p.u, sine, p.v);
         p.spread = scale * std::sqrt(p.du * p.du +
                                      width * p.dv *
                                          p.dv);  // of two places: 4 sin²(Δu/2) + 4 sin u₁ sin u₂ sin²(Δv/2)
-        p.nearest = std::sqrt(near.distance2(p.centre, ball));
-        if (p.nearest + p.spread < R - kTouch) return;
+        if (hidden(p)) return;
         heap.push_back(p);
         std::push_heap(heap.begin(), heap.end(), worse);
     };
+    Found blocked = Found::blocked;  // until a place is met that the cutter has for itself
     // From a place that lacks little: off the nearest of the part, and back to where the point is covered, in
     // turn.
     auto settles = [&](Point3 c) {
         double lacking = std::numeric_limits<double>::infinity();
         for (int round = 0; round < kRounds; ++round) {
             const auto found = clearance(c);
-            if (found.distance >= R - kTouch) return takes(c);
+            if (found.distance >= R - kTouch) {
+                blocked = Found::held;
+                return takes(c);
+            }
             met(c, found);
             const double lack = R - found.distance, away = length(found.away);
             if (away <= 0 || lack > kStuck * lacking) return false;
@@ -203,12 +240,12 @@ bool Reach::by(std::size_t index, const Point3& point) {
         std::pop_heap(heap.begin(), heap.end(), worse);
         Patch p = heap.back();
         heap.pop_back();
-        // Obstacles met since may block it.
-        p.nearest = std::sqrt(near.distance2(p.centre, ball));
+        if (hidden(p)) continue;  // by what was met since
         if (p.nearest >= R - kTouch) {
             const auto found = clearance(p.centre);
             if (found.distance >= R - kTouch) {
-                if (takes(p.centre)) return true;
+                if (takes(p.centre)) return Found::covers;
+                blocked = Found::held;
                 // Shank or holder is in the way. Where it is even with the tip as high as the patch goes,
                 // less the patch's size, the patch is gone.
                 const double tip = ball ? point[2] + R * std::cos(p.u - p.du) - R : point[2];
@@ -224,14 +261,13 @@ bool Reach::by(std::size_t index, const Point3& point) {
                 if (gone) continue;
             } else {
                 met(p.centre, found);
-                p.nearest = found.distance;
+                if (hidden(p)) continue;
             }
         }
-        if (p.nearest + p.spread < R - kTouch) continue;
         if (p.spread < kResolution) {
             if (settlings < kSettlings && p.nearest < R - kTouch) {
                 ++settlings;
-                if (settles(p.centre)) return true;
+                if (settles(p.centre)) return Found::covers;
             }
             continue;
         }
@@ -247,7 +283,7 @@ bool Reach::by(std::size_t index, const Point3& point) {
         consider(a);
         consider(b);
     }
-    return false;
+    return heap.empty() ? blocked : Found::held;
 }
 
 }  // namespace slabwright

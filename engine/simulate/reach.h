@@ -45,7 +45,10 @@ private:
         std::size_t tool;
         Point3 centre;
     };
-    [[nodiscard]] bool by(std::size_t tool, const Point3& point);
+    /// What one tool can do at a point: cover it, cover it but for its shank or holder (or nobody knows), or
+    /// not even so.
+    enum class Found { covers, held, blocked };
+    [[nodiscard]] Found by(std::size_t tool, const Point3& point);
     [[nodiscard]] bool holder_free(const Tool& tool, const Point3& tip) const;
     void remember(const Point3& obstacle);
 
