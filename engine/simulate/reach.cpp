@@ -141,138 +141,130 @@ bool Reach::holder_free(const Tool& tool, const Point3& tip) const {
     return true;
 }
 
-// Branch and bound. Each place that is tried and found blocked yields an obstacle, a point with part at or
-// above it, which blocks every place nearer to it than the radius: patches that lie wholly in one obstacle's
-// sphere are gone, others are halved. Obstacles hold for all points and tools of the layer, so those of the
-// neighbours mostly decide before the part itself is asked.
-Reach::Found Reach::by(std::size_t index, const Point3& point) {
-    const Tool& tool = tools_[index];
-    const double R = tool.diameter / 2;
-    const bool ball = tool.kind == ToolKind::ball;
-    const double floor = ball ? std::max(lowest_, z_bottom_ - R) + R : std::max(lowest_, z_bottom_);
-    if (point[2] + (ball ? R : 0) < floor) return Found::held;
-
-    Near near(point, ball);  // obstacles that can be in the way
-    auto add = [&](const Point3& q) {
-        const double dx = q[0] - point[0], dy = q[1] - point[1], dz = q[2] - point[2];
-        if (ball ? dx * dx + dy * dy + std::pow(std::max(0.0, -dz), 2) < 4 * R * R
-                 : dz >= kRests && dx * dx + dy * dy < 4 * R * R)
-            near.add(q);
-    };
-    for (const Point3& q : obstacles_) add(q);
-    auto clearance = [&](const Point3& c) {
-        if (ball) return part_.from_shadow(c, z_top_, R);
-        return part_.beside({c[0], c[1], c[2] + kRests}, z_top_, R);  // what it stands on is not in its way
-    };
-    auto met = [&](const Point3& c, const StandingPart::Clearance& found) {
-        const Point3 q{c[0] - found.away[0], c[1] - found.away[1],
-                       ball ? c[2] - found.away[2] : c[2] + kRests};
-        remember(q);
-        near.add(q);
-        return q;
-    };
-    auto takes = [&](const Point3& c) {
-        if (!holder_free(tool, {c[0], c[1], ball ? c[2] - R : c[2]})) return false;
-        found_ = {index, c};
-        if (places_.size() < kPlaces) places_.push_back({index, c});
-        else places_[next_place_++ % kPlaces] = {index, c};
-        return true;
-    };
-    // The place at a polar angle or distance u, of sine `sine`, and an azimuth v.
-    auto at = [&](double u, double sine, double v) {
-        const double out = ball ? R * sine : u;
-        return Point3{point[0] + out * std::cos(v), point[1] + out * std::sin(v),
-                      point[2] + (ball ? R * std::cos(u) : 0)};
-    };
-    std::vector<Patch> heap;  // the farthest from what is known to be in the way first
-    const double scale = ball ? R : 1,
-                 u_end = ball ? std::acos(std::clamp((floor - point[2]) / R, 0.0, 1.0)) : R;
-    // Whether one obstacle blocks all of a patch, by what is known now.
-    auto hidden = [&](Patch& p) {
-        const auto [nearest, most] = near.distances(p.centre, p.spread);
-        p.nearest = std::sqrt(nearest);
-        // A flat end mill's places are up to the patch's outer edge from the point.
-        const double farther = ball ? 0 : std::min(p.u + p.du, R) * std::min(p.u + p.du, R) - p.u * p.u;
-        return p.nearest + p.spread < R - kTouch || most + farther < (R - kTouch) * (R - kTouch);
-    };
-    // Puts a patch among those to look at unless one obstacle blocks all of it.
-    auto consider = [&](Patch p) {
-        const double u_most = std::min(p.u + p.du, ball ? std::numbers::pi / 2 : R),
-                     sine = ball ? std::sin(p.u) : p.u, width = (ball ? std::sin(u_most) : u_most) * sine;
-        p.centre = at(p.u, sine, p.v);
-        p.spread = scale * std::sqrt(p.du * p.du +
-                                     width * p.dv *
-                                         p.dv);  // of two places: 4 sin²(Δu/2) + 4 sin u₁ sin u₂ sin²(Δv/2)
-        if (hidden(p)) return;
-        heap.push_back(p);
-        std::push_heap(heap.begin(), heap.end(), worse);
-    };
-    Found blocked = Found::blocked;  // until a place is met that the cutter has for itself
-    // From a place that lacks little: off the nearest of the part, and back to where the point is covered, in
-    // turn.
-    auto settles = [&](Point3 c) {
-        double lacking = std::numeric_limits<double>::infinity();
-        for (int round = 0; round < kRounds; ++round) {
-            const auto found = clearance(c);
-            if (found.distance >= R - kTouch) {
-                blocked = Found::held;
-                return takes(c);
-            }
-            met(c, found);
-            const double lack = R - found.distance, away = length(found.away);
-            if (away <= 0 || lack > kStuck * lacking) return false;
-            lacking = lack;
-            for (int k = 0; k < 3; ++k) c[k] += found.away[k] * (lack / away);
-            if (!ball) c[2] = point[2];
-            const Point3 v{c[0] - point[0], c[1] - point[1], ball ? std::max(0.0, c[2] - point[2]) : 0};
-            const double d = length(v);
-            if (d > R)
-                for (int k = 0; k < 3; ++k) c[k] = point[k] + v[k] * (R / d);
-            if (ball && c[2] < floor) return false;
+/// Whether one tool covers one point.
+///
+/// Branch and bound. Each place that is tried and found blocked yields an obstacle, a point with part at or
+/// above it, which blocks every place nearer to it than the radius: patches that one obstacle hides are gone,
+/// others are halved. Obstacles hold for all points and tools of the layer, so those of the neighbours mostly
+/// decide before the part itself is asked.
+class Reach::Search {
+public:
+    Search(Reach& reach, std::size_t index, const Point3& point)
+        : reach_(reach),
+          tool_(reach.tools_[index]),
+          index_(index),
+          point_(point),
+          ball_(tool_.kind == ToolKind::ball),
+          R_(tool_.diameter / 2),
+          floor_(ball_ ? std::max(reach.lowest_, reach.z_bottom_ - R_) + R_
+                       : std::max(reach.lowest_, reach.z_bottom_)),
+          near_(point, ball_) {
+        for (const Point3& q : reach.obstacles_) {
+            const double dx = q[0] - point[0], dy = q[1] - point[1], dz = q[2] - point[2];
+            if (ball_ ? dx * dx + dy * dy + std::pow(std::max(0.0, -dz), 2) < 4 * R_ * R_
+                      : dz >= kRests && dx * dx + dy * dy < 4 * R_ * R_)
+                near_.add(q);
         }
-        return false;
-    };
+    }
 
-    for (int k = 0; k < 3; ++k)
-        consider({u_end / 2, (2 * k + 1) * std::numbers::pi / 3, u_end / 2, std::numbers::pi / 3, {}, 0, 0});
-    int settlings = 0;
-    for (std::size_t patches = 0; !heap.empty() && patches < kMostPatches; ++patches) {
-        std::pop_heap(heap.begin(), heap.end(), worse);
-        Patch p = heap.back();
-        heap.pop_back();
-        if (hidden(p)) continue;  // by what was met since
-        if (p.nearest >= R - kTouch) {
-            const auto found = clearance(p.centre);
-            if (found.distance >= R - kTouch) {
-                if (takes(p.centre)) return Found::covers;
-                blocked = Found::held;
-                // Shank or holder is in the way. Where it is even with the tip as high as the patch goes,
-                // less the patch's size, the patch is gone.
-                const double tip = ball ? point[2] + R * std::cos(p.u - p.du) - R : point[2];
-                bool gone = false;
-                for (const auto& [radius, above] : {std::pair{tool.shank_diameter / 2, tool.flute_length},
-                                                    std::pair{tool.holder_diameter / 2, tool.stickout}})
-                    if (radius > R && above > 0)
-                        gone =
-                            gone ||
-                            part_.beside({p.centre[0], p.centre[1], tip + above}, z_top_, radius).distance +
-                                    p.spread <
-                                radius - kTouch;
-                if (gone) continue;
-            } else {
-                met(p.centre, found);
-                if (hidden(p)) continue;
+    Found run() {
+        if (point_[2] + (ball_ ? R_ : 0) < floor_) return Found::held;
+        const double u_end = ball_ ? std::acos(std::clamp((floor_ - point_[2]) / R_, 0.0, 1.0)) : R_;
+        for (int k = 0; k < 3; ++k)
+            consider(
+                {u_end / 2, (2 * k + 1) * std::numbers::pi / 3, u_end / 2, std::numbers::pi / 3, {}, 0, 0});
+        int settlings = 0;
+        for (std::size_t patches = 0; !heap_.empty() && patches < kMostPatches; ++patches) {
+            std::pop_heap(heap_.begin(), heap_.end(), worse);
+            Patch p = heap_.back();
+            heap_.pop_back();
+            if (hidden(p)) continue;  // by what was met since
+            if (p.nearest >= R_ - kTouch) {
+                const auto found = clearance(p.centre);
+                if (found.distance >= R_ - kTouch) {
+                    if (takes(p.centre)) return Found::covers;
+                    if (held_everywhere(p)) continue;
+                } else {
+                    meet(p.centre, found);
+                    if (hidden(p)) continue;
+                }
             }
-        }
-        if (p.spread < kResolution) {
-            if (settlings < kSettlings && p.nearest < R - kTouch) {
+            if (p.spread >= kResolution) {
+                halve(p);
+            } else if (settlings < kSettlings && p.nearest < R_ - kTouch) {
                 ++settlings;
                 if (settles(p.centre)) return Found::covers;
             }
-            continue;
         }
+        return heap_.empty() ? blocked_ : Found::held;
+    }
+
+private:
+    [[nodiscard]] StandingPart::Clearance clearance(const Point3& c) const {
+        if (ball_) return reach_.part_.from_shadow(c, reach_.z_top_, R_);
+        return reach_.part_.beside({c[0], c[1], c[2] + kRests}, reach_.z_top_,
+                                   R_);  // what it stands on is not in its way
+    }
+
+    /// Remembers the nearest of the part to a place.
+    void meet(const Point3& c, const StandingPart::Clearance& found) {
+        const Point3 q{c[0] - found.away[0], c[1] - found.away[1],
+                       ball_ ? c[2] - found.away[2] : c[2] + kRests};
+        reach_.remember(q);
+        near_.add(q);
+    }
+
+    /// Whether shank and holder are free too where the cutter is.
+    bool takes(const Point3& c) {
+        blocked_ = Found::held;
+        if (!reach_.holder_free(tool_, {c[0], c[1], ball_ ? c[2] - R_ : c[2]})) return false;
+        reach_.found_ = {index_, c};
+        if (reach_.places_.size() < kPlaces) reach_.places_.push_back({index_, c});
+        else reach_.places_[reach_.next_place_++ % kPlaces] = {index_, c};
+        return true;
+    }
+
+    /// Whether shank or holder is in the way in all of a patch: even with the tip as high as the patch goes,
+    /// by more than the patch's size.
+    [[nodiscard]] bool held_everywhere(const Patch& p) const {
+        const double tip = ball_ ? point_[2] + R_ * std::cos(p.u - p.du) - R_ : point_[2];
+        for (const auto& [radius, above] : {std::pair{tool_.shank_diameter / 2, tool_.flute_length},
+                                            std::pair{tool_.holder_diameter / 2, tool_.stickout}}) {
+            if (radius <= R_ || above <= 0) continue;
+            const Point3 at{p.centre[0], p.centre[1], tip + above};
+            if (reach_.part_.beside(at, reach_.z_top_, radius).distance + p.spread < radius - kTouch)
+                return true;
+        }
+        return false;
+    }
+
+    /// Whether one obstacle blocks all of a patch, by what is known now.
+    bool hidden(Patch& p) const {
+        const auto [nearest, most] = near_.distances(p.centre, p.spread);
+        p.nearest = std::sqrt(nearest);
+        // A flat end mill's places are up to the patch's outer edge from the point.
+        const double outer = std::min(p.u + p.du, R_), farther = ball_ ? 0 : outer * outer - p.u * p.u;
+        return p.nearest + p.spread < R_ - kTouch || most + farther < (R_ - kTouch) * (R_ - kTouch);
+    }
+
+    /// Puts a patch among those to look at unless it is hidden.
+    void consider(Patch p) {
+        const double u_most = std::min(p.u + p.du, ball_ ? std::numbers::pi / 2 : R_),
+                     sine = ball_ ? std::sin(p.u) : p.u, width = (ball_ ? std::sin(u_most) : u_most) * sine,
+                     out = ball_ ? R_ * sine : p.u;
+        p.centre = {point_[0] + out * std::cos(p.v), point_[1] + out * std::sin(p.v),
+                    point_[2] + (ball_ ? R_ * std::cos(p.u) : 0)};
+        // Of two places: 4 sin²(Δu/2) + 4 sin u₁ sin u₂ sin²(Δv/2).
+        p.spread = (ball_ ? R_ : 1) * std::sqrt(p.du * p.du + width * p.dv * p.dv);
+        if (hidden(p)) return;
+        heap_.push_back(p);
+        std::push_heap(heap_.begin(), heap_.end(), worse);
+    }
+
+    /// Considers the halves of a patch, across its longer side.
+    void halve(const Patch& p) {
         Patch a = p, b = p;
-        const double across = ball ? std::sin(std::min(p.u + p.du, std::numbers::pi / 2)) : p.u + p.du;
+        const double across = ball_ ? std::sin(std::min(p.u + p.du, std::numbers::pi / 2)) : p.u + p.du;
         if (p.du >= across * p.dv) {
             a.du = b.du = p.du / 2;
             a.u -= a.du, b.u += b.du;
@@ -283,7 +275,40 @@ Reach::Found Reach::by(std::size_t index, const Point3& point) {
         consider(a);
         consider(b);
     }
-    return heap.empty() ? blocked : Found::held;
-}
+
+    /// From a place that lacks little: off the nearest of the part, and back to where the point is covered,
+    /// in turn.
+    bool settles(Point3 c) {
+        double lacking = std::numeric_limits<double>::infinity();
+        for (int round = 0; round < kRounds; ++round) {
+            const auto found = clearance(c);
+            if (found.distance >= R_ - kTouch) return takes(c);
+            meet(c, found);
+            const double lack = R_ - found.distance, away = length(found.away);
+            if (away <= 0 || lack > kStuck * lacking) return false;
+            lacking = lack;
+            for (int k = 0; k < 3; ++k) c[k] += found.away[k] * (lack / away);
+            if (!ball_) c[2] = point_[2];
+            const Point3 v{c[0] - point_[0], c[1] - point_[1], ball_ ? std::max(0.0, c[2] - point_[2]) : 0};
+            const double d = length(v);
+            if (d > R_)
+                for (int k = 0; k < 3; ++k) c[k] = point_[k] + v[k] * (R_ / d);
+            if (ball_ && c[2] < floor_) return false;
+        }
+        return false;
+    }
+
+    Reach& reach_;
+    const Tool& tool_;
+    std::size_t index_;
+    Point3 point_;
+    bool ball_;
+    double R_, floor_;                ///< mm; no place is lower than the floor
+    Near near_;                       ///< obstacles that can be in the way
+    Found blocked_ = Found::blocked;  ///< until a place is met that the cutter has for itself
+    std::vector<Patch> heap_;         ///< the farthest from what is known to be in the way first
+};
+
+Reach::Found Reach::by(std::size_t index, const Point3& point) { return Search(*this, index, point).run(); }
 
 }  // namespace slabwright

@@ -41,6 +41,7 @@ public:
     [[nodiscard]] bool reachable(const Point3& point);
 
 private:
+    class Search;
     struct Place {
         std::size_t tool;
         Point3 centre;
