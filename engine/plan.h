@@ -156,6 +156,16 @@ struct Blank {
     friend bool operator==(const Blank&, const Blank&) = default;
 };
 
+/// A dowel in the joint on a layer's top, upright, mm, pattern-base.
+struct JointDowel {
+    double x = 0, y = 0;          ///< its middle
+    double diameter = 0;          ///< of the dowel and its holes
+    double below = 0, above = 0;  ///< how deep its holes are, full diameter: in this layer's top, and in the
+                                  ///< underside of the layer above
+    [[nodiscard]] double length() const { return below + above; }
+    friend bool operator==(const JointDowel&, const JointDowel&) = default;
+};
+
 struct Layer {
     int index = 0;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
@@ -167,6 +177,7 @@ struct Layer {
     std::vector<Joint> joints;   ///< upwards: under its lowest slab, on the board or the layer below; then
                                  ///< between its slabs
     std::optional<Blank> blank;  ///< of each of its slabs (slabs.blanks = "layer"); none: the plan's stock
+    std::vector<JointDowel> dowels{};  ///< in the joint on its top, which its programs drill the holes for
 };
 
 /// The file that holds a program: "L003.ngc" of "L003.ngc#2", and of itself.
