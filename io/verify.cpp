@@ -12,6 +12,7 @@
 
 #include "engine/base_board.h"
 #include "engine/schedule/magazine.h"
+#include "engine/simulate/dowel_proof.h"
 #include "engine/simulate/keep_out_check.h"
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table_check.h"
@@ -271,6 +272,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
     simulation.cusp = job.tolerances.cusp;
     simulation.board_cut = board_cut_limit(job.machine, input.tools);
     result.report = simulate(context, input, *pattern.part, simulation, options.memory);
+    const std::vector<Violation> dowels = check_dowels(context, input, *pattern.part, job.dowels.clearance);
+    violations.insert(violations.end(), dowels.begin(), dowels.end());
     MissingToolOptions asked;
     asked.inch = job.units == LengthUnit::inch;
     asked.limit = simulation.cusp + simulation.slack;
