@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -156,13 +157,17 @@ struct Blank {
     friend bool operator==(const Blank&, const Blank&) = default;
 };
 
+/// By how much a dowel is shorter than its two holes together, at least, mm.
+inline constexpr double kDowelRoom = 1;
+
 /// A dowel in the joint on a layer's top, upright, mm, pattern-base.
 struct JointDowel {
     double x = 0, y = 0;          ///< its middle
     double diameter = 0;          ///< of the dowel and its holes
     double below = 0, above = 0;  ///< how deep its holes are, full diameter: in this layer's top, and in the
                                   ///< underside of the layer above
-    [[nodiscard]] double length() const { return below + above; }
+    /// Of the dowel itself: whole mm, with room for glue and chips at its ends.
+    [[nodiscard]] double length() const { return std::floor(below + above - kDowelRoom + 1e-6); }
     friend bool operator==(const JointDowel&, const JointDowel&) = default;
 };
 
@@ -193,7 +198,8 @@ struct Layer {
 struct SequenceStep {
     int id = 0;
     int layer = 0;
-    std::string action;  ///< "mount_board", "load_feed", "take_slab", "clamp", "glue", "place", "press",
+    std::string action;  ///< "mount_board", "load_feed", "take_slab", "clamp", "glue", "set_dowels", "place",
+                         ///< "press",
                          ///< "table", "touch_off", "load_tool", "tool_change", "face", "mill", "unload",
                          ///< "mould_box"
     std::vector<int> needs;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "engine/schedule/fit.h"
 #include "kernels/parallel/parallel.h"
@@ -28,6 +29,7 @@ constexpr double kSnap = 0.01;        // mm: of the grid that middles lie on, as
 constexpr int kDirections = 64;       // in which the farthest corners are looked for
 constexpr double kGrid = 24;          // places along the longer side of the region
 constexpr double kLeastPitch = 2;     // mm between them
+constexpr double kDryAround = 0.5;    // mm around a hole without glue, which would fill it
 constexpr double kApart = 3;          // diameters between two dowels of a joint, at least
 constexpr double kShorter = 0.5;      // of the longest pair: less is not given for a slab that tells its way
 constexpr double kTurned = 2;         // diameters within which a turned slab still goes over a dowel
@@ -119,11 +121,14 @@ private:
             joint.z = lower.z_top;
             joint.dowel.diameter = rules_.diameter;
             joint.dowel.below = dowel_depth(rules_, lower.z_top - lower.z_bottom);
-            joint.dowel.above = dowel_depth(rules_, upper.z_top - upper.z_bottom);
-            for (const Layer* layer : {&lower, &upper})
-                if (dowel_depth(rules_, layer->z_top - layer->z_bottom) == 0)
-                    joint.why_none = fmt::format("layer {} is {:.2f} mm thick, too thin for a hole",
-                                                 layer->index, layer->z_top - layer->z_bottom);
+            // Its hole is drilled into one slab, even where more are bonded onto that.
+            const double whole = std::min(upper.z_top - upper.z_bottom, upper.slab_thickness / upper.slabs);
+            joint.dowel.above = dowel_depth(rules_, whole);
+            for (const auto& [depth, layer] :
+                 {std::pair(joint.dowel.below, lower.index), std::pair(joint.dowel.above, upper.index)})
+                if (depth == 0)
+                    joint.why_none = fmt::format("layer {} is too thin for a hole of {:.1f} mm", layer,
+                                                 rules_.diameter / 2);
         }
         return joints;
     }
@@ -389,6 +394,28 @@ double plan_distance(const std::array<std::array<double, 3>, 3>& facet, const st
         right |= side < 0;
     }
     return shadow.count > 2 && left != right ? 0 : nearest;
+}
+
+Loops outside_dowels(const Loops& glue, std::span<const JointDowel> dowels) {
+    constexpr int kSides = 48;
+    Loops holes;
+    for (const JointDowel& d : dowels) {
+        const double radius = d.diameter / 2 + kDryAround;
+        for (int k = 0; k < kSides; ++k) {
+            const double angle = 2 * std::numbers::pi * k / kSides;
+            holes.points.push_back(
+                {to_units(d.x + radius * std::cos(angle)), to_units(d.y + radius * std::sin(angle))});
+        }
+        holes.close_loop();
+    }
+    return dowels.empty() ? glue : subtract(glue, holes);
+}
+
+std::span<const JointDowel> dowels_under(const Plan& plan, const Layer& layer) {
+    const Layer* below = nullptr;
+    for (const Layer& l : plan.layers)
+        if (l.index == layer.index - 1) below = &l;
+    return below != nullptr ? std::span<const JointDowel>(below->dowels) : std::span<const JointDowel>();
 }
 
 bool fits_turned(std::span<const JointDowel> dowels, const Blank& slab) {

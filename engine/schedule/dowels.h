@@ -38,6 +38,12 @@ inline constexpr double kLeastWoodAtDowel = 3;
 /// wide, would go over all of these dowels within two diameters.
 [[nodiscard]] bool fits_turned(std::span<const JointDowel> dowels, const Blank& slab);
 
+/// What of a joint's glue lies beside the holes of its dowels.
+[[nodiscard]] Loops outside_dowels(const Loops& glue, std::span<const JointDowel> dowels);
+
+/// The dowels that a layer is laid on: those in the top of the one below.
+[[nodiscard]] std::span<const JointDowel> dowels_under(const Plan& plan, const Layer& layer);
+
 /// Fills Layer::dowels: for each joint between two layers `per_joint` dowels around which, for a radius and
 /// the clearance, no surface of the pattern comes between the heights of wood_around(). The first two are as
 /// far apart as can be among the places that are looked at (corners of that region and a grid over it), each

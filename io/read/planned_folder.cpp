@@ -414,7 +414,8 @@ void read_layers(const Field& layers, PlannedFolder& folder) {
         folder.simulation.layers.push_back({layer.z_bottom, layer.z_top, layer.slab_thickness, {}});
         if (from.has("blank")) layer.blank = read_blank(from["blank"], folder.build);
         folder.simulation.layers.back().blank = layer.blank;
-        if (from.has("dowels")) folder.simulation.layers.back().dowels = read_dowels(from["dowels"]);
+        if (from.has("dowels")) layer.dowels = read_dowels(from["dowels"]);
+        folder.simulation.layers.back().dowels = layer.dowels;
         if (from.has("slabs")) layer.slabs = from["slabs"].whole();
         if (layer.slabs < 1 || layer.slabs > 1000) from["slabs"].fail("is no count of slabs");
         if (from.has("joints"))
