@@ -418,6 +418,18 @@ std::span<const JointDowel> dowels_under(const Plan& plan, const Layer& layer) {
     return below != nullptr ? std::span<const JointDowel>(below->dowels) : std::span<const JointDowel>();
 }
 
+std::vector<UndersideHole> underside_holes(const Plan& plan) {
+    std::vector<UndersideHole> holes;
+    for (const Layer& layer : plan.layers) {
+        const Blank slab = slab_of(plan, layer);
+        int number = 0;
+        for (const JointDowel& d : dowels_under(plan, layer))
+            holes.push_back({layer.index, ++number, slab.max[0] - d.x, d.y - slab.min[1], d.diameter, d.above,
+                             d.length()});
+    }
+    return holes;
+}
+
 bool fits_turned(std::span<const JointDowel> dowels, const Blank& slab) {
     const double x0 = (slab.min[0] + slab.max[0]) / 2, y0 = (slab.min[1] + slab.max[1]) / 2;
     const auto over_all = [&](double cosine, double sine) {

@@ -44,6 +44,20 @@ inline constexpr double kLeastWoodAtDowel = 3;
 /// The dowels that a layer is laid on: those in the top of the one below.
 [[nodiscard]] std::span<const JointDowel> dowels_under(const Plan& plan, const Layer& layer);
 
+/// A hole in the underside of a layer's lowest slab, drilled before that is laid.
+struct UndersideHole {
+    int layer = 0;                   ///< Layer::index
+    int number = 0;                  ///< of the layer's, from 1
+    double x = 0, y = 0;             ///< mm from the left and the front edge of the slab as it lies turned
+                                     ///< over from left to right: its left edge is then that of greatest x
+    double diameter = 0, depth = 0;  ///< mm
+    double dowel_length = 0;         ///< mm
+    friend bool operator==(const UndersideHole&, const UndersideHole&) = default;
+};
+
+/// Of all layers, upwards, in the order of their dowels.
+[[nodiscard]] std::vector<UndersideHole> underside_holes(const Plan& plan);
+
 /// Fills Layer::dowels: for each joint between two layers `per_joint` dowels around which, for a radius and
 /// the clearance, no surface of the pattern comes between the heights of wood_around(). The first two are as
 /// far apart as can be among the places that are looked at (corners of that region and a grid over it), each
