@@ -220,6 +220,21 @@ TEST(Dowels, AJointWithoutAPlaceIsToldOrRefused) {
     }
 }
 
+TEST(Dowels, ArePlacedAlikeOnAnyNumberOfThreads) {
+    std::mt19937 random(test::seed());
+    for (int round = 0; round < 5; ++round) {
+        const Hollowed part = random_block(random);
+        std::vector<Plan> plans;
+        for (const int threads : {1, 2, 5}) {
+            Context context({.threads = threads});
+            plans.push_back(plan_of(part, {16, 34, 45, 62, 80}, {.per_joint = 3, .clearance = 4}));
+            place_dowels(context, part.mesh(context).view(), plans.back());
+        }
+        for (std::size_t i = 0; i < plans[0].layers.size(); ++i)
+            for (const Plan& other : plans) EXPECT_EQ(plans[0].layers[i].dowels, other.layers[i].dowels);
+    }
+}
+
 TEST(Dowels, AFacetsDistanceIsThatOfWhatLiesBetweenTheHeights) {
     std::mt19937 random(test::seed());
     std::uniform_real_distribution<double> any(-10, 10);

@@ -27,12 +27,13 @@ constexpr double kMargin = 0.02;      // mm by which places keep farther off tha
 constexpr double kFine = 0.005;       // mm by which offset() may err
 constexpr double kSnap = 0.01;        // mm: of the grid that middles lie on, as drawings tell them
 constexpr int kDirections = 64;       // in which the farthest corners are looked for
-constexpr double kGrid = 24;          // places along the longer side of the region
-constexpr double kLeastPitch = 2;     // mm between them
-constexpr double kDryAround = 0.5;    // mm around a hole without glue, which would fill it
-constexpr double kApart = 3;          // diameters between two dowels of a joint, at least
-constexpr double kShorter = 0.5;      // of the longest pair: less is not given for a slab that tells its way
-constexpr double kTurned = 2;         // diameters within which a turned slab still goes over a dowel
+constexpr std::size_t kBetweenCancels = 1 << 16;  // facets
+constexpr double kGrid = 24;                      // places along the longer side of the region
+constexpr double kLeastPitch = 2;                 // mm between them
+constexpr double kDryAround = 0.5;                // mm around a hole without glue, which would fill it
+constexpr double kApart = 3;                      // diameters between two dowels of a joint, at least
+constexpr double kShorter = 0.5;  // of the longest pair: less is not given for a slab that tells its way
+constexpr double kTurned = 2;     // diameters within which a turned slab still goes over a dowel
 
 double point_mm(double diameter) {
     constexpr double kHalfAngle = 59 * std::numbers::pi / 180;
@@ -214,6 +215,7 @@ private:
         const std::array<double, 2> heights = wood_around(joint.dowel, joint.z);
         std::vector<char> taken(places.size(), 0);
         for (std::size_t f = 0; f < mesh_.size() && !places.empty(); ++f) {
+            if (f % kBetweenCancels == 0) context_.throw_if_cancelled();
             const auto corners = corners_of(f);
             const auto [low, high] = std::minmax({corners[0][2], corners[1][2], corners[2][2]});
             if (high < heights[0] || low > heights[1]) continue;
@@ -340,7 +342,7 @@ private:
                 fmt::format("the joint at z {:.2f} mm, under layer {}, has room for {} of {} dowels; ask for "
                             "less dowels.clearance or thinner dowels{}",
                             joint.z, upper.index, dowels.size(), rules_.per_joint,
-                            dowels.size() == 1 ? ", and turn the slab by its edges" : ""));
+                            dowels.size() == 1 ? ", or lay the slab by its edges" : ""));
         else if (fits_turned(dowels, slab))
             tell("dowel.turned",
                  fmt::format("the slab of layer {} fits on its dowels turned, too: mark its front edge",

@@ -49,7 +49,7 @@ export const supportsIn = l => (plan.supports ?? []).filter(s => s.z_low < plan.
 // The dowels that layer l is laid on, and those whose holes are drilled into its top; each with its place as the programs count.
 export function dowelsIn(l) {
     const [ox, oy] = plan.zero ?? [0, 0];
-    const told = (layer, under) => (layer?.dowels ?? []).map(d => ({...d, under, says: `${figure(d.x - ox, 2)}, ${figure(d.y - oy, 2)}`}));
+    const told = (layer, under) => (layer?.dowels ?? []).map(d => ({...d, under, says: [d.x - ox, d.y - oy].map(v => figure(v, 2).replace('-', '−')).join(', ')}));
     return [...told(plan.layers[l - 1], true), ...told(plan.layers[l], false)];
 }
 
@@ -104,7 +104,7 @@ export function planView(l, paper) {
     supportsIn(l).map(s => make('path', {class: 'support', d: `M${s.x - s.width / 2} ${-s.y - s.width / 2}h${s.width}v${s.width}h${-s.width}Zl${s.width} ${s.width}m0 ${-s.width}l${-s.width} ${s.width}`, fill: 'none', stroke: purple, 'stroke-width': 0.5 * u})),
     dowels.map(d => [make('circle', {class: d.under ? 'dowel under' : 'dowel', cx: d.x, cy: -d.y, r: d.diameter / 2, fill: d.under ? `url(#dowel-${l})` : '#fff', stroke: ink, 'stroke-width': 0.4 * u, 'stroke-dasharray': d.under ? null : `${1.2 * u} ${0.8 * u}`}),
         make('path', {d: `M${d.x - d.diameter} ${-d.y}h${2 * d.diameter}M${d.x} ${-d.y - d.diameter}v${2 * d.diameter}`, stroke: ink, 'stroke-width': 0.2 * u, fill: 'none'}),
-        label(d.x + d.diameter, -d.y - 0.8 * u, d.says, 2.8 * u)]),
+        d.under ? label(d.x + d.diameter, -d.y - 0.8 * u, d.says, 2.8 * u) : null]),
     make('path', {d: pathOf(top.map(loop => loop.points)), fill: 'none', stroke: '#17636b', 'stroke-width': 0.4 * u, 'stroke-dasharray': `${2 * u} ${1.3 * u}`}),
     kept.map(k => [make('path', {class: 'keep-out', d: k.d, fill: `url(#kept-${l})`, stroke: ink, 'stroke-width': 0.5 * u}), k.box[0] + 1.8 * k.brief.length * u < view.x + view.w ? label(k.box[0], -k.box[3] - 1.2 * u, k.brief, 3 * u) : label(k.box[2], -k.box[3] - 1.2 * u, k.brief, 3 * u, {'text-anchor': 'end'})]),
     // Measures: the slab below and left, the pattern above and right.
