@@ -253,6 +253,9 @@ void validate_flask(const Job& job) {
 
 void validate_dowels(const JointDowels& dowels) {
     require("dowels.per_joint", dowels.per_joint, 0, 12);
+    if (dowels.per_joint == 1)
+        refuse("dowels.per_joint", "dowels.per_joint is 1: a slab turns about one dowel",
+               "give 2 or more, or 0 for none");
     require("dowels.diameter", dowels.diameter, 2, 50);
     require("dowels.depth", dowels.depth, 1, 200);
     require("dowels.clearance", dowels.clearance, 1, 200);

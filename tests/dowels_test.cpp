@@ -291,7 +291,8 @@ TEST(Dowels, KeysAreReadAndChecked) {
     EXPECT_EQ(job.dowels.depth, 12.5);
     EXPECT_TRUE(job.dowels.required);
     EXPECT_EQ(parse_job("", "x").dowels.per_joint, 0);
-    for (const char* bad : {"per_joint = -1", "per_joint = 13", "diameter = 0", "depth = 3", "clearance = 0"})
+    for (const char* bad :
+         {"per_joint = -1", "per_joint = 1", "per_joint = 13", "diameter = 0", "depth = 3", "clearance = 0"})
         EXPECT_THROW((void)parse_job(fmt::format("[dowels]\n{}\n", bad), "x"), Error) << bad;
 }
 

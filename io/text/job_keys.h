@@ -299,7 +299,7 @@ void visit_flask_keys(FlaskLike& flask, Visit& visit) {
 template <class DowelsLike, class Visit>
 void visit_dowel_keys(DowelsLike& dowels, Visit& visit) {
     visit.table("dowels", "in the joints between layers, for slabs that are laid by hand");
-    visit.key("per_joint", dowels.per_joint, "how many; 0: none");
+    visit.key("per_joint", dowels.per_joint, "how many, 2 to 12; 0: none");
     visit.key("diameter", dowels.diameter, "mm");
     visit.key("depth", dowels.depth, "mm into each slab, at most");
     visit.key("clearance", dowels.clearance, "mm of wood between a hole and the pattern's surface");
