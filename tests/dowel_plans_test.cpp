@@ -234,6 +234,19 @@ TEST(DowelPlans, ASpoiltPlanListOrSequenceIsTold) {
     codes = told(plan_file, plan.dump());
     EXPECT_TRUE(has(codes, "gouge.cutter") && has(codes, "gouge.stock") && has(codes, "sequence.dowels"))
         << codes;
+    // Holes of one slab that meet.
+    plan = built.plan;
+    for (const char* key : {"x", "y"})
+        plan["layers"][1]["dowels"][0][key] = plan["layers"][0]["dowels"][0][key];
+    plan["layers"][0]["dowels"][0]["above"] = 12;
+    const std::string as_planned = slurp(plan_file);
+    spit(plan_file, plan.dump());
+    Context context;
+    bool meet = false;
+    for (const Diagnostic& d : verify(context, built.out, built.stl, "", 1).violations)
+        meet |= d.message.find("runs into one in the slab's underside") != std::string::npos;
+    EXPECT_TRUE(meet);
+    spit(plan_file, as_planned);
     // The list: not turned over, shorter, garbage.
     const std::string list = slurp(list_file);
     const std::size_t second = list.find('\n') + 1, third = list.find('\n', second) + 1;

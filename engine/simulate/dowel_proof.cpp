@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <string>
 
 #include "kernels/parallel/parallel.h"
@@ -162,6 +163,12 @@ private:
         if (!(dowel.below < layer.z_top - layer.z_bottom) || above == nullptr ||
             !(dowel.above < above->z_top - above->z_bottom))
             return tell(found, l, dowel, "dowel.wood", "its holes end outside of their slabs", 0);
+        const auto under =
+            l > 0 ? std::span<const JointDowel>(input_.layers[l - 1].dowels) : std::span<const JointDowel>();
+        for (const JointDowel& other : under)
+            if (std::hypot(other.x - dowel.x, other.y - dowel.y) < (other.diameter + dowel.diameter) / 2 &&
+                other.above + dowel.below > layer.z_top - layer.z_bottom)
+                tell(found, l, dowel, "dowel.wood", "its hole runs into one in the slab's underside", 0);
         const double reach = dowel.diameter / 2 + clearance_ - kDowelTolerance;
         const double low = layer.z_top - dowel.below, high = layer.z_top + dowel.above;
         if (!part_.covered(dowel.x, dowel.y, layer.z_top) ||

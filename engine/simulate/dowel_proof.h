@@ -33,7 +33,7 @@ void fill_dowels(Stock& stock, const SimulatedLayer& layer);
 /// Violations, each with the dowel's place and layer: dowel.missing (no program of the layer makes a hole
 /// there), dowel.place, dowel.diameter, dowel.depth (by more than kDowelTolerance), dowel.rapid (a rapid goes
 /// down in it deeper than was cut before), dowel.wood (a surface of the pattern comes nearer than the
-/// clearance, kDowelTolerance less, or a hole ends outside of its slab).
+/// clearance, kDowelTolerance less, a hole ends outside of its slab, or two of one slab meet).
 /// @param clearance mm of wood around a hole
 /// @throws Error(cancelled)
 [[nodiscard]] std::vector<Violation> check_dowels(Context& context, const SimulationInput& input,
