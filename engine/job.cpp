@@ -234,6 +234,37 @@ void validate_prepare(const PrepareJob& p) {
     }
 }
 
+void validate_flask(const Job& job) {
+    const FlaskShape& f = job.flask;
+    require("flask.gap", f.gap, 0, 10000);
+    require("flask.wall", f.wall, 0, 10000, Ends::open_low);
+    require("flask.draft_deg", f.draft_deg, 0, 45);
+    if (f.enabled && f.gap < least_flask_gap(job))
+        refuse("flask.gap",
+               fmt::format("flask.gap is {}: the cutters do not pass between pattern and flask", f.gap),
+               fmt::format("give at least {} (the widest end mill, the wall allowance and room)",
+                           least_flask_gap(job)));
+    if (f.enabled && !(f.wall > 2 * job.bonding.edge_setback))
+        refuse("flask.wall",
+               fmt::format("flask.wall is {}: glue that keeps {} mm from every edge finds no place on it",
+                           f.wall, job.bonding.edge_setback),
+               fmt::format("give more than {}, or less bonding.edge_setback", 2 * job.bonding.edge_setback));
+}
+
+void validate_dowels(const JointDowels& dowels) {
+    require("dowels.per_joint", dowels.per_joint, 0, 12);
+    if (dowels.per_joint == 1)
+        refuse("dowels.per_joint", "dowels.per_joint is 1: a slab turns about one dowel",
+               "give 2 or more, or 0 for none");
+    require("dowels.diameter", dowels.diameter, 2, 50);
+    require("dowels.depth", dowels.depth, 1, 200);
+    require("dowels.clearance", dowels.clearance, 1, 200);
+    require("dowels.set_s", dowels.set_s, 0, 3600);
+    if (dowels.depth < dowels.diameter / 2)
+        refuse("dowels.depth", fmt::format("dowels.depth is {}, under half of dowels.diameter", dowels.depth),
+               "a dowel does not hold in that: give deeper holes");
+}
+
 }  // namespace
 
 double max_layer_of(const Job& job, const Tool& tool) {
@@ -492,6 +523,7 @@ void validate(const Job& job) {
     validate_machine(job.machine);
     validate_bonding(job.bonding);
     validate_prices(job.prices, s);
+    validate_dowels(job.dowels);
 
     const Tolerances& t = job.tolerances;
     require("tolerances.gouge", t.gouge, 0.001, 1, Ends::closed, kFinerThanProgrammed);
@@ -543,21 +575,7 @@ void validate(const Job& job) {
     require("selection.overlap_weight", select.overlap_weight, 0, 100);
     require("selection.voxel", select.voxel, 0.05, 5);
 
-    const FlaskShape& f = job.flask;
-    require("flask.gap", f.gap, 0, 10000);
-    require("flask.wall", f.wall, 0, 10000, Ends::open_low);
-    require("flask.draft_deg", f.draft_deg, 0, 45);
-    if (f.enabled && f.gap < least_flask_gap(job))
-        refuse("flask.gap",
-               fmt::format("flask.gap is {}: the cutters do not pass between pattern and flask", f.gap),
-               fmt::format("give at least {} (the widest end mill, the wall allowance and room)",
-                           least_flask_gap(job)));
-    if (f.enabled && !(f.wall > 2 * job.bonding.edge_setback))
-        refuse("flask.wall",
-               fmt::format("flask.wall is {}: glue that keeps {} mm from every edge finds no place on it",
-                           f.wall, job.bonding.edge_setback),
-               fmt::format("give more than {}, or less bonding.edge_setback", 2 * job.bonding.edge_setback));
-
+    validate_flask(job);
     if (job.tools.empty())
         throw Error(ErrorKind::usage, "job.tool", "the tool library is empty", "tool",
                     "add a [[tool]] to the job file");

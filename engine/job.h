@@ -281,6 +281,16 @@ struct FlaskShape {
     double draft_deg = 1;  ///< of the opening, wider at the top
 };
 
+/// Dowels in the joints between layers (engine/schedule/dowels).
+struct JointDowels {
+    int per_joint = 0;  ///< 0: none
+    double diameter = 8;
+    double depth = 20;      ///< of a hole in each of the two slabs, at most
+    double clearance = 10;  ///< of wood between a hole and the pattern's surface
+    bool required = false;  ///< a joint without a place for any is a refusal, not a warning
+    double set_s = 5;       ///< to set one by hand
+};
+
 /// How the STL becomes the pattern.
 struct InputJob {
     Repair repair = Repair::none;
@@ -316,6 +326,7 @@ struct Job {
     Cutting cutting;
     ToolSelection selection;
     FlaskShape flask;
+    JointDowels dowels;
     Prices prices;
     /// The fixed set: face mill, 1/2 in flat end mill, 1/4 in ball end mill (LUO's comparison set).
     std::vector<Tool> tools{

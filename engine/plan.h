@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -156,6 +157,20 @@ struct Blank {
     friend bool operator==(const Blank&, const Blank&) = default;
 };
 
+/// By how much a dowel is shorter than its two holes together, at least, mm.
+inline constexpr double kDowelRoom = 1;
+
+/// A dowel in the joint on a layer's top, upright, mm, pattern-base.
+struct JointDowel {
+    double x = 0, y = 0;          ///< its middle
+    double diameter = 0;          ///< of the dowel and its holes
+    double below = 0, above = 0;  ///< how deep its holes are, full diameter: in this layer's top, and in the
+                                  ///< underside of the layer above
+    /// Of the dowel itself: whole mm, with room for glue and chips at its ends.
+    [[nodiscard]] double length() const { return std::floor(below + above - kDowelRoom + 1e-6); }
+    friend bool operator==(const JointDowel&, const JointDowel&) = default;
+};
+
 struct Layer {
     int index = 0;
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
@@ -167,6 +182,7 @@ struct Layer {
     std::vector<Joint> joints;   ///< upwards: under its lowest slab, on the board or the layer below; then
                                  ///< between its slabs
     std::optional<Blank> blank;  ///< of each of its slabs (slabs.blanks = "layer"); none: the plan's stock
+    std::vector<JointDowel> dowels{};  ///< in the joint on its top, which its programs drill the holes for
 };
 
 /// The file that holds a program: "L003.ngc" of "L003.ngc#2", and of itself.
@@ -182,7 +198,8 @@ struct Layer {
 struct SequenceStep {
     int id = 0;
     int layer = 0;
-    std::string action;  ///< "mount_board", "load_feed", "take_slab", "clamp", "glue", "place", "press",
+    std::string action;  ///< "mount_board", "load_feed", "take_slab", "clamp", "glue", "set_dowels", "place",
+                         ///< "press",
                          ///< "table", "touch_off", "load_tool", "tool_change", "face", "mill", "unload",
                          ///< "mould_box"
     std::vector<int> needs;

@@ -109,6 +109,8 @@ std::string_view remedy(std::string_view code) {
         return "turn or split the pattern, or choose other slabs";
     if (code.starts_with("keep_out."))
         return "move the keep-out farther from the stock, make it lower, or hold the slab in another way";
+    if (code.starts_with("dowel."))
+        return "give a drill of the dowels' diameter, or plan without dowels (dowels.per_joint = 0)";
     if (code == "board.too_deep") return "allow a deeper machine.base_board_cut";
     return "give other tools";
 }
@@ -117,8 +119,9 @@ std::string_view remedy(std::string_view code) {
 
 bool is_of_the_part(const SimulationReport& report) {
     return std::all_of(report.violations.begin(), report.violations.end(), [](const Violation& v) {
-        for (const char* family : {"gouge.", "contact.", "plunge.", "rapid.through", "flute.", "cut.",
-                                   "board.", "operation.", "left.", "travel.", "stack.", "keep_out."})
+        for (const char* family :
+             {"gouge.", "contact.", "plunge.", "rapid.through", "flute.", "cut.", "board.", "operation.",
+              "left.", "travel.", "stack.", "keep_out.", "dowel."})
             if (v.code.starts_with(family)) return true;
         return false;
     });

@@ -41,6 +41,7 @@
 #include "io/verify.h"
 #include "io/write/access_ply.h"
 #include "io/write/cut_list_files.h"
+#include "io/write/dowel_list.h"
 #include "io/write/inspect_json.h"
 #include "io/write/job_toml.h"
 #include "io/write/output_file.h"
@@ -231,7 +232,9 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out, const std
     write_file_in(out.path(), "sequence.json", sequence_json(plan));
     const CutList list = cut_list(plan);
     write_file_in(out.path(), "cut_list.csv", cut_list_csv(list));
-    write_file_in(out.path(), "cut_list.dxf", cut_list_dxf(list));
+    const std::vector<UndersideHole> holes = underside_holes(plan);
+    write_file_in(out.path(), "cut_list.dxf", cut_list_dxf(list, holes));
+    if (!holes.empty()) write_file_in(out.path(), "dowels.csv", dowels_csv(holes));
     write_file_in(out.path(), "plan.json", plan_json(plan));
     context.throw_if_cancelled();
     context.advance();
@@ -310,6 +313,8 @@ std::string wood_document(const Plan& plan) {
         if (plan.job.slabs.blanks == Blanks::layer)
             text += fmt::format("; all as large as the pattern {:.2f} m2 of {:.2f} m2", uniform.sawn_m2(),
                                 uniform.bought_m2());
+        const std::string dowels = dowels_text(underside_holes(plan));
+        if (!dowels.empty()) text += fmt::format("\ndowels  {}", dowels);
         return text + '\n' + cost_text(plan.job, cost_of(plan.job, amounts_of(plan, list)));
     });
 }

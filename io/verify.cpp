@@ -12,10 +12,12 @@
 
 #include "engine/base_board.h"
 #include "engine/schedule/magazine.h"
+#include "engine/simulate/dowel_proof.h"
 #include "engine/simulate/keep_out_check.h"
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table_check.h"
 #include "io/read/cut_list_check.h"
+#include "io/read/dowel_list_check.h"
 #include "io/read/input_file.h"
 #include "io/read/planned_folder.h"
 #include "io/read/sequence_reader.h"
@@ -228,6 +230,21 @@ void saw_by_list(const fs::path& file, const BuildPlan& build, std::vector<Viola
     violations.insert(violations.end(), found.begin(), found.end());
 }
 
+/// Drills the slabs' undersides by the list of dowels; where the plan has none, there is no list.
+void drill_by_list(const fs::path& file, const BuildPlan& build, std::vector<Violation>& violations) {
+    const bool has_dowels = std::any_of(build.layers.begin(), build.layers.end(),
+                                        [](const LayerToBuild& layer) { return !layer.dowels.empty(); });
+    std::error_code error;
+    const bool is_there = fs::is_regular_file(file, error);
+    if (has_dowels && !is_there)
+        violations.push_back(
+            {"dowel.no_list", "there is no list of the holes in undersides", "dowels.csv", 0, {}, 0});
+    if (!is_there) return;
+    const std::vector<Violation> found =
+        check_dowel_list(read_file(file, "verify.dowel_list", kMostCutListBytes), build);
+    violations.insert(violations.end(), found.begin(), found.end());
+}
+
 }  // namespace
 
 Verification verify_folder(Context& context, const std::string& directory, const VerifyOptions& options) {
@@ -254,6 +271,7 @@ Verification verify_folder(Context& context, const std::string& directory, const
     BuildPlan build = folder.build;
     set_heights(build, input.programs);
     check_sequence(out / "sequence.json", build, violations);
+    drill_by_list(out / "dowels.csv", build, violations);
     if (folder.states_wood) saw_by_list(out / "cut_list.csv", build, violations);
 
     result.pattern = options.pattern && options.pattern->is(folder.pattern)
@@ -271,6 +289,8 @@ Verification verify_folder(Context& context, const std::string& directory, const
     simulation.cusp = job.tolerances.cusp;
     simulation.board_cut = board_cut_limit(job.machine, input.tools);
     result.report = simulate(context, input, *pattern.part, simulation, options.memory);
+    const std::vector<Violation> dowels = check_dowels(context, input, *pattern.part, job.dowels.clearance);
+    violations.insert(violations.end(), dowels.begin(), dowels.end());
     MissingToolOptions asked;
     asked.inch = job.units == LengthUnit::inch;
     asked.limit = simulation.cusp + simulation.slack;

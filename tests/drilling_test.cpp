@@ -279,7 +279,7 @@ TEST(Drilling, WhatIsNotDrilledSaysWhy) {
     const TemporaryFolder folder;
     support::spit(folder / "plate.stl", stl_bytes("plate", test::rounded(plate.closed())));
     std::string job = job_with_drills(run({"job", "--defaults"}).out);
-    job.replace(job.find("diameter = 8.0"), 14, "diameter = 14.0");
+    job.replace(job.rfind("\ndiameter = 8.0"), 15, "\ndiameter = 14.0");
     support::spit(folder / "job.toml", job);
     const std::string out = folder / "out";
     ASSERT_EQ(run({"plan", folder / "plate.stl", "-o", out, "--job", folder / "job.toml"}).exit, 0);

@@ -55,7 +55,7 @@ struct Scramble {
         if (key.starts_with("rapid_") || key.starts_with("acceleration_")) value = real(100, 200);
         else value = value == 0 ? real(0, 1e-3) : value * (1 - real(0, 0.005));
     }
-    void key(const char*, int& value, const char*) { value += 1; }
+    void key(const char*, int& value, const char*) { value += 2; }
     void key(const char*, bool& value, const char*) { value = !value; }
     void key(const char*, std::string& value, const char*) { value += " \"quoted\" \\ \n\t \xC3\xA4"; }
     void key(const char* name, std::vector<double>& value, const char*) {

@@ -1,6 +1,7 @@
 // The swept envelope against brute force, and the cusps that a ball leaves against their closed forms.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -737,4 +738,29 @@ TEST(Stock, CutThroughShowsTheSlabBelowAndTheBoard) {
     std::array<double, 2> where{};
     EXPECT_NEAR(stock.reach(3, {10, 2, 15}, {10, 18, 15}, where), 3, 1e-6);
     EXPECT_EQ(stock.reach(3, {10, 2, 18}, {10, 18, 18}, where), 0);
+}
+
+TEST(Stock, HolesAreFilledAsFarAsTheyAreMeant) {
+    const CellGrid grid{0, 0, 0.5, 41, 41};
+    Stock stock(grid);
+    stock.add_slab(10, 20);
+    const CutterEnd drill{CutterEnd::Form::flat, 3};
+    (void)stock.cut(drill, {6, 6, 40}, {6, 6, 18});      // as deep as it is meant
+    (void)stock.cut(drill, {14, 14, 40}, {14, 14, 12});  // too deep
+    (void)stock.cut(drill, {14, 5, 40}, {14, 5, 18});    // at another place
+    stock.fill({6, 6}, 3.1, 17.9, 28);
+    stock.fill({14, 14}, 3.1, 17.9, 28);
+    for (int j = 0; j < grid.ny; ++j)
+        for (int i = 0; i < grid.nx; ++i) {
+            const auto away = [&](double x, double y) { return std::hypot(grid.x(i) - x, grid.y(j) - y); };
+            const double z = stock.surface(0, grid.index(i, j));
+            if (away(14, 14) < 2.9) EXPECT_NEAR(z, 12, 1e-5);
+            else if (away(14, 5) < 2.9) EXPECT_NEAR(z, 18, 1e-5);
+            else if (away(6, 6) < 2.9) EXPECT_NEAR(z, 28, 1e-5);
+            else if (std::min({away(14, 14), away(14, 5), away(6, 6)}) > 3.2)
+                EXPECT_NEAR(z, 30, 1e-5) << "what stands higher stays";
+        }
+    // What was filled is cut again.
+    EXPECT_FALSE(stock.clear(5, 7, 5, 7, 27.5));
+    EXPECT_GT(stock.cut(drill, {6, 6, 40}, {6, 6, 20}).removed, 0);
 }

@@ -78,6 +78,10 @@ void leave_local_frame(Plan& plan, const std::array<double, 2>& by) {
             move(layer.blank->min, by);
             move(layer.blank->max, by);
         }
+        for (JointDowel& dowel : layer.dowels) {
+            dowel.x += by[0];
+            dowel.y += by[1];
+        }
         for (Joint& joint : layer.joints) {
             move(joint.centroid, by);
             move(joint.glue, units);

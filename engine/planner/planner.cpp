@@ -15,6 +15,7 @@
 #include "engine/layers/candidates.h"
 #include "engine/layers/layers.h"
 #include "engine/moves/motion_time.h"
+#include "engine/paths/operations/dowel_holes.h"
 #include "engine/planner/drill_plan.h"
 #include "engine/planner/layer_plan.h"
 #include "engine/planner/local_frame.h"
@@ -22,6 +23,7 @@
 #include "engine/prepare/drilled_holes.h"
 #include "engine/schedule/blanks.h"
 #include "engine/schedule/cut_list.h"
+#include "engine/schedule/dowels.h"
 #include "engine/schedule/fit.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
@@ -263,6 +265,20 @@ std::uint64_t bytes_of_paths(const Context& context, const Plan& plan,
                at_once;
 }
 
+// Adds the programs of dowel holes, last in their layers. Their forces are not reckoned, as no drill's are.
+void drill_dowels(Plan& plan) {
+    double deepest = 0;
+    for (const Layer& layer : plan.layers)
+        for (const JointDowel& dowel : layer.dowels) deepest = std::max(deepest, dowel.below);
+    if (deepest == 0) return;
+    const Tool& tool = dowel_tool(plan.job, deepest);
+    for (Layer& layer : plan.layers) {
+        if (layer.dowels.empty()) continue;
+        layer.operations.push_back(dowel_holes(plan.job, layer, tool));
+        limit_feeds(layer.operations.back(), plan.job);
+    }
+}
+
 // The programs of all layers, with their diagnostics.
 // @param joints what each layer lies on is that of its first
 // @param feet   of each layer's thin walls
@@ -316,6 +332,7 @@ void cut_layers(Context& context, Plan& plan, MeshView pattern,
     std::vector<std::vector<Diagnostic>> rated(planned.size());
     if (job.cutting.engagement == Engagement::simulated)
         rated = rate_layers(context, plan, cuts, solver.solver());
+    drill_dowels(plan);
     keep_clear(plan, origin);
     parallel_each(context, planned.size(), [&](std::size_t i) {
         for (Operation& op : plan.layers[i].operations) {
@@ -396,6 +413,7 @@ Plan plan_layers(Context& context, MeshView pattern, const Plan& begun, const La
     check_chambers(plan);
     std::vector<std::vector<JointWood>> joints = wood_at_joints(context, pattern, plan);
     const std::optional<Mesh> propped = prop(context, plan, pattern, joints);
+    place_dowels(context, pattern, plan);
     if (propped) pattern = propped->view();
     place_keep_outs(plan, origin);
     (void)cut_list(plan);  // every slab is on a board

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/schedule/dowels.h"
 #include "engine/schedule/glue_path.h"
 
 namespace slabwright {
@@ -72,7 +73,9 @@ int SlabSteps::bond(const Layer& layer, int k, int ready) {
     const int taken = take(layer, layer.slab_thickness / layer.slabs, blank);
     const int clamped = add(layer, "clamp", {taken}, handled_ ? machine_.grip_s : bonding.handling_s / 3).id;
     const int glued = glue(layer, k, ready, clamped);
-    const int placed = place(layer, k, {clamped, glued}, blank);
+    std::vector<int> laid_on{clamped, glued};
+    if (const int set = k == 0 ? set_dowels(layer, glued) : 0; set != 0) laid_on.push_back(set);
+    const int placed = place(layer, k, std::move(laid_on), blank);
     // The handler holds the slab against the rising table (RPM) and lets go of it then.
     SequenceStep& press = add(layer, "press", {placed}, press_seconds(plan_.job));
     handler_free_ = handled_ ? press.id : placed;
@@ -135,6 +138,18 @@ int SlabSteps::glue(const Layer& layer, int k, int ready, int clamped) {
         if (!joint.beads.empty()) handler_ = pass.handler_end;
         step.numbers.emplace_back("handler_mm", handler_);
     }
+    return step.id;
+}
+
+int SlabSteps::set_dowels(const Layer& layer, int glued) {
+    const std::span<const JointDowel> dowels = dowels_under(plan_, layer);
+    if (dowels.empty()) return 0;
+    const auto count = static_cast<double>(dowels.size());
+    SequenceStep& step = add(layer, "set_dowels", {glued}, count * plan_.job.dowels.set_s);
+    step.numbers = {{"count", count},
+                    {"diameter_mm", dowels.front().diameter},
+                    {"length_mm", dowels.front().length()},
+                    {"hole_mm", dowels.front().above}};
     return step.id;
 }
 

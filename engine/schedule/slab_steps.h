@@ -58,6 +58,8 @@ private:
     SequenceStep& add(const Layer& layer, const char* action, std::vector<int> needs, double seconds);
     int take(const Layer& layer, double thickness, const Blank& blank);
     int glue(const Layer& layer, int k, int ready, int clamped);
+    /// Into the joint under a layer. @returns 0 where it has none
+    int set_dowels(const Layer& layer, int glued);
     int place(const Layer& layer, int k, std::vector<int> needs, const Blank& blank);
 
     Plan& plan_;

@@ -82,6 +82,7 @@ private:
                                                                {"take_slab", &BuildReplay::take_slab},
                                                                {"clamp", &BuildReplay::clamp},
                                                                {"glue", &BuildReplay::glue},
+                                                               {"set_dowels", &BuildReplay::set_dowels},
                                                                {"place", &BuildReplay::place},
                                                                {"press", &BuildReplay::press},
                                                                {"table", &BuildReplay::table},
@@ -273,6 +274,14 @@ private:
             }
     }
 
+    void set_dowels() {
+        require(s_.glued, "there is no glue on the stack");
+        if (s_.dowels) complain("sequence.order", "the dowels are set already");
+        expect_layer(due_slab().layer);
+        check_dowels(due_slab());
+        s_.dowels = here();
+    }
+
     void place() {
         const DueSlab& slab = due_slab();
         if (s_.placed >= slabs_.size()) complain("sequence.order", "all slabs of the build are placed");
@@ -280,6 +289,7 @@ private:
         require(s_.in_hand, "the material handler holds no slab");
         require(s_.clamped, "the slab is not clamped");
         require(s_.glued, "there is no glue on the stack");
+        if (!dowels_of(slab).empty()) require(s_.dowels, "its dowels are not set");
         expect("sequence.place", "x_mm", slab.blank.min[0], kLength);
         expect("sequence.place", "y_mm", slab.blank.min[1], kLength);
         expect("sequence.place", "z_bottom_mm", slab.z_bottom, kLength);
@@ -292,6 +302,7 @@ private:
         s_.in_hand.reset();
         s_.clamped.reset();
         s_.glued.reset();
+        s_.dowels.reset();
         s_.stack_ready.reset();
         s_.pressed.reset();
         s_.touched.reset();
@@ -463,17 +474,19 @@ private:
         if ((*named)[1] - (*named)[0] > 1) s_.spindle_tool = plan_.programs[(*named)[1] - 1].tool;
     }
 
-    /// By hand, after an interruption: the handler and the feed chamber are emptied, wet glue is wiped off.
+    /// By hand, after an interruption: handler and feed chamber are emptied, wet glue and dowels taken off.
     void clear() {
         if (s_.to_press) complain("sequence.order", "a slab lies on wet glue; it must be pressed first");
         wait_for(s_.hand_free);
         wait_for(s_.last_taken);
         wait_for(s_.glued);
+        wait_for(s_.dowels);
         wait_for(s_.clamped);
         expect_seconds(0, kSeconds);
         s_.in_hand.reset();
         s_.clamped.reset();
         s_.glued.reset();
+        s_.dowels.reset();
         s_.in_feed = 0;
         s_.feed_height = 0;
         s_.taken = s_.placed;

@@ -32,6 +32,7 @@ struct LayerToBuild {
     std::optional<Blank> blank{};  ///< what each of its slabs covers; none: the whole stock
     /// Of the joint under each of its slabs, upwards; what is not stated is not checked.
     std::vector<PlannedJoint> joints;
+    std::vector<JointDowel> dowels{};  ///< in the joint on its top
 };
 
 /// A program as the plan states it, in the order of execution, and how far it goes down and up.
@@ -89,7 +90,7 @@ struct BuildSequence {
 /// sequence.id, sequence.needs, sequence.action (unknown), sequence.order (the machine is not in a state for
 /// the step), sequence.layer, sequence.feed, sequence.stack (a slab from another pile), sequence.handler (its
 /// place), sequence.slab, sequence.glue, sequence.glue_side, sequence.glue_path, sequence.glue_mass,
-/// sequence.pump, sequence.place, sequence.press,
+/// sequence.pump, sequence.dowels, sequence.place, sequence.press,
 /// sequence.table, sequence.touch_off, sequence.tool, sequence.magazine (a tool that does not stand where it
 /// is wanted, a place that is none or holds another), sequence.program, sequence.height (of a program),
 /// sequence.mass, sequence.travel, sequence.time, sequence.value (a quantity that is missing or not what the

@@ -16,6 +16,7 @@ using Cause = std::optional<std::size_t>;
 struct BuildState {
     std::size_t done = 0;
     Cause board, loaded, last_taken, in_hand, clamped, hand_free, glued, to_press, pressed;
+    Cause dowels;       ///< they stand in the stack's top
     Cause stack_ready;  ///< glue may go on it: the board, or the last program of the layer below
     Cause table_at;     ///< the table is at the height of the layer on top
     Cause touched, tool_in, last_cut, unloaded, boxed;

@@ -225,4 +225,20 @@ void GlueSteps::check_beads(const StatedGlue& joint) {
     s_.handler = end;
 }
 
+std::span<const JointDowel> GlueSteps::dowels_of(const DueSlab& slab) const {
+    if (slab.number > 0 || slab.layer == 0) return {};
+    return plan_.layers[slab.layer - 1].dowels;
+}
+
+void GlueSteps::check_dowels(const DueSlab& slab) {
+    const std::span<const JointDowel> dowels = dowels_of(slab);
+    if (dowels.empty()) return complain("sequence.dowels", "sets dowels in a joint that has none");
+    expect("sequence.dowels", "count", static_cast<double>(dowels.size()), 0);
+    expect("sequence.dowels", "diameter_mm", dowels.front().diameter, kLength);
+    expect("sequence.dowels", "length_mm", dowels.front().length(), kLength);
+    expect("sequence.dowels", "hole_mm", dowels.front().above, kLength);
+    if (plan_.job_stated)
+        expect_seconds(static_cast<double>(dowels.size()) * plan_.job.dowels.set_s, kSeconds);
+}
+
 }  // namespace slabwright

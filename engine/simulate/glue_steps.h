@@ -26,6 +26,12 @@ protected:
     /// What a glue step says of its head: side, beads on this joint's loops, their glue, pump and time.
     void check_beads(const StatedGlue& joint);
 
+    /// Those that a slab is laid on.
+    [[nodiscard]] std::span<const JointDowel> dowels_of(const DueSlab& slab) const;
+    /// What a set_dowels says: how many, their size, how deep the slab's own holes are, and how long it
+    /// takes.
+    void check_dowels(const DueSlab& slab);
+
 private:
     using Bead = std::array<double, 3>;  // y, x from and to
     void check_cover(const StatedGlue& joint);

@@ -6,7 +6,7 @@ namespace slabwright {
 
 namespace {
 
-constexpr std::size_t kStepsEach = 8;     // for each slab, without its programs and their tool changes
+constexpr std::size_t kStepsEach = 9;     // for each slab, without its programs and their tool changes
 constexpr std::size_t kMostRemakes = 20;  // layers made again in one sequence
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "engine/simulate/core_contact.h"
+#include "engine/simulate/dowel_proof.h"
 #include "engine/simulate/laid_slabs.h"
 #include "engine/simulate/reach.h"
 #include "engine/simulate/simulation_memory.h"
@@ -349,7 +350,9 @@ private:
             // A path whose corners the machine may round farther than a finish pass's is safe as far as it
             // may leave it.
             const Tool wide = program.strays > kJunction ? wider(*tool, program.strays) : *tool;
-            f.gouge = check_gouge(context_, part_, layer.z_top, wide, program, {options_.gouge, 1e-5});
+            const std::optional<Program> above = above_dowels(program, layer, *tool);
+            f.gouge = check_gouge(context_, part_, layer.z_top, wide, above ? *above : program,
+                                  {options_.gouge, 1e-5});
             if (walls)
                 f.flask =
                     check_gouge(context_, *walls, layer.z_top, *tool, program, {options_.gouge, 1e-5}).cutter;
@@ -476,6 +479,7 @@ private:
                     top = stock.highest();
                 result.programs[next].top_after = top;
             }
+            fill_dowels(stock, layer);
         }
         for (std::size_t c = 0; c < grid.count(); ++c)
             result.board_cut = std::max(result.board_cut, stock.board_cut(c));
@@ -1051,47 +1055,6 @@ private:
 };
 
 }  // namespace
-
-double SimulationReport::unreachable_mm2() const {
-    std::uint64_t cells = 0;
-    for (const LayerFindings& f : layers) cells += f.unreachable;
-    return static_cast<double>(cells) * cell * cell;
-}
-
-Extreme SimulationReport::unreachable() const {
-    Extreme most;
-    for (const LayerFindings& f : layers)
-        if (f.unreachable_left.size > most.size) most = f.unreachable_left;
-    return most;
-}
-
-double SimulationReport::unmade_mm3() const {
-    double sum = 0;
-    for (const LayerFindings& f : layers) sum += f.unmade_mm3;
-    return sum;
-}
-
-Extreme SimulationReport::unmade() const {
-    Extreme most;
-    for (const LayerFindings& f : layers)
-        if (f.unmade.size > most.size) most = f.unmade;
-    return most;
-}
-
-double jitter(std::size_t k) {
-    const double steps = static_cast<double>(k) * 0.6180339887498949;
-    return steps - std::floor(steps);
-}
-
-double simulation_cell(const std::vector<Tool>& tools, double cusp) {
-    double ball = 0, any = 0;
-    for (const Tool& t : tools) {
-        if (t.kind == ToolKind::ball && (ball == 0 || t.diameter < ball)) ball = t.diameter;
-        if (any == 0 || t.diameter < any) any = t.diameter;
-    }
-    const double radius = (ball > 0 ? ball : any) / 2;
-    return std::clamp(std::sqrt(2 * radius * std::max(cusp, 1e-4)) / 2, 0.05, 1.0);
-}
 
 SimulationReport simulate(Context& context, const SimulationInput& input, const StandingPart& part,
                           const SimulationOptions& options, SimulationMemory* memory) {

@@ -25,7 +25,8 @@ struct SimulatedLayer {
     double z_bottom = 0, z_top = 0, slab_thickness = 0;
     Loops flask{};  ///< what of the slab is to stay around the pattern, over the layer's whole height; empty:
                     ///< no flask
-    std::optional<Blank> blank{};  ///< what its slabs cover; none: the whole stock
+    std::optional<Blank> blank{};      ///< what its slabs cover; none: the whole stock
+    std::vector<JointDowel> dowels{};  ///< in the joint on its top, whose holes are no gouges
 };
 
 /// All that the simulation starts from. The programs stand in the order of execution, layers ascending.
@@ -62,7 +63,7 @@ struct Extreme {
 /// flute.too_deep, cut.too_deep, spindle.off, travel.exceeded, board.too_deep, operation.empty, tool.wrong,
 /// tool.unknown, left.missed, left.too_much; and by io/verify program.order, program.unplanned,
 /// program.missing, those of io/posts/program_check and
-/// engine/simulate/keep_out_check, program.dialect, program.number, tool.table,
+/// engine/simulate/keep_out_check and dowel_proof, program.dialect, program.number, tool.table,
 /// sequence.no_file, sequence.unreadable and those of replay_build.
 struct Violation {
     std::string code;

@@ -217,7 +217,7 @@ bool is_of(const SimulationMemory& memory, const SimulationInput& input, const S
     const auto same_layer = [](const SimulatedLayer& a, const SimulatedLayer& b) {
         return std::tie(a.z_bottom, a.z_top, a.slab_thickness) ==
                    std::tie(b.z_bottom, b.z_top, b.slab_thickness) &&
-               a.flask.points == b.flask.points && a.blank == b.blank;
+               a.flask.points == b.flask.points && a.blank == b.blank && a.dowels == b.dowels;
     };
     const auto judged = [](const SimulationOptions& s) {
         return std::tie(s.gouge, s.cusp, s.slack, s.leftover_limit, s.leftover_share, s.board_cut, s.faults,

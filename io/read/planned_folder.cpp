@@ -386,6 +386,21 @@ std::optional<Blank> read_blank(const Field& blank, const BuildPlan& build) {
     return read;
 }
 
+/// The dowels in the joint on a layer's top.
+std::vector<JointDowel> read_dowels(const Field& all) {
+    std::vector<JointDowel> dowels;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        const Field d = all[i];
+        dowels.push_back({d["x"].number(), d["y"].number(), d["diameter"].number(), d["below"].number(),
+                          d["above"].number()});
+        const JointDowel& read = dowels.back();
+        for (const double v : {read.x, read.y, read.diameter, read.below, read.above})
+            if (std::abs(v) > 200000) d.fail("reaches beyond 200 m");
+        if (!(read.diameter > 0) || !(read.below > 0) || !(read.above > 0)) d.fail("is no dowel");
+    }
+    return dowels;
+}
+
 void read_layers(const Field& layers, PlannedFolder& folder) {
     std::set<std::string> named;
     if (layers.size() == 0) layers.fail("has no layer");
@@ -399,6 +414,8 @@ void read_layers(const Field& layers, PlannedFolder& folder) {
         folder.simulation.layers.push_back({layer.z_bottom, layer.z_top, layer.slab_thickness, {}});
         if (from.has("blank")) layer.blank = read_blank(from["blank"], folder.build);
         folder.simulation.layers.back().blank = layer.blank;
+        if (from.has("dowels")) layer.dowels = read_dowels(from["dowels"]);
+        folder.simulation.layers.back().dowels = layer.dowels;
         if (from.has("slabs")) layer.slabs = from["slabs"].whole();
         if (layer.slabs < 1 || layer.slabs > 1000) from["slabs"].fail("is no count of slabs");
         if (from.has("joints"))

@@ -281,9 +281,35 @@ void visit_price_keys(PricesLike& prices, Visit& visit) {
     visit.key("machine_hour", prices.machine_hour, "of an hour of the whole build");
 }
 
-/// Walks every key of the job but the tools and the keep-outs: first those of the top, then table by table.
+/// Walks the keys of the flask.
+template <class FlaskLike, class Visit>
+void visit_flask_keys(FlaskLike& flask, Visit& visit) {
+    visit.table("flask",
+                "a frame of every slab that stays around the pattern, to carry it while it is cut and as "
+                "moulding box");
+    visit.key("enabled", flask.enabled, "leave a flask");
+    visit.key("gap", flask.gap,
+              "mm from the pattern's outline to the opening, at the bottom; the widest end mill must pass");
+    visit.key("wall", flask.wall, "mm, the thinnest wall around the opening");
+    visit.key("draft_deg", flask.draft_deg,
+              "degrees by which the opening widens upwards, in one step a layer");
+}
+
+/// Walks the keys of dowels in joints.
+template <class DowelsLike, class Visit>
+void visit_dowel_keys(DowelsLike& dowels, Visit& visit) {
+    visit.table("dowels", "in the joints between layers, for slabs that are laid by hand");
+    visit.key("per_joint", dowels.per_joint, "how many, 2 to 12; 0: none");
+    visit.key("diameter", dowels.diameter, "mm");
+    visit.key("depth", dowels.depth, "mm into each slab, at most");
+    visit.key("clearance", dowels.clearance, "mm of wood between a hole and the pattern's surface");
+    visit.key("required", dowels.required, "refuse a plan with a joint that has no place for any");
+    visit.key("set_s", dowels.set_s, "s, to set one by hand");
+}
+
+/// Walks every key that any plan has: all of visit_job_keys but those of dowels.
 template <class JobLike, class Visit>
-void visit_job_keys(JobLike& job, Visit& visit) {
+void visit_plain_job_keys(JobLike& job, Visit& visit) {
     visit.word("units", job.units, kUnitWords, "of the STL: mm or in; every length in this file is in mm");
     visit.key("allow_undercut", job.allow_undercut, "plan although undercuts stay unmade");
     visit_prepare_keys(job.prepare, visit);
@@ -422,16 +448,15 @@ void visit_job_keys(JobLike& job, Visit& visit) {
               "plan every layer with the fixed set too, and keep what is faster");
     visit.key("voxel", job.selection.voxel, "mm, on which the semi-roughing area AS is measured");
 
-    visit.table("flask",
-                "a frame of every slab that stays around the pattern, to carry it while it is cut and as "
-                "moulding box");
-    visit.key("enabled", job.flask.enabled, "leave a flask");
-    visit.key("gap", job.flask.gap,
-              "mm from the pattern's outline to the opening, at the bottom; the widest end mill must pass");
-    visit.key("wall", job.flask.wall, "mm, the thinnest wall around the opening");
-    visit.key("draft_deg", job.flask.draft_deg,
-              "degrees by which the opening widens upwards, in one step a layer");
+    visit_flask_keys(job.flask, visit);
     visit_price_keys(job.prices, visit);
+}
+
+/// Walks every key of the job but the tools and the keep-outs: first those of the top, then table by table.
+template <class JobLike, class Visit>
+void visit_job_keys(JobLike& job, Visit& visit) {
+    visit_plain_job_keys(job, visit);
+    visit_dowel_keys(job.dowels, visit);
 }
 
 }  // namespace slabwright

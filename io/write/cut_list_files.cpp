@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -13,8 +14,9 @@ namespace slabwright {
 
 namespace {
 
-constexpr std::array<std::string_view, 5> kLayers{"BOARD", "PIECE", "CUT", "OFFCUT", "LABEL"};
+constexpr std::array<std::string_view, 6> kLayers{"BOARD", "PIECE", "CUT", "OFFCUT", "LABEL", "DOWELS"};
 constexpr double kBetweenBoards = 200;  // mm, in the drawing
+constexpr double kHoleLabel = 4;        // mm high
 
 std::string mm(double value) {
     std::string text;
@@ -32,6 +34,24 @@ std::array<Point2, 4> corners(const SawnRectangle& r, double right) {
     const Point2 low{to_units(r.x + right), to_units(r.y)},
         high{to_units(r.x + r.length + right), to_units(r.y + r.width)};
     return {low, {high.x, low.y}, high, {low.x, high.y}};
+}
+
+/// Where on its board a hole lies, underside up, mm. A turned piece lies turned against the clock.
+Point2 on_board(const UndersideHole& hole, const SawnPiece& piece, double right) {
+    const double x = piece.turned ? piece.place.length - hole.y : hole.x, y = piece.turned ? hole.x : hole.y;
+    return {to_units(piece.place.x + x + right), to_units(piece.place.y + y)};
+}
+
+void draw_holes(DxfText& text, const BlankToSaw& blank, const SawnPiece& piece, double right,
+                const std::vector<UndersideHole>& holes) {
+    if (blank.slab != 1) return;
+    for (const UndersideHole& hole : holes) {
+        if (hole.layer != blank.layer) continue;
+        const Point2 at = on_board(hole, piece, right);
+        text.circle("DOWELS", at, hole.diameter);
+        text.label({at.x + to_units(hole.diameter), at.y},
+                   fmt::format("D{:g} x {:g} deep", hole.diameter, hole.depth), kHoleLabel);
+    }
 }
 
 }  // namespace
@@ -61,13 +81,14 @@ std::string cut_list_csv(const CutList& list) {
     return text;
 }
 
-std::string cut_list_dxf(const CutList& list) {
+std::string cut_list_dxf(const CutList& list, const std::vector<UndersideHole>& holes) {
     double length = 0, width = 0;
     for (const BoardToSaw& board : list.boards) {
         length += (length > 0 ? kBetweenBoards : 0) + board.size.length;
         width = std::max(width, board.size.width);
     }
-    DxfText text({0, 0}, {to_units(length), to_units(width)}, kLayers);
+    DxfText text({0, 0}, {to_units(length), to_units(width)},
+                 std::span(kLayers).first(kLayers.size() - (holes.empty() ? 1 : 0)));
     double right = 0;
     std::size_t number = 0;
     for (const BoardToSaw& board : list.boards) {
@@ -80,6 +101,7 @@ std::string cut_list_dxf(const CutList& list) {
             text.loop("PIECE", corners(piece.place, right));
             text.label({to_units(piece.place.x + right + 5), to_units(piece.place.y + 5)},
                        label_of(list.blanks[piece.piece]));
+            draw_holes(text, list.blanks[piece.piece], piece, right, holes);
         }
         right += board.size.length + kBetweenBoards;
     }

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "engine/schedule/cut_list.h"
+#include "engine/schedule/dowels.h"
 
 namespace slabwright {
 
@@ -11,7 +13,8 @@ namespace slabwright {
 /// corner (io/FORMATS.md).
 [[nodiscard]] std::string cut_list_csv(const CutList& list);
 
-/// The boards side by side: layers BOARD, PIECE, CUT, OFFCUT, LABEL.
-[[nodiscard]] std::string cut_list_dxf(const CutList& list);
+/// The boards side by side: layers BOARD, PIECE, CUT, OFFCUT, LABEL, and DOWELS where there are any: the
+/// boards lie with the slabs' undersides up then.
+[[nodiscard]] std::string cut_list_dxf(const CutList& list, const std::vector<UndersideHole>& holes = {});
 
 }  // namespace slabwright

@@ -63,6 +63,14 @@ void DxfText::polyline(std::string_view layer, std::span<const Point2> points, b
     words({{0, "SEQEND"}, {8, layer}});
 }
 
+void DxfText::circle(std::string_view layer, Point2 middle, double diameter_mm) {
+    words({{0, "CIRCLE"}, {8, layer}});
+    group(10, real_mm(middle.x));
+    group(20, real_mm(middle.y));
+    group(30, "0.0");
+    group(40, real_mm(to_units(diameter_mm / 2)));
+}
+
 void DxfText::label(Point2 at, const std::string& words_there, double height_mm) {
     words({{0, "TEXT"}, {8, "LABEL"}});
     group(10, real_mm(at.x));

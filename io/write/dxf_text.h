@@ -17,6 +17,7 @@ public:
     DxfText(Point2 low, Point2 high, std::span<const std::string_view> layers);
     void loop(std::string_view layer, std::span<const Point2> points);
     void open_line(std::string_view layer, std::span<const Point2> points);
+    void circle(std::string_view layer, Point2 middle, double diameter_mm);
     /// Words at a place, 8 mm high unless told otherwise.
     void label(Point2 at, const std::string& words, double height_mm = 8);
     /// The whole text; nothing can be added after it.

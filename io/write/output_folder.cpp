@@ -36,9 +36,9 @@ constexpr const char* kRemedy = "give another folder after -o, or make room and 
 constexpr const char* kMoveAway = "move that away, or give another folder after -o";
 constexpr std::string_view kPartial = "partial", kOld = "old";
 /// The files of a plan folder beside its programs.
-constexpr std::array<std::string_view, 10> kFiles{
-    kOwnPostFile,  "plan.json",   "tool.tbl",      "sequence.json", "report.html",
-    "verify.json", "sheets.json", "assembly.html", "cut_list.csv",  "cut_list.dxf"};
+constexpr std::array<std::string_view, 11> kFiles{
+    kOwnPostFile,  "plan.json",     "tool.tbl",     "sequence.json", "report.html", "verify.json",
+    "sheets.json", "assembly.html", "cut_list.csv", "cut_list.dxf",  "dowels.csv"};
 /// Its folders, and how the names in them end.
 struct Inner {
     std::string_view folder, ending;

@@ -233,6 +233,17 @@ void put_centroid(JsonText& json, const Joint& joint) {
         .end();
 }
 
+void put_dowels(JsonText& json, const std::vector<JointDowel>& dowels) {
+    json.key("dowels").begin_array();
+    for (const JointDowel& dowel : dowels) {
+        json.begin_object(Shape::line);
+        json.key("x").rounded(dowel.x, kLength).key("y").rounded(dowel.y, kLength);
+        json.key("diameter").exact(dowel.diameter);
+        json.key("below").rounded(dowel.below, kLength).key("above").rounded(dowel.above, kLength).end();
+    }
+    json.end();
+}
+
 void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
     json.begin_object();
     json.key("index").integer(layer.index);
@@ -269,6 +280,7 @@ void put_layer(JsonText& json, const Plan& plan, const Layer& layer) {
         json.end();
     }
     json.end();
+    if (!layer.dowels.empty()) put_dowels(json, layer.dowels);
     json.key("operations").begin_array();
     std::uint32_t lines = 0;  // of the program so far that the operation is a part of
     for (const Operation& operation : layer.operations) {
@@ -436,7 +448,8 @@ std::string plan_json(const Plan& plan) {
     put_input(json, plan.input);
     json.key("job").begin_object();
     JobPrinter job{json, plan.job.machine.own_post.get()};
-    visit_job_keys(plan.job, job);
+    visit_plain_job_keys(plan.job, job);
+    if (plan.job.dowels.per_joint > 0) visit_dowel_keys(plan.job.dowels, job);
     job.close();
     json.end();
     if (plan.job.machine.own_post) put_post(json, plan.job.machine);

@@ -31,6 +31,9 @@ std::string told(const SequenceStep& step) {
             text += fmt::format(" T{:.0f}", value);
         if (step.action == "load_tool" && key == "place") text += fmt::format(" place {:.0f}:", value);
         if (step.action == "load_tool" && key == "tool_out") text += fmt::format(" for T{:.0f}", value);
+        if (step.action == "set_dowels" && key == "count") text += fmt::format(", {:.0f} of", value);
+        if (step.action == "set_dowels" && key == "diameter_mm") text += fmt::format(" {:g}", value);
+        if (step.action == "set_dowels" && key == "length_mm") text += fmt::format(" x {:g} mm", value);
         if (key == "table_height_mm") text += " to " + mm(value) + " mm";
         if (key == "slab_left_mm") text += " the slab's edges at x = " + mm(value) + " mm";
         if (key == "slab_front_mm") text += ", y = " + mm(value) + " mm, its top";

@@ -42,6 +42,22 @@ void Stock::add_slab(double z_bottom, double thickness, const std::array<double,
     }
 }
 
+void Stock::fill(const std::array<double, 2>& middle, double radius, double lowest, double z) {
+    Slab& slab = slabs_.back();
+    const auto up = static_cast<float>(z - slab.bottom);
+    const auto first = [&](double from, double at) {
+        return std::max(0, static_cast<int>(std::ceil((at - radius - from) / grid_.cell)));
+    };
+    for (int j = first(grid_.y0, middle[1]); j < grid_.ny && grid_.y(j) <= middle[1] + radius; ++j)
+        for (int i = first(grid_.x0, middle[0]); i < grid_.nx && grid_.x(i) <= middle[0] + radius; ++i) {
+            float& height = slab.height[grid_.index(i, j)];
+            if (std::hypot(grid_.x(i) - middle[0], grid_.y(j) - middle[1]) <= radius &&
+                slab.bottom + height >= lowest)
+                height = std::max(height, up);
+        }
+    for (float& top : block_tops_) top = std::max(top, up);
+}
+
 namespace {
 
 // What cells over a slab's bottom lost, told in eight places, so that a compiler sees that the order of cells

@@ -54,6 +54,10 @@ public:
     /// lose more than `most` mm, or more than the topmost slab.
     std::optional<LevelEffect> cut(LevelRegion& region, double z, double most);
 
+    /// Fills holes in the topmost slab: its surface goes up to z in cells whose middles lie within `radius`
+    /// mm of a place, where it lies between `lowest` and z (mm).
+    void fill(const std::array<double, 2>& middle, double radius, double lowest, double z);
+
     /// Whether nothing of the topmost slab stands higher than z over the cells within [x0, x1] × [y0, y1].
     /// Told from blocks of cells whose highest is known, or was when they stood higher; one that does not
     /// tell is looked at again.

@@ -385,5 +385,26 @@ check.equal('selection: no tables without a choice', await (async () => {
     check.equal('keep-outs: asked for once', await page.locator('.sheet .checks', {hasText: 'fence, 55.5 mm over the board'}).count(), 1);
     await page.close();
 }
+// Dowels stand on the sheets of both layers that they go into, and are cut before the build begins.
+{
+    const built = `${work}/dowelled`, job = `${work}/dowelled.toml`;
+    const drill = ['number = 11', 'kind = "drill"', 'name = "drill 8 mm"', 'diameter = 8', 'flute_length = 45', 'stickout = 60', 'shank_diameter = 8', 'holder_diameter = 30',
+        'max_rpm = 6000', 'max_feed = 3000', 'plunge_feed = 600', 'stepdown_min = 1', 'stepdown_max = 6'];
+    const defaults = execFileSync(command, ['job', '--defaults']).toString().replace(/^per_joint = 0 /m, 'per_joint = 2 ');
+    writeFileSync(job, `${defaults}\n[[tool]]\n${drill.join('\n')}\n`);
+    execFileSync(command, ['plan', `${work}/pump-cover.stl`, '-o', built, '--job', job, '--quiet', '--no-verify']);
+    const {layers: planned} = JSON.parse(readFileSync(`${built}/plan.json`, 'utf8'));
+    const {page, complaints} = await open(started, `${built}/report.html`);
+    const of = l => planned[l]?.dowels?.length ?? 0;
+    check.that('dowels: there are some', of(0) > 0);
+    for (const l of planned.keys()) {
+        check.equal(`dowels: under the slab of layer ${l + 1}`, await page.locator(`#sheet-${l + 1} .plan-view circle.dowel.under`).count(), of(l - 1));
+        check.equal(`dowels: holes in the top of layer ${l + 1}`, await page.locator(`#sheet-${l + 1} .plan-view circle.dowel:not(.under)`).count(), of(l));
+    }
+    check.equal('dowels: asked for', await page.locator('.sheet .checks', {hasText: 'dowels set and dry-fitted'}).count(), planned.filter((_, l) => of(l - 1) > 0).length);
+    check.that('dowels: cut before', /\d+ dowels Ø 8 × \d+ mm/.test(await page.locator('.cover').textContent()));
+    check.equal('dowels: no complaints', complaints, []);
+    await page.close();
+}
 await started.close();
 check.end();

@@ -8,10 +8,17 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kAir = 0.5;  // mm above what stands, or above the last peck, where the plunge feed begins
-constexpr double kLink = 2;   // mm above the layer between holes
+Operation drill_with(const LayerCut& cut, const Tool& tool, const std::vector<DrilledHole>& holes) {
+    Operation op = cut.operation(OperationKind::drill, "holes", tool);
+    PathBuilder path(op, tool, std::min(tool.plunge_feed, cut.job.machine.max_feed),
+                     cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + kLinkOverHoles);
+    for (const DrilledHole& hole : in_order(holes)) peck(path, op, tool, hole);
+    if (!path.finish()) op.moves.clear();
+    return op;
+}
 
-// Nearest first, from where the last one was; the first is that of the least x, then y.
+}  // namespace
+
 std::vector<DrilledHole> in_order(std::vector<DrilledHole> holes) {
     for (std::size_t i = 0; i < holes.size(); ++i) {
         const auto rank = [&](const DrilledHole& h) {
@@ -26,27 +33,18 @@ std::vector<DrilledHole> in_order(std::vector<DrilledHole> holes) {
     return holes;
 }
 
-Operation drill_with(const LayerCut& cut, const Tool& tool, const std::vector<DrilledHole>& holes) {
-    Operation op = cut.operation(OperationKind::drill, "holes", tool);
-    PathBuilder path(op, tool, std::min(tool.plunge_feed, cut.job.machine.max_feed),
-                     cut.layer.z_top + cut.job.machine.clearance, cut.layer.z_top + kLink);
-    for (const DrilledHole& hole : in_order(holes)) {
-        const Point2 at{to_units(hole.x), to_units(hole.y)};
-        const double deep = hole.top - hole.tip;
-        const int pecks = std::max(1, static_cast<int>(std::ceil(deep / tool.stepdown_max - 1e-9)));
-        op.stepdown = std::max(op.stepdown, deep / pecks);
-        for (int k = 1; k <= pecks; ++k) {
-            path.go_above(at);
-            path.sink(to_units(hole.top - deep * (k - 1) / pecks + kAir));
-            path.plunge(to_units(hole.top - deep * k / pecks));
-            path.retract();
-        }
+void peck(PathBuilder& path, Operation& op, const Tool& drill, const DrilledHole& hole) {
+    const Point2 at{to_units(hole.x), to_units(hole.y)};
+    const double deep = hole.top - hole.tip;
+    const int pecks = std::max(1, static_cast<int>(std::ceil(deep / drill.stepdown_max - 1e-9)));
+    op.stepdown = std::max(op.stepdown, deep / pecks);
+    for (int k = 1; k <= pecks; ++k) {
+        path.go_above(at);
+        path.sink(to_units(hole.top - deep * (k - 1) / pecks + kAirOverHole));
+        path.plunge(to_units(hole.top - deep * k / pecks));
+        path.retract();
     }
-    if (!path.finish()) op.moves.clear();
-    return op;
 }
-
-}  // namespace
 
 std::vector<Operation> drill_holes(const LayerCut& cut) {
     std::vector<Operation> operations;

@@ -46,6 +46,13 @@ function stripes(id, color, ground, u, turn) {
 // Columns of stock that stand in a layer: they are left there, and sawn off when the pattern is done.
 export const supportsIn = l => (plan.supports ?? []).filter(s => s.z_low < plan.layers[l].z_top - 0.001 && s.z_high > plan.layers[l].z_bottom + 0.001);
 
+// The dowels that layer l is laid on, and those whose holes are drilled into its top; each with its place as the programs count.
+export function dowelsIn(l) {
+    const [ox, oy] = plan.zero ?? [0, 0];
+    const told = (layer, under) => (layer?.dowels ?? []).map(d => ({...d, under, says: [d.x - ox, d.y - oy].map(v => figure(v, 2).replace('-', '−')).join(', ')}));
+    return [...told(plan.layers[l - 1], true), ...told(plan.layers[l], false)];
+}
+
 // What no tool may run into in a layer, in the places of the pattern: its outline as a path, its box, and its name
 // with its height, briefly and at length.
 export function keepOutsIn(l) {
@@ -81,11 +88,11 @@ export function planView(l, paper) {
     const [ox, oy] = plan.zero ?? [0, 0], zx = Math.min(x1 + 6 * u, Math.max(x0 - 6 * u, ox)), zy = -Math.min(y1 + 6 * u, Math.max(y0 - 6 * u, oy));
     const view = {x: left - margin.left * u, y: -back - margin.top * u, w: right - left + (margin.left + margin.right) * u, h: back - front + (margin.top + margin.bottom) * u};
     const {min, max} = plan.input.bbox, px0 = min[0], px1 = max[0], py0 = min[1], py1 = max[1];
-    const filled = filledBoxes(l);
+    const filled = filledBoxes(l), dowels = dowelsIn(l);
     const inside = ox >= sx0 - 0.001 && ox <= sx1 && oy >= sy0 - 0.001 && oy <= sy1;
     return make('svg', {class: 'plan-view', viewBox: `${view.x} ${view.y} ${view.w} ${view.h}`, role: 'img',
         'aria-label': `Slab of layer ${layer.index} from above, ${figure(sx1 - sx0, 1)} by ${figure(sy1 - sy0, 1)} mm${smaller ? `, ${figure(sx0 - x0, 1)} mm right of and ${figure(sy0 - y0, 1)} mm behind the base board’s corner` : ''}; glue on ${figure(layer.glue_area_mm2 / 100, 1)} square centimetres; zero ${inside ? 'on' : 'beside'} the slab`},
-    make('defs', {}, stripes(`glue-${l}`, '#d69a1e', '#f9dfa0', u, 45), stripes(`air-${l}`, red, '#f4c3c3', u, -45), kept.length ? stripes(`kept-${l}`, ink, '#dfe2e5', u, 90) : null),
+    make('defs', {}, stripes(`glue-${l}`, '#d69a1e', '#f9dfa0', u, 45), stripes(`air-${l}`, red, '#f4c3c3', u, -45), kept.length ? stripes(`kept-${l}`, ink, '#dfe2e5', u, 90) : null, dowels.length ? stripes(`dowel-${l}`, ink, '#fff', u / 2, 45) : null),
     smaller ? [make('rect', {x: x0, y: -y1, width, height: depth, fill: 'none', stroke: '#8a8375', 'stroke-width': 0.3 * u, 'stroke-dasharray': `${3 * u} ${1.5 * u}`}), label(x0 + 1.5 * u, -y1 + 4 * u, 'base board', 3 * u, {fill: dim})] : null,
     make('rect', {x: sx0, y: -sy1, width: sx1 - sx0, height: sy1 - sy0, fill: wood, stroke: '#8a6a3a', 'stroke-width': 0.5 * u}),
     flaskRings(l).map(ring => make('path', {d: `M${ring.map(([x, y]) => `${x} ${-y}`).join('L')}Z`, fill: 'none', stroke: '#8a6a3a', 'stroke-width': 0.3 * u})),
@@ -95,6 +102,9 @@ export function planView(l, paper) {
     filled.length ? make('path', {d: filled.map(b => `M${b.x0.toFixed(2)} ${(-b.y0).toFixed(2)}H${b.x1.toFixed(2)}V${(-b.y1).toFixed(2)}H${b.x0.toFixed(2)}Z`).join(''), fill: `url(#air-${l})`, stroke: 'none'}) : null,
     make('path', {d: pathOf(bottom.map(loop => loop.points)), fill: 'none', stroke: ink, 'stroke-width': 0.45 * u}),
     supportsIn(l).map(s => make('path', {class: 'support', d: `M${s.x - s.width / 2} ${-s.y - s.width / 2}h${s.width}v${s.width}h${-s.width}Zl${s.width} ${s.width}m0 ${-s.width}l${-s.width} ${s.width}`, fill: 'none', stroke: purple, 'stroke-width': 0.5 * u})),
+    dowels.map(d => [make('circle', {class: d.under ? 'dowel under' : 'dowel', cx: d.x, cy: -d.y, r: d.diameter / 2, fill: d.under ? `url(#dowel-${l})` : '#fff', stroke: ink, 'stroke-width': 0.4 * u, 'stroke-dasharray': d.under ? null : `${1.2 * u} ${0.8 * u}`}),
+        make('path', {d: `M${d.x - d.diameter} ${-d.y}h${2 * d.diameter}M${d.x} ${-d.y - d.diameter}v${2 * d.diameter}`, stroke: ink, 'stroke-width': 0.2 * u, fill: 'none'}),
+        d.under ? label(d.x + d.diameter, -d.y - 0.8 * u, d.says, 2.8 * u) : null]),
     make('path', {d: pathOf(top.map(loop => loop.points)), fill: 'none', stroke: '#17636b', 'stroke-width': 0.4 * u, 'stroke-dasharray': `${2 * u} ${1.3 * u}`}),
     kept.map(k => [make('path', {class: 'keep-out', d: k.d, fill: `url(#kept-${l})`, stroke: ink, 'stroke-width': 0.5 * u}), k.box[0] + 1.8 * k.brief.length * u < view.x + view.w ? label(k.box[0], -k.box[3] - 1.2 * u, k.brief, 3 * u) : label(k.box[2], -k.box[3] - 1.2 * u, k.brief, 3 * u, {'text-anchor': 'end'})]),
     // Measures: the slab below and left, the pattern above and right.

@@ -17,7 +17,7 @@ export const phases = [
 ];
 
 const ofAction = {
-    mount_board: 'slabs', take_slab: 'slabs', clamp: 'slabs', glue: 'slabs', place: 'slabs', press: 'press', face: 'face', tool_change: 'tool_change', load_tool: 'tool_change',
+    mount_board: 'slabs', take_slab: 'slabs', clamp: 'slabs', glue: 'slabs', set_dowels: 'slabs', place: 'slabs', press: 'press', face: 'face', tool_change: 'tool_change', load_tool: 'tool_change',
 };
 const ofKind = {face: 'face', rough: 'rough', semi_rough: 'rough'};
 

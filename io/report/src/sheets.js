@@ -2,7 +2,7 @@
 
 import {duration, figure, make, plural, words} from './dom.js';
 import {boardsText, costText, cutListSheet} from './cutlist.js';
-import {keepOutsIn, planView, sideView, stackView, supportsIn} from './drawing.js';
+import {dowelsIn, keepOutsIn, planView, sideView, stackView, supportsIn} from './drawing.js';
 import {blankOf, blankSize, data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
 import {filledVolume} from './wood.js';
 import {tableHeight, zeroOf} from './zero.js';
@@ -117,6 +117,16 @@ function magazine(l) {
     return make('div', {}, make('h4', {}, `Magazine of ${plan.job.machine.magazine} places`), table(['✓', 'Place', 'Put in', 'Tool', 'In place of', 'Before'], rows, [1]));
 }
 
+// What is said of dowels under layer l's slab, and of those whose holes are drilled into its top; nothing where it has none.
+function dowelFacts(l) {
+    const of = under => dowelsIn(l).filter(d => d.under === under), under = of(true), over = of(false), lines = [];
+    const size = d => `Ø ${figure(d.diameter, 2)} mm`, places = list => list.map(d => `(${d.says})`).join(', ');
+    if (under.length) lines.push(make('p', {}, make('strong', {}, `laid on ${plural(under.length, 'dowel')} ${size(under[0])}, ${figure(Math.floor(under[0].below + under[0].above - 1 + 1e-6), 0)} mm long`),
+        ` at x, y ${places(under)}; first drill its underside ${figure(under[0].above, 1)} mm deep, places in dowels.csv`));
+    if (over.length) lines.push(make('p', {}, `its last program drills ${plural(over.length, 'hole')} ${size(over[0])}, ${figure(over[0].below, 1)} mm deep, at ${places(over)}`));
+    return lines;
+}
+
 function sheet(l, minutes) {
     const layer = plan.layers[l], programs = operations.filter(operation => operation.layer === l), zero = zeroOf(l), filled = filledVolume(l);
     const off = layer.z_bottom + layer.slab_thickness - layer.z_top, files = [...new Set(programs.map(o => fileOf(o).replace(/^nc\//, '')))], first = files[0], final = files[files.length - 1];
@@ -131,11 +141,11 @@ function sheet(l, minutes) {
         warningBox(warnings, 5),
         make('div', {class: 'drawings'}, planView(l, [132, 92]), sideView(l, [58, 92])),
         make('p', {class: 'key'}, make('i', {class: 'glue'}), ' glue ', make('i', {class: 'solid'}), ' pattern at the bottom ', make('i', {class: 'dash'}), ' at the top ',
-            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, supportsIn(l).length ? [make('i', {class: 'support'}), ' support, stays till the end '] : null, keepOutsIn(l).length ? [make('i', {class: 'keep-out'}), ' no tool enters '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
+            filled >= 1 ? [make('i', {class: 'air'}), ' stays filled '] : null, supportsIn(l).length ? [make('i', {class: 'support'}), ' support, stays till the end '] : null, keepOutsIn(l).length ? [make('i', {class: 'keep-out'}), ' no tool enters '] : null, dowelsIn(l).length ? [make('i', {class: 'dowel'}), ' dowel under the slab, dashed: hole in its top '] : null, make('i', {class: 'zero'}), ' zero. Measures in mm; z as the control shows it.'),
         make('div', {class: 'facts'},
             fact('Zero', make('p', {}, zero.place), make('p', {}, make('strong', {}, 'XY: '), zero.xy, zero.after ? `; ${zero.after}` : null), make('p', {}, make('strong', {}, 'Z: '), zero.z), make('p', {}, make('strong', {}, 'Table: '), tableHeight(l))),
             fact('Slab', make('p', {}, make('strong', {}, `${blankSize(l)} × ${figure(layer.slab_thickness, 2)} mm`), ` ${plan.job.material.name}${laid}`),
-                make('p', {}, `pattern z ${figure(layer.z_bottom, 3)} to ${figure(layer.z_top, 3)}; facing takes ${figure(off, 2)} mm`), make('p', {class: 'soft'}, layer.reason)),
+                make('p', {}, `pattern z ${figure(layer.z_bottom, 3)} to ${figure(layer.z_top, 3)}; facing takes ${figure(off, 2)} mm`), make('p', {class: 'soft'}, layer.reason), dowelFacts(l)),
             fact(glued ? 'Glue and press' : 'No glue', glued
                 ? [make('p', {}, make('strong', {}, `${figure(layer.glue_area_mm2 / 100, 1)} cm²`), ` ${plan.job.bonding.glue}, on the yellow`), glueHead(l),
                     make('p', {}, make('strong', {}, `${figure(layer.press_force_n, 0)} N`), ` for ${figure(plan.job.bonding.press_time_s, 0)} s`)]
@@ -150,6 +160,7 @@ function sheet(l, minutes) {
             l === 0 ? `base board ${figure(plan.job.machine.base_board_thickness, 1)} mm mounted and level` : `layer ${plan.layers[l - 1].index} faced, free of dust where the glue goes`,
             `slab at least ${figure(layer.slab_thickness, 2)} mm thick all over, no warp`,
             ...keepOutsIn(l).filter(k => k.slab || l === 0).map(k => `stands where it is drawn, no higher: ${k.says}`),
+            ...(dowelsIn(l).some(d => d.under) ? ['holes in the slab’s underside drilled as dowels.csv says, dowels set and dry-fitted'] : []),
             ...(glued ? [`glue on, pressed ${figure(plan.job.bonding.press_time_s, 0)} s`] : []),
             'XY and Z touched off as above',
             ...((plan.post ? plan.post.base : plan.job.machine.post) === 'grbl' ? ['at each change of tool: the new tip touched off where the last one was'] : []),
@@ -168,6 +179,16 @@ function slabsToLay() {
         lines.get(key).count += layer.slabs;
     });
     return [...lines.values()].sort((a, b) => b.area - a.area || b.thickness - a.thickness);
+}
+
+// Dowels of one size, the shortest first.
+function dowelsToCut() {
+    const counts = new Map();
+    for (const d of plan.layers.flatMap(layer => layer.dowels ?? [])) {
+        const length = Math.floor(d.below + d.above - 1 + 1e-6), key = `Ø ${figure(d.diameter, 2)} × ${figure(length, 0)} mm`;
+        counts.set(key, {length, count: (counts.get(key)?.count ?? 0) + 1});
+    }
+    return [...counts].sort((a, b) => a[1].length - b[1].length).map(([size, {count}]) => `${plural(count, 'dowel')} ${size}`);
 }
 
 function cover(minutes) {
@@ -189,6 +210,7 @@ function cover(minutes) {
                 ...slabsToLay().map(s => `${plural(s.count, 'slab')} ${plan.job.material.name}, ${s.size} × ${figure(s.thickness, 2)} mm`),
                 ...(plan.wood ? [`sawn from ${boardsText()} (cut list below)`] : []),
                 `${plan.job.bonding.glue} for ${figure(t.glue_mm2 / 100, 0)} cm²`,
+                ...dowelsToCut(),
                 `${plural(used.length, 'tool')} as below, programs of nc/ on the control${control()}`,
                 `press up to ${figure(Math.max(...plan.layers.map(layer => layer.press_force_n)), 0)} N, ${figure(plan.job.bonding.press_time_s, 0)} s a joint`,
                 `machine carries ${figure(t.stack_mass_kg, 0)} kg`,
