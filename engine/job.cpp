@@ -203,6 +203,7 @@ void validate_machine(const Machine& c) {
     require("machine.base_board_thickness", c.base_board_thickness, 0, 1000);
     require("machine.base_board_cut", c.base_board_cut, -1000, c.base_board_thickness);
     validate_keep_outs(c.keep_outs);
+    validate_pin(c.pin, c.zero == WorkZero::pin);
 }
 
 void validate_prepare(const PrepareJob& p) {
@@ -272,6 +273,19 @@ Job with_tools_for(const Job& job, double height) {
 Frame frame_of(const Machine& machine) {
     if (machine.frame != Frame::automatic) return machine.frame;
     return machine.table == BuildTable::moving ? Frame::layer_top : Frame::pattern_base;
+}
+
+double zero_height(const Machine& machine, double layer_top) {
+    switch (frame_of(machine)) {
+        case Frame::layer_top:
+            return layer_top;
+        case Frame::table_top:
+            return -machine.base_board_thickness;
+        case Frame::pattern_base:
+        case Frame::automatic:
+            break;
+    }
+    return 0;
 }
 
 double level_acceleration(const Machine& machine) {
@@ -470,6 +484,7 @@ void validate(const Job& job) {
     require("material.kfc", m.kfc, 0, 100000);
     require("material.kfe", m.kfe, 0, 100000);
     validate_prepare(job.prepare);
+    validate_probing(job.probing);
     const Slabs& s = job.slabs;
     if (s.thicknesses.empty())
         refuse("slabs.thicknesses", "slabs.thicknesses is empty",
