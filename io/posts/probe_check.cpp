@@ -168,7 +168,7 @@ private:
         else if (touches_ == 0 && std::abs(down - probing.search) > kSame)
             complain("probe.search", fmt::format("seeks {:.3f} mm down, not {:.3f} mm", down, probing.search),
                      std::abs(down - probing.search));
-        else if (touches_ > 0 && !(down <= 2 * kProbeBack + kSame && down > above_))
+        else if (touches_ > 0 && !(down <= 2 * kProbeBack + kSame && above_ > 0 && down > above_))
             complain("probe.search", fmt::format("seeks {:.3f} mm down from {:.3f} mm above", down, above_),
                      down);
         ++touches_;
