@@ -171,7 +171,7 @@ void validate_handler(const Machine& c) {
                "give machine.handler_speed and machine.feed_height and a table that moves, or \"stack\"");
 }
 
-void validate_machine(const Machine& c) {
+void validate_machine(const Machine& c, const Probing& probing) {
     require("machine.travel_x", c.travel_x, 1, 100000, Ends::closed, kNoRouter);
     require("machine.travel_y", c.travel_y, 1, 100000, Ends::closed, kNoRouter);
     require("machine.travel_z", c.travel_z, 1, 100000, Ends::closed, kNoRouter);
@@ -182,6 +182,7 @@ void validate_machine(const Machine& c) {
     require("machine.feed_mass_kg", c.feed_mass_kg, 0.001, 1e6, Ends::closed, kNoRouter);
     validate_handler(c);
     validate_motion(c);
+    validate_probing(probing);
     require("machine.max_rpm", c.max_rpm, 10, 1e6, Ends::closed, kNoRouter);
     require("machine.spindle_power_w", c.spindle_power_w, 0, 1e6);
     require("machine.spindle_torque_nm", c.spindle_torque_nm, 0, 1e4);
@@ -484,7 +485,6 @@ void validate(const Job& job) {
     require("material.kfc", m.kfc, 0, 100000);
     require("material.kfe", m.kfe, 0, 100000);
     validate_prepare(job.prepare);
-    validate_probing(job.probing);
     const Slabs& s = job.slabs;
     if (s.thicknesses.empty())
         refuse("slabs.thicknesses", "slabs.thicknesses is empty",
@@ -504,7 +504,7 @@ void validate(const Job& job) {
                            s.facing_allowance, s.thicknesses.front()),
                "face off less, or take that slab out of the list");
 
-    validate_machine(job.machine);
+    validate_machine(job.machine, job.probing);
     validate_bonding(job.bonding);
     validate_prices(job.prices, s);
 

@@ -321,6 +321,13 @@ void visit_price_keys(PricesLike& prices, Visit& visit) {
     visit.key("machine_hour", prices.machine_hour, "of an hour of the whole build");
 }
 
+/// Walks the keys of the machine, and of its probing programs where it has some.
+template <class JobLike, class Visit>
+void visit_machine_and_probing_keys(JobLike& job, Visit& visit) {
+    visit_machine_keys(job.machine, visit);
+    if (shows(visit, job.machine.probe != ProbeMode::none)) visit_probing_keys(job.probing, visit);
+}
+
 /// Walks every key of the job but the tools and the keep-outs: first those of the top, then table by table.
 template <class JobLike, class Visit>
 void visit_job_keys(JobLike& job, Visit& visit) {
@@ -351,8 +358,7 @@ void visit_job_keys(JobLike& job, Visit& visit) {
                "of the four to a helical edge: oblique, or printed (Luo 6.2.2, whose matrix repeats a row)");
 
     visit_slab_keys(job.slabs, visit);
-    visit_machine_keys(job.machine, visit);
-    if (shows(visit, job.machine.probe != ProbeMode::none)) visit_probing_keys(job.probing, visit);
+    visit_machine_and_probing_keys(job, visit);
 
     visit_bonding_keys(job.bonding, visit);
 
