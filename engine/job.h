@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/keep_out.h"
+#include "engine/probing.h"
 #include "kernels/features/features.h"
 #include "kernels/forces/forces.h"
 #include "kernels/geometry/cutter_shape.h"
@@ -23,9 +24,10 @@ enum class Repair : std::uint8_t { none, mend, rebuild };
 /// Boundaries as printed (LUO 4.2.5), by the dynamic program, or, slabs bonded to any thickness, those with
 /// which the whole build takes least; `uniform`: as far apart as they may be, for comparing.
 enum class LayerStrategy : std::uint8_t { printed, optimal, combined, uniform };
-/// Where z = 0 lies in the programs: at the pattern's bottom, at the layer's top, or as suits the machine's
-/// table (frame_of).
-enum class Frame : std::uint8_t { pattern_base, layer_top, automatic };
+/// Where z = 0 lies in the programs: at the pattern's bottom, which is the base board's top; at each layer's
+/// top as it is faced; at the machine table's top, the base board's thickness lower; or as suits the
+/// machine's table (frame_of).
+enum class Frame : std::uint8_t { pattern_base, layer_top, automatic, table_top };
 /// Whether the build table sinks by every layer, so that all of them are cut at one height (RPM), or stays.
 enum class BuildTable : std::uint8_t { moving, fixed };
 /// Who puts the glue on, and where: by hand; the machine's head on the underside of the slab that the handler
@@ -62,8 +64,8 @@ enum class AccessRule : std::uint8_t { sections, exact, printed };
 enum class RoughLimit : std::uint8_t { smaller, finish_radius, cusp };
 enum class ToolKind : std::uint8_t { flat, ball, face, drill };
 /// Where x 0, y 0 of the programs lies: where the model has it, at the base board's corner of least x and y,
-/// or in the base board's middle.
-enum class WorkZero : std::uint8_t { model, corner, centre };
+/// in the base board's middle, or at a pin (Machine::pin).
+enum class WorkZero : std::uint8_t { model, corner, centre, pin };
 /// How large slabs are sawn: all of them as the pattern needs, or each as its own layer does.
 enum class Blanks : std::uint8_t { pattern, layer };
 /// The axis whose coordinate changes its sign; the mirror lies in the origin.
@@ -169,6 +171,9 @@ struct Machine {
     LengthUnit units = LengthUnit::mm;        ///< of the programs
     ProgramSpan programs = ProgramSpan::operation;
     WorkZero zero = WorkZero::model;
+    /// x and y of a pin or a bored hole, from the base board's corner of least x and y; empty: there is none.
+    std::vector<double> pin;
+    ProbeMode probe = ProbeMode::none;
     double base_board_thickness = 19;  ///< the sacrificial board under the first layer
     double base_board_cut = -1;        ///< how deep it may be cut; negative: the finish tool's overrun
     std::vector<KeepOut> keep_outs;    ///< what no tool may run into
@@ -320,6 +325,7 @@ struct Job {
     Material material;
     Slabs slabs;
     Machine machine;
+    Probing probing;
     Bonding bonding;
     Tolerances tolerances;
     LayerPlanning layers;
@@ -341,6 +347,9 @@ struct Job {
 /// The frame of the programs, never `automatic`: the machine's, or else layer_top where its table moves and
 /// pattern_base where it is fixed.
 [[nodiscard]] Frame frame_of(const Machine& machine);
+
+/// The programs' z = 0 in a layer, mm, pattern-base. @param layer_top of that layer, likewise
+[[nodiscard]] double zero_height(const Machine& machine, double layer_top);
 
 /// mm/s² that the machine has in every direction of x and y: that of the slower axis.
 [[nodiscard]] double level_acceleration(const Machine& machine);

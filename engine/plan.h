@@ -199,9 +199,8 @@ struct SequenceStep {
     int id = 0;
     int layer = 0;
     std::string action;  ///< "mount_board", "load_feed", "take_slab", "clamp", "glue", "set_dowels", "place",
-                         ///< "press",
-                         ///< "table", "touch_off", "load_tool", "tool_change", "face", "mill", "unload",
-                         ///< "mould_box"
+                         ///< "press", "table", "touch_off", "probe", "load_tool", "tool_change", "face",
+                         ///< "mill", "unload", "mould_box"
     std::vector<int> needs;
     std::vector<std::pair<std::string, double>> numbers;     ///< named quantities, names end in their unit
     std::vector<std::pair<std::string, std::string>> words;  ///< programs, materials
@@ -275,6 +274,15 @@ struct InputInfo {
     std::optional<InputPreparation> prepared;  ///< where anything was done
 };
 
+/// A program that finds z = 0 (machine.probe).
+struct ProbeProgram {
+    int layer = 0;     ///< Layer::index
+    int tool = 0;      ///< in the spindle
+    std::string file;  ///< name under nc/
+    /// x and y of what is touched and z that the tip then has, mm, as the programs count.
+    std::array<double, 3> touches{};
+};
+
 struct Plan {
     InputInfo input;
     Job job;
@@ -284,6 +292,7 @@ struct Plan {
     std::vector<Feature> features;
     std::vector<Layer> layers;
     std::vector<SequenceStep> sequence;
+    std::vector<ProbeProgram> probes;  ///< in the order of execution
     Totals totals;
     std::vector<Diagnostic> diagnostics;
 };
@@ -296,6 +305,8 @@ struct Plan {
                 return to_units(plan.stock_min[k]);
             case WorkZero::centre:
                 return to_units((plan.stock_min[k] + plan.stock_max[k]) / 2);
+            case WorkZero::pin:
+                return to_units(plan.stock_min[k] + plan.job.machine.pin.at(k));
             case WorkZero::model:
                 break;
         }

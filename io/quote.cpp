@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "engine/schedule/probes.h"
 #include "io/read/pattern.h"
 #include "io/slabwright.h"
 #include "io/text/json_text.h"
@@ -13,6 +14,7 @@ namespace slabwright {
 
 QuotedModel quote_model(Context& context, const PatternSource& source, const Job& job) {
     validate(job);
+    check_probing(job);
     const std::shared_ptr<Pattern> pattern = read_pattern(context, source, job);
     return {pattern->read.input, quote(context, pattern->read.mesh.view(), job), job};
 }

@@ -25,6 +25,7 @@
 #include "engine/tools/libraries.h"
 #include "io/posts/dialect.h"
 #include "io/posts/gcode_writer.h"
+#include "io/posts/probe_program.h"
 #include "io/posts/tool_table.h"
 #include "io/proof.h"
 #include "io/read/input_file.h"
@@ -213,6 +214,10 @@ void fill(Context& context, const Plan& plan, const OutputFolder& out, const std
             if (stale.erase(name) == 0 || other.empty() || other[l])
                 files.push_back({&plan.layers[l], o, name});
         }
+    for (const ProbeProgram& probe : plan.probes) {
+        stale.erase(probe.file);
+        write_file_in(programs_folder, probe.file, probe_text(plan, probe));
+    }
     for (const std::string& file : stale) std::filesystem::remove(programs_folder / file);
     context.begin_phase("writing", 0.985, 1.0, files.size() + 1);
     // Each program is a file of its own, so threads cannot mix their texts.

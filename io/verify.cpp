@@ -12,8 +12,11 @@
 
 #include "engine/base_board.h"
 #include "engine/schedule/magazine.h"
+#include "engine/schedule/probes.h"
 #include "engine/simulate/dowel_proof.h"
 #include "engine/simulate/keep_out_check.h"
+#include "engine/simulate/planned_build.h"
+#include "io/posts/probe_check.h"
 #include "io/posts/program_check.h"
 #include "io/posts/tool_table_check.h"
 #include "io/read/cut_list_check.h"
@@ -33,6 +36,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uint64_t kMostCutListBytes = 16 * kMebibyte;
+constexpr std::uint64_t kMostProbeBytes = kMebibyte;
 
 std::string read_file(const fs::path& path, const char* code, std::uint64_t most_bytes) {
     return read_whole(path, {ErrorKind::verification, code, most_bytes, "plan again"});
@@ -200,6 +204,28 @@ void read_programs(Context& context, const PlannedFolder& folder, const FolderRe
         violations.insert(violations.end(), found.begin(), found.end());
 }
 
+/// The programs that find z = 0, read back.
+void check_probes(const PlannedFolder& folder, std::vector<Violation>& violations) {
+    if (folder.build.probes.empty()) return;
+    const PlannedBuild build(folder.build);
+    for (const PlannedProbe& probe : folder.build.probes) {
+        const std::string file = probe.file.substr(3);
+        if (std::error_code ignored; !fs::is_regular_file(folder.path / probe.file, ignored)) {
+            violations.push_back(
+                {"program.missing", "plan.json names it, nc/ does not hold it", file, 0, {}, 0});
+            continue;
+        }
+        ProbeTask task{probe.tool, 0};
+        for (const DueSlab& slab : build.slabs())
+            if (slab.layer == probe.layer)
+                task.touch_z = build.probed_at(slab, slab.z_bottom + slab.thickness)[2];
+        const std::vector<Violation> found =
+            check_probe(read_file(folder.path / probe.file, "verify.program", kMostProbeBytes), file, task,
+                        folder.build.job);
+        violations.insert(violations.end(), found.begin(), found.end());
+    }
+}
+
 /// What nc/ holds beside the planned programs.
 void find_strangers(const PlannedFolder& folder, std::vector<Violation>& violations) {
     const fs::path programs = folder.path / "nc";
@@ -207,6 +233,7 @@ void find_strangers(const PlannedFolder& folder, std::vector<Violation>& violati
     std::set<std::string> planned;
     for (const PlannedProgram& program : folder.build.programs)
         planned.insert(std::string(file_of(program.file).substr(3)));
+    for (const PlannedProbe& probe : folder.build.probes) planned.insert(probe.file.substr(3));
     std::vector<std::string> strangers;
     for (const auto& entry : fs::directory_iterator(programs))
         if (const std::string file = entry.path().filename().string(); !planned.contains(file))
@@ -261,10 +288,14 @@ Verification verify_folder(Context& context, const std::string& directory, const
     if (job.machine.post == Post::linuxcnc) {  // the others' tables are kept at the control
         const fs::path table = out / "tool.tbl";
         const std::string text = read_file(table, "verify.tool_table", kMostToolTableBytes);
-        if (const auto magazine = stated_magazine(out / "sequence.json", job.machine.magazine))
-            violations = check_tool_table(text, table.string(), input.tools, *magazine);
+        if (const auto magazine = stated_magazine(out / "sequence.json", job.machine.magazine)) {
+            std::vector<Tool> tools = input.tools;
+            if (const std::optional<Tool> probe = probe_of(job)) tools.push_back(*probe);
+            violations = check_tool_table(text, table.string(), tools, *magazine);
+        }
     }
     read_programs(context, folder, refusal, input.programs, violations);
+    check_probes(folder, violations);
     find_strangers(folder, violations);
     const std::vector<Violation> entered = check_keep_outs(context, input, folder.build.zero);
     violations.insert(violations.end(), entered.begin(), entered.end());

@@ -61,6 +61,7 @@ struct Scramble {
     void key(const char* name, std::vector<double>& value, const char*) {
         if (name == std::string_view("thicknesses")) value = {6.35, 12.7, real(18, 19), 25.4};
         else if (name == std::string_view("board_m2")) value = {real(10, 20)};
+        else if (name == std::string_view("pin")) value = {1, real(2, 3)};
         else if (name == std::string_view("skin_box")) value = {0, 1, real(0, 2), 3, 4, 5};
         else value = {1, 2, real(0.1, 3)};
     }

@@ -93,9 +93,13 @@ void leave_local_frame(Plan& plan, const std::array<double, 2>& by) {
     const bool of_model = plan.job.machine.zero == WorkZero::model;
     for (SequenceStep& step : plan.sequence)
         for (auto& [name, number] : step.numbers) {
-            if (name == "x_mm" || (of_model && name == "slab_left_mm")) number += by[0];
-            if (name == "y_mm" || (of_model && name == "slab_front_mm")) number += by[1];
+            if (name == "x_mm" || (of_model && (name == "slab_left_mm" || name == "touch_x_mm")))
+                number += by[0];
+            if (name == "y_mm" || (of_model && (name == "slab_front_mm" || name == "touch_y_mm")))
+                number += by[1];
         }
+    for (ProbeProgram& probe : plan.probes)
+        for (std::size_t k = 0; of_model && k < 2; ++k) probe.touches[k] += by[k];
     for (Diagnostic& d : plan.diagnostics)
         if (d.where) move(*d.where, by);
 }

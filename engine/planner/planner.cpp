@@ -28,6 +28,7 @@
 #include "engine/schedule/heights.h"
 #include "engine/schedule/joints.h"
 #include "engine/schedule/keep_outs.h"
+#include "engine/schedule/probes.h"
 #include "engine/schedule/schedule.h"
 #include "engine/schedule/standing_walls.h"
 #include "engine/schedule/supports.h"
@@ -512,6 +513,7 @@ Plan plan_from(Context& context, MeshView view, Plan plan, const std::array<doub
 
 Plan make_plan(Context& context, const Mesh& mesh, const InputInfo& input, const Job& job) {
     validate(job);
+    check_probing(job);
     Plan plan;
     plan.input = input;
     plan.totals.part_volume_mm3 = input.volume_mm3;

@@ -123,6 +123,12 @@ double bonding_minutes(const Job& job, const Box3& box, double glued, const Blan
            60;
 }
 
+/// Changes of tools in a layer. The probe is put in once more, where it is a tool of its own.
+double changes_of(const Machine& machine) {
+    const bool probed = machine.probe == ProbeMode::cycle && knows_tool_lengths(machine.post);
+    return probed ? kChanges + 1 : kChanges;
+}
+
 }  // namespace
 
 Quote quote(Context& context, MeshView mesh, const Job& job) {
@@ -197,7 +203,7 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
     work("raster", ways.raster, tools.finish, kRates.raster);
     result.work.push_back({"places", ways.places, kRates.place * ways.places});
     for (const QuotedWork& w : result.work) result.cutting_minutes += w.minutes;
-    result.tool_change_minutes = kChanges * layer_count * job.machine.tool_change_s / 60;
+    result.tool_change_minutes = changes_of(job.machine) * layer_count * job.machine.tool_change_s / 60;
     result.build_minutes = result.cutting_minutes + result.bonding_minutes + result.tool_change_minutes;
     Amounts amounts = amounts_of(plan, result.boards);
     amounts.glue_m2 = result.glue_m2;

@@ -253,6 +253,9 @@ private:
             }
             if (key != "tool" || static_cast<int>(value) == spindle_tool_) continue;
             change_tool(own.layer, static_cast<int>(value), needs);
+            // The new tip is not touched off, for it is probed.
+            if (own.action == "probe" && !knows_tool_lengths(machine_.post))
+                steps_.back().words = {{"length", "probe"}};
         }
         for (const auto& [key, value] : step.numbers)
             if (key == "last_tool") spindle_tool_ = static_cast<int>(value);  // its program changes it

@@ -41,7 +41,7 @@ LayerHeights layer_heights(const Machine& machine, double first_top, double laye
     const bool counts_from_top = frame_of(machine) == Frame::layer_top;
     const double risen = layer_top - first_top;
     LayerHeights heights;
-    heights.origin = counts_from_top ? layer_top : 0;
+    heights.origin = zero_height(machine, layer_top);
     // What does not move with the layer must be moved on the control.
     if (machine.table == BuildTable::moving) heights.work_offset = counts_from_top ? 0 : -risen;
     else heights.work_offset = counts_from_top ? risen : 0;

@@ -9,6 +9,7 @@
 #include "engine/schedule/glue_path.h"
 #include "engine/schedule/heights.h"
 #include "engine/schedule/magazine.h"
+#include "engine/schedule/probes.h"
 #include "engine/schedule/slab_steps.h"
 
 namespace slabwright {
@@ -137,7 +138,8 @@ class ProgramRuns {
 public:
     /// @param plan, totals outlive this
     ProgramRuns(Plan& plan, Totals& totals)
-        : steps_(plan.sequence),
+        : plan_(plan),
+          steps_(plan.sequence),
           machine_(plan.job.machine),
           totals_(totals),
           magazine_(steps_, machine_, tools_of_programs(plan)) {}
@@ -148,6 +150,7 @@ public:
     /// The programs of a layer. @param origin mm, of their z = 0. @param last the step before them. @returns
     /// the last one's
     int run(const Layer& layer, double origin, int last) {
+        int files = 0;
         for (std::size_t begin = 0, end = 0; begin < layer.operations.size(); begin = end) {
             end = file_end(layer, begin);
             const Operation& first = layer.operations[begin];
@@ -159,7 +162,11 @@ public:
                 SequenceStep& change = add(layer, "tool_change", needs, machine_.tool_change_s);
                 say_tool(change, first.tool, machine_, magazine_.place_of(first.tool));
                 needs = {change.id};
+                if (probes_each_tool_) change.words = {{"length", "probe"}};
             }
+            if (probes_each_tool_ && (files == 0 || first.tool != spindle_tool_))
+                needs = {add_probe(plan_, layer, first.tool, files, {needs.begin(), needs.end()})};
+            ++files;
             for (std::size_t i = begin; i < end; ++i)
                 count(totals_, layer.operations[i], spindle_tool_, machine_);
             const bool faces = end - begin == 1 && first.kind == OperationKind::face;
@@ -170,14 +177,37 @@ public:
         return last;
     }
 
+    /// What finds z = 0 for a layer before its first program; nothing where each tool is probed.
+    /// @param top of the raw slab, as the programs count @param last the step before @returns the last one's
+    int find_zero(const Layer& layer, double top, int last) {
+        if (probes_each_tool_) return last;
+        if (machine_.probe == ProbeMode::none) {
+            SequenceStep& touch = add(layer, "touch_off", {last}, 0);
+            say_touch_off(touch, plan_, layer, top);
+            return touch.id;
+        }
+        const int tool = plan_.job.probing.tool;
+        if (tool != spindle_tool_) {
+            SequenceStep& change = add(layer, "tool_change", {last}, machine_.tool_change_s);
+            say_tool(change, tool, machine_, 0);
+            last = change.id;
+            spindle_tool_ = tool;
+            ++totals_.tool_changes;
+            totals_.tool_change_minutes += machine_.tool_change_s / 60;
+        }
+        return add_probe(plan_, layer, tool, 0, {last});
+    }
+
 private:
     SequenceStep& add(const Layer& layer, const char* action, const std::set<int>& needs, double seconds) {
         return add_step(steps_, layer.index, action, {needs.begin(), needs.end()}, seconds);
     }
 
+    Plan& plan_;
     std::vector<SequenceStep>& steps_;
     const Machine& machine_;
     Totals& totals_;
+    const bool probes_each_tool_ = machine_.probe == ProbeMode::cycle && !knows_tool_lengths(machine_.post);
     MagazineSteps magazine_;
     std::size_t program_ = 0;
     int spindle_tool_ = 0;
@@ -194,6 +224,7 @@ void schedule(Plan& plan) {
 
     std::vector<SequenceStep>& steps = plan.sequence;
     steps.clear();
+    plan.probes.clear();
     const auto add = [&](int layer, const char* action, std::vector<int> needs,
                          double seconds) -> SequenceStep& {
         return add_step(steps, layer, action, std::move(needs), seconds);
@@ -228,9 +259,9 @@ void schedule(Plan& plan) {
         SequenceStep& table = add(layer.index, "table", {pressed}, sinking);
         table.numbers = {{"table_height_mm", heights.table}, {"work_offset_z_mm", heights.work_offset}};
         // What the touch-off has to find: the raw slab's top, in the programs' frame.
-        SequenceStep& touch = add(layer.index, "touch_off", {table.id}, 0);
-        say_touch_off(touch, plan, layer, layer.z_bottom + layer.slab_thickness - heights.origin);
-        stack_ready = runs.run(layer, heights.origin, touch.id);
+        const int set = table.id,
+                  found = runs.find_zero(layer, layer.z_bottom + layer.slab_thickness - heights.origin, set);
+        stack_ready = runs.run(layer, heights.origin, found);
     }
     const int last_layer = plan.layers.empty() ? 0 : plan.layers.back().index;
     const int unloaded = add(last_layer, "unload", {stack_ready}, 0).id;

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "engine/simulate/glue_steps.h"
 #include "engine/simulate/planned_build.h"
+#include "engine/simulate/probe_steps.h"
 #include "engine/simulate/step_order.h"
 
 namespace slabwright {
@@ -17,10 +17,10 @@ namespace {
 constexpr double kForce = 0.01;  // N and kg
 constexpr double kLitres = 0.01;
 
-class BuildReplay : GlueSteps {
+class BuildReplay : ProbeSteps {
 public:
     BuildReplay(const BuildPlan& plan, const BuildSequence& sequence, BuildState from)
-        : GlueSteps(plan, sequence.steps, std::move(from)), sequence_(sequence), slabs_(build_.slabs()) {
+        : ProbeSteps(plan, sequence.steps, std::move(from)), sequence_(sequence), slabs_(build_.slabs()) {
         s_.ran_in.resize(plan.programs.size());
         s_.faced_off.resize(plan.face_offs.size());
         programs_left_.resize(plan.layers.size());
@@ -55,13 +55,6 @@ private:
         if (plan_.job_stated) expect_seconds(planned, kSeconds);
     }
 
-    /// The step presupposes what `cause` brought about; without it, the machine is not in a state for the
-    /// step.
-    void require(Cause cause, const char* lacking) {
-        if (!cause) complain("sequence.order", lacking);
-        else wait_for(cause);
-    }
-
     // --- the steps
 
     void check_head() {
@@ -87,6 +80,7 @@ private:
                                                                {"press", &BuildReplay::press},
                                                                {"table", &BuildReplay::table},
                                                                {"touch_off", &BuildReplay::touch_off},
+                                                               {"probe", &BuildReplay::probe},
                                                                {"tool_change", &BuildReplay::tool_change},
                                                                {"load_tool", &BuildReplay::load_tool},
                                                                {"face", &BuildReplay::program},
@@ -390,12 +384,12 @@ private:
     void tool_change() {
         wait_for(s_.last_cut);
         const std::optional<int> tool = whole("tool");
-        if (tool && !build_.tool_of(*tool))
+        if (tool && !build_.tool_of(*tool) && !probes_with(*tool))
             complain("sequence.tool", fmt::format("tool {} is not in the library", *tool));
         if (s_.unused_change) complain("sequence.tool", "the tool before it has not been used");
         if (tool && s_.spindle_tool == *tool)
             complain("sequence.tool", fmt::format("tool {} is in the spindle already", *tool));
-        const std::optional<const PlannedProgram*> user = tool_user();
+        const std::optional<const PlannedProgram*> user = is_for_probe() ? std::nullopt : tool_user();
         if (user && !*user) complain("sequence.order", "no program is left for the tool");
         if (const PlannedProgram* next = user.value_or(nullptr)) {
             expect_layer(next->layer);
@@ -412,7 +406,7 @@ private:
                          fmt::format("tool {} stands in no place of the magazine", *tool));
         }
         expect_job_seconds(plan_.job.machine.tool_change_s);
-        if (!build_.keeps_lengths()) expect_word("sequence.tool_length", "length", "touch off");
+        if (!build_.keeps_lengths()) find_length();
         s_.spindle_tool = tool.value_or(0);
         s_.tool_in = here();
         s_.unused_change = true;

@@ -46,6 +46,13 @@ struct PlannedProgram {
     std::optional<double> low, high;  ///< mm, pattern-base, of its text; none where it could not be read
 };
 
+/// A program that finds z = 0, as the plan states it.
+struct PlannedProbe {
+    std::string file;       ///< "nc/…"
+    std::size_t layer = 0;  ///< index into the layers
+    int tool = 0;
+};
+
 /// What a sequence has to build.
 struct BuildPlan {
     Job job;                  ///< of it machine, material and bonding
@@ -58,6 +65,7 @@ struct BuildPlan {
     std::vector<PlannedProgram> programs;
     /// Programs that face spoilt layers off (engine/planner/remake.h); of the plan's own sequence none.
     std::vector<PlannedProgram> face_offs{};
+    std::vector<PlannedProbe> probes{};
     std::vector<Tool> tools;
     bool flask = false;
     std::optional<double> flask_mass_kg, sand_litres;
@@ -91,10 +99,11 @@ struct BuildSequence {
 /// the step), sequence.layer, sequence.feed, sequence.stack (a slab from another pile), sequence.handler (its
 /// place), sequence.slab, sequence.glue, sequence.glue_side, sequence.glue_path, sequence.glue_mass,
 /// sequence.pump, sequence.dowels, sequence.place, sequence.press,
-/// sequence.table, sequence.touch_off, sequence.tool, sequence.magazine (a tool that does not stand where it
-/// is wanted, a place that is none or holds another), sequence.program, sequence.height (of a program),
-/// sequence.mass, sequence.travel, sequence.time, sequence.value (a quantity that is missing or not what the
-/// plan says), sequence.missing (what was not done in the end).
+/// sequence.table, sequence.touch_off, sequence.probe (another place or height), sequence.tool,
+/// sequence.magazine (a tool that does not stand where it is wanted, a place that is none or holds another),
+/// sequence.program, sequence.height (of a program), sequence.mass, sequence.travel, sequence.time,
+/// sequence.value (a quantity that is missing or not what the plan says), sequence.missing (what was not done
+/// in the end).
 [[nodiscard]] std::vector<Violation> replay_build(const BuildPlan& plan, const BuildSequence& sequence);
 
 /// What some steps bring about.

@@ -34,7 +34,8 @@ std::size_t PlannedBuild::most_steps() const {
     const std::size_t builds = 1 + std::min(plan_.face_offs.size(), kMostRemakes);
     // A program may have a change of tool and a load of the magazine before it; its places are filled too.
     const auto places = static_cast<std::size_t>(plan_.job_stated ? plan_.job.machine.magazine : 0);
-    return builds * (kStepsEach * (slabs_.size() + 2) + 3 * programs + places);
+    return builds * (kStepsEach * (slabs_.size() + 2) + 3 * programs + places) +
+           3 * builds * plan_.probes.size();
 }
 
 double PlannedBuild::board_mass(double thickness) const {
@@ -49,6 +50,7 @@ PlannedJoint PlannedBuild::joint_of(const DueSlab& slab) const {
 }
 
 double PlannedBuild::origin_of(std::size_t layer) const {
+    if (plan_.frame == Frame::table_top) return -plan_.job.machine.base_board_thickness;
     return plan_.frame == Frame::layer_top ? plan_.layers[layer].z_top : 0;
 }
 
@@ -60,6 +62,19 @@ double PlannedBuild::bottom_at(std::size_t layer) const {
 std::array<std::pair<const char*, double>, 2> PlannedBuild::edges_of(const DueSlab& slab) const {
     return {{{"slab_left_mm", slab.blank.min[0] - plan_.zero[0]},
              {"slab_front_mm", slab.blank.min[1] - plan_.zero[1]}}};
+}
+
+std::array<double, 3> PlannedBuild::probed_at(const DueSlab& slab, double top) const {
+    const Probing& probing = plan_.job.probing;
+    const double origin = origin_of(slab.layer);
+    std::array<double, 3> at{(slab.blank.min[0] + slab.blank.max[0]) / 2 - plan_.zero[0],
+                             (slab.blank.min[1] + slab.blank.max[1]) / 2 - plan_.zero[1], top - origin};
+    if (probing.reference.size() == 3)
+        at = {plan_.stock_min[0] + probing.reference[0] - plan_.zero[0],
+              plan_.stock_min[1] + probing.reference[1] - plan_.zero[1],
+              probing.reference[2] - plan_.job.machine.base_board_thickness - origin};
+    at[2] += probing.plate;
+    return at;
 }
 
 const Tool* PlannedBuild::tool_of(int number) const {

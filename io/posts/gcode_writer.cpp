@@ -250,10 +250,39 @@ std::vector<std::string> remarks(const Operation& operation, const Tool& tool) {
                         decimal(operation.minutes, 2))};
 }
 
+/// What z = 0 is.
+std::string_view height_words(Frame frame) {
+    switch (frame) {
+        case Frame::layer_top:
+            return "the layer's top";
+        case Frame::table_top:
+            return "the machine table's top";
+        case Frame::pattern_base:
+        case Frame::automatic:
+            break;
+    }
+    return "the pattern's bottom";
+}
+
+/// Where x = y = 0 lies; "" where the model has it.
+std::string zero_words(const Machine& machine) {
+    switch (machine.zero) {
+        case WorkZero::corner:
+            return "the base board's left front corner";
+        case WorkZero::centre:
+            return "the base board's middle";
+        case WorkZero::pin:
+            return fmt::format("the pin, x {} y {} mm from the base board's corner",
+                               decimal(machine.pin.at(0), 3), decimal(machine.pin.at(1), 3));
+        case WorkZero::model:
+            break;
+    }
+    return "";
+}
+
 /// All that comes before the first motion of a program.
 std::string head_text(const Plan& plan, const Layer& layer, const Operation& operation, const Tool& tool,
                       const Dialect& dialect) {
-    const bool layer_top = frame_of(plan.job.machine) == Frame::layer_top;
     const Templates templates(plan, operation, dialect);
     std::string text = templates.filled(dialect.begin);
     const auto comment = [&](const std::string& line) { text += comment_line(dialect, line); };
@@ -261,10 +290,8 @@ std::string head_text(const Plan& plan, const Layer& layer, const Operation& ope
     comment(fmt::format("pattern {}", plan.input.file));
     comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index,
                         plan.layers.size(), decimal(layer.z_bottom, 4), decimal(layer.z_top, 4)));
-    comment(fmt::format("z = 0 at {}", layer_top ? "the layer's top" : "the pattern's bottom"));
-    if (plan.job.machine.zero != WorkZero::model)
-        comment(fmt::format("x = y = 0 at the base board's {}",
-                            plan.job.machine.zero == WorkZero::corner ? "left front corner" : "middle"));
+    comment(fmt::format("z = 0 at {}", height_words(frame_of(plan.job.machine))));
+    if (const std::string at = zero_words(plan.job.machine); !at.empty()) comment("x = y = 0 at " + at);
     for (const std::string& line : remarks(operation, tool)) comment(line);
     const std::string notes = templates.filled(dialect.notes);
     for (std::size_t at = 0; at < notes.size();) {

@@ -200,7 +200,7 @@ std::vector<FeedLength> written_feed_lengths(const Dialect& dialect, std::span<c
 
 ProgramOrigin program_origin(const Plan& plan, const Layer& layer) {
     const Point2 zero = work_zero(plan);
-    return {zero.x, zero.y, frame_of(plan.job.machine) == Frame::layer_top ? to_units(layer.z_top) : 0};
+    return {zero.x, zero.y, to_units(zero_height(plan.job.machine, layer.z_top))};
 }
 
 }  // namespace slabwright

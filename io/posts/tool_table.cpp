@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "engine/schedule/probes.h"
 #include "io/posts/gcode_writer.h"
 #include "io/text/json_text.h"
 
@@ -12,6 +13,8 @@ namespace slabwright {
 std::string tool_table(const Job& job, const std::vector<int>& magazine) {
     std::vector<const Tool*> tools;
     for (const Tool& tool : job.tools) tools.push_back(&tool);
+    const std::optional<Tool> probe = probe_of(job);
+    if (probe) tools.push_back(&*probe);
     std::sort(tools.begin(), tools.end(), [](const Tool* a, const Tool* b) { return a->number < b->number; });
     std::string text;
     std::size_t outside = magazine.size();  // the last pocket that was given

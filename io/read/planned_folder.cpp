@@ -426,6 +426,23 @@ void read_layers(const Field& layers, PlannedFolder& folder) {
     }
 }
 
+/// The programs that find z = 0.
+void read_probes(const Field& plan, BuildPlan& build) {
+    if (!plan.has("probes")) return;
+    const Field all = plan["probes"];
+    if (!build.job_stated) all.fail("are there, and no job that says how they probe");
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        PlannedProbe& probe = build.probes.emplace_back();
+        probe.file = all[i]["file"].text();
+        const std::string name = fs::path(probe.file).filename().string();
+        if (name.empty() || probe.file != "nc/" + name) all[i]["file"].fail("is no file of nc/");
+        probe.tool = all[i]["tool"].whole();
+        const int index = all[i]["layer"].whole();
+        while (probe.layer < build.layers.size() && build.layers[probe.layer].index != index) ++probe.layer;
+        if (probe.layer == build.layers.size()) all[i]["layer"].fail("is no layer of the plan");
+    }
+}
+
 }  // namespace
 
 GcodeLimits gcode_limits(const Tolerances& tolerances) {
@@ -465,7 +482,10 @@ Program read_planned_program(const std::string& text, const std::string& file, c
 
 void place_program(Program& program, const BuildPlan& build, std::size_t layer) {
     // Programs count from there in whole 0.1 µm, as they were written.
-    const double up = build.frame == Frame::layer_top ? to_mm(to_units(build.layers[layer].z_top)) : 0;
+    const double from = build.frame == Frame::layer_top   ? build.layers[layer].z_top
+                        : build.frame == Frame::table_top ? -build.job.machine.base_board_thickness
+                                                          : 0;
+    const double up = to_mm(to_units(from));
     for (ProgramStep& s : program.steps) s.x += build.zero[0], s.y += build.zero[1], s.z += up;
     for (ProgramArc& a : program.arcs) a.arc.x += build.zero[0], a.arc.y += build.zero[1], a.arc.z += up;
 }
@@ -489,6 +509,8 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     build.frame = enumerator(kFrameWords, plan["frame"]);
     if (build.frame == Frame::automatic) plan["frame"].fail("names no frame");
     if (plan.has("job") && read_job(plan["job"], build)) read_post(plan, out, refusal, build.job.machine);
+    if (build.frame == Frame::table_top && !build.job_stated)
+        plan["frame"].fail("counts from the machine's table, and no job says how thick the base board is");
     build.job.machine.keep_outs = read_keep_outs(plan);
     build.pattern = plan["input"]["file"].text();
     build.sha256 = plan["input"]["sha256"].text();
@@ -505,6 +527,7 @@ PlannedFolder read_planned_folder(const fs::path& out, const FolderRefusal& refu
     const Field tools = plan["tools"];
     for (std::size_t i = 0; i < tools.size(); ++i) build.tools.push_back(read_tool(tools[i]));
     read_layers(plan["layers"], folder);
+    read_probes(plan, build);
     folder.states_wood = plan.has("wood");
     SimulationInput& input = folder.simulation;
     input.machine = build.job.machine;

@@ -147,6 +147,7 @@ BuildSequence read_sequence(std::string_view text) {
     BuildSequence sequence;
     const std::string frame = text_of(member(document, "frame", of), "frame");
     if (frame == word_of(kFrameWords, Frame::layer_top)) sequence.frame = Frame::layer_top;
+    else if (frame == word_of(kFrameWords, Frame::table_top)) sequence.frame = Frame::table_top;
     else if (frame != word_of(kFrameWords, Frame::pattern_base))
         refuse(fmt::format("its frame \"{}\" is none", frame));
     sequence.pattern = text_of(member(document, "pattern", of), "pattern");

@@ -37,8 +37,10 @@ inline constexpr Word<RoughPattern> kRoughWords[] = {{"contour", RoughPattern::c
 inline constexpr Word<RestPattern> kRestWords[] = {{"by_library", RestPattern::by_library},
                                                    {"raster", RestPattern::raster},
                                                    {"contour", RestPattern::contour}};
-inline constexpr Word<Frame> kFrameWords[] = {
-    {"pattern-base", Frame::pattern_base}, {"layer-top", Frame::layer_top}, {"auto", Frame::automatic}};
+inline constexpr Word<Frame> kFrameWords[] = {{"pattern-base", Frame::pattern_base},
+                                              {"layer-top", Frame::layer_top},
+                                              {"table-top", Frame::table_top},
+                                              {"auto", Frame::automatic}};
 inline constexpr Word<BuildTable> kTableWords[] = {{"moving", BuildTable::moving},
                                                    {"fixed", BuildTable::fixed}};
 inline constexpr Word<GlueHead> kGlueHeadWords[] = {{"auto", GlueHead::automatic},
@@ -47,8 +49,19 @@ inline constexpr Word<GlueHead> kGlueHeadWords[] = {{"auto", GlueHead::automatic
                                                     {"stack", GlueHead::stack}};
 inline constexpr Word<ProgramSpan> kProgramWords[] = {
     {"operation", ProgramSpan::operation}, {"tool", ProgramSpan::tool}, {"layer", ProgramSpan::layer}};
-inline constexpr Word<WorkZero> kZeroWords[] = {
-    {"model", WorkZero::model}, {"corner", WorkZero::corner}, {"centre", WorkZero::centre}};
+inline constexpr Word<WorkZero> kZeroWords[] = {{"model", WorkZero::model},
+                                                {"corner", WorkZero::corner},
+                                                {"centre", WorkZero::centre},
+                                                {"pin", WorkZero::pin}};
+inline constexpr Word<ProbeMode> kProbeWords[] = {{"none", ProbeMode::none}, {"cycle", ProbeMode::cycle}};
+
+/// Whether a visitor is shown keys that a job does not use: all are but one that says it writes used ones
+/// only (kUsedKeysOnly), so that plans without them stay as they are.
+template <class Visit>
+constexpr bool shows(const Visit&, bool used) {
+    if constexpr (requires { Visit::kUsedKeysOnly; }) return used;
+    else return true;
+}
 inline constexpr Word<Blanks> kBlankWords[] = {{"pattern", Blanks::pattern}, {"layer", Blanks::layer}};
 inline constexpr Word<Post> kPostWords[] = {{"linuxcnc", Post::linuxcnc}, {"fanuc", Post::fanuc},
                                             {"haas", Post::haas},         {"grbl", Post::grbl},
@@ -212,9 +225,11 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
     visit.key("magazine_swap_s", machine.magazine_swap_s,
               "s, by hand: one tool out of a place of the magazine, another in");
     visit.key("clearance", machine.clearance, "mm of air between a rapid and the highest stock");
-    visit.word("frame", machine.frame, kFrameWords,
-               "pattern-base (z = 0 at the pattern's bottom), layer-top (z = 0 at the layer's top), or auto: "
-               "layer-top where the table moves");
+    visit.word(
+        "frame", machine.frame, kFrameWords,
+        "z 0 of the programs: pattern-base (the pattern's bottom, the base board's top), layer-top (each "
+        "layer's top as faced), table-top (the machine table's top), or auto: layer-top where the table "
+        "moves, else pattern-base");
     visit.word("post", machine.post, kPostWords,
                "the control that the programs are for: linuxcnc, fanuc, haas, grbl, mach, iso, siemens or "
                "heidenhain; or a file, a post of your own");
@@ -225,11 +240,36 @@ void visit_machine_keys(MachineLike& machine, Visit& visit) {
                "changes), or a layer, which changes tools by itself");
     visit.word("zero", machine.zero, kZeroWords,
                "x 0, y 0 of the programs: model (as the model has it), corner (left front corner of the base "
-               "board) or centre (its middle)");
+               "board), centre (its middle) or pin (machine.pin)");
+    if (shows(visit, !machine.pin.empty()))
+        visit.key("pin", machine.pin,
+                  "mm, [x, y] of a pin or bored hole from the base board's left front corner; []: none");
+    if (shows(visit, machine.probe != ProbeMode::none))
+        visit.word("probe", machine.probe, kProbeWords,
+                   "who finds z 0: none (the operator, touch_off) or cycle (a probing program in nc/, see "
+                   "[probing])");
     visit.key("base_board_thickness", machine.base_board_thickness,
               "mm, the sacrificial board under the first layer");
     visit.key("base_board_cut", machine.base_board_cut,
               "mm that may be cut into it; negative: as deep as the finish tool overruns");
+}
+
+/// Walks the keys of the probing programs.
+template <class ProbingLike, class Visit>
+void visit_probing_keys(ProbingLike& probing, Visit& visit) {
+    visit.table("probing", "how machine.probe = \"cycle\" finds z 0");
+    visit.key("tool", probing.tool, "T number of the probe, or of a tool of the library with a touch plate");
+    visit.key("tip_diameter", probing.tip_diameter, "mm, of the probe");
+    visit.key("fast_feed", probing.fast_feed, "mm/min, until it touches for the first time");
+    visit.key("slow_feed", probing.slow_feed, "mm/min, the second time, which counts");
+    visit.key("plate", probing.plate,
+              "mm, thickness of the touch plate that lies on what is touched; 0: none");
+    visit.key("search", probing.search,
+              "mm that it goes down at most; it begins half of that over what it touches");
+    visit.key("retract", probing.retract, "mm that it goes up when it is done");
+    visit.key("reference", probing.reference,
+              "mm, [x, y, z] of what is touched: x and y from the base board's left front corner, z from the "
+              "table's top; []: each layer's slab");
 }
 
 /// Walks the keys of what lies in stock.
@@ -279,6 +319,13 @@ void visit_price_keys(PricesLike& prices, Visit& visit) {
               "of a square metre of base board; 0: as slabs of its thickness, else not stated");
     visit.key("glue_kg", prices.glue_kg, "of a kilogram of glue; needs bonding.glue_g_per_m2");
     visit.key("machine_hour", prices.machine_hour, "of an hour of the whole build");
+}
+
+/// Walks the keys of the machine, and of its probing programs where it has some.
+template <class JobLike, class Visit>
+void visit_machine_and_probing_keys(JobLike& job, Visit& visit) {
+    visit_machine_keys(job.machine, visit);
+    if (shows(visit, job.machine.probe != ProbeMode::none)) visit_probing_keys(job.probing, visit);
 }
 
 /// Walks the keys of the flask.
@@ -337,7 +384,7 @@ void visit_plain_job_keys(JobLike& job, Visit& visit) {
                "of the four to a helical edge: oblique, or printed (Luo 6.2.2, whose matrix repeats a row)");
 
     visit_slab_keys(job.slabs, visit);
-    visit_machine_keys(job.machine, visit);
+    visit_machine_and_probing_keys(job, visit);
 
     visit_bonding_keys(job.bonding, visit);
 

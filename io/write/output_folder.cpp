@@ -153,6 +153,9 @@ std::optional<std::set<std::string>> programs_of(const fs::path& plan) {
         for (const json& layer : document.at("layers"))
             for (const json& operation : layer.at("operations"))
                 names.insert(fs::path(file_of(operation.at("file").get<std::string>())).filename().string());
+        if (document.contains("probes"))
+            for (const json& probe : document.at("probes"))
+                names.insert(fs::path(probe.at("file").get<std::string>()).filename().string());
         return names;
     } catch (const json::exception&) {
         return std::nullopt;

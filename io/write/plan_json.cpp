@@ -27,6 +27,7 @@ void put_xy(JsonText& json, const std::array<double, 2>& xy) {
 
 /// Writes the keys of a job as they are spelled in the job file.
 struct JobPrinter {
+    static constexpr bool kUsedKeysOnly = true;
     JsonText& json;
     const OwnPost* own_post;  // null: none
     bool in_table = false;
@@ -484,6 +485,15 @@ std::string plan_json(const Plan& plan) {
     json.key("layers").begin_array();
     for (const Layer& layer : plan.layers) put_layer(json, plan, layer);
     json.end();
+    if (!plan.probes.empty()) {
+        json.key("probes").begin_array();
+        for (const ProbeProgram& probe : plan.probes) {
+            json.begin_object(Shape::line).key("file").string("nc/" + probe.file);
+            json.key("layer").integer(probe.layer);
+            json.key("tool").integer(probe.tool).end();
+        }
+        json.end();
+    }
     json.key("totals");
     put_totals(json, plan.totals);
     const CutList list = cut_list(plan);

@@ -5,7 +5,7 @@ import {boardsText, costText, cutListSheet} from './cutlist.js';
 import {dowelsIn, keepOutsIn, planView, sideView, stackView, supportsIn} from './drawing.js';
 import {blankOf, blankSize, data, fileOf, layerMinutes, operations, phases, plan, remarks, sharedMinutes, toolOf, toolUse, totals, verdict, verify} from './report.js';
 import {filledVolume} from './wood.js';
-import {tableHeight, zeroOf} from './zero.js';
+import {probed, tableHeight, zeroHeight, zeroOf} from './zero.js';
 
 const cubic = mm3 => mm3 < 1000 ? `${figure(mm3, 0)} mm³` : `${figure(mm3 / 1000, 1)} cm³`;
 
@@ -162,10 +162,10 @@ function sheet(l, minutes) {
             ...keepOutsIn(l).filter(k => k.slab || l === 0).map(k => `stands where it is drawn, no higher: ${k.says}`),
             ...(dowelsIn(l).some(d => d.under) ? ['holes in the slab’s underside drilled as dowels.csv says, dowels set and dry-fitted'] : []),
             ...(glued ? [`glue on, pressed ${figure(plan.job.bonding.press_time_s, 0)} s`] : []),
-            'XY and Z touched off as above',
-            ...((plan.post ? plan.post.base : plan.job.machine.post) === 'grbl' ? ['at each change of tool: the new tip touched off where the last one was'] : []),
+            probed(l) ? 'XY touched off as above, Z probed by program' : 'XY and Z touched off as above',
+            ...((plan.post ? plan.post.base : plan.job.machine.post) === 'grbl' && !probed(l) ? ['at each change of tool: the new tip touched off where the last one was'] : []),
             'dust extraction on',
-            `after facing: top measured at z ${figure(plan.frame === 'layer-top' ? 0 : layer.z_top, 2)}`,
+            `after facing: top measured at z ${figure(layer.z_top - zeroHeight(l), 2)}`,
         ].map((text, i) => tick(`L${l}:check${i}`, text))),
         make('p', {class: 'proof'}, make('strong', {}, 'Simulated: '), simulated(l).join('; ')));
 }

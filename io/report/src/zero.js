@@ -7,11 +7,18 @@ import {woodHeights} from './wood.js';
 const least = 0.005; // mm; nearer is the same place
 const [ox, oy] = plan.zero ?? [0, 0]; // x 0, y 0 of the programs, as the model has it
 
-const places = {corner: 'x 0, y 0 at the base board’s left front corner', centre: 'x 0, y 0 in the middle of the base board'};
+const [pinX, pinY] = plan.job.machine.pin ?? [0, 0];
+const places = {corner: 'x 0, y 0 at the base board’s left front corner', centre: 'x 0, y 0 in the middle of the base board', pin: `x 0, y 0 at the pin ${figure(pinX, 2)} mm right of and ${figure(pinY, 2)} mm behind the base board’s left front corner`};
+
+// Where z 0 of layer l's programs lies above the pattern's bottom, mm.
+export function zeroHeight(l) {
+    if (plan.frame === 'table-top') return -plan.job.machine.base_board_thickness;
+    return plan.frame === 'layer-top' ? plan.layers[l].z_top : 0;
+}
 
 // The raw slab's top, the face and the layer's bottom as the control shows them, mm.
 export function shownHeights(l) {
-    const layer = plan.layers[l], down = plan.frame === 'layer-top' ? layer.z_top : 0;
+    const layer = plan.layers[l], down = zeroHeight(l);
     return {raw: layer.z_bottom + layer.slab_thickness - down, face: layer.z_top - down, bottom: layer.z_bottom - down, base: -down};
 }
 
@@ -36,19 +43,29 @@ function woodAfter(l) {
 
 const millimetres = value => `${value < 0 ? '−' : ''}${figure(Math.abs(value), 2)}`;
 
+// Which programs find z 0 in layer l, and what they touch; '' where the operator does.
+export function probed(l) {
+    const {layers, probes = [], job: {probing}} = plan, here = probes.filter(p => p.layer === layers[l].index);
+    if (!here.length) return '';
+    const [x, y, up] = probing.reference, on = probing.reference.length
+        ? `the reference ${figure(up, 2)} mm above the table, ${figure(x, 2)} mm right of and ${figure(y, 2)} mm behind the base board’s corner`
+        : 'the middle of the raw slab';
+    return `${here.map(p => `${p.file.slice(3)} (T${p.tool})`).join(', ')} find${here.length > 1 ? '' : 's'} z 0 on ${on}: begin with the tip over it, ${figure(probing.search / 2, 2)} mm above at most`;
+}
+
 // {place, xy, z, after, warnings}: sentences for the sheet of layer l.
 export function zeroOf(l) {
-    const [x0, y0] = blankOf(l).min.map((v, k) => v - [ox, oy][k]), above = plan.frame === 'layer-top', layer = plan.layers[l], at = shownHeights(l), warnings = [];
+    const [x0, y0] = blankOf(l).min.map((v, k) => v - [ox, oy][k]), above = plan.frame === 'layer-top', onTable = plan.frame === 'table-top', layer = plan.layers[l], at = shownHeights(l), warnings = [];
     const off = outside(l);
     const own = places[plan.job.machine.zero], across = own ?? 'x 0, y 0 of the STL';
-    const place = above ? `${across}; z 0 at this layer’s finished top` : `${across}; z 0 at the pattern’s bottom, the base board’s top`;
+    const place = `${across}; z 0 at ${above ? 'this layer’s finished top' : onTable ? 'the machine table’s top' : 'the pattern’s bottom, the base board’s top'}`;
     const xy = `slab’s left edge is x ${millimetres(x0)}, its front edge y ${millimetres(y0)}`;
     const raw = `raw slab top is z ${millimetres(at.raw)} if the slab is ${figure(layer.slab_thickness, 2)} mm thick: measure it`;
-    const z = !above && l === 0 ? `the base board’s top before the slab is laid is z 0; after that the ${raw}` : raw;
-    if (off && plan.job.machine.zero !== 'corner') warnings.push(`Zero x 0, y 0 lies in the air, ${off} the slab: there is no wood to touch. Touch off the slab’s edges.`);
-    if (!above && l > 0) warnings.push(`Z 0 lies ${figure(layer.z_bottom, 2)} mm under this slab, inside the stack: it cannot be touched.`);
-    const after = own === places.corner ? 'touch the base board’s left and front edges once; they stay through the build' : off ? '' : woodAfter(l) === false ? 'the raw slab covers x 0, y 0; milled, it is in the air there' : 'the slab covers x 0, y 0';
-    return {place, xy, z, after, warnings};
+    const z = onTable ? `touch the machine’s table beside the base board: z 0; or the ${raw}` : !above && l === 0 ? `the base board’s top before the slab is laid is z 0; after that the ${raw}` : raw;
+    if (off && plan.job.machine.zero !== 'corner' && plan.job.machine.zero !== 'pin') warnings.push(`Zero x 0, y 0 lies in the air, ${off} the slab: there is no wood to touch. Touch off the slab’s edges.`);
+    if (!above && !onTable && l > 0) warnings.push(`Z 0 lies ${figure(layer.z_bottom, 2)} mm under this slab, inside the stack: it cannot be touched.`);
+    const after = own === places.pin ? off ? 'touch the pin; it stays clear of the slab' : 'touch the pin before the slab covers it; the control keeps x and y through the build' : own === places.corner ? 'touch the base board’s left and front edges once; they stay through the build' : off ? '' : woodAfter(l) === false ? 'the raw slab covers x 0, y 0; milled, it is in the air there' : 'the slab covers x 0, y 0';
+    return {place, xy, z: [z, probed(l)].filter(Boolean).join('; '), after, warnings};
 }
 
 // How the control's zero has moved since the first layer, with the table or without it.

@@ -1,0 +1,116 @@
+#include "engine/schedule/probes.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "engine/schedule/slab_steps.h"
+#include "kernels/errors.h"
+
+namespace slabwright {
+
+namespace {
+
+constexpr const char* kByHand =
+    "leave machine.probe at \"none\": the sequence asks the operator to touch off";
+
+[[noreturn]] void refuse(const std::string& message, const std::string& remedy) {
+    throw Error(ErrorKind::usage, "job.probe", message, "machine.probe", remedy);
+}
+
+/// Why no probing program is written for a control; "" where one is.
+std::string_view unsure_of(Post post) {
+    switch (post) {
+        case Post::linuxcnc:
+        case Post::grbl:
+            return "";
+        case Post::fanuc:
+            return "the skip block G31 goes on without an alarm where nothing is touched, and the macro "
+                   "variables that tell are an option of the control";
+        case Post::haas:
+            return "the words that switch the probe on before G31 differ from machine to machine";
+        case Post::mach:
+            return "Mach's G31 goes on without an alarm where nothing is touched";
+        case Post::iso:
+            return "plain ISO has no word for a probing move";
+        case Post::siemens:
+            return "which input MEAS reads, and how a frame is set, differ from machine to machine";
+        case Post::heidenhain:
+            return "its touch probe cycles take feeds and heights from a table of the control, which no "
+                   "program tells";
+    }
+    return "";
+}
+
+}  // namespace
+
+void check_probing(const Job& job) {
+    const Machine& machine = job.machine;
+    if (machine.probe == ProbeMode::none) return;
+    if (const std::string_view why = unsure_of(machine.post); !why.empty())
+        refuse(fmt::format("no probing program is written for this machine.post: {}", why), kByHand);
+    if (machine.own_post) refuse("a post of your own has no probing program", kByHand);
+    if (machine.magazine > 0)
+        refuse("machine.probe is \"cycle\", and the probe has no place in the magazine",
+               "give machine.magazine = 0, or leave machine.probe at \"none\"");
+    const std::vector<double>& reference = job.probing.reference;
+    if (!reference.empty() && machine.table == BuildTable::moving)
+        refuse("probing.reference lies on the machine's table, which moves away with the stack",
+               "leave it out: each layer's slab is probed");
+    if (reference.empty() && !knows_tool_lengths(machine.post))
+        refuse(
+            "this control keeps no tool lengths, so each new tip is probed, and a slab that has been cut is "
+            "no place for that",
+            "give probing.reference, a pad or plate on a table that stays (machine.table = \"fixed\")");
+}
+
+std::optional<Tool> probe_of(const Job& job) {
+    if (job.machine.probe == ProbeMode::none || !knows_tool_lengths(job.machine.post)) return std::nullopt;
+    for (const Tool& tool : job.tools)
+        if (tool.number == job.probing.tool) return std::nullopt;
+    Tool probe;
+    probe.number = job.probing.tool;
+    probe.name = "probe";
+    probe.diameter = job.probing.tip_diameter;
+    return probe;
+}
+
+std::array<double, 3> probed_place(const Plan& plan, const Layer& layer) {
+    const Machine& machine = plan.job.machine;
+    const Probing& probing = plan.job.probing;
+    const Point2 zero = work_zero(plan);
+    const double origin = zero_height(machine, layer.z_top);
+    const Blank slab = slab_of(plan, layer);
+    std::array<double, 3> place{(slab.min[0] + slab.max[0]) / 2, (slab.min[1] + slab.max[1]) / 2,
+                                layer.z_bottom + layer.slab_thickness};
+    if (!probing.reference.empty())
+        place = {plan.stock_min[0] + probing.reference[0], plan.stock_min[1] + probing.reference[1],
+                 probing.reference[2] - machine.base_board_thickness};
+    return {place[0] - to_mm(zero.x), place[1] - to_mm(zero.y), place[2] + probing.plate - origin};
+}
+
+int add_probe(Plan& plan, const Layer& layer, int tool, int files, std::vector<int> needs) {
+    const Probing& probing = plan.job.probing;
+    ProbeProgram& probe = plan.probes.emplace_back();
+    probe.layer = layer.index;
+    probe.tool = tool;
+    probe.touches = probed_place(plan, layer);
+    // "L003_02z_…" sorts behind the layer's second program and before its third; "L003-0_…" before
+    // "L003.ngc".
+    const std::string stem = fmt::format("L{:03}", layer.index);
+    probe.file = program_file(plan.job.machine, plan.job.machine.programs == ProgramSpan::layer
+                                                    ? fmt::format("{}-0_probe_T{}", stem, tool)
+                                                    : fmt::format("{}_{:02}{}_probe_T{}", stem, files,
+                                                                  files == 0 ? "" : "z", tool));
+    SequenceStep& step = add_step(plan.sequence, layer.index, "probe", std::move(needs), 0);
+    step.numbers = {{"tool", tool},
+                    {"touch_x_mm", probe.touches[0]},
+                    {"touch_y_mm", probe.touches[1]},
+                    {"touch_z_mm", probe.touches[2]},
+                    {"start_z_mm", probe.touches[2] + probing.search / 2}};
+    step.words = {{"program", "nc/" + probe.file},
+                  {"touches", probing.reference.empty() ? "slab" : "reference"}};
+    return step.id;
+}
+
+}  // namespace slabwright

@@ -1,0 +1,29 @@
+// The programs that find z = 0 by touching (machine.probe): which there are, in which order they run, and
+// what each touches.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "engine/plan.h"
+
+namespace slabwright {
+
+/// @throws Error(usage, "job.probe") where machine.probe asks for programs that are not written for this
+/// machine or control, with the reason
+void check_probing(const Job& job);
+
+/// The probe, where the job's library does not hold its tool; none where nothing is probed with it.
+[[nodiscard]] std::optional<Tool> probe_of(const Job& job);
+
+/// What a probing program of a layer touches: x and y of the place and z that the tip then has, mm, as the
+/// programs count. The middle of the raw slab's top, or probing.reference; the plate's thickness is added.
+[[nodiscard]] std::array<double, 3> probed_place(const Plan& plan, const Layer& layer);
+
+/// Adds a probing program to plan.probes and its step, which stands for touch_off, to plan.sequence.
+/// @param tool in the spindle, @param files of the layer's programs that run before it
+/// @param needs of the step @returns its id
+int add_probe(Plan& plan, const Layer& layer, int tool, int files, std::vector<int> needs);
+
+}  // namespace slabwright
