@@ -1,6 +1,5 @@
 // How the programs' z = 0 is found on the machine by a probing cycle: what the job says of it, and where the
-// tip is then. A layer's slab is probed on its top as it is laid, in its middle, before anything cuts it; or
-// z is found on a reference beside the stack, whose height over the machine's table is known.
+// tip is then, over a reference beside the stack whose height over the machine's table is known.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +20,7 @@ struct Probing {
     double plate = 0;         ///< thickness of the touch plate that lies on what is touched
     double search = 20;       ///< that it goes down at most; it begins half of that over what it touches
     double retract = 10;      ///< that it goes up when it is done
-    /// x and y from the base board's left front corner, z from the machine table's top, of what is touched;
-    /// empty: each layer's slab.
+    /// x and y from the base board's left front corner, z from the machine table's top, of what is touched.
     std::vector<double> reference;
 };
 

@@ -217,8 +217,7 @@ void check_probes(const PlannedFolder& folder, std::vector<Violation>& violation
         }
         ProbeTask task{probe.tool, 0};
         for (const DueSlab& slab : build.slabs())
-            if (slab.layer == probe.layer)
-                task.touch_z = build.probed_at(slab, slab.z_bottom + slab.thickness)[2];
+            if (slab.layer == probe.layer) task.touch_z = build.probed_at(slab)[2];
         const std::vector<Violation> found =
             check_probe(read_file(folder.path / probe.file, "verify.program", kMostProbeBytes), file, task,
                         folder.build.job);

@@ -35,7 +35,9 @@ using slabwright::support::TemporaryFolder;
 namespace {
 
 const std::string kSphere = SLABWRIGHT_SOURCE_DIR "/tests/data/half-sphere.stl";
-constexpr const char* kOnTable = "[machine]\ntable = \"fixed\"\nprobe = \"cycle\"\n";
+constexpr const char* kOnTable =
+    "[probing]\nplate = 2.0\nreference = [-40.0, 25.0, 10.0]\n[machine]\ntable = \"fixed\"\nprobe = "
+    "\"cycle\"\n";
 constexpr const char* kGrbl =
     "[machine]\npost = \"grbl\"\nprograms = \"tool\"\ntable = \"fixed\"\nprobe = \"cycle\"\n"
     "[probing]\nplate = 1.5\nreference = [-40.0, 25.0, 10.0]\n";
@@ -159,27 +161,27 @@ TEST(Probing, JobsThatDoNotUseItSayNothingOfIt) {
     EXPECT_EQ(slurp(out + "/plan.json").find("\"pin\""), std::string::npos);
 }
 
-TEST(Probing, ALayersSlabIsProbedInTheMiddleOfItsRawTop) {
+TEST(Probing, TheReferenceIsProbedInEachLayer) {
     for (const char* units : {"mm", "in"})
         for (const char* frame : {"layer-top", "pattern-base", "table-top"}) {
             const TemporaryFolder folder;
             const std::string out = folder / "out";
-            const Plan planned = made(fmt::format("{}units = \"{}\"\nframe = \"{}\"\nzero = \"corner\"\n"
-                                                  "[probing]\nplate = 2.0\n",
-                                                  kOnTable, units, frame),
-                                      out);
+            const Plan planned = made(
+                fmt::format("{}units = \"{}\"\nframe = \"{}\"\nzero = \"corner\"\n", kOnTable, units, frame),
+                out);
             EXPECT_EQ(codes(out), "") << units << " " << frame;
             EXPECT_TRUE(steps_of(out, "touch_off").empty());
             const auto probed = steps_of(out, "probe");
             ASSERT_EQ(probed.size(), planned.layers.size());
             for (std::size_t l = 0; l < probed.size(); ++l) {
                 const Layer& layer = planned.layers[l];
-                EXPECT_NEAR(quantity(probed[l], "touch_x_mm"),
-                            (planned.stock_max[0] - planned.stock_min[0]) / 2, 1e-3);
-                EXPECT_NEAR(
-                    quantity(probed[l], "touch_z_mm"),
-                    layer.z_bottom + layer.slab_thickness + 2 - zero_height(planned.job.machine, layer.z_top),
-                    1e-6);
+                EXPECT_NEAR(quantity(probed[l], "touch_x_mm"), -40, 1e-6);
+                EXPECT_NEAR(quantity(probed[l], "touch_y_mm"), 25, 1e-6);
+                // The pattern's bottom lies on the base board.
+                EXPECT_NEAR(quantity(probed[l], "touch_z_mm"),
+                            10 + 2 - planned.job.machine.base_board_thickness -
+                                zero_height(planned.job.machine, layer.z_top),
+                            1e-6);
                 EXPECT_NEAR(quantity(probed[l], "start_z_mm"), quantity(probed[l], "touch_z_mm") + 10, 1e-6);
                 EXPECT_EQ(probed[l]["program"], fmt::format("nc/L{:03}_00_probe_T99.ngc", l + 1));
             }
@@ -213,7 +215,6 @@ TEST(Probing, EachTipIsProbedOnTheReferenceWhereTheControlKeepsNoLengths) {
         }
         if (action == "probe") {
             ++probes;
-            EXPECT_EQ(step["touches"], "reference");
             EXPECT_NEAR(quantity(step, "touch_z_mm"), 10 + 1.5 - planned.job.machine.base_board_thickness,
                         1e-6);
         }
@@ -324,12 +325,10 @@ TEST(Probing, AStepThatLiesIsTold) {
         nlohmann::json value;
         const char* code;
     };
-    const std::vector<Lie> lies{{"touch_x_mm", 3, "sequence.probe "},
-                                {"touch_z_mm", 3, "sequence.probe "},
-                                {"start_z_mm", 90, "sequence.probe "},
-                                {"tool", 2, "sequence.tool "},
-                                {"touches", "reference", "sequence.probe "},
-                                {"program", "nc/L001_01_face_T1.ngc", "sequence.program "}};
+    const std::vector<Lie> lies{
+        {"touch_x_mm", 3, "sequence.probe "},  {"touch_z_mm", 3, "sequence.probe "},
+        {"start_z_mm", 90, "sequence.probe "}, {"tool", 2, "sequence.tool "},
+        {"touch_y_mm", 0, "sequence.probe "},  {"program", "nc/L001_01_face_T1.ngc", "sequence.program "}};
     const TemporaryFolder folder;
     const std::string out = folder / "out";
     made(kOnTable, out);
@@ -356,7 +355,10 @@ TEST(Probing, IsRefusedWhereNoCycleIsSure) {
         EXPECT_TRUE(told.starts_with("job.probe: no probing program is written")) << post << told;
         EXPECT_NE(told.find("the sequence asks the operator"), std::string::npos);
     }
-    EXPECT_NE(refusal("[machine]\npost = \"grbl\"\nprobe = \"cycle\"\n").find("give probing.reference"),
+    EXPECT_NE(refusal("[machine]\npost = \"grbl\"\ntable = \"fixed\"\nprobe = \"cycle\"\n")
+                  .find("give probing.reference"),
+              std::string::npos);
+    EXPECT_NE(refusal("[machine]\ntable = \"fixed\"\nprobe = \"cycle\"\n").find("a raw slab is no place"),
               std::string::npos);
     EXPECT_NE(refusal("[machine]\nprobe = \"cycle\"\n[probing]\nreference = [0.0, 0.0, 0.0]\n")
                   .find("moves away with the stack"),
@@ -365,7 +367,13 @@ TEST(Probing, IsRefusedWhereNoCycleIsSure) {
               std::string::npos);
     for (const char* key : {"fast_feed = 900.0", "slow_feed = 300.0", "search = 1.0", "retract = 0.5",
                             "plate = -1.0", "reference = [1.0]"})
-        EXPECT_TRUE(refusal(fmt::format("{}[probing]\n{}\n", kOnTable, key)).starts_with("job.range")) << key;
+        EXPECT_TRUE(refusal(fmt::format("[machine]\ntable = \"fixed\"\nprobe = \"cycle\"\n[probing]\n{}{}\n",
+                                        std::string_view(key).starts_with("reference")
+                                            ? ""
+                                            : "reference = [-40.0, 25.0, 10.0]\n",
+                                        key))
+                        .starts_with("job.range"))
+            << key;
 }
 
 TEST(Probing, ABuildUnderWayIsResumedAndALayerMadeAgain) {

@@ -53,14 +53,15 @@ void check_probing(const Job& job) {
     if (machine.magazine > 0)
         refuse("machine.probe is \"cycle\", and the probe has no place in the magazine",
                "give machine.magazine = 0, or leave machine.probe at \"none\"");
-    const std::vector<double>& reference = job.probing.reference;
-    if (!reference.empty() && machine.table == BuildTable::moving)
+    if (machine.table == BuildTable::moving)
         refuse("probing.reference lies on the machine's table, which moves away with the stack",
-               "leave it out: each layer's slab is probed");
-    if (reference.empty() && !knows_tool_lengths(machine.post))
+               "z 0 moves by work_offset_z_mm of the sequence; leave machine.probe at \"none\"");
+    // A raw slab's thickness is known to some tenths of a millimetre. Were z 0 found on it, each slab would
+    // carry what it is thicker or thinner into its own layer and all above.
+    if (job.probing.reference.empty())
         refuse(
-            "this control keeps no tool lengths, so each new tip is probed, and a slab that has been cut is "
-            "no place for that",
+            "there is no probing.reference, and a raw slab is no place to find z 0: it may be thicker than "
+            "it says",
             "give probing.reference, a pad or plate on a table that stays (machine.table = \"fixed\")");
 }
 
@@ -79,14 +80,10 @@ std::array<double, 3> probed_place(const Plan& plan, const Layer& layer) {
     const Machine& machine = plan.job.machine;
     const Probing& probing = plan.job.probing;
     const Point2 zero = work_zero(plan);
-    const double origin = zero_height(machine, layer.z_top);
-    const Blank slab = slab_of(plan, layer);
-    std::array<double, 3> place{(slab.min[0] + slab.max[0]) / 2, (slab.min[1] + slab.max[1]) / 2,
-                                layer.z_bottom + layer.slab_thickness};
-    if (!probing.reference.empty())
-        place = {plan.stock_min[0] + probing.reference[0], plan.stock_min[1] + probing.reference[1],
-                 probing.reference[2] - machine.base_board_thickness};
-    return {place[0] - to_mm(zero.x), place[1] - to_mm(zero.y), place[2] + probing.plate - origin};
+    return {plan.stock_min[0] + probing.reference[0] - to_mm(zero.x),
+            plan.stock_min[1] + probing.reference[1] - to_mm(zero.y),
+            probing.reference[2] - machine.base_board_thickness + probing.plate -
+                zero_height(machine, layer.z_top)};
 }
 
 int add_probe(Plan& plan, const Layer& layer, int tool, int files, std::vector<int> needs) {
@@ -108,8 +105,7 @@ int add_probe(Plan& plan, const Layer& layer, int tool, int files, std::vector<i
                     {"touch_y_mm", probe.touches[1]},
                     {"touch_z_mm", probe.touches[2]},
                     {"start_z_mm", probe.touches[2] + probing.search / 2}};
-    step.words = {{"program", "nc/" + probe.file},
-                  {"touches", probing.reference.empty() ? "slab" : "reference"}};
+    step.words = {{"program", "nc/" + probe.file}};
     return step.id;
 }
 

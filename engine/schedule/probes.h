@@ -18,7 +18,7 @@ void check_probing(const Job& job);
 [[nodiscard]] std::optional<Tool> probe_of(const Job& job);
 
 /// What a probing program of a layer touches: x and y of the place and z that the tip then has, mm, as the
-/// programs count. The middle of the raw slab's top, or probing.reference; the plate's thickness is added.
+/// programs count: of probing.reference, the plate's thickness added.
 [[nodiscard]] std::array<double, 3> probed_place(const Plan& plan, const Layer& layer);
 
 /// Adds a probing program to plan.probes and its step, which stands for touch_off, to plan.sequence.

@@ -64,17 +64,13 @@ std::array<std::pair<const char*, double>, 2> PlannedBuild::edges_of(const DueSl
              {"slab_front_mm", slab.blank.min[1] - plan_.zero[1]}}};
 }
 
-std::array<double, 3> PlannedBuild::probed_at(const DueSlab& slab, double top) const {
+std::array<double, 3> PlannedBuild::probed_at(const DueSlab& slab) const {
     const Probing& probing = plan_.job.probing;
-    const double origin = origin_of(slab.layer);
-    std::array<double, 3> at{(slab.blank.min[0] + slab.blank.max[0]) / 2 - plan_.zero[0],
-                             (slab.blank.min[1] + slab.blank.max[1]) / 2 - plan_.zero[1], top - origin};
-    if (probing.reference.size() == 3)
-        at = {plan_.stock_min[0] + probing.reference[0] - plan_.zero[0],
-              plan_.stock_min[1] + probing.reference[1] - plan_.zero[1],
-              probing.reference[2] - plan_.job.machine.base_board_thickness - origin};
-    at[2] += probing.plate;
-    return at;
+    if (probing.reference.size() != 3) return {kUnbounded, kUnbounded, kUnbounded};  // nowhere
+    return {plan_.stock_min[0] + probing.reference[0] - plan_.zero[0],
+            plan_.stock_min[1] + probing.reference[1] - plan_.zero[1],
+            probing.reference[2] - plan_.job.machine.base_board_thickness + probing.plate -
+                origin_of(slab.layer)};
 }
 
 const Tool* PlannedBuild::tool_of(int number) const {

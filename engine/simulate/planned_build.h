@@ -44,7 +44,7 @@ public:
     [[nodiscard]] std::array<std::pair<const char*, double>, 2> edges_of(const DueSlab& slab) const;
     /// x and y of what a probing program touches, and z that the tip then has, as the programs count, mm.
     /// @param top of the stack then, mm, pattern-base
-    [[nodiscard]] std::array<double, 3> probed_at(const DueSlab& slab, double top) const;
+    [[nodiscard]] std::array<double, 3> probed_at(const DueSlab& slab) const;
     /// Whether the programs do not count x and y as the model does; a sequence must tell the edges then.
     [[nodiscard]] bool has_own_zero() const { return plan_.zero != std::array<double, 2>{}; }
     [[nodiscard]] const Tool* tool_of(int number) const;

@@ -30,13 +30,7 @@ void ProbeSteps::probe() {
                                               planned->file, planned->tool, s_.spindle_tool));
     if (s_.placed == 0) return;
     const DueSlab& slab = build_.slabs()[s_.placed - 1];
-    const bool on_slab = plan_.job.probing.reference.empty();
-    expect_word("sequence.probe", "touches", on_slab ? "slab" : "reference");
-    // What has been cut may not stand there.
-    const double raw = slab.z_bottom + slab.thickness;
-    if (on_slab && build_.stack_top(s_) != raw)
-        complain("sequence.probe", "touches a slab that has been faced");
-    const std::array<double, 3> at = build_.probed_at(slab, raw);
+    const std::array<double, 3> at = build_.probed_at(slab);
     expect("sequence.probe", "touch_x_mm", at[0], kLength);
     expect("sequence.probe", "touch_y_mm", at[1], kLength);
     expect("sequence.probe", "touch_z_mm", at[2], kLength);

@@ -34,9 +34,8 @@ std::string probe_text(const Plan& plan, const ProbeProgram& probe) {
     const auto& [x, y, z] = probe.touches;
     std::string text = comment(dialect, fmt::format("Slabwright {}: {}", SLABWRIGHT_VERSION, probe.file));
     text += comment(dialect, fmt::format("layer {}: finds z 0 with tool {}", probe.layer, probe.tool));
-    text += comment(dialect, fmt::format("touches {} at x {} y {} mm",
-                                         probing.reference.empty() ? "the raw slab" : "the reference",
-                                         number(x, 2), number(y, 2)));
+    text += comment(dialect,
+                    fmt::format("touches {} at x {} y {} mm", "the reference", number(x, 2), number(y, 2)));
     text += comment(dialect, fmt::format("begin with the tip over it, {} mm above at most",
                                          number(probing.search / 2, 2)));
     text += fmt::format("{} G17 G90 G94 G40 G49 G80\n", dialect.inch() ? "G20" : "G21");

@@ -269,7 +269,7 @@ void visit_probing_keys(ProbingLike& probing, Visit& visit) {
     visit.key("retract", probing.retract, "mm that it goes up when it is done");
     visit.key("reference", probing.reference,
               "mm, [x, y, z] of what is touched: x and y from the base board's left front corner, z from the "
-              "table's top; []: each layer's slab");
+              "table's top, which stays");
 }
 
 /// Walks the keys of what lies in stock.

@@ -3,7 +3,7 @@
 import {figure, make} from './dom.js';
 import {blankOf, data, flaskRings, plan} from './report.js';
 import {filledBoxes} from './wood.js';
-import {probed, shownHeights, zeroHeight} from './zero.js';
+import {shownHeights, zeroHeight} from './zero.js';
 
 const ink = '#1f252b', dim = '#525c66', red = '#b0141f', wood = '#f1e6d3', cutWood = '#d9bd8a', glueInk = '#8f6200', purple = '#5b3a8e';
 
@@ -149,10 +149,7 @@ export function sideView(l, paper) {
     mark(raw, at.raw, 'raw', dim, true), raw - layer.z_top > nothing ? mark(layer.z_top, at.face, 'face', '#17636b', raw - layer.z_top > 5 * u) : null, mark(layer.z_bottom, at.bottom, l === 0 ? 'board' : 'glue', glueInk),
     y(zero) <= paper[1] * u ? make('path', {d: `M${-1.8 * u} ${y(zero)}l${-0.01 * u} 0M${w / 2} ${y(zero)}l${-2 * u} ${-3.4 * u}h${4 * u}Z`, fill: red, stroke: '#fff', 'stroke-width': 0.3 * u}) : null,
     y(zero) <= paper[1] * u ? label(w / 2 + 2.6 * u, y(zero) - 0.9 * u, 'z 0', 3.6 * u, {fill: red, 'font-weight': 700})
-        : label(w / 2, y(low) + 4.4 * u, `z 0 ${figure(low - zero, 2)} mm lower`, 3.3 * u, {fill: red, 'font-weight': 700}),
-    probed(l) && !plan.job.probing.reference.length ? [
-        make('path', {d: `M${w / 2} ${y(raw) - 5 * u}V${y(raw)}m${-1.2 * u} ${-2 * u}l${1.2 * u} ${2 * u}l${1.2 * u} ${-2 * u}`, stroke: red, 'stroke-width': 0.5 * u, fill: 'none'}),
-        label(w / 2 + 1.8 * u, y(raw) - 2.4 * u, 'probed here', 3.2 * u, {fill: red, 'font-weight': 600})] : null);
+        : label(w / 2, y(low) + 4.4 * u, `z 0 ${figure(low - zero, 2)} mm lower`, 3.3 * u, {fill: red, 'font-weight': 700}));
 }
 
 // The finished stack seen along y: slabs, what is milled of them, glue as it lies, and in red what stays filled. A low stack is drawn taller

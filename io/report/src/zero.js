@@ -47,9 +47,8 @@ const millimetres = value => `${value < 0 ? '−' : ''}${figure(Math.abs(value),
 export function probed(l) {
     const {layers, probes = [], job: {probing}} = plan, here = probes.filter(p => p.layer === layers[l].index);
     if (!here.length) return '';
-    const [x, y, up] = probing.reference, on = probing.reference.length
-        ? `the reference ${figure(up, 2)} mm above the table, ${figure(x, 2)} mm right of and ${figure(y, 2)} mm behind the base board’s corner`
-        : 'the middle of the raw slab';
+    const [x, y, up] = probing.reference,
+        on = `the reference ${figure(up, 2)} mm above the table, ${figure(x, 2)} mm right of and ${figure(y, 2)} mm behind the base board’s corner`;
     return `${here.map(p => `${p.file.slice(3)} (T${p.tool})`).join(', ')} find${here.length > 1 ? '' : 's'} z 0 on ${on}: begin with the tip over it, ${figure(probing.search / 2, 2)} mm above at most`;
 }
 
