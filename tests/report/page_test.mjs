@@ -271,6 +271,22 @@ const numbers = text => text.split(',').map(Number);
     check.that('keyboard: plays', plays, await stage('share'));
     await page.keyboard.press('Space');
     check.equal('keyboard: and pauses', await page.locator('#play').textContent(), 'Play');
+    // The whole build: program by program, layer by layer, from the first.
+    await page.locator('#operation').selectOption('-1');
+    await page.locator('#play-build').click();
+    const goes = await page.waitForFunction(() => Number(document.querySelector('#operation').value) >= 2, null, {timeout: 60000}).then(() => true, () => false);
+    check.that('the whole build: one program after the other', goes, await page.locator('#operation').inputValue());
+    await page.locator('#play-build').click();
+    const stood = await stage('share');
+    check.equal('the whole build: pauses', await page.locator('#play-build').textContent(), 'Play the whole build');
+    await page.waitForTimeout(300);
+    check.equal('the whole build: and stands', await stage('share'), stood);
+    // What stands after the programs that were played is what each program alone finds.
+    await page.evaluate(() => { document.querySelector('#time').value = 0; document.querySelector('#time').dispatchEvent(new Event('input')); });
+    const found = await stage('stock'), at = await page.locator('#operation').inputValue();
+    await page.locator('#operation').selectOption('-1');
+    await page.locator('#operation').selectOption(at);
+    check.equal('the whole build: on the same wood', await stage('stock'), found);
 }
 
 // The accessibility checker, on the whole page and again in a narrow window.
@@ -374,6 +390,7 @@ check.equal('selection: no tables without a choice', await (async () => {
     check.that('supports: sawn off in the end', (await page.locator('.cover .steps li:last-child').textContent()).includes(`saw off ${supports.length} support`));
     check.equal('supports: no complaints', complaints, []);
     // So are bolts and fences, within the drawing; the first sheet asks for them.
+    check.equal('keep-outs: in the view', await page.evaluate(() => document.querySelector('#scene').dataset.keep), '3');
     check.equal('keep-outs: on all sheets', await page.locator('.plan-view path.keep-out').count(), 3 * planned.length);
     check.that('keep-outs: within the drawing', await page.locator('#sheet-1 .plan-view').evaluate(view => {
         const all = view.viewBox.baseVal;

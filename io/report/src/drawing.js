@@ -53,8 +53,8 @@ export function dowelsIn(l) {
     return [...told(plan.layers[l - 1], true), ...told(plan.layers[l], false)];
 }
 
-// What no tool may run into in a layer, in the places of the pattern: its outline as a path, its box, and its name
-// with its height, briefly and at length.
+// What no tool may run into in a layer, in the places of the pattern: its outline as a path and as corners, its box, its height, and
+// its name with that, briefly and at length.
 export function keepOutsIn(l) {
     const [ox, oy] = plan.zero ?? [0, 0], {min, max} = blankOf(l);
     return (plan.keep_outs ?? []).map(k => {
@@ -62,7 +62,8 @@ export function keepOutsIn(l) {
         const corners = k.circle.length ? [[cx - r, cy - r], [cx + r, cy + r]] : k.rectangle.length ? [[ax, ay], [bx, ay], [bx, by], [ax, by]] : k.polygon;
         const xs = corners.map(c => c[0] + ox), ys = corners.map(c => c[1] + oy), box = [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
         const d = k.circle.length ? `M${cx + ox - r} ${-cy - oy}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0Z` : `M${xs.map((x, i) => `${x} ${-ys[i]}`).join('L')}Z`;
-        return {name: k.name, d, box, slab: k.from === 'slab', brief: `${k.name}, ${figure(k.height, 1)} mm`, says: `${k.name}, ${figure(k.height, 1)} mm ${k.from === 'slab' ? 'over the slab' : 'over the board'}`};
+        const around = k.circle.length ? Array.from({length: 48}, (_, i) => [cx + ox + r * Math.cos(i * Math.PI / 24), cy + oy + r * Math.sin(i * Math.PI / 24)]) : xs.map((x, i) => [x, ys[i]]);
+        return {name: k.name, d, around, box, height: k.height, slab: k.from === 'slab', brief: `${k.name}, ${figure(k.height, 1)} mm`, says: `${k.name}, ${figure(k.height, 1)} mm ${k.from === 'slab' ? 'over the slab' : 'over the board'}`};
     }).filter(k => !k.slab || (k.box[0] < max[0] && k.box[2] > min[0] && k.box[1] < max[1] && k.box[3] > min[1]));
 }
 

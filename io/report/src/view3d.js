@@ -3,6 +3,7 @@
 import * as THREE from 'three';
 import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
 import {bytesOf, figure, make} from './dom.js';
+import {keepOutsIn} from './drawing.js';
 import {pathOf} from './paths.js';
 import {data, featureKinds, flaskRings, featureRange, layerName, operationName, operations, plan, toolOf} from './report.js';
 import {Run, StockField} from './stock.js';
@@ -83,7 +84,7 @@ class View {
         renderer.setClearColor(0, 0);
         this.controls = new OrbitControls(this.camera, canvas);
         this.controls.addEventListener('change', () => this.draw());
-        this.state = {explode: 0, axis: 'none', section: 0.5, shape: 'pattern', mode: 'layers', operation: -1, share: 0, play: false};
+        this.state = {explode: 0, axis: 'none', section: 0.5, shape: 'pattern', mode: 'layers', operation: -1, share: 0, play: false, whole: false};
         this.model = readModel();
         this.sectionPlane = new THREE.Plane();
         this.buildLayers();
@@ -91,6 +92,7 @@ class View {
         this.buildBoundaries();
         this.buildMachine();
         this.buildJoints();
+        this.buildKeepOuts();
         this.pin = new THREE.Mesh(new THREE.TorusGeometry(this.size / 60, this.size / 300, 12, 40), new THREE.MeshBasicMaterial({color: '#d97500', depthTest: false}));
         this.pin.renderOrder = 10;
         this.pin.visible = false;
@@ -249,6 +251,18 @@ class View {
         this.machine.add(this.stockMesh);
     }
 
+    // What no tool may run into: bolts and fences stand on the base board, a clamp on the slab that is milled.
+    buildKeepOuts() {
+        this.keepOuts = plan.layers.flatMap((layer, l) => keepOutsIn(l).filter(k => k.slab || l === 0).map(k => {
+            const shape = new THREE.Shape(k.around.map(([x, y]) => new THREE.Vector2(x, y)));
+            const material = new THREE.MeshLambertMaterial({color: '#b3261e', transparent: true, opacity: 0.55, side: THREE.DoubleSide, clippingPlanes: []});
+            const mesh = new THREE.Mesh(new THREE.ExtrudeGeometry(shape, {depth: k.height, bevelEnabled: false}), material);
+            mesh.position.z = k.slab ? layer.z_bottom + layer.slab_thickness : 0;
+            this.scene.add(mesh);
+            return {mesh, slab: k.slab, layer: l, from: mesh.position.z};
+        }));
+    }
+
     refreshStock() {
         const {nx, ny} = data.stock, heights = this.run.field.heights, bottom = this.run.field.bottom;
         const {position} = this.stockMesh.geometry.attributes, index = this.stockMesh.geometry.index, z = position.array, to = index.array, count = nx * ny;
@@ -271,7 +285,9 @@ class View {
         position.needsUpdate = index.needsUpdate = true;
     }
 
-    chooseOperation(index) {
+    // @param follows whether the operation before it has just ended
+    chooseOperation(index, follows = false) {
+        const done = this.run;
         this.state.operation = index;
         this.state.share = 0;
         for (const old of ['way', 'faint', 'rapids']) if (this[old]) { this.machine.remove(this[old]); this[old].geometry.dispose(); this[old] = null; }
@@ -281,13 +297,19 @@ class View {
         this.timeSlider.value = 0;
         if (index >= 0) {
             const operation = operations[index], tool = toolOf(operation.tool), path = pathOf(index), layer = plan.layers[operation.layer];
-            const field = new StockField(data.stock, layer.z_bottom, layer.z_bottom + layer.slab_thickness);
             const cutterOf = t => ({radius: t.diameter / 2, ball: t.kind === 'ball'});
-            let missing = 0;
-            for (const earlier of operations.filter(o => o.layer === operation.layer && o.index < index)) {
-                const before = pathOf(earlier.index);
-                missing += before.leftOut;
-                if (before.count > 1) new Run(field, cutterOf(toolOf(earlier.tool)), before).to(1);
+            let field, missing = 0;
+            if (follows && operations[index - 1].layer === operation.layer) {
+                // The one before has just been run to its end.
+                ({field} = done);
+                missing = this.missing + done.path.leftOut;
+            } else {
+                field = new StockField(data.stock, layer.z_bottom, layer.z_bottom + layer.slab_thickness);
+                for (const earlier of operations.filter(o => o.layer === operation.layer && o.index < index)) {
+                    const before = pathOf(earlier.index);
+                    missing += before.leftOut;
+                    if (before.count > 1) new Run(field, cutterOf(toolOf(earlier.tool)), before).to(1);
+                }
             }
             this.run = new Run(field, cutterOf(tool), path);
             this.missing = missing;
@@ -389,6 +411,12 @@ class View {
             }
             this.boundaries[l].lines.visible = this.ticks.boundaries.checked;
         });
+        for (const {mesh, slab, layer, from} of this.keepOuts) {
+            mesh.visible = this.ticks.keep.checked && (!slab || layer === milled);
+            mesh.position.z = from + (slab ? this.shift(layer) : 0);
+            mesh.material.clippingPlanes = cut;
+        }
+        this.stage.dataset.keep = String(this.keepOuts.filter(k => k.mesh.visible).length);
         this.machine.position.z = milled >= 0 ? this.shift(milled) : 0;
         this.stockMesh.visible = this.ticks.stock.checked;
         for (const lines of [this.way, this.faint, this.rapids]) if (lines) lines.visible = this.ticks.way.checked;
@@ -488,21 +516,23 @@ class View {
         const [featureTick, features] = tick(`Features (${plan.features.length})`, plan.features.length <= 80, () => { this.place(); this.legend(); });
         const [stockTick, stock] = tick('Stock as simulated', true, () => this.place());
         const [wayTick, way] = tick('Tool path', true, () => this.place());
-        this.ticks = {pattern, boundaries, features, stock, way, filled, glue};
+        const [keepTick, keep] = tick('Keep-outs', true, () => this.place());
+        this.ticks = {pattern, boundaries, features, stock, way, filled, glue, keep};
         this.legendBox = make('div', {id: 'legend'});
-        const [operation, select] = choice('Operation', 'operation', [['-1', 'none'], ...operations.map(o => [String(o.index), operationName(o)])], value => this.chooseOperation(Number(value)));
+        const [operation, select] = choice('Operation', 'operation', [['-1', 'none'], ...operations.map(o => [String(o.index), operationName(o)])], value => { if (this.state.whole) this.stop(); this.chooseOperation(Number(value)); });
         this.select = select;
         const [time, timeSlider] = slider('Time', {id: 'time', step: 0.0005, disabled: true}, value => { this.stop(); this.time(value); });
         this.timeSlider = timeSlider;
         this.playButton = button('Play', () => this.toggle(), {id: 'play', disabled: true});
+        this.buildButton = button('Play the whole build', () => this.toggleBuild(), {id: 'play-build', disabled: !operations.length});
         this.readout = make('output', {id: 'readout'});
         this.panel.append(
             make('fieldset', {}, make('legend', {}, 'Look'), make('div', {class: 'row'},
                 button('Fit', () => this.fit()), button('Top', () => this.look(0, -1e-4, 1)), button('Front', () => this.look(0, -1, 0)), button('Side', () => this.look(1, 0, 0)),
                 button('+', () => this.zoom(0.8), {'aria-label': 'Nearer'}), button('−', () => this.zoom(1.25), {'aria-label': 'Farther'}))),
             make('fieldset', {}, make('legend', {}, 'Layers'), explode, axis, section, this.sectionReadout),
-            make('fieldset', {}, make('legend', {}, 'Show'), shape, mode, patternTick, filledTick, glueTick, boundaryTick, featureTick, this.legendBox),
-            make('fieldset', {}, make('legend', {}, 'Cutting'), operation, time, make('div', {class: 'row'}, this.playButton), this.readout, make('div', {class: 'row ticks'}, stockTick, wayTick),
+            make('fieldset', {}, make('legend', {}, 'Show'), shape, mode, patternTick, filledTick, glueTick, boundaryTick, featureTick, this.keepOuts.length ? keepTick : null, this.legendBox),
+            make('fieldset', {}, make('legend', {}, 'Cutting'), operation, time, make('div', {class: 'row'}, this.playButton, this.buildButton), this.readout, make('div', {class: 'row ticks'}, stockTick, wayTick),
                 make('p', {class: 'note'}, `The stock has ${figure(data.stock.cell_mm, 2)} mm between its points; ways are drawn within ${figure(data.paths.tolerance_mm, 3)} mm, time by feed.`)),
             make('details', {}, make('summary', {}, 'Keys and mouse'), make('p', {class: 'note'},
                 'Drag turns, right drag or two fingers move, wheel or pinch zooms, a double click tells what is there. With the view focused: ', make('kbd', {}, '← → ↑ ↓'), ' turn, with ', make('kbd', {}, 'Shift'), ' move, ',
@@ -510,23 +540,45 @@ class View {
     }
 
     toggle() { this.state.play ? this.stop() : this.start(); }
-    stop() { this.state.play = false; this.playButton.textContent = 'Play'; }
+    stop() {
+        this.state.play = this.state.whole = false;
+        this.playButton.textContent = 'Play';
+        this.buildButton.textContent = 'Play the whole build';
+        this.stage.dataset.whole = '';
+    }
     start() {
         if (!this.run) return;
         this.state.play = true;
         this.playButton.textContent = 'Pause';
         if (this.state.share >= 1) this.time(0);
-        const whole = 20000; // ms for one program
+        const minutes = operations.reduce((sum, o) => sum + o.minutes, 0);
+        // One program takes 20 s, a whole build 90 s and what its short programs take more.
+        const length = () => this.state.whole ? Math.max(600, 90000 * operations[this.state.operation].minutes / minutes) : 20000;
         let last = performance.now();
         const step = now => {
             if (!this.state.play) return;
-            const share = Math.min(1, this.state.share + (now - last) / whole);
+            const share = Math.min(1, this.state.share + (now - last) / length());
             last = now;
             this.timeSlider.value = share;
             this.time(share);
-            if (share >= 1) this.stop(); else requestAnimationFrame(step);
+            const next = this.state.operation + 1;
+            if (share >= 1 && this.state.whole && next < operations.length) this.chooseOperation(next, true);
+            else if (share >= 1) { this.stop(); return; }
+            requestAnimationFrame(step);
         };
         requestAnimationFrame(step);
+    }
+
+    // From the first slab's first program to the last one's end; or from where it was stopped on.
+    toggleBuild() {
+        if (this.state.whole) { this.stop(); return; }
+        if (this.state.play) this.stop();
+        const {operation, share} = this.state;
+        if (operation < 0 || (operation === operations.length - 1 && share >= 1)) this.chooseOperation(0);
+        this.state.whole = true;
+        this.buildButton.textContent = 'Pause the build';
+        this.stage.dataset.whole = 'plays';
+        this.start();
     }
 
     key(event) {
