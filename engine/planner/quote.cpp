@@ -28,16 +28,23 @@ constexpr double kUpright = 89.5, kLevel = 0.5, kSteep = 45;  // degrees
 /// of castings (bench/quote), least squares of relative errors, weighted by one over the root of each.
 /// Walls and floors are small beside these and go with the places.
 struct Rates {
-    double facing = 3.238, roughing = 0.599, contours = 2.66, raster = 3.403, place = 4.306;
+    double facing = 4.567, roughing = 0.53, contours = 2.502, raster = 3.342;
+    double place = 1.949;   // min
+    double turn = 0.01382;  // min a radian: machines slow down where an outline turns
+    double thin = 52.23;    // min/min: where wood is thin, feeds are low and passes many
 };
 constexpr Rates kRates{};
-constexpr double kSmallPlace = 60;  // mm: a loop so long counts as half a place
-constexpr double kChanges = 5;      // of tools in a layer
+constexpr double kSmallPlace = 60;   // mm: a loop so long counts as half a place
+constexpr double kChanges = 5;       // of tools in a layer
+constexpr double kThin = 8;          // mm: of a section's mean half width at which it counts a third as thin
+constexpr double kLeastArea = 1e-3;  // mm²
 
 /// Ways of one kind in all layers, mm.
 struct Ways {
     double facing = 0, roughing = 0, contours = 0, raster = 0;
     double places = 0;  ///< loops of sections, small ones by their length
+    double turns = 0;   ///< rad by which outlines turn, either way, over all levels
+    double thin = 0;    ///< mm around thin wood, over all levels
 };
 
 const Tool& face_mill(const Job& job) {
@@ -53,6 +60,33 @@ double perimeter(std::span<const Point2> loop) {
         sum += std::hypot(to_mm(b.x) - to_mm(a.x), to_mm(b.y) - to_mm(a.y));
     }
     return sum;
+}
+
+/// rad by which a loop turns at its corners, either way.
+double turning(std::span<const Point2> loop) {
+    double sum = 0;
+    const std::size_t n = loop.size();
+    for (std::size_t k = 0; k < n; ++k) {
+        const Point2 a = loop[k], b = loop[(k + 1) % n], c = loop[(k + 2) % n];
+        const double ux = to_mm(b.x) - to_mm(a.x), uy = to_mm(b.y) - to_mm(a.y);
+        const double vx = to_mm(c.x) - to_mm(b.x), vy = to_mm(c.y) - to_mm(b.y);
+        sum += std::abs(std::atan2(ux * vy - uy * vx, ux * vx + uy * vy));
+    }
+    return sum;
+}
+
+/// What the outlines of one section count for. @param levels that are cut about it
+void add_outlines(const Loops& solid, double levels, Ways& ways) {
+    double around = 0;
+    for (std::size_t i = 0; i < solid.size(); ++i) {
+        const double length = perimeter(solid.loop(i));
+        around += length;
+        ways.places += length / (length + kSmallPlace) / 3;
+        ways.turns += levels * turning(solid.loop(i));
+    }
+    if (!(around > 0)) return;
+    const double half_width = 2 * std::max(area(solid), kLeastArea) / around;
+    ways.thin += levels * around * std::exp(-half_width / kThin);
 }
 
 /// Layers with the slabs that they are milled from, of the stocked thicknesses.
@@ -172,10 +206,7 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
             const Loops solid = simplify(sections[3 * l + k].loops);
             area_at[k] = area(solid);
             if (k < 2) area_at[k] = std::max(area_at[k], area_at[k + 1]);  // what is under it stays filled
-            for (std::size_t i = 0; i < solid.size(); ++i) {
-                const double around = perimeter(solid.loop(i));
-                ways.places += around / (around + kSmallPlace) / 3;
-            }
+            add_outlines(solid, height / tools.finish.stepdown_max / 3, ways);
         }
         const double solid_mm3 = (area_at[0] + 4 * area_at[1] + area_at[2]) / 6 * height;
         const double takes = slab * together - height;
@@ -201,7 +232,9 @@ Quote quote(Context& context, MeshView mesh, const Job& job) {
     work("roughing", ways.roughing, tools.rough, kRates.roughing);
     work("contours", ways.contours, tools.finish, kRates.contours);
     work("raster", ways.raster, tools.finish, kRates.raster);
+    work("thin wood", ways.thin, tools.finish, kRates.thin);
     result.work.push_back({"places", ways.places, kRates.place * ways.places});
+    result.work.push_back({"turns", 0, kRates.turn * ways.turns});
     for (const QuotedWork& w : result.work) result.cutting_minutes += w.minutes;
     result.tool_change_minutes = changes_of(job.machine) * layer_count * job.machine.tool_change_s / 60;
     result.build_minutes = result.cutting_minutes + result.bonding_minutes + result.tool_change_minutes;
