@@ -35,7 +35,7 @@ struct Rates {
 };
 constexpr Rates kRates{};
 constexpr double kSmallPlace = 60;   // mm: a loop so long counts as half a place
-constexpr double kChanges = 5;       // of tools in a layer
+constexpr double kChanges = 3.2;     // of tools in a layer
 constexpr double kThin = 8;          // mm: of a section's mean half width at which it counts a third as thin
 constexpr double kLeastArea = 1e-3;  // mm²
 
