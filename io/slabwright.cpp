@@ -583,10 +583,6 @@ void slice_to_file(Context& context, const PatternSource& source, const Job& job
 
 std::string terminal_text(std::string_view text, bool one_line) { return printable(text, one_line); }
 
-std::string number_text(double value, int decimals) {
-    std::string text;
-    append_rounded(text, value, decimals);
-    return text;
-}
+std::string number_text(double value, int decimals) { return rounded_text(value, decimals); }
 
 }  // namespace slabwright

@@ -14,12 +14,6 @@ namespace slabwright {
 
 namespace {
 
-std::string number(double value, int decimals) {
-    std::string text;
-    append_rounded(text, value, decimals);
-    return text;
-}
-
 void add_jet_options(CLI::App& command, SheetsOptions& options) {
     const CLI::Range over_0(1e-6, 1e6);
     command.add_option("--pressure", options.pressure, "MPa, jet")->check(over_0);
@@ -287,16 +281,18 @@ std::string run_feed(const FeedOptions& options) {
     }
     return options.feed > 0
                ? fmt::format("the material takes {} J/mm3: give --energy {} to slabwright sheets\n",
-                             number(jet.specific_energy_j_mm3, 4), number(jet.specific_energy_j_mm3, 4))
-               : fmt::format("{} mm/min through {} mm along the jet at {} J/mm3\n", number(feed, 1),
-                             number(depth, 3), number(jet.specific_energy_j_mm3, 3));
+                             rounded_text(jet.specific_energy_j_mm3, 4),
+                             rounded_text(jet.specific_energy_j_mm3, 4))
+               : fmt::format("{} mm/min through {} mm along the jet at {} J/mm3\n", rounded_text(feed, 1),
+                             rounded_text(depth, 3), rounded_text(jet.specific_energy_j_mm3, 3));
 }
 
 std::string sheets_verdict(const SheetProof& proof, const std::string& out) {
     std::string text = fmt::format(
         "{}: the programs {} the part: deepest cut into it {} mm, most left over {} mm, volume {}{} %\n", out,
-        proof.passed ? "make" : "do NOT make", number(proof.gouge, 3), number(proof.left_over, 3),
-        proof.made_mm3 >= proof.part_mm3 ? "+" : "", number(100 * (proof.made_mm3 / proof.part_mm3 - 1), 2));
+        proof.passed ? "make" : "do NOT make", rounded_text(proof.gouge, 3), rounded_text(proof.left_over, 3),
+        proof.made_mm3 >= proof.part_mm3 ? "+" : "",
+        rounded_text(100 * (proof.made_mm3 / proof.part_mm3 - 1), 2));
     constexpr std::size_t shown = 20;  // verify.json holds them all
     for (std::size_t i = 0; i < std::min(shown, proof.violations.size()); ++i)
         text += fmt::format("{}: {}\n", proof.violations[i].code, proof.violations[i].message);
@@ -323,16 +319,17 @@ std::string sheets_summary(const SheetsResult& result, const std::string& out, b
     double minutes = 0, metres = 0;
     for (const SheetProgram& program : plan.programs)
         minutes += program.minutes, metres += program.cut_mm / 1000;
-    std::string text = fmt::format(
-        "{}: {} sheets ({} of the thinnest alone), {} programs, {} m of cut, {} min\n", out,
-        plan.pieces.size(), plan.uniform_sheets, plan.programs.size(), number(metres, 1), number(minutes, 1));
+    std::string text =
+        fmt::format("{}: {} sheets ({} of the thinnest alone), {} programs, {} m of cut, {} min\n", out,
+                    plan.pieces.size(), plan.uniform_sheets, plan.programs.size(), rounded_text(metres, 1),
+                    rounded_text(minutes, 1));
     std::map<double, std::pair<int, int>> stock;
     for (const SheetProgram& program : plan.programs) {
         ++stock[program.thickness].first;
         stock[program.thickness].second += static_cast<int>(program.pieces.size());
     }
     for (const auto& [thickness, counts] : stock)
-        text += fmt::format("stock   {} of {} mm, for {} {}\n", counts.first, number(thickness, 3),
+        text += fmt::format("stock   {} of {} mm, for {} {}\n", counts.first, rounded_text(thickness, 3),
                             counts.second, counts.second == 1 ? "piece" : "pieces");
     if (result.proof.dowels > 0)
         text += fmt::format("held    {} holes for dowels and rods; {} islands are held by nothing\n",
@@ -345,11 +342,11 @@ std::string sheets_summary(const SheetsResult& result, const std::string& out, b
             text += "no: " + cost.why_not + '\n';
             continue;
         }
-        text +=
-            fmt::format("{} sheets from {} of stock, {} m, {} min, up to {} mm off, {} of {} kg", cost.sheets,
-                        cost.stock_sheets, number(cost.cut_mm / 1000, 1), number(cost.minutes, 1),
-                        number(cost.deviation, 3), number(cost.part_kg, 2), number(cost.stock_kg, 2));
-        text += cost.money > 0 ? fmt::format(", {} of money\n", number(cost.money, 2)) : "\n";
+        text += fmt::format("{} sheets from {} of stock, {} m, {} min, up to {} mm off, {} of {} kg",
+                            cost.sheets, cost.stock_sheets, rounded_text(cost.cut_mm / 1000, 1),
+                            rounded_text(cost.minutes, 1), rounded_text(cost.deviation, 3),
+                            rounded_text(cost.part_kg, 2), rounded_text(cost.stock_kg, 2));
+        text += cost.money > 0 ? fmt::format(", {} of money\n", rounded_text(cost.money, 2)) : "\n";
     }
     for (const Diagnostic& d : plan.diagnostics)
         if (d.severity != Severity::note) text += fmt::format("{}: {}\n", name(d.severity), d.message);

@@ -17,12 +17,6 @@ namespace {
 
 constexpr std::size_t kPiece = std::size_t{1} << 20;
 
-std::string decimal(double value, int decimals) {
-    std::string text;
-    append_rounded(text, value, decimals);
-    return text;
-}
-
 /// What a program needs to be safe to start and to leave the spindle where the next one can start.
 void require_safe(const Layer& layer, const Operation& operation, const Tool* tool, const Dialect& dialect) {
     const auto refuse = [&](const std::string& message) {
@@ -244,10 +238,11 @@ private:
 
 /// What a program says of the operation that follows.
 std::vector<std::string> remarks(const Operation& operation, const Tool& tool) {
-    return {fmt::format("{}: {}", name(operation.kind), operation.purpose),
-            fmt::format("tool {}: {}, diameter {} mm", tool.number, tool.name, decimal(tool.diameter, 4)),
-            fmt::format("cutting {} mm, {} min", decimal(operation.cutting_mm, 1),
-                        decimal(operation.minutes, 2))};
+    return {
+        fmt::format("{}: {}", name(operation.kind), operation.purpose),
+        fmt::format("tool {}: {}, diameter {} mm", tool.number, tool.name, rounded_text(tool.diameter, 4)),
+        fmt::format("cutting {} mm, {} min", rounded_text(operation.cutting_mm, 1),
+                    rounded_text(operation.minutes, 2))};
 }
 
 /// What z = 0 is.
@@ -273,7 +268,7 @@ std::string zero_words(const Machine& machine) {
             return "the base board's middle";
         case WorkZero::pin:
             return fmt::format("the pin, x {} y {} mm from the base board's corner",
-                               decimal(machine.pin.at(0), 3), decimal(machine.pin.at(1), 3));
+                               rounded_text(machine.pin.at(0), 3), rounded_text(machine.pin.at(1), 3));
         case WorkZero::model:
             break;
     }
@@ -289,7 +284,7 @@ std::string head_text(const Plan& plan, const Layer& layer, const Operation& ope
     comment(fmt::format("Slabwright {}: {}", SLABWRIGHT_VERSION, file_of(operation.file)));
     comment(fmt::format("pattern {}", plan.input.file));
     comment(fmt::format("layer {} of {}, z {} to {} mm from the pattern's bottom", layer.index,
-                        plan.layers.size(), decimal(layer.z_bottom, 4), decimal(layer.z_top, 4)));
+                        plan.layers.size(), rounded_text(layer.z_bottom, 4), rounded_text(layer.z_top, 4)));
     comment(fmt::format("z = 0 at {}", height_words(frame_of(plan.job.machine))));
     if (const std::string at = zero_words(plan.job.machine); !at.empty()) comment("x = y = 0 at " + at);
     for (const std::string& line : remarks(operation, tool)) comment(line);

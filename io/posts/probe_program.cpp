@@ -10,12 +10,6 @@ namespace slabwright {
 
 namespace {
 
-std::string number(double value, int decimals) {
-    std::string text;
-    append_rounded(text, value, decimals);
-    return text;
-}
-
 std::string comment(const Dialect& dialect, const std::string& text) {
     std::string inside = comment_text(text);
     if (inside.size() > dialect.longest_comment) inside.resize(dialect.longest_comment);
@@ -27,17 +21,17 @@ std::string comment(const Dialect& dialect, const std::string& text) {
 std::string probe_text(const Plan& plan, const ProbeProgram& probe) {
     const Probing& probing = plan.job.probing;
     const Dialect dialect = dialect_of(plan.job.machine);
-    const auto length = [&](double mm) { return number(mm / dialect.unit_mm(), dialect.decimals); };
+    const auto length = [&](double mm) { return rounded_text(mm / dialect.unit_mm(), dialect.decimals); };
     const auto feed = [&](double mm_min) {
-        return number(mm_min / dialect.feed_unit, dialect.feed_decimals);
+        return rounded_text(mm_min / dialect.feed_unit, dialect.feed_decimals);
     };
     const auto& [x, y, z] = probe.touches;
     std::string text = comment(dialect, fmt::format("Slabwright {}: {}", SLABWRIGHT_VERSION, probe.file));
     text += comment(dialect, fmt::format("layer {}: finds z 0 with tool {}", probe.layer, probe.tool));
-    text += comment(dialect,
-                    fmt::format("touches {} at x {} y {} mm", "the reference", number(x, 2), number(y, 2)));
+    text += comment(dialect, fmt::format("touches the reference at x {} y {} mm", rounded_text(x, 2),
+                                         rounded_text(y, 2)));
     text += comment(dialect, fmt::format("begin with the tip over it, {} mm above at most",
-                                         number(probing.search / 2, 2)));
+                                         rounded_text(probing.search / 2, 2)));
     text += fmt::format("{} G17 G90 G94 G40 G49 G80\n", dialect.inch() ? "G20" : "G21");
     text += dialect.changes_tools ? fmt::format("G54\nT{0} M6\nG43 H{0}\n", probe.tool)
                                   : fmt::format("G54\nT{}\n", probe.tool);

@@ -15,12 +15,6 @@ namespace slabwright {
 
 namespace {
 
-std::string decimal(double value, int decimals) {
-    std::string text;
-    append_rounded(text, value, decimals);
-    return text;
-}
-
 std::string at(Point2 p) {
     std::string text = "X";
     append_mm(text, p.x);
@@ -60,13 +54,13 @@ private:
         const bool is_router = job_.head == SheetHead::router, leans = job_.cutting.most_tilt_deg > 0;
         text_ += fmt::format("G0 {}{}\n", at(placed(stroke[0], place)), leans ? " A0 C0" : "");
         if (is_router)
-            text_ += fmt::format("G0 Z1\nG1 Z{} F{}\n", decimal(-job_.engraving.depth, 4),
-                                 decimal(job_.plunge_feed, 1));
+            text_ += fmt::format("G0 Z1\nG1 Z{} F{}\n", rounded_text(-job_.engraving.depth, 4),
+                                 rounded_text(job_.plunge_feed, 1));
         else text_ += fmt::format("G0 Z0\n{}\n", job_.on);
         for (std::size_t i = 1; i < stroke.size(); ++i)
-            text_ += fmt::format("G1 {} F{}\n", at(placed(stroke[i], place)), decimal(feed, 1));
+            text_ += fmt::format("G1 {} F{}\n", at(placed(stroke[i], place)), rounded_text(feed, 1));
         if (!is_router) text_ += job_.off + '\n';
-        text_ += fmt::format("G0 Z{}\n", decimal(job_.clearance, 4));
+        text_ += fmt::format("G0 Z{}\n", rounded_text(job_.clearance, 4));
     }
 
     static bool turns(const SheetWay& way) {
@@ -81,13 +75,13 @@ private:
         const int steps = std::max(1, static_cast<int>(std::ceil(depth / job_.stepdown - 1e-9)));
         text_ += fmt::format("G0 {}\nG0 Z1\n", at(way.pierce));
         for (int s = 1; s <= steps; ++s) {
-            text_ +=
-                fmt::format("G1 Z{} F{}\n", decimal(-depth * s / steps, 4), decimal(job_.plunge_feed, 1));
-            text_ += fmt::format("G1 {} F{}\n", at(way.points[0].top), decimal(way.feed, 1));
+            text_ += fmt::format("G1 Z{} F{}\n", rounded_text(-depth * s / steps, 4),
+                                 rounded_text(job_.plunge_feed, 1));
+            text_ += fmt::format("G1 {} F{}\n", at(way.points[0].top), rounded_text(way.feed, 1));
             for (std::size_t i = 1; i < way.points.size(); ++i) text_ += at(way.points[i].top) + '\n';
             if (s < steps) text_ += at(way.pierce) + '\n';
         }
-        text_ += fmt::format("G0 Z{}\n", decimal(job_.clearance, 4));
+        text_ += fmt::format("G0 Z{}\n", rounded_text(job_.clearance, 4));
     }
 
     /// X and Y that the control is told for the head where its axis meets the sheet's top.
@@ -97,20 +91,23 @@ private:
         return at({to_units(place.x), to_units(place.y)});
     }
     [[nodiscard]] std::string height_of(const HeadPoint& head) const {
-        return decimal(pivot_place({}, head.a_deg, head.c_deg, job_.pivot).z, 4);
+        return rounded_text(pivot_place({}, head.a_deg, head.c_deg, job_.pivot).z, 4);
     }
 
     void jetted(const SheetWay& way) {
         const bool leans = job_.cutting.most_tilt_deg > 0;
         const HeadPoint& first = way.points[0];
         text_ += "G0 " + at_head(way.pierce, first);
-        if (leans) text_ += fmt::format(" A{} C{}", decimal(first.a_deg, 4), decimal(first.c_deg, 4));
-        text_ += fmt::format("\nG0 Z{}\n{}\nG4 P{}\n", height_of(first), job_.on, decimal(job_.pierce_s, 3));
-        text_ += fmt::format("G1 {} F{}\n", at_head(first.top, first), decimal(way.feed, 1));
+        if (leans)
+            text_ += fmt::format(" A{} C{}", rounded_text(first.a_deg, 4), rounded_text(first.c_deg, 4));
+        text_ +=
+            fmt::format("\nG0 Z{}\n{}\nG4 P{}\n", height_of(first), job_.on, rounded_text(job_.pierce_s, 3));
+        text_ += fmt::format("G1 {} F{}\n", at_head(first.top, first), rounded_text(way.feed, 1));
         if (!turns(way)) {
             for (std::size_t i = 1; i < way.points.size(); ++i) {
                 text_ += at_head(way.points[i].top, first);
-                if (way.shares[i] != way.shares[i - 1]) text_ += " F" + decimal(way.feed * way.shares[i], 1);
+                if (way.shares[i] != way.shares[i - 1])
+                    text_ += " F" + rounded_text(way.feed * way.shares[i], 1);
                 text_ += '\n';
             }
         } else {
@@ -118,7 +115,7 @@ private:
             for (std::size_t i = 1; i < way.points.size(); ++i) turned(way, i);
             text_ += "G94\n";
         }
-        text_ += fmt::format("{}\nG0 Z{}\n", job_.off, decimal(job_.clearance, 4));
+        text_ += fmt::format("{}\nG0 Z{}\n", job_.off, rounded_text(job_.clearance, 4));
     }
 
     /// One move whose time is that of the longer of its two ends, and of the head's turn at 30 degrees a
@@ -133,8 +130,8 @@ private:
         const double degrees = std::max(std::abs(q.a_deg - p.a_deg), std::abs(q.c_deg - p.c_deg));
         const double minutes = std::max({mm / way.feed / way.shares[i], degrees / 1800, 2e-6});
         const std::string height = job_.pivot > 0 ? " Z" + height_of(q) : "";
-        text_ += fmt::format("G1 {}{} A{} C{} F{}\n", at_head(q.top, q), height, decimal(q.a_deg, 4),
-                             decimal(q.c_deg, 4), decimal(1 / minutes, 4));
+        text_ += fmt::format("G1 {}{} A{} C{} F{}\n", at_head(q.top, q), height, rounded_text(q.a_deg, 4),
+                             rounded_text(q.c_deg, 4), rounded_text(1 / minutes, 4));
     }
 
     std::string& text_;
@@ -156,7 +153,7 @@ void append_hold(std::string& text, const SheetPiece& piece, double dowel) {
         text += fmt::format("(dowel of piece {} at ", piece.number);
         append_mm(text, hole.x);
         append_mm(text += ' ', hole.y);
-        text += fmt::format(" diameter {})\n", decimal(dowel, 4));
+        text += fmt::format(" diameter {})\n", rounded_text(dowel, 4));
     }
 }
 
@@ -169,14 +166,14 @@ bool is_engraved(const SheetsPlan& plan, const SheetProgram& program) {
 /// With what it is engraved.
 std::string engraver(const SheetJob& job) {
     const std::string by = job.head == SheetHead::router  ? fmt::format("tool {}", job.engraving.tool)
-                           : job.head == SheetHead::laser ? "power " + decimal(job.engraving.power, 3)
-                                                          : "feed " + decimal(engraving_feed(job), 1);
-    return fmt::format("(engraver {} width {} depth {})\n", by, decimal(job.engraving.width, 4),
-                       decimal(job.engraving.depth, 4));
+                           : job.head == SheetHead::laser ? "power " + rounded_text(job.engraving.power, 3)
+                                                          : "feed " + rounded_text(engraving_feed(job), 1);
+    return fmt::format("(engraver {} width {} depth {})\n", by, rounded_text(job.engraving.width, 4),
+                       rounded_text(job.engraving.depth, 4));
 }
 
 std::string tool_change(const SheetJob& job, int tool) {
-    return fmt::format("T{} M6\nG43 H{}\nS{} M3\nG4 P3\n", tool, tool, decimal(job.rpm, 0));
+    return fmt::format("T{} M6\nG43 H{}\nS{} M3\nG4 P3\n", tool, tool, rounded_text(job.rpm, 0));
 }
 
 }  // namespace
@@ -186,36 +183,38 @@ std::string sheet_program_text(const SheetsPlan& plan, std::size_t index) {
     const SheetJob& job = plan.job;
     std::string text = fmt::format(
         "(slabwright sheets: program {} of {})\n(stock {} x {} thickness {} kerf {} {})\n", index + 1,
-        plan.programs.size(), decimal(program.stock.length, 4), decimal(program.stock.width, 4),
-        decimal(program.thickness, 4), decimal(job.cutting.kerf, 4), word_of_head(job.head));
+        plan.programs.size(), rounded_text(program.stock.length, 4), rounded_text(program.stock.width, 4),
+        rounded_text(program.thickness, 4), rounded_text(job.cutting.kerf, 4), word_of_head(job.head));
     for (const int number : program.pieces) {
         const SheetPiece& piece = plan.pieces[static_cast<std::size_t>(number) - 1];
         std::string x, y;
         append_mm(x, piece.place.shift.x);
         append_mm(y, piece.place.shift.y);
-        text +=
-            fmt::format("(piece {} from {} to {} turn {} at {} {})\n", number, decimal(piece.span.bottom, 4),
-                        decimal(piece.span.top, 4), piece.place.turn, x, y);
+        text += fmt::format("(piece {} from {} to {} turn {} at {} {})\n", number,
+                            rounded_text(piece.span.bottom, 4), rounded_text(piece.span.top, 4),
+                            piece.place.turn, x, y);
     }
     for (const int number : program.pieces)
         append_hold(text, plan.pieces[static_cast<std::size_t>(number) - 1], job.alignment.dowel);
     const bool is_router = job.head == SheetHead::router, engraves = is_engraved(plan, program);
     if (engraves) text += engraver(job);
-    if (job.cutting.taper_deg != 0) text += fmt::format("(taper {})\n", decimal(job.cutting.taper_deg, 4));
-    if (job.pivot > 0) text += fmt::format("(pivot {})\n", decimal(job.pivot, 4));
+    if (job.cutting.taper_deg != 0)
+        text += fmt::format("(taper {})\n", rounded_text(job.cutting.taper_deg, 4));
+    if (job.pivot > 0) text += fmt::format("(pivot {})\n", rounded_text(job.pivot, 4));
     if (!is_router && (job.on != "M3" || job.off != "M5"))
         text += fmt::format("(head on {} off {})\n", job.on, job.off);
     text += "G21 G17 G90 G94 G40 G49 G80\nG64 P0.005\nG54\n";
     if (is_router) text += tool_change(job, engraves ? job.engraving.tool : job.tool);
-    text += fmt::format("G0 Z{}\n", decimal(job.clearance, 4));
+    text += fmt::format("G0 Z{}\n", rounded_text(job.clearance, 4));
     WayText ways(text, job, program);
     if (engraves) {
-        if (job.head == SheetHead::laser) text += fmt::format("S{}\n", decimal(job.engraving.power, 3));
+        if (job.head == SheetHead::laser) text += fmt::format("S{}\n", rounded_text(job.engraving.power, 3));
         for (const int number : program.pieces)
             ways.engrave(plan.pieces[static_cast<std::size_t>(number) - 1]);
         if (is_router && job.engraving.tool != job.tool)
-            text += "M5\n" + tool_change(job, job.tool) + fmt::format("G0 Z{}\n", decimal(job.clearance, 4));
-        if (job.head == SheetHead::laser) text += fmt::format("S{}\n", decimal(job.power, 3));
+            text +=
+                "M5\n" + tool_change(job, job.tool) + fmt::format("G0 Z{}\n", rounded_text(job.clearance, 4));
+        if (job.head == SheetHead::laser) text += fmt::format("S{}\n", rounded_text(job.power, 3));
     }
     for (const SheetWay& way : program.ways) ways.write(way);
     if (is_router) text += "M5\n";

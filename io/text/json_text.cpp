@@ -78,6 +78,12 @@ void append_rounded(std::string& text, double value, int decimals) {
     text += digits == "-0" ? std::string_view("0") : digits;
 }
 
+std::string rounded_text(double value, int decimals) {
+    std::string text;
+    append_rounded(text, value, decimals);
+    return text;
+}
+
 void JsonText::line_break() {
     text_ += '\n';
     text_.append(levels_.size() * 2, ' ');

@@ -25,6 +25,9 @@ namespace slabwright {
 /// "number.not_finite"): no file of ours has a place for NaN or infinity
 void append_rounded(std::string& text, double value, int decimals);
 
+/// The same as a text of its own.
+[[nodiscard]] std::string rounded_text(double value, int decimals);
+
 /// Builds one JSON text. Containers opened with `line` are written on one line, others one element a line.
 class JsonText {
 public:

@@ -29,7 +29,7 @@ void put_xy(JsonText& json, const std::array<double, 2>& xy) {
 struct JobPrinter {
     static constexpr bool kUsedKeysOnly = true;
     JsonText& json;
-    const OwnPost* own_post;  // null: none
+    const OwnPost* own_post = nullptr;  // null: none
     bool in_table = false;
     void table(const char* name, const char*) {
         close();

@@ -15,11 +15,7 @@ namespace {
 constexpr std::size_t kShown = 12;  // steps of those that are left
 constexpr int kLength = 4;          // decimals
 
-std::string mm(double value) {
-    std::string text;
-    append_rounded(text, value, 3);
-    return text;
-}
+std::string mm(double value) { return rounded_text(value, 3); }
 
 /// "step 12, layer 2: mill nc/L002_02_rough_T2.ngc"
 std::string told(const SequenceStep& step) {
