@@ -359,8 +359,8 @@ TEST(Feeds, RunsSplitOverArcsComeBackOnTheSameWay) {
     moves.push_back(arc);
     moves.push_back(at(30, 30, 10, 5000));
     moves.push_back(at(30, 30, 30, 0));
-    const DeepRun run{2, 4, 4, 3};
-    const std::vector<Move> split = split_runs(moves, {&run, 1}, 1500);
+    const Passes run = passes_of({2, 4, 4, 3});
+    const std::vector<Move> split = split_runs(moves, {&run, 1}, 1500, false).moves;
     ASSERT_EQ(split.size(), moves.size() + 2 * (1 + 3 + 3) + 1);
     EXPECT_EQ(split[2].z, to_units(10 + 4 * 2 / 3.0));
     for (std::size_t k = 1; k < split.size(); ++k) {

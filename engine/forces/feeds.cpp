@@ -331,19 +331,33 @@ private:
                 divided.at = {to_mm(end.x), to_mm(end.y), to_mm(end.z)};
             }
         }
-        op_.moves = split_runs(
-            op_.moves, runs,
-            static_cast<std::uint32_t>(std::max(1.0, std::min(tool_.plunge_feed, job_.machine.max_feed))));
+        std::vector<Passes> passes;
+        for (const DeepRun& run : runs) passes.push_back(passes_of(run));
+        const std::vector<Move> whole = op_.moves;
+        const auto plunge_feed =
+            static_cast<std::uint32_t>(std::max(1.0, std::min(tool_.plunge_feed, job_.machine.max_feed)));
+        const bool by_turns = core_diameter_of(tool_) <= 0;
+        SplitMoves split = split_runs(whole, passes, plunge_feed, by_turns);
         // After a run there stands what stood after it before, so only the runs themselves are looked at
         // anew.
-        again = before;
-        if (any_halved(memory_.seen, runs)) {
-            see(again);
-            return;
+        const bool halved = any_halved(memory_.seen, passes);
+        const auto look = [&] {
+            op_.moves = std::move(split.moves);
+            std::vector<MoveRange> parts;
+            if (!halved)
+                for (const SplitRun& run : split.runs) parts.push_back(run.all);
+            again = before;
+            see(again, parts);
+            return parts;
+        };
+        std::vector<MoveRange> parts = look();
+        // What earlier rounds have taken away is not gone over again.
+        if (without_idle(passes, split.runs, halved ? memory_.seen : memory_.anew)) {
+            split = split_runs(whole, passes, plunge_feed, by_turns);
+            parts = look();
         }
-        const std::vector<MoveRange> parts = split_parts(runs);
-        see(again, parts);
-        replaced(memory_.seen, runs, parts, memory_.anew, memory_.all);
+        if (halved) return;
+        replaced(memory_.seen, passes, parts, memory_.anew, memory_.all);
         memory_.seen.swap(memory_.all);
     }
 

@@ -1,6 +1,7 @@
 #include "engine/forces/seen_stretches.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/tools/tools.h"
 
@@ -53,18 +54,7 @@ void run_through(Context& context, StandingSlab& slab, const Operation& op, cons
     else slab.run_parts(op, tool, parts, see);
 }
 
-std::vector<MoveRange> split_parts(std::span<const DeepRun> runs) {
-    std::vector<MoveRange> parts;
-    std::uint32_t more = 0;
-    for (const DeepRun& run : runs) {
-        const std::uint32_t first = run.first + more, length = run.last - run.first + 1;
-        more += static_cast<std::uint32_t>(run.passes - 1) * (1 + 2 * length) + 1;
-        parts.push_back({first, run.last + more});
-    }
-    return parts;
-}
-
-bool any_halved(const std::vector<SeenStretch>& seen, std::span<const DeepRun> runs) {
+bool any_halved(const std::vector<SeenStretch>& seen, std::span<const Passes> runs) {
     std::size_t r = 0;
     for (const SeenStretch& s : seen) {
         while (r < runs.size() && runs[r].last < s.first) ++r;
@@ -74,7 +64,7 @@ bool any_halved(const std::vector<SeenStretch>& seen, std::span<const DeepRun> r
     return false;
 }
 
-void replaced(const std::vector<SeenStretch>& seen, std::span<const DeepRun> runs,
+void replaced(const std::vector<SeenStretch>& seen, std::span<const Passes> runs,
               std::span<const MoveRange> parts, const std::vector<SeenStretch>& anew,
               std::vector<SeenStretch>& all) {
     all.clear();
@@ -93,6 +83,25 @@ void replaced(const std::vector<SeenStretch>& seen, std::span<const DeepRun> run
         all.push_back(s);
     }
     while (r < runs.size()) take();
+}
+
+bool without_idle(std::span<Passes> runs, std::span<const SplitRun> split,
+                  const std::vector<SeenStretch>& seen) {
+    bool any = false;
+    std::size_t next = 0;
+    for (std::size_t r = 0; r < runs.size(); ++r) {
+        std::vector<std::int32_t> busy;
+        for (std::size_t p = 0; p < runs[r].up.size(); ++p) {
+            const MoveRange& pass = split[r].passes[p];
+            while (next < seen.size() && seen[next].last < pass.first) ++next;
+            bool cuts = false;
+            for (; next < seen.size() && seen[next].first <= pass.last; ++next) cuts |= seen[next].cuts;
+            if (cuts) busy.push_back(runs[r].up[p]);
+        }
+        any |= busy.size() < runs[r].up.size();
+        runs[r].up = std::move(busy);
+    }
+    return any;
 }
 
 }  // namespace slabwright

@@ -29,17 +29,20 @@ void run_through(Context& context, StandingSlab& slab, const Operation& op, cons
                  const Layer& layer, const WoodLimits& limits, double setback, std::vector<SeenStretch>& seen,
                  std::span<const MoveRange> parts = {});
 
-/// Where runs lie when they are split (split_runs).
-[[nodiscard]] std::vector<MoveRange> split_parts(std::span<const DeepRun> runs);
-
 /// Whether a stretch lies partly in a run.
-[[nodiscard]] bool any_halved(const std::vector<SeenStretch>& seen, std::span<const DeepRun> runs);
+[[nodiscard]] bool any_halved(const std::vector<SeenStretch>& seen, std::span<const Passes> runs);
 
 /// What was seen before runs were split, with `anew` in place of what was seen of the runs.
 /// @param parts where the runs lie now
 /// @param all   gets it
-void replaced(const std::vector<SeenStretch>& seen, std::span<const DeepRun> runs,
+void replaced(const std::vector<SeenStretch>& seen, std::span<const Passes> runs,
               std::span<const MoveRange> parts, const std::vector<SeenStretch>& anew,
               std::vector<SeenStretch>& all);
+
+/// Leaves out the passes that cut nothing.
+/// @param seen of the moves as they were split; @param split where the passes lie in them
+/// @returns whether there was one
+bool without_idle(std::span<Passes> runs, std::span<const SplitRun> split,
+                  const std::vector<SeenStretch>& seen);
 
 }  // namespace slabwright

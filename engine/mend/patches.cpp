@@ -154,8 +154,8 @@ MovePatch in_passes(const std::vector<Move>& moves, std::size_t first, std::size
                     int passes, std::uint32_t plunge_feed) {
     const std::vector<Move> part(moves.begin() + static_cast<std::ptrdiff_t>(first) - 1,
                                  moves.begin() + static_cast<std::ptrdiff_t>(last));
-    const DeepRun run{1, static_cast<std::uint32_t>(part.size() - 1), depth, passes};
-    std::vector<Move> split = split_runs(part, {&run, 1}, plunge_feed);
+    const Passes raised = passes_of({1, static_cast<std::uint32_t>(part.size() - 1), depth, passes});
+    std::vector<Move> split = split_runs(part, {&raised, 1}, plunge_feed, false).moves;
     split.erase(split.begin());
     return {first, last, std::move(split)};
 }
