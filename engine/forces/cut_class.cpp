@@ -29,9 +29,8 @@ CutClass class_of(const CutStretch& s, const Tool& tool, ClassSteps steps) {
     return c;
 }
 
-CutClass shallower(CutClass c, int passes) {
-    c.depth =
-        static_cast<std::int16_t>(std::max(0.0, c.depth - std::floor(kCoarse.depth * std::log2(passes))));
+CutClass shallower(CutClass c, int passes, ClassSteps steps) {
+    c.depth = static_cast<std::int16_t>(std::max(0.0, c.depth - std::floor(steps.depth * std::log2(passes))));
     return c;
 }
 

@@ -51,8 +51,8 @@ using ByClassAndFeed = std::unordered_map<ClassAndFeed, T, HashClassAndFeed>;
 /// The class of a stretch of a tool's way: depth and width are rounded up.
 [[nodiscard]] CutClass class_of(const CutStretch& stretch, const Tool& tool, ClassSteps steps);
 
-/// One of so many equal passes of a coarse class.
-[[nodiscard]] CutClass shallower(CutClass c, int passes);
+/// One of so many equal passes of a class.
+[[nodiscard]] CutClass shallower(CutClass c, int passes, ClassSteps steps);
 
 /// The cut that a class stands for. @param idle of the tool (idle_cut). @param feed mm/min
 [[nodiscard]] CutSegment segment_of(const CutClass& c, const CutSegment& idle, const Tool& tool, double feed,

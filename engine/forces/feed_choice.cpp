@@ -13,9 +13,14 @@ namespace {
 
 constexpr double kClassSlack =
     0.9;  // a coarse class that bears less than this share of a limit stands for all its cuts
+constexpr double kLost = 2;                   // of what a wall bears, that the least of forces may be
 constexpr double kHolds = 1 - kBentAccuracy;  // of a limit, when the peaks are as rough as that
 
 }  // namespace
+
+WallPush wall_push(const SeenStretch& s, const Operation& op, const Tool& tool) {
+    return {s.at[0], s.at[1], s.at[2] + s.low, s.at[2] + s.depth, tool.diameter / 2, op.kind};
+}
 
 FeedChoice::FeedChoice(Context& context, const Job& job, const Operation& op, const Tool& tool,
                        SharedBents* shared, bool never_faster)
@@ -33,13 +38,35 @@ double FeedChoice::wood_load(const SeenStretch& s, const Bent& bent) const {
 }
 
 CutLoad FeedChoice::load(const SeenStretch& s, int passes) {
-    if (passes == 1) return {s.stated > 0 ? s.stated : share(*s.bent), s.wall_load(), s.wood_load};
+    if (passes == 1)
+        return {s.stated > 0 ? s.stated : share(*s.bent), s.saved_wall_load(*s.bent), s.wood_load};
     SeenStretch lowest = s;
     const float off = s.depth * static_cast<float>(passes - 1) / static_cast<float>(passes);
-    lowest.coarse = shallower(s.coarse, passes);
+    lowest.coarse = shallower(s.coarse, passes, kCoarse);
     lowest.wood -= off;
     lowest.height = std::max(0.F, lowest.height - off / 2);
     return load_of(lowest, cutting_.at(lowest.coarse, s.feed));
+}
+
+double FeedChoice::pace(const SeenStretch& s, int passes, const WallMap* walls) {
+    if (passes == 1 || !s.cuts) return passes * 60.0 / s.feed;
+    const float depth = s.depth / static_cast<float>(passes);
+    double sum = 0;
+    for (int k = 0; k < passes; ++k) {
+        SeenStretch pass = s;
+        pass.coarse = shallower(s.coarse, passes, kCoarse);
+        pass.fine = shallower(s.fine, passes, kFine);
+        pass.at[2] += static_cast<float>(k) * depth;
+        pass.low = 0;
+        pass.depth = depth;
+        pass.wood -= static_cast<float>(passes - 1 - k) * depth;
+        if (s.wall_n > 0)
+            if (const WallBears bears = walls->bears(wall_push(pass, op_, tool_)); bears.foot)
+                pass.wall_n = static_cast<float>(bears.force_n);
+        choose(pass);
+        sum += 60.0 / pass.feed;
+    }
+    return sum;
 }
 
 void FeedChoice::choose(SeenStretch& s) {
@@ -53,7 +80,8 @@ void FeedChoice::choose(SeenStretch& s) {
         s.bent = &cutting_.at(s.coarse, planned);
     } else {
         ClassFeeds& of = feeds_of(s, planned);
-        const bool by_class = !(s.overhang > 0) && !(s.wall_n > 0);
+        s.wall_lost = wall_is_lost(s, of.steps.back().feed);
+        const bool by_class = !(s.overhang > 0) && !(s.wall_n > 0 && !s.wall_lost);
         FeedStep* step = by_class ? of.chosen : nullptr;
         if (step == nullptr) step = slow_enough(s, of.steps);
         if (by_class) of.chosen = step;
@@ -68,7 +96,7 @@ void FeedChoice::choose(SeenStretch& s) {
 
 CutLoad FeedChoice::load_of(const SeenStretch& s, const Bent& bent) {
     if (++looked_at_ % 128 == 0) context_.throw_if_cancelled();
-    return {share(bent), s.wall_load(bent), wood_load(s, bent)};
+    return {share(bent), s.saved_wall_load(bent), wood_load(s, bent)};
 }
 
 // As the plan will state it.
@@ -107,6 +135,12 @@ FeedChoice::ClassFeeds& FeedChoice::feeds_of(const SeenStretch& s, std::uint32_t
 const Bent& FeedChoice::bent_at(const SeenStretch& s, FeedStep& step) {
     if (step.bent == nullptr) step.bent = &cutting_.at(s.coarse, step.feed);
     return *step.bent;
+}
+// What breaks even at the least feed and in many passes is not worth their time.
+bool FeedChoice::wall_is_lost(const SeenStretch& s, double least_feed) {
+    if (!(s.wall_n > 0)) return false;
+    const int passes = job_.cutting.adapt_stepdown ? kMostPasses : 1;
+    return s.wall_load(cutting_.at(shallower(s.coarse, passes, kCoarse), least_feed)) > kLost;
 }
 /// The fastest step that all limits bear. Where none does: the slowest that is allowed, when it is the
 /// cutter that bears too much; the fastest that the cutter bears, when it is the wood.

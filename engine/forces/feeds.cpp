@@ -4,13 +4,13 @@
 #include <cmath>
 #include <functional>
 #include <optional>
-#include <set>
 #include <unordered_set>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "engine/forces/cuts.h"
+#include "engine/forces/deep_runs.h"
 #include "engine/forces/feed_choice.h"
 #include "engine/forces/seen_stretches.h"
 #include "engine/forces/split_cuts.h"
@@ -22,13 +22,10 @@ namespace slabwright {
 
 namespace {
 
-constexpr double kLeastRun = 20;        // mm that a faster feed must last
-constexpr int kMostPasses = 4;          // into which a cut is divided at once
-constexpr int kMostRounds = 6;          // of dividing
-constexpr double kMostAdded = 2;        // of an operation's way, that rounds after the first may add
-constexpr double kAlwaysAdded = 3000;   // mm that they may add in any case
-constexpr double kThinnerShell = 0.35;  // of a ball's lowest pass, from round to round
-constexpr double kSide = 0.75;          // of the diameter: higher, a ball cuts with its side
+constexpr double kLeastRun = 20;       // mm that a faster feed must last
+constexpr int kMostRounds = 6;         // of dividing
+constexpr double kMostAdded = 2;       // of an operation's way, that rounds after the first may add
+constexpr double kAlwaysAdded = 3000;  // mm that they may add in any case
 
 /// What a layer's stretches are kept in while they are looked at, of any content.
 struct SeenMemory {
@@ -88,72 +85,6 @@ void set_feeds(Context& context, Operation& op, std::vector<std::uint32_t> wante
         if (level[k]) op.moves[k].feed = wanted[k];
 }
 
-/// In how many passes the wood holds, from `least` on; 0 where it holds in none.
-template <class LoadOf>
-int passes_for_wood(const SeenStretch& s, int least, LoadOf&& load) {
-    if (s.depth >= 4 * kLeastDepth)
-        for (int n = std::max(2, least); n <= kMostPasses; ++n)
-            if (load(s, n).wood <= 1) return n;
-    return 0;
-}
-
-/// Runs of stretches that no feed makes light enough and that several passes would.
-/// @param load what a stretch bears in so many passes, in the lowest of them, which the least wood carries
-template <class LoadOf>
-std::vector<DeepRun> deep_runs(const std::vector<SeenStretch>& seen, const Operation& op, const Tool& tool,
-                               int round, LoadOf&& load) {
-    const double diameter = tool.diameter;
-    const bool ball = tool.kind == ToolKind::ball;
-    // Wood that no passes save, as over a wide cavity, is not worth their time: neither where it breaks nor,
-    // on levels above, where it will.
-    const auto column = [&](const SeenStretch& s) {
-        return std::pair{static_cast<int>(std::floor(s.at[0] / diameter)),
-                         static_cast<int>(std::floor(s.at[1] / diameter))};
-    };
-    std::set<std::pair<int, int>> lost;
-    for (const SeenStretch& s : seen)
-        if (s.overhang > 0 && load(s, 1).wood > 1 && passes_for_wood(s, 2, load) == 0) lost.insert(column(s));
-    std::vector<DeepRun> runs;
-    double hardest = 0;  // of the last run
-    for (const SeenStretch& s : seen) {
-        if (!s.cuts || s.depth < 4 * kLeastDepth) continue;
-        const CutLoad whole = load(s, 1);
-        // What a ball cuts with its side is divided by height. Below that a raised pass leaves a shell as
-        // thick as it is raised, which has thinner chips; what is too much still gets a thinner one.
-        const bool shell = ball && (s.depth < kSide * diameter || round > 1);
-        int passes = 0;
-        if (whole.side() > 1)
-            passes = std::clamp(static_cast<int>(std::ceil(whole.side())) + (ball && !shell ? 0 : round), 2,
-                                kMostPasses);
-        if (whole.wood > 1 && !lost.contains(column(s)))
-            passes = std::max(passes, passes_for_wood(s, passes, load));
-        if (passes == 0) continue;
-        const double thick = s.depth - s.low, depth = shell  ? s.low + thick * std::pow(kThinnerShell, round)
-                                                      : ball ? thick
-                                                             : s.depth;
-        const PassShares shares = shell ? PassShares::growing : PassShares::equal;
-        if (!runs.empty() && s.first <= runs.back().last + 1) {
-            DeepRun& run = runs.back();
-            run.last = std::max(run.last, s.last);
-            run.passes = std::max(run.passes, passes);
-            // The hardest cut of a run says how it is divided.
-            if (run.shares == shares) run.depth_mm = std::max(run.depth_mm, depth);
-            else if (whole.side() > hardest) run.depth_mm = depth, run.shares = shares;
-            hardest = std::max(hardest, whole.side());
-        } else {
-            runs.push_back({s.first, s.last, depth, passes, shares});
-            hardest = whole.side();
-        }
-    }
-    // A run goes by feed and in the plane from end to end.
-    std::erase_if(runs, [&](const DeepRun& run) {
-        for (std::uint32_t k = run.first; k <= run.last; ++k)
-            if (k == 0 || op.moves[k].feed == 0) return true;
-        return false;
-    });
-    return runs;
-}
-
 double way_of(const Operation& op, std::uint32_t first, std::uint32_t last) {
     double way = 0;
     for (std::uint32_t k = first; k <= last; ++k) {
@@ -175,6 +106,7 @@ double way_added(const Operation& op, const std::vector<DeepRun>& runs) {
 struct HardestPush {
     double load = 0, force_n = 0;
     WallPush push{};
+    bool lost = false;
 };
 
 /// One operation of a layer: how it is divided, the feeds that it gets, and what its cuts then are.
@@ -209,9 +141,10 @@ public:
                 if (s.feed == 0) choice_.choose(s);
             }
             if (!job_.cutting.adapt_stepdown || round == kMostRounds) break;
-            const std::vector<DeepRun> runs =
-                deep_runs(memory_.seen, op_, tool_, round,
-                          [&](const SeenStretch& s, int passes) { return choice_.load(s, passes); });
+            const std::vector<DeepRun> runs = deep_runs(
+                memory_.seen, op_, tool_, round,
+                {[&](const SeenStretch& s, int passes) { return choice_.load(s, passes); },
+                 [&](const SeenStretch& s, int passes) { return choice_.pace(s, passes, limits_.walls); }});
             context_.throw_if_cancelled();
             // A slender ball in a narrow place would take hours to bend as little as it may: it is told.
             added += way_added(op_, runs);
@@ -276,7 +209,7 @@ public:
                 }
             if (s.wall_n > 0)
                 if (const double wall = s.wall_load(bent()); wall > hardest.load)
-                    hardest = {wall, bent().in_plane_n, wall_push(s, op_, tool_)};
+                    hardest = {wall, bent().in_plane_n, wall_push(s, op_, tool_), s.wall_lost};
             if (feed == s.feed) cuts.strain = std::max(cuts.strain, choice_.load(s, 1).side());
             if (!listed.insert({s.fine, static_cast<double>(feed)}).second) continue;
             cuts.cuts.push_back(segment_of(s.fine, choice_.cutting().idle(), tool_, feed, kFine));
@@ -306,7 +239,7 @@ private:
             diagnostics.push_back({Severity::note, "stepdown.lowered",
                                    fmt::format("layer {}, {}: {} cut{} of {:.0f} mm in all {} taken in "
                                                "several passes, the deepest of {:.2f} mm in {}, where "
-                                               "cutter or wood would bear too much at any feed",
+                                               "cutter or wood would bear too much at once",
                                                layer.index, op.purpose, cuts, cuts == 1 ? "" : "s", way,
                                                cuts == 1 ? "is" : "are", deepest, passes),
                                    at});
@@ -425,12 +358,14 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Wo
     result.starts.push_back(result.cuts.size());
     if (hardest.load > 1 + kBentAccuracy) {
         const WallBears wall = limits.walls->bears(hardest.push);
-        diagnostics.push_back(weak_wall(
-            layer.index,
-            {wall.foot, wall.height_mm, hardest.force_n, hardest.load * job.material.strength_mpa},
-            job.material.strength_mpa,
-            job.cutting.adapt_feed && job.cutting.adapt_stepdown ? " at the least feed and in several passes"
-                                                                 : ""));
+        diagnostics.push_back(
+            weak_wall(layer.index,
+                      {wall.foot, wall.height_mm, hardest.force_n, hardest.load * job.material.strength_mpa},
+                      job.material.strength_mpa,
+                      hardest.lost ? ", and no feed or passes would save it"
+                      : job.cutting.adapt_feed && job.cutting.adapt_stepdown
+                          ? " at the least feed and in several passes"
+                          : ""));
     }
     return result;
 }

@@ -9,10 +9,6 @@ namespace slabwright {
 
 bool roughs(OperationKind kind) { return kind == OperationKind::rough || kind == OperationKind::face; }
 
-WallPush wall_push(const SeenStretch& s, const Operation& op, const Tool& tool) {
-    return {s.at[0], s.at[1], s.at[2] + s.low, s.at[2] + s.depth, tool.diameter / 2, op.kind};
-}
-
 void run_through(Context& context, StandingSlab& slab, const Operation& op, const Tool& tool,
                  const Layer& layer, const WoodLimits& limits, double setback, std::vector<SeenStretch>& seen,
                  std::span<const MoveRange> parts) {
@@ -23,6 +19,7 @@ void run_through(Context& context, StandingSlab& slab, const Operation& op, cons
         now.first = s.first;
         now.last = s.last;
         now.cuts = s.cuts();
+        now.length = static_cast<float>(s.length);
         for (std::size_t i = 0; i < 3; ++i) now.at[i] = static_cast<float>(s.at[i]);
         if (now.cuts) {
             now.coarse = class_of(s, tool, kCoarse);

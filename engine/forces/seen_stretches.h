@@ -17,9 +17,6 @@ namespace slabwright {
 /// Whether it clears: roughing, and facing of a slab.
 [[nodiscard]] bool roughs(OperationKind kind);
 
-/// How a stretch pushes at what stands beside it.
-[[nodiscard]] WallPush wall_push(const SeenStretch& stretch, const Operation& op, const Tool& tool);
-
 /// Runs an operation, or some of its moves, through what stands.
 /// @param setback of the glue from the edge of what carries the slab, mm
 /// @param seen  gets all stretches, without feeds
