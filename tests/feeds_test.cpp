@@ -376,6 +376,61 @@ TEST(Feeds, RunsSplitOverArcsComeBackOnTheSameWay) {
     EXPECT_TRUE(std::equal(moves.begin() + 2, moves.end(), split.end() - 4));
 }
 
+// Whatever the way: passes lie straight above it, the way itself is the last, and between passes the cutter
+// goes back only where it must.
+TEST(Feeds, PassesGoThereAndBackOrRoundAndRound) {
+    std::mt19937 random(test::seed());
+    const auto any = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+    for (int trial = 0; trial < 200; ++trial) {
+        const bool closed = any(0, 1) == 1, sloped = any(0, 3) == 0, by_turns = any(0, 1) == 1;
+        const int length = any(2, 6), count = any(1, 5);
+        std::vector<Move> moves{at(0, 0, 30, 0), at(0, 0, 10, 1500)};
+        for (int k = 1; k <= length; ++k)
+            moves.push_back(at(closed && k == length ? 0 : 10 * k,
+                               any(1, 9) * (closed && k == length ? 0 : 1),
+                               sloped && !(closed && k == length) ? 10 + 0.1 * k : 10, 4000));
+        moves.push_back(at(90, 90, 30, 0));
+        Passes run{2, static_cast<std::uint32_t>(length + 1), {}};
+        for (int k = count; k > 0; --k) run.up.push_back(to_units(0.5 * k));
+        const SplitMoves split = split_runs(moves, {&run, 1}, 1500, by_turns);
+        ASSERT_EQ(split.runs.size(), 1U);
+        ASSERT_EQ(split.runs[0].passes.size(), run.up.size());
+        const bool turns = by_turns && !sloped;
+        const auto n = static_cast<std::size_t>(length), passes = run.up.size();
+        const std::size_t back = closed ? 0 : turns ? passes % 2 : passes;
+        EXPECT_EQ(split.moves.size(), moves.size() + passes * (1 + n) + back * n + 1);
+        EXPECT_EQ(split.runs[0].all.first, 2U);
+        EXPECT_EQ(split.runs[0].all.last + 2, split.moves.size());
+        EXPECT_TRUE(std::equal(moves.begin() + 2, moves.end(), split.moves.end() - static_cast<int>(n) - 1));
+        for (std::size_t p = 0; p < passes; ++p) {
+            const MoveRange& pass = split.runs[0].passes[p];
+            ASSERT_EQ(pass.last - pass.first + 1, n);
+            // Its corners, in either sense, begin included.
+            std::vector<Move> corners(split.moves.begin() + pass.first - 1,
+                                      split.moves.begin() + pass.last + 1);
+            if (!closed && turns && p % 2 == 1) std::reverse(corners.begin(), corners.end());
+            for (std::size_t k = 0; k <= n; ++k) {
+                EXPECT_EQ(corners[k].x, moves[k + 1].x);
+                EXPECT_EQ(corners[k].y, moves[k + 1].y);
+                EXPECT_EQ(corners[k].z, moves[k + 1].z + run.up[p]);
+            }
+        }
+        // Sideways nothing goes but along the way.
+        for (std::size_t k = 2; k < split.moves.size() - 1; ++k) {
+            const Move &a = split.moves[k - 1], &b = split.moves[k];
+            if (a.x == b.x && a.y == b.y) continue;
+            const auto corner = [&](const Move& m) {
+                for (std::size_t c = 1; c <= n + 1; ++c)
+                    if (moves[c].x == m.x && moves[c].y == m.y) return static_cast<int>(c);
+                return -1;
+            };
+            const int apart = std::abs(corner(a) - corner(b));
+            EXPECT_TRUE(apart == 1 || (closed && apart == length - 1))
+                << "from " << corner(a) << " to " << corner(b);
+        }
+    }
+}
+
 // Wood that hangs over: cut where it stands on something it needs nothing; far out, a web thinner than
 // section 9 asks for is reported.
 TEST(Feeds, WoodThatHangsOverTooFarIsReported) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "engine/forces/feeds.h"
 #include "engine/forces/wall_map.h"
@@ -151,7 +153,7 @@ TEST(WallFeeds, PinsBearWhatIsLeftOfTheForces) {
         return std::uniform_real_distribution<double>(low, high)(random);
     };
     int saved = 0;
-    for (int trial = 0; trial < 20; ++trial) {
+    for (int trial = 0; trial < 40; ++trial) {
         Plan plan = plate();
         plan.job.material.strength_mpa = 27;
         const double left = plan.job.cutting.wall_allowance, bottom = std::round(any(2, 8));
@@ -176,6 +178,117 @@ TEST(WallFeeds, PinsBearWhatIsLeftOfTheForces) {
         if (before > 1.1 * 27) ++saved;
     }
     EXPECT_GE(saved, 3);
+}
+
+double seconds(const Plan& plan) {
+    double sum = 0;
+    for (const Operation& op : plan.layers[0].operations)
+        for (std::size_t k = 1; k < op.moves.size(); ++k) {
+            const Move &a = op.moves[k - 1], &b = op.moves[k];
+            if (b.feed > 0)
+                sum += 60 * std::hypot(to_mm(b.x - a.x), to_mm(b.y - a.y), to_mm(b.z - a.z)) / b.feed;
+        }
+    return sum;
+}
+
+bool is_told(const std::vector<Diagnostic>& told, const char* what) {
+    return std::any_of(told.begin(), told.end(),
+                       [&](const Diagnostic& d) { return d.message.find(what) != std::string::npos; });
+}
+
+// Wood just strong enough to bear a low feed: several passes at higher feeds are faster, where there is depth
+// to divide, and never slower.
+TEST(WallFeeds, PassesAreFasterThanALowFeed) {
+    std::mt19937 random(test::seed());
+    const auto any = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    int faster = 0;
+    for (int trial = 0; trial < 12; ++trial) {
+        Plan plan = plate();
+        const double left = plan.job.cutting.wall_allowance, bottom = std::round(any(2, 8)), side = any(2, 5);
+        const Block pin{any(45, 75), any(30, 50), side * any(1, 8), side};
+        const std::vector<StandingFoot> feet{foot_of(pin, -any(0, 60), 18, false)};
+        Context context;
+        bool holds = false;
+        const auto run = [&](bool stepdown, double strength) {
+            plan.job.material.strength_mpa = strength;
+            plan.job.cutting.adapt_stepdown = stepdown;
+            plan.layers[0].operations = around(plan, pin, bottom, left);
+            plan.layers[0].operations.pop_back();  // the flat end mill's alone
+            const WallMap walls(feet, strength, widest_beside_walls(plan.job), left);
+            std::vector<Diagnostic> told;
+            (void)adapt_layer(context, plan.layers[0], plan, {nullptr, &walls}, told);
+            holds = !is_told(told, "at its foot");
+            return seconds(plan);
+        };
+        double breaks = 0.1, enough = 1000;  // at any feed; at some
+        for (int k = 0; k < 30; ++k) {
+            const double middle = std::sqrt(breaks * enough);
+            run(false, middle);
+            (holds ? enough : breaks) = middle;
+        }
+        const double slow = run(false, 1.03 * enough), fast = run(true, 1.03 * enough);
+        EXPECT_TRUE(holds);
+        EXPECT_LE(fast, slow) << "seed " << test::seed() << ", side " << side << ", bottom " << bottom;
+        if (fast < 0.8 * slow) ++faster;
+    }
+    EXPECT_GE(faster, 8);
+}
+
+// A ball's shells beside a weak wall, in many rounds of passes: hardly any goes where an earlier round has
+// taken everything away.
+TEST(WallFeeds, NoPassGoesWhereNothingStands) {
+    std::size_t passes = 0, idle = 0;
+    for (const double strength : {4.0, 6.0, 8.0, 12.0, 16.0}) {
+        Plan plan = plate();
+        plan.job.material.strength_mpa = strength;
+        const Block pin{60, 40, 12, 2};
+        const std::vector<StandingFoot> feet{foot_of(pin, 2, 18, true)};
+        const WallMap walls(feet, strength, widest_beside_walls(plan.job), 0);
+        plan.layers[0].operations = around(plan, pin, 2, plan.job.cutting.wall_allowance);
+        Context context;
+        std::vector<Diagnostic> told;
+        (void)adapt_layer(context, plan.layers[0], plan, {nullptr, &walls}, told);
+        StandingSlab slab(plan.stock_min, plan.stock_max, 0, 18,
+                          StandingSlab::cell_for(plan.job, plan.stock_min, plan.stock_max));
+        for (const Operation& op : plan.layers[0].operations) {
+            std::vector<char> cuts(op.moves.size(), 0);
+            slab.run(op, plan.job.tools[static_cast<std::size_t>(op.tool) - 1], [&](const CutStretch& s) {
+                for (std::uint32_t k = s.first; k <= s.last; ++k) cuts[k] |= s.cuts() ? 1 : 0;
+            });
+            if (op.kind != OperationKind::finish) continue;
+            for (std::size_t k = 1; k < op.moves.size(); ++k) {
+                const Move &a = op.moves[k - 1], &b = op.moves[k];
+                if (b.feed == 0 || a.z != b.z || (a.x == b.x && a.y == b.y)) continue;
+                ++passes;
+                idle += cuts[k] == 0 ? 1 : 0;
+            }
+        }
+    }
+    EXPECT_GT(passes, 200U);
+    EXPECT_LE(12 * idle, passes) << idle << " idle ways of " << passes;  // one in six otherwise
+}
+
+// A needle breaks at any feed and in any passes: it is cut as planned, and told.
+TEST(WallFeeds, WhatNothingSavesIsCutAsPlanned) {
+    Plan plan = plate();
+    plan.job.material.strength_mpa = 27;
+    const Block needle{60, 40, 0.3, 0.3};
+    const std::vector<StandingFoot> feet{foot_of(needle, 2, 18, true)};
+    const WallMap walls(feet, plan.job.material.strength_mpa, widest_beside_walls(plan.job), 0);
+    Context context;
+    const auto run = [&](const WallMap* map, std::vector<Diagnostic>& told) {
+        plan.layers[0].operations = around(plan, needle, 2, plan.job.cutting.wall_allowance);
+        (void)adapt_layer(context, plan.layers[0], plan, {nullptr, map}, told);
+        return plan.layers[0].operations;
+    };
+    std::vector<Diagnostic> unasked, told;
+    const std::vector<Operation> planned = run(nullptr, unasked), beside = run(&walls, told);
+    EXPECT_TRUE(is_told(told, "no feed or passes would save it"));
+    EXPECT_FALSE(is_told(unasked, "would save it"));
+    ASSERT_EQ(planned.size(), beside.size());
+    for (std::size_t k = 0; k < planned.size(); ++k) EXPECT_EQ(planned[k].moves, beside[k].moves);
 }
 
 }  // namespace

@@ -362,10 +362,9 @@ LayerCuts adapt_layer(Context& context, Layer& layer, const Plan& plan, const Wo
             weak_wall(layer.index,
                       {wall.foot, wall.height_mm, hardest.force_n, hardest.load * job.material.strength_mpa},
                       job.material.strength_mpa,
-                      hardest.lost ? ", and no feed or passes would save it"
-                      : job.cutting.adapt_feed && job.cutting.adapt_stepdown
-                          ? " at the least feed and in several passes"
-                          : ""));
+                      hardest.lost                                           ? WallCare::lost
+                      : job.cutting.adapt_feed && job.cutting.adapt_stepdown ? WallCare::feeds
+                                                                             : WallCare::none));
     }
     return result;
 }

@@ -34,15 +34,18 @@ WallFoot WallFoot::thicker_by(double mm) const {
     return thicker;
 }
 
-Diagnostic weak_wall(int layer, const LoadedWall& wall, double strength_mpa, const char* held) {
+Diagnostic weak_wall(int layer, const LoadedWall& wall, double strength_mpa, WallCare care) {
     const StandingFoot& foot = *wall.foot;
+    const bool lost = care == WallCare::lost;
     return {Severity::warning, "wall.weak",
             fmt::format("layer {}: a wall or pin {:.1f} mm thick stands {:.1f} mm high where {:.0f} N push "
-                        "at it{}: {:.0f} MPa at its foot, more than the wood's {:.0f} MPa; cut it with a "
-                        "smaller tool or a lower finish_feed, lay a boundary nearer under its top, or make "
-                        "it thicker",
-                        layer, foot.foot.thickness_mm, wall.height_mm, wall.force_n, held, wall.stress_mpa,
-                        strength_mpa),
+                        "at it{}: {:.0f} MPa at its foot, more than the wood's {:.0f} MPa{}; {}, lay a "
+                        "boundary nearer under its top, or make it thicker",
+                        layer, foot.foot.thickness_mm, wall.height_mm, wall.force_n,
+                        care == WallCare::feeds ? " at the least feed and in several passes" : "",
+                        wall.stress_mpa, strength_mpa, lost ? ", and no feed or passes would save it" : "",
+                        lost ? "hold it from beside while it is cut, turn the pattern"
+                             : "cut it with a smaller tool or a lower finish_feed"),
             std::array{foot.middle[0], foot.middle[1], foot.z}};
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -67,9 +68,15 @@ struct LoadedWall {
     double height_mm = 0, force_n = 0, stress_mpa = 0;
 };
 
+/// What was done so that a wall does not break.
+enum class WallCare : std::uint8_t {
+    none,
+    feeds,  ///< the least feed and several passes
+    lost    ///< nothing: neither would save it
+};
+
 /// "wall.weak", with place, thickness, height, stress and remedy.
-/// @param held what was done against it, in words after a space; or ""
-[[nodiscard]] Diagnostic weak_wall(int layer, const LoadedWall& wall, double strength_mpa, const char* held);
+[[nodiscard]] Diagnostic weak_wall(int layer, const LoadedWall& wall, double strength_mpa, WallCare care);
 
 /// The thin walls of one layer.
 class WallMap {

@@ -257,7 +257,7 @@ std::vector<Diagnostic> weak_walls(const Plan& plan, std::span<const std::vector
     for (std::size_t l = 0; l < feet.size(); ++l) {
         const LoadedWall worst = most_loaded(feet[l], push_of(plan.layers[l], plan.job), plan.job);
         if (worst.stress_mpa > strength)
-            found.push_back(weak_wall(plan.layers[l].index, worst, strength, ""));
+            found.push_back(weak_wall(plan.layers[l].index, worst, strength, WallCare::none));
     }
     return found;
 }
