@@ -5,6 +5,7 @@
 #include <map>
 #include <numbers>
 
+#include "engine/moves/thinning.h"
 #include "engine/plan.h"
 #include "engine/schedule/blanks.h"
 #include "engine/schedule/fit.h"
@@ -34,7 +35,8 @@ struct Rates {
     double thin = 52.23;    // min/min: where wood is thin, feeds are low and passes many
 };
 constexpr Rates kRates{};
-constexpr double kSmallPlace = 60;   // mm: a loop so long counts as half a place
+constexpr double kSmallPlace = 150;  // mm: a loop so long counts as half a place
+constexpr double kSeenTurn = 0.03;   // mm from a loop's chords, within which it may turn
 constexpr double kChanges = 3.2;     // of tools in a layer
 constexpr double kThin = 8;          // mm: of a section's mean half width at which it counts a third as thin
 constexpr double kLeastArea = 1e-3;  // mm²
@@ -43,7 +45,7 @@ constexpr double kLeastArea = 1e-3;  // mm²
 struct Ways {
     double facing = 0, roughing = 0, contours = 0, raster = 0;
     double places = 0;  ///< loops of sections, small ones by their length
-    double turns = 0;   ///< rad by which outlines turn, either way, over all levels
+    double turns = 0;   ///< rad by which outlines turn back, over all levels
     double thin = 0;    ///< mm around thin wood, over all levels
 };
 
@@ -62,8 +64,8 @@ double perimeter(std::span<const Point2> loop) {
     return sum;
 }
 
-/// rad by which a loop turns at its corners, either way.
-double turning(std::span<const Point2> loop) {
+/// rad by which a loop turns back at its corners, of what it turns besides going round once.
+double turning_back(std::span<const Point2> loop) {
     double sum = 0;
     const std::size_t n = loop.size();
     for (std::size_t k = 0; k < n; ++k) {
@@ -72,7 +74,7 @@ double turning(std::span<const Point2> loop) {
         const double vx = to_mm(c.x) - to_mm(b.x), vy = to_mm(c.y) - to_mm(b.y);
         sum += std::abs(std::atan2(ux * vy - uy * vx, ux * vx + uy * vy));
     }
-    return sum;
+    return std::max(0.0, (sum - 2 * std::numbers::pi) / 2);
 }
 
 /// What the outlines of one section count for. @param levels that are cut about it
@@ -82,8 +84,9 @@ void add_outlines(const Loops& solid, double levels, Ways& ways) {
         const double length = perimeter(solid.loop(i));
         around += length;
         ways.places += length / (length + kSmallPlace) / 3;
-        ways.turns += levels * turning(solid.loop(i));
     }
+    const Loops coarse = thinned(solid, kSeenTurn);
+    for (std::size_t i = 0; i < coarse.size(); ++i) ways.turns += levels * turning_back(coarse.loop(i));
     if (!(around > 0)) return;
     const double half_width = 2 * std::max(area(solid), kLeastArea) / around;
     ways.thin += levels * around * std::exp(-half_width / kThin);
