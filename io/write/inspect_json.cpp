@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "io/text/json_text.h"
+#include "io/write/milled_ways_json.h"
 #include "io/write/plan_json.h"
 #include "kernels/errors.h"
 
@@ -74,6 +75,21 @@ std::string hole_line(const RoundHole& hole) {
     return line + "\n";
 }
 
+void look_at_sides(Context& context, MeshView mesh, const Job& job, Inspection& result) {
+    constexpr double nothing = 0.5;  // mm³
+    try {
+        result.ways = {milled_way(context, mesh, job, {0, 0, 0})};
+        const MilledWay& lies = result.ways.front();
+        if (lies.above.air.volume_mm3 >= nothing || lies.both_sides.air.volume_mm3 >= nothing)
+            result.ways = milled_ways(context, mesh, job);
+    } catch (const Error& error) {
+        if (error.code() != "layers.request") throw;
+        result.ways.clear();
+        result.diagnostics.push_back(
+            {Severity::note, "layers.request", fmt::format("no layers: {}", error.message()), {}});
+    }
+}
+
 }  // namespace
 
 Inspection inspect_pattern(Context& context, const PatternSource& source, const Job& job) {
@@ -96,9 +112,11 @@ Inspection inspect_pattern(Context& context, const PatternSource& source, const 
         result.disagreements = std::move(found.disagreements);
         context.begin_phase("holes", 0.6, 0.7);
         result.holes = find_holes(context, pattern.mesh.view());
-        context.begin_phase("undercuts", 0.7, 1.0);
+        context.begin_phase("undercuts", 0.7, 0.75);
         const double tops[] = {double{bounds(pattern.mesh.view()).max.z}};
         result.undercuts = measure_undercuts(context, pattern.mesh.view(), tops, options);
+        context.begin_phase("sides", 0.75, 1.0);
+        look_at_sides(context, pattern.mesh.view(), job, result);
     }
     result.report = std::move(pattern.report);
     return result;
@@ -154,6 +172,8 @@ std::string inspection_json(const Inspection& inspection) {
         json.key("where").begin_array().rounded(u.x, 4).rounded(u.y, 4).rounded(u.z, 4).end().end();
     }
     json.end();
+    json.key("ways");
+    put_milled_ways(json, inspection.ways);
     json.key("diagnostics");
     put_diagnostics(json, inspection.diagnostics);
     json.end();
@@ -205,6 +225,7 @@ std::string inspection_text(const Inspection& inspection) {
     }
     if (inspection.undercuts.size() > shown)
         text += fmt::format("  and {} more undercuts\n", inspection.undercuts.size() - shown);
+    text += milled_ways_text(inspection.ways);
     for (const Diagnostic& d : inspection.diagnostics)
         text += fmt::format("  {}: {}\n", name(d.severity), d.message);
     return text;

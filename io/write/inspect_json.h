@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/planner/milled_ways.h"
 #include "io/read/pattern_mesh.h"
 #include "kernels/features/features.h"
 #include "kernels/features/holes.h"
@@ -22,6 +23,8 @@ struct Inspection {
     /// What would stay unmade if the pattern were one layer; layer boundaries can only make it less.
     std::vector<UnmadeUndercut> undercuts;
     std::vector<RoundHole> holes;
+    /// What the job's layers would leave as it lies, and where that is anything, on its other five sides too.
+    std::vector<MilledWay> ways;
 };
 
 /// Reads the file and looks at it. @throws Error(input | usage | cancelled) as read_pattern_mesh; a mesh that
